@@ -1,0 +1,4 @@
+//! Scissors, scalpel and remote. To come.
+
+/// To come.
+pub fn generate() {}

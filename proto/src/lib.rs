@@ -1,0 +1,10 @@
+//! The contract of the grasp service, compiled from `proto/grasp/v1`.
+
+/// Messages, clients and servers of package `grasp.v1`.
+#[allow(missing_docs, clippy::pedantic, unreachable_pub)]
+pub mod v1 {
+    tonic::include_proto!("grasp.v1");
+}
+
+/// The descriptor set of `grasp.v1` and what it imports, for server reflection.
+pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/grasp_descriptor.bin"));

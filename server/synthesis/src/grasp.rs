@@ -1,0 +1,37 @@
+//! Grasps and their contacts, in the object's frame.
+
+use glam::Vec3;
+
+use crate::hand::{Digit, HandPose, Phalanx};
+
+/// A point where a digit touches the object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// On the surface, in metres.
+    pub position: Vec3,
+    /// The surface's outward unit normal.
+    pub normal: Vec3,
+    /// The triangle that is touched.
+    pub triangle: u32,
+    /// The digit that touches.
+    pub digit: Digit,
+    /// The link of the digit that touches.
+    pub phalanx: Phalanx,
+}
+
+/// A valid grasp.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grasp {
+    /// The receiving hand in the object's frame.
+    pub pose: HandPose,
+    /// The bend ratio that each digit was closed with, thumb first; none where the digit found no contact.
+    pub bend_ratios: [Option<f32>; 5],
+    /// Where it touches, thumb first.
+    pub contacts: Vec<Contact>,
+    /// The force that the hand applies on the object at each contact, in newtons.
+    pub forces: Vec<Vec3>,
+    /// Angle between the summed contact wrench and the one that opposes gravity (Eq. 4.5), in radians.
+    pub wrench_angle: f32,
+    /// E of Eq. 4.6.
+    pub comfort: f32,
+}

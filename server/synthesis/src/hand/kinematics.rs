@@ -1,0 +1,69 @@
+//! Forward kinematics of the digit chains (thesis 4.4, Eq. 4.2 and 4.3, Table 4.2).
+//!
+//! The thesis prints pitch about z and yaw about x although +y runs along the phalanx and +z is forward; pitch is
+//! about x and yaw about z, as the order of angles in its Table 4.2 says.
+
+use glam::{Quat, Vec3};
+
+use super::{DigitAngles, HandPose, Handedness, rig::DigitRig, rig::Rig};
+use crate::pose::Pose;
+
+/// The frames of one posed digit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DigitFrames {
+    /// The frames of the three links: origin at the joint, +y along the link, +z to the pad.
+    pub links: [Pose; 3],
+    /// Where the fingertip is.
+    pub tip: Vec3,
+}
+
+/// The frames of all digits of a posed hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandFrames {
+    /// The wrist frame.
+    pub wrist: Pose,
+    /// The digits, thumb first.
+    pub digits: [DigitFrames; 5],
+}
+
+/// The local rotation of a base joint: pitch θ1 about x after yaw ψ1 about z.
+pub fn base_rotation(handedness: Handedness, base_yaw: f32, base_pitch: f32) -> Quat {
+    Quat::from_rotation_z(handedness.yaw_sign() * base_yaw) * Quat::from_rotation_x(base_pitch)
+}
+
+/// The frames of a digit in the frame of `frame_from_wrist`.
+pub fn digit_frames(
+    digit: &DigitRig,
+    handedness: Handedness,
+    frame_from_wrist: Pose,
+    angles: DigitAngles,
+) -> DigitFrames {
+    let base = frame_from_wrist
+        * digit.wrist_from_base
+        * Pose::from_orientation(base_rotation(handedness, angles.base_yaw, angles.base_pitch));
+    let next = |parent: Pose, length: f32, pitch: f32| {
+        parent * Pose::new(Vec3::new(0.0, length, 0.0), Quat::from_rotation_x(pitch))
+    };
+    let second = next(base, digit.lengths[0], angles.second_pitch);
+    let third = next(second, digit.lengths[1], angles.third_pitch);
+    let tip = third.transform_point(Vec3::new(0.0, digit.lengths[2], 0.0));
+    DigitFrames {
+        links: [base, second, third],
+        tip,
+    }
+}
+
+/// The frames of all digits.
+pub fn hand_frames(rig: &Rig, pose: &HandPose) -> HandFrames {
+    HandFrames {
+        wrist: pose.frame_from_wrist,
+        digits: std::array::from_fn(|i| {
+            digit_frames(
+                &rig.digits[i],
+                rig.handedness,
+                pose.frame_from_wrist,
+                pose.digits[i],
+            )
+        }),
+    }
+}

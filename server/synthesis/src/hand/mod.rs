@@ -1,0 +1,125 @@
+//! The hand: its rig, its pose, where its bones, joints and skin are.
+
+pub mod joints;
+pub mod kinematics;
+pub mod rig;
+pub mod skin;
+
+use serde::{Deserialize, Serialize};
+
+use crate::pose::Pose;
+
+/// Which hand of a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Handedness {
+    /// The left hand.
+    Left,
+    /// The right hand.
+    Right,
+}
+
+impl Handedness {
+    /// The other hand.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+
+    /// +1 for the right hand, -1 for the left: the sign of a yaw about +z that turns a finger toward the little
+    /// finger's side.
+    pub fn yaw_sign(self) -> f32 {
+        match self {
+            Self::Left => -1.0,
+            Self::Right => 1.0,
+        }
+    }
+}
+
+/// A digit of the hand; the thesis' finger index i.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Digit {
+    /// 0.
+    Thumb,
+    /// 1.
+    Index,
+    /// 2.
+    Middle,
+    /// 3.
+    Ring,
+    /// 4.
+    Little,
+}
+
+impl Digit {
+    /// All digits in the thesis' order.
+    pub const ALL: [Self; 5] = [Self::Thumb, Self::Index, Self::Middle, Self::Ring, Self::Little];
+
+    /// The thesis' finger index: 0 for the thumb to 4 for the little finger.
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// A link of a digit's chain; the thesis' phalanx index j.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phalanx {
+    /// 1: the proximal phalanx of a finger, the metacarpal of the thumb.
+    First,
+    /// 2: the intermediate phalanx of a finger, the proximal phalanx of the thumb.
+    Second,
+    /// 3: the distal phalanx.
+    Third,
+}
+
+impl Phalanx {
+    /// All links from the wrist outward.
+    pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::Third];
+
+    /// 0 for the link next to the palm to 2 for the distal one.
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// The joint angles of one digit, in radians: the thesis' q = (θ1, ψ1, θ2), with θ3 beside them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DigitAngles {
+    /// ψ1: sideways rotation of the base joint, toward the little finger's side; for the thumb, off the palm's plane.
+    pub base_yaw: f32,
+    /// θ1: bend of the base joint toward the palm.
+    pub base_pitch: f32,
+    /// θ2: bend of the second joint.
+    pub second_pitch: f32,
+    /// θ3: bend of the third joint; two thirds of θ2 in the thesis' model.
+    pub third_pitch: f32,
+}
+
+impl DigitAngles {
+    /// θ3 / θ2, from the dependency of DIP on PIP (thesis 4.4, Table 4.2).
+    pub const THIRD_PITCH_SHARE: f32 = 2.0 / 3.0;
+
+    /// The thesis' finger pose, in which the third joint follows the second.
+    pub fn coupled(base_yaw: f32, base_pitch: f32, second_pitch: f32) -> Self {
+        Self {
+            base_yaw,
+            base_pitch,
+            second_pitch,
+            third_pitch: Self::THIRD_PITCH_SHARE * second_pitch,
+        }
+    }
+}
+
+/// A complete configuration of the hand: the thesis' 21-dimensional vector (and the third joints).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HandPose {
+    /// F0: the wrist frame (+y along the fingers, +z out of the palm) in the frame of the computation.
+    pub frame_from_wrist: Pose,
+    /// The digits, thumb first.
+    pub digits: [DigitAngles; 5],
+}

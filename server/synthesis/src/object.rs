@@ -1,0 +1,101 @@
+//! Objects that can be grasped.
+
+use glam::Vec3;
+
+use crate::geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox};
+
+/// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
+pub const THESIS_FRICTION: f32 = 0.34;
+
+/// An object with everything that the synthesis asks of it, in the object's own frame.
+#[derive(Clone, Debug)]
+pub struct GraspObject {
+    /// Its surface and search structure.
+    pub surface: MeshBvh,
+    /// B of thesis 4.3.
+    pub bounding_box: OrientedBox,
+    /// In kilograms.
+    pub mass: f32,
+    /// In metres, in the object's frame.
+    pub centre_of_mass: Vec3,
+    /// Coefficient of static friction between skin and the surface.
+    pub friction: f32,
+    /// One flag a triangle: may it not be touched?
+    forbidden: Vec<bool>,
+}
+
+/// Why an object was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ObjectError {
+    /// Mass is not a positive number.
+    #[error("mass is {0} kg; it must be finite and more than 0")]
+    Mass(f32),
+    /// Friction is not a positive number.
+    #[error("friction is {0}; it must be finite and more than 0")]
+    Friction(f32),
+    /// The centre of mass is not finite.
+    #[error("centre of mass {0} is not finite")]
+    CentreOfMass(Vec3),
+    /// A forbidden triangle does not exist.
+    #[error("forbidden triangle {triangle} does not exist; the mesh has {triangles}")]
+    ForbiddenTriangle {
+        /// The index that was given.
+        triangle: u32,
+        /// How many triangles there are.
+        triangles: usize,
+    },
+}
+
+impl GraspObject {
+    /// Builds the search structures of an object.
+    ///
+    /// # Errors
+    /// Every violation found.
+    pub fn new(
+        mesh: TriangleMesh,
+        mass: f32,
+        centre_of_mass: Vec3,
+        friction: f32,
+        forbidden_triangles: &[u32],
+    ) -> Result<Self, Vec<ObjectError>> {
+        let mut errors = Vec::new();
+        if !(mass.is_finite() && mass > 0.0) {
+            errors.push(ObjectError::Mass(mass));
+        }
+        if !(friction.is_finite() && friction > 0.0) {
+            errors.push(ObjectError::Friction(friction));
+        }
+        if !centre_of_mass.is_finite() {
+            errors.push(ObjectError::CentreOfMass(centre_of_mass));
+        }
+        let triangles = mesh.triangles().len();
+        let mut forbidden = vec![false; triangles];
+        for &triangle in forbidden_triangles {
+            match forbidden.get_mut(triangle as usize) {
+                Some(flag) => *flag = true,
+                None => errors.push(ObjectError::ForbiddenTriangle { triangle, triangles }),
+            }
+        }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        Ok(Self {
+            bounding_box: OrientedBox::around(&mesh),
+            surface: MeshBvh::build(mesh),
+            mass,
+            centre_of_mass,
+            friction,
+            forbidden,
+        })
+    }
+
+    /// True if the triangle may not be touched (Algorithm 7); O(1).
+    pub fn is_forbidden(&self, triangle: u32) -> bool {
+        self.forbidden[triangle as usize]
+    }
+
+    /// How many triangles may not be touched.
+    pub fn forbidden_count(&self) -> usize {
+        self.forbidden.iter().filter(|&&f| f).count()
+    }
+}

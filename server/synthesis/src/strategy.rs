@@ -1,0 +1,72 @@
+//! The ladder of search strategies of the thesis' chapter 5.
+
+use serde::{Deserialize, Serialize};
+
+/// Each strategy adds a step to the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Strategy {
+    /// Naive synthesis (5.2).
+    A,
+    /// Placement measures relative to the object (5.3, Algorithm 11).
+    B,
+    /// Palm-CoM-palm angle (5.3).
+    C,
+    /// Early stop when the thumb has no contact (5.4, Algorithm 12).
+    D,
+    /// One way of choosing the bend ratios (5.4, Algorithm 13).
+    E,
+    /// First sufficient force distribution (5.6, Algorithm 14).
+    F,
+}
+
+/// Which bend ratios a finger tries: the columns of Figure 5.20.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BendRatioChoice {
+    /// (a) 0.7, 1 and 1.42 in turn.
+    All,
+    /// (b) As (a), but the fingers skip 0.7.
+    AllFingersWithoutLow,
+    /// (c) One of the three at random.
+    OneRandom,
+    /// (d) As (c), but the fingers skip 0.7.
+    OneRandomFingersWithoutLow,
+    /// (e) Only 1.
+    OnlyOne,
+    /// (f) Only 1.42.
+    OnlyHigh,
+}
+
+impl Strategy {
+    /// All strategies in order.
+    pub const ALL: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F];
+
+    /// Are placements pruned by the measures relative to the object?
+    pub fn prunes_by_object(self) -> bool {
+        self >= Self::B
+    }
+
+    /// Are placements pruned by the palm-CoM-palm angle?
+    pub fn prunes_by_presenting_hand(self) -> bool {
+        self >= Self::C
+    }
+
+    /// Does posing stop when the thumb has no contact?
+    pub fn stops_without_thumb(self) -> bool {
+        self >= Self::D
+    }
+
+    /// The bend ratios that chapter 5 uses at this step of the ladder.
+    pub fn default_bend_ratios(self) -> BendRatioChoice {
+        if self >= Self::E {
+            BendRatioChoice::OneRandom
+        } else {
+            BendRatioChoice::All
+        }
+    }
+
+    /// Is the first force distribution that suffices taken, instead of the best of a hundred?
+    pub fn takes_first_force_distribution(self) -> bool {
+        self >= Self::F
+    }
+}
