@@ -1,0 +1,51 @@
+"""A real server for the foreign clients, and the code that grpcio-tools generated from the contract."""
+
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "target" / "foreign"))
+
+
+def start_server(*arguments):
+    """Starts the release binary on a free port; returns the process and its host:port."""
+    process = subprocess.Popen(
+        [ROOT / "target/release/grasp-server", *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "NO_COLOR": "1", "RUST_LOG": "info"},
+    )
+    for line in process.stderr:
+        if match := re.search(r"(?:127\.0\.0\.1|\[::1\]):(\d+)", line):
+            return process, match.group(0)
+    raise RuntimeError(f"the server ended with {process.wait()} before it named its address")
+
+
+def stop_server(process):
+    """SIGTERM must end an idle server cleanly, and soon."""
+    process.send_signal(signal.SIGTERM)
+    # The log must be drained, or a full pipe would hold the server up.
+    process.communicate(timeout=10)
+    assert process.returncode == 0
+
+
+@pytest.fixture(scope="session")
+def address():
+    process, host_port = start_server("--listen", "127.0.0.1:0")
+    yield host_port
+    stop_server(process)
+
+
+@pytest.fixture(scope="session")
+def channel(address):
+    import grpc
+
+    with grpc.insecure_channel(address) as opened:
+        yield opened

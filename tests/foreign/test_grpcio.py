@@ -1,0 +1,185 @@
+"""The service as grpcio, the C++ implementation of gRPC, sees it."""
+
+import time
+
+import grpc
+import pytest
+from google.protobuf.duration_pb2 import Duration
+from google.rpc import error_details_pb2
+from grpc_health.v1 import health_pb2, health_pb2_grpc
+from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
+from grpc_status import rpc_status
+
+from grasp.v1 import geometry_pb2, grasp_service_pb2, grasp_service_pb2_grpc, hand_pb2
+from grasp.v1 import object_service_pb2, object_service_pb2_grpc
+
+# A closed box of 2 x 2 x 12 cm, in centimetres, made here: corner i has bit k of i on axis k.
+BOX_OBJ = "\n".join(
+    [f"v {2 * (i & 1) - 1} {2 * (i >> 1 & 1) - 1} {12 * (i >> 2 & 1) - 6}" for i in range(8)]
+    + ["f 1 3 4 2", "f 5 6 8 7", "f 1 2 6 5", "f 3 7 8 4", "f 1 5 7 3", "f 2 4 8 6"]
+)
+
+
+def details(error, kind):
+    """The standard details of the given kind that an error carries."""
+    found = []
+    for detail in rpc_status.from_call(error).details:
+        message = kind()
+        if detail.Unpack(message):
+            found.append(message)
+    return found
+
+
+@pytest.fixture(scope="module")
+def grasps(channel):
+    return grasp_service_pb2_grpc.GraspServiceStub(channel)
+
+
+@pytest.fixture(scope="module")
+def objects(channel):
+    return object_service_pb2_grpc.ObjectServiceStub(channel)
+
+
+def test_health_is_serving_overall_and_by_service(channel):
+    health = health_pb2_grpc.HealthStub(channel)
+    for service in ["", "grasp.v1.GraspService", "grasp.v1.ObjectService"]:
+        answer = health.Check(health_pb2.HealthCheckRequest(service=service))
+        assert answer.status == health_pb2.HealthCheckResponse.SERVING
+    with pytest.raises(grpc.RpcError) as refused:
+        health.Check(health_pb2.HealthCheckRequest(service="grasp.v1.NoSuchService"))
+    assert refused.value.code() == grpc.StatusCode.NOT_FOUND
+
+
+def test_reflection_names_the_services(channel):
+    database = ProtoReflectionDescriptorDatabase(channel)
+    assert {"grasp.v1.GraspService", "grasp.v1.ObjectService", "grpc.health.v1.Health"} <= set(database.get_services())
+
+
+def test_the_built_in_objects_have_the_masses_of_table_5_1(objects):
+    masses = {o.name: o.mass_kg for o in objects.ListObjects(object_service_pb2.ListObjectsRequest()).objects}
+    for name, mass in {"scissors": 0.050, "scalpel": 0.020, "remote": 0.130}.items():
+        assert masses[f"objects/{name}"] == pytest.approx(mass)
+
+
+def test_pages_cover_all_objects_once(objects):
+    names, token = [], ""
+    while True:
+        page = objects.ListObjects(object_service_pb2.ListObjectsRequest(page_size=2, page_token=token))
+        assert len(page.objects) <= 2
+        names += [o.name for o in page.objects]
+        token = page.next_page_token
+        if not token:
+            break
+    assert names == sorted(set(names))
+    assert len(names) >= 3
+
+
+def test_a_created_box_is_measured_right_and_can_be_grasped(objects, grasps):
+    created = objects.CreateObject(
+        object_service_pb2.CreateObjectRequest(object_id="box", obj=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1)
+    ).object
+    assert created.triangle_count == 12
+    half = created.box_half_extents
+    assert sorted([half.x, half.y, half.z]) == pytest.approx([0.01, 0.01, 0.06], rel=1e-3)
+    centre = created.centre_of_mass
+    assert [centre.x, centre.y, centre.z] == pytest.approx([0, 0, 0], abs=1e-6)
+
+    answer = grasps.FindGrasp(
+        grasp_service_pb2.FindGraspRequest(object="objects/box", budget=Duration(seconds=9), seed=1), timeout=20
+    )
+    assert answer.outcome == grasp_service_pb2.OUTCOME_FOUND
+    grasp = answer.grasp
+    assert len(grasp.joints) == 26
+    assert len(grasp.digits) == 5
+    assert {c.digit for c in grasp.contacts} >= {hand_pb2.DIGIT_THUMB}
+    for contact in grasp.contacts:
+        p, n = contact.object_position, contact.object_normal
+        # On the surface of the box, by its closed form.
+        assert max(abs(p.x) / 0.01, abs(p.y) / 0.01, abs(p.z) / 0.06) == pytest.approx(1, abs=1e-3)
+        assert n.x**2 + n.y**2 + n.z**2 == pytest.approx(1, abs=1e-4)
+
+
+def test_creating_the_same_object_twice_is_refused(objects):
+    request = object_service_pb2.CreateObjectRequest(object_id="twice", obj=BOX_OBJ.encode(), mass_kg=0.1)
+    objects.CreateObject(request)
+    with pytest.raises(grpc.RpcError) as refused:
+        objects.CreateObject(request)
+    assert refused.value.code() == grpc.StatusCode.ALREADY_EXISTS
+
+
+def test_every_violation_is_named_at_once(grasps):
+    request = grasp_service_pb2.FindGraspRequest(
+        object="objects/remote",
+        client_from_object=geometry_pb2.Pose(
+            position=geometry_pb2.Vector3(x=float("nan")), orientation=geometry_pb2.Quaternion()
+        ),
+        budget=Duration(seconds=-1),
+        up=geometry_pb2.Vector3(),
+    )
+    with pytest.raises(grpc.RpcError) as refused:
+        grasps.FindGrasp(request)
+    assert refused.value.code() == grpc.StatusCode.INVALID_ARGUMENT
+    (bad_request,) = details(refused.value, error_details_pb2.BadRequest)
+    fields = {violation.field for violation in bad_request.field_violations}
+    assert {"client_from_object.position", "client_from_object.orientation", "budget", "up"} <= fields
+    assert details(refused.value, error_details_pb2.ErrorInfo)
+
+
+def test_an_unknown_object_is_not_found_by_name(grasps):
+    with pytest.raises(grpc.RpcError) as refused:
+        grasps.FindGrasp(grasp_service_pb2.FindGraspRequest(object="objects/teapot"))
+    assert refused.value.code() == grpc.StatusCode.NOT_FOUND
+    (resource,) = details(refused.value, error_details_pb2.ResourceInfo)
+    assert resource.resource_name == "objects/teapot"
+
+
+def unanswerable(**settings):
+    """A holdout that no attempt can satisfy."""
+    return grasp_service_pb2.FindGraspRequest(object="objects/slippery", seed=7, **settings)
+
+
+@pytest.fixture(scope="module")
+def slippery(objects):
+    objects.CreateObject(
+        object_service_pb2.CreateObjectRequest(
+            object_id="slippery",
+            obj=BOX_OBJ.encode(),
+            unit_metres=0.01,
+            mass_kg=0.1,
+            # All twelve triangles are forbidden: nothing can be touched.
+            forbidden=object_service_pb2.ForbiddenSurfaces(triangles=range(12)),
+        )
+    )
+
+
+def test_an_exhausted_budget_is_an_answer_with_a_report(grasps, slippery):
+    answer = grasps.FindGrasp(unanswerable(budget=Duration(nanos=50_000_000)), timeout=5)
+    assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
+    assert not answer.HasField("grasp")
+    assert answer.report.attempts == sum(r.count for r in answer.report.rejections) > 0
+    assert answer.report.HasField("nearest_miss")
+
+
+def test_the_deadline_bounds_the_search(grasps, slippery):
+    answer = grasps.FindGrasp(unanswerable(budget=Duration(seconds=9)), timeout=1)
+    assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
+    budget = answer.report.budget
+    assert budget.seconds + budget.nanos * 1e-9 < 1
+
+
+def test_a_cancelled_call_frees_the_server(grasps, slippery):
+    call = grasps.FindGrasp.future(unanswerable(budget=Duration(seconds=9)))
+    time.sleep(0.2)
+    call.cancel()
+    answer = grasps.FindGrasp(unanswerable(budget=Duration(nanos=50_000_000)), timeout=5)
+    assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
+
+
+def test_a_reproducible_answer_is_the_same_twice(grasps):
+    request = grasp_service_pb2.FindGraspRequest(
+        object="objects/scissors", budget=Duration(seconds=9), seed=3, reproducible=True
+    )
+    first, second = (grasps.FindGrasp(request, timeout=20) for _ in range(2))
+    assert first.outcome == grasp_service_pb2.OUTCOME_FOUND
+    assert first.grasp == second.grasp
+    assert first.report.attempt == second.report.attempt
