@@ -1,4 +1,8 @@
 //! The rigs and skins of the hands. To come.
 
-/// To come.
-pub fn generate() {}
+use crate::AssetFile;
+
+/// Rigs, skins and GLB files of the hands.
+pub(crate) fn generate() -> Vec<AssetFile> {
+    Vec::new()
+}

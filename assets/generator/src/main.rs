@@ -1,9 +1,109 @@
 //! Makes the built-in objects, hands and holdouts. A rerun gives identical bytes.
 
 mod hands;
+mod holdouts;
 mod objects;
 
-fn main() {
-    objects::generate();
-    hands::generate();
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use clap::{Parser, ValueEnum};
+
+/// A file of the assets: its path below the assets folder, with `/` between the parts, and its bytes.
+pub(crate) type AssetFile = (String, Vec<u8>);
+
+/// The folder that the built-in assets are embedded from.
+const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+/// Makes the built-in objects, hands and holdouts.
+///
+/// A rerun gives identical bytes, so that the files can be traced back to the code that made them.
+#[derive(Debug, Parser)]
+#[command(name = "grasp-assets-generator", version)]
+struct Arguments {
+    /// What to make.
+    #[arg(value_enum, default_value_t = Section::All)]
+    section: Section,
+
+    /// The folder to write to or to compare with.
+    #[arg(long, value_name = "DIR", default_value = ASSETS)]
+    out: PathBuf,
+
+    /// Writes nothing; compares with the files that are there and exits with 1 if any differs.
+    #[arg(long)]
+    check: bool,
+}
+
+/// A part of the assets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Section {
+    /// Scissors, scalpel and remote.
+    Objects,
+    /// Rigs and skins of the hands.
+    Hands,
+    /// The 15 holdouts; made with the objects and hands that are embedded in this program.
+    Holdouts,
+    /// Everything, in the order above.
+    All,
+}
+
+impl Section {
+    /// Makes the section's files in memory.
+    fn generate(self) -> Vec<AssetFile> {
+        match self {
+            Self::Objects => objects::generate(),
+            Self::Hands => hands::generate(),
+            Self::Holdouts => holdouts::generate(),
+            Self::All => [Self::Objects, Self::Hands, Self::Holdouts]
+                .into_iter()
+                .flat_map(Self::generate)
+                .collect(),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let files = arguments.section.generate();
+    if arguments.check {
+        return check(&arguments.out, &files);
+    }
+    for (path, bytes) in &files {
+        if let Err(error) = write(&arguments.out.join(path), bytes) {
+            eprintln!("{path}: cannot be written: {error}");
+            return ExitCode::FAILURE;
+        }
+        println!("{path}: {} bytes", bytes.len());
+    }
+    ExitCode::SUCCESS
+}
+
+/// Writes a file and the folders above it.
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    fs::write(path, bytes)
+}
+
+/// Names every file below `folder` that is missing or not what was made now.
+fn check(folder: &Path, files: &[AssetFile]) -> ExitCode {
+    let mut code = ExitCode::SUCCESS;
+    for (path, bytes) in files {
+        match fs::read(folder.join(path)) {
+            Ok(found) if found == *bytes => {}
+            Ok(_) => {
+                println!("{path}: differs");
+                code = ExitCode::FAILURE;
+            }
+            Err(error) => {
+                println!("{path}: cannot be read: {error}");
+                code = ExitCode::FAILURE;
+            }
+        }
+    }
+    code
 }

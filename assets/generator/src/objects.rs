@@ -1,4 +1,8 @@
 //! Scissors, scalpel and remote. To come.
 
-/// To come.
-pub fn generate() {}
+use crate::AssetFile;
+
+/// Meshes and manifests of the objects.
+pub(crate) fn generate() -> Vec<AssetFile> {
+    Vec::new()
+}
