@@ -5,7 +5,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::{DigitAngles, HandPose, Handedness, rig::DigitRig, rig::Rig};
+use super::{DigitAngles, HandPose, rig::DigitRig, rig::Rig};
 use crate::pose::Pose;
 
 /// The frames of one posed digit.
@@ -26,21 +26,16 @@ pub struct HandFrames {
     pub digits: [DigitFrames; 5],
 }
 
-/// The local rotation of a base joint: pitch θ1 about x after yaw ψ1 about z.
-pub fn base_rotation(handedness: Handedness, base_yaw: f32, base_pitch: f32) -> Quat {
-    Quat::from_rotation_z(handedness.yaw_sign() * base_yaw) * Quat::from_rotation_x(base_pitch)
+/// The local rotation of a digit's base joint: pitch θ1 about the x axis that yaw ψ1 about z has turned.
+pub fn base_rotation(digit: &DigitRig, base_yaw: f32, base_pitch: f32) -> Quat {
+    Quat::from_rotation_z(digit.yaw_sign * base_yaw) * Quat::from_rotation_x(base_pitch)
 }
 
 /// The frames of a digit in the frame of `frame_from_wrist`.
-pub fn digit_frames(
-    digit: &DigitRig,
-    handedness: Handedness,
-    frame_from_wrist: Pose,
-    angles: DigitAngles,
-) -> DigitFrames {
+pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngles) -> DigitFrames {
     let base = frame_from_wrist
         * digit.wrist_from_base
-        * Pose::from_orientation(base_rotation(handedness, angles.base_yaw, angles.base_pitch));
+        * Pose::from_orientation(base_rotation(digit, angles.base_yaw, angles.base_pitch));
     let next = |parent: Pose, length: f32, pitch: f32| {
         parent * Pose::new(Vec3::new(0.0, length, 0.0), Quat::from_rotation_x(pitch))
     };
@@ -57,13 +52,6 @@ pub fn digit_frames(
 pub fn hand_frames(rig: &Rig, pose: &HandPose) -> HandFrames {
     HandFrames {
         wrist: pose.frame_from_wrist,
-        digits: std::array::from_fn(|i| {
-            digit_frames(
-                &rig.digits[i],
-                rig.handedness,
-                pose.frame_from_wrist,
-                pose.digits[i],
-            )
-        }),
+        digits: std::array::from_fn(|i| digit_frames(&rig.digits[i], pose.frame_from_wrist, pose.digits[i])),
     }
 }

@@ -28,15 +28,6 @@ impl Handedness {
             Self::Right => Self::Left,
         }
     }
-
-    /// +1 for the right hand, -1 for the left: the sign of a yaw about +z that turns a finger toward the little
-    /// finger's side.
-    pub fn yaw_sign(self) -> f32 {
-        match self {
-            Self::Left => -1.0,
-            Self::Right => 1.0,
-        }
-    }
 }
 
 /// A digit of the hand; the thesis' finger index i.

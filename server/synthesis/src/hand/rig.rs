@@ -48,6 +48,10 @@ pub struct DigitRig {
     /// The base joint's frame of the stretched digit (all angles zero) in the wrist frame: +y along the first link,
     /// +z to the digit's pad.
     pub wrist_from_base: Pose,
+    /// The sense of a positive yaw ψ1: +1 turns counter-clockwise about the base's +z, -1 clockwise. A positive yaw
+    /// brings a finger toward the little finger's side (+1 on the right hand, thesis Figure 4.2b) and lifts the thumb
+    /// off the palm's plane (-1 on the right hand, because the thumb's pad faces the little finger's side).
+    pub yaw_sign: f32,
     /// Lengths L of the three links in metres; the last one reaches the fingertip.
     pub lengths: [f32; 3],
     /// Diameters W of the three links in metres (Eq. 4.1).
@@ -109,6 +113,7 @@ impl Rig {
             reach: self.reach,
             digits: self.digits.map(|digit| DigitRig {
                 wrist_from_base: digit.wrist_from_base.mirrored_x(),
+                yaw_sign: -digit.yaw_sign,
                 ..digit
             }),
             finger_metacarpals: self.finger_metacarpals.map(flip),
