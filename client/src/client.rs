@@ -1,0 +1,328 @@
+//! The client: connection, deadlines, retries.
+
+use std::{
+    future::Future,
+    time::{Duration, Instant},
+};
+
+use grasp_proto::v1::{
+    self, grasp_service_client::GraspServiceClient, object_service_client::ObjectServiceClient,
+};
+use tonic::{
+    Code, Request, Response, Status,
+    transport::{Channel, Endpoint},
+};
+use tonic_health::pb::{HealthCheckRequest, health_client::HealthClient};
+
+use crate::{
+    error::ClientError,
+    object::{Health, NewObject, Object, ObjectPage},
+    retry::RetryPolicy,
+    search::{FindAnswer, FindRequest},
+    wire,
+};
+
+/// How long a connection may take to stand, unless the builder says otherwise. Longer helps on slow networks; shorter
+/// tells a game sooner that there is no server.
+const DEFAULT_CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// How long a call may take with all its retries, unless the builder says otherwise; a search gets its budget on top.
+const DEFAULT_CALL_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// How tonic words a deadline that passed: it reports CANCELLED, on either side of the wire.
+const TONIC_TIMEOUT_MESSAGE: &str = "Timeout expired";
+
+/// How a client connects and calls.
+#[derive(Clone, Debug)]
+pub struct GraspClientBuilder {
+    endpoint: String,
+    connect_timeout: Duration,
+    call_timeout: Duration,
+    retry: RetryPolicy,
+}
+
+impl GraspClientBuilder {
+    /// How long a connection may take to stand. Default: 5 s.
+    #[must_use]
+    pub fn connect_timeout(mut self, timeout: Duration) -> Self {
+        self.connect_timeout = timeout;
+        self
+    }
+
+    /// How long a call may take with all its retries; a search gets its budget on top. The server is told (header
+    /// `grpc-timeout`), so that it stops working for a caller who is gone. Default: 10 s.
+    #[must_use]
+    pub fn call_timeout(mut self, timeout: Duration) -> Self {
+        self.call_timeout = timeout;
+        self
+    }
+
+    /// When calls are tried again. Default: [`RetryPolicy::default`].
+    #[must_use]
+    pub fn retry(mut self, policy: RetryPolicy) -> Self {
+        self.retry = policy;
+        self
+    }
+
+    /// Connects now.
+    ///
+    /// # Errors
+    /// [`ClientError::Endpoint`] or [`ClientError::Connect`].
+    pub async fn connect(self) -> Result<GraspClient, ClientError> {
+        let channel = self
+            .transport_endpoint()?
+            .connect()
+            .await
+            .map_err(|error| ClientError::Connect {
+                endpoint: self.endpoint.clone(),
+                source: error.into(),
+            })?;
+        Ok(self.over(channel))
+    }
+
+    /// Connects when the first call is made, so that the client may start before the server. Must be called inside a
+    /// tokio runtime.
+    ///
+    /// # Errors
+    /// [`ClientError::Endpoint`].
+    pub fn connect_lazy(self) -> Result<GraspClient, ClientError> {
+        let channel = self.transport_endpoint()?.connect_lazy();
+        Ok(self.over(channel))
+    }
+
+    /// Calls over a channel that was made elsewhere, for instance with TLS; its connect timeout is its own.
+    pub fn over(self, channel: Channel) -> GraspClient {
+        GraspClient {
+            channel,
+            call_timeout: self.call_timeout,
+            retry: self.retry,
+        }
+    }
+
+    fn transport_endpoint(&self) -> Result<Endpoint, ClientError> {
+        let endpoint_error = |source| ClientError::Endpoint {
+            endpoint: self.endpoint.clone(),
+            source,
+        };
+        let endpoint =
+            Endpoint::from_shared(self.endpoint.clone()).map_err(|error| endpoint_error(error.into()))?;
+        if endpoint.uri().scheme_str().is_none() || endpoint.uri().host().is_none() {
+            return Err(endpoint_error("it has no scheme or no host".into()));
+        }
+        Ok(endpoint
+            .connect_timeout(self.connect_timeout)
+            // A grasp is one small message each way: waiting to fill a packet would only add latency.
+            .tcp_nodelay(true))
+    }
+}
+
+/// A client of a grasp server. Cheap to clone; clones share one connection.
+///
+/// # Examples
+/// ```no_run
+/// use grasp_client::{ClientError, FindRequest, GraspClient};
+///
+/// # async fn take() -> Result<(), ClientError> {
+/// let client = GraspClient::connect("http://[::1]:50051").await?;
+/// let answer = client.find_grasp(&FindRequest::new("objects/remote")).await?;
+/// match answer.grasp {
+///     Some(grasp) => println!("take it with the wrist at {} m", grasp.client_from_wrist.position),
+///     None => println!("no grasp in {} attempts", answer.report.attempts),
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug)]
+pub struct GraspClient {
+    channel: Channel,
+    call_timeout: Duration,
+    retry: RetryPolicy,
+}
+
+impl GraspClient {
+    /// Connects with default settings.
+    ///
+    /// # Errors
+    /// [`ClientError::Endpoint`] or [`ClientError::Connect`].
+    pub async fn connect(endpoint: impl Into<String>) -> Result<Self, ClientError> {
+        Self::builder(endpoint).connect().await
+    }
+
+    /// A client with own settings; `endpoint` is a URL like `http://[::1]:50051`.
+    pub fn builder(endpoint: impl Into<String>) -> GraspClientBuilder {
+        GraspClientBuilder {
+            endpoint: endpoint.into(),
+            connect_timeout: DEFAULT_CONNECT_TIMEOUT,
+            call_timeout: DEFAULT_CALL_TIMEOUT,
+            retry: RetryPolicy::default(),
+        }
+    }
+
+    /// Asks for a grasp. No grasp within the budget is an answer, not an error. May take the call timeout and the
+    /// request's budget together. Dropping the future stops the server's work.
+    ///
+    /// # Errors
+    /// Any but the errors of connecting; [`ClientError::InvalidArgument`] names all that is wrong with the request.
+    pub async fn find_grasp(&self, request: &FindRequest) -> Result<FindAnswer, ClientError> {
+        let message = wire::find_request_to_wire(request);
+        let timeout = self
+            .call_timeout
+            .saturating_add(request.budget.unwrap_or_default());
+        let answer = self
+            .call("FindGrasp", timeout, &message, |channel, request| async move {
+                GraspServiceClient::new(channel).find_grasp(request).await
+            })
+            .await?;
+        Ok(wire::find_answer_from_wire(answer)?)
+    }
+
+    /// One page of the objects, sorted by name; `page_size` 0 leaves the size to the server, `page_token` is none for
+    /// the first page.
+    ///
+    /// # Errors
+    /// Any but the errors of connecting.
+    pub async fn list_objects_page(
+        &self,
+        page_size: u16,
+        page_token: Option<String>,
+    ) -> Result<ObjectPage, ClientError> {
+        let message = v1::ListObjectsRequest {
+            page_size: page_size.into(),
+            page_token: page_token.unwrap_or_default(),
+        };
+        let page = self
+            .call(
+                "ListObjects",
+                self.call_timeout,
+                &message,
+                |channel, request| async move { ObjectServiceClient::new(channel).list_objects(request).await },
+            )
+            .await?;
+        Ok(wire::object_page_from_wire(page)?)
+    }
+
+    /// All objects, sorted by name, however many pages that takes.
+    ///
+    /// # Errors
+    /// Any but the errors of connecting.
+    pub async fn list_objects(&self) -> Result<Vec<Object>, ClientError> {
+        let mut objects = Vec::new();
+        let mut token = None;
+        loop {
+            let page = self.list_objects_page(0, token.clone()).await?;
+            objects.extend(page.objects);
+            match page.next_page_token {
+                None => return Ok(objects),
+                // A server that repeats itself would keep the loop going for ever.
+                next if next == token => {
+                    return Err(ClientError::Malformed {
+                        field: "next_page_token".to_owned(),
+                        problem: "is the one of the page before".to_owned(),
+                    });
+                }
+                next => token = next,
+            }
+        }
+    }
+
+    /// One object; `name` is "objects/{object}".
+    ///
+    /// # Errors
+    /// Any but the errors of connecting; [`ClientError::NotFound`] if there is no such object.
+    pub async fn get_object(&self, name: impl Into<String>) -> Result<Object, ClientError> {
+        let message = v1::GetObjectRequest { name: name.into() };
+        let answer = self
+            .call(
+                "GetObject",
+                self.call_timeout,
+                &message,
+                |channel, request| async move { ObjectServiceClient::new(channel).get_object(request).await },
+            )
+            .await?;
+        Ok(wire::object_from_wire(answer.object)?)
+    }
+
+    /// Makes an object. The call is tried again like any other; if an answer got lost on the way, the next attempt
+    /// meets its own object and ends with [`ClientError::AlreadyExists`].
+    ///
+    /// # Errors
+    /// Any but the errors of connecting; [`ClientError::InvalidArgument`] names all that is wrong with the object.
+    pub async fn create_object(&self, object: &NewObject) -> Result<Object, ClientError> {
+        let message = wire::new_object_to_wire(object);
+        let answer = self
+            .call(
+                "CreateObject",
+                self.call_timeout,
+                &message,
+                |channel, request| async move { ObjectServiceClient::new(channel).create_object(request).await },
+            )
+            .await?;
+        Ok(wire::object_from_wire(answer.object)?)
+    }
+
+    /// Asks for the health of the whole server.
+    ///
+    /// # Errors
+    /// Any but the errors of connecting.
+    pub async fn health(&self) -> Result<Health, ClientError> {
+        let message = HealthCheckRequest::default();
+        let answer = self
+            .call(
+                "Check",
+                self.call_timeout,
+                &message,
+                |channel, request| async move { HealthClient::new(channel).check(request).await },
+            )
+            .await?;
+        Ok(wire::health_from_wire(answer))
+    }
+
+    /// Sends `message` until it is answered, fails for good or `timeout` has passed since the first attempt.
+    async fn call<M, T, F>(
+        &self,
+        method: &'static str,
+        timeout: Duration,
+        message: &M,
+        send: impl Fn(Channel, Request<M>) -> F,
+    ) -> Result<T, ClientError>
+    where
+        M: Clone,
+        F: Future<Output = Result<Response<T>, Status>>,
+    {
+        let start = Instant::now();
+        let mut attempts = 0;
+        loop {
+            attempts += 1;
+            let remaining = timeout.saturating_sub(start.elapsed());
+            let mut request = Request::new(message.clone());
+            request.set_timeout(remaining);
+            let result = tokio::time::timeout(remaining, send(self.channel.clone(), request)).await;
+            let status = match result {
+                Ok(Ok(response)) => return Ok(response.into_inner()),
+                Ok(Err(status)) if !is_timeout(&status, start.elapsed() >= timeout) => status,
+                Ok(Err(_)) | Err(_) => {
+                    Status::deadline_exceeded(format!("{method} was not answered within {timeout:?}"))
+                }
+            };
+            let wait = self.retry.wait_after(attempts, &status);
+            match wait.filter(|&wait| start.elapsed() + wait < timeout) {
+                Some(wait) => {
+                    tracing::debug!(
+                        method,
+                        attempts,
+                        ?wait,
+                        message = status.message(),
+                        "trying again"
+                    );
+                    tokio::time::sleep(wait).await;
+                }
+                None => return Err(ClientError::from_status(&status, attempts)),
+            }
+        }
+    }
+}
+
+/// True if the status says, in tonic's way, that a deadline passed.
+fn is_timeout(status: &Status, deadline_passed: bool) -> bool {
+    status.code() == Code::Cancelled && (deadline_passed || status.message() == TONIC_TIMEOUT_MESSAGE)
+}

@@ -1,0 +1,291 @@
+//! What can go wrong with a call, with the standard details that the server attached.
+
+use std::{collections::BTreeMap, fmt, time::Duration};
+
+use serde::Serialize;
+use tonic::{Code, Status};
+use tonic_types::StatusExt as _;
+
+/// An error of a lower layer.
+pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
+
+/// What can go wrong.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClientError {
+    /// The endpoint is not a URL.
+    #[error("endpoint {endpoint:?} is not a URL like http://[::1]:50051")]
+    Endpoint {
+        /// What was given.
+        endpoint: String,
+        /// What is wrong with it.
+        source: BoxError,
+    },
+    /// No connection could be made.
+    #[error("cannot connect to {endpoint}")]
+    Connect {
+        /// Whereto.
+        endpoint: String,
+        /// Why not.
+        source: BoxError,
+    },
+    /// The request breaks rules; [`ErrorDetails::field_violations`] says which.
+    #[error("invalid argument: {0}")]
+    InvalidArgument(Box<CallError>),
+    /// Something that the request names does not exist; [`ErrorDetails::resource`] says what.
+    #[error("not found: {0}")]
+    NotFound(Box<CallError>),
+    /// Something that the request would make exists. After a retry (see [`CallError::attempts`]) it may be the
+    /// call's own work.
+    #[error("already exists: {0}")]
+    AlreadyExists(Box<CallError>),
+    /// The server has no room for the request; [`ErrorDetails::retry_delay`] may say when to come back.
+    #[error("resource exhausted: {0}")]
+    ResourceExhausted(Box<CallError>),
+    /// The server could not be reached or takes no requests, also after retries.
+    #[error("unavailable: {0}")]
+    Unavailable(Box<CallError>),
+    /// No answer came in time.
+    #[error("deadline exceeded: {0}")]
+    DeadlineExceeded(Box<CallError>),
+    /// The call failed in another way; see [`CallError::code`].
+    #[error("{name}: {0}", name = code_name(.0.code))]
+    Other(Box<CallError>),
+    /// The answer breaks the contract, as one of another service or of a newer server might.
+    #[error("malformed answer: {field} {problem}")]
+    Malformed {
+        /// The field's path in the answer.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+/// A call that failed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CallError {
+    /// The gRPC status code.
+    pub code: Code,
+    /// The server's message, or the transport's.
+    pub message: String,
+    /// How often the call was tried.
+    pub attempts: u32,
+    /// What the server attached.
+    pub details: ErrorDetails,
+}
+
+impl fmt::Display for CallError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)?;
+        for FieldViolation { field, description } in &self.details.field_violations {
+            write!(f, "; {field}: {description}")?;
+        }
+        if self.attempts > 1 {
+            write!(f, " (tried {} times)", self.attempts)?;
+        }
+        Ok(())
+    }
+}
+
+/// The standard details of an error (`google.rpc`), as far as the service uses them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ErrorDetails {
+    /// A stable name of the cause in `UPPER_SNAKE_CASE` (`ErrorInfo.reason`).
+    pub reason: Option<String>,
+    /// Facts about the cause by name (`ErrorInfo.metadata`).
+    pub metadata: BTreeMap<String, String>,
+    /// Everything that is wrong with the request (`BadRequest`).
+    pub field_violations: Vec<FieldViolation>,
+    /// What the error is about (`ResourceInfo`).
+    pub resource: Option<Resource>,
+    /// How long to wait before another try (`RetryInfo`).
+    pub retry_delay: Option<Duration>,
+}
+
+/// One thing that is wrong with a request.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FieldViolation {
+    /// The field's path in the request.
+    pub field: String,
+    /// What is wrong with its value and what would be right.
+    pub description: String,
+}
+
+/// Something that an error is about.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Resource {
+    /// The kind of thing.
+    #[serde(rename = "type")]
+    pub kind: String,
+    /// Its name.
+    pub name: String,
+    /// What is wrong with it.
+    pub description: String,
+}
+
+impl ClientError {
+    /// The failed call, if the error came from one.
+    pub fn call(&self) -> Option<&CallError> {
+        match self {
+            Self::InvalidArgument(call)
+            | Self::NotFound(call)
+            | Self::AlreadyExists(call)
+            | Self::ResourceExhausted(call)
+            | Self::Unavailable(call)
+            | Self::DeadlineExceeded(call)
+            | Self::Other(call) => Some(call),
+            Self::Endpoint { .. } | Self::Connect { .. } | Self::Malformed { .. } => None,
+        }
+    }
+
+    /// The error of a call that ended with `status` at its `attempts`th attempt.
+    pub(crate) fn from_status(status: &Status, attempts: u32) -> Self {
+        let call = Box::new(CallError {
+            code: status.code(),
+            message: status.message().to_owned(),
+            attempts,
+            details: decode_details(status),
+        });
+        match call.code {
+            Code::InvalidArgument => Self::InvalidArgument(call),
+            Code::NotFound => Self::NotFound(call),
+            Code::AlreadyExists => Self::AlreadyExists(call),
+            Code::ResourceExhausted => Self::ResourceExhausted(call),
+            Code::Unavailable => Self::Unavailable(call),
+            Code::DeadlineExceeded => Self::DeadlineExceeded(call),
+            Code::Ok
+            | Code::Cancelled
+            | Code::Unknown
+            | Code::PermissionDenied
+            | Code::FailedPrecondition
+            | Code::Aborted
+            | Code::OutOfRange
+            | Code::Unimplemented
+            | Code::Internal
+            | Code::DataLoss
+            | Code::Unauthenticated => Self::Other(call),
+        }
+    }
+}
+
+/// The details of a status; details that cannot be decoded count as absent, since the message still says what is wrong.
+fn decode_details(status: &Status) -> ErrorDetails {
+    let details = status.get_error_details();
+    let violations = details.bad_request().map(|bad| bad.field_violations.as_slice());
+    ErrorDetails {
+        reason: details.error_info().map(|info| info.reason.clone()),
+        metadata: details
+            .error_info()
+            .map(|info| info.metadata.clone().into_iter().collect())
+            .unwrap_or_default(),
+        field_violations: violations
+            .unwrap_or_default()
+            .iter()
+            .map(|violation| FieldViolation {
+                field: violation.field.clone(),
+                description: violation.description.clone(),
+            })
+            .collect(),
+        resource: details.resource_info().map(|info| Resource {
+            kind: info.resource_type.clone(),
+            name: info.resource_name.clone(),
+            description: info.description.clone(),
+        }),
+        retry_delay: details.retry_info().and_then(|info| info.retry_delay),
+    }
+}
+
+/// The name of a code as the gRPC specification writes it, such as `INVALID_ARGUMENT`.
+pub fn code_name(code: Code) -> &'static str {
+    match code {
+        Code::Ok => "OK",
+        Code::Cancelled => "CANCELLED",
+        Code::Unknown => "UNKNOWN",
+        Code::InvalidArgument => "INVALID_ARGUMENT",
+        Code::DeadlineExceeded => "DEADLINE_EXCEEDED",
+        Code::NotFound => "NOT_FOUND",
+        Code::AlreadyExists => "ALREADY_EXISTS",
+        Code::PermissionDenied => "PERMISSION_DENIED",
+        Code::ResourceExhausted => "RESOURCE_EXHAUSTED",
+        Code::FailedPrecondition => "FAILED_PRECONDITION",
+        Code::Aborted => "ABORTED",
+        Code::OutOfRange => "OUT_OF_RANGE",
+        Code::Unimplemented => "UNIMPLEMENTED",
+        Code::Internal => "INTERNAL",
+        Code::Unavailable => "UNAVAILABLE",
+        Code::DataLoss => "DATA_LOSS",
+        Code::Unauthenticated => "UNAUTHENTICATED",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::*;
+
+    fn status(code: Code, details: tonic_types::ErrorDetails) -> Status {
+        Status::with_error_details(code, "2 fields are wrong", details)
+    }
+
+    #[test]
+    fn field_violations_and_reason_are_decoded() {
+        let mut details = tonic_types::ErrorDetails::with_bad_request_violation("budget", "is -1 s");
+        details.add_bad_request_violation("object", "is empty");
+        details.set_error_info(
+            "INVALID_REQUEST",
+            "grasp",
+            HashMap::from([("limit".to_owned(), "10".to_owned())]),
+        );
+        let error = ClientError::from_status(&status(Code::InvalidArgument, details), 1);
+        let ClientError::InvalidArgument(call) = &error else {
+            panic!("{error:?}")
+        };
+        let fields: Vec<_> = call
+            .details
+            .field_violations
+            .iter()
+            .map(|v| v.field.as_str())
+            .collect();
+        assert_eq!(fields, ["budget", "object"]);
+        assert_eq!(call.details.reason.as_deref(), Some("INVALID_REQUEST"));
+        assert_eq!(call.details.metadata["limit"], "10");
+        assert_eq!(
+            error.to_string(),
+            "invalid argument: 2 fields are wrong; budget: is -1 s; object: is empty"
+        );
+    }
+
+    #[test]
+    fn a_missing_resource_is_named() {
+        let details =
+            tonic_types::ErrorDetails::with_resource_info("grasp.v1.Object", "objects/anvil", "", "no such");
+        let error = ClientError::from_status(&status(Code::NotFound, details), 1);
+        let ClientError::NotFound(call) = error else {
+            panic!("{error:?}")
+        };
+        assert_eq!(call.details.resource.unwrap().name, "objects/anvil");
+    }
+
+    #[test]
+    fn the_retry_delay_is_decoded() {
+        let details = tonic_types::ErrorDetails::with_retry_info(Some(Duration::from_millis(250)));
+        let error = ClientError::from_status(&status(Code::ResourceExhausted, details), 1);
+        let ClientError::ResourceExhausted(call) = error else {
+            panic!("{error:?}")
+        };
+        assert_eq!(call.details.retry_delay, Some(Duration::from_millis(250)));
+    }
+
+    #[test]
+    fn undecodable_details_leave_the_message() {
+        let status = Status::with_details(
+            Code::Internal,
+            "it broke",
+            tonic::codegen::Bytes::from_static(b"\xff\xff\xff"),
+        );
+        let error = ClientError::from_status(&status, 3);
+        assert_eq!(error.to_string(), "INTERNAL: it broke (tried 3 times)");
+        assert_eq!(error.call().unwrap().details, ErrorDetails::default());
+    }
+}

@@ -1,0 +1,143 @@
+//! How durations and seeds are written as JSON: durations as numbers of seconds, seeds as strings of digits, since
+//! 64 bits do not fit into every reader's numbers (as in protobuf's JSON form). Seeds may be read from numbers, too.
+
+/// A duration as a number of seconds.
+pub(crate) mod seconds {
+    use std::time::Duration;
+
+    use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
+
+    pub(crate) fn serialize<S: Serializer>(duration: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_f64(duration.as_secs_f64())
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
+        let seconds = f64::deserialize(deserializer)?;
+        Duration::try_from_secs_f64(seconds)
+            .map_err(|_| D::Error::custom(format!("{seconds} is no number of seconds from 0 up")))
+    }
+}
+
+/// A duration as a number of seconds, or null.
+pub(crate) mod optional_seconds {
+    use std::time::Duration;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    struct Seconds(#[serde(with = "super::seconds")] Duration);
+
+    #[expect(
+        clippy::ref_option,
+        reason = "serde's `with` hands in a reference to the field"
+    )]
+    pub(crate) fn serialize<S: Serializer>(
+        duration: &Option<Duration>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        duration.map(Seconds).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Duration>, D::Error> {
+        Ok(Option::<Seconds>::deserialize(deserializer)?.map(|Seconds(duration)| duration))
+    }
+}
+
+/// A seed as a string of digits.
+pub(crate) mod seed {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum NumberOrText {
+        Number(u64),
+        Text(String),
+    }
+
+    #[expect(
+        clippy::trivially_copy_pass_by_ref,
+        reason = "serde's `with` hands in a reference to the field"
+    )]
+    pub(crate) fn serialize<S: Serializer>(seed: &u64, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(seed)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+        match NumberOrText::deserialize(deserializer)? {
+            NumberOrText::Number(seed) => Ok(seed),
+            NumberOrText::Text(text) => text
+                .parse()
+                .map_err(|_| D::Error::custom(format!("seed {text:?} is no whole number below 2^64"))),
+        }
+    }
+}
+
+/// A seed as a string of digits, or null.
+pub(crate) mod optional_seed {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    struct Seed(#[serde(with = "super::seed")] u64);
+
+    #[expect(
+        clippy::ref_option,
+        reason = "serde's `with` hands in a reference to the field"
+    )]
+    pub(crate) fn serialize<S: Serializer>(seed: &Option<u64>, serializer: S) -> Result<S::Ok, S::Error> {
+        seed.map(Seed).serialize(serializer)
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
+        Ok(Option::<Seed>::deserialize(deserializer)?.map(|Seed(seed)| seed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use crate::search::FindRequest;
+
+    #[test]
+    fn a_seed_survives_json_in_full() {
+        let request = FindRequest {
+            seed: Some(u64::MAX),
+            ..FindRequest::new("objects/remote")
+        };
+        let text = serde_json::to_string(&request).unwrap();
+        assert!(text.contains(r#""seed":"18446744073709551615""#), "{text}");
+        assert_eq!(serde_json::from_str::<FindRequest>(&text).unwrap(), request);
+    }
+
+    #[test]
+    fn a_seed_may_be_a_number_but_not_a_word() {
+        let read = |seed: &str| {
+            serde_json::from_str::<FindRequest>(&format!(r#"{{"object": "objects/x", "seed": {seed}}}"#))
+        };
+        assert_eq!(read("7").unwrap().seed, Some(7));
+        assert_eq!(read("null").unwrap().seed, None);
+        assert!(read(r#""seven""#).unwrap_err().to_string().contains("seven"));
+    }
+
+    #[test]
+    fn a_budget_is_a_number_of_seconds() {
+        let read = |budget: &str| {
+            let text = format!(r#"{{"object": "objects/x", "budget_seconds": {budget}}}"#);
+            serde_json::from_str::<FindRequest>(&text).map(|request| request.budget)
+        };
+        assert_eq!(read("0.25").unwrap(), Some(Duration::from_millis(250)));
+        assert_eq!(read("3").unwrap(), Some(Duration::from_secs(3)));
+        assert_eq!(read("null").unwrap(), None);
+        assert!(read("-1").unwrap_err().to_string().contains("-1"));
+        assert!(read("1e300").is_err());
+    }
+
+    #[test]
+    fn a_misspelt_field_is_refused() {
+        let error =
+            serde_json::from_str::<FindRequest>(r#"{"object": "objects/x", "budget": 1}"#).unwrap_err();
+        assert!(error.to_string().contains("unknown field `budget`"), "{error}");
+    }
+}

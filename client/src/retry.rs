@@ -1,0 +1,185 @@
+//! When a call is tried again: on UNAVAILABLE only, with growing waits, a bounded number of times, and only as long as
+//! the call's deadline allows. The server may ask for a longer wait (`RetryInfo`), set the wait or forbid another try
+//! (trailer `grpc-retry-pushback-ms`, gRPC proposal A6).
+
+use std::{
+    hash::{BuildHasher as _, RandomState},
+    time::Duration,
+};
+
+use tonic::{Code, Status};
+use tonic_types::StatusExt as _;
+
+/// The trailer by which a server steers retries (gRPC proposal A6).
+const PUSHBACK_TRAILER: &str = "grpc-retry-pushback-ms";
+
+/// Waits vary by this share up and down, so that clients that failed together do not come back together. The value is
+/// that of gRPC proposal A6; 0 would keep them in step.
+const JITTER: f64 = 0.2;
+
+/// How often and after which waits a call is tried again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RetryPolicy {
+    /// How often a call is tried in all, the first time included; 1 switches retries off.
+    pub max_attempts: u32,
+    /// The wait before the second attempt, give or take a fifth.
+    pub initial_backoff: Duration,
+    /// No wait is longer, unless the server asks for it.
+    pub max_backoff: Duration,
+    /// Each wait is this many times the one before; at least 1.
+    pub multiplier: f64,
+}
+
+impl RetryPolicy {
+    /// Each call is tried once.
+    pub const NEVER: Self = Self {
+        max_attempts: 1,
+        initial_backoff: Duration::ZERO,
+        max_backoff: Duration::ZERO,
+        multiplier: 1.0,
+    };
+
+    /// How long to wait after `attempts` attempts of which the last ended with `status`; none: give up.
+    pub(crate) fn wait_after(&self, attempts: u32, status: &Status) -> Option<Duration> {
+        if status.code() != Code::Unavailable || attempts >= self.max_attempts {
+            return None;
+        }
+        match pushback(status) {
+            Pushback::Absent => {
+                let asked = status
+                    .get_error_details()
+                    .retry_info()
+                    .and_then(|i| i.retry_delay);
+                let backoff = self.backoff(attempts, random_fraction());
+                Some(asked.map_or(backoff, |asked| asked.max(backoff)))
+            }
+            Pushback::Wait(wait) => Some(wait),
+            Pushback::Stop => None,
+        }
+    }
+
+    /// The wait after `attempts` attempts; `fraction` from 0 to 1 picks it within the jitter.
+    fn backoff(&self, attempts: u32, fraction: f64) -> Duration {
+        // The exponent is bounded so that the product stays finite; by then it exceeds any sensible maximum.
+        let growth = self
+            .multiplier
+            .max(1.0)
+            .powi(attempts.clamp(1, 64).cast_signed() - 1);
+        let seconds = (self.initial_backoff.as_secs_f64() * growth).min(self.max_backoff.as_secs_f64());
+        let jittered = seconds * (1.0 - JITTER + 2.0 * JITTER * fraction);
+        Duration::try_from_secs_f64(jittered).unwrap_or(self.max_backoff)
+    }
+}
+
+impl Default for RetryPolicy {
+    /// Four attempts with waits of about 0.1 s, 0.2 s and 0.4 s: enough for a server that restarts its listener,
+    /// short enough for a caller that waits.
+    fn default() -> Self {
+        Self {
+            max_attempts: 4,
+            initial_backoff: Duration::from_millis(100),
+            max_backoff: Duration::from_secs(2),
+            multiplier: 2.0,
+        }
+    }
+}
+
+/// What the server says about another try.
+#[derive(Debug, PartialEq)]
+enum Pushback {
+    Absent,
+    Wait(Duration),
+    Stop,
+}
+
+/// Reads the trailer; a negative or unreadable value forbids another try (A6).
+fn pushback(status: &Status) -> Pushback {
+    let Some(value) = status.metadata().get(PUSHBACK_TRAILER) else {
+        return Pushback::Absent;
+    };
+    match value.to_str().ok().and_then(|text| text.parse::<u32>().ok()) {
+        Some(milliseconds) => Pushback::Wait(Duration::from_millis(milliseconds.into())),
+        None => Pushback::Stop,
+    }
+}
+
+/// A number from 0 up to 1 that differs between processes and calls: the standard library's randomly keyed hasher is
+/// random enough to spread waits.
+fn random_fraction() -> f64 {
+    f64::from((RandomState::new().hash_one(0_u8) >> 32) as u32) / f64::from(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unavailable() -> Status {
+        Status::unavailable("draining")
+    }
+
+    fn with_pushback(value: &str) -> Status {
+        let mut status = unavailable();
+        status
+            .metadata_mut()
+            .insert(PUSHBACK_TRAILER, value.parse().unwrap());
+        status
+    }
+
+    #[test]
+    fn waits_grow_up_to_the_maximum_and_stay_within_the_jitter() {
+        let policy = RetryPolicy {
+            max_attempts: 99,
+            ..RetryPolicy::default()
+        };
+        for (attempts, middle) in [(1, 0.1), (2, 0.2), (3, 0.4), (4, 0.8), (6, 2.0), (90, 2.0)] {
+            let shortest = policy.backoff(attempts, 0.0).as_secs_f64();
+            let longest = policy.backoff(attempts, 1.0).as_secs_f64();
+            assert!(
+                (shortest - 0.8 * middle).abs() < 1e-6,
+                "{attempts}: {shortest} against 0.8 of {middle}"
+            );
+            assert!(
+                (longest - 1.2 * middle).abs() < 1e-6,
+                "{attempts}: {longest} against 1.2 of {middle}"
+            );
+        }
+    }
+
+    #[test]
+    fn only_unavailable_is_tried_again_and_only_so_often() {
+        let policy = RetryPolicy::default();
+        for code in 0..=16 {
+            let status = Status::new(Code::from(code), "");
+            let again = policy.wait_after(1, &status).is_some();
+            assert_eq!(again, code == 14, "code {code}");
+        }
+        assert!(policy.wait_after(3, &unavailable()).is_some());
+        assert_eq!(policy.wait_after(4, &unavailable()), None);
+        assert_eq!(RetryPolicy::NEVER.wait_after(1, &unavailable()), None);
+    }
+
+    #[test]
+    fn pushback_sets_the_wait_or_stops() {
+        let policy = RetryPolicy::default();
+        assert_eq!(
+            policy.wait_after(1, &with_pushback("30")),
+            Some(Duration::from_millis(30))
+        );
+        assert_eq!(policy.wait_after(1, &with_pushback("-1")), None);
+        assert_eq!(policy.wait_after(1, &with_pushback("soon")), None);
+        assert_eq!(policy.wait_after(4, &with_pushback("30")), None);
+    }
+
+    #[test]
+    fn retry_info_lengthens_the_wait_but_never_shortens_it() {
+        let asking = |delay| {
+            let details = tonic_types::ErrorDetails::with_retry_info(Some(delay));
+            Status::with_error_details(Code::Unavailable, "busy", details)
+        };
+        let policy = RetryPolicy::default();
+        let long = Duration::from_secs(5);
+        assert_eq!(policy.wait_after(1, &asking(long)), Some(long));
+        let wait = policy.wait_after(1, &asking(Duration::from_millis(1))).unwrap();
+        assert!(wait >= Duration::from_millis(80), "{wait:?}");
+    }
+}

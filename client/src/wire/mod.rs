@@ -1,0 +1,79 @@
+//! The one place where the library's types become messages of `grasp.v1` and back.
+//!
+//! Functions named `*_to_wire` cannot fail: the server judges requests. Functions named `*_from_wire` refuse answers
+//! that break the contract, with the path of the offending field.
+
+mod geometry;
+mod hand;
+mod object;
+mod search;
+
+pub(crate) use object::{health_from_wire, new_object_to_wire, object_from_wire, object_page_from_wire};
+pub(crate) use search::{find_answer_from_wire, find_request_to_wire};
+
+use crate::error::ClientError;
+
+/// A field of an answer that breaks the contract.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Malformed {
+    path: String,
+    problem: String,
+}
+
+impl Malformed {
+    fn new(field: &str, problem: impl Into<String>) -> Self {
+        Self {
+            path: field.to_owned(),
+            problem: problem.into(),
+        }
+    }
+
+    fn missing(field: &str) -> Self {
+        Self::new(field, "is missing")
+    }
+
+    fn unknown_value(field: &str, value: i32) -> Self {
+        Self::new(field, format!("has the unknown value {value}"))
+    }
+
+    /// The same seen from the message that holds `parent`.
+    fn within(mut self, parent: &str) -> Self {
+        self.path = format!("{parent}.{}", self.path);
+        self
+    }
+}
+
+impl From<Malformed> for ClientError {
+    fn from(malformed: Malformed) -> Self {
+        Self::Malformed {
+            field: malformed.path,
+            problem: malformed.problem,
+        }
+    }
+}
+
+/// The value of a field that must be there.
+fn required<T>(field: &str, value: Option<T>) -> Result<T, Malformed> {
+    value.ok_or_else(|| Malformed::missing(field))
+}
+
+/// Converts every element of a repeated field, naming the one that is wrong.
+fn each<T, U>(
+    field: &str,
+    values: Vec<T>,
+    convert: impl Fn(T) -> Result<U, Malformed>,
+) -> Result<Vec<U>, Malformed> {
+    values
+        .into_iter()
+        .enumerate()
+        .map(|(i, value)| convert(value).map_err(|malformed| malformed.within(&format!("{field}[{i}]"))))
+        .collect()
+}
+
+/// A repeated field of fixed length.
+fn exactly<T, const N: usize>(field: &str, values: Vec<T>) -> Result<[T; N], Malformed> {
+    let count = values.len();
+    values
+        .try_into()
+        .map_err(|_| Malformed::new(field, format!("has {count} elements instead of {N}")))
+}

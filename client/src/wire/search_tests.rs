@@ -1,0 +1,223 @@
+use std::time::Duration;
+
+use glam::Vec3;
+
+use super::*;
+use crate::hand::{Digit, Handedness, JOINT_COUNT, Phalanx};
+
+fn wire_vector(x: f32) -> v1::Vector3 {
+    v1::Vector3 { x, y: 0.0, z: 0.0 }
+}
+
+/// An answer in which every number differs from every other, so that a swap of fields shows.
+fn wire_answer() -> v1::FindGraspResponse {
+    v1::FindGraspResponse {
+        outcome: v1::Outcome::Found.into(),
+        grasp: Some(v1::Grasp {
+            rig: "thesis".to_owned(),
+            handedness: v1::Handedness::Left.into(),
+            client_from_wrist: Some(v1::Pose {
+                position: Some(wire_vector(1.0)),
+                orientation: None,
+            }),
+            object_from_wrist: Some(v1::Pose {
+                position: Some(wire_vector(2.0)),
+                orientation: None,
+            }),
+            digits: vec![v1::DigitAngles::default(); 5],
+            joints: (0..26_u8)
+                .map(|i| v1::JointPose {
+                    client_from_joint: None,
+                    radius: f32::from(i),
+                })
+                .collect(),
+            contacts: vec![v1::Contact {
+                client_position: Some(wire_vector(3.0)),
+                client_normal: Some(wire_vector(4.0)),
+                object_position: Some(wire_vector(5.0)),
+                object_normal: Some(wire_vector(6.0)),
+                digit: v1::Digit::Ring.into(),
+                phalanx: v1::Phalanx::Third.into(),
+                triangle: 7,
+                client_force: Some(wire_vector(8.0)),
+                object_force: Some(wire_vector(9.0)),
+            }],
+            comfort: 10.0,
+            wrench_angle: 11.0,
+        }),
+        report: Some(v1::SearchReport {
+            attempts: 12,
+            pruned_placements: 13,
+            rejections: vec![
+                v1::RejectionCount {
+                    rejection: v1::Rejection::PalmCollision.into(),
+                    count: 14,
+                },
+                v1::RejectionCount {
+                    rejection: 99,
+                    count: 15,
+                },
+            ],
+            step_times: vec![v1::StepTime {
+                step: v1::Step::FingerPosing.into(),
+                time: Some(prost_types::Duration {
+                    seconds: 16,
+                    nanos: 0,
+                }),
+            }],
+            seed: u64::MAX,
+            attempt: Some(17),
+            search_time: Some(prost_types::Duration {
+                seconds: 0,
+                nanos: 18,
+            }),
+            budget: Some(prost_types::Duration {
+                seconds: 19,
+                nanos: 0,
+            }),
+            workers: 20,
+            nearest_miss: None,
+            strategy: v1::Strategy::F.into(),
+            validity: v1::Validity::Thesis.into(),
+        }),
+    }
+}
+
+fn path_of(answer: v1::FindGraspResponse) -> String {
+    find_answer_from_wire(answer).unwrap_err().path
+}
+
+#[test]
+fn an_answer_keeps_every_number_in_its_place() {
+    let answer = find_answer_from_wire(wire_answer()).unwrap();
+    let grasp = answer.grasp.unwrap();
+    assert_eq!(grasp.handedness, Handedness::Left);
+    assert_eq!(grasp.client_from_wrist.position.x, 1.0);
+    assert_eq!(grasp.object_from_wrist.position.x, 2.0);
+    assert_eq!(
+        grasp.joints.map(|joint| joint.radius),
+        std::array::from_fn::<f32, JOINT_COUNT, _>(|i| i as f32)
+    );
+    let expected = Contact {
+        client_position: Vec3::X * 3.0,
+        client_normal: Vec3::X * 4.0,
+        object_position: Vec3::X * 5.0,
+        object_normal: Vec3::X * 6.0,
+        digit: Digit::Ring,
+        phalanx: Phalanx::Third,
+        triangle: 7,
+        client_force: Vec3::X * 8.0,
+        object_force: Vec3::X * 9.0,
+    };
+    assert_eq!(grasp.contacts, [expected]);
+    assert_eq!((grasp.comfort, grasp.wrench_angle), (10.0, 11.0));
+    let report = answer.report;
+    assert_eq!((report.attempts, report.pruned_placements), (12, 13));
+    assert_eq!(report.rejections[0].rejection, Rejection::PalmCollision);
+    assert_eq!(report.rejections[0].count, 14);
+    assert_eq!(report.step_times[0].step, Step::FingerPosing);
+    assert_eq!(report.step_times[0].time, Duration::from_secs(16));
+    assert_eq!((report.seed, report.attempt), (u64::MAX, Some(17)));
+    assert_eq!(report.search_time, Duration::from_nanos(18));
+    assert_eq!(report.budget, Duration::from_secs(19));
+    assert_eq!(report.workers, 20);
+    assert_eq!(
+        (report.strategy, report.validity),
+        (Some(Strategy::F), Some(Validity::Thesis))
+    );
+}
+
+#[test]
+fn what_a_newer_server_reports_is_kept_apart_instead_of_refused() {
+    let mut wire = wire_answer();
+    let report = wire.report.as_mut().unwrap();
+    report.strategy = 77;
+    report.validity = 77;
+    report.step_times[0].step = 77;
+    let report = find_answer_from_wire(wire).unwrap().report;
+    assert_eq!(report.rejections[1].rejection, Rejection::Unrecognised);
+    assert_eq!(report.rejections[1].count, 15);
+    assert_eq!((report.strategy, report.validity), (None, None));
+    assert_eq!(report.step_times[0].step, Step::Unrecognised);
+}
+
+#[test]
+fn outcome_and_grasp_must_agree() {
+    let mut without_grasp = wire_answer();
+    without_grasp.grasp = None;
+    assert_eq!(path_of(without_grasp.clone()), "grasp");
+    without_grasp.outcome = v1::Outcome::BudgetExhausted.into();
+    let answer = find_answer_from_wire(without_grasp).unwrap();
+    assert_eq!((answer.outcome, answer.grasp), (Outcome::BudgetExhausted, None));
+    let mut with_grasp = wire_answer();
+    with_grasp.outcome = v1::Outcome::BudgetExhausted.into();
+    assert_eq!(path_of(with_grasp.clone()), "grasp");
+    with_grasp.outcome = 42;
+    assert_eq!(path_of(with_grasp), "outcome");
+}
+
+#[test]
+fn a_malformed_answer_is_refused_with_the_path_of_the_field() {
+    let mut wire = wire_answer();
+    wire.report = None;
+    assert_eq!(path_of(wire), "report");
+
+    let mut wire = wire_answer();
+    wire.grasp.as_mut().unwrap().joints.pop();
+    assert_eq!(
+        find_answer_from_wire(wire).unwrap_err(),
+        Malformed::new("joints", "has 25 elements instead of 26").within("grasp")
+    );
+
+    let mut wire = wire_answer();
+    wire.grasp.as_mut().unwrap().contacts[0].client_force = None;
+    assert_eq!(path_of(wire), "grasp.contacts[0].client_force");
+
+    let mut wire = wire_answer();
+    wire.report.as_mut().unwrap().step_times[0].time = None;
+    assert_eq!(path_of(wire), "report.step_times[0].time");
+}
+
+#[test]
+fn a_request_that_says_nothing_leaves_all_to_the_server() {
+    let wire = find_request_to_wire(&FindRequest::new("objects/remote"));
+    assert_eq!(wire.object, "objects/remote");
+    assert_eq!(wire.strategy(), v1::Strategy::Unspecified);
+    assert_eq!(wire.bend_ratios(), v1::BendRatios::Unspecified);
+    assert_eq!(wire.validity(), v1::Validity::Unspecified);
+    assert_eq!(wire.convention(), v1::Convention::Openxr);
+    assert_eq!((wire.budget, wire.seed, wire.up), (None, None, None));
+}
+
+#[test]
+fn a_request_keeps_what_it_says() {
+    let request = FindRequest {
+        up: Some(Vec3::Z),
+        budget: Some(Duration::from_millis(1500)),
+        max_attempts: Some(1),
+        strategy: Some(Strategy::D),
+        bend_ratios: Some(BendRatios::OnlyHigh),
+        validity: Some(Validity::Thesis),
+        seed: Some(2),
+        reproducible: true,
+        only_attempt: Some(3),
+        record_step_times: true,
+        convention: Convention::Unreal,
+        friction: Some(0.5),
+        ..FindRequest::new("objects/remote")
+    };
+    let wire = find_request_to_wire(&request);
+    assert_eq!(wire.up.unwrap().z, 1.0);
+    let budget = wire.budget.unwrap();
+    assert_eq!((budget.seconds, budget.nanos), (1, 500_000_000));
+    assert_eq!(
+        (wire.max_attempts, wire.seed, wire.only_attempt),
+        (Some(1), Some(2), Some(3))
+    );
+    assert_eq!(wire.strategy(), v1::Strategy::D);
+    assert_eq!(wire.bend_ratios(), v1::BendRatios::OnlyHigh);
+    assert_eq!(wire.validity(), v1::Validity::Thesis);
+    assert!(wire.reproducible && wire.record_step_times);
+    assert_eq!(wire.convention(), v1::Convention::Unreal);
+    assert_eq!(wire.friction, Some(0.5));
+}
