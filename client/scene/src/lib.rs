@@ -1,27 +1,25 @@
 //! Pictures (PNG) and scenes (GLB) of hands holding objects.
 //!
-//! To come; the interface is fixed: a [`Scene`] of coloured meshes and arrows is rendered to a PNG or written as GLB.
+//! A [`Scene`] of coloured meshes is rendered on the CPU ([`render::render`]) or written as a binary glTF file
+//! ([`glb::to_glb`]). [`handover::HandoverScene`] builds one from an object, hands, contacts and forces.
+//!
+//! Right-handed, +Y up, metres. Colours are linear, not sRGB, unless a name says otherwise. The same scene gives the
+//! same bytes for any number of threads.
 
-use glam::Vec3;
+pub mod camera;
+mod font;
+pub mod image;
+mod normals;
+mod occlusion;
+pub mod primitives;
+pub mod raster;
+pub mod render;
+pub mod scene;
+mod shading;
+mod shadow;
+mod surface;
 
-/// A smooth or flat shaded triangle mesh of one colour.
-#[derive(Clone, Debug)]
-pub struct Part {
-    /// Name of the node in the GLB.
-    pub name: String,
-    /// Vertex positions in metres, in the scene's frame (+Y up).
-    pub positions: Vec<Vec3>,
-    /// Triangles, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Linear RGBA, each 0 to 1.
-    pub colour: [f32; 4],
-    /// Smooth normals across edges flatter than this angle in radians; 0 shades every triangle flat.
-    pub crease_angle: f32,
-}
-
-/// Parts that are seen together.
-#[derive(Clone, Debug, Default)]
-pub struct Scene {
-    /// What is in it.
-    pub parts: Vec<Part>,
-}
+pub use camera::Camera;
+pub use image::{Image, contact_sheet, side_by_side};
+pub use render::{RenderOptions, render, render_png};
+pub use scene::{Finish, Part, Scene, linear_from_srgb};

@@ -1,0 +1,117 @@
+//! What a picture or a GLB file shows: parts with a colour and a finish.
+
+use glam::Vec3;
+
+/// Smooth normals across edges flatter than this, in radians (40°): rounds tessellated curves, keeps box edges sharp.
+pub const DEFAULT_CREASE_ANGLE: f32 = 0.7;
+
+/// How a surface takes the light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Finish {
+    /// Plastic with a soft highlight.
+    #[default]
+    Satin,
+    /// Brushed metal: the colour is that of its reflections.
+    Metal,
+    /// Skin: light bleeds past the terminator, reddish.
+    Skin,
+    /// Fabric: no highlight, brighter toward the outline.
+    Cloth,
+    /// A contact or a force: evenly lit, and shining faintly through what hides it.
+    Marker,
+}
+
+/// A smooth or flat shaded triangle mesh.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Name of the node in the GLB.
+    pub name: String,
+    /// Vertex positions in metres, in the scene's frame (+Y up).
+    pub positions: Vec<Vec3>,
+    /// Triangles, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Linear RGBA, each 0 to 1. Alpha below 1 is drawn in steps of one sample of the anti-aliasing grid.
+    pub colour: [f32; 4],
+    /// Linear RGB factors on `colour`, one a vertex; empty: 1 everywhere.
+    pub vertex_tints: Vec<Vec3>,
+    /// Smooth normals across edges flatter than this angle in radians; 0 shades every triangle flat. Vertices at the
+    /// same place count as one, so seams of a file do not show.
+    pub crease_angle: f32,
+    /// How it takes the light.
+    pub finish: Finish,
+    /// What the GLB node carries as `extras`.
+    pub extras: Option<serde_json::Value>,
+}
+
+impl Part {
+    /// A part of one colour with the default crease angle and finish.
+    pub fn new(
+        name: impl Into<String>,
+        positions: Vec<Vec3>,
+        triangles: Vec<[u32; 3]>,
+        colour: [f32; 4],
+    ) -> Self {
+        Self {
+            name: name.into(),
+            positions,
+            triangles,
+            colour,
+            vertex_tints: Vec::new(),
+            crease_angle: DEFAULT_CREASE_ANGLE,
+            finish: Finish::default(),
+            extras: None,
+        }
+    }
+
+    /// The same part with another finish.
+    #[must_use]
+    pub fn with_finish(self, finish: Finish) -> Self {
+        Self { finish, ..self }
+    }
+
+    /// The colour of a vertex: the part's times the vertex' tint.
+    pub(crate) fn vertex_colour(&self, vertex: u32) -> Vec3 {
+        let [r, g, b, _] = self.colour;
+        let tint = self
+            .vertex_tints
+            .get(vertex as usize)
+            .copied()
+            .unwrap_or(Vec3::ONE);
+        Vec3::new(r, g, b) * tint
+    }
+}
+
+/// Parts that are seen together.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// What is in it.
+    pub parts: Vec<Part>,
+}
+
+impl Scene {
+    /// Every vertex of every part.
+    pub fn points(&self) -> impl Iterator<Item = Vec3> + Clone + '_ {
+        self.parts.iter().flat_map(|part| part.positions.iter().copied())
+    }
+
+    /// The corners of the smallest box around all parts along the axes; none for a scene without vertices.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        self.points()
+            .map(|p| (p, p))
+            .reduce(|(min, max), (p, _)| (min.min(p), max.max(p)))
+    }
+}
+
+/// Linear RGBA of an opaque sRGB colour as graphics programs show it, 0 to 255 a channel.
+pub fn linear_from_srgb(red: u8, green: u8, blue: u8) -> [f32; 4] {
+    // IEC 61966-2-1.
+    let channel = |value: u8| {
+        let value = f32::from(value) / 255.0;
+        if value <= 0.040_45 {
+            value / 12.92
+        } else {
+            ((value + 0.055) / 1.055).powf(2.4)
+        }
+    };
+    [channel(red), channel(green), channel(blue), 1.0]
+}
