@@ -1,6 +1,18 @@
-//! The built-in hands: rig and skin of `thesis` and `adult`, left and right. To come; the interface is fixed.
+//! The built-in hands: rig and skin of `thesis` and `adult`, left and right; and the reader for skins.
 
-use grasp_synthesis::hand::{Handedness, rig::Rig, skin::Skin};
+use std::sync::LazyLock;
+
+use glam::{Affine3A, Mat4, Vec3};
+use grasp_synthesis::{
+    hand::{
+        Handedness,
+        description::{RigDescription, RigViolation},
+        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index, openxr_from_thesis_frame},
+        rig::Rig,
+        skin::Skin,
+    },
+    pose::Pose,
+};
 
 /// The names of the built-in rigs.
 pub const RIG_NAMES: [&str; 2] = ["thesis", "adult"];
@@ -10,13 +22,222 @@ pub const RIG_NAMES: [&str; 2] = ["thesis", "adult"];
 pub struct Hand {
     /// Bones, limits, widths and collision segments.
     pub rig: Rig,
-    /// The skin, bound to the 26 joints of the stretched hand in the wrist frame.
+    /// The skin in the wrist frame, bound to the 26 joints of a relaxed, slightly spread hand.
     pub skin: Skin,
-    /// The same hand as a GLB file with WebXR joint names.
+    /// The same hand as a GLB file with WebXR joint names, in the `OpenXR` frame of the wrist.
     pub glb: &'static [u8],
 }
 
 /// A built-in hand, parsed once.
-pub fn hand(_rig: &str, _handedness: Handedness) -> Option<&'static Hand> {
-    None
+pub fn hand(rig: &str, handedness: Handedness) -> Option<&'static Hand> {
+    static HANDS: LazyLock<[Hand; 4]> = LazyLock::new(|| FILES.map(|(json, glb)| built_in(json, glb)));
+    HANDS
+        .iter()
+        .find(|hand| hand.rig.name == rig && hand.rig.handedness == handedness)
+}
+
+/// The embedded files: description and GLB.
+const FILES: [(&str, &[u8]); 4] = [
+    (
+        include_str!("../hands/thesis_left.json"),
+        include_bytes!("../hands/thesis_left.glb"),
+    ),
+    (
+        include_str!("../hands/thesis_right.json"),
+        include_bytes!("../hands/thesis_right.glb"),
+    ),
+    (
+        include_str!("../hands/adult_left.json"),
+        include_bytes!("../hands/adult_left.glb"),
+    ),
+    (
+        include_str!("../hands/adult_right.json"),
+        include_bytes!("../hands/adult_right.glb"),
+    ),
+];
+
+/// What the embedded files say. They are made by the generator and read by the tests, so that they cannot be broken
+/// in a build that passed.
+fn built_in(json: &str, glb: &'static [u8]) -> Hand {
+    let rig = read_rig(json).expect("an embedded rig is valid");
+    let skin = read_skin(glb, &rig).expect("an embedded skin is valid");
+    Hand { rig, skin, glb }
+}
+
+/// Why a rig or a skin was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum HandError {
+    /// The description is not JSON of the right form.
+    #[error("the rig description cannot be read: {0}")]
+    Json(#[from] serde_json::Error),
+    /// The description says something that no hand can be.
+    #[error("the rig description is invalid: {}", list(.0))]
+    Rig(Vec<RigViolation>),
+    /// The file is not glTF.
+    #[error("the skin cannot be read: {0}")]
+    Gltf(#[from] gltf::Error),
+    /// Something that a skinned hand needs is not in the file.
+    #[error("the skin has no {0}")]
+    Missing(&'static str),
+    /// A joint of the hand is not among the skin's joints.
+    #[error("the skin has no joint named {0}")]
+    MissingJoint(&'static str),
+    /// A vertex attribute has the wrong number of rows, or an index is out of range.
+    #[error("the skin's {0} do not fit its positions or joints")]
+    Mismatch(&'static str),
+}
+
+fn list(violations: &[RigViolation]) -> String {
+    violations
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join("; ")
+}
+
+/// A rig from its description.
+///
+/// # Errors
+/// The text is not such a description, or it is invalid; then with all violations.
+pub fn read_rig(json: &str) -> Result<Rig, HandError> {
+    serde_json::from_str::<RigDescription>(json)?
+        .to_rig()
+        .map_err(HandError::Rig)
+}
+
+/// The skin of a rig from a GLB file with WebXR joint names, brought into the wrist frame of the thesis. The joints
+/// may have any order; those with other names are not used. The radii are those of the rig.
+///
+/// # Errors
+/// The file is not a GLB with one skinned mesh, or a joint is missing.
+pub fn read_skin(glb: &[u8], rig: &Rig) -> Result<Skin, HandError> {
+    let file = gltf::Gltf::from_slice(glb)?;
+    let blob = file.blob.as_deref().ok_or(HandError::Missing("binary chunk"))?;
+    let (mesh, skin) = file
+        .nodes()
+        .find_map(|node| node.mesh().zip(node.skin()))
+        .ok_or(HandError::Missing("skinned mesh"))?;
+    let primitive = mesh.primitives().next().ok_or(HandError::Missing("triangles"))?;
+    let reader = primitive.reader(|_| Some(blob));
+    let positions: Vec<Vec3> = reader
+        .read_positions()
+        .ok_or(HandError::Missing("positions"))?
+        .map(Vec3::from)
+        .collect();
+    let corners: Vec<u32> = reader
+        .read_indices()
+        .ok_or(HandError::Missing("triangle indices"))?
+        .into_u32()
+        .collect();
+    let file_joints: Vec<[u16; 4]> = reader
+        .read_joints(0)
+        .ok_or(HandError::Missing("joint indices"))?
+        .into_u16()
+        .collect();
+    let weights: Vec<[f32; 4]> = reader
+        .read_weights(0)
+        .ok_or(HandError::Missing("weights"))?
+        .into_f32()
+        .collect();
+    let inverse_binds: Vec<Mat4> = skin
+        .reader(|_| Some(blob))
+        .read_inverse_bind_matrices()
+        .ok_or(HandError::Missing("inverse bind matrices"))?
+        .map(|columns| Mat4::from_cols_array_2d(&columns))
+        .collect();
+
+    // From the file's order of joints to that of OpenXR, by name.
+    let openxr_index: Vec<Option<usize>> = skin
+        .joints()
+        .map(|joint| {
+            let name = joint.name()?;
+            JOINT_NAMES.iter().position(|&known| known == name)
+        })
+        .collect();
+    let bind = bind_joints(rig, &openxr_index, &inverse_binds)?;
+
+    if corners.iter().any(|&v| v as usize >= positions.len()) || corners.len() % 3 != 0 {
+        return Err(HandError::Mismatch("triangle indices"));
+    }
+    if weights.len() != positions.len() || file_joints.len() != positions.len() {
+        return Err(HandError::Mismatch("weights"));
+    }
+    let joint_indices = file_joints
+        .iter()
+        .zip(&weights)
+        .map(|(joints, weights)| vertex_joints(*joints, *weights, &openxr_index))
+        .collect::<Result<_, _>>()?;
+    // The file is in the OpenXR frame of the wrist; the skin is wanted in the thesis' frame of the same place.
+    let wrist_from_file = openxr_from_thesis_frame(Pose::IDENTITY) * wrist_in_file(&bind).inverse();
+    Ok(Skin {
+        positions: positions
+            .into_iter()
+            .map(|p| wrist_from_file.transform_point(p))
+            .collect(),
+        triangles: corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
+        joint_indices,
+        weights,
+        bind: bind.transformed(wrist_from_file),
+    })
+}
+
+fn wrist_in_file(bind: &HandJoints) -> Pose {
+    bind.joints[index::WRIST].pose
+}
+
+/// The `OpenXR` indices of a vertex's joints; those without weight may be anything.
+fn vertex_joints(
+    joints: [u16; 4],
+    weights: [f32; 4],
+    openxr_index: &[Option<usize>],
+) -> Result<[u8; 4], HandError> {
+    let mut found = [0; 4];
+    for i in 0..4 {
+        if weights[i] > 0.0 {
+            let joint = openxr_index.get(usize::from(joints[i])).copied().flatten();
+            found[i] = joint.ok_or(HandError::Mismatch("joint indices"))? as u8;
+        }
+    }
+    Ok(found)
+}
+
+/// The joints in the bind pose, in the file's frame. The file has no palm joint: it is the middle of the middle
+/// metacarpal.
+fn bind_joints(
+    rig: &Rig,
+    openxr_index: &[Option<usize>],
+    inverse_binds: &[Mat4],
+) -> Result<HandJoints, HandError> {
+    let mut poses: [Option<Pose>; JOINT_COUNT] = [None; JOINT_COUNT];
+    for (joint, inverse_bind) in openxr_index.iter().zip(inverse_binds) {
+        if let Some(joint) = *joint {
+            let bind = Affine3A::from_mat4(inverse_bind.inverse());
+            let (_, orientation, position) = bind.to_scale_rotation_translation();
+            poses[joint] = Some(Pose {
+                position,
+                orientation: orientation.normalize(),
+            });
+        }
+    }
+    let middle = index::FIRST_OF_DIGIT[2];
+    if let (Some(metacarpal), Some(knuckle)) = (poses[middle], poses[middle + 1]) {
+        poses[index::PALM] = Some(Pose {
+            position: metacarpal.position.midpoint(knuckle.position),
+            orientation: metacarpal.orientation,
+        });
+    }
+    let mut joints = [Joint {
+        pose: Pose::IDENTITY,
+        radius: 0.0,
+    }; JOINT_COUNT];
+    for (i, joint) in joints.iter_mut().enumerate() {
+        *joint = Joint {
+            pose: poses[i].ok_or(HandError::MissingJoint(JOINT_NAMES[i]))?,
+            radius: rig.joint_radii[i],
+        };
+    }
+    Ok(HandJoints {
+        handedness: rig.handedness,
+        joints,
+    })
 }

@@ -1,5 +1,6 @@
 //! The hand: its rig, its pose, where its bones, joints and skin are.
 
+pub mod description;
 pub mod joints;
 pub mod kinematics;
 pub mod rig;
