@@ -5,7 +5,10 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use crate::{
-    geometry::mesh_bvh::MeshBvh,
+    geometry::{
+        mesh::{MeshError, TriangleMesh},
+        mesh_bvh::MeshBvh,
+    },
     hand::{joints::HandJoints, skin::Skin},
     object::GraspObject,
     pose::Pose,
@@ -39,22 +42,75 @@ pub enum PresentingHandError {
     /// The joints collapse the skin.
     #[error("the joint poses fold the skin into triangles without area")]
     Collapsed,
+    /// A joint is not a number, or so far away that the skin is not.
+    #[error(
+        "the joint poses put vertex {vertex} of the skin at infinity; they must be finite and near the object"
+    )]
+    NotFinite {
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// The skin itself is broken.
+    #[error("the skin is not a mesh: {0}")]
+    Skin(MeshError),
+}
+
+/// Why a holdout was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HoldoutError {
+    /// Up is not a direction.
+    #[error("up is {0}; it must be a unit vector")]
+    Up(Vec3),
+}
+
+impl Holdout {
+    /// An object held out, with everything in its own frame; `up` points against gravity.
+    ///
+    /// # Errors
+    /// `up` is not a unit vector.
+    pub fn new(
+        object: Arc<GraspObject>,
+        presenting_hand: Option<PresentingHand>,
+        up: Vec3,
+    ) -> Result<Self, HoldoutError> {
+        if !up.is_normalized() {
+            return Err(HoldoutError::Up(up));
+        }
+        Ok(Self {
+            object,
+            presenting_hand,
+            up,
+        })
+    }
 }
 
 impl PresentingHand {
-    /// Poses a skin on joints that are given in the object's frame.
+    /// Poses a skin on joints that are given in the object's frame. Triangles that the pose collapses are left out.
     ///
     /// # Errors
-    /// The joints collapse the skin.
+    /// The joints collapse the whole skin or are not finite.
     pub fn new(skin: &Skin, joints: HandJoints) -> Result<Self, PresentingHandError> {
-        let _ = (skin, joints);
-        Err(PresentingHandError::Collapsed)
+        let mesh =
+            TriangleMesh::without_degenerates(skin.posed(&joints), &skin.triangles).map_err(|error| {
+                match error {
+                    MeshError::Empty => PresentingHandError::Collapsed,
+                    MeshError::NotFinite { vertex } => PresentingHandError::NotFinite { vertex },
+                    broken @ (MeshError::IndexOutOfRange { .. } | MeshError::Degenerate { .. }) => {
+                        PresentingHandError::Skin(broken)
+                    }
+                }
+            })?;
+        Ok(Self {
+            palm: joints.palm_skin(),
+            joints,
+            surface: MeshBvh::build_quick(mesh),
+        })
     }
 
     /// The same for joints in another frame.
     ///
     /// # Errors
-    /// The joints collapse the skin.
+    /// The joints collapse the whole skin or are not finite.
     pub fn in_frame(
         skin: &Skin,
         joints: &HandJoints,

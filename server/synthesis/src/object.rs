@@ -7,6 +7,10 @@ use crate::geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::Orien
 /// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
 pub const THESIS_FRICTION: f32 = 0.34;
 
+/// How many forbidden triangles that do not exist are named one by one. More would help nobody and let a client ask
+/// for an answer as long as its request.
+pub const MAX_NAMED_TRIANGLES: usize = 10;
+
 /// An object with everything that the synthesis asks of it, in the object's own frame.
 #[derive(Clone, Debug)]
 pub struct GraspObject {
@@ -44,13 +48,22 @@ pub enum ObjectError {
         /// How many triangles there are.
         triangles: usize,
     },
+    /// Many forbidden triangles do not exist; the first are named one by one.
+    #[error("{count} more forbidden triangles do not exist; the mesh has {triangles}")]
+    MoreForbiddenTriangles {
+        /// How many are not named.
+        count: usize,
+        /// How many triangles there are.
+        triangles: usize,
+    },
 }
 
 impl GraspObject {
     /// Builds the search structures of an object.
     ///
     /// # Errors
-    /// Every violation found.
+    /// Every violation found, except that of forbidden triangles that do not exist only the first
+    /// [`MAX_NAMED_TRIANGLES`] are named and the others counted.
     pub fn new(
         mesh: TriangleMesh,
         mass: f32,
@@ -70,11 +83,24 @@ impl GraspObject {
         }
         let triangles = mesh.triangles().len();
         let mut forbidden = vec![false; triangles];
+        let mut unknown = Vec::new();
         for &triangle in forbidden_triangles {
             match forbidden.get_mut(triangle as usize) {
                 Some(flag) => *flag = true,
-                None => errors.push(ObjectError::ForbiddenTriangle { triangle, triangles }),
+                None => unknown.push(triangle),
             }
+        }
+        errors.extend(
+            unknown
+                .iter()
+                .take(MAX_NAMED_TRIANGLES)
+                .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
+        );
+        if unknown.len() > MAX_NAMED_TRIANGLES {
+            errors.push(ObjectError::MoreForbiddenTriangles {
+                count: unknown.len() - MAX_NAMED_TRIANGLES,
+                triangles,
+            });
         }
         if !errors.is_empty() {
             return Err(errors);

@@ -1,6 +1,8 @@
 //! Triangle meshes.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+
+use super::aabb::Aabb;
 
 /// A triangle mesh: every index is in range, every coordinate finite, no triangle without area.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,25 +50,37 @@ impl TriangleMesh {
         if triangles.is_empty() {
             return Err(MeshError::Empty);
         }
-        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(MeshError::NotFinite { vertex });
-        }
+        check_finite(&positions)?;
         for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= positions.len()) {
-                return Err(MeshError::IndexOutOfRange {
-                    triangle,
-                    vertex,
-                    vertices: positions.len(),
-                });
-            }
-            let [a, b, c] = corners.map(|v| positions[v as usize]);
-            // NaN-safe: an overflowing product must not count as an area.
-            let doubled_area = (b - a).cross(c - a).length();
-            if !(doubled_area.is_finite() && doubled_area > 0.0) {
+            check_indices(triangle, *corners, positions.len())?;
+            if !has_area(&positions, *corners) {
                 return Err(MeshError::Degenerate { triangle });
             }
         }
         Ok(Self { positions, triangles })
+    }
+
+    /// The same, but triangles without area are left out: for meshes that are deformed. Indices of triangles then mean
+    /// those that remain.
+    ///
+    /// # Errors
+    /// The first thing that is wrong; [`MeshError::Empty`] if no triangle remains.
+    pub fn without_degenerates(positions: Vec<Vec3>, triangles: &[[u32; 3]]) -> Result<Self, MeshError> {
+        check_finite(&positions)?;
+        let mut kept = Vec::with_capacity(triangles.len());
+        for (triangle, corners) in triangles.iter().enumerate() {
+            check_indices(triangle, *corners, positions.len())?;
+            if has_area(&positions, *corners) {
+                kept.push(*corners);
+            }
+        }
+        if kept.is_empty() {
+            return Err(MeshError::Empty);
+        }
+        Ok(Self {
+            positions,
+            triangles: kept,
+        })
     }
 
     /// The vertices in metres.
@@ -86,13 +100,86 @@ impl TriangleMesh {
 
     /// The outward unit normal of a triangle.
     pub fn normal(&self, triangle: usize) -> Vec3 {
-        let [a, b, c] = self.corners(triangle);
-        // Scaled first: the product of two tiny edges would underflow.
-        let scale = (b - a)
-            .abs()
-            .max_element()
-            .max((c - a).abs().max_element())
-            .recip();
-        ((b - a) * scale).cross((c - a) * scale).normalize_or(Vec3::Y)
+        // In f64, so that slivers and tiny triangles get a sound normal: products of f32 differences are exact there.
+        let [a, b, c] = self.corners(triangle).map(Vec3::as_dvec3);
+        (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3()
     }
+
+    /// The axis-aligned box around the triangles.
+    pub fn aabb(&self) -> Aabb {
+        Aabb::around(
+            self.triangles
+                .iter()
+                .flatten()
+                .map(|&v| self.positions[v as usize]),
+        )
+    }
+
+    /// Area of the surface in m².
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len())
+            .map(|triangle| {
+                let [a, b, c] = self.corners(triangle).map(Vec3::as_dvec3);
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .sum()
+    }
+
+    /// The volume in m³ by the divergence theorem: negative if the mesh is inside out. Overlapping parts count twice;
+    /// it means nothing for a mesh that is not closed.
+    pub fn signed_volume(&self) -> f64 {
+        self.volume_moments().0
+    }
+
+    /// The centroid of the volume in metres: the centre of mass of a homogeneous body. None if the mesh encloses no
+    /// volume: if it is below a billionth of that of its box, or the centroid falls outside that box, as for a mesh
+    /// that is far from closed.
+    pub fn volume_centroid(&self) -> Option<Vec3> {
+        /// Share of the box's volume that is taken for the sum of rounding errors.
+        const NO_VOLUME: f64 = 1e-9;
+        let aabb = self.aabb();
+        let (volume, centroid) = self.volume_moments();
+        let of_box = aabb.extents().as_dvec3().element_product();
+        let centroid = centroid.as_vec3();
+        (volume.abs() > NO_VOLUME * of_box && aabb.contains(centroid)).then_some(centroid)
+    }
+
+    /// Volume and centroid: the sums over the tetrahedra between the triangles and a point in the middle of the mesh.
+    fn volume_moments(&self) -> (f64, DVec3) {
+        let origin = self.aabb().centre().as_dvec3();
+        let mut volume = 0.0;
+        let mut moment = DVec3::ZERO;
+        for triangle in 0..self.triangles.len() {
+            let [a, b, c] = self.corners(triangle).map(|corner| corner.as_dvec3() - origin);
+            let tetrahedron = a.dot(b.cross(c)) / 6.0;
+            volume += tetrahedron;
+            moment += tetrahedron * 0.25 * (a + b + c);
+        }
+        (volume, origin + moment / volume)
+    }
+}
+
+fn check_finite(positions: &[Vec3]) -> Result<(), MeshError> {
+    match positions.iter().position(|p| !p.is_finite()) {
+        Some(vertex) => Err(MeshError::NotFinite { vertex }),
+        None => Ok(()),
+    }
+}
+
+fn check_indices(triangle: usize, corners: [u32; 3], vertices: usize) -> Result<(), MeshError> {
+    match corners.into_iter().find(|&v| v as usize >= vertices) {
+        Some(vertex) => Err(MeshError::IndexOutOfRange {
+            triangle,
+            vertex,
+            vertices,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// True if the corners span an area that is a normal `f32`; indices must be in range.
+fn has_area(positions: &[Vec3], corners: [u32; 3]) -> bool {
+    let [a, b, c] = corners.map(|v| positions[v as usize]);
+    // In f32, like the search structures: what underflows or overflows there must not count as an area.
+    (b - a).cross(c - a).length().is_normal()
 }

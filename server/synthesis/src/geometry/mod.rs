@@ -1,8 +1,14 @@
 //! Segments, meshes, bounding boxes and the queries that the synthesis needs.
 
+pub mod aabb;
+mod closest;
+mod containment;
+mod crossing;
 pub mod mesh;
 pub mod mesh_bvh;
 pub mod oriented_box;
+pub mod topology;
+mod wide_bvh;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

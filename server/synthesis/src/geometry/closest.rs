@@ -1,0 +1,180 @@
+//! The closest point of a surface: branch and bound, four boxes and four triangles at a time.
+
+use glam::{DVec3, Vec3, Vec4};
+
+use super::{
+    crossing::{cross, dot, lanes},
+    mesh::TriangleMesh,
+    wide_bvh::{Child, ChildRef, Node, TrianglePack, WideBvh},
+};
+
+/// Relative slack of a squared distance to a box: a few roundings, so that a box is never left out by one.
+const BOX_SLACK: f32 = 1.0 - 8.0 * f32::EPSILON;
+
+/// A child that waits, with the squared distance to its box.
+#[derive(Clone, Copy, Default)]
+struct Waiting {
+    squared_distance: f32,
+    child: ChildRef,
+}
+
+/// The triangle that is closest to a point, the closest point on it and its distance, if that is at most
+/// `max_distance` metres.
+pub(super) fn closest(
+    bvh: &WideBvh,
+    mesh: &TriangleMesh,
+    point: Vec3,
+    max_distance: f32,
+) -> Option<(u32, Vec3, f32)> {
+    if !(point.is_finite() && max_distance >= 0.0) {
+        return None;
+    }
+    let splat = [Vec4::splat(point.x), Vec4::splat(point.y), Vec4::splat(point.z)];
+    // Slightly more than asked for; the last step compares exactly.
+    let mut best = (max_distance * max_distance).max(f32::MIN_POSITIVE) / (BOX_SLACK * BOX_SLACK);
+    let mut winner = None;
+    bvh.with_stack(|stack: &mut [Waiting]| {
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let Waiting {
+                squared_distance,
+                child,
+            } = stack[height];
+            if squared_distance > best {
+                continue;
+            }
+            match child.child() {
+                Child::Node(index) => {
+                    let node = &bvh.nodes[index];
+                    let distances = box_distances(node, &splat);
+                    let near = distances.cmple(Vec4::splat(best)).bitmask();
+                    let distances = distances.to_array();
+                    let base = height;
+                    for lane in lanes(near) {
+                        let waiting = Waiting {
+                            squared_distance: distances[lane],
+                            child: node.children[lane],
+                        };
+                        // Insertion by falling distance: the closest child is taken up next.
+                        let mut place = height;
+                        while place > base && stack[place - 1].squared_distance < waiting.squared_distance {
+                            stack[place] = stack[place - 1];
+                            place -= 1;
+                        }
+                        stack[place] = waiting;
+                        height += 1;
+                    }
+                }
+                Child::Pack(index) => {
+                    let pack = &bvh.packs[index];
+                    let distances = pack_distances(pack, &splat);
+                    let closer = distances.cmplt(Vec4::splat(best)).bitmask();
+                    for lane in lanes(closer) {
+                        if distances[lane] < best {
+                            best = distances[lane];
+                            winner = Some(pack.triangle(lane));
+                        }
+                    }
+                }
+            }
+        }
+    });
+    let triangle = winner?;
+    let exact = closest_on_triangle(mesh.corners(triangle as usize), point.as_dvec3());
+    let distance = exact.distance(point.as_dvec3());
+    (distance <= f64::from(max_distance)).then_some((triangle, exact.as_vec3(), distance as f32))
+}
+
+/// Squared distances to the boxes of a node's children; 0 inside, ∞ for unused children.
+#[inline]
+fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
+    let [least, most] = &node.bounds;
+    let outside: [Vec4; 3] = std::array::from_fn(|axis| {
+        (least[axis] - point[axis])
+            .max(point[axis] - most[axis])
+            .max(Vec4::ZERO)
+    });
+    dot(&outside, &outside) * BOX_SLACK
+}
+
+/// Squared distances to the triangles of a pack; NaN for unused lanes.
+///
+/// Without branches: the distance to the plane where the point's projection falls inside, else the least of the
+/// distances to the three edges.
+#[inline]
+fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
+    let c: [Vec4; 3] = std::array::from_fn(|axis| point[axis] - pack.corner[axis]);
+    let edge3: [Vec4; 3] = std::array::from_fn(|axis| pack.edge2[axis] - pack.edge1[axis]);
+    let from_second: [Vec4; 3] = std::array::from_fn(|axis| c[axis] - pack.edge1[axis]);
+
+    let d1 = dot(&pack.edge1, &c);
+    let d2 = dot(&pack.edge2, &c);
+    let length1 = dot(&pack.edge1, &pack.edge1);
+    let length2 = dot(&pack.edge2, &pack.edge2);
+
+    // Which side of each edge the projection is on. Not by the usual products of dot products, which are off by the
+    // square of a sliver's slenderness.
+    let around_first = cross(&c, &pack.normal);
+    let around_second = cross(&from_second, &pack.normal);
+    let inside = dot(&pack.edge1, &around_first)
+        .min(-dot(&pack.edge2, &around_first))
+        .min(dot(&edge3, &around_second))
+        .cmpge(Vec4::ZERO);
+    let height = dot(&pack.normal, &c);
+
+    let edges = edge_distance(&c, &pack.edge1, d1, length1)
+        .min(edge_distance(&c, &pack.edge2, d2, length2))
+        .min(edge_distance(
+            &from_second,
+            &edge3,
+            dot(&edge3, &from_second),
+            dot(&edge3, &edge3),
+        ));
+    Vec4::select(inside, height * height, edges)
+}
+
+/// Squared distances from points to edges: `from_start` is the point seen from the edge's start, `along` its product
+/// with the edge.
+#[inline]
+fn edge_distance(from_start: &[Vec4; 3], edge: &[Vec4; 3], along: Vec4, squared_length: Vec4) -> Vec4 {
+    let t = (along / squared_length).max(Vec4::ZERO).min(Vec4::ONE);
+    let offset: [Vec4; 3] = std::array::from_fn(|axis| from_start[axis] - edge[axis] * t);
+    dot(&offset, &offset)
+}
+
+/// The point of a triangle that is closest to `point`, in double precision (C. Ericson: Real-Time Collision
+/// Detection, 2005, 5.1.5: the Voronoi regions of the corners, the edges and the face in turn).
+fn closest_on_triangle(corners: [Vec3; 3], point: DVec3) -> DVec3 {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    let (ab, ac) = (b - a, c - a);
+    let ap = point - a;
+    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a;
+    }
+    let bp = point - b;
+    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b;
+    }
+    let beyond_ab = d1 * d4 - d3 * d2;
+    if beyond_ab <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return a + ab * (d1 / (d1 - d3));
+    }
+    let cp = point - c;
+    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c;
+    }
+    let beyond_ac = d5 * d2 - d1 * d6;
+    if beyond_ac <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return a + ac * (d2 / (d2 - d6));
+    }
+    let beyond_bc = d3 * d6 - d5 * d4;
+    if beyond_bc <= 0.0 && d4 >= d3 && d5 >= d6 {
+        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+    }
+    let scale = (beyond_bc + beyond_ac + beyond_ab).recip();
+    a + ab * (beyond_ac * scale) + ac * (beyond_ab * scale)
+}

@@ -1,0 +1,327 @@
+//! Where segments cross triangles.
+//!
+//! Every query runs in two stages. The first tests four triangles at once in `f32` (T. Möller, B. Trumbore: Fast,
+//! Minimum Storage Ray-Triangle Intersection, 1997) and knows how far its rounding can be off. What is certain is
+//! taken; what is not, because the segment passes within rounding of an edge or an endpoint lies within rounding of
+//! the surface, is decided by the second stage in `f64`. So no crossing is lost near the ends of a segment, and none
+//! between two triangles that share an edge.
+
+use glam::{BVec4A, DVec3, Vec3, Vec4};
+
+use super::{
+    Segment,
+    mesh::TriangleMesh,
+    wide_bvh::{Child, ChildRef, Node, TrianglePack, WideBvh},
+};
+
+/// Bound of the relative rounding error of the `f32` stage, in units of the product of the lengths involved: about 20
+/// operations of half an epsilon each. Larger is safe and sends more triangles to the `f64` stage; smaller may lose
+/// crossings.
+const ROUNDING: f32 = 16.0 * f32::EPSILON;
+
+/// Relative slack of the interval in which a segment passes a box: three roundings each of two plane distances.
+/// Larger is safe and visits more nodes.
+const SLAB_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
+
+/// Stands for a component of the direction that is zero, in metres, so that its inverse is finite: far below the
+/// spacing of coordinates, and its inverse times any coordinate does not overflow.
+const TINY_COMPONENT: f32 = 1e-18;
+
+/// A segment as the inner loops want it: start + t·direction for t from 0 to 1.
+pub(super) struct Query {
+    start: [Vec4; 3],
+    direction: [Vec4; 3],
+    inverse: [Vec4; 3],
+    /// By axis: 0 if the segment runs toward larger coordinates, 1 if toward smaller ones.
+    near: [usize; 3],
+    length: f32,
+    exact: ExactQuery,
+}
+
+impl Query {
+    /// Prepares a segment.
+    #[inline]
+    pub(super) fn new(segment: Segment) -> Self {
+        let direction = segment.end - segment.start;
+        let safe = direction
+            .abs()
+            .max(Vec3::splat(TINY_COMPONENT))
+            .copysign(direction);
+        let inverse = safe.recip();
+        let splat = |v: Vec3| [Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z)];
+        Self {
+            start: splat(segment.start),
+            direction: splat(direction),
+            inverse: splat(inverse),
+            near: [
+                usize::from(inverse.x < 0.0),
+                usize::from(inverse.y < 0.0),
+                usize::from(inverse.z < 0.0),
+            ],
+            length: direction.length(),
+            exact: ExactQuery {
+                start: segment.start.as_dvec3(),
+                direction: segment.end.as_dvec3() - segment.start.as_dvec3(),
+            },
+        }
+    }
+
+    /// Which children's boxes the segment enters before `t_max`.
+    #[inline]
+    fn entered(&self, node: &Node, t_max: Vec4) -> u32 {
+        let plane = |side: usize, axis: usize| {
+            (node.bounds[(self.near[axis] ^ side) & 1][axis] - self.start[axis]) * self.inverse[axis]
+        };
+        let enter = plane(0, 0).max(plane(0, 1)).max(plane(0, 2).max(Vec4::ZERO));
+        let leave = plane(1, 0).min(plane(1, 1)).min(plane(1, 2).min(t_max));
+        enter.cmple(leave * SLAB_SLACK).bitmask()
+    }
+
+    /// Which triangles of a pack the segment crosses for certain, and which possibly.
+    #[inline]
+    fn filter(&self, pack: &TrianglePack) -> (BVec4A, BVec4A) {
+        let d = &self.direction;
+        let c: [Vec4; 3] = std::array::from_fn(|axis| pack.corner[axis] - self.start[axis]);
+        let r = cross(&c, d);
+        let facing = dot(&pack.normal, d);
+        // Everything is mirrored so that the segment runs along the normal.
+        let sign = Vec4::ONE.copysign(facing);
+        let determinant = pack.doubled_area * (facing * sign);
+        let u = dot(&pack.edge2, &r) * sign;
+        let v = -dot(&pack.edge1, &r) * sign;
+        let w = determinant - u - v;
+        let along = dot(&pack.normal, &c) * sign;
+        let left = facing * sign - along;
+        let distance = c[0].abs() + c[1].abs() + c[2].abs();
+        let across_error = (pack.reach * (ROUNDING * self.length)) * (distance + pack.reach);
+        let along_error = (distance + Vec4::splat(self.length)) * ROUNDING;
+        let across = u.min(v).min(w);
+        let within = along.min(left);
+        let certain = across.cmpgt(across_error) & within.cmpgt(along_error);
+        let possible = across.cmpge(-across_error) & within.cmpge(-along_error);
+        (certain, possible)
+    }
+}
+
+/// A segment in double precision.
+pub(super) struct ExactQuery {
+    start: DVec3,
+    direction: DVec3,
+}
+
+/// How a segment meets the plane of a triangle, in double precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Crossing {
+    /// The share of the segment before the crossing.
+    pub(super) t: f64,
+    /// True if the segment runs along the normal: out of the volume.
+    pub(super) leaves: bool,
+}
+
+/// The outcome of a test in double precision.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum ExactCrossing {
+    /// The segment's line passes the triangle.
+    Miss,
+    /// It meets the triangle within rounding of an edge.
+    Graze(Option<Crossing>),
+    /// It meets the triangle's inside.
+    Hit(Crossing),
+}
+
+impl ExactQuery {
+    /// Tests a triangle by the signed volumes of the segment's line with its three edges. Two triangles that share an
+    /// edge compute the same volume but for its sign, so that nothing slips through between them (S. Woop, C. Benthin,
+    /// I. Wald: Watertight Ray/Triangle Intersection, 2013). A segment in the plane of a triangle does not cross it.
+    pub(super) fn test(&self, corners: [Vec3; 3]) -> ExactCrossing {
+        /// Share of the triangle's area below which a part of it counts as none: thousands of roundings.
+        const GRAZE: f64 = 1e-12;
+        /// Error of a volume in shares of the product of the lengths in it: some ten roundings.
+        const NOISE: f64 = 4e-15;
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3() - self.start);
+        let volumes = [b.cross(c), c.cross(a), a.cross(b)].map(|product| self.direction.dot(product));
+        let least = volumes[0].min(volumes[1]).min(volumes[2]);
+        let most = volumes[0].max(volumes[1]).max(volumes[2]);
+        let reach = a.length_squared().max(b.length_squared()).max(c.length_squared());
+        let noise = NOISE * self.direction.length() * reach;
+        let slack = GRAZE * (volumes[0].abs() + volumes[1].abs() + volumes[2].abs()) + noise;
+        if least < -slack && most > slack {
+            return ExactCrossing::Miss;
+        }
+        let normal = (b - a).cross(c - a);
+        let facing = self.direction.dot(normal);
+        if facing.abs() <= noise {
+            return ExactCrossing::Graze(None);
+        }
+        let t = a.dot(normal) / facing;
+        let passes_inside = least >= 0.0 || most <= 0.0;
+        let crossing = (passes_inside && (0.0..=1.0).contains(&t)).then_some(Crossing {
+            t,
+            leaves: facing > 0.0,
+        });
+        let clear = least > slack || most < -slack;
+        match crossing {
+            Some(crossing) if clear => ExactCrossing::Hit(crossing),
+            None if clear => ExactCrossing::Miss,
+            grazing => ExactCrossing::Graze(grazing),
+        }
+    }
+
+    /// The crossing, on an edge or inside.
+    fn crossing(&self, corners: [Vec3; 3]) -> Option<Crossing> {
+        match self.test(corners) {
+            ExactCrossing::Miss => None,
+            ExactCrossing::Graze(crossing) => crossing,
+            ExactCrossing::Hit(crossing) => Some(crossing),
+        }
+    }
+}
+
+/// True if the segment crosses any triangle; endpoints count.
+pub(super) fn crosses_any(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> bool {
+    let query = Query::new(segment);
+    bvh.with_stack(|stack: &mut [ChildRef]| {
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            match stack[height].child() {
+                Child::Node(index) => {
+                    let node = &bvh.nodes[index];
+                    let mut entered = query.entered(node, Vec4::ONE);
+                    while entered != 0 {
+                        stack[height] = node.children[entered.trailing_zeros() as usize & 3];
+                        height += 1;
+                        entered &= entered - 1;
+                    }
+                }
+                Child::Pack(index) => {
+                    let pack = &bvh.packs[index];
+                    let (certain, possible) = query.filter(pack);
+                    if certain.any() || (possible.any() && any_crossing(&query, pack, possible, mesh)) {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    })
+}
+
+/// True if the segment crosses one of the possible triangles of a pack.
+#[cold]
+fn any_crossing(query: &Query, pack: &TrianglePack, possible: BVec4A, mesh: &TriangleMesh) -> bool {
+    lanes(possible.bitmask()).any(|lane| {
+        let corners = mesh.corners(pack.triangle(lane) as usize);
+        query.exact.crossing(corners).is_some()
+    })
+}
+
+/// The first crossing: the triangle and the share of the segment before it. Of several at the same place the triangle
+/// with the lowest index.
+pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Option<(u32, Crossing)> {
+    let query = Query::new(segment);
+    let mut best: Option<(u32, Crossing)> = None;
+    let mut t_max = Vec4::ONE;
+    bvh.with_stack(|stack: &mut [ChildRef]| {
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            match stack[height].child() {
+                Child::Node(index) => {
+                    let node = &bvh.nodes[index];
+                    for lane in lanes(query.entered(node, t_max)) {
+                        stack[height] = node.children[lane];
+                        height += 1;
+                    }
+                }
+                Child::Pack(index) => {
+                    let pack = &bvh.packs[index];
+                    for lane in lanes(query.filter(pack).1.bitmask()) {
+                        let triangle = pack.triangle(lane);
+                        let Some(crossing) = query.exact.crossing(mesh.corners(triangle as usize)) else {
+                            continue;
+                        };
+                        let nearer = best.is_none_or(|(other, known)| {
+                            crossing.t < known.t || (crossing.t == known.t && triangle < other)
+                        });
+                        if nearer {
+                            best = Some((triangle, crossing));
+                            t_max = Vec4::splat(crossing.t as f32 * SLAB_SLACK);
+                        }
+                    }
+                }
+            }
+        }
+    });
+    best
+}
+
+/// Every crossing of a segment, in no particular order, until `visit` returns false.
+pub(super) fn visit_all(
+    bvh: &WideBvh,
+    mesh: &TriangleMesh,
+    segment: Segment,
+    mut visit: impl FnMut(ExactCrossing) -> bool,
+) {
+    let query = Query::new(segment);
+    bvh.with_stack(|stack: &mut [ChildRef]| {
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            match stack[height].child() {
+                Child::Node(index) => {
+                    let node = &bvh.nodes[index];
+                    for lane in lanes(query.entered(node, Vec4::ONE)) {
+                        stack[height] = node.children[lane];
+                        height += 1;
+                    }
+                }
+                Child::Pack(index) => {
+                    let pack = &bvh.packs[index];
+                    for lane in lanes(query.filter(pack).1.bitmask()) {
+                        let corners = mesh.corners(pack.triangle(lane) as usize);
+                        if !visit(query.exact.test(corners)) {
+                            return;
+                        }
+                    }
+                }
+            }
+        }
+    });
+}
+
+impl ExactQuery {
+    /// Prepares a segment.
+    pub(super) fn new(segment: Segment) -> Self {
+        Self {
+            start: segment.start.as_dvec3(),
+            direction: segment.end.as_dvec3() - segment.start.as_dvec3(),
+        }
+    }
+}
+
+/// The set bits of a mask, lowest first.
+#[inline]
+pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = (mask != 0).then(|| mask.trailing_zeros() as usize & 3);
+        mask &= mask.wrapping_sub(1);
+        lane
+    })
+}
+
+/// Four dot products.
+#[inline]
+pub(super) fn dot(a: &[Vec4; 3], b: &[Vec4; 3]) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Four cross products.
+#[inline]
+pub(super) fn cross(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}

@@ -1,0 +1,198 @@
+//! How the triangles of a mesh hang together: what decides whether it encloses a volume.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+use super::mesh::TriangleMesh;
+
+/// What the edges of a mesh say about it. Vertices at the same place count as one, so that seams of texture
+/// coordinates are no holes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Topology {
+    /// Number of connected parts.
+    pub components: usize,
+    /// Edges with exactly one triangle: the rims of holes.
+    pub boundary_edges: usize,
+    /// Edges with more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Edges of two triangles that run through them in the same direction: one of the triangles is inside out.
+    pub miswound_edges: usize,
+}
+
+impl Topology {
+    /// True if the surface has no rim: every edge has at least two triangles.
+    pub fn is_closed(&self) -> bool {
+        self.boundary_edges == 0
+    }
+
+    /// True if neighbouring triangles agree on which side is outside.
+    pub fn is_consistently_wound(&self) -> bool {
+        self.miswound_edges == 0
+    }
+
+    /// Counts the edges of a mesh; O(n log n).
+    pub fn of(mesh: &TriangleMesh) -> Self {
+        let vertices = weld(mesh.positions());
+        let welded = mesh
+            .triangles()
+            .iter()
+            .map(|corners| corners.map(|corner| vertices[corner as usize]));
+        let mut edges = directed_edges(welded, mesh.positions().len());
+        edges.sort_unstable();
+
+        let mut parts = DisjointSets::new(mesh.triangles().len());
+        let mut topology = Self {
+            components: 0,
+            boundary_edges: 0,
+            non_manifold_edges: 0,
+            miswound_edges: 0,
+        };
+        for users in edges.chunk_by(|a, b| a.ends == b.ends) {
+            for pair in users.windows(2) {
+                parts.join(pair[0].triangle, pair[1].triangle);
+            }
+            match users {
+                [_] => topology.boundary_edges += 1,
+                [a, b] => topology.miswound_edges += usize::from(a.reversed == b.reversed),
+                _ => topology.non_manifold_edges += 1,
+            }
+        }
+        topology.components = parts.count();
+        topology
+    }
+}
+
+/// An edge of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct EdgeUse {
+    /// The vertices, the lower index first.
+    ends: [u32; 2],
+    triangle: u32,
+    /// True if the triangle runs from the higher index to the lower.
+    reversed: bool,
+}
+
+fn directed_edges(triangles: impl Iterator<Item = [u32; 3]>, capacity: usize) -> Vec<EdgeUse> {
+    let mut edges = Vec::with_capacity(6 * capacity);
+    for (triangle, [a, b, c]) in triangles.enumerate() {
+        for [from, to] in [[a, b], [b, c], [c, a]] {
+            edges.push(EdgeUse {
+                ends: [from.min(to), from.max(to)],
+                triangle: triangle as u32,
+                reversed: from > to,
+            });
+        }
+    }
+    edges
+}
+
+/// The boundary of a mesh as a chain: edges from the first to the second position, each as often as triangles use it
+/// in that direction more than in the other. A mesh whose boundary is empty encloses a volume, whatever its seams and
+/// however its parts overlap.
+pub(super) fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
+    // Closed without welding in the common case, which is much cheaper to find out.
+    let by_index = chain(&mesh.triangles().iter().copied(), mesh.positions().len());
+    if by_index.is_empty() {
+        return Vec::new();
+    }
+    let vertices = weld(mesh.positions());
+    let welded = mesh
+        .triangles()
+        .iter()
+        .map(|corners| corners.map(|corner| vertices[corner as usize]));
+    chain(&welded, mesh.positions().len())
+        .into_iter()
+        .map(|([from, to], count)| {
+            let [from, to] = [from, to].map(|vertex| mesh.positions()[vertex as usize]);
+            ([from, to], count)
+        })
+        .collect()
+}
+
+/// The edges that triangles do not use equally often in both directions, by their lower vertex: a counting sort
+/// followed by a look at the few edges of each vertex; O(n) for vertices of bounded valence.
+fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) -> Vec<([u32; 2], i32)> {
+    let directed = || {
+        triangles
+            .clone()
+            .flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]])
+            .filter(|[from, to]| from != to)
+    };
+    let mut starts = vec![0_u32; vertices + 1];
+    for [from, to] in directed() {
+        starts[from.min(to) as usize + 1] += 1;
+    }
+    for vertex in 0..vertices {
+        starts[vertex + 1] += starts[vertex];
+    }
+    let mut cursor = starts.clone();
+    let mut uses = vec![(0_u32, 0_i32); starts[vertices] as usize];
+    for [from, to] in directed() {
+        let slot = &mut cursor[from.min(to) as usize];
+        uses[*slot as usize] = (from.max(to), if from < to { 1 } else { -1 });
+        *slot += 1;
+    }
+    let mut chain = Vec::new();
+    for vertex in 0..vertices {
+        let row = &mut uses[starts[vertex] as usize..starts[vertex + 1] as usize];
+        row.sort_unstable();
+        for same in row.chunk_by(|a, b| a.0 == b.0) {
+            let count: i32 = same.iter().map(|&(_, direction)| direction).sum();
+            if count != 0 {
+                chain.push(([vertex as u32, same[0].0], count));
+            }
+        }
+    }
+    chain
+}
+
+/// For each vertex the first one at exactly the same place.
+fn weld(positions: &[Vec3]) -> Vec<u32> {
+    let mut first = HashMap::with_capacity(positions.len());
+    positions
+        .iter()
+        .enumerate()
+        .map(|(index, &position)| {
+            // Adding zero turns -0 into +0.
+            let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
+            *first.entry(key).or_insert(index as u32)
+        })
+        .collect()
+}
+
+/// Sets that can be joined (union by halving paths).
+struct DisjointSets {
+    parents: Vec<u32>,
+}
+
+impl DisjointSets {
+    fn new(count: usize) -> Self {
+        Self {
+            parents: (0..count as u32).collect(),
+        }
+    }
+
+    fn root(&mut self, mut item: u32) -> u32 {
+        while self.parents[item as usize] != item {
+            let grandparent = self.parents[self.parents[item as usize] as usize];
+            self.parents[item as usize] = grandparent;
+            item = grandparent;
+        }
+        item
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (low, high) = (a.min(b), a.max(b));
+        self.parents[high as usize] = low;
+    }
+
+    fn count(&self) -> usize {
+        self.parents
+            .iter()
+            .enumerate()
+            .filter(|&(item, &parent)| item == parent as usize)
+            .count()
+    }
+}

@@ -1,0 +1,276 @@
+//! The layout of the hierarchy: obvhs builds a binary tree, which is collapsed here into nodes of four children and
+//! packs of up to four triangles, so that one `Vec4` operation serves four boxes or four triangles
+//! (H. Dammertz, J. Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent
+//! Rays, 2008).
+
+use std::time::Duration;
+
+use glam::{DVec3, Vec3, Vec3A, Vec4};
+use obvhs::{
+    BvhBuildParams,
+    aabb::Aabb as BuilderAabb,
+    bvh2::{Bvh2, builder::build_bvh2},
+    ploc::{PlocSearchDistance, SortPrecision},
+};
+
+use super::mesh::TriangleMesh;
+
+/// How many children a node has, how many triangles a pack.
+pub(super) const WIDTH: usize = 4;
+
+/// Depth of the stack that queries keep on the machine's stack. Trees of a few thousand triangles need about 30
+/// entries; a deeper tree gets a stack from the heap, which costs about 20 ns a query.
+const STACK_ENTRIES: usize = 64;
+
+/// Marks a child that is a pack of triangles.
+const PACK_FLAG: u32 = 1 << 31;
+
+/// Marks a lane of a pack that holds no triangle.
+const NO_TRIANGLE: u32 = u32::MAX;
+
+/// How much time building may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum BuildQuality {
+    /// For meshes that are queried millions of times.
+    Thorough,
+    /// For meshes that are built for one request.
+    Quick,
+}
+
+impl BuildQuality {
+    /// The builder's settings. No pre-splitting: it puts a triangle into several leaves, so that containment would
+    /// count its crossings more than once.
+    fn params(self) -> BvhBuildParams {
+        let common = BvhBuildParams {
+            pre_split: false,
+            ploc_search_distance: PlocSearchDistance::Minimum,
+            search_depth_threshold: 0,
+            reinsertion_batch_ratio: 0.0,
+            post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
+            sort_precision: SortPrecision::U64,
+            max_prims_per_leaf: WIDTH as u32,
+            // Four triangles cost as much as one, so leaves should be full: a high price on traversal.
+            collapse_traversal_cost: 3.0,
+        };
+        match self {
+            Self::Quick => common,
+            Self::Thorough => BvhBuildParams {
+                ploc_search_distance: PlocSearchDistance::High,
+                search_depth_threshold: 2,
+                reinsertion_batch_ratio: 1.0,
+                post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
+                ..common
+            },
+        }
+    }
+}
+
+/// Where a child of a node leads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Child {
+    /// To a node.
+    Node(usize),
+    /// To a pack of triangles.
+    Pack(usize),
+}
+
+/// A [`Child`] in four bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct ChildRef(u32);
+
+impl ChildRef {
+    fn new(child: Child) -> Self {
+        match child {
+            Child::Node(index) => Self(index as u32),
+            Child::Pack(index) => Self(index as u32 | PACK_FLAG),
+        }
+    }
+
+    /// What it refers to.
+    #[inline]
+    pub(super) fn child(self) -> Child {
+        if self.0 & PACK_FLAG == 0 {
+            Child::Node(self.0 as usize)
+        } else {
+            Child::Pack((self.0 & !PACK_FLAG) as usize)
+        }
+    }
+}
+
+/// A node: the boxes of up to four children, coordinate by coordinate.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// Smallest (0) and largest (1) x, y and z of each child. An unused child has its smallest at +∞ and its largest
+    /// at -∞, so that no query enters it.
+    pub(super) bounds: [[Vec4; 3]; 2],
+    /// The children.
+    pub(super) children: [ChildRef; WIDTH],
+}
+
+impl Node {
+    const UNUSED: Self = Self {
+        bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]],
+        children: [ChildRef(0); WIDTH],
+    };
+
+    fn set_child(&mut self, slot: usize, min: Vec3A, max: Vec3A, child: Child) {
+        for axis in 0..3 {
+            self.bounds[0][axis][slot] = min[axis];
+            self.bounds[1][axis][slot] = max[axis];
+        }
+        self.children[slot] = ChildRef::new(child);
+    }
+}
+
+/// Up to four triangles, coordinate by coordinate. Unused lanes hold NaN, which fails every comparison.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TrianglePack {
+    /// First corner.
+    pub(super) corner: [Vec4; 3],
+    /// From the first corner to the second.
+    pub(super) edge1: [Vec4; 3],
+    /// From the first corner to the third.
+    pub(super) edge2: [Vec4; 3],
+    /// Unit normal.
+    pub(super) normal: [Vec4; 3],
+    /// Twice the area, in m².
+    pub(super) doubled_area: Vec4,
+    /// An upper bound of the length of the longest edge in metres: the scale of the rounding errors.
+    pub(super) reach: Vec4,
+    /// Indices into the mesh, [`NO_TRIANGLE`] in unused lanes.
+    triangles: [u32; WIDTH],
+}
+
+impl TrianglePack {
+    fn new(mesh: &TriangleMesh, triangles: &[u32]) -> Self {
+        let unused = Vec4::NAN;
+        let mut pack = Self {
+            corner: [unused; 3],
+            edge1: [unused; 3],
+            edge2: [unused; 3],
+            normal: [unused; 3],
+            doubled_area: unused,
+            reach: unused,
+            triangles: [NO_TRIANGLE; WIDTH],
+        };
+        for (lane, &triangle) in triangles.iter().enumerate() {
+            let [a, b, c] = mesh.corners(triangle as usize);
+            let (edge1, edge2) = (b - a, c - a);
+            // In f64, so that slivers get a sound normal.
+            let [wide_a, wide_b, wide_c] = [a, b, c].map(Vec3::as_dvec3);
+            let cross = (wide_b - wide_a).cross(wide_c - wide_a);
+            let normal = cross.normalize_or(DVec3::Y).as_vec3();
+            for axis in 0..3 {
+                pack.corner[axis][lane] = a[axis];
+                pack.edge1[axis][lane] = edge1[axis];
+                pack.edge2[axis][lane] = edge2[axis];
+                pack.normal[axis][lane] = normal[axis];
+            }
+            pack.doubled_area[lane] = cross.length() as f32;
+            pack.reach[lane] = edge1.length().max(edge2.length()).max((c - b).length());
+            pack.triangles[lane] = triangle;
+        }
+        pack
+    }
+
+    /// The mesh's triangle in a lane.
+    #[inline]
+    pub(super) fn triangle(&self, lane: usize) -> u32 {
+        self.triangles[lane]
+    }
+}
+
+/// The hierarchy.
+#[derive(Clone, Debug)]
+pub(super) struct WideBvh {
+    /// The first is the root.
+    pub(super) nodes: Vec<Node>,
+    /// The triangles, in the order of the leaves.
+    pub(super) packs: Vec<TrianglePack>,
+    /// The most entries that a query's stack may need.
+    stack_bound: usize,
+}
+
+impl WideBvh {
+    /// Builds the hierarchy of a mesh; O(n log n).
+    pub(super) fn build(mesh: &TriangleMesh, quality: BuildQuality) -> Self {
+        let boxes: Vec<BuilderAabb> = (0..mesh.triangles().len())
+            .map(|triangle| {
+                let [a, b, c] = mesh.corners(triangle).map(Vec3A::from);
+                BuilderAabb::new(a.min(b).min(c), a.max(b).max(c))
+            })
+            .collect();
+        let mut build_time = Duration::ZERO;
+        let binary = build_bvh2(&boxes, quality.params(), &mut build_time);
+        Self::collapse(&binary, mesh)
+    }
+
+    /// Collapses a binary tree into one of four children a node: of the children gathered so far, the one with the
+    /// largest surface (the one most likely to be entered) is replaced by its own two until there are four.
+    fn collapse(binary: &Bvh2, mesh: &TriangleMesh) -> Self {
+        let mut wide = Self {
+            nodes: Vec::with_capacity(binary.nodes.len() / 3 + 1),
+            packs: Vec::with_capacity(binary.nodes.len() / 2 + 1),
+            stack_bound: 0,
+        };
+        let mut depth = 1;
+        // (wide node to fill, binary node it stands for, its depth)
+        let mut open = vec![(0, 0_u32, 1_usize)];
+        wide.nodes.push(Node::UNUSED);
+        while let Some((slot, root, level)) = open.pop() {
+            depth = depth.max(level);
+            let (gathered, count) = gather(binary, root);
+            let mut node = Node::UNUSED;
+            for (i, &index) in gathered[..count].iter().enumerate() {
+                let source = &binary.nodes[index as usize];
+                let child = if source.is_leaf() {
+                    let first = source.first_index as usize;
+                    let last = first + source.prim_count as usize;
+                    wide.packs
+                        .push(TrianglePack::new(mesh, &binary.primitive_indices[first..last]));
+                    Child::Pack(wide.packs.len() - 1)
+                } else {
+                    wide.nodes.push(Node::UNUSED);
+                    open.push((wide.nodes.len() - 1, index, level + 1));
+                    Child::Node(wide.nodes.len() - 1)
+                };
+                let aabb = source.aabb();
+                node.set_child(i, aabb.min, aabb.max, child);
+            }
+            wide.nodes[slot] = node;
+        }
+        // Each level leaves at most three siblings behind while the fourth is entered.
+        wide.stack_bound = 3 * depth + 1;
+        wide
+    }
+
+    /// Runs a query with a stack that is certainly large enough.
+    #[inline]
+    pub(super) fn with_stack<T: Copy + Default, R>(&self, query: impl FnOnce(&mut [T]) -> R) -> R {
+        if self.stack_bound <= STACK_ENTRIES {
+            query(&mut [T::default(); STACK_ENTRIES])
+        } else {
+            query(&mut vec![T::default(); self.stack_bound])
+        }
+    }
+}
+
+/// The up to four descendants of a binary node that become the children of one wide node.
+fn gather(binary: &Bvh2, root: u32) -> ([u32; WIDTH], usize) {
+    let mut gathered = [root; WIDTH];
+    let mut count = 1;
+    while count < WIDTH {
+        let largest_inner = (0..count)
+            .filter(|&i| !binary.nodes[gathered[i] as usize].is_leaf())
+            .max_by(|&i, &j| {
+                let area = |k: usize| binary.nodes[gathered[k] as usize].aabb().half_area();
+                area(i).total_cmp(&area(j))
+            });
+        let Some(i) = largest_inner else { break };
+        let first = binary.nodes[gathered[i] as usize].first_index;
+        gathered[i] = first;
+        gathered[count] = first + 1;
+        count += 1;
+    }
+    (gathered, count)
+}

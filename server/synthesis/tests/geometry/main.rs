@@ -1,0 +1,12 @@
+//! Tests of the geometry against brute force in double precision.
+
+mod closest_point;
+mod containment;
+mod crossing;
+mod files;
+mod holdout;
+mod mesh;
+mod meshes;
+mod oracle;
+mod oriented_box;
+mod random;
