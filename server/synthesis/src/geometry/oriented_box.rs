@@ -14,8 +14,8 @@ const SUPPORT_DIRECTIONS: usize = 256;
 /// of irregular objects now and then.
 const EXTRA_STARTS: usize = 30;
 
-/// Rounds of turning about each axis from one start. Most end after three.
-const MAX_ROUNDS: usize = 16;
+/// Turns from one start. Most end after ten.
+const MAX_TURNS: usize = 100;
 
 /// Thickness in shares of the diagonal that is added to the box when sizes are compared, so that among the boxes of a
 /// flat object, which have no volume, the one with the smallest face wins.
@@ -150,21 +150,19 @@ fn starts(points: &[DVec3]) -> impl Iterator<Item = DMat3> {
         .chain(spread)
 }
 
-/// Turns the axes until turning about none of them makes the box smaller.
+/// Turns the axes, each time about the one where that makes the box smallest, until none makes it smaller.
 fn refine(points: &[DVec3], start: DMat3, size: impl Fn(DMat3) -> f64) -> DMat3 {
     let mut axes = start;
-    for _ in 0..MAX_ROUNDS {
-        let before = size(axes);
-        for fixed in [2, 0, 1] {
-            let turned = turn_about(points, axes, fixed);
-            if size(turned) < size(axes) {
-                axes = turned;
-            }
-        }
+    for _ in 0..MAX_TURNS {
+        let turns = [0, 1, 2].map(|fixed| turn_about(points, axes, fixed));
+        let Some(turned) = turns.into_iter().min_by(|&a, &b| size(a).total_cmp(&size(b))) else {
+            break;
+        };
         // Less than a millionth is rounding.
-        if size(axes) > (1.0 - 1e-6) * before {
+        if size(turned) > (1.0 - 1e-6) * size(axes) {
             break;
         }
+        axes = turned;
     }
     axes
 }
