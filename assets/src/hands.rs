@@ -24,7 +24,7 @@ pub struct Hand {
     pub rig: Rig,
     /// The skin in the wrist frame, bound to the 26 joints of a relaxed, slightly spread hand.
     pub skin: Skin,
-    /// The same hand as a GLB file with WebXR joint names, in the `OpenXR` frame of the wrist.
+    /// The same hand as a GLB file with `WebXR` joint names, in the `OpenXR` frame of the wrist.
     pub glb: &'static [u8],
 }
 
@@ -105,7 +105,7 @@ pub fn read_rig(json: &str) -> Result<Rig, HandError> {
         .map_err(HandError::Rig)
 }
 
-/// The skin of a rig from a GLB file with WebXR joint names, brought into the wrist frame of the thesis. The joints
+/// The skin of a rig from a GLB file with `WebXR` joint names, brought into the wrist frame of the thesis. The joints
 /// may have any order; those with other names are not used. The radii are those of the rig.
 ///
 /// # Errors
@@ -156,7 +156,7 @@ pub fn read_skin(glb: &[u8], rig: &Rig) -> Result<Skin, HandError> {
         .collect();
     let bind = bind_joints(rig, &openxr_index, &inverse_binds)?;
 
-    if corners.iter().any(|&v| v as usize >= positions.len()) || corners.len() % 3 != 0 {
+    if corners.iter().any(|&v| v as usize >= positions.len()) || !corners.len().is_multiple_of(3) {
         return Err(HandError::Mismatch("triangle indices"));
     }
     if weights.len() != positions.len() || file_joints.len() != positions.len() {

@@ -26,7 +26,7 @@ use crate::AssetFile;
 const GRID_MM: f32 = 1.7;
 
 /// Edge lengths of the finished skin in millimetres of the figures: on the digits, on the palm, on the forearm.
-const EDGE_MM: [f32; 3] = [3.5, 6.0, 10.0];
+const EDGE_MM: [f32; 3] = [3.7, 6.0, 8.0];
 
 /// How deep the palm's collision segments lie under the skin in millimetres (thesis 4.5: "about half a centimetre").
 const COLLISION_DEPTH_MM: f32 = 5.0;
@@ -63,10 +63,10 @@ fn bind_angles() -> [DigitAngles; 5] {
     };
     [
         degrees(25.0, [0.0, 8.0, 10.0]),
-        degrees(-5.0, [10.0, 16.0, 8.0]),
-        degrees(0.0, [10.0, 16.0, 8.0]),
-        degrees(4.0, [10.0, 16.0, 8.0]),
-        degrees(8.0, [10.0, 16.0, 8.0]),
+        degrees(-6.0, [15.0, 22.0, 12.0]),
+        degrees(0.0, [15.0, 22.0, 12.0]),
+        degrees(5.0, [15.0, 22.0, 12.0]),
+        degrees(9.0, [15.0, 22.0, 12.0]),
     ]
 }
 

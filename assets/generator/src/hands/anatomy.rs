@@ -52,16 +52,17 @@ pub(super) const ROLL_DEGREES: [f32; 4] = [2.0, 0.0, -2.0, -4.0];
 pub(super) const THUMB_BASE_MM: [f32; 3] = [22.0, 21.0, 9.0];
 
 /// The direction of the thumb beside the flat hand in degrees: away from +y in the palm's plane, and out of it.
-pub(super) const THUMB_RADIAL_DEGREES: f32 = 26.0;
+pub(super) const THUMB_RADIAL_DEGREES: f32 = 27.0;
 /// See [`THUMB_RADIAL_DEGREES`].
-pub(super) const THUMB_PALMAR_DEGREES: f32 = 4.0;
+pub(super) const THUMB_PALMAR_DEGREES: f32 = 5.0;
 /// The direction of the thumb's pad beside the flat hand in degrees: from the palm's normal toward the little
-/// finger's side. With this figure the pad meets those of the index and the middle finger within the limits of both
-/// rigs; smaller ones make the thumb flex out of the palm instead of across it.
-pub(super) const THUMB_PAD_DEGREES: f32 = 72.0;
+/// finger's side. It contains the 17 degrees by which a thumb turns about its own length when it opposes the fingers
+/// (Cooney 1981), because the model has no roll. Of 60 to 115 degrees, those from 85 on let the thumb oppose index and
+/// middle finger across objects of 0.3 to 8 cm in the most poses; with smaller ones it flexes out of the palm instead
+/// of across it, with larger ones into the palm.
+pub(super) const THUMB_PAD_DEGREES: f32 = 73.0 + 17.0;
 
-/// The lengths in millimetres from wrist to tip of the stretched middle finger: of the rig `adult` by the figures
-/// above, of the rig `thesis` by the thesis (4.3).
+/// The length in millimetres from wrist to tip of the stretched middle finger in the rig `thesis` (thesis 4.3).
 pub(super) const THESIS_REACH_MM: f32 = 220.0;
 
 /// Diameters of the links in millimetres: at the first phalanx that of its far joint, then the mean of both joints,
@@ -116,11 +117,12 @@ pub(super) const THESIS_LIMITS: [LimitsDegrees; 5] = {
 };
 
 /// Anatomical limits (AAOS and others): knuckles ±20 sideways and 0 to 90, PIP 0 to 100, DIP 0 to 90; the thumb's CMC
-/// 0 to 70 off the palm's plane and -20 to 15 across the palm, MCP 0 to 50, IP 0 to 80.
+/// 0 to 70 off the palm's plane and -20 to 15 across the palm, MCP 0 to 50, IP 0 to 80. The IP may also be stretched
+/// 15 further, as every thumb does that presses with its pad; without it pads meet only in curled hands.
 pub(super) const ADULT_LIMITS: [LimitsDegrees; 5] = {
     const FINGER: LimitsDegrees = [[-20.0, 20.0], [0.0, 90.0], [0.0, 100.0], [0.0, 90.0]];
     [
-        [[0.0, 70.0], [-20.0, 15.0], [0.0, 50.0], [0.0, 80.0]],
+        [[0.0, 70.0], [-20.0, 15.0], [0.0, 50.0], [-15.0, 80.0]],
         FINGER,
         FINGER,
         FINGER,

@@ -92,6 +92,7 @@ impl Blend {
 #[derive(Clone, Debug)]
 pub(super) struct HandField {
     palm: Blend,
+    webs: Blend,
     digits: [Blend; 5],
     /// Over what width a digit flows into the palm.
     root_width: [f32; 5],
@@ -120,6 +121,10 @@ impl HandField {
                 shapes: palm_shapes(rig, &frames, mm),
                 width: 13.0 * mm,
             },
+            webs: Blend {
+                shapes: web_shapes(rig, &frames, mm),
+                width: 2.0 * mm,
+            },
             digits,
             root_width: [12.0, 7.0, 7.0, 7.0, 7.0].map(|w| w * mm),
             cut: -40.0 * mm,
@@ -129,7 +134,8 @@ impl HandField {
 
     /// Negative inside, positive outside, in metres.
     pub(super) fn value(&self, p: Vec3) -> f32 {
-        let palm = self.palm.value(p);
+        let mm = self.metre_per_mm;
+        let palm = smooth_min(self.palm.value(p), self.webs.value(p), 6.0 * mm);
         let whole = self
             .digits
             .iter()
@@ -137,7 +143,7 @@ impl HandField {
             .map(|(digit, width)| smooth_min(digit.value(p), palm, width))
             .fold(palm, f32::min);
         // The forearm ends in a plane with a rounded edge.
-        -smooth_min(-whole, -(self.cut - p.y), 8.0 * self.metre_per_mm)
+        -smooth_min(-whole, -(self.cut - p.y), 14.0 * mm)
     }
 
     /// The direction in which the value grows, a unit vector.
@@ -226,26 +232,70 @@ fn palm_shapes(rig: &Rig, frames: &kinematics::HandFrames, mm: f32) -> Vec<Shape
     let mut shapes = Vec::new();
     // The four metacarpals with their flesh, a little in front of the bones.
     let near = [12.0, 12.5, 12.5, 11.5];
-    let far = [11.6, 11.8, 11.2, 10.4];
+    let far = [11.4, 11.6, 11.0, 10.2];
     for finger in 0..4 {
         let start = rig.finger_metacarpals[finger] + point(0.0, 0.0, 1.0);
         let knuckle = frames.digits[finger + 1].links[0].position;
         shapes.push(Shape::cone(
             start,
-            knuckle + point(0.0, -2.0, 1.5),
+            knuckle + point(0.0, -4.0, 1.5),
             near[finger] * mm,
             far[finger] * mm,
         ));
     }
-    // The webs between neighbouring fingers reach a third of the first phalanx, in front of the bones.
-    for finger in 0..3 {
-        let [a, b] = [finger + 1, finger + 2].map(|digit| frames.digits[digit].links[0]);
-        let reach = 0.22;
+    // The ball of the thumb: around its metacarpal, and a broad root in the palm.
+    let thumb = frames.digits[0].links;
+    let (cmc, mcp) = (thumb[0].position, thumb[1].position);
+    let bulk = thumb[0].transform_point(point(0.0, 22.0, 4.0));
+    shapes.push(Shape::cone(
+        cmc + point(-2.0, 0.0, 1.0),
+        bulk,
+        12.0 * mm,
+        13.5 * mm,
+    ));
+    shapes.push(Shape::cone(bulk, mcp, 13.5 * mm, 11.0 * mm));
+    shapes.push(Shape::cone(
+        point(10.0, 24.0, 7.0),
+        bulk + point(-9.0, 2.0, 1.0),
+        12.0 * mm,
+        12.0 * mm,
+    ));
+    // The ball of the little finger.
+    shapes.push(Shape::cone(
+        point(-21.0, 16.0, 4.0),
+        point(-31.0, 52.0, 4.5),
+        11.5 * mm,
+        11.5 * mm,
+    ));
+    // Carpus, wrist and forearm: an oval, narrowest just behind the wrist's crease.
+    for side in [-1.0, 1.0] {
+        shapes.push(Shape::cone(
+            point(side * 11.0, -6.0, -0.5),
+            point(side * 11.0, 28.0, 0.5),
+            14.5 * mm,
+            13.0 * mm,
+        ));
+        shapes.push(Shape::cone(
+            point(side * 11.0, -6.0, -0.5),
+            point(side * 11.5, -60.0, -1.0),
+            14.5 * mm,
+            17.5 * mm,
+        ));
+    }
+    shapes
+}
+
+/// The webs between the digits, thin folds in front of the bones.
+fn web_shapes(rig: &Rig, frames: &kinematics::HandFrames, mm: f32) -> Vec<Shape> {
+    let mut shapes = Vec::new();
+    // Between neighbouring fingers: up to a quarter of the first phalanx.
+    let radius = 7.0 * mm;
+    for finger in 1..4 {
+        let [a, b] = [finger, finger + 1].map(|digit| frames.digits[digit].links[0]);
         let end = |frame: Pose, digit: usize| {
-            frame.transform_point(Vec3::new(0.0, reach * rig.digits[digit].lengths[0], 1.5 * mm))
+            frame.transform_point(Vec3::new(0.0, 0.25 * rig.digits[digit].lengths[0], 2.0 * mm))
         };
-        let (c, d) = (end(a, finger + 1), end(b, finger + 2));
-        let radius = 7.5 * mm;
+        let (c, d) = (end(a, finger), end(b, finger + 1));
         shapes.push(Shape::Sheet {
             corners: [a.position, b.position, c],
             radius,
@@ -255,52 +305,16 @@ fn palm_shapes(rig: &Rig, frames: &kinematics::HandFrames, mm: f32) -> Vec<Shape
             radius,
         });
     }
-    // The ball of the thumb: around its metacarpal, and a broad root in the palm.
-    let thumb = frames.digits[0].links;
-    let (cmc, mcp) = (thumb[0].position, thumb[1].position);
-    let bulk = thumb[0].transform_point(point(0.0, 24.0, 3.0));
-    shapes.push(Shape::cone(
-        cmc + point(-2.0, 2.0, 0.0),
-        bulk,
-        12.0 * mm,
-        13.0 * mm,
-    ));
-    shapes.push(Shape::cone(bulk, mcp, 13.0 * mm, 11.0 * mm));
-    shapes.push(Shape::cone(
-        point(9.0, 26.0, 7.0),
-        bulk + point(-7.0, 2.0, 0.0),
-        11.0 * mm,
-        11.0 * mm,
-    ));
-    // The web between thumb and index finger.
-    let index_start = rig.finger_metacarpals[0];
+    // Between thumb and index finger: from the CMC to the thumb's MCP and to the last quarter of the metacarpal.
+    let thumb = frames.digits[0].links[0];
     let index_knuckle = frames.digits[1].links[0].position;
-    let web = index_start.lerp(index_knuckle, 0.74);
     shapes.push(Shape::Sheet {
-        corners: [cmc, thumb[0].transform_point(point(0.0, 38.0, 2.0)), web],
+        corners: [
+            thumb.position,
+            thumb.transform_point(mm * Vec3::new(0.0, 38.0, 2.0)),
+            rig.finger_metacarpals[0].lerp(index_knuckle, 0.76),
+        ],
         radius: 5.5 * mm,
     });
-    // The ball of the little finger.
-    shapes.push(Shape::cone(
-        point(-19.0, 20.0, 5.0),
-        point(-30.0, 60.0, 5.0),
-        11.0 * mm,
-        10.0 * mm,
-    ));
-    // Carpus, wrist and forearm: an oval, narrowest just behind the wrist's crease.
-    for side in [-1.0, 1.0] {
-        shapes.push(Shape::cone(
-            point(side * 12.0, -8.0, -0.5),
-            point(side * 10.0, 30.0, 0.0),
-            15.5 * mm,
-            13.0 * mm,
-        ));
-        shapes.push(Shape::cone(
-            point(side * 12.0, -8.0, -0.5),
-            point(side * 13.0, -60.0, -1.0),
-            15.5 * mm,
-            19.0 * mm,
-        ));
-    }
     shapes
 }

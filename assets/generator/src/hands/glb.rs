@@ -1,4 +1,4 @@
-//! Writes a skinned hand as binary glTF 2.0: 25 joints with WebXR names, -Z along the bones, in the wrist's frame.
+//! Writes a skinned hand as binary glTF 2.0: 25 joints with `WebXR` names, -Z along the bones, in the wrist's frame.
 
 use glam::{Mat4, Vec3};
 use grasp_synthesis::{
@@ -70,7 +70,7 @@ fn parent(joint: usize) -> usize {
     }
 }
 
-/// The GLB file of a hand. The palm joint is left out: WebXR has none, and no vertex may depend on it.
+/// The GLB file of a hand. The palm joint is left out: `WebXR` has none, and no vertex may depend on it.
 pub(super) fn hand_glb(name: &str, skin: &Skin) -> Vec<u8> {
     let wrist_from_bind = skin.bind.joints[index::WRIST].pose.inverse();
     let wrist_from_joint: [Pose; JOINT_COUNT] =
@@ -87,7 +87,7 @@ pub(super) fn hand_glb(name: &str, skin: &Skin) -> Vec<u8> {
             (low.min(p), high.max(p))
         });
     let count = positions.len();
-    let vec3_bytes = |vectors: &[Vec3]| float_bytes(vectors.iter().flat_map(|v| v.to_array()));
+    let vec3_bytes = |vectors: &[Vec3]| float_bytes(vectors.iter().flat_map(Vec3::to_array));
     let mut vertex = |bytes: &[u8], component, kind, bounds| {
         buffer.add(bytes, count, component, kind, Some(ARRAY_BUFFER), bounds)
     };
@@ -136,30 +136,7 @@ pub(super) fn hand_glb(name: &str, skin: &Skin) -> Vec<u8> {
         None,
         None,
     );
-    // Nodes: joint n is node n - 1, the mesh comes last.
-    let mut nodes: Vec<Value> = (1..JOINT_COUNT)
-        .map(|joint| {
-            let local = if joint == index::WRIST {
-                Pose::IDENTITY
-            } else {
-                wrist_from_joint[parent(joint)].inverse() * wrist_from_joint[joint]
-            };
-            let children: Vec<usize> = (joint + 1..JOINT_COUNT)
-                .filter(|&child| parent(child) == joint)
-                .map(|child| child - 1)
-                .collect();
-            let mut node = json!({
-                "name": JOINT_NAMES[joint],
-                "translation": local.position.to_array(),
-                "rotation": local.orientation.to_array(),
-            });
-            if !children.is_empty() {
-                node["children"] = json!(children);
-            }
-            node
-        })
-        .collect();
-    nodes.push(json!({ "name": name, "mesh": 0, "skin": 0 }));
+    let nodes = nodes(name, &wrist_from_joint);
     let document = json!({
         "asset": { "version": "2.0", "generator": "grasp-assets-generator" },
         "scene": 0,
@@ -192,6 +169,34 @@ pub(super) fn hand_glb(name: &str, skin: &Skin) -> Vec<u8> {
         "accessors": buffer.accessors,
     });
     container(document.to_string().into_bytes(), buffer.bytes)
+}
+
+/// The nodes: joint n is node n - 1, the skinned mesh comes last.
+fn nodes(name: &str, wrist_from_joint: &[Pose; JOINT_COUNT]) -> Vec<Value> {
+    let mut nodes: Vec<Value> = (1..JOINT_COUNT)
+        .map(|joint| {
+            let local = if joint == index::WRIST {
+                Pose::IDENTITY
+            } else {
+                wrist_from_joint[parent(joint)].inverse() * wrist_from_joint[joint]
+            };
+            let children: Vec<usize> = (joint + 1..JOINT_COUNT)
+                .filter(|&child| parent(child) == joint)
+                .map(|child| child - 1)
+                .collect();
+            let mut node = json!({
+                "name": JOINT_NAMES[joint],
+                "translation": local.position.to_array(),
+                "rotation": local.orientation.to_array(),
+            });
+            if !children.is_empty() {
+                node["children"] = json!(children);
+            }
+            node
+        })
+        .collect();
+    nodes.push(json!({ "name": name, "mesh": 0, "skin": 0 }));
+    nodes
 }
 
 /// The inverse bind matrix of a joint; rows that are exactly (0, 0, 0, 1) as the format wants.

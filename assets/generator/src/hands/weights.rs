@@ -1,7 +1,7 @@
 //! How much each joint moves each vertex of the skin.
 //!
-//! A vertex belongs at most to one digit, so that no finger pulls at its neighbour; beyond the first phalanges it
-//! belongs to the palm, whose weights are spread over wrist and metacarpals.
+//! A vertex belongs to one digit, so that no finger pulls at its neighbour; only the fold of a web hangs on both of
+//! its fingers. Toward the wrist the digits give way to the palm, whose weights are spread over wrist and metacarpals.
 
 use glam::Vec3;
 use grasp_synthesis::hand::{
@@ -22,44 +22,70 @@ pub(super) fn skin_weights(rig: &Rig, bind: &HandJoints, positions: &[Vec3]) -> 
 
 fn weights_at(rig: &Rig, bind: &HandJoints, p: Vec3) -> [f32; JOINT_COUNT] {
     let mut weights = palm_weights(bind, p);
-    let scale = rig.reach / 0.19;
+    // Metres per millimetre of the adult hand.
+    let scale = 1e-3 * rig.reach / 0.19;
     // The two digits whose skin is nearest.
     let mut near: Vec<(f32, usize)> = (0..5)
         .map(|digit| (distance_over_skin(bind, digit, p), digit))
         .collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let [(over, digit), (next_over, _), ..] = near[..] else {
+    let [(over, digit), (next_over, next_digit), ..] = near[..] else {
         return weights;
     };
+    // Where two fingers are about equally near there is their web; beyond it the nearest finger stands alone.
+    let web = if digit > 0 && next_digit > 0 {
+        0.5 * smooth_step(6.0 * scale, 0.0, next_over - over)
+    } else {
+        0.0
+    };
+    let near_web = smooth_step(
+        24.0 * scale,
+        16.0 * scale,
+        past_joint(bind, bent_joints(digit)[0], p),
+    );
+    let share = web * near_web;
+    let digit_share = (1.0 - share) * root_share(bind, digit, over, scale, p);
+    let next_share = share * root_share(bind, next_digit, next_over, scale, p);
+    for weight in &mut weights {
+        *weight *= 1.0 - digit_share - next_share;
+    }
+    add_digit(&mut weights, bind, digit, digit_share, p);
+    add_digit(&mut weights, bind, next_digit, next_share, p);
+    weights
+}
+
+/// How far a point belongs to a digit and not to the palm: a blend across the digit's root. Skin far from the
+/// phalanges, as in the web of the thumb, stays with the palm.
+fn root_share(bind: &HandJoints, digit: usize, over: f32, scale: f32, p: Vec3) -> f32 {
+    let close = smooth_step(14.0 * scale, 3.0 * scale, over);
+    close * blend(bind, bent_joints(digit)[0], [-0.9, 1.1], p)
+}
+
+/// Spreads the `share` of a digit over its joints.
+fn add_digit(weights: &mut [f32; JOINT_COUNT], bind: &HandJoints, digit: usize, mut share: f32, p: Vec3) {
     let joints = bent_joints(digit);
-    let at = |joint: usize| bind.joints[joint].pose.position;
-    // Signed distance past each bending joint, measured along the mean of the bones before and after it.
-    let past = |joint: usize| {
-        let along =
-            (at(joint) - at(joint - 1)).normalize_or_zero() + (at(joint + 1) - at(joint)).normalize_or_zero();
-        (p - at(joint)).dot(along.normalize_or(Vec3::Y))
-    };
-    let blend = |joint: usize, from: f32, to: f32| {
-        let radius = bind.joints[joint].radius;
-        smooth_step(from * radius, to * radius, past(joint))
-    };
-    // The root: the palm gives way to the first phalanx. Skin far from every phalanx, as in the webs, stays with the
-    // palm, and so does skin midway between two fingers unless it is clearly beyond the web.
-    let beyond_web = smooth_step(14.0 * scale, 22.0 * scale, 1e3 * past(joints[0]));
-    let alone = smooth_step(0.0, 6.0 * scale, 1e3 * (next_over - over));
-    let close = 1.0 - smooth_step(3.0 * scale, 14.0 * scale, 1e3 * over);
-    let root = blend(joints[0], -0.9, 1.1) * close * (alone + (1.0 - alone) * beyond_web);
-    weights.iter_mut().for_each(|weight| *weight *= 1.0 - root);
-    let mut share = root;
     for (i, &joint) in joints.iter().enumerate() {
         let onward = match joints.get(i + 1) {
-            Some(&next) => blend(next, -0.8, 0.8),
+            Some(&next) => blend(bind, next, [-0.8, 0.8], p),
             None => 0.0,
         };
         weights[joint] += share * (1.0 - onward);
         share *= onward;
     }
-    weights
+}
+
+/// The signed distance past a bending joint in metres, along the mean of the bones before and after it.
+fn past_joint(bind: &HandJoints, joint: usize, p: Vec3) -> f32 {
+    let at = |joint: usize| bind.joints[joint].pose.position;
+    let along =
+        (at(joint) - at(joint - 1)).normalize_or_zero() + (at(joint + 1) - at(joint)).normalize_or_zero();
+    (p - at(joint)).dot(along.normalize_or(Vec3::Y))
+}
+
+/// The blend across a joint, 0 before and 1 after it; its ends in radii of the joint.
+fn blend(bind: &HandJoints, joint: usize, ends: [f32; 2], p: Vec3) -> f32 {
+    let [from, to] = ends.map(|end| end * bind.joints[joint].radius);
+    smooth_step(from, to, past_joint(bind, joint, p))
 }
 
 /// The joints of a digit that bend outside of the palm: knuckle, PIP and DIP; the thumb's MCP and IP.

@@ -35,7 +35,7 @@ pub struct RigDescription {
     pub finger_metacarpals_m: [[f32; 3]; 4],
     /// The ten collision segments under the palm's skin: both ends of each, in metres.
     pub palm_segments_m: [[[f32; 3]; 2]; 10],
-    /// Distance from joint to skin in metres by the joint's WebXR name, and "palm".
+    /// Distance from joint to skin in metres by the joint's `WebXR` name, and "palm".
     pub joint_radii_m: BTreeMap<String, f32>,
 }
 
@@ -268,8 +268,7 @@ impl DigitDescription {
     fn check(&self, violations: &mut Vec<RigViolation>, name: &str) {
         check_point(violations, || format!("digits.{name}.base_m"), self.base_m);
         let length = Quat::from_array(self.base_orientation_xyzw).length();
-        // Written so that NaN is refused.
-        if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+        if !is_unit(length) {
             violations.push(RigViolation::NotAUnitQuaternion {
                 field: format!("digits.{name}.base_orientation_xyzw"),
                 length,
@@ -294,8 +293,7 @@ impl DigitDescription {
             ("second_pitch", limits.second_pitch),
             ("third_pitch", limits.third_pitch),
         ] {
-            // NaN fails every comparison.
-            if !(min >= -180.0 && min <= max && max <= 180.0) {
+            if !is_range(min, max) {
                 violations.push(RigViolation::NotARange {
                     field: format!("digits.{name}.limits_degrees.{joint}"),
                     min,
@@ -330,9 +328,26 @@ fn degrees(range: AngleRange) -> [f32; 2] {
     [range.min, range.max].map(|radians| ((f64::from(radians).to_degrees() * 1e4).round() / 1e4) as f32)
 }
 
+// NaN fails every comparison, so that the following are false for it.
+
+fn is_unit(length: f32) -> bool {
+    (length - 1.0).abs() <= UNIT_TOLERANCE
+}
+
+fn is_range(min: f32, max: f32) -> bool {
+    min >= -180.0 && min <= max && max <= 180.0
+}
+
+fn is_coordinate(value: f32) -> bool {
+    value.abs() <= LARGEST_METRES
+}
+
+fn is_length(value: f32) -> bool {
+    value > 0.0 && value <= LARGEST_METRES
+}
+
 fn check_point(violations: &mut Vec<RigViolation>, field: impl Fn() -> String, point: [f32; 3]) {
-    // Written so that NaN is refused.
-    if let Some(&value) = point.iter().find(|v| !(v.abs() <= LARGEST_METRES)) {
+    if let Some(&value) = point.iter().find(|&&value| !is_coordinate(value)) {
         violations.push(RigViolation::NotACoordinate {
             field: field(),
             value,
@@ -341,7 +356,7 @@ fn check_point(violations: &mut Vec<RigViolation>, field: impl Fn() -> String, p
 }
 
 fn check_length(violations: &mut Vec<RigViolation>, field: impl Fn() -> String, value: f32) {
-    if !(value > 0.0 && value <= LARGEST_METRES) {
+    if !is_length(value) {
         violations.push(RigViolation::NotALength {
             field: field(),
             value,

@@ -21,7 +21,7 @@ pub mod index {
     pub const TIP_OF_DIGIT: [usize; 5] = [5, 10, 15, 20, 25];
 }
 
-/// The joints' names in `OpenXR` order, as the WebXR hand input module writes them ("palm" is `OpenXR`'s own).
+/// The joints' names in `OpenXR` order, as the `WebXR` hand input module writes them ("palm" is `OpenXR`'s own).
 pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
     "palm",
     "wrist",
