@@ -8,6 +8,8 @@
 
 pub mod camera;
 mod font;
+pub mod glb;
+pub mod handover;
 pub mod image;
 mod normals;
 mod occlusion;
@@ -17,9 +19,14 @@ pub mod render;
 pub mod scene;
 mod shading;
 mod shadow;
+mod skin_look;
+mod sleeve;
 mod surface;
+pub mod views;
 
 pub use camera::Camera;
+pub use glb::to_glb;
+pub use handover::{ContactMark, HandoverScene, PosedHand};
 pub use image::{Image, contact_sheet, side_by_side};
 pub use render::{RenderOptions, render, render_png};
 pub use scene::{Finish, Part, Scene, linear_from_srgb};

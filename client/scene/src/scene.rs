@@ -32,8 +32,8 @@ pub struct Part {
     pub triangles: Vec<[u32; 3]>,
     /// Linear RGBA, each 0 to 1. Alpha below 1 is drawn in steps of one sample of the anti-aliasing grid.
     pub colour: [f32; 4],
-    /// Linear RGB factors on `colour`, one a vertex; empty: 1 everywhere.
-    pub vertex_tints: Vec<Vec3>,
+    /// Linear RGB of each vertex instead of that in `colour`; empty: `colour` everywhere.
+    pub vertex_colours: Vec<Vec3>,
     /// Smooth normals across edges flatter than this angle in radians; 0 shades every triangle flat. Vertices at the
     /// same place count as one, so seams of a file do not show.
     pub crease_angle: f32,
@@ -56,7 +56,7 @@ impl Part {
             positions,
             triangles,
             colour,
-            vertex_tints: Vec::new(),
+            vertex_colours: Vec::new(),
             crease_angle: DEFAULT_CREASE_ANGLE,
             finish: Finish::default(),
             extras: None,
@@ -69,15 +69,13 @@ impl Part {
         Self { finish, ..self }
     }
 
-    /// The colour of a vertex: the part's times the vertex' tint.
+    /// Linear RGB at a vertex.
     pub(crate) fn vertex_colour(&self, vertex: u32) -> Vec3 {
         let [r, g, b, _] = self.colour;
-        let tint = self
-            .vertex_tints
+        self.vertex_colours
             .get(vertex as usize)
             .copied()
-            .unwrap_or(Vec3::ONE);
-        Vec3::new(r, g, b) * tint
+            .unwrap_or(Vec3::new(r, g, b))
     }
 }
 

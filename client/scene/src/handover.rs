@@ -1,0 +1,247 @@
+//! Scenes of handovers: the object, both hands, contacts and forces.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+use grasp_synthesis::{
+    geometry::mesh::TriangleMesh,
+    hand::{Digit, Phalanx, joints::HandJoints, skin::Skin},
+    pose::Pose,
+};
+use serde_json::json;
+
+use crate::{
+    image::{Image, side_by_side},
+    primitives,
+    render::{RenderOptions, render},
+    scene::{Finish, Part, Scene, linear_from_srgb},
+    skin_look::{Complexion, hand_parts},
+    sleeve::sleeve,
+    views::choose_views,
+};
+
+/// Radius of a contact's ball in metres, and how far its centre lies in front of the surface.
+const CONTACT_RADIUS: f32 = 2.6e-3;
+const CONTACT_LIFT: f32 = 0.8e-3;
+
+/// Length of the arrow of the largest force in metres; the others in proportion.
+const LONGEST_ARROW: f32 = 0.05;
+
+/// Arrows are at least this long, in metres, so that a small force can be seen at all.
+const SHORTEST_ARROW: f32 = 0.006;
+
+/// Forces below this are not drawn, in newtons.
+const SMALLEST_FORCE: f32 = 1e-4;
+
+/// Radius of an arrow's shaft in metres.
+const ARROW_RADIUS: f32 = 1.3e-3;
+
+/// sRGB of what is not the caller's choice.
+const FORBIDDEN: [u8; 3] = [176, 52, 48];
+const CONTACT: [u8; 3] = [255, 196, 0];
+const FORCE: [u8; 3] = [255, 120, 0];
+const GIVER_SLEEVE: [u8; 3] = [64, 98, 150];
+const RECEIVER_SLEEVE: [u8; 3] = [74, 128, 92];
+
+/// A hand with its skin.
+#[derive(Clone, Debug)]
+pub struct PosedHand<'a> {
+    /// The skin that is bent.
+    pub skin: &'a Skin,
+    /// Where the joints are, in the client's frame.
+    pub joints: HandJoints,
+}
+
+/// Where the receiving hand touches the object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactMark {
+    /// On the surface, in metres, in the client's frame.
+    pub position: Vec3,
+    /// The surface's outward unit normal, in the client's frame.
+    pub normal: Vec3,
+    /// The force of the hand on the object in newtons, in the client's frame.
+    pub force: Vec3,
+    /// The digit that touches; none for the palm.
+    pub digit: Option<Digit>,
+    /// The digit's link that touches; none for the palm.
+    pub phalanx: Option<Phalanx>,
+}
+
+/// A handover to be drawn, in the client's frame: metres, right-handed.
+#[derive(Clone, Debug)]
+pub struct HandoverScene<'a> {
+    /// The object, in its own frame.
+    pub object: &'a TriangleMesh,
+    /// Where the object is.
+    pub client_from_object: Pose,
+    /// The object's triangles that may not be touched; drawn red.
+    pub forbidden: &'a [u32],
+    /// Linear RGB of the object.
+    pub object_colour: [f32; 4],
+    /// How the object takes the light.
+    pub object_finish: Finish,
+    /// The presenting hand.
+    pub giver: Option<PosedHand<'a>>,
+    /// The receiving hand.
+    pub receiver: Option<PosedHand<'a>>,
+    /// Where the receiving hand touches.
+    pub contacts: Vec<ContactMark>,
+}
+
+impl<'a> HandoverScene<'a> {
+    /// An object alone, light grey.
+    pub fn new(object: &'a TriangleMesh, client_from_object: Pose) -> Self {
+        Self {
+            object,
+            client_from_object,
+            forbidden: &[],
+            object_colour: linear_from_srgb(198, 203, 210),
+            object_finish: Finish::Satin,
+            giver: None,
+            receiver: None,
+            contacts: Vec::new(),
+        }
+    }
+
+    /// The scene: parts `object`, `giver_hand`, `giver_nails`, `giver_sleeve`, the same for `receiver`, and for each
+    /// contact `contact_thumb_third` and `force_thumb_third` or the like, with the force in newtons as extras.
+    pub fn to_scene(&self) -> Scene {
+        let mut parts = vec![self.object_part()];
+        let hands = [
+            ("giver", &self.giver, Complexion::FAIR, GIVER_SLEEVE),
+            ("receiver", &self.receiver, Complexion::BROWN, RECEIVER_SLEEVE),
+        ];
+        for (who, hand, complexion, sleeve_colour) in hands {
+            if let Some(PosedHand { skin, joints }) = hand {
+                let posed = skin.posed(joints);
+                let colour = srgb(sleeve_colour);
+                let cover = sleeve(&format!("{who}_sleeve"), joints, &posed, colour);
+                parts.extend(hand_parts(who, skin, posed, complexion));
+                parts.push(cover);
+            }
+        }
+        parts.extend(self.contact_parts());
+        Scene { parts }
+    }
+
+    /// The two views that show most, side by side; `options` is for each of them.
+    pub fn render(&self, options: RenderOptions) -> Image {
+        let scene = self.to_scene();
+        let aspect = options.width.max(1) as f32 / options.height.max(1) as f32;
+        let [first, second] = choose_views(&scene, importance, options.up, aspect);
+        side_by_side(
+            &render(&scene, &first, options),
+            &render(&scene, &second, options),
+        )
+    }
+
+    fn object_part(&self) -> Part {
+        let [r, g, b, _] = self.object_colour;
+        let mut positions: Vec<Vec3> = self
+            .object
+            .positions()
+            .iter()
+            .map(|&p| self.client_from_object.transform_point(p))
+            .collect();
+        let mut triangles = self.object.triangles().to_vec();
+        let mut vertex_colours = Vec::new();
+        if !self.forbidden.is_empty() {
+            // Forbidden triangles get vertices of their own, so that their colour ends sharply.
+            vertex_colours = vec![Vec3::new(r, g, b); positions.len()];
+            let [r, g, b, _] = srgb(FORBIDDEN);
+            let mut copies = HashMap::new();
+            for &triangle in self.forbidden {
+                let Some(corners) = triangles.get_mut(triangle as usize) else {
+                    continue;
+                };
+                for vertex in corners {
+                    *vertex = *copies.entry(*vertex).or_insert_with(|| {
+                        positions.push(positions[*vertex as usize]);
+                        vertex_colours.push(Vec3::new(r, g, b));
+                        positions.len() as u32 - 1
+                    });
+                }
+            }
+        }
+        Part {
+            vertex_colours,
+            finish: self.object_finish,
+            ..Part::new("object", positions, triangles, self.object_colour)
+        }
+    }
+
+    fn contact_parts(&self) -> Vec<Part> {
+        let largest = self
+            .contacts
+            .iter()
+            .map(|c| c.force.length())
+            .fold(SMALLEST_FORCE, f32::max);
+        let mut times_used: HashMap<String, u32> = HashMap::new();
+        let mut parts = Vec::new();
+        for contact in &self.contacts {
+            let mut label = contact.label();
+            let times = times_used.entry(label.clone()).or_default();
+            *times += 1;
+            if *times > 1 {
+                label = format!("{label}_{times}");
+            }
+            let newtons = contact.force.length();
+            let extras = json!({
+                "digit": contact.digit,
+                "phalanx": contact.phalanx,
+                "force_n": newtons,
+                "force_vector_n": contact.force.to_array(),
+            });
+            let centre = contact.position + contact.normal * CONTACT_LIFT;
+            let mut ball =
+                primitives::sphere(&format!("contact_{label}"), centre, CONTACT_RADIUS, srgb(CONTACT))
+                    .with_finish(Finish::Marker);
+            ball.extras = Some(extras.clone());
+            parts.push(ball);
+            if newtons >= SMALLEST_FORCE {
+                let length = (LONGEST_ARROW * newtons / largest).max(SHORTEST_ARROW);
+                let tail = contact.position - contact.force / newtons * length;
+                let name = format!("force_{label}");
+                let mut arrow = primitives::arrow(&name, tail, contact.position, ARROW_RADIUS, srgb(FORCE))
+                    .with_finish(Finish::Marker);
+                arrow.extras = Some(extras);
+                parts.push(arrow);
+            }
+        }
+        parts
+    }
+}
+
+impl ContactMark {
+    /// "thumb_third", "palm" or the like.
+    fn label(&self) -> String {
+        let digit = match self.digit {
+            Some(Digit::Thumb) => "thumb",
+            Some(Digit::Index) => "index",
+            Some(Digit::Middle) => "middle",
+            Some(Digit::Ring) => "ring",
+            Some(Digit::Little) => "little",
+            None => return "palm".into(),
+        };
+        match self.phalanx {
+            Some(Phalanx::First) => format!("{digit}_first"),
+            Some(Phalanx::Second) => format!("{digit}_second"),
+            Some(Phalanx::Third) => format!("{digit}_third"),
+            None => digit.into(),
+        }
+    }
+}
+
+/// How much it matters to see a part: the contacts together as much as the object or the receiving hand.
+fn importance(part: &Part) -> f32 {
+    match part.name.as_str() {
+        "object" | "receiver_hand" => 1.0,
+        "giver_hand" => 0.6,
+        name if name.starts_with("contact_") => 0.25,
+        _ => 0.0,
+    }
+}
+
+fn srgb([r, g, b]: [u8; 3]) -> [f32; 4] {
+    linear_from_srgb(r, g, b)
+}

@@ -1,0 +1,133 @@
+//! Where to look from: the directions from which most of what matters is visible.
+
+use glam::{Quat, Vec3};
+
+use crate::{
+    camera::Camera,
+    raster::{self, NOTHING},
+    scene::{Finish, Part, Scene},
+    surface::{Triangle, project, triangles_of},
+};
+
+/// Candidate directions: so many around the vertical …
+const AZIMUTHS: u32 = 12;
+
+/// … at each of these elevations in radians, with how welcome such a view is: people look slightly down at hands.
+const ELEVATIONS: [(f32, f32); 3] = [(-0.15, 0.88), (0.35, 1.0), (0.85, 0.93)];
+
+/// Pixels in a row of the trial pictures that candidates are judged by.
+const TRIAL_WIDTH: usize = 160;
+
+/// Smallest angle between the two views, in radians (70°).
+pub const MIN_ANGLE_BETWEEN_VIEWS: f32 = 1.222;
+
+/// Two cameras that frame a scene: from the direction that shows most, and from the best one at least
+/// [`MIN_ANGLE_BETWEEN_VIEWS`] away from it. `importance` says how much it matters to see a part; what counts is the
+/// part's visible area compared with the largest that any candidate shows of it.
+pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, aspect: f32) -> [Camera; 2] {
+    let triangles = triangles_of(scene);
+    let importances: Vec<f32> = scene.parts.iter().map(importance).collect();
+    let to_up = Quat::from_rotation_arc(Vec3::Y, up.normalize_or(Vec3::Y));
+    let mut directions = Vec::new();
+    for (elevation, welcome) in ELEVATIONS {
+        for step in 0..AZIMUTHS {
+            let azimuth = Quat::from_rotation_y(step as f32 / AZIMUTHS as f32 * std::f32::consts::TAU);
+            let direction = azimuth * Vec3::new(0.0, elevation.sin(), elevation.cos());
+            directions.push((to_up * direction, welcome));
+        }
+    }
+
+    let areas: Vec<Vec<f32>> = directions
+        .iter()
+        .map(|&(direction, _)| {
+            let camera = Camera::framing(scene, direction, up, aspect);
+            visible_areas(&triangles, scene.parts.len(), &camera)
+        })
+        .collect();
+    let largest: Vec<f32> = (0..scene.parts.len())
+        .map(|part| areas.iter().map(|a| a[part]).fold(0.0, f32::max))
+        .collect();
+    let score = |candidate: usize| {
+        let shown = |part: usize| {
+            if largest[part] > 0.0 {
+                // The root values the first glimpse of a part more than its last corner.
+                importances[part] * (areas[candidate][part] / largest[part]).sqrt()
+            } else {
+                0.0
+            }
+        };
+        directions[candidate].1 * (0..scene.parts.len()).map(shown).sum::<f32>()
+    };
+    let best_of = |candidates: &mut dyn Iterator<Item = usize>| {
+        // The first of equals.
+        candidates.fold(None, |best: Option<(usize, f32)>, candidate| {
+            let value = score(candidate);
+            match best {
+                Some((_, highest)) if highest >= value => best,
+                _ => Some((candidate, value)),
+            }
+        })
+    };
+    let first = best_of(&mut (0..directions.len())).map_or(0, |(candidate, _)| candidate);
+    let far_enough = |&candidate: &usize| {
+        directions[candidate].0.angle_between(directions[first].0) >= MIN_ANGLE_BETWEEN_VIEWS
+    };
+    let second =
+        best_of(&mut (0..directions.len()).filter(far_enough)).map_or(first, |(candidate, _)| candidate);
+    [first, second].map(|candidate| Camera::framing(scene, directions[candidate].0, up, aspect))
+}
+
+/// The pixels of a trial picture that each part shows. Markers do not hide anything.
+fn visible_areas(triangles: &[Triangle], parts: usize, camera: &Camera) -> Vec<f32> {
+    let height = ((TRIAL_WIDTH as f32 / camera.aspect) as usize).max(1);
+    let draw = |markers: bool| {
+        let wanted = |t: &Triangle| (t.finish == Finish::Marker) == markers;
+        let screen = project(triangles, camera, TRIAL_WIDTH, height, wanted);
+        raster::rasterise(TRIAL_WIDTH, height, &screen, |_, _, _| true)
+    };
+    let (solid, markers) = (draw(false), draw(true));
+    let mut areas = vec![0.0; parts];
+    for pixel in 0..TRIAL_WIDTH * height {
+        if solid.ids[pixel] != NOTHING {
+            areas[triangles[solid.ids[pixel] as usize].part as usize] += 1.0;
+        }
+        if markers.ids[pixel] != NOTHING && markers.depths[pixel] >= solid.depths[pixel] {
+            areas[triangles[markers.ids[pixel] as usize].part as usize] += 1.0;
+        }
+    }
+    areas
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::primitives::sphere;
+
+    #[test]
+    fn the_first_view_looks_at_what_the_wall_does_not_hide() {
+        let wall = Part::new(
+            "wall",
+            vec![
+                Vec3::new(-1.0, -1.0, 0.0),
+                Vec3::new(1.0, -1.0, 0.0),
+                Vec3::new(1.0, 1.0, 0.0),
+                Vec3::new(-1.0, 1.0, 0.0),
+            ],
+            vec![[0, 1, 2], [0, 2, 3]],
+            [1.0; 4],
+        );
+        for side in [-1.0, 1.0] {
+            let ball = sphere("ball", Vec3::new(0.0, 0.0, 0.3 * side), 0.1, [1.0; 4]);
+            let mark =
+                sphere("mark", Vec3::new(0.0, 0.0, 0.45 * side), 0.03, [1.0; 4]).with_finish(Finish::Marker);
+            let scene = Scene {
+                parts: vec![wall.clone(), ball, mark],
+            };
+            let importance = |part: &Part| if part.name == "wall" { 0.0 } else { 1.0 };
+            let [first, second] = choose_views(&scene, importance, Vec3::Y, 1.3);
+            let towards = |camera: &Camera| camera.world_from_camera.transform_vector(Vec3::Z);
+            assert!(towards(&first).z * side > 0.3, "looks from {}", towards(&first));
+            assert!(towards(&first).angle_between(towards(&second)) >= MIN_ANGLE_BETWEEN_VIEWS - 1e-3);
+        }
+    }
+}
