@@ -85,10 +85,7 @@ impl Writer {
             description["min"] = json!(low.to_array());
             description["max"] = json!(high.to_array());
         }
-        let bytes = values
-            .iter()
-            .flat_map(|v| v.to_array())
-            .flat_map(f32::to_le_bytes);
+        let bytes = values.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes);
         self.accessor(bytes, description, ARRAY_BUFFER)
     }
 
@@ -108,9 +105,10 @@ impl Writer {
     }
 
     fn finish(self) -> Vec<u8> {
-        let mut root = json!({"asset": {"version": "2.0", "generator": "grasp"}, "scene": 0, "scenes": [{}]});
+        let mut root = json!({"asset": {"version": "2.0", "generator": "grasp"}});
         // The specification forbids empty arrays.
         if !self.nodes.is_empty() {
+            root["scene"] = 0.into();
             root["scenes"] = json!([{"nodes": (0..self.nodes.len()).collect::<Vec<_>>()}]);
             root["nodes"] = self.nodes.into();
             root["meshes"] = self.meshes.into();
@@ -206,5 +204,132 @@ impl Vertices {
             }
         }
         vertices
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use gltf::Semantic;
+
+    use super::*;
+    use crate::{primitives, scene::linear_from_srgb};
+
+    fn sample() -> Scene {
+        let red = linear_from_srgb(200, 30, 20);
+        let mut ball = primitives::sphere("ball", Vec3::new(0.1, 0.2, 0.3), 0.05, red);
+        ball.extras = Some(json!({"force_n": 2.5}));
+        let mut rod =
+            primitives::tapered_cylinder("rod", Vec3::ZERO, Vec3::Y, 0.1, 0.1, [0.2, 0.3, 0.4, 0.5]);
+        rod.vertex_colours = rod.positions.iter().map(|p| p.abs().min(Vec3::ONE)).collect();
+        let empty = Part::new("empty", vec![Vec3::ZERO], Vec::new(), red);
+        Scene {
+            parts: vec![ball, empty, rod],
+        }
+    }
+
+    /// The file as the gltf crate, which validates it, sees it.
+    fn parse(bytes: &[u8]) -> (gltf::Document, Vec<u8>) {
+        let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(bytes).expect("a valid file");
+        (document, blob.unwrap_or_default())
+    }
+
+    #[test]
+    fn a_reader_finds_every_triangle_where_it_was() {
+        let scene = sample();
+        let (document, blob) = parse(&to_glb(&scene));
+        let nodes: Vec<_> = document.default_scene().expect("a scene").nodes().collect();
+        let parts: Vec<_> = scene.parts.iter().filter(|p| !p.triangles.is_empty()).collect();
+        assert_eq!(nodes.len(), parts.len());
+        for (node, part) in nodes.iter().zip(parts) {
+            assert_eq!(node.name(), Some(part.name.as_str()));
+            let mesh = node.mesh().expect("a mesh");
+            let primitive = mesh.primitives().next().expect("a primitive");
+            let reader = primitive.reader(|_| Some(&blob));
+            let positions: Vec<Vec3> = reader
+                .read_positions()
+                .expect("positions")
+                .map(Vec3::from)
+                .collect();
+            let normals: Vec<Vec3> = reader.read_normals().expect("normals").map(Vec3::from).collect();
+            let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
+            let corners: Vec<Vec3> = part
+                .triangles
+                .iter()
+                .flatten()
+                .map(|&v| part.positions[v as usize])
+                .collect();
+            let read: Vec<Vec3> = indices.iter().map(|&i| positions[i as usize]).collect();
+            assert_eq!(read, corners);
+            assert_eq!(normals.len(), positions.len());
+            assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-5));
+            for (triangle, face) in indices.chunks(3).zip(corners.chunks(3)) {
+                let face = (face[1] - face[0]).cross(face[2] - face[0]);
+                assert!(triangle.iter().all(|&i| normals[i as usize].dot(face) > 0.0));
+            }
+            let bounds = primitive.bounding_box();
+            assert_eq!(
+                Vec3::from(bounds.min),
+                corners.iter().copied().fold(Vec3::INFINITY, Vec3::min)
+            );
+            assert_eq!(
+                Vec3::from(bounds.max),
+                corners.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max)
+            );
+        }
+    }
+
+    #[test]
+    fn colours_blending_and_extras_arrive() {
+        let scene = sample();
+        let bytes = to_glb(&scene);
+        let (document, blob) = parse(&bytes);
+        let material = |i: usize| document.materials().nth(i).expect("a material");
+        assert_eq!(
+            material(0).pbr_metallic_roughness().base_color_factor(),
+            scene.parts[0].colour
+        );
+        assert_eq!(material(0).alpha_mode(), gltf::material::AlphaMode::Opaque);
+        assert_eq!(
+            material(1).pbr_metallic_roughness().base_color_factor(),
+            [1.0, 1.0, 1.0, 0.5]
+        );
+        assert_eq!(material(1).alpha_mode(), gltf::material::AlphaMode::Blend);
+
+        let rod = document
+            .meshes()
+            .nth(1)
+            .expect("the rod")
+            .primitives()
+            .next()
+            .expect("one");
+        assert!(rod.get(&Semantic::Colors(0)).is_some());
+        let reader = rod.reader(|_| Some(&blob));
+        let colours = reader.read_colors(0).expect("colours").into_rgb_f32();
+        for (colour, position) in colours.zip(reader.read_positions().expect("positions")) {
+            assert_eq!(Vec3::from(colour), Vec3::from(position).abs().min(Vec3::ONE));
+        }
+
+        let json_length = u32::from_le_bytes(bytes[12..16].try_into().expect("four bytes")) as usize;
+        let root: Value = serde_json::from_slice(&bytes[20..20 + json_length]).expect("JSON");
+        assert_eq!(root["nodes"][0]["extras"], json!({"force_n": 2.5}));
+    }
+
+    #[test]
+    fn smooth_vertices_are_shared_and_sharp_ones_split() {
+        let ball = primitives::sphere("ball", Vec3::ZERO, 1.0, [1.0; 4]);
+        assert_eq!(Vertices::of(&ball).positions.len(), ball.positions.len());
+        let flat = Part {
+            crease_angle: 0.0,
+            ..ball.clone()
+        };
+        let split = Vertices::of(&flat).positions.len();
+        assert!(split > ball.positions.len() * 2 && split <= ball.triangles.len() * 3);
+    }
+
+    #[test]
+    fn an_empty_scene_is_a_valid_file() {
+        let (document, blob) = parse(&to_glb(&Scene::default()));
+        assert_eq!(document.nodes().count(), 0);
+        assert!(blob.is_empty());
     }
 }

@@ -199,25 +199,27 @@ pub(crate) fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// The film: linear light of any strength to linear display light between 0 and 1. Colours keep their hue and, below
-/// 0.76, nearly their value; above, they roll off to white (Khronos PBR Neutral tone mapper, 2024).
+/// Exposure: the factor between light and film. More is brighter and loses white objects to the background.
+const EXPOSURE: f32 = 0.88;
+
+/// Film shows light up to here as it is and compresses what is brighter.
+const COMPRESSION_START: f32 = 0.62;
+
+/// How fast compressed colours fade to white.
+const FADE_TO_WHITE: f32 = 0.25;
+
+/// The film: linear light of any strength to linear display light between 0 and 1. Dark and middle colours stay what
+/// they are; bright ones roll off to white without a change of hue (the shoulder of the Khronos PBR Neutral tone
+/// mapper of 2024, which starts later, without its toe, which makes skin orange).
 pub(crate) fn develop(light: Vec3) -> Vec3 {
-    const COMPRESSION_START: f32 = 0.76;
-    const DESATURATION: f32 = 0.15;
-    let lowest = light.min_element().max(0.0);
-    let offset = if lowest < 0.08 {
-        lowest - 6.25 * lowest * lowest
-    } else {
-        0.04
-    };
-    let colour = light - offset;
+    let colour = light.max(Vec3::ZERO) * EXPOSURE;
     let peak = colour.max_element();
     if peak < COMPRESSION_START {
-        return colour.max(Vec3::ZERO);
+        return colour;
     }
     let room = 1.0 - COMPRESSION_START;
     let new_peak = 1.0 - room * room / (peak + room - COMPRESSION_START);
-    let whiteness = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    let whiteness = 1.0 - 1.0 / (FADE_TO_WHITE * (peak - new_peak) + 1.0);
     (colour * (new_peak / peak)).lerp(Vec3::splat(new_peak), whiteness)
 }
 

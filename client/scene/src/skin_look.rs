@@ -23,7 +23,7 @@ pub(crate) struct Complexion {
 
 impl Complexion {
     pub(crate) const FAIR: Self = Self {
-        back: [226, 182, 156],
+        back: [224, 178, 152],
         palm: [230, 180, 158],
         flush: [214, 146, 124],
         nail: [236, 196, 184],
@@ -178,18 +178,24 @@ fn nail_places(skin: &Skin, tip: usize) -> Option<Vec<Place>> {
     let tip_at = distal
         .inverse()
         .transform_point(skin.bind.joints[tip].pose.position);
-    // Only triangles around the tip can be hit.
+    let is_of_tip = |vertex: u32| {
+        let vertex = vertex as usize;
+        let weights = skin.joint_indices[vertex].iter().zip(&skin.weights[vertex]);
+        let share: f32 = weights
+            .filter(|(joint, _)| usize::from(**joint) == tip || usize::from(**joint) == tip - 1)
+            .map(|(_, weight)| weight)
+            .sum();
+        share > 0.5
+    };
     let near: Vec<(usize, [Vec3; 3])> = skin
         .triangles
         .iter()
         .enumerate()
+        .filter(|(_, triangle)| triangle.iter().all(|&v| is_of_tip(v)))
         .map(|(i, t)| {
-            (
-                i,
-                t.map(|v| distal.inverse().transform_point(skin.positions[v as usize])),
-            )
+            let local = t.map(|v| distal.inverse().transform_point(skin.positions[v as usize]));
+            (i, local)
         })
-        .filter(|(_, corners)| corners[0].distance(tip_at) < radius * 4.0)
         .collect();
     // The distal frame's -z leads to the tip.
     let skin_end = near

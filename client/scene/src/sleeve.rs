@@ -8,21 +8,21 @@ use crate::{
     scene::{Finish, Part},
 };
 
-/// Length of the visible forearm in metres: enough to show where the arm comes from.
-const LENGTH: f32 = 0.095;
+/// Length of the sleeve in metres: long enough to leave the picture, as an arm does.
+const LENGTH: f32 = 0.17;
 
 /// From the wrist joint to the cuff's edge, away from the hand, in metres.
 const CUFF_START: f32 = 0.006;
 
 /// Free space between wrist and cuff, in metres.
-const CLEARANCE: f32 = 0.004;
+const CLEARANCE: f32 = 0.003;
 
 /// Width of the cuff along the arm and how far it stands out from the sleeve, in metres.
 const CUFF_WIDTH: f32 = 0.020;
 const CUFF_THICKNESS: f32 = 0.0022;
 
 /// How much wider the sleeve is at its end than at the cuff.
-const WIDENING: f32 = 1.22;
+const WIDENING: f32 = 1.28;
 
 /// Skin counts as the wrist's this close to the joint along the arm, in metres.
 const WRIST_BAND: f32 = 0.012;

@@ -21,12 +21,17 @@ const TRIAL_WIDTH: usize = 160;
 /// Smallest angle between the two views, in radians (70°).
 pub const MIN_ANGLE_BETWEEN_VIEWS: f32 = 1.222;
 
-/// Two cameras that frame a scene: from the direction that shows most, and from the best one at least
+/// Two cameras that frame all parts of some importance: from the direction that shows most, and from the best one at least
 /// [`MIN_ANGLE_BETWEEN_VIEWS`] away from it. `importance` says how much it matters to see a part; what counts is the
 /// part's visible area compared with the largest that any candidate shows of it.
 pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, aspect: f32) -> [Camera; 2] {
     let triangles = triangles_of(scene);
     let importances: Vec<f32> = scene.parts.iter().map(importance).collect();
+    let frame = |direction: Vec3| {
+        let framed = scene.parts.iter().zip(&importances).filter(|(_, i)| **i > 0.0);
+        let points = framed.flat_map(|(part, _)| part.positions.iter().copied());
+        Camera::framing_points(points, direction, up, aspect)
+    };
     let to_up = Quat::from_rotation_arc(Vec3::Y, up.normalize_or(Vec3::Y));
     let mut directions = Vec::new();
     for (elevation, welcome) in ELEVATIONS {
@@ -39,10 +44,7 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
 
     let areas: Vec<Vec<f32>> = directions
         .iter()
-        .map(|&(direction, _)| {
-            let camera = Camera::framing(scene, direction, up, aspect);
-            visible_areas(&triangles, scene.parts.len(), &camera)
-        })
+        .map(|&(direction, _)| visible_areas(&triangles, scene.parts.len(), &frame(direction)))
         .collect();
     let largest: Vec<f32> = (0..scene.parts.len())
         .map(|part| areas.iter().map(|a| a[part]).fold(0.0, f32::max))
@@ -74,7 +76,7 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
     };
     let second =
         best_of(&mut (0..directions.len()).filter(far_enough)).map_or(first, |(candidate, _)| candidate);
-    [first, second].map(|candidate| Camera::framing(scene, directions[candidate].0, up, aspect))
+    [first, second].map(|candidate| frame(directions[candidate].0))
 }
 
 /// The pixels of a trial picture that each part shows. Markers do not hide anything.
