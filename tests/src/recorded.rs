@@ -1,0 +1,98 @@
+//! Meshes and hand poses that nobody of this project made, used where they are and never copied.
+//!
+//! They lie in the folder that `GRASP_TEST_DATA` names, else in `../shared/data` beside the repository. Tests that
+//! need them say aloud that they were skipped when they are absent.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    hand::{
+        Handedness,
+        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index},
+    },
+    pose::Pose,
+};
+use serde::Deserialize;
+
+/// The folder with the recorded data, if it is there.
+pub fn data_folder() -> Option<PathBuf> {
+    let folder = std::env::var_os("GRASP_TEST_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
+        PathBuf::from,
+    );
+    folder.join("poses").is_dir().then_some(folder)
+}
+
+/// The folder with the recorded data; says aloud that `test` is skipped when it is absent.
+pub fn data_folder_or_skip(test: &str) -> Option<PathBuf> {
+    let folder = data_folder();
+    if folder.is_none() {
+        eprintln!("SKIPPED {test}: no recorded data (set GRASP_TEST_DATA to their folder)");
+    }
+    folder
+}
+
+/// A hand pose that was recorded from a person or made by an artist.
+#[derive(Clone, Debug)]
+pub struct RecordedPose {
+    /// What the source calls it.
+    pub name: String,
+    /// Its joints in the wrist's `OpenXR` frame; the palm joint is derived.
+    pub joints: HandJoints,
+}
+
+#[derive(Deserialize)]
+struct PoseFile {
+    poses: Vec<PoseEntry>,
+}
+
+#[derive(Deserialize)]
+struct PoseEntry {
+    name: String,
+    handedness: Handedness,
+    joints: BTreeMap<String, JointEntry>,
+}
+
+#[derive(Deserialize)]
+struct JointEntry {
+    position: Vec3,
+    orientation_xyzw: Quat,
+}
+
+/// All poses of a file such as `poses/handy-work_poses.json`. The files carry no radii: they are given by `radii`, in
+/// metres, in `OpenXR` order.
+pub fn read_poses(file: &Path, radii: &[f32; JOINT_COUNT]) -> Vec<RecordedPose> {
+    let text = std::fs::read_to_string(file).expect("the pose file can be read");
+    let file: PoseFile = serde_json::from_str(&text).expect("the pose file has the documented form");
+    file.poses.iter().map(|entry| recorded_pose(entry, radii)).collect()
+}
+
+fn recorded_pose(entry: &PoseEntry, radii: &[f32; JOINT_COUNT]) -> RecordedPose {
+    let joint = |i: usize| {
+        let recorded = &entry.joints[JOINT_NAMES[i]];
+        Joint {
+            pose: Pose::new(recorded.position, recorded.orientation_xyzw.normalize()),
+            radius: radii[i],
+        }
+    };
+    let metacarpal = joint(index::FIRST_OF_DIGIT[2]);
+    let knuckle = joint(index::FIRST_OF_DIGIT[2] + 1);
+    let palm = Joint {
+        pose: Pose::new(
+            metacarpal.pose.position.midpoint(knuckle.pose.position),
+            metacarpal.pose.orientation,
+        ),
+        radius: radii[index::PALM],
+    };
+    RecordedPose {
+        name: entry.name.clone(),
+        joints: HandJoints {
+            handedness: entry.handedness,
+            joints: std::array::from_fn(|i| if i == index::PALM { palm } else { joint(i) }),
+        },
+    }
+}
