@@ -1,2 +1,7 @@
-//! To come.
-fn main() {}
+//! The command line `grasp`.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

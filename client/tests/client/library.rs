@@ -1,157 +1,12 @@
-//! The library against a tiny service that fails as it is told, over real gRPC.
+//! The library against a service that fails as it is told, over real gRPC.
 
-use std::{
-    collections::VecDeque,
-    sync::{Arc, Mutex},
-    time::Duration,
-};
+use std::time::Duration;
 
 use grasp_client::{ClientError, FindRequest, GraspClient, Health, NewObject, Outcome, RetryPolicy};
-use grasp_proto::v1::{
-    self,
-    grasp_service_server::{GraspService, GraspServiceServer},
-    object_service_server::{ObjectService, ObjectServiceServer},
-};
-use tokio_stream::wrappers::TcpListenerStream;
-use tonic::{Code, Request, Response, Status, transport::Server};
+use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
-/// What the service does with one call.
-enum Act {
-    Fail(Status),
-    Answer,
-    Hang,
-}
-
-/// Acts out a script and keeps the deadlines that it was told.
-#[derive(Clone, Default)]
-struct Scripted {
-    script: Arc<Mutex<VecDeque<Act>>>,
-    grpc_timeouts: Arc<Mutex<Vec<String>>>,
-    /// The second page of objects names itself as the next one.
-    repeats_itself: bool,
-}
-
-impl Scripted {
-    fn new(script: impl IntoIterator<Item = Act>) -> Self {
-        Self {
-            script: Arc::new(Mutex::new(script.into_iter().collect())),
-            ..Self::default()
-        }
-    }
-
-    async fn act<T>(&self, request: &Request<T>) -> Result<(), Status> {
-        if let Some(timeout) = request.metadata().get("grpc-timeout") {
-            let timeout = timeout.to_str().unwrap().to_owned();
-            self.grpc_timeouts.lock().unwrap().push(timeout);
-        }
-        let act = self.script.lock().unwrap().pop_front();
-        match act.expect("the script covers every call") {
-            Act::Fail(status) => Err(status),
-            Act::Answer => Ok(()),
-            Act::Hang => std::future::pending().await,
-        }
-    }
-
-    fn calls(&self) -> usize {
-        self.grpc_timeouts.lock().unwrap().len()
-    }
-
-    /// Serves on a free port and connects to it.
-    async fn serve(&self, retry: RetryPolicy, call_timeout: Duration) -> GraspClient {
-        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let address = listener.local_addr().unwrap();
-        let (health_reporter, health_service) = tonic_health::server::health_reporter();
-        health_reporter.set_serving::<GraspServiceServer<Self>>().await;
-        let router = Server::builder()
-            .add_service(health_service)
-            .add_service(GraspServiceServer::new(self.clone()))
-            .add_service(ObjectServiceServer::new(self.clone()));
-        tokio::spawn(router.serve_with_incoming(TcpListenerStream::new(listener)));
-        GraspClient::builder(format!("http://{address}"))
-            .call_timeout(call_timeout)
-            .retry(retry)
-            .connect()
-            .await
-            .unwrap()
-    }
-}
-
-#[tonic::async_trait]
-impl GraspService for Scripted {
-    async fn find_grasp(
-        &self,
-        request: Request<v1::FindGraspRequest>,
-    ) -> Result<Response<v1::FindGraspResponse>, Status> {
-        self.act(&request).await?;
-        Ok(Response::new(v1::FindGraspResponse {
-            outcome: v1::Outcome::BudgetExhausted.into(),
-            grasp: None,
-            report: Some(v1::SearchReport {
-                attempts: 5,
-                search_time: Some(prost_types::Duration::default()),
-                budget: request
-                    .into_inner()
-                    .budget
-                    .or(Some(prost_types::Duration::default())),
-                ..v1::SearchReport::default()
-            }),
-        }))
-    }
-}
-
-fn wire_object(name: &str) -> v1::Object {
-    v1::Object {
-        name: name.to_owned(),
-        centre_of_mass: Some(v1::Vector3::default()),
-        box_half_extents: Some(v1::Vector3::default()),
-        ..v1::Object::default()
-    }
-}
-
-#[tonic::async_trait]
-impl ObjectService for Scripted {
-    async fn create_object(
-        &self,
-        request: Request<v1::CreateObjectRequest>,
-    ) -> Result<Response<v1::CreateObjectResponse>, Status> {
-        self.act(&request).await?;
-        let name = format!("objects/{}", request.into_inner().object_id);
-        Ok(Response::new(v1::CreateObjectResponse {
-            object: Some(wire_object(&name)),
-        }))
-    }
-
-    async fn get_object(
-        &self,
-        request: Request<v1::GetObjectRequest>,
-    ) -> Result<Response<v1::GetObjectResponse>, Status> {
-        self.act(&request).await?;
-        Ok(Response::new(v1::GetObjectResponse {
-            object: Some(wire_object(&request.into_inner().name)),
-        }))
-    }
-
-    /// Three pages of one object each, named by the token that asked for them.
-    async fn list_objects(
-        &self,
-        request: Request<v1::ListObjectsRequest>,
-    ) -> Result<Response<v1::ListObjectsResponse>, Status> {
-        self.act(&request).await?;
-        let token = request.into_inner().page_token;
-        let next = match token.as_str() {
-            "" => "b",
-            "b" if self.repeats_itself => "b",
-            "b" => "c",
-            "c" => "",
-            other => panic!("token {other:?} was never given"),
-        };
-        Ok(Response::new(v1::ListObjectsResponse {
-            objects: vec![wire_object(&format!("objects/{token}"))],
-            next_page_token: next.to_owned(),
-        }))
-    }
-}
+use crate::scripted::{Act, Scripted};
 
 /// Retries without noticeable waits.
 fn quick() -> RetryPolicy {
@@ -160,6 +15,16 @@ fn quick() -> RetryPolicy {
         max_backoff: Duration::from_millis(2),
         ..RetryPolicy::default()
     }
+}
+
+/// Serves and connects.
+async fn connect(service: &Scripted, call_timeout: Duration) -> GraspClient {
+    GraspClient::builder(service.serve().await)
+        .call_timeout(call_timeout)
+        .retry(quick())
+        .connect()
+        .await
+        .unwrap()
 }
 
 const PATIENT: Duration = Duration::from_mins(1);
@@ -171,7 +36,7 @@ fn unavailable() -> Act {
 #[tokio::test]
 async fn unavailable_is_tried_again_until_it_is_answered() {
     let service = Scripted::new([unavailable(), unavailable(), Act::Answer]);
-    let client = service.serve(quick(), PATIENT).await;
+    let client = connect(&service, PATIENT).await;
     let answer = client
         .find_grasp(&FindRequest::new("objects/remote"))
         .await
@@ -184,7 +49,7 @@ async fn unavailable_is_tried_again_until_it_is_answered() {
 #[tokio::test]
 async fn retries_are_bounded_and_counted() {
     let service = Scripted::new((0..9).map(|_| unavailable()));
-    let client = service.serve(quick(), PATIENT).await;
+    let client = connect(&service, PATIENT).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
     assert!(matches!(error, ClientError::Unavailable(_)), "{error:?}");
     assert_eq!(error.call().unwrap().attempts, 4);
@@ -200,7 +65,7 @@ async fn nothing_but_unavailable_is_tried_again() {
         Code::Aborted,
     ] {
         let service = Scripted::new([Act::Fail(Status::new(code, "no")), Act::Answer]);
-        let client = service.serve(quick(), PATIENT).await;
+        let client = connect(&service, PATIENT).await;
         let error = client.get_object("objects/remote").await.unwrap_err();
         assert_eq!(error.call().unwrap().code, code);
         assert_eq!(service.calls(), 1, "{code}");
@@ -214,7 +79,7 @@ async fn a_server_that_forbids_another_try_is_obeyed() {
         .metadata_mut()
         .insert("grpc-retry-pushback-ms", "-1".parse().unwrap());
     let service = Scripted::new([Act::Fail(status), Act::Answer]);
-    let client = service.serve(quick(), PATIENT).await;
+    let client = connect(&service, PATIENT).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
     assert!(matches!(error, ClientError::Unavailable(_)), "{error:?}");
     assert_eq!(service.calls(), 1);
@@ -225,7 +90,7 @@ async fn a_wait_beyond_the_deadline_is_not_begun() {
     let details = ErrorDetails::with_retry_info(Some(Duration::from_hours(1)));
     let status = Status::with_error_details(Code::Unavailable, "come back in an hour", details);
     let service = Scripted::new([Act::Fail(status), Act::Answer]);
-    let client = service.serve(quick(), PATIENT).await;
+    let client = connect(&service, PATIENT).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
     let ClientError::Unavailable(call) = error else {
         panic!("{error:?}")
@@ -237,7 +102,7 @@ async fn a_wait_beyond_the_deadline_is_not_begun() {
 #[tokio::test]
 async fn a_server_that_does_not_answer_meets_the_deadline() {
     let service = Scripted::new([Act::Hang]);
-    let client = service.serve(quick(), Duration::from_millis(50)).await;
+    let client = connect(&service, Duration::from_millis(50)).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
     assert!(matches!(error, ClientError::DeadlineExceeded(_)), "{error:?}");
 }
@@ -245,7 +110,7 @@ async fn a_server_that_does_not_answer_meets_the_deadline() {
 #[tokio::test]
 async fn the_server_is_told_the_deadline_with_the_budget_on_top() {
     let service = Scripted::new([Act::Answer, Act::Answer]);
-    let client = service.serve(quick(), Duration::from_mins(1)).await;
+    let client = connect(&service, Duration::from_mins(1)).await;
     client.get_object("objects/remote").await.unwrap();
     let request = FindRequest {
         budget: Some(Duration::from_secs(40)),
@@ -280,7 +145,7 @@ async fn violations_reach_the_caller() {
     details.add_bad_request_violation("object_id", "is empty");
     let status = Status::with_error_details(Code::InvalidArgument, "2 violations", details);
     let service = Scripted::new([Act::Fail(status)]);
-    let client = service.serve(quick(), PATIENT).await;
+    let client = connect(&service, PATIENT).await;
     let error = client
         .create_object(&NewObject::new("", b"".as_slice(), -1.0))
         .await
@@ -295,7 +160,7 @@ async fn violations_reach_the_caller() {
 #[tokio::test]
 async fn all_pages_of_a_list_are_read() {
     let service = Scripted::new([Act::Answer, Act::Answer, Act::Answer]);
-    let client = service.serve(quick(), PATIENT).await;
+    let client = connect(&service, PATIENT).await;
     let objects = client.list_objects().await.unwrap();
     let names: Vec<_> = objects.iter().map(|object| object.name.as_str()).collect();
     assert_eq!(names, ["objects/", "objects/b", "objects/c"]);
@@ -303,11 +168,9 @@ async fn all_pages_of_a_list_are_read() {
 
 #[tokio::test]
 async fn a_list_that_repeats_itself_ends_with_an_error() {
-    let service = Scripted {
-        repeats_itself: true,
-        ..Scripted::new((0..9).map(|_| Act::Answer))
-    };
-    let client = service.serve(quick(), PATIENT).await;
+    let mut service = Scripted::new((0..9).map(|_| Act::Answer));
+    service.repeats_itself = true;
+    let client = connect(&service, PATIENT).await;
     let error = client.list_objects().await.unwrap_err();
     assert!(matches!(error, ClientError::Malformed { .. }), "{error:?}");
     assert_eq!(service.calls(), 2);
@@ -315,14 +178,14 @@ async fn a_list_that_repeats_itself_ends_with_an_error() {
 
 #[tokio::test]
 async fn health_is_told() {
-    let client = Scripted::default().serve(quick(), PATIENT).await;
+    let client = connect(&Scripted::default(), PATIENT).await;
     assert_eq!(client.health().await.unwrap(), Health::Serving);
 }
 
 #[tokio::test]
 async fn a_created_object_comes_back() {
     let service = Scripted::new([unavailable(), Act::Answer]);
-    let client = service.serve(quick(), PATIENT).await;
+    let client = connect(&service, PATIENT).await;
     let object = client
         .create_object(&NewObject::new("mug", b"v 0 0 0".as_slice(), 0.3))
         .await

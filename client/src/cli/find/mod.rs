@@ -1,0 +1,173 @@
+//! `grasp find`
+
+mod report;
+
+use std::{
+    io::Read as _,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use clap::{ArgGroup, Args};
+use grasp_client::{FindAnswer, FindRequest, Outcome};
+use serde::Serialize;
+
+use super::{
+    EXIT_CODES, Ending,
+    failure::Failure,
+    holdout,
+    output::{Output, write_json},
+    server::ServerOptions,
+    values::{BendRatiosName, HandName, StrategyName, parse_duration},
+};
+
+/// The long help: the shapes of requests and answers as JSON.
+const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
+
+The holdout is one of the built-in ones (--holdout) or a JSON file (--request). Such a file has the fields of the
+API's FindGraspRequest; only "object" is required:
+
+  {
+    "object": "objects/remote",
+    "client_from_object": {"position": [0, 1.2, 0.4], "orientation": [0, 0, 0, 1]},
+    "presenting_hand": {"angles": {
+      "rig": "thesis", "handedness": "right",
+      "client_from_wrist": {"position": [0, 1.2, 0.2], "orientation": [0, 0, 0, 1]},
+      "digits": [{"base_yaw": 0, "base_pitch": 0.2, "second_pitch": 0.3, "third_pitch": 0.2}, …five, thumb first]}},
+    "receiving_hand": {"rig": "thesis", "handedness": "right"},
+    "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
+    "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
+    "record_step_times": false, "convention": "openxr", "friction": null
+  }
+
+Instead of angles, the presenting hand may be the joints of a headset: {"joints": {"handedness": "left",
+"joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}. Metres, radians,
+quaternions x y z w. Options on the command line win over the file. --print-request writes the request instead of
+sending it, as a start for own ones.
+
+With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
+"round_trip_seconds": …} with the fields of the API's FindGraspResponse; durations are numbers of seconds, the seed is
+a string of digits."#;
+
+/// Ask for a grasp on an object that is held out.
+#[derive(Args, Debug)]
+#[command(long_about = ABOUT, after_help = EXIT_CODES)]
+#[command(group(ArgGroup::new("what").required(true).args(["holdout", "request"])))]
+pub(super) struct Arguments {
+    /// A built-in holdout, such as remote-hold1.
+    #[arg(long, value_name = "NAME")]
+    holdout: Option<String>,
+    /// A file with a request as JSON; - for standard input.
+    #[arg(long, value_name = "FILE")]
+    request: Option<PathBuf>,
+    /// How to search. Default: the server's.
+    #[arg(long, ignore_case = true)]
+    strategy: Option<StrategyName>,
+    /// Which bend ratios the fingers try. Default: what the strategy says.
+    #[arg(long)]
+    bend_ratios: Option<BendRatiosName>,
+    /// How long to search. Default: the server's.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    budget: Option<Duration>,
+    /// At most this many attempts. Default: as many as the budget allows.
+    #[arg(long, value_name = "N")]
+    max_attempts: Option<u64>,
+    /// Start of every random stream. Default: drawn by the server.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Replay: run this attempt of the seed and no other.
+    #[arg(long, value_name = "N", requires = "seed")]
+    only_attempt: Option<u64>,
+    /// The valid attempt of the lowest index wins, the same for any number of workers.
+    #[arg(long)]
+    reproducible: bool,
+    /// The hand to pose. Default: the right one.
+    #[arg(long, value_name = "HAND")]
+    receiving_hand: Option<HandName>,
+    /// The rig of the hand to pose. Default: the server's.
+    #[arg(long, value_name = "RIG")]
+    receiving_rig: Option<String>,
+    /// Coefficient of static friction. Default: the object's.
+    #[arg(long, value_name = "MU")]
+    friction: Option<f32>,
+    /// Record and show the time spent in each step.
+    #[arg(long)]
+    step_times: bool,
+    /// Write the request as JSON instead of sending it.
+    #[arg(long)]
+    print_request: bool,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct TimedAnswer {
+    #[serde(flatten)]
+    answer: FindAnswer,
+    round_trip_seconds: f64,
+}
+
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let request = arguments.to_request()?;
+    if arguments.print_request {
+        write_json(&request)?;
+        return Ok(Ending::Done);
+    }
+    let client = arguments.server.connect().await?;
+    let start = Instant::now();
+    let answer = client.find_grasp(&request).await?;
+    let timed = TimedAnswer {
+        answer,
+        round_trip_seconds: start.elapsed().as_secs_f64(),
+    };
+    output.write(&timed, |timed| {
+        report::describe(&request, &timed.answer, timed.round_trip_seconds)
+    })?;
+    Ok(match timed.answer.outcome {
+        Outcome::Found => Ending::Done,
+        Outcome::BudgetExhausted => Ending::NoGrasp,
+    })
+}
+
+impl Arguments {
+    /// The request of the holdout or the file, with the options laid over it.
+    fn to_request(&self) -> Result<FindRequest, Failure> {
+        let mut request = match (&self.holdout, &self.request) {
+            (Some(name), _) => holdout::request_for(holdout::built_in(name)?),
+            (None, Some(path)) => read_request(path)?,
+            (None, None) => {
+                return Err(Failure::Usage(
+                    "neither --holdout nor --request was given".to_owned(),
+                ));
+            }
+        };
+        request.strategy = self.strategy.map(Into::into).or(request.strategy);
+        request.bend_ratios = self.bend_ratios.map(Into::into).or(request.bend_ratios);
+        request.budget = self.budget.or(request.budget);
+        request.max_attempts = self.max_attempts.or(request.max_attempts);
+        request.seed = self.seed.or(request.seed);
+        request.only_attempt = self.only_attempt.or(request.only_attempt);
+        request.reproducible |= self.reproducible;
+        request.record_step_times |= self.step_times;
+        request.friction = self.friction.or(request.friction);
+        let receiver = &mut request.receiving_hand;
+        receiver.handedness = self.receiving_hand.map(Into::into).or(receiver.handedness);
+        receiver.rig = self.receiving_rig.clone().or(receiver.rig.take());
+        Ok(request)
+    }
+}
+
+/// Reads a request from a file or, for `-`, from standard input.
+fn read_request(path: &Path) -> Result<FindRequest, Failure> {
+    let cannot_read = |error| Failure::other(format!("cannot read {}", path.display()), error);
+    let text = if path == Path::new("-") {
+        let mut text = String::new();
+        std::io::stdin().read_to_string(&mut text).map_err(cannot_read)?;
+        text
+    } else {
+        std::fs::read_to_string(path).map_err(cannot_read)?
+    };
+    serde_json::from_str(&text)
+        .map_err(|error| Failure::Usage(format!("request {}: {error}", path.display())))
+}

@@ -1,0 +1,125 @@
+//! An answer for people.
+
+use std::fmt::Write as _;
+
+use grasp_client::{FindAnswer, FindRequest, Grasp, Outcome, SearchReport};
+
+use crate::cli::{
+    figures::{human_time, name_of, rejections_at_a_glance},
+    output::{pairs, table},
+};
+
+/// The whole answer.
+pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_seconds: f64) -> String {
+    let report = &answer.report;
+    let mut lines = vec![
+        ("object", request.object.clone()),
+        (
+            "outcome",
+            match answer.outcome {
+                Outcome::Found => "found".to_owned(),
+                Outcome::BudgetExhausted => "no grasp within the budget".to_owned(),
+            },
+        ),
+    ];
+    if let Some(grasp) = &answer.grasp {
+        lines.extend(describe_grasp(grasp));
+    }
+    lines.extend(describe_search(report));
+    lines.push(("round trip", human_time(round_trip_seconds)));
+    let mut text = pairs(&lines);
+    if let Some(grasp) = &answer.grasp {
+        let _ = write!(text, "\n\n{}", contact_table(grasp));
+    }
+    text
+}
+
+fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
+    let wrist = grasp.client_from_wrist;
+    let (p, q) = (wrist.position, wrist.orientation);
+    vec![
+        (
+            "hand",
+            format!("{}, rig {}", name_of(&grasp.handedness), grasp.rig),
+        ),
+        (
+            "wrist",
+            format!(
+                "{:.4}, {:.4}, {:.4} m, turned {:.4}, {:.4}, {:.4}, {:.4}",
+                p.x, p.y, p.z, q.x, q.y, q.z, q.w
+            ),
+        ),
+        ("comfort E", format!("{:.4}", grasp.comfort)),
+        ("wrench angle", format!("{:.2}°", grasp.wrench_angle.to_degrees())),
+    ]
+}
+
+fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
+    let mut lines = vec![
+        (
+            "attempts",
+            format!(
+                "{} ({} placements pruned)",
+                report.attempts, report.pruned_placements
+            ),
+        ),
+        ("rejections", rejections_at_a_glance(report, usize::MAX)),
+    ];
+    if let Some(miss) = &report.nearest_miss {
+        let angle = miss.wrench_angle.map_or_else(String::new, |angle| {
+            format!(", wrench angle {:.2}°", angle.to_degrees())
+        });
+        lines.push((
+            "nearest miss",
+            format!("attempt {}: {}{angle}", miss.attempt, name_of(&miss.rejection)),
+        ));
+    }
+    for time in &report.step_times {
+        lines.push((
+            "time in step",
+            format!("{} {}", name_of(&time.step), human_time(time.time.as_secs_f64())),
+        ));
+    }
+    lines.push((
+        "replay",
+        match report.attempt {
+            Some(attempt) => format!("--seed {} --only-attempt {attempt}", report.seed),
+            None => format!("--seed {}", report.seed),
+        },
+    ));
+    lines.push((
+        "search",
+        format!(
+            "{} of {} with {} workers",
+            human_time(report.search_time.as_secs_f64()),
+            human_time(report.budget.as_secs_f64()),
+            report.workers
+        ),
+    ));
+    lines
+}
+
+fn contact_table(grasp: &Grasp) -> String {
+    let mut table = table(&[
+        "digit",
+        "phalanx",
+        ">x / m",
+        ">y / m",
+        ">z / m",
+        ">triangle",
+        ">force / N",
+    ]);
+    for contact in &grasp.contacts {
+        let p = contact.client_position;
+        table.add_row([
+            name_of(&contact.digit),
+            name_of(&contact.phalanx),
+            format!("{:.4}", p.x),
+            format!("{:.4}", p.y),
+            format!("{:.4}", p.z),
+            contact.triangle.to_string(),
+            format!("{:.3}", contact.client_force.length()),
+        ]);
+    }
+    table.to_string()
+}

@@ -1,0 +1,81 @@
+//! Results on standard output: text for people, JSON for scripts. A closed pipe is no reason to panic.
+
+use std::io::{self, Write as _};
+
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use serde::Serialize;
+
+use super::failure::Failure;
+
+/// Where results go and in which form.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Output {
+    json: bool,
+}
+
+impl Output {
+    pub(super) fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    pub(super) fn is_json(self) -> bool {
+        self.json
+    }
+
+    /// Writes `value` as JSON or what `text` makes of it.
+    pub(super) fn write<T: Serialize>(
+        self,
+        value: &T,
+        text: impl FnOnce(&T) -> String,
+    ) -> Result<(), Failure> {
+        if self.json {
+            write_json(value)
+        } else {
+            write_line(&text(value))
+        }
+    }
+}
+
+/// Writes `value` as JSON whatever was asked for.
+pub(super) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
+    write_line(&text)
+}
+
+/// Writes raw bytes to standard output.
+pub(super) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    out.write_all(bytes)
+        .and_then(|()| out.flush())
+        .map_err(Failure::Output)
+}
+
+fn write_line(text: &str) -> Result<(), Failure> {
+    write_bytes(format!("{text}\n").as_bytes())
+}
+
+/// A table with a header; columns whose header starts with `>` are aligned to the right.
+pub(super) fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(presets::UTF8_HORIZONTAL_ONLY)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_header(header.iter().map(|name| name.trim_start_matches('>')));
+    for (name, column) in header.iter().zip(table.column_iter_mut()) {
+        if name.starts_with('>') {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+/// Names and values, one pair a line, values aligned.
+pub(super) fn pairs(pairs: &[(&str, String)]) -> String {
+    let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let lines: Vec<_> = pairs
+        .iter()
+        .map(|(name, value)| format!("{name:width$}  {value}"))
+        .collect();
+    lines.join("\n")
+}

@@ -1,0 +1,181 @@
+//! Values on the command line.
+
+use std::time::Duration;
+
+use clap::ValueEnum;
+use glam::Vec3;
+use grasp_client::{BendRatios, Handedness, Strategy};
+
+/// Reads a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
+pub(super) fn parse_duration(text: &str) -> Result<Duration, String> {
+    let expected = || format!("{text:?} is no duration; write one like 500ms, 2s or 1m, more than 0");
+    let unit_start = text
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .ok_or_else(expected)?;
+    let (number, unit) = text.split_at(unit_start);
+    let seconds_per_unit = match unit {
+        "us" => 1e-6,
+        "ms" => 1e-3,
+        "s" => 1.0,
+        "m" => 60.0,
+        _ => return Err(expected()),
+    };
+    let seconds = number.parse::<f64>().map_err(|_| expected())? * seconds_per_unit;
+    Duration::try_from_secs_f64(seconds)
+        .ok()
+        .filter(|duration| !duration.is_zero())
+        .ok_or_else(expected)
+}
+
+/// Reads a vector such as `0,0.01,-0.02`.
+pub(super) fn parse_vector(text: &str) -> Result<Vec3, String> {
+    let expected = || format!("{text:?} is no vector; write three numbers like 0,0.01,-0.02");
+    let numbers: Vec<f32> = text
+        .split(',')
+        .map(|number| number.trim().parse::<f32>())
+        .collect::<Result<_, _>>()
+        .map_err(|_| expected())?;
+    let [x, y, z] = numbers.try_into().map_err(|_| expected())?;
+    Ok(Vec3::new(x, y, z))
+}
+
+/// Triangle indices such as `7` or `10-20`, both ends included.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct TriangleRange(pub(super) std::ops::RangeInclusive<u32>);
+
+/// Reads one index or a range of indices.
+pub(super) fn parse_triangles(text: &str) -> Result<TriangleRange, String> {
+    let expected = || format!("{text:?} is no triangle index; write one like 7 or a range like 10-20");
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let first: u32 = first.parse().map_err(|_| expected())?;
+    let last: u32 = last.parse().map_err(|_| expected())?;
+    // A typing error must not fill the memory: no mesh that a server takes has this many triangles.
+    if first > last || last - first >= 10_000_000 {
+        return Err(expected());
+    }
+    Ok(TriangleRange(first..=last))
+}
+
+/// The ladder of the thesis' chapter 5.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+#[value(rename_all = "UPPER")]
+pub(super) enum StrategyName {
+    /// Naive synthesis.
+    A,
+    /// Placement measures relative to the object.
+    B,
+    /// Palm-CoM-palm angle.
+    C,
+    /// Early stop when the thumb has no contact.
+    D,
+    /// One way of choosing the bend ratios.
+    E,
+    /// First sufficient force distribution.
+    F,
+}
+
+impl From<StrategyName> for Strategy {
+    fn from(name: StrategyName) -> Self {
+        match name {
+            StrategyName::A => Self::A,
+            StrategyName::B => Self::B,
+            StrategyName::C => Self::C,
+            StrategyName::D => Self::D,
+            StrategyName::E => Self::E,
+            StrategyName::F => Self::F,
+        }
+    }
+}
+
+/// The columns of Figure 5.20.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum BendRatiosName {
+    /// 0.7, 1 and 1.42 in turn.
+    All,
+    /// The same, but the fingers skip 0.7.
+    AllFingersWithoutLow,
+    /// One of the three at random.
+    OneRandom,
+    /// The same, but the fingers skip 0.7.
+    OneRandomFingersWithoutLow,
+    /// Only 1.
+    OnlyOne,
+    /// Only 1.42.
+    OnlyHigh,
+}
+
+impl From<BendRatiosName> for BendRatios {
+    fn from(name: BendRatiosName) -> Self {
+        match name {
+            BendRatiosName::All => Self::All,
+            BendRatiosName::AllFingersWithoutLow => Self::AllFingersWithoutLow,
+            BendRatiosName::OneRandom => Self::OneRandom,
+            BendRatiosName::OneRandomFingersWithoutLow => Self::OneRandomFingersWithoutLow,
+            BendRatiosName::OnlyOne => Self::OnlyOne,
+            BendRatiosName::OnlyHigh => Self::OnlyHigh,
+        }
+    }
+}
+
+/// Which hand of a person.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum HandName {
+    /// The left hand.
+    Left,
+    /// The right hand.
+    Right,
+}
+
+impl From<HandName> for Handedness {
+    fn from(name: HandName) -> Self {
+        match name {
+            HandName::Left => Self::Left,
+            HandName::Right => Self::Right,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_have_units_and_are_more_than_nothing() {
+        assert_eq!(parse_duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(parse_duration("1.5s"), Ok(Duration::from_millis(1500)));
+        assert_eq!(parse_duration("250us"), Ok(Duration::from_micros(250)));
+        assert_eq!(parse_duration("2m"), Ok(Duration::from_mins(2)));
+        for wrong in [
+            "",
+            "5",
+            "s",
+            "-1s",
+            "0s",
+            "1h",
+            "1 s",
+            "1e3s",
+            "1..2s",
+            "NaNs",
+            "9999999999999999999999m",
+        ] {
+            assert!(parse_duration(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn vectors_have_three_numbers() {
+        assert_eq!(parse_vector("0, 0.5,-2"), Ok(Vec3::new(0.0, 0.5, -2.0)));
+        for wrong in ["", "1,2", "1,2,3,4", "a,b,c", "1;2;3"] {
+            assert!(parse_vector(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn triangles_are_indices_or_ranges() {
+        assert_eq!(parse_triangles("7"), Ok(TriangleRange(7..=7)));
+        assert_eq!(parse_triangles("10-20"), Ok(TriangleRange(10..=20)));
+        for wrong in ["", "-", "20-10", "1-", "x", "0-4294967295"] {
+            assert!(parse_triangles(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! The command line as scripts see it: standard output, standard error and exit codes of the built binary.
+
+use std::{
+    io::Write as _,
+    process::{Child, Command, Output, Stdio},
+};
+
+use serde_json::Value;
+use tonic::{Code, Status};
+use tonic_types::{ErrorDetails, StatusExt as _};
+
+use crate::scripted::{Act, Scripted};
+
+/// A process of the command line that is about to start; its environment names no server.
+fn grasp(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_grasp"));
+    command
+        .args(arguments)
+        .env_remove("GRASP_SERVER")
+        .env_remove("GRASP_LOG")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// Runs the command line while the test's runtime serves.
+fn run(arguments: &[&str]) -> Output {
+    run_with_input(arguments, "")
+}
+
+fn run_with_input(arguments: &[&str], input: &str) -> Output {
+    tokio::task::block_in_place(|| {
+        let mut child = grasp(arguments).spawn().unwrap();
+        // A command that does not read its input may have closed it already.
+        let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
+        child.wait_with_output().unwrap()
+    })
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+fn json(bytes: &[u8]) -> Value {
+    serde_json::from_slice(bytes).unwrap_or_else(|error| panic!("{error} in {:?}", text(bytes)))
+}
+
+/// An URL at which nobody listens.
+fn nobody() -> String {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    format!("http://{}", listener.local_addr().unwrap())
+}
+
+fn invalid() -> Act {
+    let mut details = ErrorDetails::with_bad_request_violation("mass_kg", "is -1; it must be more than 0");
+    details.add_bad_request_violation("obj", "is empty");
+    let status = Status::with_error_details(Code::InvalidArgument, "the object has 2 errors", details);
+    Act::Fail(status)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_are_listed_for_people_and_for_scripts() {
+    let service = Scripted::new((0..6).map(|_| Act::Answer));
+    let url = service.serve().await;
+    let people = run(&["objects", "list", "--server", &url]);
+    assert_eq!(code(&people), 0, "{}", text(&people.stderr));
+    let table = text(&people.stdout);
+    assert!(
+        table.contains("objects/b") && table.contains("objects/c"),
+        "{table}"
+    );
+    let scripts = run(&["objects", "list", "--json", "--server", &url]);
+    assert_eq!(json(&scripts.stdout)["objects"][2]["name"], "objects/c");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn one_object_is_shown_by_its_short_name() {
+    let service = Scripted::new([Act::Answer]);
+    let url = service.serve().await;
+    let output = run(&["objects", "get", "remote", "--json", "--server", &url]);
+    assert_eq!(json(&output.stdout)["name"], "objects/remote");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_object_is_made_and_named_after_its_file() {
+    let service = Scripted::new([Act::Answer]);
+    let url = service.serve().await;
+    let folder = tempfile("an_object_is_made");
+    let mesh = folder.join("Coffee Mug.obj");
+    std::fs::write(&mesh, "v 0 0 0\n").unwrap();
+    let mesh = mesh.to_str().unwrap();
+    let output = run(&[
+        "objects", "create", "--obj", mesh, "--mass", "0.2", "--json", "--server", &url,
+    ]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert_eq!(json(&output.stdout)["name"], "objects/coffee-mug");
+}
+
+/// A fresh folder for one test, below the folder that cargo gives to integration tests.
+fn tempfile(name: &str) -> std::path::PathBuf {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_refusal_lists_every_violation_on_its_own_line() {
+    let service = Scripted::new([invalid(), invalid()]);
+    let url = service.serve().await;
+    let mesh = tempfile("a_refusal").join("empty.obj");
+    std::fs::write(&mesh, "").unwrap();
+    let mesh = mesh.to_str().unwrap();
+    let people = run(&[
+        "objects",
+        "create",
+        "x",
+        "--obj",
+        mesh,
+        "--mass=-1",
+        "--server",
+        &url,
+    ]);
+    assert_eq!(code(&people), 4);
+    assert_eq!(
+        text(&people.stderr),
+        "error: the object has 2 errors\n  mass_kg: is -1; it must be more than 0\n  obj: is empty\n"
+    );
+    assert!(people.stdout.is_empty());
+    let scripts = run(&[
+        "--json",
+        "objects",
+        "create",
+        "x",
+        "--obj",
+        mesh,
+        "--mass=-1",
+        "--server",
+        &url,
+    ]);
+    assert_eq!(code(&scripts), 4);
+    let error = &json(&scripts.stderr)["error"];
+    assert_eq!(error["kind"], "invalid_argument");
+    assert_eq!(error["code"], "INVALID_ARGUMENT");
+    assert_eq!(error["field_violations"][1]["field"], "obj");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_not_found_exits_with_4() {
+    let details = ErrorDetails::with_resource_info("grasp.v1.Object", "objects/anvil", "", "does not exist");
+    let status = Status::with_error_details(Code::NotFound, "no object is called objects/anvil", details);
+    let url = Scripted::new([Act::Fail(status)]).serve().await;
+    let output = run(&["objects", "get", "anvil", "--server", &url]);
+    assert_eq!(code(&output), 4);
+    assert_eq!(text(&output.stderr), "error: no object is called objects/anvil\n");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_missing_server_exits_with_5() {
+    let people = run(&["health", "--server", &nobody()]);
+    assert_eq!(code(&people), 5);
+    assert!(
+        text(&people.stderr).starts_with("error: cannot connect to http://127.0.0.1:"),
+        "{}",
+        text(&people.stderr)
+    );
+    let scripts = run(&["health", "--json", "--server", &nobody()]);
+    assert_eq!(code(&scripts), 5);
+    assert_eq!(json(&scripts.stderr)["error"]["kind"], "connect");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_stays_unavailable_exits_with_5() {
+    let unavailable = (0..2).map(|_| Act::Fail(Status::unavailable("draining")));
+    let service = Scripted::new(unavailable);
+    let url = service.serve().await;
+    let output = run(&["objects", "get", "remote", "--tries", "2", "--server", &url]);
+    assert_eq!(code(&output), 5);
+    assert_eq!(text(&output.stderr), "error: draining (tried 2 times)\n");
+    assert_eq!(service.calls(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn health_exits_with_0_when_serving() {
+    let url = Scripted::default().serve().await;
+    let output = run(&["health", "--server", &url]);
+    assert_eq!((code(&output), text(&output.stdout)), (0, "serving\n"));
+    let output = run(&["health", "--json", "--server", &url]);
+    assert_eq!(json(&output.stdout)["health"], "serving");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_grasp_within_the_budget_exits_with_3() {
+    let service = Scripted::new([Act::Answer, Act::Answer]);
+    let url = service.serve().await;
+    let request = r#"{"object": "objects/remote", "budget_seconds": 1}"#;
+    let arguments = ["find", "--request", "-", "--budget", "250ms", "--server", &url];
+    let people = run_with_input(&arguments, request);
+    assert_eq!(code(&people), 3, "{}", text(&people.stderr));
+    assert!(text(&people.stdout).contains("no grasp within the budget"));
+    let scripts = run_with_input(&[&arguments[..], &["--json"]].concat(), request);
+    assert_eq!(code(&scripts), 3);
+    let answer = json(&scripts.stdout);
+    assert_eq!(answer["outcome"], "budget_exhausted");
+    assert_eq!(answer["grasp"], Value::Null);
+    // The service answers with the budget that it was sent: the option wins over the file.
+    assert_eq!(answer["report"]["budget_seconds"], 0.25);
+    assert!(answer["round_trip_seconds"].is_f64());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn usage_errors_exit_with_2_before_any_server_is_asked() {
+    let cases: [(&[&str], &str); 7] = [
+        (&[], "Usage"),
+        (&["find"], "--holdout"),
+        (
+            &["find", "--holdout", "a", "--request", "b"],
+            "cannot be used with",
+        ),
+        (
+            &["find", "--holdout", "teapot-hold1"],
+            "\"teapot-hold1\" is not built in",
+        ),
+        (&["find", "--holdout", "remote-hold1", "--budget", "5"], "500ms"),
+        (
+            &["find", "--holdout", "remote-hold1", "--strategy", "G"],
+            "[possible values: A, B, C, D, E, F]",
+        ),
+        (&["health", "--server", "nowhere"], "is not a URL"),
+    ];
+    for (arguments, expected) in cases {
+        let people = run(arguments);
+        assert_eq!(code(&people), 2, "{arguments:?}");
+        let message = text(&people.stderr);
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+        let scripts = run(&[arguments, &["--json"]].concat());
+        assert_eq!(code(&scripts), 2, "{arguments:?}");
+        assert!(json(&scripts.stderr)["error"]["message"].is_string());
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_request_that_is_not_understood_exits_with_2_and_says_where() {
+    let output = run_with_input(
+        &["find", "--request", "-"],
+        "{\n  \"object\": \"objects/remote\",\n  \"budgit\": 1\n}",
+    );
+    assert_eq!(code(&output), 2);
+    let message = text(&output.stderr);
+    assert!(
+        message.contains("unknown field `budgit`") && message.contains("line 3"),
+        "{message}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_request_may_be_printed_and_read_again() {
+    let printed = run_with_input(
+        &["find", "--request", "-", "--print-request", "--seed", "7"],
+        r#"{"object": "objects/remote"}"#,
+    );
+    assert_eq!(code(&printed), 0);
+    assert_eq!(json(&printed.stdout)["seed"], "7");
+    let again = run_with_input(
+        &["find", "--request", "-", "--print-request"],
+        text(&printed.stdout),
+    );
+    assert_eq!(text(&again.stdout), text(&printed.stdout));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn completions_name_the_commands() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let output = run(&["completions", shell]);
+        assert_eq!(code(&output), 0);
+        let script = text(&output.stdout);
+        for command in ["objects", "find", "health", "holdout"] {
+            assert!(script.contains(command), "{shell}: {command}");
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_closed_pipe_ends_the_command_quietly() {
+    let url = Scripted::new((0..3).map(|_| Act::Answer)).serve().await;
+    for arguments in [
+        vec!["completions", "bash"],
+        vec!["--help"],
+        vec!["objects", "list", "--server", &url],
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = tokio::task::block_in_place(|| grasp(&arguments).stdout(writer).output().unwrap());
+        assert_eq!(code(&output), 0, "{arguments:?}");
+        assert_eq!(text(&output.stderr), "", "{arguments:?}");
+    }
+}
+
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread")]
+async fn an_interrupt_ends_the_command_with_130() {
+    let service = Scripted::new([Act::Hang]);
+    let url = service.serve().await;
+    let child: Child = grasp(&["objects", "get", "remote", "--timeout", "5m", "--server", &url])
+        .spawn()
+        .unwrap();
+    while service.calls() == 0 {
+        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+    }
+    let output = tokio::task::block_in_place(|| {
+        let interrupted = Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(interrupted.success());
+        child.wait_with_output().unwrap()
+    });
+    assert_eq!(
+        (code(&output), text(&output.stderr)),
+        (130, "error: interrupted\n")
+    );
+}

@@ -1,0 +1,145 @@
+//! A tiny service that does as it is told.
+
+use std::{
+    collections::VecDeque,
+    sync::{Arc, Mutex},
+};
+
+use grasp_proto::v1::{
+    self,
+    grasp_service_server::{GraspService, GraspServiceServer},
+    object_service_server::{ObjectService, ObjectServiceServer},
+};
+use tokio_stream::wrappers::TcpListenerStream;
+use tonic::{Request, Response, Status, transport::Server};
+
+/// What the service does with one call.
+pub(crate) enum Act {
+    Fail(Status),
+    Answer,
+    Hang,
+}
+
+/// Acts out a script and keeps the deadlines that it was told.
+#[derive(Clone, Default)]
+pub(crate) struct Scripted {
+    script: Arc<Mutex<VecDeque<Act>>>,
+    pub(crate) grpc_timeouts: Arc<Mutex<Vec<String>>>,
+    /// The second page of objects names itself as the next one.
+    pub(crate) repeats_itself: bool,
+}
+
+impl Scripted {
+    pub(crate) fn new(script: impl IntoIterator<Item = Act>) -> Self {
+        Self {
+            script: Arc::new(Mutex::new(script.into_iter().collect())),
+            ..Self::default()
+        }
+    }
+
+    async fn act<T>(&self, request: &Request<T>) -> Result<(), Status> {
+        if let Some(timeout) = request.metadata().get("grpc-timeout") {
+            let timeout = timeout.to_str().unwrap().to_owned();
+            self.grpc_timeouts.lock().unwrap().push(timeout);
+        }
+        let act = self.script.lock().unwrap().pop_front();
+        match act.expect("the script covers every call") {
+            Act::Fail(status) => Err(status),
+            Act::Answer => Ok(()),
+            Act::Hang => std::future::pending().await,
+        }
+    }
+
+    pub(crate) fn calls(&self) -> usize {
+        self.grpc_timeouts.lock().unwrap().len()
+    }
+
+    /// Serves on a free port until the test's runtime ends; gives the URL.
+    pub(crate) async fn serve(&self) -> String {
+        let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let (_, health_service) = tonic_health::server::health_reporter();
+        let router = Server::builder()
+            .add_service(health_service)
+            .add_service(GraspServiceServer::new(self.clone()))
+            .add_service(ObjectServiceServer::new(self.clone()));
+        tokio::spawn(router.serve_with_incoming(TcpListenerStream::new(listener)));
+        format!("http://{address}")
+    }
+}
+
+#[tonic::async_trait]
+impl GraspService for Scripted {
+    async fn find_grasp(
+        &self,
+        request: Request<v1::FindGraspRequest>,
+    ) -> Result<Response<v1::FindGraspResponse>, Status> {
+        self.act(&request).await?;
+        Ok(Response::new(v1::FindGraspResponse {
+            outcome: v1::Outcome::BudgetExhausted.into(),
+            grasp: None,
+            report: Some(v1::SearchReport {
+                attempts: 5,
+                search_time: Some(prost_types::Duration::default()),
+                budget: request
+                    .into_inner()
+                    .budget
+                    .or(Some(prost_types::Duration::default())),
+                ..v1::SearchReport::default()
+            }),
+        }))
+    }
+}
+
+fn wire_object(name: &str) -> v1::Object {
+    v1::Object {
+        name: name.to_owned(),
+        centre_of_mass: Some(v1::Vector3::default()),
+        box_half_extents: Some(v1::Vector3::default()),
+        ..v1::Object::default()
+    }
+}
+
+#[tonic::async_trait]
+impl ObjectService for Scripted {
+    async fn create_object(
+        &self,
+        request: Request<v1::CreateObjectRequest>,
+    ) -> Result<Response<v1::CreateObjectResponse>, Status> {
+        self.act(&request).await?;
+        let name = format!("objects/{}", request.into_inner().object_id);
+        Ok(Response::new(v1::CreateObjectResponse {
+            object: Some(wire_object(&name)),
+        }))
+    }
+
+    async fn get_object(
+        &self,
+        request: Request<v1::GetObjectRequest>,
+    ) -> Result<Response<v1::GetObjectResponse>, Status> {
+        self.act(&request).await?;
+        Ok(Response::new(v1::GetObjectResponse {
+            object: Some(wire_object(&request.into_inner().name)),
+        }))
+    }
+
+    /// Three pages of one object each, named by the token that asked for them.
+    async fn list_objects(
+        &self,
+        request: Request<v1::ListObjectsRequest>,
+    ) -> Result<Response<v1::ListObjectsResponse>, Status> {
+        self.act(&request).await?;
+        let token = request.into_inner().page_token;
+        let next = match token.as_str() {
+            "" => "b",
+            "b" if self.repeats_itself => "b",
+            "b" => "c",
+            "c" => "",
+            other => panic!("token {other:?} was never given"),
+        };
+        Ok(Response::new(v1::ListObjectsResponse {
+            objects: vec![wire_object(&format!("objects/{token}"))],
+            next_page_token: next.to_owned(),
+        }))
+    }
+}
