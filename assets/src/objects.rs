@@ -1,8 +1,12 @@
-//! The built-in objects: scissors, scalpel, remote. To come; the interface is fixed.
+//! The built-in objects: scissors, scalpel, remote (thesis 5.1).
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
+use glam::Vec3;
 use grasp_synthesis::object::GraspObject;
+use serde::{Deserialize, Serialize};
+
+use crate::obj::{ObjLimits, ObjMesh, read_obj};
 
 /// A built-in object.
 #[derive(Clone, Debug)]
@@ -11,18 +15,113 @@ pub struct BuiltInObject {
     pub name: &'static str,
     /// Its mesh as OBJ text.
     pub obj: &'static str,
-    /// Its manifest as JSON text.
+    /// Its manifest as JSON text; see [`Manifest`].
     pub manifest: &'static str,
+    /// What it is, for a person to read.
+    pub description: String,
+    /// The names of the mesh's groups with their triangles, ascending; sorted by name.
+    pub groups: Vec<(String, Vec<u32>)>,
     /// Ready to be grasped.
     pub object: Arc<GraspObject>,
 }
 
+/// What the file beside a mesh says about the object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// The object's name.
+    pub name: String,
+    /// What it is, for a person to read.
+    pub description: String,
+    /// How the object lies in its frame.
+    pub frame: String,
+    /// In kilograms.
+    pub mass_kg: f32,
+    /// In metres, in the object's frame.
+    pub centre_of_mass_m: Vec3,
+    /// Coefficient of static friction between skin and the surface.
+    pub friction: f32,
+    /// Groups of the mesh that may not be touched.
+    pub forbidden_groups: Vec<String>,
+    /// Triangles of the mesh.
+    pub triangles: usize,
+    /// Vertices of the mesh.
+    pub vertices: usize,
+    /// Where mesh and figures come from.
+    pub source: String,
+    /// Under which terms they may be used, as an SPDX expression.
+    pub licence: String,
+}
+
+impl Manifest {
+    /// Reads a manifest.
+    ///
+    /// # Errors
+    /// The text is not JSON, lacks something, or says something unknown.
+    pub fn parse(json: &str) -> Result<Self, serde_json::Error> {
+        serde_json::from_str(json)
+    }
+}
+
+/// Name, mesh and manifest of the built-in objects, sorted by name.
+const FILES: [[&str; 3]; 3] = [
+    [
+        "remote",
+        include_str!("../objects/remote.obj"),
+        include_str!("../objects/remote.json"),
+    ],
+    [
+        "scalpel",
+        include_str!("../objects/scalpel.obj"),
+        include_str!("../objects/scalpel.json"),
+    ],
+    [
+        "scissors",
+        include_str!("../objects/scissors.obj"),
+        include_str!("../objects/scissors.json"),
+    ],
+];
+
+/// The built-in meshes are small and known; this only keeps a slip of the generator from going unnoticed.
+const LIMITS: ObjLimits = ObjLimits {
+    bytes: 1 << 20,
+    vertices: 10_000,
+    triangles: 10_000,
+};
+
+static OBJECTS: LazyLock<Vec<BuiltInObject>> =
+    LazyLock::new(|| FILES.map(|[name, obj, manifest]| parse(name, obj, manifest)).into());
+
 /// All built-in objects, sorted by name, parsed once.
 pub fn objects() -> &'static [BuiltInObject] {
-    &[]
+    &OBJECTS
 }
 
 /// A built-in object by name.
 pub fn object(name: &str) -> Option<&'static BuiltInObject> {
     objects().iter().find(|object| object.name == name)
+}
+
+/// Parses embedded files. They are part of the program: if they are wrong, so is the program.
+fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> BuiltInObject {
+    let about = Manifest::parse(manifest)
+        .unwrap_or_else(|error| panic!("the manifest of the built-in {name} is broken: {error}"));
+    let ObjMesh { mesh, groups, .. } = read_obj(obj.as_bytes(), 1.0, LIMITS)
+        .unwrap_or_else(|errors| panic!("the mesh of the built-in {name} is broken: {errors:?}"));
+    let forbidden: Vec<u32> = groups
+        .iter()
+        .filter(|(group, _)| about.forbidden_groups.contains(group))
+        .flat_map(|(_, triangles)| triangles)
+        .copied()
+        .collect();
+    let object = GraspObject::new(mesh, about.mass_kg, about.centre_of_mass_m, about.friction, &forbidden)
+        .unwrap_or_else(|errors| panic!("the built-in {name} is broken: {errors:?}"));
+    BuiltInObject {
+        name,
+        obj,
+        manifest,
+        description: about.description,
+        groups,
+        object: Arc::new(object),
+    }
 }

@@ -1,8 +1,118 @@
-//! Scissors, scalpel and remote. To come.
+//! Scissors, scalpel and remote: the objects of thesis 5.1, with the thesis' masses and about its triangle counts.
+
+mod builder;
+mod remote;
+mod scalpel;
+mod scissors;
+
+use std::fmt::Write as _;
+
+use glam::Vec3;
+use grasp_assets::objects::Manifest;
+use grasp_synthesis::object::THESIS_FRICTION;
 
 use crate::AssetFile;
+use builder::Shape;
+
+/// What cannot be read off a mesh.
+struct About {
+    name: &'static str,
+    build: fn() -> Shape,
+    description: &'static str,
+    frame: &'static str,
+    /// In kilograms; thesis Table 5.1.
+    mass_kg: f32,
+    /// In metres, with the origin at the centre of the mesh's bounding box.
+    centre_of_mass_m: Vec3,
+    forbidden_groups: &'static [&'static str],
+}
+
+const OBJECTS: [About; 3] = [
+    About {
+        name: "remote",
+        build: remote::build,
+        description: "A remote control: a rounded body, thicker at the batteries, with raised buttons.",
+        frame: "Origin at the centre of the bounding box, +Y toward the end that sends, +Z out of the buttons' side.",
+        mass_kg: 0.130,
+        // Two AA cells are 46 g of the 130 g and lie about 45 mm behind the middle, below the half thickness.
+        centre_of_mass_m: Vec3::new(0.0, -0.020, -0.001),
+        forbidden_groups: &["buttons"],
+    },
+    About {
+        name: "scalpel",
+        build: scalpel::build,
+        description: "A scalpel: handle no. 3 with a blade no. 10.",
+        frame: "Origin at the centre of the bounding box, +Y toward the blade's tip, +X toward its edge, +Z out of a flat.",
+        mass_kg: 0.020,
+        // The middle of the heft, which reaches from 61.0 mm behind its own origin to 61.5 mm before it, as the
+        // blade does to 95 mm.
+        centre_of_mass_m: Vec3::new(0.0, -0.01675, 0.0),
+        forbidden_groups: &["blade_edge"],
+    },
+    About {
+        name: "scissors",
+        build: scissors::build,
+        description: "Shut surgical scissors with two finger rings.",
+        frame: "Origin at the centre of the bounding box, +Y toward the tip, +Z out of the flat side with the screw's head.",
+        mass_kg: 0.050,
+        centre_of_mass_m: Vec3::ZERO,
+        forbidden_groups: &[],
+    },
+];
 
 /// Meshes and manifests of the objects.
 pub(crate) fn generate() -> Vec<AssetFile> {
-    Vec::new()
+    OBJECTS.iter().flat_map(files).collect()
+}
+
+fn files(about: &About) -> [AssetFile; 2] {
+    let name = about.name;
+    let shape = (about.build)();
+    let manifest = Manifest {
+        name: name.to_owned(),
+        description: about.description.to_owned(),
+        frame: about.frame.to_owned(),
+        mass_kg: about.mass_kg,
+        centre_of_mass_m: about.centre_of_mass_m,
+        friction: THESIS_FRICTION,
+        forbidden_groups: about.forbidden_groups.iter().map(|&group| group.to_owned()).collect(),
+        triangles: shape.groups.iter().map(|(_, triangles)| triangles.len()).sum(),
+        vertices: shape.micrometres.len(),
+        source: "grasp-assets-generator; mass, friction and centre of mass after Table 5.1 and section 4.5 of the thesis"
+            .to_owned(),
+        licence: "MIT OR Apache-2.0".to_owned(),
+    };
+    let mut json = serde_json::to_vec_pretty(&manifest).expect("a manifest is plain data");
+    json.push(b'\n');
+    [
+        (format!("objects/{name}.obj"), obj(name, &shape).into_bytes()),
+        (format!("objects/{name}.json"), json),
+    ]
+}
+
+/// The mesh as OBJ text in metres with six decimals.
+fn obj(name: &str, shape: &Shape) -> String {
+    let mut text = format!("# {name}, in metres; made by grasp-assets-generator\n");
+    let mut line = |arguments: std::fmt::Arguments<'_>| {
+        text.write_fmt(arguments).expect("a string takes any text");
+    };
+    for vertex in &shape.micrometres {
+        let [x, y, z] = vertex.map(metres);
+        line(format_args!("v {x} {y} {z}\n"));
+    }
+    for (group, triangles) in &shape.groups {
+        line(format_args!("g {group}\n"));
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|vertex| vertex + 1);
+            line(format_args!("f {a} {b} {c}\n"));
+        }
+    }
+    text
+}
+
+/// Whole micrometres as metres with six decimals.
+fn metres(micrometres: i64) -> String {
+    let sign = if micrometres < 0 { "-" } else { "" };
+    let size = micrometres.unsigned_abs();
+    format!("{sign}{}.{:06}", size / 1_000_000, size % 1_000_000)
 }
