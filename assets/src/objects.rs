@@ -89,8 +89,11 @@ const LIMITS: ObjLimits = ObjLimits {
     triangles: 10_000,
 };
 
-static OBJECTS: LazyLock<Vec<BuiltInObject>> =
-    LazyLock::new(|| FILES.map(|[name, obj, manifest]| parse(name, obj, manifest)).into());
+static OBJECTS: LazyLock<Vec<BuiltInObject>> = LazyLock::new(|| {
+    FILES
+        .map(|[name, obj, manifest]| parse(name, obj, manifest))
+        .into()
+});
 
 /// All built-in objects, sorted by name, parsed once.
 pub fn objects() -> &'static [BuiltInObject] {
@@ -114,8 +117,14 @@ fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> Built
         .flat_map(|(_, triangles)| triangles)
         .copied()
         .collect();
-    let object = GraspObject::new(mesh, about.mass_kg, about.centre_of_mass_m, about.friction, &forbidden)
-        .unwrap_or_else(|errors| panic!("the built-in {name} is broken: {errors:?}"));
+    let object = GraspObject::new(
+        mesh,
+        about.mass_kg,
+        about.centre_of_mass_m,
+        about.friction,
+        &forbidden,
+    )
+    .unwrap_or_else(|errors| panic!("the built-in {name} is broken: {errors:?}"));
     BuiltInObject {
         name,
         obj,

@@ -34,8 +34,9 @@ const OBJECTS: [About; 3] = [
         description: "A remote control: a rounded body, thicker at the batteries, with raised buttons.",
         frame: "Origin at the centre of the bounding box, +Y toward the end that sends, +Z out of the buttons' side.",
         mass_kg: 0.130,
-        // Two AA cells are 46 g of the 130 g and lie about 45 mm behind the middle, below the half thickness.
-        centre_of_mass_m: Vec3::new(0.0, -0.020, -0.001),
+        // Two AA cells are about 46 of the 130 g and lie 45 mm behind the middle and 2 mm below it; the rest is
+        // spread like the mesh's volume, whose centre is 4.2 mm behind the middle and 0.5 mm above it.
+        centre_of_mass_m: Vec3::new(0.0, -0.019, -0.0005),
         forbidden_groups: &["buttons"],
     },
     About {

@@ -31,7 +31,9 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
         .map_err(|error| vec![ObjError::Unreadable(error)])?;
     // Without groups in its input, tobj returns one model.
     let Some(parsed) = models.into_iter().next().map(|model| model.mesh) else {
-        return Err(vec![ObjError::Empty { dropped: scan.without_area.count }]);
+        return Err(vec![ObjError::Empty {
+            dropped: scan.without_area.count,
+        }]);
     };
 
     let (positions, welded) = weld(&parsed.positions, unit_metres);
@@ -97,7 +99,11 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
     // The checks above are those of the mesh, so it cannot refuse.
     let mesh = TriangleMesh::new(positions, triangles)
         .map_err(|_| vec![ObjError::Unreadable(tobj::LoadError::GenericFailure)])?;
-    Ok(Cleaned { mesh, faces, warnings })
+    Ok(Cleaned {
+        mesh,
+        faces,
+        warnings,
+    })
 }
 
 /// What was left out.
@@ -120,7 +126,9 @@ impl Dropped {
         ]
         .into_iter()
         .filter(|(oddity, _)| oddity.count > 0)
-        .map(|(Oddity { count, first_line }, what)| format!("{count} {what}; the first is in line {first_line}"))
+        .map(|(Oddity { count, first_line }, what)| {
+            format!("{count} {what}; the first is in line {first_line}")
+        })
         .collect()
     }
 }
@@ -256,7 +264,11 @@ impl Joints {
 
     fn warnings(&self) -> impl Iterator<Item = String> {
         [
-            (self.open, 0, "edges are open: the surface has holes and its volume is a guess"),
+            (
+                self.open,
+                0,
+                "edges are open: the surface has holes and its volume is a guess",
+            ),
             (
                 self.inconsistent,
                 0,

@@ -79,7 +79,9 @@ pub enum ObjError {
         limit: usize,
     },
     /// A vertex has too few or too many numbers.
-    #[error("line {line}: a vertex has {found} numbers; it must have 3, 4 with a weight, 6 or 7 with a colour")]
+    #[error(
+        "line {line}: a vertex has {found} numbers; it must have 3, 4 with a weight, 6 or 7 with a colour"
+    )]
     NumberCount {
         /// The line, counted from 1.
         line: usize,
@@ -175,7 +177,11 @@ pub fn read_obj(text: &[u8], unit_metres: f32, limits: ObjLimits) -> Result<ObjM
         }]);
     }
     let scan = Scan::of(text, unit_metres, limits)?;
-    let Cleaned { mesh, faces, warnings } = clean::clean(&scan, unit_metres)?;
+    let Cleaned {
+        mesh,
+        faces,
+        warnings,
+    } = clean::clean(&scan, unit_metres)?;
     Ok(ObjMesh {
         groups: scan.groups(&faces),
         mesh,
@@ -203,6 +209,10 @@ impl Violations {
         if self.more > 0 {
             self.listed.push(ObjError::More(self.more));
         }
-        if self.listed.is_empty() { Ok(()) } else { Err(self.listed) }
+        if self.listed.is_empty() {
+            Ok(())
+        } else {
+            Err(self.listed)
+        }
     }
 }

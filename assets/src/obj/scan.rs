@@ -82,10 +82,7 @@ impl Scan {
         let mut groups = BTreeMap::<&str, Vec<u32>>::new();
         for (triangle, &face) in faces.iter().enumerate() {
             for &name in &self.name_sets[self.faces[face].names] {
-                groups
-                    .entry(&self.names[name])
-                    .or_default()
-                    .push(triangle as u32);
+                groups.entry(&self.names[name]).or_default().push(triangle as u32);
             }
         }
         groups
@@ -162,14 +159,10 @@ impl Scanner {
             {
                 Some(number) if number.is_finite() => *value = number,
                 Some(_) => {
-                    return self
-                        .violations
-                        .push(ObjError::NotFinite { line, text: text() });
+                    return self.violations.push(ObjError::NotFinite { line, text: text() });
                 }
                 None => {
-                    return self
-                        .violations
-                        .push(ObjError::NotANumber { line, text: text() });
+                    return self.violations.push(ObjError::NotANumber { line, text: text() });
                 }
             }
         }
@@ -212,7 +205,11 @@ impl Scanner {
         }
         self.scan.plain.push('\n');
         if self.names_changed {
-            let Names { groups, object, material } = &self.current;
+            let Names {
+                groups,
+                object,
+                material,
+            } = &self.current;
             let mut set: Vec<usize> = groups.iter().chain(object).chain(material).copied().collect();
             set.sort_unstable();
             set.dedup();
@@ -237,9 +234,11 @@ impl Scanner {
             usize::try_from(index).ok()
         };
         let Some(positive) = positive.filter(|&positive| positive > 0) else {
-            return self
-                .violations
-                .push(ObjError::IndexOutOfRange { line, index, vertices });
+            return self.violations.push(ObjError::IndexOutOfRange {
+                line,
+                index,
+                vertices,
+            });
         };
         if positive > vertices {
             self.forward.push((line, positive));
@@ -296,8 +295,11 @@ impl Scanner {
         }
         for &(line, index) in self.forward.iter().filter(|(_, index)| *index > vertices) {
             let index = i64::try_from(index).unwrap_or(i64::MAX);
-            self.violations
-                .push(ObjError::IndexOutOfRange { line, index, vertices });
+            self.violations.push(ObjError::IndexOutOfRange {
+                line,
+                index,
+                vertices,
+            });
         }
         self.violations.into_result()?;
         Ok(self.scan)

@@ -64,7 +64,12 @@ impl MeshBuilder {
 
     /// Joins two rings of equal length; `group` names the group of the quad between vertex `k` and the one after it,
     /// or none where the surface stays open.
-    pub(crate) fn strip(&mut self, from: &[usize], to: &[usize], group: impl Fn(usize) -> Option<&'static str>) {
+    pub(crate) fn strip(
+        &mut self,
+        from: &[usize],
+        to: &[usize],
+        group: impl Fn(usize) -> Option<&'static str>,
+    ) {
         assert_eq!(from.len(), to.len(), "a strip joins rings of equal length");
         for k in 0..from.len() {
             let next = (k + 1) % from.len();

@@ -28,13 +28,7 @@ const CUTS: usize = 3;
 const PAD_CUTS: usize = 5;
 
 /// Cross-sections of the body from above to below: how far inside the outline, and z, in millimetres.
-const BODY_RINGS: [[f64; 2]; 5] = [
-    [2.2, -0.2],
-    [0.7, -1.2],
-    [0.0, -3.8],
-    [1.8, -15.0],
-    [6.0, -19.0],
-];
+const BODY_RINGS: [[f64; 2]; 5] = [[2.2, -0.2], [0.7, -1.2], [0.0, -3.8], [1.8, -15.0], [6.0, -19.0]];
 
 /// What is in a row of the grid.
 enum Row {
@@ -55,10 +49,26 @@ struct Button {
     bevelled: bool,
 }
 
-const ROUND: Button = Button { half_size: DVec2::splat(4.6), radius: 4.6, bevelled: true };
-const SMALL: Button = Button { half_size: DVec2::new(3.6, 3.6), radius: 3.6, bevelled: false };
-const NUMBER: Button = Button { half_size: DVec2::new(4.8, 4.1), radius: 3.0, bevelled: false };
-const ROCKER: Button = Button { half_size: DVec2::new(4.6, 10.5), radius: 4.5, bevelled: true };
+const ROUND: Button = Button {
+    half_size: DVec2::splat(4.6),
+    radius: 4.6,
+    bevelled: true,
+};
+const SMALL: Button = Button {
+    half_size: DVec2::new(3.6, 3.6),
+    radius: 3.6,
+    bevelled: false,
+};
+const NUMBER: Button = Button {
+    half_size: DVec2::new(4.8, 4.1),
+    radius: 3.0,
+    bevelled: false,
+};
+const ROCKER: Button = Button {
+    half_size: DVec2::new(4.6, 10.5),
+    radius: 4.5,
+    bevelled: true,
+};
 
 /// How far the buttons stand out, in millimetres.
 const BUTTON_HEIGHT: f64 = 1.7;
@@ -125,7 +135,9 @@ impl Sketch {
 
     /// The vertex of the grid at a point of the flat upper side.
     fn grid_vertex(&mut self, point: DVec2) -> usize {
-        let key = (point * 1000.0).to_array().map(|coordinate| coordinate.round() as i64);
+        let key = (point * 1000.0)
+            .to_array()
+            .map(|coordinate| coordinate.round() as i64);
         if let Some(&vertex) = self.grid.get(&key) {
             return vertex;
         }
@@ -207,7 +219,8 @@ impl Sketch {
                 .map(|&direction| centre + direction * radius)
                 .collect();
             let next = self.level(&circle, z);
-            self.mesh.strip(&last, &next, |_| Some(if index == 0 { BODY } else { BUTTONS }));
+            self.mesh
+                .strip(&last, &next, |_| Some(if index == 0 { BODY } else { BUTTONS }));
             last = next;
         }
         self.mesh.cap(BUTTONS, &last);
@@ -296,7 +309,11 @@ fn bend(flat: DVec3) -> DVec3 {
     let toward_tip = 0.5 * (1.0 + along);
     let width = 1.0 - 0.09 * toward_tip;
     // Only what lies below the upper side grows thinner.
-    let depth = if flat.z < 0.0 { 1.0 - 0.22 * toward_tip } else { 1.0 };
+    let depth = if flat.z < 0.0 {
+        1.0 - 0.22 * toward_tip
+    } else {
+        1.0
+    };
     let dome = -0.7 * across * across - 1.1 * along * along;
     DVec3::new(flat.x * width, flat.y, flat.z * depth + dome)
 }

@@ -78,7 +78,10 @@ pub(crate) fn build() -> Shape {
         let [half_width, half_thickness] = GRIP;
         for (along, depth) in [(0.0, 0.0), (0.8, 1.0), (1.8, 1.0), (2.6, 0.0)] {
             let depth = depth * GROOVE_DEPTH;
-            handle(&mut mesh, [y + along, half_width - depth, half_thickness - depth, 0.8]);
+            handle(
+                &mut mesh,
+                [y + along, half_width - depth, half_thickness - depth, 0.8],
+            );
         }
     }
     for section in NOSE {
@@ -96,7 +99,9 @@ pub(crate) fn build() -> Shape {
     });
     for (index, (y, edge)) in straight.into_iter().chain(curved).enumerate() {
         let ring = mesh.ring(blade_section(y, edge));
-        mesh.strip(&last, &ring, |k| Some(if index == 0 { BODY } else { blade_group(k) }));
+        mesh.strip(&last, &ring, |k| {
+            Some(if index == 0 { BODY } else { blade_group(k) })
+        });
         last = ring;
     }
     let apex = mesh.vertex(DVec3::new(-half_width, tip, 0.0));
@@ -106,7 +111,11 @@ pub(crate) fn build() -> Shape {
 
 /// The group of the quad that follows vertex `k` of a blade's cross-section.
 fn blade_group(k: usize) -> &'static str {
-    if matches!(k, 0 | 1 | 13 | 14 | 15) { BLADE_EDGE } else { BODY }
+    if matches!(k, 0 | 1 | 13 | 14 | 15) {
+        BLADE_EDGE
+    } else {
+        BODY
+    }
 }
 
 /// A rounded rectangle, counter-clockwise about +y, starting on +x just above the middle plane (seen with −z up).

@@ -25,17 +25,42 @@ struct BladeSection {
 
 /// From the tip to the screw.
 const BLADES: [BladeSection; 4] = [
-    BladeSection { y: 61.0, back: 1.7, edge: 0.8, thickness: 1.0 },
-    BladeSection { y: 50.0, back: 3.6, edge: 1.5, thickness: 1.4 },
-    BladeSection { y: 33.0, back: 5.2, edge: 2.2, thickness: 1.8 },
-    BladeSection { y: 14.0, back: 6.4, edge: 2.6, thickness: 2.1 },
+    BladeSection {
+        y: 61.0,
+        back: 1.7,
+        edge: 0.8,
+        thickness: 1.0,
+    },
+    BladeSection {
+        y: 50.0,
+        back: 3.6,
+        edge: 1.5,
+        thickness: 1.4,
+    },
+    BladeSection {
+        y: 33.0,
+        back: 5.2,
+        edge: 2.2,
+        thickness: 1.8,
+    },
+    BladeSection {
+        y: 14.0,
+        back: 6.4,
+        edge: 2.6,
+        thickness: 2.1,
+    },
 ];
 
 /// Tip of the shut blades from the screw, in millimetres.
 const TIP_Y: f64 = 65.0;
 
 /// Cross-sections of the flat box around the screw: y, half width and half thickness in millimetres.
-const BOX: [[f64; 3]; 4] = [[6.5, 6.9, 2.3], [0.0, 7.4, 2.4], [-6.5, 6.8, 2.4], [-11.5, 5.2, 2.3]];
+const BOX: [[f64; 3]; 4] = [
+    [6.5, 6.9, 2.3],
+    [0.0, 7.4, 2.4],
+    [-6.5, 6.8, 2.4],
+    [-11.5, 5.2, 2.3],
+];
 
 /// A shank's cross-sections: centre x and y, half width, half thickness, and how far its middle is above the
 /// scissors' middle plane, in millimetres. The right shank belongs to the upper blade.
@@ -86,7 +111,8 @@ pub(crate) fn build() -> Shape {
     }
 
     // The box, with a hole on its upper side for the screw.
-    let rings = BOX.map(|[y, half_width, half_thickness]| mesh.ring(box_section(y, half_width, half_thickness)));
+    let rings =
+        BOX.map(|[y, half_width, half_thickness]| mesh.ring(box_section(y, half_width, half_thickness)));
     mesh.strip(&last.expect("there are blade sections"), &rings[0], whole);
     for pair in rings.windows(2).take(2) {
         mesh.strip(&pair[0], &pair[1], |k| (k != 2 && k != 3).then_some(BODY));
@@ -104,7 +130,12 @@ pub(crate) fn build() -> Shape {
 
 /// The outline of both blades, lying on each other.
 fn blade_section(section: &BladeSection) -> [DVec3; 8] {
-    let &BladeSection { y, back, edge, thickness } = section;
+    let &BladeSection {
+        y,
+        back,
+        edge,
+        thickness,
+    } = section;
     // A blade thins toward its edge.
     let thin = 0.45 * thickness;
     [
@@ -168,8 +199,15 @@ fn handle(mesh: &mut MeshBuilder, start: Ring, side: f64) {
     let mut last = start;
     let ends = SHANK.map(|[x, y, ..]| DVec2::new(x, y));
     for (index, &[x, y, half_width, half_thickness, z]) in SHANK.iter().enumerate() {
-        let before = if index == 0 { DVec2::new(2.8, -10.0) } else { ends[index - 1] };
-        let after = ends.get(index + 1).copied().unwrap_or(ring_point(RING_FORK_DEGREES));
+        let before = if index == 0 {
+            DVec2::new(2.8, -10.0)
+        } else {
+            ends[index - 1]
+        };
+        let after = ends
+            .get(index + 1)
+            .copied()
+            .unwrap_or(ring_point(RING_FORK_DEGREES));
         let section = section(
             DVec3::new(x, y, z),
             after - before,
