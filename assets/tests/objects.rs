@@ -91,8 +91,9 @@ fn the_surfaces_have_the_holes_that_they_should() {
         let used: std::collections::HashSet<u32> = mesh.triangles().iter().flatten().copied().collect();
         assert_eq!(used.len(), mesh.positions().len(), "{name} has unused vertices");
         let edges = directed_edges(mesh).len() / 2;
-        let characteristic = used.len() as i64 - edges as i64 + mesh.triangles().len() as i64;
-        assert_eq!(characteristic, 2 - 2 * holes, "{name}");
+        // Euler: vertices − edges + faces = 2 − 2 holes.
+        let (vertices, faces) = (used.len(), mesh.triangles().len());
+        assert_eq!(vertices + faces + 2 * holes, edges + 2, "{name}");
         // One component: everything can be reached over edges.
         let mut parts: HashMap<u32, u32> = used.iter().map(|&v| (v, v)).collect();
         let mut changed = true;

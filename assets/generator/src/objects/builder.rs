@@ -145,10 +145,8 @@ impl MeshBuilder {
                 new_index[vertex] = Some(0);
             }
         }
-        let mut kept = 0;
-        for index in new_index.iter_mut().flatten() {
+        for (kept, index) in new_index.iter_mut().flatten().enumerate() {
             *index = kept;
-            kept += 1;
         }
         let mut flags = new_index.iter();
         self.positions

@@ -98,14 +98,13 @@ pub(crate) fn build() -> Shape {
     let mut last: Option<Ring> = None;
     for section in &BLADES {
         let ring = mesh.ring(blade_section(section));
-        match &last {
-            Some(before) => mesh.strip(before, &ring, whole),
-            None => {
-                let tip = mesh.vertex(DVec3::new(0.0, TIP_Y, 0.0));
-                // The tip lies behind this ring, so the fan runs the other way.
-                let reversed: Ring = ring.iter().rev().copied().collect();
-                mesh.fan(&reversed, tip, |_| BODY);
-            }
+        if let Some(before) = &last {
+            mesh.strip(before, &ring, whole);
+        } else {
+            // The tip lies behind this ring, so the fan runs the other way.
+            let tip = mesh.vertex(DVec3::new(0.0, TIP_Y, 0.0));
+            let reversed: Ring = ring.iter().rev().copied().collect();
+            mesh.fan(&reversed, tip, |_| BODY);
         }
         last = Some(ring);
     }
