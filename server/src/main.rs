@@ -1,2 +1,109 @@
-//! To come.
-fn main() {}
+//! The binary: configuration, log, runtime, listener, signals.
+
+use std::{path::PathBuf, process::ExitCode, time::Duration};
+
+use clap::{CommandFactory as _, Parser};
+use grasp_server::{
+    Config,
+    config::{LogFormat, RawConfig, read_file, unknown_variables},
+};
+use tokio::{net::TcpListener, signal::unix::SignalKind};
+use tracing_subscriber::EnvFilter;
+
+/// How long work that ignores its end is waited for before the process ends.
+const RUNTIME_END: Duration = Duration::from_millis(500);
+
+/// Answers grasp requests over gRPC.
+///
+/// Every option can also be set in the environment or in a file; flags win over the environment, and the environment
+/// over the file.
+#[derive(Debug, Parser)]
+#[command(version, name = "grasp-server")]
+struct Flags {
+    /// Configuration file (TOML); its keys are the options' names with _ for -.
+    #[arg(long, env = "GRASP_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Print the configuration that is in force as TOML and exit.
+    #[arg(long)]
+    print_config: bool,
+    #[command(flatten)]
+    values: RawConfig,
+}
+
+fn main() -> ExitCode {
+    match start(Flags::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn start(flags: Flags) -> Result<(), Box<dyn std::error::Error>> {
+    let file = match &flags.config {
+        Some(path) => read_file(path)?,
+        None => RawConfig::default(),
+    };
+    let config = flags.values.or(file).validate()?;
+    if flags.print_config {
+        print!("{}", toml::to_string(&RawConfig::from(&config))?);
+        return Ok(());
+    }
+    start_log(&config)?;
+    for name in unknown_variables(variables(), &known_variables()) {
+        tracing::warn!(
+            name,
+            "an environment variable looks like one of the server's and is none"
+        );
+    }
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(config.io_threads.get())
+        .enable_all()
+        .build()?;
+    let result = runtime.block_on(serve(config));
+    runtime.shutdown_timeout(RUNTIME_END);
+    result
+}
+
+async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
+    let listener = TcpListener::bind(config.listen)
+        .await
+        .map_err(|error| format!("cannot listen on {}: {error}", config.listen))?;
+    // Before anybody is told that the server is there: from now on a signal is a drain.
+    let mut terminate = tokio::signal::unix::signal(SignalKind::terminate())?;
+    let mut interrupt = tokio::signal::unix::signal(SignalKind::interrupt())?;
+    let shutdown = async move {
+        tokio::select! {
+            _ = terminate.recv() => {}
+            _ = interrupt.recv() => {}
+        }
+    };
+    tracing::info!(address = %listener.local_addr()?, workers = config.workers, "serving");
+    grasp_server::run(listener, config, shutdown).await?;
+    Ok(())
+}
+
+fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(EnvFilter::try_new(&config.log)?)
+        .with_writer(std::io::stderr);
+    match config.log_format {
+        LogFormat::Text => log.init(),
+        LogFormat::Json => log.json().flatten_event(true).init(),
+    }
+    std::panic::set_hook(Box::new(|panic| tracing::error!(%panic, "panic")));
+    Ok(())
+}
+
+fn variables() -> impl Iterator<Item = String> {
+    std::env::vars_os().filter_map(|(name, _)| name.into_string().ok())
+}
+
+fn known_variables() -> Vec<String> {
+    Flags::command()
+        .get_arguments()
+        .filter_map(|argument| argument.get_env())
+        .filter_map(|name| name.to_str().map(str::to_owned))
+        .collect()
+}

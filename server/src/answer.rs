@@ -1,0 +1,257 @@
+//! Grasps and reports become messages, in the client's frame and convention.
+
+use std::time::Duration;
+
+use glam::Vec3;
+use grasp_proto::v1;
+use grasp_synthesis::{
+    grasp::{Contact, Grasp},
+    hand::{
+        Digit, HandPose, Handedness, Phalanx,
+        joints::{HandJoints, JOINT_COUNT, openxr_from_thesis_frame},
+        rig::Rig,
+    },
+    pose::Pose,
+    rejection::Rejection,
+    search::{NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes},
+    strategy::Strategy,
+};
+
+use crate::{convention::Convention, error::ServiceError};
+
+/// Where and how a client wants its answer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ClientFrame {
+    /// Axes, units and joint order.
+    pub convention: Convention,
+    /// The object in the client's frame, in `OpenXR` axes.
+    pub client_from_object: Pose,
+}
+
+/// What a report tells beside what the search found out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Circumstances {
+    /// Wall time of the search.
+    pub search_time: Duration,
+    /// The budget that was in force.
+    pub budget: Duration,
+}
+
+/// The answer to a holdout.
+///
+/// # Errors
+/// [`ServiceError::Cancelled`] if the search was told to stop.
+pub(crate) fn find_response(
+    outcome: &SearchOutcome,
+    rig: &Rig,
+    frame: ClientFrame,
+    settings: &SearchSettings,
+    circumstances: Circumstances,
+) -> Result<v1::FindGraspResponse, ServiceError> {
+    let wire_outcome = match outcome.end {
+        SearchEnd::Found => v1::Outcome::Found,
+        SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted => v1::Outcome::BudgetExhausted,
+        SearchEnd::Stopped => return Err(ServiceError::Cancelled),
+    };
+    Ok(v1::FindGraspResponse {
+        outcome: wire_outcome.into(),
+        grasp: outcome.grasp.as_ref().map(|grasp| wire_grasp(grasp, rig, frame)),
+        report: Some(report(&outcome.report, frame, settings, circumstances)),
+    })
+}
+
+/// A vector without any conversion.
+pub(crate) fn vector(v: Vec3) -> v1::Vector3 {
+    v1::Vector3 {
+        x: v.x,
+        y: v.y,
+        z: v.z,
+    }
+}
+
+/// A pose without any conversion.
+pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
+    let [x, y, z, w] = pose.orientation.to_array();
+    v1::Pose {
+        position: Some(vector(pose.position)),
+        orientation: Some(v1::Quaternion { x, y, z, w }),
+    }
+}
+
+fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
+    let ClientFrame {
+        convention,
+        client_from_object,
+    } = frame;
+    let object_from_wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
+    let joints = HandJoints::of_pose(rig, &grasp.pose).transformed(client_from_object);
+    v1::Grasp {
+        rig: rig.name.clone(),
+        handedness: wire_handedness(rig.handedness).into(),
+        client_from_wrist: Some(wire_pose(
+            convention.joint_from_openxr(client_from_object * object_from_wrist),
+        )),
+        object_from_wrist: Some(wire_pose(convention.joint_from_openxr(object_from_wrist))),
+        digits: grasp
+            .pose
+            .digits
+            .iter()
+            .map(|angles| v1::DigitAngles {
+                base_yaw: angles.base_yaw,
+                base_pitch: angles.base_pitch,
+                second_pitch: angles.second_pitch,
+                third_pitch: Some(angles.third_pitch),
+            })
+            .collect(),
+        joints: (0..JOINT_COUNT)
+            .map(|place| {
+                let joint = joints.joints[convention.joint_at(place)];
+                v1::JointPose {
+                    client_from_joint: Some(wire_pose(convention.joint_from_openxr(joint.pose))),
+                    radius: convention.length_from_openxr(joint.radius),
+                }
+            })
+            .collect(),
+        contacts: grasp
+            .contacts
+            .iter()
+            .zip(&grasp.forces)
+            .map(|(contact, &force)| wire_contact(contact, force, frame))
+            .collect(),
+        comfort: grasp.comfort,
+        wrench_angle: grasp.wrench_angle,
+    }
+}
+
+fn wire_contact(contact: &Contact, force: Vec3, frame: ClientFrame) -> v1::Contact {
+    let ClientFrame {
+        convention,
+        client_from_object,
+    } = frame;
+    let point = |p| Some(vector(convention.point_from_openxr(p)));
+    let direction = |d| Some(vector(convention.direction_from_openxr(d)));
+    v1::Contact {
+        client_position: point(client_from_object.transform_point(contact.position)),
+        client_normal: direction(client_from_object.transform_vector(contact.normal)),
+        object_position: point(contact.position),
+        object_normal: direction(contact.normal),
+        digit: wire_digit(contact.digit).into(),
+        phalanx: wire_phalanx(contact.phalanx).into(),
+        triangle: contact.triangle,
+        client_force: direction(client_from_object.transform_vector(force)),
+        object_force: direction(force),
+    }
+}
+
+fn report(
+    report: &SearchReport,
+    frame: ClientFrame,
+    settings: &SearchSettings,
+    circumstances: Circumstances,
+) -> v1::SearchReport {
+    v1::SearchReport {
+        attempts: report.attempts,
+        pruned_placements: report.pruned_placements,
+        rejections: Rejection::ALL
+            .iter()
+            .filter(|rejection| report.rejections[rejection.index()] > 0)
+            .map(|&rejection| v1::RejectionCount {
+                rejection: wire_rejection(rejection).into(),
+                count: report.rejections[rejection.index()],
+            })
+            .collect(),
+        step_times: report.step_times.as_ref().map(step_times).unwrap_or_default(),
+        seed: settings.seed,
+        attempt: report.attempt,
+        search_time: Some(wire_duration(circumstances.search_time)),
+        budget: Some(wire_duration(circumstances.budget)),
+        workers: u32::try_from(settings.workers).unwrap_or(u32::MAX),
+        nearest_miss: report.nearest_miss.as_ref().map(|miss| nearest_miss(miss, frame)),
+        strategy: wire_strategy(settings.strategy).into(),
+        validity: v1::Validity::Thesis.into(),
+    }
+}
+
+fn step_times(times: &StepTimes) -> Vec<v1::StepTime> {
+    [
+        (v1::Step::WristPlacement, times.wrist_placement),
+        (v1::Step::FingerPosing, times.finger_posing),
+        (v1::Step::CollisionValidation, times.collision_validation),
+        (v1::Step::ContactValidation, times.contact_validation),
+        (v1::Step::ImmobilityValidation, times.immobility_validation),
+    ]
+    .into_iter()
+    .map(|(step, time)| v1::StepTime {
+        step: step.into(),
+        time: Some(wire_duration(time)),
+    })
+    .collect()
+}
+
+fn nearest_miss(miss: &NearestMiss, frame: ClientFrame) -> v1::NearestMiss {
+    let HandPose { frame_from_wrist, .. } = miss.pose;
+    let client_from_wrist = frame.client_from_object * openxr_from_thesis_frame(frame_from_wrist);
+    v1::NearestMiss {
+        rejection: wire_rejection(miss.rejection).into(),
+        attempt: miss.attempt,
+        wrench_angle: miss.wrench_angle,
+        client_from_wrist: Some(wire_pose(frame.convention.joint_from_openxr(client_from_wrist))),
+    }
+}
+
+/// Searches take far less than the 292 billion years that fit.
+fn wire_duration(duration: Duration) -> prost_types::Duration {
+    prost_types::Duration {
+        seconds: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),
+        nanos: i32::try_from(duration.subsec_nanos()).unwrap_or(i32::MAX),
+    }
+}
+
+fn wire_handedness(handedness: Handedness) -> v1::Handedness {
+    match handedness {
+        Handedness::Left => v1::Handedness::Left,
+        Handedness::Right => v1::Handedness::Right,
+    }
+}
+
+fn wire_digit(digit: Digit) -> v1::Digit {
+    match digit {
+        Digit::Thumb => v1::Digit::Thumb,
+        Digit::Index => v1::Digit::Index,
+        Digit::Middle => v1::Digit::Middle,
+        Digit::Ring => v1::Digit::Ring,
+        Digit::Little => v1::Digit::Little,
+    }
+}
+
+fn wire_phalanx(phalanx: Phalanx) -> v1::Phalanx {
+    match phalanx {
+        Phalanx::First => v1::Phalanx::First,
+        Phalanx::Second => v1::Phalanx::Second,
+        Phalanx::Third => v1::Phalanx::Third,
+    }
+}
+
+fn wire_rejection(rejection: Rejection) -> v1::Rejection {
+    match rejection {
+        Rejection::NoContacts => v1::Rejection::NoContacts,
+        Rejection::NoThumb => v1::Rejection::NoThumb,
+        Rejection::NoThumbEarlyStop => v1::Rejection::NoThumbEarlyStop,
+        Rejection::NoFingers => v1::Rejection::NoFingers,
+        Rejection::PalmCollision => v1::Rejection::PalmCollision,
+        Rejection::FingerCollision => v1::Rejection::FingerCollision,
+        Rejection::UnwantedContact => v1::Rejection::UnwantedContact,
+        Rejection::NotImmobilizing => v1::Rejection::NotImmobilizing,
+    }
+}
+
+fn wire_strategy(strategy: Strategy) -> v1::Strategy {
+    match strategy {
+        Strategy::A => v1::Strategy::A,
+        Strategy::B => v1::Strategy::B,
+        Strategy::C => v1::Strategy::C,
+        Strategy::D => v1::Strategy::D,
+        Strategy::E => v1::Strategy::E,
+        Strategy::F => v1::Strategy::F,
+    }
+}

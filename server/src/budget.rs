@@ -1,0 +1,126 @@
+//! How long a search may take.
+
+use std::time::{Duration, Instant};
+
+/// The limits that the server sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BudgetLimits {
+    /// For requests that name none.
+    pub default: Duration,
+    /// No search takes longer.
+    pub maximum: Duration,
+    /// Left of a call's deadline for the way back to the client.
+    pub reserve: Duration,
+}
+
+/// The budget that is in force: the smallest of the request's (or the default), the server's maximum, and what the
+/// call's deadline leaves after the reserve. All count from the call's arrival, so that waiting for a free worker
+/// is part of the budget. Of a deadline that is shorter than two reserves, half is searched: a grasp may still be
+/// found, and its answer may still arrive.
+pub(crate) fn effective_budget(
+    requested: Option<Duration>,
+    limits: BudgetLimits,
+    arrived: Instant,
+    deadline: Option<Instant>,
+) -> Duration {
+    let wanted = requested.unwrap_or(limits.default).min(limits.maximum);
+    match deadline {
+        None => wanted,
+        Some(deadline) => {
+            let allowed = deadline.saturating_duration_since(arrived);
+            let left = allowed.saturating_sub(limits.reserve).max(allowed / 2);
+            wanted.min(left)
+        }
+    }
+}
+
+/// The time that a `grpc-timeout` header gives: up to eight digits and a unit (H, M, S, m, u or n). Nothing for a
+/// header that breaks the protocol; such a call has no deadline, as if the header were absent.
+pub(crate) fn parse_grpc_timeout(header: &str) -> Option<Duration> {
+    let (digits, unit) = header.split_at_checked(header.len().checked_sub(1)?)?;
+    if digits.is_empty() || digits.len() > 8 || !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return None;
+    }
+    let value: u64 = digits.parse().ok()?;
+    match unit {
+        "H" => Some(Duration::from_secs(value * 3600)),
+        "M" => Some(Duration::from_secs(value * 60)),
+        "S" => Some(Duration::from_secs(value)),
+        "m" => Some(Duration::from_millis(value)),
+        "u" => Some(Duration::from_micros(value)),
+        "n" => Some(Duration::from_nanos(value)),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: BudgetLimits = BudgetLimits {
+        default: Duration::from_secs(1),
+        maximum: Duration::from_secs(10),
+        reserve: Duration::from_millis(5),
+    };
+
+    fn budget(requested_ms: Option<u64>, deadline_ms: Option<u64>) -> Duration {
+        let arrived = Instant::now();
+        effective_budget(
+            requested_ms.map(Duration::from_millis),
+            LIMITS,
+            arrived,
+            deadline_ms.map(|ms| arrived + Duration::from_millis(ms)),
+        )
+    }
+
+    #[test]
+    fn the_smallest_limit_wins() {
+        let ms = Duration::from_millis;
+        assert_eq!(budget(None, None), ms(1000), "the default");
+        assert_eq!(budget(Some(20), None), ms(20), "the request's");
+        assert_eq!(budget(Some(60_000), None), ms(10_000), "the maximum");
+        assert_eq!(budget(None, Some(16)), ms(11), "the deadline less the reserve");
+        assert_eq!(
+            budget(Some(8), Some(16)),
+            ms(8),
+            "the request's below the deadline's"
+        );
+        assert_eq!(
+            budget(None, Some(4)),
+            ms(2),
+            "half of a deadline below two reserves"
+        );
+        assert_eq!(budget(None, Some(0)), ms(0), "a deadline that has passed");
+    }
+
+    #[test]
+    fn timeouts_of_the_protocol_are_read() {
+        assert_eq!(parse_grpc_timeout("3H"), Some(Duration::from_hours(3)));
+        assert_eq!(parse_grpc_timeout("2M"), Some(Duration::from_mins(2)));
+        assert_eq!(parse_grpc_timeout("42S"), Some(Duration::from_secs(42)));
+        assert_eq!(parse_grpc_timeout("100m"), Some(Duration::from_millis(100)));
+        assert_eq!(parse_grpc_timeout("7u"), Some(Duration::from_micros(7)));
+        assert_eq!(
+            parse_grpc_timeout("99999999n"),
+            Some(Duration::from_nanos(99_999_999))
+        );
+    }
+
+    #[test]
+    fn other_timeouts_are_not() {
+        for header in [
+            "",
+            "S",
+            "1",
+            "123456789S",
+            "-1S",
+            "1.5S",
+            "1s",
+            "1 S",
+            "0x1S",
+            "1é",
+        ] {
+            assert_eq!(parse_grpc_timeout(header), None, "{header}");
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! Checks the configuration as it was written.
+
+use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, time::Duration};
+
+use grasp_assets::hands::RIG_NAMES;
+
+use super::{BadValue, Config, ConfigError, LogFormat, RawConfig};
+use crate::{budget::BudgetLimits, objects::store::StoreLimits};
+
+impl RawConfig {
+    /// Checks every value; absent ones get their defaults.
+    ///
+    /// # Errors
+    /// [`ConfigError::BadValues`] with every value that cannot be used.
+    pub fn validate(self) -> Result<Config, ConfigError> {
+        let defaults = Config::default();
+        let mut bad = Vec::new();
+        let check = &mut Check(&mut bad);
+        let budgets = self.budgets(check, defaults.budgets);
+        let config = Config {
+            listen: check.parsed(
+                "listen",
+                self.listen,
+                defaults.listen,
+                "an address like [::1]:50051",
+                |text| text.parse::<SocketAddr>().ok(),
+            ),
+            workers: check.count("workers", self.workers, 1..=1024, defaults.workers),
+            io_threads: check.count("io_threads", self.io_threads, 1..=1024, defaults.io_threads),
+            budgets,
+            maximum_searches: check.count(
+                "maximum_searches",
+                self.maximum_searches,
+                1..=256,
+                defaults.maximum_searches,
+            ),
+            maximum_uploads: check.count(
+                "maximum_uploads",
+                self.maximum_uploads,
+                1..=64,
+                defaults.maximum_uploads,
+            ),
+            maximum_object_bytes: check.count(
+                "maximum_object_bytes",
+                self.maximum_object_bytes,
+                1024..=256 << 20,
+                defaults.maximum_object_bytes,
+            ),
+            maximum_object_triangles: check.count(
+                "maximum_object_triangles",
+                self.maximum_object_triangles,
+                4..=10_000_000,
+                defaults.maximum_object_triangles,
+            ),
+            store: StoreLimits {
+                objects: check.within(
+                    "cache_objects",
+                    self.cache_objects,
+                    1..=100_000,
+                    defaults.store.objects,
+                ),
+                bytes: check.within(
+                    "cache_bytes",
+                    self.cache_bytes,
+                    1 << 20..=1 << 40,
+                    defaults.store.bytes,
+                ),
+            },
+            maximum_connections: check.count(
+                "maximum_connections",
+                self.maximum_connections,
+                1..=1_000_000,
+                defaults.maximum_connections,
+            ),
+            drain: check.time("drain_ms", self.drain_ms, 0..=600_000, defaults.drain),
+            default_rig: check.parsed(
+                "default_rig",
+                self.default_rig,
+                defaults.default_rig,
+                &RIG_NAMES.join(" or "),
+                |name| RIG_NAMES.contains(&name).then(|| name.to_owned()),
+            ),
+            log_format: check.parsed(
+                "log_format",
+                self.log_format,
+                defaults.log_format,
+                "text or json",
+                |text| match text {
+                    "text" => Some(LogFormat::Text),
+                    "json" => Some(LogFormat::Json),
+                    _ => None,
+                },
+            ),
+            log: check.parsed("log", self.log, defaults.log, "a filter such as info", |text| {
+                tracing_subscriber::EnvFilter::try_new(text)
+                    .ok()
+                    .map(|_| text.to_owned())
+            }),
+        };
+        if bad.is_empty() {
+            Ok(config)
+        } else {
+            Err(ConfigError::BadValues(bad))
+        }
+    }
+
+    fn budgets(&self, check: &mut Check<'_>, defaults: BudgetLimits) -> BudgetLimits {
+        let budgets = BudgetLimits {
+            default: check.time(
+                "default_budget_ms",
+                self.default_budget_ms,
+                1..=600_000,
+                defaults.default,
+            ),
+            maximum: check.time(
+                "maximum_budget_ms",
+                self.maximum_budget_ms,
+                1..=600_000,
+                defaults.maximum,
+            ),
+            reserve: check.time(
+                "deadline_reserve_ms",
+                self.deadline_reserve_ms,
+                0..=1000,
+                defaults.reserve,
+            ),
+        };
+        if budgets.default > budgets.maximum {
+            check.refuse(
+                "default_budget_ms",
+                budgets.default.as_millis(),
+                format!("at most maximum_budget_ms, {}", budgets.maximum.as_millis()),
+            );
+        }
+        budgets
+    }
+}
+
+/// Collects the values that cannot be used.
+struct Check<'a>(&'a mut Vec<BadValue>);
+
+impl Check<'_> {
+    fn refuse(&mut self, key: &'static str, value: impl fmt::Display, needed: impl Into<String>) {
+        self.0.push(BadValue {
+            key,
+            value: value.to_string(),
+            needed: needed.into(),
+        });
+    }
+
+    fn in_range(
+        &mut self,
+        key: &'static str,
+        value: Option<u64>,
+        range: &RangeInclusive<u64>,
+    ) -> Option<u64> {
+        let value = value?;
+        if range.contains(&value) {
+            return Some(value);
+        }
+        self.refuse(key, value, format!("{} to {}", range.start(), range.end()));
+        None
+    }
+
+    fn within(
+        &mut self,
+        key: &'static str,
+        value: Option<u64>,
+        range: RangeInclusive<u64>,
+        default: usize,
+    ) -> usize {
+        self.in_range(key, value, &range)
+            .and_then(|value| usize::try_from(value).ok())
+            .unwrap_or(default)
+    }
+
+    fn count(
+        &mut self,
+        key: &'static str,
+        value: Option<u64>,
+        range: RangeInclusive<u64>,
+        default: NonZeroUsize,
+    ) -> NonZeroUsize {
+        NonZeroUsize::new(self.within(key, value, range, default.get())).unwrap_or(default)
+    }
+
+    fn time(
+        &mut self,
+        key: &'static str,
+        value: Option<u64>,
+        range: RangeInclusive<u64>,
+        default: Duration,
+    ) -> Duration {
+        self.in_range(key, value, &range)
+            .map_or(default, Duration::from_millis)
+    }
+
+    fn parsed<T>(
+        &mut self,
+        key: &'static str,
+        value: Option<String>,
+        default: T,
+        needed: &str,
+        parse: impl Fn(&str) -> Option<T>,
+    ) -> T {
+        let Some(text) = value else { return default };
+        parse(&text).unwrap_or_else(|| {
+            self.refuse(key, format_args!("{text:?}"), needed);
+            default
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::unknown_variables;
+
+    #[test]
+    fn nothing_said_gives_the_defaults() {
+        assert_eq!(RawConfig::default().validate().unwrap(), Config::default());
+    }
+
+    #[test]
+    fn what_is_printed_can_be_read_again() {
+        let config = Config {
+            log_format: LogFormat::Json,
+            drain: Duration::from_millis(77),
+            ..Config::default()
+        };
+        let text = toml::to_string(&RawConfig::from(&config)).unwrap();
+        let raw: RawConfig = toml::from_str(&text).unwrap();
+        assert_eq!(raw.validate().unwrap(), config);
+    }
+
+    #[test]
+    fn unknown_keys_are_refused_by_name() {
+        let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
+        assert!(error.to_string().contains("wokers"), "{error}");
+    }
+
+    #[test]
+    fn the_first_source_that_says_something_wins() {
+        let flags = RawConfig {
+            workers: Some(3),
+            ..RawConfig::default()
+        };
+        let file = RawConfig {
+            workers: Some(5),
+            drain_ms: Some(9),
+            ..RawConfig::default()
+        };
+        let merged = flags.or(file);
+        assert_eq!((merged.workers, merged.drain_ms), (Some(3), Some(9)));
+    }
+
+    #[test]
+    fn every_bad_value_is_told_with_its_key() {
+        let raw = RawConfig {
+            listen: Some("here".into()),
+            workers: Some(0),
+            io_threads: Some(0),
+            default_budget_ms: Some(0),
+            maximum_budget_ms: Some(0),
+            deadline_reserve_ms: Some(10_000),
+            maximum_searches: Some(0),
+            maximum_uploads: Some(0),
+            maximum_object_bytes: Some(1),
+            maximum_object_triangles: Some(0),
+            cache_objects: Some(0),
+            cache_bytes: Some(0),
+            maximum_connections: Some(0),
+            drain_ms: Some(u64::MAX),
+            default_rig: Some("robot".into()),
+            log_format: Some("xml".into()),
+            log: Some("a=b=c".into()),
+        };
+        let Err(ConfigError::BadValues(bad)) = raw.validate() else {
+            panic!("all of it is wrong");
+        };
+        assert_eq!(bad.len(), 17, "{bad:?}");
+        assert_eq!(
+            bad[0].to_string(),
+            "listen is \"here\"; it must be an address like [::1]:50051"
+        );
+        assert_eq!(bad[1].to_string(), "workers is 0; it must be 1 to 1024");
+    }
+
+    #[test]
+    fn a_default_budget_above_the_maximum_is_told() {
+        let raw = RawConfig {
+            default_budget_ms: Some(500),
+            maximum_budget_ms: Some(400),
+            ..RawConfig::default()
+        };
+        let error = raw.validate().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "default_budget_ms is 500; it must be at most maximum_budget_ms, 400"
+        );
+    }
+
+    #[test]
+    fn misspelt_variables_are_found() {
+        let present = ["GRASP_WORKER", "GRASP_WORKERS", "PATH"].map(str::to_owned);
+        assert_eq!(
+            unknown_variables(present, &["GRASP_WORKERS".to_owned()]),
+            ["GRASP_WORKER"]
+        );
+    }
+}

@@ -1,0 +1,152 @@
+//! The configuration as it is written: flags before environment before file before defaults.
+
+use std::{fs, path::Path, time::Duration};
+
+use clap::Args;
+use serde::{Deserialize, Serialize};
+
+use super::{Config, ConfigError, LogFormat};
+
+/// What every variable of the environment starts with.
+const VARIABLE_PREFIX: &str = "GRASP_";
+
+/// Every key, unchecked. What is absent is left to the next source.
+#[derive(Args, Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawConfig {
+    /// Address to listen on [default: `[::1]:50051`].
+    #[arg(long, env = "GRASP_LISTEN", value_name = "ADDRESS")]
+    pub listen: Option<String>,
+    /// Threads that search [default: one per core].
+    #[arg(long, env = "GRASP_WORKERS", value_name = "COUNT")]
+    pub workers: Option<u64>,
+    /// Threads for requests and answers [default: 2, or an eighth of the cores].
+    #[arg(long, env = "GRASP_IO_THREADS", value_name = "COUNT")]
+    pub io_threads: Option<u64>,
+    /// Budget of a search that names none [default: 1000].
+    #[arg(long, env = "GRASP_DEFAULT_BUDGET_MS", value_name = "MS")]
+    pub default_budget_ms: Option<u64>,
+    /// Budget that no search exceeds [default: 10000].
+    #[arg(long, env = "GRASP_MAXIMUM_BUDGET_MS", value_name = "MS")]
+    pub maximum_budget_ms: Option<u64>,
+    /// Left of a call's deadline for the way back to the client [default: 5].
+    #[arg(long, env = "GRASP_DEADLINE_RESERVE_MS", value_name = "MS")]
+    pub deadline_reserve_ms: Option<u64>,
+    /// Searches that run or wait at most [default: 64].
+    #[arg(long, env = "GRASP_MAXIMUM_SEARCHES", value_name = "COUNT")]
+    pub maximum_searches: Option<u64>,
+    /// Objects that are received or built at a time [default: 4].
+    #[arg(long, env = "GRASP_MAXIMUM_UPLOADS", value_name = "COUNT")]
+    pub maximum_uploads: Option<u64>,
+    /// Bytes of an OBJ mesh at most [default: 8388608].
+    #[arg(long, env = "GRASP_MAXIMUM_OBJECT_BYTES", value_name = "BYTES")]
+    pub maximum_object_bytes: Option<u64>,
+    /// Triangles, and vertices, of a mesh at most [default: 200000].
+    #[arg(long, env = "GRASP_MAXIMUM_OBJECT_TRIANGLES", value_name = "COUNT")]
+    pub maximum_object_triangles: Option<u64>,
+    /// Created objects that are kept at most [default: 1000].
+    #[arg(long, env = "GRASP_CACHE_OBJECTS", value_name = "COUNT")]
+    pub cache_objects: Option<u64>,
+    /// Bytes that created objects take at most, by estimate [default: 536870912].
+    #[arg(long, env = "GRASP_CACHE_BYTES", value_name = "BYTES")]
+    pub cache_bytes: Option<u64>,
+    /// Connections at most [default: 1000].
+    #[arg(long, env = "GRASP_MAXIMUM_CONNECTIONS", value_name = "COUNT")]
+    pub maximum_connections: Option<u64>,
+    /// How long running calls are waited for at the end [default: 10000].
+    #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
+    pub drain_ms: Option<u64>,
+    /// Rig of a receiving hand that names none [default: thesis].
+    #[arg(long, env = "GRASP_DEFAULT_RIG", value_name = "NAME")]
+    pub default_rig: Option<String>,
+    /// How the log is written: text or json [default: text].
+    #[arg(long, env = "GRASP_LOG_FORMAT", value_name = "FORMAT")]
+    pub log_format: Option<String>,
+    /// What is logged: info, debug, or a filter such as `grasp_server=debug,h2=warn` [default: info].
+    #[arg(long, env = "GRASP_LOG", value_name = "FILTER")]
+    pub log: Option<String>,
+}
+
+/// Reads a configuration file.
+///
+/// # Errors
+/// It cannot be read, is no TOML, or has a key that does not exist.
+pub fn read_file(path: &Path) -> Result<RawConfig, ConfigError> {
+    let text = fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    toml::from_str(&text).map_err(|source| ConfigError::Malformed {
+        path: path.to_owned(),
+        source: Box::new(source),
+    })
+}
+
+/// Names among `present` that start like a variable of the server and are none: most likely misspelt. They are told,
+/// not refused, because container platforms add variables of their own.
+pub fn unknown_variables(present: impl IntoIterator<Item = String>, known: &[String]) -> Vec<String> {
+    present
+        .into_iter()
+        .filter(|name| name.starts_with(VARIABLE_PREFIX) && !known.contains(name))
+        .collect()
+}
+
+impl RawConfig {
+    /// These values, and those of `fallback` where there is none.
+    #[must_use]
+    pub fn or(self, fallback: Self) -> Self {
+        Self {
+            listen: self.listen.or(fallback.listen),
+            workers: self.workers.or(fallback.workers),
+            io_threads: self.io_threads.or(fallback.io_threads),
+            default_budget_ms: self.default_budget_ms.or(fallback.default_budget_ms),
+            maximum_budget_ms: self.maximum_budget_ms.or(fallback.maximum_budget_ms),
+            deadline_reserve_ms: self.deadline_reserve_ms.or(fallback.deadline_reserve_ms),
+            maximum_searches: self.maximum_searches.or(fallback.maximum_searches),
+            maximum_uploads: self.maximum_uploads.or(fallback.maximum_uploads),
+            maximum_object_bytes: self.maximum_object_bytes.or(fallback.maximum_object_bytes),
+            maximum_object_triangles: self
+                .maximum_object_triangles
+                .or(fallback.maximum_object_triangles),
+            cache_objects: self.cache_objects.or(fallback.cache_objects),
+            cache_bytes: self.cache_bytes.or(fallback.cache_bytes),
+            maximum_connections: self.maximum_connections.or(fallback.maximum_connections),
+            drain_ms: self.drain_ms.or(fallback.drain_ms),
+            default_rig: self.default_rig.or(fallback.default_rig),
+            log_format: self.log_format.or(fallback.log_format),
+            log: self.log.or(fallback.log),
+        }
+    }
+}
+
+impl From<&Config> for RawConfig {
+    fn from(config: &Config) -> Self {
+        let count = |n: usize| Some(n as u64);
+        let time = |t: Duration| u64::try_from(t.as_millis()).ok();
+        Self {
+            listen: Some(config.listen.to_string()),
+            workers: count(config.workers.get()),
+            io_threads: count(config.io_threads.get()),
+            default_budget_ms: time(config.budgets.default),
+            maximum_budget_ms: time(config.budgets.maximum),
+            deadline_reserve_ms: time(config.budgets.reserve),
+            maximum_searches: count(config.maximum_searches.get()),
+            maximum_uploads: count(config.maximum_uploads.get()),
+            maximum_object_bytes: count(config.maximum_object_bytes.get()),
+            maximum_object_triangles: count(config.maximum_object_triangles.get()),
+            cache_objects: count(config.store.objects),
+            cache_bytes: count(config.store.bytes),
+            maximum_connections: count(config.maximum_connections.get()),
+            drain_ms: time(config.drain),
+            default_rig: Some(config.default_rig.clone()),
+            log_format: Some(
+                match config.log_format {
+                    LogFormat::Text => "text",
+                    LogFormat::Json => "json",
+                }
+                .to_owned(),
+            ),
+            log: Some(config.log.clone()),
+        }
+    }
+}

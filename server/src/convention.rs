@@ -1,0 +1,317 @@
+//! The engines' conventions: the one place where poses, points, directions and joint orders of the wire become
+//! `OpenXR` ones and back.
+//!
+//! `OpenXR` is right-handed, +Y up, in metres. Unity mirrors z, Unreal permutes the axes and counts centimetres:
+//! both are changes of basis that apply to every frame alike. Godot keeps the basis, but its `XRHandTracker` turns
+//! each hand joint by a half turn, so that joint frames convert differently from all other poses.
+//!
+//! Functions come in pairs: `*_to_openxr` reads the client's convention, `*_from_openxr` writes it.
+
+use glam::{Quat, Vec3};
+use grasp_proto::v1;
+use grasp_synthesis::{hand::joints::JOINT_COUNT, pose::Pose};
+
+/// Centimetres in a metre: Unreal's unit.
+const CENTIMETRES_PER_METRE: f32 = 100.0;
+
+/// The half turn about (0, -1, 1) between an `OpenXR` joint's axes and those of Godot's `XRHandTracker`; its own
+/// inverse, up to the quaternion's sign.
+const GODOT_JOINT_TURN: Quat = Quat::from_xyzw(
+    0.0,
+    -std::f32::consts::FRAC_1_SQRT_2,
+    std::f32::consts::FRAC_1_SQRT_2,
+    0.0,
+);
+
+/// The axes, units and joint order of a client's engine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Convention {
+    /// Right-handed, +Y up, metres; Bevy's and `WebXR`'s too.
+    OpenXr,
+    /// Left-handed, +Y up, +Z forward, metres.
+    Unity,
+    /// Left-handed, +Z up, +X forward, centimetres.
+    Unreal,
+    /// As `OpenXr`, but for the axes of hand joints.
+    Godot,
+}
+
+impl Convention {
+    /// The convention that a request names; unspecified means `OpenXR`.
+    pub(crate) fn from_wire(convention: v1::Convention) -> Self {
+        match convention {
+            v1::Convention::Unspecified | v1::Convention::Openxr => Self::OpenXr,
+            v1::Convention::Unity => Self::Unity,
+            v1::Convention::Unreal => Self::Unreal,
+            v1::Convention::Godot => Self::Godot,
+        }
+    }
+
+    /// Metres in one of the convention's units of length.
+    pub(crate) fn metres_per_unit(self) -> f32 {
+        match self {
+            Self::OpenXr | Self::Unity | Self::Godot => 1.0,
+            Self::Unreal => CENTIMETRES_PER_METRE.recip(),
+        }
+    }
+
+    /// A length in metres.
+    pub(crate) fn length_to_openxr(self, length: f32) -> f32 {
+        match self {
+            Self::OpenXr | Self::Unity | Self::Godot => length,
+            Self::Unreal => length / CENTIMETRES_PER_METRE,
+        }
+    }
+
+    /// A length in the convention's unit.
+    pub(crate) fn length_from_openxr(self, metres: f32) -> f32 {
+        match self {
+            Self::OpenXr | Self::Unity | Self::Godot => metres,
+            Self::Unreal => metres * CENTIMETRES_PER_METRE,
+        }
+    }
+
+    /// A direction, or a force in newtons: the axes change, the length does not.
+    pub(crate) fn direction_to_openxr(self, v: Vec3) -> Vec3 {
+        match self {
+            Self::OpenXr | Self::Godot => v,
+            Self::Unity => Vec3::new(v.x, v.y, -v.z),
+            Self::Unreal => Vec3::new(v.y, v.z, -v.x),
+        }
+    }
+
+    /// The inverse of [`Self::direction_to_openxr`].
+    pub(crate) fn direction_from_openxr(self, v: Vec3) -> Vec3 {
+        match self {
+            Self::OpenXr | Self::Godot => v,
+            Self::Unity => Vec3::new(v.x, v.y, -v.z),
+            Self::Unreal => Vec3::new(-v.z, v.x, v.y),
+        }
+    }
+
+    /// A point, in metres.
+    pub(crate) fn point_to_openxr(self, point: Vec3) -> Vec3 {
+        self.direction_to_openxr(point).map(|x| self.length_to_openxr(x))
+    }
+
+    /// A point, from metres.
+    pub(crate) fn point_from_openxr(self, point: Vec3) -> Vec3 {
+        self.direction_from_openxr(point)
+            .map(|x| self.length_from_openxr(x))
+    }
+
+    /// The pose of anything but a hand joint.
+    pub(crate) fn pose_to_openxr(self, pose: Pose) -> Pose {
+        let q = pose.orientation;
+        Pose {
+            position: self.point_to_openxr(pose.position),
+            orientation: match self {
+                Self::OpenXr | Self::Godot => q,
+                Self::Unity => Quat::from_xyzw(-q.x, -q.y, q.z, q.w),
+                Self::Unreal => Quat::from_xyzw(q.y, q.z, -q.x, -q.w),
+            },
+        }
+    }
+
+    /// The inverse of [`Self::pose_to_openxr`].
+    pub(crate) fn pose_from_openxr(self, pose: Pose) -> Pose {
+        let q = pose.orientation;
+        Pose {
+            position: self.point_from_openxr(pose.position),
+            orientation: match self {
+                Self::OpenXr | Self::Godot => q,
+                Self::Unity => Quat::from_xyzw(-q.x, -q.y, q.z, q.w),
+                Self::Unreal => Quat::from_xyzw(-q.z, q.x, q.y, -q.w),
+            },
+        }
+    }
+
+    /// The pose of a hand joint, the wrist included.
+    pub(crate) fn joint_to_openxr(self, joint: Pose) -> Pose {
+        match self {
+            Self::OpenXr | Self::Unity | Self::Unreal => self.pose_to_openxr(joint),
+            Self::Godot => turned(self.pose_to_openxr(joint)),
+        }
+    }
+
+    /// The inverse of [`Self::joint_to_openxr`].
+    pub(crate) fn joint_from_openxr(self, joint: Pose) -> Pose {
+        match self {
+            Self::OpenXr | Self::Unity | Self::Unreal => self.pose_from_openxr(joint),
+            Self::Godot => self.pose_from_openxr(turned(joint)),
+        }
+    }
+
+    /// The `OpenXR` index of the joint that comes at `place` in the convention's list of 26; also the other way
+    /// round, since Unity's swap of palm and wrist is its own inverse.
+    pub(crate) fn joint_at(self, place: usize) -> usize {
+        debug_assert!(place < JOINT_COUNT);
+        match self {
+            Self::OpenXr | Self::Unreal | Self::Godot => place,
+            Self::Unity => match place {
+                0 => 1,
+                1 => 0,
+                other => other,
+            },
+        }
+    }
+
+    /// The convention's axis against gravity, seen in `OpenXR`: +Y in all of them once converted.
+    pub(crate) fn up_in_openxr(self) -> Vec3 {
+        match self {
+            Self::OpenXr | Self::Unity | Self::Godot => self.direction_to_openxr(Vec3::Y),
+            Self::Unreal => self.direction_to_openxr(Vec3::Z),
+        }
+    }
+}
+
+/// A joint with Godot's half turn added or taken away.
+fn turned(joint: Pose) -> Pose {
+    Pose {
+        position: joint.position,
+        orientation: joint.orientation * GODOT_JOINT_TURN,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::FRAC_1_SQRT_2;
+
+    use glam::Mat3;
+
+    use super::*;
+
+    const ALL: [Convention; 4] = [
+        Convention::OpenXr,
+        Convention::Unity,
+        Convention::Unreal,
+        Convention::Godot,
+    ];
+
+    /// The change of basis that the table of conventions states, written down independently as a matrix whose
+    /// columns are the `OpenXR` axes in the engine's.
+    fn engine_from_openxr(convention: Convention) -> Mat3 {
+        match convention {
+            Convention::OpenXr | Convention::Godot => Mat3::IDENTITY,
+            Convention::Unity => Mat3::from_cols(Vec3::X, Vec3::Y, -Vec3::Z),
+            Convention::Unreal => Mat3::from_cols(Vec3::Y, Vec3::Z, -Vec3::X),
+        }
+    }
+
+    fn samples() -> Vec<Pose> {
+        let mut poses = Vec::new();
+        for i in 0..40_u8 {
+            let t = f32::from(i);
+            let axis =
+                Vec3::new((t * 1.3).sin(), (t * 0.7).cos(), (t * 2.1).sin() + 0.1).normalize_or(Vec3::X);
+            poses.push(Pose {
+                position: Vec3::new((t * 0.9).sin(), (t * 1.7).cos() * 2.0, t * 0.1 - 2.0),
+                orientation: Quat::from_axis_angle(axis, t * 0.37 - 5.0),
+            });
+        }
+        poses
+    }
+
+    fn same_rotation(a: Quat, b: Quat) -> bool {
+        a.dot(b).abs() > 1.0 - 1e-6
+    }
+
+    #[test]
+    fn what_is_converted_and_back_is_the_same() {
+        for convention in ALL {
+            for pose in samples() {
+                for back in [
+                    convention.pose_to_openxr(convention.pose_from_openxr(pose)),
+                    convention.joint_to_openxr(convention.joint_from_openxr(pose)),
+                    convention.pose_from_openxr(convention.pose_to_openxr(pose)),
+                    convention.joint_from_openxr(convention.joint_to_openxr(pose)),
+                ] {
+                    assert!(
+                        (back.position - pose.position).length() < 1e-5,
+                        "{convention:?} {pose:?} {back:?}"
+                    );
+                    assert!(
+                        same_rotation(back.orientation, pose.orientation),
+                        "{convention:?} {pose:?} {back:?}"
+                    );
+                }
+                let v = pose.position;
+                assert_eq!(
+                    convention.direction_to_openxr(convention.direction_from_openxr(v)),
+                    v
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn poses_commute_with_the_change_of_basis() {
+        for convention in ALL {
+            let m = engine_from_openxr(convention);
+            let unit = convention.length_from_openxr(1.0);
+            for pose in samples() {
+                let engine = convention.pose_from_openxr(pose);
+                for point in [Vec3::X, Vec3::new(0.3, -2.0, 1.1)] {
+                    let expected = m * pose.transform_point(point) * unit;
+                    let actual = engine.transform_point(m * point * unit);
+                    assert!(
+                        (expected - actual).length() < 1e-4 * unit,
+                        "{convention:?} {expected} {actual}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn known_values_of_the_table() {
+        let pose = Pose {
+            position: Vec3::new(1.0, 2.0, 3.0),
+            orientation: Quat::from_xyzw(0.1, 0.3, 0.5, 0.806_226),
+        };
+        let unity = Convention::Unity.pose_from_openxr(pose);
+        assert_eq!(unity.position, Vec3::new(1.0, 2.0, -3.0));
+        assert_eq!(unity.orientation.to_array(), [-0.1, -0.3, 0.5, 0.806_226]);
+        let unreal = Convention::Unreal.pose_from_openxr(pose);
+        assert_eq!(unreal.position, Vec3::new(-300.0, 100.0, 200.0));
+        assert_eq!(unreal.orientation.to_array(), [-0.5, 0.1, 0.3, -0.806_226]);
+        let godot = Convention::Godot.pose_from_openxr(pose);
+        assert_eq!(godot, pose);
+        // The half turn about (0, -1, 1), multiplied out by hand for the joint at the identity.
+        let joint = Convention::Godot.joint_from_openxr(Pose::IDENTITY);
+        assert_eq!(
+            joint.orientation.to_array(),
+            [0.0, -FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0]
+        );
+    }
+
+    #[test]
+    fn godot_joints_point_with_y_to_the_tip() {
+        // An OpenXR joint at the identity points -Z to the tip and has +Y out of the back of the hand.
+        let joint = Convention::Godot.joint_from_openxr(Pose::IDENTITY);
+        assert!((joint.orientation * Vec3::Y - Vec3::NEG_Z).length() < 1e-6);
+        assert!((joint.orientation * Vec3::Z - Vec3::NEG_Y).length() < 1e-6);
+    }
+
+    #[test]
+    fn up_is_y_in_every_convention() {
+        for convention in ALL {
+            assert_eq!(convention.up_in_openxr(), Vec3::Y);
+        }
+    }
+
+    #[test]
+    fn unity_lists_the_wrist_before_the_palm() {
+        assert_eq!(Convention::Unity.joint_at(0), 1);
+        assert_eq!(Convention::Unity.joint_at(1), 0);
+        for convention in ALL {
+            let mut seen = [false; JOINT_COUNT];
+            for place in 0..JOINT_COUNT {
+                let joint = convention.joint_at(place);
+                assert_eq!(convention.joint_at(joint), place);
+                seen[joint] = true;
+            }
+            assert!(seen.iter().all(|&s| s));
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! What can go wrong with a call, and the status that tells it.
+
+use std::{collections::HashMap, time::Duration};
+
+use tonic::{Code, Status, metadata::MetadataValue};
+use tonic_types::{ErrorDetails, FieldViolation, StatusExt as _};
+
+/// The domain of every `ErrorInfo`: the package of the contract.
+pub(crate) const ERROR_DOMAIN: &str = "grasp.v1";
+
+/// Trailer by which a gRPC client's retry policy learns when to try again, in milliseconds.
+const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
+
+/// One thing that is wrong with a request.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Violation {
+    /// Path of the field, as in `presenting_hand.angles.digits[2].base_pitch`.
+    pub field: String,
+    /// The value, and what would be right.
+    pub description: String,
+}
+
+/// What is bounded and was full.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Searches that run or wait.
+    Searches,
+    /// Uploads that are received or built.
+    Uploads,
+    /// Bytes of created objects of which every one is in use.
+    ObjectCache,
+}
+
+/// Why a call has no answer.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ServiceError {
+    /// The request breaks the contract; everything that is wrong with it.
+    #[error("{}", summary(.0))]
+    Invalid(Vec<Violation>),
+    /// No object has the name.
+    #[error("{name} does not exist{}", if *.evicted { ": it was evicted from the cache; create it again" } else { "" })]
+    ObjectNotFound {
+        /// The name that was asked for.
+        name: String,
+        /// True if it existed once and was pushed out by others.
+        evicted: bool,
+    },
+    /// An object with the name exists.
+    #[error("{name} already exists; choose another object_id")]
+    ObjectExists {
+        /// The name that was asked for.
+        name: String,
+    },
+    /// The server has enough to do.
+    #[error("{} ({maximum}); try again", limit_text(*.limit))]
+    Overloaded {
+        /// What is full.
+        limit: Limit,
+        /// How much it holds.
+        maximum: usize,
+        /// When to try again.
+        retry_after: Duration,
+    },
+    /// The call's deadline passed before a search could start.
+    #[error("the deadline passed before the search could start")]
+    DeadlineExceeded,
+    /// The search was told to stop before its end.
+    #[error("the call was cancelled")]
+    Cancelled,
+    /// A job panicked. The panic is in the server's log.
+    #[error("the server failed on this call; the log tells why")]
+    Panicked,
+}
+
+impl ServiceError {
+    /// The one violation of a request that has no other.
+    pub fn invalid(field: impl Into<String>, description: impl Into<String>) -> Self {
+        Self::Invalid(vec![Violation {
+            field: field.into(),
+            description: description.into(),
+        }])
+    }
+}
+
+impl From<ServiceError> for Status {
+    fn from(error: ServiceError) -> Self {
+        let message = error.to_string();
+        match error {
+            ServiceError::Invalid(violations) => {
+                let mut details = info("INVALID_REQUEST", []);
+                details.set_bad_request(
+                    violations
+                        .into_iter()
+                        .map(|violation| FieldViolation::new(violation.field, violation.description))
+                        .collect::<Vec<_>>(),
+                );
+                Status::with_error_details(Code::InvalidArgument, message, details)
+            }
+            ServiceError::ObjectNotFound { name, evicted } => {
+                let reason = if evicted {
+                    "OBJECT_EVICTED"
+                } else {
+                    "OBJECT_NOT_FOUND"
+                };
+                let mut details = info(reason, [("name", name.clone())]);
+                details.set_resource_info("grasp.v1.Object", name, "", message.clone());
+                Status::with_error_details(Code::NotFound, message, details)
+            }
+            ServiceError::ObjectExists { name } => {
+                let mut details = info("OBJECT_EXISTS", [("name", name.clone())]);
+                details.set_resource_info("grasp.v1.Object", name, "", message.clone());
+                Status::with_error_details(Code::AlreadyExists, message, details)
+            }
+            ServiceError::Overloaded {
+                limit,
+                maximum,
+                retry_after,
+            } => {
+                let mut details = info(limit_reason(limit), [("maximum", maximum.to_string())]);
+                details.set_retry_info(Some(retry_after));
+                let mut status = Status::with_error_details(Code::ResourceExhausted, message, details);
+                let pushback =
+                    MetadataValue::from(u64::try_from(retry_after.as_millis()).unwrap_or(u64::MAX));
+                status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
+                status
+            }
+            ServiceError::DeadlineExceeded => {
+                Status::with_error_details(Code::DeadlineExceeded, message, info("DEADLINE_EXCEEDED", []))
+            }
+            ServiceError::Cancelled => {
+                Status::with_error_details(Code::Cancelled, message, info("CALL_CANCELLED", []))
+            }
+            ServiceError::Panicked => {
+                Status::with_error_details(Code::Internal, message, info("JOB_PANICKED", []))
+            }
+        }
+    }
+}
+
+/// Details with the `ErrorInfo` that every status carries.
+fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDetails {
+    let metadata: HashMap<String, String> = metadata
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect();
+    ErrorDetails::with_error_info(reason, ERROR_DOMAIN, metadata)
+}
+
+fn limit_reason(limit: Limit) -> &'static str {
+    match limit {
+        Limit::Searches => "TOO_MANY_SEARCHES",
+        Limit::Uploads => "TOO_MANY_UPLOADS",
+        Limit::ObjectCache => "OBJECT_CACHE_FULL",
+    }
+}
+
+fn limit_text(limit: Limit) -> &'static str {
+    match limit {
+        Limit::Searches => "the server runs as many searches as it may",
+        Limit::Uploads => "the server receives as many objects at once as it may",
+        Limit::ObjectCache => "every object in the full cache is in use",
+    }
+}
+
+/// The first violation and how many more there are: what fits a status message.
+fn summary(violations: &[Violation]) -> String {
+    match violations {
+        [] => "the request is invalid".to_owned(),
+        [only] => format!("{}: {}", only.field, only.description),
+        [first, rest @ ..] => {
+            format!("{}: {} (and {} more)", first.field, first.description, rest.len())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_error_carries_a_reason_in_the_domain() {
+        let errors = [
+            (
+                ServiceError::invalid("seed", "is wrong"),
+                Code::InvalidArgument,
+                "INVALID_REQUEST",
+            ),
+            (
+                ServiceError::ObjectNotFound {
+                    name: "objects/x".into(),
+                    evicted: false,
+                },
+                Code::NotFound,
+                "OBJECT_NOT_FOUND",
+            ),
+            (
+                ServiceError::ObjectNotFound {
+                    name: "objects/x".into(),
+                    evicted: true,
+                },
+                Code::NotFound,
+                "OBJECT_EVICTED",
+            ),
+            (
+                ServiceError::ObjectExists {
+                    name: "objects/x".into(),
+                },
+                Code::AlreadyExists,
+                "OBJECT_EXISTS",
+            ),
+            (
+                ServiceError::Overloaded {
+                    limit: Limit::Searches,
+                    maximum: 64,
+                    retry_after: Duration::from_millis(50),
+                },
+                Code::ResourceExhausted,
+                "TOO_MANY_SEARCHES",
+            ),
+            (
+                ServiceError::DeadlineExceeded,
+                Code::DeadlineExceeded,
+                "DEADLINE_EXCEEDED",
+            ),
+            (ServiceError::Cancelled, Code::Cancelled, "CALL_CANCELLED"),
+            (ServiceError::Panicked, Code::Internal, "JOB_PANICKED"),
+        ];
+        for (error, code, reason) in errors {
+            let status = Status::from(error);
+            assert_eq!(status.code(), code);
+            let details = status.get_error_details();
+            let info = details.error_info().expect("an ErrorInfo");
+            assert_eq!((info.reason.as_str(), info.domain.as_str()), (reason, "grasp.v1"));
+        }
+    }
+
+    #[test]
+    fn overload_says_when_to_try_again() {
+        let status = Status::from(ServiceError::Overloaded {
+            limit: Limit::Uploads,
+            maximum: 4,
+            retry_after: Duration::from_millis(250),
+        });
+        assert_eq!(status.metadata().get(RETRY_PUSHBACK).unwrap(), "250");
+        let details = status.get_error_details();
+        assert_eq!(
+            details.retry_info().unwrap().retry_delay,
+            Some(Duration::from_millis(250))
+        );
+    }
+
+    #[test]
+    fn all_violations_are_in_the_details_and_the_message_says_how_many() {
+        let violations = (0..3)
+            .map(|i| Violation {
+                field: format!("f{i}"),
+                description: "is wrong".into(),
+            })
+            .collect();
+        let status = Status::from(ServiceError::Invalid(violations));
+        assert_eq!(status.message(), "f0: is wrong (and 2 more)");
+        assert_eq!(
+            status
+                .get_error_details()
+                .bad_request()
+                .unwrap()
+                .field_violations
+                .len(),
+            3
+        );
+    }
+}

@@ -1,0 +1,150 @@
+//! Makes objects of meshes that clients send.
+
+use std::{collections::HashMap, sync::Arc};
+
+use glam::Vec3;
+use grasp_assets::obj::{ObjLimits, ObjMesh, read_obj};
+use grasp_synthesis::{geometry::mesh::TriangleMesh, object::GraspObject};
+
+use super::{
+    StoredObject,
+    centre_of_mass::{Source, centre_of_mass},
+};
+use crate::{
+    error::ServiceError,
+    validate::{Field, ObjectFields, Violations, quoted},
+};
+
+/// Largest edge of an object's bounding box, in metres; above it, the unit is wrong.
+const LARGEST_EXTENT: f32 = 100.0;
+
+/// Smallest edge of an object along its longest axis, in metres; below it, the unit is wrong.
+const SMALLEST_EXTENT: f32 = 1e-3;
+
+/// Longest edge in metres that nobody wonders about: what is longer is not handed over with one hand.
+const USUAL_EXTENT: f32 = 2.0;
+
+/// Names of groups that an answer lists at most.
+const LISTED_GROUPS: usize = 12;
+
+/// Reads the mesh, checks it and builds its search structures: up to seconds of work for the largest meshes.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] with `violations` and everything that is wrong with the mesh.
+pub(crate) fn build_object(
+    fields: ObjectFields,
+    limits: ObjLimits,
+    mut violations: Violations,
+) -> Result<StoredObject, ServiceError> {
+    if fields.obj.is_empty() || fields.obj.len() > limits.bytes {
+        // Reported with the fields; there is nothing to read.
+        return Err(violations.into_error());
+    }
+    let obj = match read_obj(&fields.obj, fields.unit_metres, limits) {
+        Ok(obj) => obj,
+        Err(errors) => {
+            for error in errors {
+                violations.add(Field::root("obj"), error.to_string());
+            }
+            return Err(violations.into_error());
+        }
+    };
+    let mut warnings = obj.warnings.clone();
+    check_extent(&obj.mesh, &mut warnings, &mut violations);
+    let forbidden = forbidden_triangles(&fields, &obj, &mut violations);
+    if !violations.is_empty() {
+        return Err(violations.into_error());
+    }
+    let centre_of_mass = fields.centre_of_mass.unwrap_or_else(|| {
+        let (centre, source) = centre_of_mass(&obj.mesh);
+        if source == Source::Surface {
+            warnings
+                .push("the mesh encloses no volume: the centre of mass is that of its surface".to_owned());
+        }
+        centre
+    });
+    match GraspObject::new(obj.mesh, fields.mass, centre_of_mass, fields.friction, &forbidden) {
+        Ok(object) => Ok(StoredObject::new(fields.id, false, Arc::new(object), warnings)),
+        Err(errors) => {
+            for error in errors {
+                violations.add(Field::root("obj"), error.to_string());
+            }
+            Err(violations.into_error())
+        }
+    }
+}
+
+/// Is the object as large as something that is held?
+fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>, violations: &mut Violations) {
+    let mut low = Vec3::INFINITY;
+    let mut high = Vec3::NEG_INFINITY;
+    for &position in mesh.positions() {
+        low = low.min(position);
+        high = high.max(position);
+    }
+    let extent = (high - low).max_element();
+    // The negation also refuses an extent that overflowed.
+    if !(SMALLEST_EXTENT..=LARGEST_EXTENT).contains(&extent) {
+        violations.add(
+            Field::root("obj"),
+            format!(
+                "is {extent} m long; {SMALLEST_EXTENT} m to {LARGEST_EXTENT} m are allowed (is unit_metres right?)"
+            ),
+        );
+    } else if extent > USUAL_EXTENT {
+        warnings.push(format!("the object is {extent} m long: is unit_metres right?"));
+    }
+}
+
+/// The triangles of all forbidden groups and indices.
+fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Violations) -> Vec<u32> {
+    let field = Field::root("forbidden");
+    let groups: HashMap<&str, &[u32]> = obj
+        .groups
+        .iter()
+        .map(|(name, triangles)| (name.as_str(), triangles.as_slice()))
+        .collect();
+    let mut forbidden = Vec::new();
+    for (place, name) in fields.forbidden_groups.iter().enumerate() {
+        match groups.get(name.as_str()) {
+            Some(triangles) => forbidden.extend_from_slice(triangles),
+            None => violations.add(
+                field.child("groups").at(place),
+                format!("is {}; {}", quoted(name), known_groups(obj)),
+            ),
+        }
+    }
+    let triangles = obj.mesh.triangles().len();
+    for (place, &triangle) in fields.forbidden_triangles.iter().enumerate() {
+        if (triangle as usize) < triangles {
+            forbidden.push(triangle);
+        } else {
+            violations.add(
+                field.child("triangles").at(place),
+                format!("is {triangle}; the mesh has {triangles} triangles, counted from 0"),
+            );
+        }
+    }
+    forbidden.sort_unstable();
+    forbidden.dedup();
+    forbidden
+}
+
+fn known_groups(obj: &ObjMesh) -> String {
+    if obj.groups.is_empty() {
+        return "the mesh names no groups, objects or materials".to_owned();
+    }
+    let names: Vec<String> = obj
+        .groups
+        .iter()
+        .take(LISTED_GROUPS)
+        .map(|(name, _)| quoted(name))
+        .collect();
+    let more = obj.groups.len().saturating_sub(LISTED_GROUPS);
+    let more = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
+    format!("the mesh has {}{more}", names.join(", "))
+}

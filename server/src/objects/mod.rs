@@ -1,0 +1,141 @@
+//! The objects that can be held out: the built-in ones, and those that clients created, in a cache of bounded size.
+
+pub(crate) mod build;
+mod centre_of_mass;
+pub(crate) mod store;
+
+use std::sync::Arc;
+
+use grasp_proto::v1;
+use grasp_synthesis::object::GraspObject;
+use sha2::{Digest as _, Sha256};
+
+use crate::answer::{vector, wire_pose};
+
+/// Bytes that a triangle takes in the search structures beside its three indices: the nodes and the prepared
+/// triangle of the hierarchy, and the forbidden flag. An estimate, on the large side: it bounds the cache.
+const SEARCH_BYTES_PER_TRIANGLE: usize = 192;
+
+/// An object as the server keeps it.
+#[derive(Clone, Debug)]
+pub(crate) struct StoredObject {
+    /// The last part of its name.
+    pub id: String,
+    /// Does it come with the server?
+    pub built_in: bool,
+    /// Ready to be grasped.
+    pub object: Arc<GraspObject>,
+    /// SHA-256 of vertices, triangles and forbidden set, hexadecimal.
+    pub content_hash: String,
+    /// What is odd about its mesh.
+    pub warnings: Vec<String>,
+}
+
+impl StoredObject {
+    /// An object under its id.
+    pub(crate) fn new(id: String, built_in: bool, object: Arc<GraspObject>, warnings: Vec<String>) -> Self {
+        Self {
+            id,
+            built_in,
+            content_hash: content_hash(&object),
+            object,
+            warnings,
+        }
+    }
+
+    /// "objects/{object}".
+    pub(crate) fn name(&self) -> String {
+        name_of(&self.id)
+    }
+
+    /// About how many bytes it takes.
+    pub(crate) fn bytes(&self) -> usize {
+        let mesh = self.object.surface.mesh();
+        size_of_val(mesh.positions())
+            + size_of_val(mesh.triangles())
+            + mesh.triangles().len() * SEARCH_BYTES_PER_TRIANGLE
+            + self.warnings.iter().map(String::len).sum::<usize>()
+    }
+
+    /// The object as the contract tells it.
+    pub(crate) fn to_wire(&self) -> v1::Object {
+        let mesh = self.object.surface.mesh();
+        let bounding_box = &self.object.bounding_box;
+        v1::Object {
+            name: self.name(),
+            built_in: self.built_in,
+            triangle_count: count(mesh.triangles().len()),
+            vertex_count: count(mesh.positions().len()),
+            mass_kg: self.object.mass,
+            centre_of_mass: Some(vector(self.object.centre_of_mass)),
+            friction: self.object.friction,
+            forbidden_triangle_count: count(self.object.forbidden_count()),
+            object_from_box: Some(wire_pose(bounding_box.object_from_box)),
+            box_half_extents: Some(vector(bounding_box.half_extents)),
+            content_hash: self.content_hash.clone(),
+            warnings: self.warnings.clone(),
+        }
+    }
+}
+
+/// The name of an object with this id.
+pub(crate) fn name_of(id: &str) -> String {
+    format!("objects/{id}")
+}
+
+/// Meshes are bounded far below 2^32 triangles and vertices.
+fn count(n: usize) -> u32 {
+    u32::try_from(n).unwrap_or(u32::MAX)
+}
+
+/// SHA-256 over the counts, the vertices, the triangles and the forbidden set, all little-endian.
+fn content_hash(object: &GraspObject) -> String {
+    use std::fmt::Write as _;
+    let mesh = object.surface.mesh();
+    let mut hash = Sha256::new();
+    hash.update((mesh.positions().len() as u64).to_le_bytes());
+    hash.update((mesh.triangles().len() as u64).to_le_bytes());
+    for position in mesh.positions() {
+        for coordinate in position.to_array() {
+            hash.update(coordinate.to_le_bytes());
+        }
+    }
+    for corner in mesh.triangles().iter().flatten() {
+        hash.update(corner.to_le_bytes());
+    }
+    for triangle in 0..count(mesh.triangles().len()) {
+        hash.update([u8::from(object.is_forbidden(triangle))]);
+    }
+    let mut text = String::with_capacity(64);
+    for byte in hash.finalize() {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use glam::Vec3;
+    use grasp_synthesis::geometry::mesh::TriangleMesh;
+
+    use super::*;
+
+    /// A tetrahedron of the given edge with one forbidden triangle.
+    pub(crate) fn tetrahedron(id: &str, edge: f32, forbidden: &[u32]) -> StoredObject {
+        let positions = vec![Vec3::ZERO, Vec3::X * edge, Vec3::Y * edge, Vec3::Z * edge];
+        let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let mesh = TriangleMesh::new(positions, triangles).unwrap();
+        let object = GraspObject::new(mesh, 0.1, Vec3::ZERO, 0.3, forbidden).unwrap();
+        StoredObject::new(id.to_owned(), false, Arc::new(object), Vec::new())
+    }
+
+    #[test]
+    fn the_hash_depends_on_mesh_and_forbidden_set_alone() {
+        let hash = |id, edge, forbidden| tetrahedron(id, edge, forbidden).content_hash;
+        assert_eq!(hash("a", 1.0, &[]), hash("b", 1.0, &[]));
+        assert_ne!(hash("a", 1.0, &[]), hash("a", 2.0, &[]));
+        assert_ne!(hash("a", 1.0, &[]), hash("a", 1.0, &[1]));
+        assert_eq!(hash("a", 1.0, &[]).len(), 64);
+    }
+}

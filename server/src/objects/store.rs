@@ -1,0 +1,300 @@
+//! Objects by name. The built-in ones stay; created ones are kept while they fit.
+//!
+//! When a new object does not fit, created objects that no call uses are evicted, the least recently used first. A
+//! client that asks for an evicted object is told that it was evicted, and creates it again.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    ops::Bound,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use grasp_assets::objects::objects;
+
+use super::{StoredObject, name_of};
+use crate::error::{Limit, ServiceError};
+
+/// Ids of evicted objects that are remembered, so that their clients are told.
+const REMEMBERED_EVICTIONS: usize = 1024;
+
+/// When to try again after every object in the full cache was in use: searches end within seconds.
+const RETRY_AFTER: Duration = Duration::from_secs(1);
+
+/// How much the created objects may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StoreLimits {
+    /// How many there may be.
+    pub objects: usize,
+    /// How many bytes they may take together, by estimate.
+    pub bytes: usize,
+}
+
+/// All objects.
+#[derive(Debug)]
+pub(crate) struct ObjectStore {
+    built_in: BTreeMap<String, Arc<StoredObject>>,
+    created: Mutex<Created>,
+    limits: StoreLimits,
+}
+
+#[derive(Debug, Default)]
+struct Created {
+    objects: BTreeMap<String, Entry>,
+    bytes: usize,
+    /// Counts uses; the largest is the latest.
+    uses: u64,
+    evicted: VecDeque<String>,
+}
+
+#[derive(Debug)]
+struct Entry {
+    object: Arc<StoredObject>,
+    last_used: u64,
+}
+
+impl ObjectStore {
+    /// The built-in objects and room for others.
+    pub(crate) fn new(limits: StoreLimits) -> Self {
+        let built_in = objects()
+            .iter()
+            .map(|built_in| {
+                let id = built_in.name.to_owned();
+                let stored = StoredObject::new(id.clone(), true, Arc::clone(&built_in.object), Vec::new());
+                (id, Arc::new(stored))
+            })
+            .collect();
+        Self {
+            built_in,
+            created: Mutex::default(),
+            limits,
+        }
+    }
+
+    /// True if an object has this id.
+    pub(crate) fn contains(&self, id: &str) -> bool {
+        self.built_in.contains_key(id) || self.created().objects.contains_key(id)
+    }
+
+    /// The object with this id, for use: while the answer is kept, the object is not evicted.
+    ///
+    /// # Errors
+    /// [`ServiceError::ObjectNotFound`].
+    pub(crate) fn get(&self, id: &str) -> Result<Arc<StoredObject>, ServiceError> {
+        if let Some(object) = self.built_in.get(id) {
+            return Ok(Arc::clone(object));
+        }
+        let mut created = self.created();
+        created.uses += 1;
+        let now = created.uses;
+        match created.objects.get_mut(id) {
+            Some(entry) => {
+                entry.last_used = now;
+                Ok(Arc::clone(&entry.object))
+            }
+            None => Err(ServiceError::ObjectNotFound {
+                name: name_of(id),
+                evicted: created.evicted.iter().any(|evicted| evicted == id),
+            }),
+        }
+    }
+
+    /// Adds an object, in place of others if need be.
+    ///
+    /// # Errors
+    /// - [`ServiceError::ObjectExists`] if one has its id.
+    /// - [`ServiceError::Invalid`] if it is larger than the whole cache.
+    /// - [`ServiceError::Overloaded`] if those that would have to go are in use.
+    pub(crate) fn insert(&self, object: StoredObject) -> Result<Arc<StoredObject>, ServiceError> {
+        let bytes = object.bytes();
+        if bytes > self.limits.bytes {
+            return Err(ServiceError::invalid(
+                "obj",
+                format!(
+                    "takes about {bytes} bytes with its search structures; the cache holds {}",
+                    self.limits.bytes
+                ),
+            ));
+        }
+        let mut created = self.created();
+        if self.built_in.contains_key(&object.id) || created.objects.contains_key(&object.id) {
+            return Err(ServiceError::ObjectExists { name: object.name() });
+        }
+        while created.objects.len() >= self.limits.objects || created.bytes + bytes > self.limits.bytes {
+            if !created.evict_one() {
+                return Err(ServiceError::Overloaded {
+                    limit: Limit::ObjectCache,
+                    maximum: self.limits.objects,
+                    retry_after: RETRY_AFTER,
+                });
+            }
+        }
+        let object = Arc::new(object);
+        created.uses += 1;
+        created.bytes += bytes;
+        let entry = Entry {
+            object: Arc::clone(&object),
+            last_used: created.uses,
+        };
+        created.evicted.retain(|id| *id != object.id);
+        created.objects.insert(object.id.clone(), entry);
+        Ok(object)
+    }
+
+    /// Up to `size` objects by name, from the first after `after`, and whether there are more.
+    pub(crate) fn page(&self, after: Option<&str>, size: usize) -> (Vec<Arc<StoredObject>>, bool) {
+        let from = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
+        let created = self.created();
+        // One more of each than fits the page: enough to know whether there is another.
+        let mut objects: Vec<_> = self
+            .built_in
+            .range::<str, _>(from)
+            .map(|(_, object)| object)
+            .take(size + 1)
+            .chain(
+                created
+                    .objects
+                    .range::<str, _>(from)
+                    .map(|(_, entry)| &entry.object)
+                    .take(size + 1),
+            )
+            .map(Arc::clone)
+            .collect();
+        objects.sort_by(|a, b| a.id.cmp(&b.id));
+        let more = objects.len() > size;
+        objects.truncate(size);
+        (objects, more)
+    }
+
+    fn created(&self) -> MutexGuard<'_, Created> {
+        // No code panics while it holds the lock; were it to, the map would still be whole.
+        self.created.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Created {
+    /// Evicts the least recently used object that no call uses; false if there is none.
+    fn evict_one(&mut self) -> bool {
+        let oldest = self
+            .objects
+            .iter()
+            .filter(|(_, entry)| Arc::strong_count(&entry.object) == 1)
+            .min_by_key(|(_, entry)| entry.last_used)
+            .map(|(id, _)| id.clone());
+        let Some((id, entry)) = oldest.and_then(|id| self.objects.remove_entry(&id)) else {
+            return false;
+        };
+        self.bytes -= entry.object.bytes();
+        if self.evicted.len() == REMEMBERED_EVICTIONS {
+            self.evicted.pop_front();
+        }
+        self.evicted.push_back(id);
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::objects::tests::tetrahedron;
+
+    fn store(objects: usize, tetrahedra: usize) -> ObjectStore {
+        let bytes = tetrahedra * tetrahedron("any", 1.0, &[]).bytes();
+        ObjectStore::new(StoreLimits { objects, bytes })
+    }
+
+    fn insert(store: &ObjectStore, id: &str) -> Result<(), ServiceError> {
+        store.insert(tetrahedron(id, 1.0, &[])).map(|_| ())
+    }
+
+    #[test]
+    fn the_least_recently_used_goes_first_by_count_and_by_bytes() {
+        for store in [store(2, 100), store(100, 2)] {
+            insert(&store, "a").unwrap();
+            insert(&store, "b").unwrap();
+            store.get("a").unwrap();
+            insert(&store, "c").unwrap();
+            assert!(store.contains("a") && store.contains("c"));
+            assert_eq!(
+                store.get("b").unwrap_err(),
+                ServiceError::ObjectNotFound {
+                    name: "objects/b".into(),
+                    evicted: true
+                }
+            );
+            assert_eq!(
+                store.get("z").unwrap_err(),
+                ServiceError::ObjectNotFound {
+                    name: "objects/z".into(),
+                    evicted: false
+                }
+            );
+            // What was created again was not evicted any more, once it is gone for another reason.
+            insert(&store, "b").unwrap();
+            store.get("b").unwrap();
+        }
+    }
+
+    #[test]
+    fn what_is_in_use_stays() {
+        let store = store(2, 100);
+        insert(&store, "a").unwrap();
+        insert(&store, "b").unwrap();
+        let a = store.get("a").unwrap();
+        let b = store.get("b").unwrap();
+        assert!(matches!(
+            insert(&store, "c"),
+            Err(ServiceError::Overloaded {
+                limit: Limit::ObjectCache,
+                ..
+            })
+        ));
+        drop(b);
+        insert(&store, "c").unwrap();
+        assert!(store.contains("a") && !store.contains("b"));
+        drop(a);
+    }
+
+    #[test]
+    fn what_can_never_fit_evicts_nothing() {
+        let store = ObjectStore::new(StoreLimits {
+            objects: 10,
+            bytes: 10,
+        });
+        assert!(matches!(insert(&store, "a"), Err(ServiceError::Invalid(_))));
+    }
+
+    #[test]
+    fn an_id_is_given_once() {
+        let store = store(10, 10);
+        insert(&store, "a").unwrap();
+        assert_eq!(
+            insert(&store, "a"),
+            Err(ServiceError::ObjectExists {
+                name: "objects/a".into()
+            })
+        );
+    }
+
+    #[test]
+    fn pages_go_through_all_objects_once() {
+        let store = store(10, 10);
+        for id in ["e", "a", "d", "b", "c"] {
+            insert(&store, id).unwrap();
+        }
+        let everything: Vec<String> = store.page(None, 1000).0.iter().map(|o| o.id.clone()).collect();
+        for size in 1..=everything.len() + 1 {
+            let mut seen: Vec<String> = Vec::new();
+            loop {
+                let (objects, more) = store.page(seen.last().map(String::as_str), size);
+                assert!(objects.len() <= size && (objects.len() == size || !more));
+                seen.extend(objects.iter().map(|o| o.id.clone()));
+                if !more {
+                    break;
+                }
+            }
+            assert_eq!(seen, everything);
+        }
+        assert!(everything.is_sorted() && everything.len() >= 5);
+    }
+}

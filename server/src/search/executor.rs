@@ -1,0 +1,222 @@
+//! Runs jobs on threads of their own: admission, stopping, panics.
+//!
+//! A job gets a coordinating thread, which waits for the workers of the search pool, so that no thread of the async
+//! runtime ever waits. The workers' threads are named `grasp-search-N` and shared by all jobs.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
+
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use crate::error::{Limit, ServiceError};
+
+/// When a client that was turned away should try again: about the time of a few searches.
+const RETRY_AFTER: Duration = Duration::from_millis(50);
+
+/// The search pool and its door.
+#[derive(Clone, Debug)]
+pub(crate) struct SearchExecutor {
+    pool: Arc<ThreadPool>,
+    admission: Arc<Semaphore>,
+    maximum: usize,
+}
+
+/// The right to run one job; given back when the job's work has ended, even if nobody waits for it any more.
+#[derive(Debug)]
+pub(crate) struct Admission {
+    _permit: OwnedSemaphorePermit,
+}
+
+/// Sets the stop flag when the call that waits for the job is dropped.
+struct StopOnDrop(Arc<AtomicBool>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+impl SearchExecutor {
+    /// A pool of `workers` threads that admits `maximum` jobs at a time.
+    ///
+    /// # Errors
+    /// The threads cannot be started.
+    pub(crate) fn new(workers: usize, maximum: usize) -> Result<Self, ThreadPoolBuildError> {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(workers)
+            .thread_name(|index| format!("grasp-search-{index}"))
+            // Without it, a panic outside a job's own scope would abort the process.
+            .panic_handler(|_| tracing::error!("a search worker panicked outside of a job"))
+            .build()?;
+        Ok(Self {
+            pool: Arc::new(pool),
+            admission: Arc::new(Semaphore::new(maximum)),
+            maximum,
+        })
+    }
+
+    /// How many workers race in a search.
+    pub(crate) fn workers(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// How many jobs run or wait.
+    pub(crate) fn jobs(&self) -> usize {
+        self.maximum - self.admission.available_permits()
+    }
+
+    /// Asks for the right to run a job.
+    ///
+    /// # Errors
+    /// [`ServiceError::Overloaded`] if as many run or wait as may.
+    pub(crate) fn admit(&self) -> Result<Admission, ServiceError> {
+        match Arc::clone(&self.admission).try_acquire_owned() {
+            Ok(permit) => Ok(Admission { _permit: permit }),
+            Err(_) => Err(ServiceError::Overloaded {
+                limit: Limit::Searches,
+                maximum: self.maximum,
+                retry_after: RETRY_AFTER,
+            }),
+        }
+    }
+
+    /// Runs a job and waits for it. The job gets the pool and a flag that tells it to stop: set when the future that
+    /// this returns is dropped.
+    ///
+    /// # Errors
+    /// [`ServiceError::Panicked`] if the job panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
+    pub(crate) async fn run<T: Send + 'static>(
+        &self,
+        admission: Admission,
+        job: impl FnOnce(&ThreadPool, &AtomicBool) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
+        let pool = Arc::clone(&self.pool);
+        run_blocking(move || {
+            // Moved into the work: a call that is dropped gives its place away only when its work has stopped.
+            let _admission = admission;
+            job(&pool, &stop)
+        })
+        .await
+    }
+}
+
+/// Runs work that blocks, away from the threads of the async runtime.
+///
+/// # Errors
+/// [`ServiceError::Panicked`] if it panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
+pub(crate) async fn run_blocking<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, ServiceError> {
+    // The task catches the panic; the panic hook has logged it.
+    tokio::task::spawn_blocking(work).await.map_err(|error| {
+        if error.is_panic() {
+            ServiceError::Panicked
+        } else {
+            ServiceError::Cancelled
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{sync::mpsc, thread};
+
+    use super::*;
+
+    fn executor(maximum: usize) -> SearchExecutor {
+        SearchExecutor::new(2, maximum).expect("threads start")
+    }
+
+    /// Waits until the jobs have ended; the test's own time limit is the only other end.
+    async fn until_idle(executor: &SearchExecutor) {
+        while executor.jobs() > 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    }
+
+    #[tokio::test]
+    async fn a_panic_ends_its_job_alone() {
+        let executor = executor(4);
+        let bad = executor.run(executor.admit().unwrap(), |_, _| -> u8 { panic!("on purpose") });
+        let good = executor.run(executor.admit().unwrap(), |_, _| 7);
+        let (bad, good) = tokio::join!(bad, good);
+        assert_eq!((bad, good), (Err(ServiceError::Panicked), Ok(7)));
+        until_idle(&executor).await;
+    }
+
+    #[tokio::test]
+    async fn a_panic_in_a_worker_ends_its_job_alone() {
+        let executor = executor(4);
+        for _ in 0..8 {
+            let bad = executor.run(executor.admit().unwrap(), |pool, _| {
+                pool.in_place_scope(|scope| {
+                    scope.spawn(|_| panic!("on purpose"));
+                    scope.spawn(|_| {});
+                });
+            });
+            assert_eq!(bad.await, Err(ServiceError::Panicked));
+        }
+        let threads = executor
+            .run(executor.admit().unwrap(), |pool, _| {
+                pool.broadcast(|_| thread::current().name().map(str::to_owned))
+            })
+            .await
+            .unwrap();
+        let names: Vec<_> = threads.into_iter().flatten().collect();
+        assert_eq!(names, ["grasp-search-0", "grasp-search-1"]);
+    }
+
+    #[tokio::test]
+    async fn a_full_house_turns_the_next_away() {
+        let executor = executor(2);
+        let first = executor.admit().unwrap();
+        let second = executor.admit().unwrap();
+        assert!(matches!(
+            executor.admit(),
+            Err(ServiceError::Overloaded {
+                limit: Limit::Searches,
+                maximum: 2,
+                ..
+            })
+        ));
+        drop(first);
+        assert_eq!(executor.jobs(), 1);
+        drop((executor.admit().unwrap(), second));
+        assert_eq!(executor.jobs(), 0);
+    }
+
+    #[tokio::test]
+    async fn dropping_the_call_stops_the_work_and_frees_its_place_after_it() {
+        let executor = executor(1);
+        let (started, has_started) = mpsc::channel();
+        let call = {
+            let executor = executor.clone();
+            tokio::spawn(async move {
+                let admission = executor.admit().unwrap();
+                executor
+                    .run(admission, move |_, stop| {
+                        started.send(()).unwrap();
+                        while !stop.load(Ordering::Relaxed) {
+                            thread::sleep(Duration::from_millis(1));
+                        }
+                    })
+                    .await
+            })
+        };
+        tokio::task::spawn_blocking(move || has_started.recv())
+            .await
+            .unwrap()
+            .unwrap();
+        assert_eq!(executor.jobs(), 1);
+        call.abort();
+        until_idle(&executor).await;
+    }
+}

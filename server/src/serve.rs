@@ -1,0 +1,241 @@
+//! From a listener to a server, and back to silence.
+
+use std::{future::Future, num::NonZeroUsize, sync::Arc, time::Duration};
+
+use grasp_assets::obj::ObjLimits;
+use grasp_proto::v1::{grasp_service_server::GraspServiceServer, object_service_server::ObjectServiceServer};
+use tokio::{net::TcpListener, sync::Semaphore};
+use tokio_util::sync::CancellationToken;
+use tonic::{server::NamedService, transport};
+use tonic_health::{ServingStatus, server::HealthReporter};
+
+use crate::{
+    call::{CallLayer, CallsInFlight},
+    config::Config,
+    net::{AcceptLimits, accept},
+    objects::store::ObjectStore,
+    search::executor::SearchExecutor,
+    services::{
+        BYTES_BESIDE_MESH, GraspHandler, LARGEST_ANSWER, LARGEST_FIND_REQUEST, ObjectHandler, Shared,
+    },
+};
+
+/// Streams that a client may have open on a connection.
+const STREAMS_PER_CONNECTION: u32 = 100;
+
+/// Calls of a connection that are worked on at a time; more are turned away.
+const CALLS_PER_CONNECTION: usize = 64;
+
+/// Bytes of a request's headers.
+const LARGEST_HEADERS: u32 = 16 << 10;
+
+/// Streams that a client may open and reset before it is taken for an attacker.
+const PENDING_RESETS: usize = 20;
+
+/// Bytes in flight on a stream.
+const STREAM_WINDOW: u32 = 256 << 10;
+
+/// Bytes in flight on a connection.
+const CONNECTION_WINDOW: u32 = 1 << 20;
+
+/// Bytes of a frame.
+const LARGEST_FRAME: u32 = 16 << 10;
+
+/// How often a silent connection is asked whether it lives …
+const KEEPALIVE_EVERY: Duration = Duration::from_secs(30);
+
+/// … and how long the answer may take.
+const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// How long a client may take to send the preface of HTTP/2.
+const PREFACE_TIME: Duration = Duration::from_secs(10);
+
+/// What a call may take beyond the longest budget: reading and building a large mesh.
+const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
+
+/// From the last answer to the end of its connection: time for it to be sent, and for the clients to close.
+const LINGER: Duration = Duration::from_millis(200);
+
+/// Why the server ended, or did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The threads that search cannot be started.
+    #[error("cannot start the search workers: {0}")]
+    Workers(#[from] rayon::ThreadPoolBuildError),
+    /// The descriptors of the contract are broken.
+    #[error("cannot offer reflection: {0}")]
+    Reflection(#[from] tonic_reflection::server::Error),
+    /// The transport gave up.
+    #[error("the transport failed: {0}")]
+    Transport(#[from] transport::Error),
+}
+
+/// A server that is ready to serve.
+#[derive(Debug)]
+pub struct Server {
+    shared: Arc<Shared>,
+    calls: CallsInFlight,
+    maximum_uploads: NonZeroUsize,
+    maximum_connections: NonZeroUsize,
+    drain: Duration,
+}
+
+/// What the server is doing, for tests and monitors.
+#[derive(Clone, Debug)]
+pub struct Gauges {
+    shared: Arc<Shared>,
+    calls: CallsInFlight,
+}
+
+impl Gauges {
+    /// Searches that run or wait.
+    pub fn searches(&self) -> usize {
+        self.shared.executor.jobs()
+    }
+
+    /// Calls without an answer.
+    pub fn calls(&self) -> usize {
+        self.calls.count()
+    }
+}
+
+/// Serves on a listener until `shutdown` completes: then health says `NOT_SERVING`, no connection is accepted any
+/// more, running calls may end within the drain time, and every connection is closed.
+///
+/// # Errors
+/// See [`ServeError`].
+pub async fn run(
+    listener: TcpListener,
+    config: Config,
+    shutdown: impl Future<Output = ()>,
+) -> Result<(), ServeError> {
+    Server::new(config)?.serve(listener, shutdown).await
+}
+
+impl Server {
+    /// Starts the search workers and reads the built-in objects.
+    ///
+    /// # Errors
+    /// [`ServeError::Workers`].
+    pub fn new(config: Config) -> Result<Self, ServeError> {
+        let triangles = config.maximum_object_triangles.get();
+        let shared = Shared {
+            objects: ObjectStore::new(config.store),
+            executor: SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?,
+            budgets: config.budgets,
+            obj_limits: ObjLimits {
+                bytes: config.maximum_object_bytes.get(),
+                vertices: triangles,
+                triangles,
+            },
+            default_rig: config.default_rig,
+        };
+        Ok(Self {
+            shared: Arc::new(shared),
+            calls: CallsInFlight::default(),
+            maximum_uploads: config.maximum_uploads,
+            maximum_connections: config.maximum_connections,
+            drain: config.drain,
+        })
+    }
+
+    /// What the server is doing.
+    pub fn gauges(&self) -> Gauges {
+        Gauges {
+            shared: Arc::clone(&self.shared),
+            calls: self.calls.clone(),
+        }
+    }
+
+    /// Serves; see [`run`].
+    ///
+    /// # Errors
+    /// See [`ServeError`].
+    pub async fn serve(
+        self,
+        listener: TcpListener,
+        shutdown: impl Future<Output = ()>,
+    ) -> Result<(), ServeError> {
+        let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
+            .max_decoding_message_size(LARGEST_FIND_REQUEST)
+            .max_encoding_message_size(LARGEST_ANSWER);
+        let objects = ObjectServiceServer::new(ObjectHandler::new(Arc::clone(&self.shared)))
+            .max_decoding_message_size(self.shared.obj_limits.bytes + BYTES_BESIDE_MESH)
+            .max_encoding_message_size(LARGEST_ANSWER);
+        let (health, health_service) = tonic_health::server::health_reporter();
+        set_health(&health, ServingStatus::Serving).await;
+
+        let stop = CancellationToken::new();
+        let close = CancellationToken::new();
+        let limits = AcceptLimits {
+            connections: self.maximum_connections.get(),
+            preface: PREFACE_TIME,
+        };
+        let incoming = accept(listener, limits, stop.clone(), close.clone());
+        let serving = transport::Server::builder()
+            .max_concurrent_streams(STREAMS_PER_CONNECTION)
+            .concurrency_limit_per_connection(CALLS_PER_CONNECTION)
+            .load_shed(true)
+            .timeout(self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET)
+            .http2_max_header_list_size(LARGEST_HEADERS)
+            .http2_max_pending_accept_reset_streams(Some(PENDING_RESETS))
+            .initial_stream_window_size(STREAM_WINDOW)
+            .initial_connection_window_size(CONNECTION_WINDOW)
+            .max_frame_size(LARGEST_FRAME)
+            .http2_keepalive_interval(Some(KEEPALIVE_EVERY))
+            .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+            .layer(CallLayer {
+                in_flight: self.calls.clone(),
+                uploads: Arc::new(Semaphore::new(self.maximum_uploads.get())),
+                maximum_uploads: self.maximum_uploads.get(),
+            })
+            .add_service(grasps)
+            .add_service(objects)
+            .add_service(health_service)
+            .add_service(reflection().build_v1()?)
+            .add_service(reflection().build_v1alpha()?)
+            .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());
+
+        // Ends what is left, whichever way this function ends.
+        let _close_at_the_end = close.clone().drop_guard();
+        let _stop_at_the_end = stop.clone().drop_guard();
+        let shutting_down = async {
+            shutdown.await;
+            tracing::info!(calls = self.calls.count(), "draining");
+            set_health(&health, ServingStatus::NotServing).await;
+            stop.cancel();
+            let drained = tokio::time::timeout(self.drain, self.calls.none()).await;
+            if drained.is_err() {
+                tracing::warn!(calls = self.calls.count(), "the drain time is over");
+            }
+            tokio::time::sleep(LINGER).await;
+            // Idle connections and open streams would be waited for without end.
+            close.cancel();
+            std::future::pending::<()>().await;
+        };
+        tokio::select! {
+            served = serving => served?,
+            () = shutting_down => {}
+        }
+        tracing::info!("stopped");
+        Ok(())
+    }
+}
+
+/// Reflection for the contract and for health.
+fn reflection() -> tonic_reflection::server::Builder<'static> {
+    tonic_reflection::server::Builder::configure()
+        .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
+        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+}
+
+/// Says the same of every service, and of the server as a whole.
+async fn set_health(health: &HealthReporter, status: ServingStatus) {
+    for service in [
+        "",
+        GraspServiceServer::<GraspHandler>::NAME,
+        ObjectServiceServer::<ObjectHandler>::NAME,
+    ] {
+        health.set_service_status(service, status).await;
+    }
+}

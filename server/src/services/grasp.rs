@@ -1,0 +1,104 @@
+//! `GraspService`.
+
+use std::{
+    hash::{BuildHasher as _, RandomState},
+    sync::Arc,
+    time::Duration,
+};
+
+use grasp_proto::v1::{self, grasp_service_server::GraspService};
+use tonic::{Request, Response, Status};
+
+use super::Shared;
+use crate::{
+    budget::effective_budget,
+    call::{CallContext, SearchSummary},
+    error::ServiceError,
+    search::job::FindJob,
+    validate::find_query,
+};
+
+/// Answers `GraspService`.
+#[derive(Clone, Debug)]
+pub(crate) struct GraspHandler {
+    shared: Arc<Shared>,
+}
+
+impl GraspHandler {
+    /// A handler of the shared state.
+    pub(crate) fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+
+    async fn find(
+        &self,
+        request: v1::FindGraspRequest,
+        call: &CallContext,
+    ) -> Result<v1::FindGraspResponse, ServiceError> {
+        let shared = &self.shared;
+        let query = find_query(request, &shared.default_rig, |id| shared.objects.contains(id))?;
+        call.tell_object(&query.object_id);
+        let object = shared.objects.get(&query.object_id)?;
+        let budget = effective_budget(query.budget, shared.budgets, call.arrived, call.deadline);
+        if budget.is_zero() {
+            return Err(ServiceError::DeadlineExceeded);
+        }
+        let admission = shared.executor.admit()?;
+        let job = FindJob {
+            seed: query.seed.unwrap_or_else(drawn_seed),
+            query,
+            object,
+            arrived: call.arrived,
+            budget,
+            workers: shared.executor.workers(),
+        };
+        let answer = shared
+            .executor
+            .run(admission, move |pool, stop| job.run(pool, stop))
+            .await??;
+        call.tell_search(summary(&answer));
+        Ok(answer)
+    }
+}
+
+#[tonic::async_trait]
+impl GraspService for GraspHandler {
+    async fn find_grasp(
+        &self,
+        request: Request<v1::FindGraspRequest>,
+    ) -> Result<Response<v1::FindGraspResponse>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.find(request.into_inner(), &call).await?))
+    }
+}
+
+/// A seed for a request that names none: unpredictable and new for every call. It is told in the report.
+fn drawn_seed() -> u64 {
+    // The standard library's hasher is keyed from the operating system's randomness.
+    RandomState::new().hash_one(0_u8)
+}
+
+fn summary(answer: &v1::FindGraspResponse) -> SearchSummary {
+    let report = answer.report.as_ref();
+    let time = report
+        .and_then(|report| report.search_time)
+        .and_then(|time| Duration::try_from(time).ok());
+    SearchSummary {
+        outcome: answer.outcome().as_str_name(),
+        attempts: report.map_or(0, |report| report.attempts),
+        time: time.unwrap_or_default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn drawn_seeds_differ() {
+        let seeds: HashSet<u64> = (0..1000).map(|_| drawn_seed()).collect();
+        assert_eq!(seeds.len(), 1000);
+    }
+}

@@ -1,0 +1,350 @@
+//! Checks hands: joint angles of a rig and tracked joints.
+
+use glam::Vec3;
+use grasp_assets::hands::{self, Hand, RIG_NAMES};
+use grasp_proto::v1;
+use grasp_synthesis::{
+    hand::{
+        DigitAngles, HandPose, Handedness,
+        joints::{HandJoints, JOINT_COUNT, Joint, index, thesis_from_openxr_frame},
+        rig::{AngleRange, DigitRig},
+        skin::Skin,
+    },
+    pose::Pose,
+};
+
+use super::{Field, Violations, known, pose, quoted, raw};
+use crate::convention::Convention;
+
+/// How far a joint angle may be outside its limits, in radians: room for the rounding of a client that clamps in
+/// degrees. It is clamped to the limit.
+const ANGLE_SLACK: f32 = 1e-3;
+
+/// Largest distance from a joint to the skin, in metres; palms of large hands have about 0.03.
+const LARGEST_RADIUS: f32 = 0.1;
+
+/// Largest distance from the wrist to any other joint, in metres; the longest hand on record has 0.33.
+const LARGEST_REACH: f32 = 0.5;
+
+/// Smallest distance from the wrist to the middle finger's knuckle, in metres: below it, it is no hand.
+const SMALLEST_PALM: f32 = 0.01;
+
+/// The rig whose skin a tracked hand wears.
+const TRACKED_HAND_RIG: &str = "adult";
+
+/// The giver's hand, in the client's frame and `OpenXR` axes.
+#[derive(Clone, Debug)]
+pub(crate) struct GiverHand {
+    /// Its joints.
+    pub joints: HandJoints,
+    /// The skin to pose on them.
+    pub skin: &'static Skin,
+    /// The field that gave the joints, to blame if they fold the skin.
+    pub field: &'static str,
+}
+
+/// The giver's hand of a request; none if it names none, or if it is wrong.
+pub(super) fn presenting_hand(
+    field: Field<'_>,
+    hand: v1::PresentingHand,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<GiverHand> {
+    match hand.form {
+        None => {
+            violations.add(
+                field,
+                "is empty; angles or joints are required, or no presenting_hand at all",
+            );
+            None
+        }
+        Some(v1::presenting_hand::Form::Angles(angles)) => {
+            angled_hand(field.child("angles"), &angles, convention, violations)
+        }
+        Some(v1::presenting_hand::Form::Joints(joints)) => {
+            tracked_hand(field.child("joints"), &joints, convention, violations)
+        }
+    }
+}
+
+/// The receiving hand: the server's default rig and the right hand unless said otherwise.
+pub(super) fn receiving_hand(
+    field: Field<'_>,
+    hand: Option<v1::ReceivingHand>,
+    default_rig: &str,
+    violations: &mut Violations,
+) -> Option<&'static Hand> {
+    let hand = hand.unwrap_or_default();
+    let handedness = match known(field.child("handedness"), hand.handedness, violations) {
+        v1::Handedness::Left => Handedness::Left,
+        v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
+    };
+    let rig = if hand.rig.is_empty() {
+        default_rig
+    } else {
+        &hand.rig
+    };
+    built_in(field.child("rig"), rig, handedness, violations)
+}
+
+fn built_in(
+    field: Field<'_>,
+    rig: &str,
+    handedness: Handedness,
+    violations: &mut Violations,
+) -> Option<&'static Hand> {
+    let hand = hands::hand(rig, handedness);
+    if hand.is_none() {
+        violations.add(
+            field,
+            format!(
+                "is {}; the built-in rigs are {}",
+                quoted(rig),
+                RIG_NAMES.join(" and ")
+            ),
+        );
+    }
+    hand
+}
+
+/// The side of a hand that has to say it.
+fn required_handedness(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Handedness> {
+    if v1::Handedness::try_from(value) == Ok(v1::Handedness::Unspecified) {
+        violations.add(field, "is required: HANDEDNESS_LEFT or HANDEDNESS_RIGHT");
+        return None;
+    }
+    match known(field, value, violations) {
+        v1::Handedness::Left => Some(Handedness::Left),
+        v1::Handedness::Right => Some(Handedness::Right),
+        v1::Handedness::Unspecified => None,
+    }
+}
+
+fn angled_hand(
+    field: Field<'_>,
+    angles: &v1::HandAngles,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<GiverHand> {
+    let handedness = required_handedness(field.child("handedness"), angles.handedness, violations);
+    // The limits of both hands are the same: they are checked even if the side is missing.
+    let hand = built_in(
+        field.child("rig"),
+        &angles.rig,
+        handedness.unwrap_or(Handedness::Right),
+        violations,
+    );
+    let client_from_wrist = pose(
+        field.child("client_from_wrist"),
+        angles.client_from_wrist,
+        convention.metres_per_unit(),
+        violations,
+    );
+    let digits_field = field.child("digits");
+    if angles.digits.len() != 5 {
+        violations.add(
+            digits_field,
+            format!("has {} digits; 5 are needed, thumb first", angles.digits.len()),
+        );
+    }
+    let hand = hand?;
+    let mut digits = [DigitAngles::default(); 5];
+    for (place, (digit, sent)) in digits.iter_mut().zip(&angles.digits).enumerate() {
+        *digit = digit_angles(digits_field.at(place), sent, &hand.rig.digits[place], violations);
+    }
+    handedness?;
+    let pose = HandPose {
+        frame_from_wrist: thesis_from_openxr_frame(convention.joint_to_openxr(client_from_wrist)),
+        digits,
+    };
+    Some(GiverHand {
+        joints: HandJoints::of_pose(&hand.rig, &pose),
+        skin: &hand.skin,
+        field: "presenting_hand.angles",
+    })
+}
+
+fn digit_angles(
+    field: Field<'_>,
+    sent: &v1::DigitAngles,
+    rig: &DigitRig,
+    violations: &mut Violations,
+) -> DigitAngles {
+    let limits = &rig.limits;
+    let mut checked = |name, angle: f32, range: AngleRange| {
+        if !range.contains(angle, ANGLE_SLACK) {
+            violations.add(
+                field.child(name),
+                format!("is {angle} rad; the rig allows {} to {}", range.min, range.max),
+            );
+            return range.min;
+        }
+        angle.clamp(range.min, range.max)
+    };
+    let base_yaw = checked("base_yaw", sent.base_yaw, limits.base_yaw);
+    let base_pitch = checked("base_pitch", sent.base_pitch, limits.base_pitch);
+    let second_pitch = checked("second_pitch", sent.second_pitch, limits.second_pitch);
+    let third_pitch = match sent.third_pitch {
+        Some(angle) => checked("third_pitch", angle, limits.third_pitch),
+        None => (DigitAngles::THIRD_PITCH_SHARE * second_pitch)
+            .clamp(limits.third_pitch.min, limits.third_pitch.max),
+    };
+    DigitAngles {
+        base_yaw,
+        base_pitch,
+        second_pitch,
+        third_pitch,
+    }
+}
+
+fn tracked_hand(
+    field: Field<'_>,
+    hand: &v1::HandJoints,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<GiverHand> {
+    let before = violations.len();
+    let handedness = required_handedness(field.child("handedness"), hand.handedness, violations);
+    let set_field = field.child("joint_set");
+    let set = known(set_field, hand.joint_set, violations);
+    let expected = match set {
+        v1::JointSet::Openxr26 => Some(JOINT_COUNT),
+        v1::JointSet::Webxr25 => Some(JOINT_COUNT - 1),
+        v1::JointSet::Unspecified => None,
+    };
+    if hand.joint_set == v1::JointSet::Unspecified as i32 {
+        violations.add(
+            set_field,
+            "is required: JOINT_SET_OPENXR_26 or JOINT_SET_WEBXR_25",
+        );
+    }
+    let joints_field = field.child("joints");
+    if expected.is_some_and(|count| count != hand.joints.len()) || hand.joints.len() > JOINT_COUNT {
+        violations.add(
+            joints_field,
+            format!(
+                "has {} joints; {} needs {}",
+                hand.joints.len(),
+                set.as_str_name(),
+                expected.map_or("26 or 25".to_owned(), |count| count.to_string()),
+            ),
+        );
+        return None;
+    }
+    let nowhere = Joint {
+        pose: Pose::IDENTITY,
+        radius: 0.0,
+    };
+    let mut joints = [nowhere; JOINT_COUNT];
+    for (place, sent) in hand.joints.iter().enumerate() {
+        let joint = joint_pose(joints_field.at(place), sent, convention, violations);
+        match set {
+            v1::JointSet::Openxr26 => joints[convention.joint_at(place)] = joint,
+            // Without the palm, every convention lists the joints in OpenXR's order.
+            v1::JointSet::Webxr25 => joints[place + 1] = joint,
+            v1::JointSet::Unspecified => {}
+        }
+    }
+    let (Some(handedness), Some(_)) = (handedness, expected) else {
+        return None;
+    };
+    if violations.len() > before {
+        // Distances between joints that were replaced mean nothing.
+        return None;
+    }
+    if set == v1::JointSet::Webxr25 {
+        joints[index::PALM] = synthesised_palm(&joints);
+    }
+    proportions(joints_field, &joints, violations);
+    Some(GiverHand {
+        joints: HandJoints { handedness, joints },
+        skin: &built_in(field, TRACKED_HAND_RIG, handedness, violations)?.skin,
+        field: "presenting_hand.joints",
+    })
+}
+
+fn joint_pose(
+    field: Field<'_>,
+    sent: &v1::JointPose,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Joint {
+    let unit = convention.metres_per_unit();
+    let pose_field = field.child("client_from_joint");
+    if sent.client_from_joint.is_none() {
+        violations.add(pose_field, "is absent; every joint needs a pose");
+    }
+    let radius = convention.length_to_openxr(sent.radius);
+    if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
+        violations.add(
+            field.child("radius"),
+            format!(
+                "is {}; it must be more than 0 and at most {}",
+                sent.radius,
+                convention.length_from_openxr(LARGEST_RADIUS)
+            ),
+        );
+    }
+    Joint {
+        pose: convention.joint_to_openxr(pose(pose_field, sent.client_from_joint, unit, violations)),
+        radius,
+    }
+}
+
+/// The palm joint that `WebXR` leaves out: the middle of the middle finger's metacarpal, with its axes and radius.
+fn synthesised_palm(joints: &[Joint; JOINT_COUNT]) -> Joint {
+    let metacarpal = joints[index::FIRST_OF_DIGIT[2]];
+    let proximal = joints[index::FIRST_OF_DIGIT[2] + 1];
+    Joint {
+        pose: Pose {
+            position: (metacarpal.pose.position + proximal.pose.position) * 0.5,
+            orientation: metacarpal.pose.orientation,
+        },
+        radius: metacarpal.radius,
+    }
+}
+
+/// Are the joints as far apart as those of a hand?
+fn proportions(field: Field<'_>, joints: &[Joint; JOINT_COUNT], violations: &mut Violations) {
+    let wrist = joints[index::WRIST].pose.position;
+    let from_wrist = |joint: &Joint| joint.pose.position.distance(wrist);
+    let farthest = joints.iter().map(from_wrist).fold(0.0, f32::max);
+    if farthest > LARGEST_REACH {
+        violations.add(
+            field,
+            format!("reach {farthest} m from the wrist; a hand reaches at most {LARGEST_REACH} m"),
+        );
+    }
+    let knuckle = from_wrist(&joints[index::FIRST_OF_DIGIT[2] + 1]);
+    if knuckle < SMALLEST_PALM {
+        violations.add(
+            field,
+            format!(
+                "have the middle finger's proximal joint {knuckle} m from the wrist; at least {SMALLEST_PALM} m \
+                 are needed"
+            ),
+        );
+    }
+}
+
+/// The direction against gravity of a request, seen in `OpenXR` axes: a unit vector.
+pub(super) fn up(
+    field: Field<'_>,
+    up: Option<v1::Vector3>,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Vec3 {
+    let Some(up) = up else {
+        return convention.up_in_openxr();
+    };
+    let up = raw(up);
+    // Scaled first: the square of a huge or tiny vector is no number.
+    let unit = (up / up.abs().max_element()).try_normalize();
+    match unit {
+        Some(unit) if up.is_finite() => convention.direction_to_openxr(unit),
+        _ => {
+            violations.add(field, format!("is {up}; it must be finite and point somewhere"));
+            convention.up_in_openxr()
+        }
+    }
+}

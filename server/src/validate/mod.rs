@@ -1,0 +1,324 @@
+//! Requests become checked values, or a list of everything that is wrong with them.
+//!
+//! Every function takes the field's path and the violations found so far, and returns a value with which checking
+//! can go on even if it was wrong; [`Violations::finish`] decides. Nothing here allocates for a request that is
+//! right.
+
+mod find;
+mod hand;
+mod object;
+mod page;
+
+use std::fmt;
+
+use glam::{Quat, Vec3};
+use grasp_proto::v1;
+use grasp_synthesis::pose::Pose;
+
+pub(crate) use find::{FindQuery, find_query};
+pub(crate) use hand::GiverHand;
+pub(crate) use object::{ObjectFields, object_fields, object_id_of};
+pub(crate) use page::{page_query, page_token};
+
+use crate::error::{ServiceError, Violation};
+
+/// Violations that are told at most; a client that sends thousands gets the first ones and their number.
+const MAXIMUM_TOLD: usize = 64;
+
+/// Characters of a client's text that are told back at most.
+const MAXIMUM_QUOTED: usize = 80;
+
+/// How far the norm of a quaternion may be from one.
+const QUATERNION_TOLERANCE: f32 = 0.01;
+
+/// Largest distance from the client's origin along an axis, in metres: beyond it a float resolves less than 0.1 mm.
+const FARTHEST: f32 = 1000.0;
+
+/// Largest coefficient of static friction; silicone rubber on itself stays below 2.
+pub(crate) const MAXIMUM_FRICTION: f32 = 5.0;
+
+/// What was found to be wrong so far.
+#[derive(Debug, Default)]
+pub(crate) struct Violations {
+    told: Vec<Violation>,
+    untold: usize,
+}
+
+impl Violations {
+    /// Adds one.
+    pub(crate) fn add(&mut self, field: impl fmt::Display, description: impl Into<String>) {
+        if self.told.len() < MAXIMUM_TOLD {
+            self.told.push(Violation {
+                field: field.to_string(),
+                description: description.into(),
+            });
+        } else {
+            self.untold += 1;
+        }
+    }
+
+    /// True if nothing is wrong.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.told.is_empty()
+    }
+
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.told.len() + self.untold
+    }
+
+    /// `value` if nothing is wrong.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] with everything that was found.
+    pub(crate) fn finish<T>(self, value: T) -> Result<T, ServiceError> {
+        if self.is_empty() {
+            Ok(value)
+        } else {
+            Err(self.into_error())
+        }
+    }
+
+    /// The error that tells them.
+    pub(crate) fn into_error(mut self) -> ServiceError {
+        if self.untold > 0 {
+            self.told.push(Violation {
+                field: String::new(),
+                description: format!("{} more violations are not listed", self.untold),
+            });
+        }
+        ServiceError::Invalid(self.told)
+    }
+}
+
+/// The path of a field, written out only when it is told.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Field<'a> {
+    parent: Option<&'a Field<'a>>,
+    name: &'a str,
+    index: Option<usize>,
+}
+
+impl<'a> Field<'a> {
+    /// A field of the request itself.
+    pub(crate) const fn root(name: &'a str) -> Self {
+        Self {
+            parent: None,
+            name,
+            index: None,
+        }
+    }
+
+    /// A field of this message.
+    pub(crate) const fn child(&'a self, name: &'a str) -> Self {
+        Self {
+            parent: Some(self),
+            name,
+            index: None,
+        }
+    }
+
+    /// An element of this repeated field.
+    pub(crate) const fn at(self, index: usize) -> Self {
+        Self {
+            index: Some(index),
+            ..self
+        }
+    }
+}
+
+impl fmt::Display for Field<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(parent) = self.parent {
+            write!(f, "{parent}.")?;
+        }
+        f.write_str(self.name)?;
+        match self.index {
+            Some(index) => write!(f, "[{index}]"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A client's text in quotes, shortened.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut characters = text.chars();
+    let start: String = characters.by_ref().take(MAXIMUM_QUOTED).collect();
+    let ellipsis = if characters.next().is_some() { "…" } else { "" };
+    format!("{start:?}{ellipsis}")
+}
+
+/// A vector as it was sent.
+fn raw(v: v1::Vector3) -> Vec3 {
+    Vec3::new(v.x, v.y, v.z)
+}
+
+/// A vector whose numbers are finite; zero otherwise.
+fn finite(field: Field<'_>, v: v1::Vector3, violations: &mut Violations) -> Vec3 {
+    let vector = raw(v);
+    if vector.is_finite() {
+        vector
+    } else {
+        violations.add(field, format!("is {vector}; every number must be finite"));
+        Vec3::ZERO
+    }
+}
+
+/// A point in the client's convention, one unit of which is `metres_per_unit` long.
+fn point(field: Field<'_>, v: v1::Vector3, metres_per_unit: f32, violations: &mut Violations) -> Vec3 {
+    let point = finite(field, v, violations);
+    let farthest = FARTHEST / metres_per_unit;
+    if point.abs().max_element() > farthest {
+        violations.add(
+            field,
+            format!("is {point}; no coordinate may be more than {farthest} from 0 (1 km)"),
+        );
+        return Vec3::ZERO;
+    }
+    point
+}
+
+/// A unit quaternion, renormalised.
+fn orientation(field: Field<'_>, q: v1::Quaternion, violations: &mut Violations) -> Quat {
+    let quaternion = Quat::from_xyzw(q.x, q.y, q.z, q.w);
+    let norm = quaternion.length();
+    if (norm - 1.0).abs() <= QUATERNION_TOLERANCE {
+        return quaternion.normalize();
+    }
+    // Also reached by NaN and infinity, for which the comparison is false.
+    violations.add(
+        field,
+        format!("is {quaternion}, of norm {norm}; a unit quaternion is needed, within 1 %"),
+    );
+    Quat::IDENTITY
+}
+
+/// A pose in the client's convention; an absent one, or absent part of one, is the identity.
+fn pose(field: Field<'_>, pose: Option<v1::Pose>, metres_per_unit: f32, violations: &mut Violations) -> Pose {
+    let Some(pose) = pose else {
+        return Pose::IDENTITY;
+    };
+    Pose {
+        position: pose.position.map_or(Vec3::ZERO, |v| {
+            point(field.child("position"), v, metres_per_unit, violations)
+        }),
+        orientation: pose.orientation.map_or(Quat::IDENTITY, |q| {
+            orientation(field.child("orientation"), q, violations)
+        }),
+    }
+}
+
+/// A coefficient of friction.
+fn friction(field: Field<'_>, value: f32, violations: &mut Violations) -> f32 {
+    if !(value > 0.0 && value <= MAXIMUM_FRICTION) {
+        violations.add(
+            field,
+            format!("is {value}; it must be more than 0 and at most {MAXIMUM_FRICTION}"),
+        );
+    }
+    value
+}
+
+/// The value of an enum that the contract knows; its default otherwise.
+fn known<E: TryFrom<i32> + Default>(field: Field<'_>, value: i32, violations: &mut Violations) -> E {
+    E::try_from(value).unwrap_or_else(|_| {
+        violations.add(field, format!("is {value}, which the contract does not define"));
+        E::default()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_name_every_level() {
+        let hand = Field::root("presenting_hand");
+        let angles = hand.child("angles");
+        let digit = angles.child("digits").at(2);
+        assert_eq!(
+            digit.child("base_pitch").to_string(),
+            "presenting_hand.angles.digits[2].base_pitch"
+        );
+    }
+
+    #[test]
+    fn quaternions_near_one_are_normalised_and_others_refused() {
+        let field = Field::root("q");
+        let mut violations = Violations::default();
+        let q = orientation(
+            field,
+            v1::Quaternion {
+                x: 0.0,
+                y: 0.0,
+                z: 0.0,
+                w: 1.009,
+            },
+            &mut violations,
+        );
+        assert!(violations.is_empty());
+        assert!((q.length() - 1.0).abs() < 1e-6);
+        for w in [0.0, 0.98, 1.02, f32::NAN, f32::INFINITY, -f32::INFINITY, 1e30] {
+            let mut violations = Violations::default();
+            let q = orientation(
+                field,
+                v1::Quaternion {
+                    x: 0.0,
+                    y: 0.0,
+                    z: 0.0,
+                    w,
+                },
+                &mut violations,
+            );
+            assert_eq!(violations.told.len(), 1, "{w}");
+            assert_eq!(q, Quat::IDENTITY);
+        }
+    }
+
+    #[test]
+    fn points_beyond_a_kilometre_and_not_finite_ones_are_refused() {
+        let field = Field::root("p");
+        for (x, unit, right) in [
+            (999.0, 1.0, true),
+            (1001.0, 1.0, false),
+            (1001.0, 0.01, true),
+            (f32::NAN, 1.0, false),
+            (f32::NEG_INFINITY, 1.0, false),
+        ] {
+            let mut violations = Violations::default();
+            let v = point(field, v1::Vector3 { x, y: 0.0, z: 0.0 }, unit, &mut violations);
+            assert_eq!(violations.is_empty(), right, "{x} {unit}");
+            assert!(v.is_finite());
+        }
+    }
+
+    #[test]
+    fn a_flood_of_violations_is_cut_and_counted() {
+        let mut violations = Violations::default();
+        for i in 0..1000 {
+            violations.add(Field::root("f").at(i), "is wrong");
+        }
+        let Err(ServiceError::Invalid(told)) = violations.finish(()) else {
+            panic!("violations must not pass");
+        };
+        assert_eq!(told.len(), MAXIMUM_TOLD + 1);
+        assert!(told[MAXIMUM_TOLD].description.starts_with("936 more"));
+    }
+
+    #[test]
+    fn long_texts_are_told_back_shortened() {
+        assert_eq!(quoted("a\nb"), "\"a\\nb\"");
+        assert_eq!(quoted(&"é".repeat(500)).chars().count(), MAXIMUM_QUOTED + 3);
+    }
+
+    #[test]
+    fn enums_of_the_future_are_refused() {
+        let mut violations = Violations::default();
+        let strategy: v1::Strategy = known(Field::root("strategy"), 77, &mut violations);
+        assert_eq!(strategy, v1::Strategy::Unspecified);
+        assert_eq!(
+            violations.told[0].description,
+            "is 77, which the contract does not define"
+        );
+    }
+}

@@ -1,0 +1,239 @@
+//! Checks what is said about objects: names, and the fields of a new one beside its mesh.
+
+use glam::Vec3;
+use grasp_proto::v1;
+use grasp_synthesis::object::THESIS_FRICTION;
+
+use super::{Field, Violations, friction, point, quoted};
+
+/// What every object's name starts with.
+const COLLECTION: &str = "objects/";
+
+/// Characters of an object's id at most.
+const LONGEST_ID: usize = 63;
+
+/// Largest mass of an object in kilograms: more than anybody holds out.
+const LARGEST_MASS: f32 = 1000.0;
+
+/// Lengths that one unit of a mesh may have, in metres: a micrometre to a kilometre.
+const UNIT_RANGE: std::ops::RangeInclusive<f32> = 1e-6..=1e3;
+
+/// A new object but for its mesh.
+#[derive(Debug)]
+pub(crate) struct ObjectFields {
+    /// The last part of its name.
+    pub id: String,
+    /// The mesh as OBJ text.
+    pub obj: Vec<u8>,
+    /// Metres per unit of the mesh.
+    pub unit_metres: f32,
+    /// In kilograms.
+    pub mass: f32,
+    /// In metres, in the object's frame; none to compute it.
+    pub centre_of_mass: Option<Vec3>,
+    /// Coefficient of static friction.
+    pub friction: f32,
+    /// Groups, objects and materials of the OBJ text that may not be touched.
+    pub forbidden_groups: Vec<String>,
+    /// Triangles that may not be touched.
+    pub forbidden_triangles: Vec<u32>,
+}
+
+/// The id of a name like `objects/remote`.
+pub(crate) fn object_id_of(field: Field<'_>, name: &str, violations: &mut Violations) -> Option<String> {
+    match name.strip_prefix(COLLECTION) {
+        Some(id) if is_object_id(id) => Some(id.to_owned()),
+        _ => {
+            violations.add(
+                field,
+                if name.is_empty() {
+                    "is required: objects/ and the object's id".to_owned()
+                } else {
+                    format!("is {}; it must be objects/ and the object's id", quoted(name))
+                },
+            );
+            None
+        }
+    }
+}
+
+/// Checks the fields of a new object. The mesh is read later; what is wrong with it adds to `violations`.
+pub(crate) fn object_fields(
+    request: v1::CreateObjectRequest,
+    maximum_bytes: usize,
+    violations: &mut Violations,
+) -> ObjectFields {
+    if !is_object_id(&request.object_id) {
+        violations.add(
+            Field::root("object_id"),
+            format!(
+                "is {}; it must be 1 to {LONGEST_ID} of a-z, 0-9 and -, starting with a letter",
+                quoted(&request.object_id)
+            ),
+        );
+    }
+    if request.obj.is_empty() {
+        violations.add(
+            Field::root("obj"),
+            "is empty; the mesh is required as Wavefront OBJ text",
+        );
+    } else if request.obj.len() > maximum_bytes {
+        violations.add(
+            Field::root("obj"),
+            format!(
+                "has {} bytes; at most {maximum_bytes} are allowed",
+                request.obj.len()
+            ),
+        );
+    }
+    let unit_metres = match request.unit_metres {
+        None => 1.0,
+        Some(unit) if UNIT_RANGE.contains(&unit) => unit,
+        Some(unit) => {
+            violations.add(
+                Field::root("unit_metres"),
+                format!(
+                    "is {unit}; it must be {} to {}",
+                    UNIT_RANGE.start(),
+                    UNIT_RANGE.end()
+                ),
+            );
+            // The mesh is still read, to tell what is wrong with it.
+            1.0
+        }
+    };
+    if !(request.mass_kg > 0.0 && request.mass_kg <= LARGEST_MASS) {
+        violations.add(
+            Field::root("mass_kg"),
+            format!(
+                "is {}; it must be more than 0 and at most {LARGEST_MASS}",
+                request.mass_kg
+            ),
+        );
+    }
+    let centre_of_mass = request
+        .centre_of_mass
+        .map(|v| point(Field::root("centre_of_mass"), v, 1.0, violations));
+    let friction = request.friction.map_or(THESIS_FRICTION, |value| {
+        friction(Field::root("friction"), value, violations)
+    });
+    let forbidden = request.forbidden.unwrap_or_default();
+    ObjectFields {
+        id: request.object_id,
+        obj: request.obj,
+        unit_metres,
+        mass: request.mass_kg,
+        centre_of_mass,
+        friction,
+        forbidden_groups: forbidden.groups,
+        forbidden_triangles: forbidden.triangles,
+    }
+}
+
+fn is_object_id(id: &str) -> bool {
+    id.len() <= LONGEST_ID
+        && id.starts_with(|c: char| c.is_ascii_lowercase())
+        && id
+            .bytes()
+            .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::ServiceError;
+
+    fn right() -> v1::CreateObjectRequest {
+        v1::CreateObjectRequest {
+            object_id: "mug-1".into(),
+            obj: b"v 0 0 0".to_vec(),
+            unit_metres: None,
+            mass_kg: 0.3,
+            centre_of_mass: None,
+            friction: None,
+            forbidden: None,
+        }
+    }
+
+    fn fields_of_violations(request: v1::CreateObjectRequest) -> Vec<String> {
+        let mut violations = Violations::default();
+        object_fields(request, 100, &mut violations);
+        match violations.finish(()) {
+            Ok(()) => Vec::new(),
+            Err(ServiceError::Invalid(violations)) => violations.into_iter().map(|v| v.field).collect(),
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    #[test]
+    fn a_right_request_has_defaults() {
+        let mut violations = Violations::default();
+        let fields = object_fields(right(), 100, &mut violations);
+        assert!(violations.is_empty());
+        assert_eq!((fields.unit_metres, fields.friction), (1.0, THESIS_FRICTION));
+    }
+
+    #[test]
+    fn every_violation_is_told() {
+        for id in ["", "1mug", "Mug", "mug_1", "mug/1", "mög", &"m".repeat(64)] {
+            let request = v1::CreateObjectRequest {
+                object_id: id.into(),
+                ..right()
+            };
+            assert_eq!(fields_of_violations(request), ["object_id"], "{id}");
+        }
+        for mass_kg in [0.0, -1.0, f32::NAN, f32::INFINITY, 1001.0] {
+            let request = v1::CreateObjectRequest { mass_kg, ..right() };
+            assert_eq!(fields_of_violations(request), ["mass_kg"], "{mass_kg}");
+        }
+        for friction in [0.0, -0.1, 5.1, f32::NAN, f32::INFINITY] {
+            let request = v1::CreateObjectRequest {
+                friction: Some(friction),
+                ..right()
+            };
+            assert_eq!(fields_of_violations(request), ["friction"], "{friction}");
+        }
+        for unit in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e4, 1e-9] {
+            let request = v1::CreateObjectRequest {
+                unit_metres: Some(unit),
+                ..right()
+            };
+            assert_eq!(fields_of_violations(request), ["unit_metres"], "{unit}");
+        }
+        for x in [f32::NAN, f32::NEG_INFINITY, 2000.0] {
+            let centre_of_mass = Some(v1::Vector3 { x, y: 0.0, z: 0.0 });
+            let request = v1::CreateObjectRequest {
+                centre_of_mass,
+                ..right()
+            };
+            assert_eq!(fields_of_violations(request), ["centre_of_mass"], "{x}");
+        }
+        for obj in [vec![], vec![b' '; 101]] {
+            let request = v1::CreateObjectRequest { obj, ..right() };
+            assert_eq!(fields_of_violations(request), ["obj"]);
+        }
+        let all = v1::CreateObjectRequest::default();
+        assert_eq!(fields_of_violations(all), ["object_id", "obj", "mass_kg"]);
+    }
+
+    #[test]
+    fn names_have_the_collection_and_an_id() {
+        let mut violations = Violations::default();
+        let field = Field::root("name");
+        assert_eq!(
+            object_id_of(field, "objects/remote", &mut violations).as_deref(),
+            Some("remote")
+        );
+        for name in [
+            "",
+            "remote",
+            "objects/",
+            "objects/Remote",
+            "objects/a/b",
+            "hands/remote",
+        ] {
+            assert_eq!(object_id_of(field, name, &mut violations), None, "{name}");
+        }
+        assert_eq!(violations.len(), 6);
+    }
+}
