@@ -17,3 +17,4 @@ pub mod pose;
 pub mod rejection;
 pub mod search;
 pub mod strategy;
+pub mod synthesis;

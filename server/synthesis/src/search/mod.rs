@@ -1,15 +1,26 @@
 //! The race: workers pull attempt indices until a valid grasp is found, the deadline passes or they are told to stop.
 
+mod race;
+mod report;
+mod tally;
+
 use std::{sync::atomic::AtomicBool, time::Duration};
 
 use crate::{
     clock::Clock,
     grasp::Grasp,
-    hand::{HandPose, rig::Rig},
+    hand::rig::Rig,
     holdout::Holdout,
-    rejection::Rejection,
     strategy::{BendRatioChoice, Strategy},
+    synthesis::{
+        attempt::Scene,
+        stopwatch::{NoStopwatch, StepStopwatch},
+    },
 };
+use race::Race;
+pub use report::{NearestMiss, SearchReport};
+
+pub use crate::synthesis::stopwatch::StepTimes;
 
 /// How to search.
 #[derive(Clone, Debug)]
@@ -49,51 +60,6 @@ pub enum SearchEnd {
     Stopped,
 }
 
-/// The time spent in each step of Algorithm 1, summed over workers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct StepTimes {
-    /// Step 1.
-    pub wrist_placement: Duration,
-    /// Step 2.
-    pub finger_posing: Duration,
-    /// Step 3.
-    pub collision_validation: Duration,
-    /// Step 4.
-    pub contact_validation: Duration,
-    /// Step 5.
-    pub immobility_validation: Duration,
-}
-
-/// The failed attempt that came closest to a grasp.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NearestMiss {
-    /// Why it failed.
-    pub rejection: Rejection,
-    /// Its index.
-    pub attempt: u64,
-    /// For `NotImmobilizing`: the smallest wrench angle, in radians.
-    pub wrench_angle: Option<f32>,
-    /// The hand in the object's frame.
-    pub pose: HandPose,
-}
-
-/// What a search did.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SearchReport {
-    /// Attempts that were run to their end: accepted placements, as the thesis counts.
-    pub attempts: u64,
-    /// Placements that the measures pruned.
-    pub pruned_placements: u64,
-    /// Rejections by kind, in the order of [`Rejection::ALL`].
-    pub rejections: [u64; 8],
-    /// Times by step, if they were asked for.
-    pub step_times: Option<StepTimes>,
-    /// The index of the attempt that gave the grasp.
-    pub attempt: Option<u64>,
-    /// The attempt that came closest, if none was valid.
-    pub nearest_miss: Option<NearestMiss>,
-}
-
 /// The end of a search.
 #[derive(Clone, Debug)]
 pub struct SearchOutcome {
@@ -106,6 +72,15 @@ pub struct SearchOutcome {
 }
 
 /// Races `settings.workers` tasks of `pool` for a valid grasp. Returns when all of them have stopped.
+///
+/// Called from a thread of `pool` itself, that thread is one of the workers; called from elsewhere, it waits.
+///
+/// A worker looks at `stop`, at the clock and at what the others found at least every 50 µs or so of its own work.
+/// Without a deadline or with one that does not come, and without `stop`, a search with `settings.reproducible` has the
+/// same outcome for any number of workers, step times aside. If it is cut short, it has no grasp: never another one.
+///
+/// # Panics
+/// If an attempt panics. The other workers stop first, and the pool stays usable.
 pub fn find_grasp(
     pool: &rayon::ThreadPool,
     holdout: &Holdout,
@@ -114,10 +89,31 @@ pub fn find_grasp(
     clock: &dyn Clock,
     stop: &AtomicBool,
 ) -> SearchOutcome {
-    let _ = (pool, holdout, rig, settings, clock, stop);
-    SearchOutcome {
-        end: SearchEnd::Stopped,
-        grasp: None,
-        report: SearchReport::default(),
-    }
+    debug_assert!(settings.workers >= 1, "there must be at least one worker");
+    let scene = Scene::new(
+        holdout,
+        rig,
+        settings.strategy,
+        settings.bend_ratios,
+        settings.friction,
+    );
+    let race = Race::new(&scene, settings, clock, stop);
+    let run = |worker: usize| {
+        if settings.record_step_times {
+            race.run_worker(worker, StepStopwatch::new(clock));
+        } else {
+            race.run_worker(worker, NoStopwatch);
+        }
+    };
+    let run = &run;
+    pool.in_place_scope(|scope| {
+        let own = usize::from(pool.current_thread_index().is_some());
+        for worker in own..settings.workers {
+            scope.spawn(move |_| run(worker));
+        }
+        if own == 1 {
+            run(0);
+        }
+    });
+    race.outcome()
 }

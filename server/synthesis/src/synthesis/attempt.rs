@@ -1,0 +1,246 @@
+//! Algorithm 1 (`TRYSYNTHESIZEGRASP`): one attempt at a grasp.
+//!
+//! The thesis prints "or `ISIMMOBILIZINGGRASP`" in line 6; a grasp is invalid if it does NOT immobilize.
+
+use super::{
+    closing_motion::{DigitMotion, hand_motion},
+    collision_validation::collision,
+    comfort::comfort,
+    contact_validation::{collect_contacts, touches_forbidden_surface},
+    finger_posing::{PosedDigit, find_touching_finger_pose, missing_contacts},
+    immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers, Load},
+    random::AttemptStream,
+    stopwatch::{Step, Stopwatch},
+    wrenches::Wrench,
+    wrist_placement::{WristFrame, WristPlacer},
+};
+use crate::{
+    grasp::{Contact, Grasp},
+    hand::{Digit, HandPose, rig::Rig},
+    holdout::Holdout,
+    pose::Pose,
+    rejection::Rejection,
+    strategy::{BendRatioChoice, Strategy},
+};
+
+/// What all attempts of a search share, prepared once.
+#[derive(Clone, Debug)]
+pub struct Scene<'a> {
+    holdout: &'a Holdout,
+    rig: &'a Rig,
+    strategy: Strategy,
+    bend_ratios: BendRatioChoice,
+    placer: WristPlacer<'a>,
+    motion: [DigitMotion; 5],
+    load: Load,
+}
+
+impl<'a> Scene<'a> {
+    /// Prepares attempts at a holdout. `friction` is the coefficient of static friction.
+    pub fn new(
+        holdout: &'a Holdout,
+        rig: &'a Rig,
+        strategy: Strategy,
+        bend_ratios: BendRatioChoice,
+        friction: f32,
+    ) -> Self {
+        debug_assert!(
+            friction.is_finite() && friction > 0.0,
+            "friction {friction} is not positive"
+        );
+        debug_assert!(
+            holdout.up.is_normalized(),
+            "up {} is not a unit vector",
+            holdout.up
+        );
+        Self {
+            holdout,
+            rig,
+            strategy,
+            bend_ratios,
+            placer: WristPlacer::new(holdout, rig, strategy),
+            motion: hand_motion(rig),
+            load: Load {
+                gravity: Wrench::of_gravity(holdout.object.mass, holdout.up),
+                centre_of_mass: holdout.object.centre_of_mass,
+                friction,
+            },
+        }
+    }
+}
+
+/// How an attempt ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AttemptEnd {
+    /// With a valid grasp.
+    Valid(Box<Grasp>),
+    /// With a failed check. `wrench_angle` is the smallest angle of Eq. 4.5 in radians, if it came to that.
+    Rejected {
+        /// The check that failed.
+        rejection: Rejection,
+        /// For `NotImmobilizing`: the best distribution's angle.
+        wrench_angle: Option<f32>,
+    },
+    /// The stop signal came before it was over.
+    Interrupted,
+}
+
+/// The state of an attempt, kept from one to the next for its buffers.
+#[derive(Clone, Debug)]
+pub struct Attempt {
+    pruned_placements: u64,
+    wrist: WristFrame,
+    digits: [PosedDigit; 5],
+    /// How many of `digits` this attempt posed.
+    posed: usize,
+    contacts: Vec<Contact>,
+    immobility: ImmobilityBuffers,
+}
+
+impl Default for Attempt {
+    fn default() -> Self {
+        Self {
+            pruned_placements: 0,
+            wrist: WristFrame::new(Pose::IDENTITY),
+            digits: [PosedDigit::default(); 5],
+            posed: 0,
+            contacts: Vec::new(),
+            immobility: ImmobilityBuffers::default(),
+        }
+    }
+}
+
+impl Attempt {
+    /// How many placements the measures pruned before the attempt had one.
+    pub fn pruned_placements(&self) -> u64 {
+        self.pruned_placements
+    }
+
+    /// The hand as far as the attempt came; digits that it did not pose are stretched.
+    pub fn pose(&self, scene: &Scene<'_>) -> HandPose {
+        let mut digits = scene.rig.stretched();
+        for (angles, posed) in digits.iter_mut().zip(&self.digits[..self.posed]) {
+            *angles = posed.angles;
+        }
+        HandPose {
+            frame_from_wrist: self.wrist.object_from_wrist,
+            digits,
+        }
+    }
+
+    /// `TRYSYNTHESIZEGRASP`. `interrupted` is asked often enough that at most some 50 µs of work lie between two calls.
+    pub fn try_synthesize_grasp(
+        &mut self,
+        scene: &Scene<'_>,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> AttemptEnd {
+        stopwatch.start();
+        self.pruned_placements = 0;
+        self.posed = 0;
+        let reject = |rejection| AttemptEnd::Rejected {
+            rejection,
+            wrench_angle: None,
+        };
+
+        // Step 1, Wrist Placement.
+        let placed = scene
+            .placer
+            .place(stream, interrupted, &mut self.pruned_placements);
+        stopwatch.lap(Step::WristPlacement);
+        let Some(wrist) = placed else {
+            return AttemptEnd::Interrupted;
+        };
+        self.wrist = wrist;
+
+        // Step 2, Finger Posing.
+        let posed = self.pose_digits(scene, stream, interrupted);
+        stopwatch.lap(Step::FingerPosing);
+        if !posed {
+            return AttemptEnd::Interrupted;
+        }
+        if let Some(rejection) = missing_contacts(scene.strategy, &self.digits[..self.posed]) {
+            return reject(rejection);
+        }
+
+        // Step 3, Collision Validation.
+        let collision = collision(scene.holdout, scene.rig, &self.wrist, &self.digits);
+        stopwatch.lap(Step::CollisionValidation);
+        if let Some(rejection) = collision {
+            return reject(rejection);
+        }
+
+        // Step 4, Contact Validation.
+        let object = &scene.holdout.object;
+        collect_contacts(object, &self.digits, &mut self.contacts);
+        let unwanted = touches_forbidden_surface(object, &self.contacts);
+        stopwatch.lap(Step::ContactValidation);
+        if unwanted {
+            return reject(Rejection::UnwantedContact);
+        }
+
+        // Step 5, Immobility Validation.
+        let choice = if scene.strategy.takes_first_force_distribution() {
+            DistributionChoice::FirstSufficient
+        } else {
+            DistributionChoice::Best
+        };
+        let immobility = self
+            .immobility
+            .validate(&self.contacts, &scene.load, choice, stream, interrupted);
+        stopwatch.lap(Step::ImmobilityValidation);
+        match immobility {
+            Immobility::Immobilizing(wrench_angle) => {
+                AttemptEnd::Valid(Box::new(self.grasp(scene, wrench_angle)))
+            }
+            Immobility::NotImmobilizing(wrench_angle) => AttemptEnd::Rejected {
+                rejection: Rejection::NotImmobilizing,
+                wrench_angle: Some(wrench_angle),
+            },
+            Immobility::Interrupted => AttemptEnd::Interrupted,
+        }
+    }
+
+    /// `CALCULATEHOLDPOSEANDCONTACTS`: poses the digits in turn, from strategy D on only while the thumb touches
+    /// (Algorithm 12). False if interrupted.
+    fn pose_digits(
+        &mut self,
+        scene: &Scene<'_>,
+        stream: &mut AttemptStream,
+        interrupted: &impl Fn() -> bool,
+    ) -> bool {
+        for (digit, motion) in Digit::ALL.into_iter().zip(&scene.motion) {
+            if interrupted() {
+                return false;
+            }
+            let posed = find_touching_finger_pose(
+                &scene.holdout.object,
+                &self.wrist,
+                motion,
+                digit,
+                scene.bend_ratios,
+                stream,
+            );
+            let touches = posed.touches();
+            self.digits[digit.index()] = posed;
+            self.posed += 1;
+            if digit == Digit::Thumb && !touches && scene.strategy.stops_without_thumb() {
+                break;
+            }
+        }
+        true
+    }
+
+    /// The grasp of an attempt that passed all checks.
+    fn grasp(&self, scene: &Scene<'_>, wrench_angle: f32) -> Grasp {
+        Grasp {
+            pose: self.pose(scene),
+            bend_ratios: self.digits.map(|digit| digit.bend_ratio),
+            contacts: self.contacts.clone(),
+            forces: self.immobility.forces(),
+            wrench_angle,
+            comfort: comfort(self.immobility.digit_totals(&self.contacts)),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The random stream of an attempt.
+
+use glam::{Quat, Vec3};
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// 2^-24: the spacing of numbers made from 24 random bits, which is all that an `f32` below 1 can hold.
+const UNIT_24: f32 = 1.0 / (1 << 24) as f32;
+
+/// 2^-20: the spacing of numbers in [-1, 1) made from 21 random bits, so that three fit into one draw. A wrist position
+/// is thereby placed on a grid finer than a micrometre.
+const SIGNED_21: f32 = 1.0 / (1 << 20) as f32;
+
+/// All randomness of one attempt.
+///
+/// Each attempt has its own stream from the search's seed and its own index. Whatever else runs, and on however many
+/// workers, attempt i of a seed draws the same numbers.
+#[derive(Clone, Debug)]
+pub struct AttemptStream {
+    generator: Xoshiro256PlusPlus,
+}
+
+impl AttemptStream {
+    /// The stream of an attempt.
+    pub fn new(seed: u64, attempt: u64) -> Self {
+        // For one seed this maps indices to states one to one: no two attempts of a search share a stream. The seed is
+        // mixed first, so that seed 1 is not seed 0 shifted by an index.
+        let state = mix(mix(seed).wrapping_add(attempt));
+        Self {
+            generator: Xoshiro256PlusPlus::seed_from_u64(state),
+        }
+    }
+
+    /// A number in [0, 1).
+    #[inline]
+    pub fn unit(&mut self) -> f32 {
+        (self.generator.next_u64() >> 40) as f32 * UNIT_24
+    }
+
+    /// A number between `min` and `max`.
+    #[inline]
+    pub fn between(&mut self, min: f32, max: f32) -> f32 {
+        // Rounding can lift the sum to just above the upper end.
+        (min + (max - min) * self.unit()).min(max)
+    }
+
+    /// A whole number in 0 .. `count`.
+    #[inline]
+    pub fn below(&mut self, count: usize) -> usize {
+        debug_assert!(
+            count > 0 && count <= 1 << 24,
+            "count {count} is not in 1 ..= 2^24"
+        );
+        ((self.unit() * count as f32) as usize).min(count - 1)
+    }
+
+    /// A point of the cube from -1 to 1.
+    #[inline]
+    pub fn in_cube(&mut self) -> Vec3 {
+        let bits = self.generator.next_u64();
+        let coordinate = |shift: u32| ((bits >> shift) & 0x1F_FFFF) as f32 * SIGNED_21 - 1.0;
+        Vec3::new(coordinate(43), coordinate(22), coordinate(1))
+    }
+
+    /// A point of the unit disk other than its centre, and its squared distance from there.
+    #[inline]
+    fn in_disk(&mut self) -> (f32, f32, f32) {
+        loop {
+            let bits = self.generator.next_u64();
+            let x = (bits >> 40) as f32 * (2.0 * UNIT_24) - 1.0;
+            let y = ((bits >> 16) & 0xFF_FFFF) as f32 * (2.0 * UNIT_24) - 1.0;
+            let squared = x * x + y * y;
+            if squared < 1.0 && squared > 0.0 {
+                return (x, y, squared);
+            }
+        }
+    }
+
+    /// A rotation, uniform over all rotations: Marsaglia, "Choosing a point from the surface of a sphere", Annals of
+    /// Mathematical Statistics 43 (1972), for the sphere of unit quaternions. It needs no trigonometry.
+    #[inline]
+    pub fn rotation(&mut self) -> Quat {
+        let (x, y, first) = self.in_disk();
+        let (z, w, second) = self.in_disk();
+        let scale = ((1.0 - first) / second).sqrt();
+        Quat::from_xyzw(x, y, z * scale, w * scale)
+    }
+
+    /// Four numbers in [0, 1] that sum to one, uniform over all such numbers (a flat Dirichlet distribution): the
+    /// spacings of three sorted uniform numbers.
+    #[inline]
+    pub fn four_shares(&mut self) -> [f32; 4] {
+        let (a, b, c) = (self.unit(), self.unit(), self.unit());
+        let (low, high) = (a.min(b), a.max(b));
+        let (first, middle) = (low.min(c), low.max(c));
+        let (second, third) = (middle.min(high), middle.max(high));
+        [first, second - first, third - second, 1.0 - third]
+    }
+}
+
+/// The finaliser of `SplitMix64` (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014): a
+/// bijection in which every input bit moves about half of the output bits.
+fn mix(value: u64) -> u64 {
+    let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}

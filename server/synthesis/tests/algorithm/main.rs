@@ -1,0 +1,9 @@
+//! Tests of the synthesis algorithm and of the search, on simple bodies and a simple hand.
+
+mod forces;
+mod placement;
+mod posing;
+mod race;
+mod random;
+mod support;
+mod validity;

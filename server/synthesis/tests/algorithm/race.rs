@@ -1,0 +1,486 @@
+//! The race: reproducible for any number of workers, quick to stop, honest about how it ended.
+
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::atomic::{AtomicBool, AtomicU64, Ordering},
+    time::Duration,
+};
+
+use glam::Vec3;
+use grasp_synthesis::{
+    clock::Clock,
+    grasp::Grasp,
+    holdout::Holdout,
+    rejection::Rejection,
+    search::{SearchEnd, SearchOutcome, SearchSettings, find_grasp},
+    strategy::Strategy,
+};
+
+use crate::support::{
+    FakeClock, bar, floating, held, plate, pool, rig, rod, settings, upright_bar_with_forbidden_ends,
+};
+
+fn search(holdout: &Holdout, settings: &SearchSettings, threads: usize) -> SearchOutcome {
+    let clock = FakeClock::default();
+    find_grasp(
+        &pool(threads),
+        holdout,
+        &rig(),
+        settings,
+        &clock,
+        &AtomicBool::new(false),
+    )
+}
+
+/// FNV-1a over every bit of a search's answer.
+fn hash(outcome: &SearchOutcome) -> u64 {
+    let mut hash = 0xCBF2_9CE4_8422_2325_u64;
+    let mut add = |bits: u64| {
+        for byte in bits.to_le_bytes() {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
+        }
+    };
+    let report = &outcome.report;
+    add(report.attempts);
+    add(report.pruned_placements);
+    for count in report.rejections {
+        add(count);
+    }
+    add(report.attempt.unwrap_or(u64::MAX));
+    if let Some(grasp) = &outcome.grasp {
+        for number in numbers(grasp) {
+            add(u64::from(number.to_bits()));
+        }
+        for contact in &grasp.contacts {
+            add(u64::from(contact.triangle));
+            add((contact.digit.index() * 3 + contact.phalanx.index()) as u64);
+        }
+    }
+    hash
+}
+
+/// Every number of a grasp.
+fn numbers(grasp: &Grasp) -> Vec<f32> {
+    let mut numbers = vec![grasp.wrench_angle, grasp.comfort];
+    let wrist = grasp.pose.frame_from_wrist;
+    numbers.extend(wrist.position.to_array());
+    numbers.extend(wrist.orientation.to_array());
+    for angles in &grasp.pose.digits {
+        numbers.extend([
+            angles.base_yaw,
+            angles.base_pitch,
+            angles.second_pitch,
+            angles.third_pitch,
+        ]);
+    }
+    numbers.extend(grasp.bend_ratios.map(|ratio| ratio.unwrap_or(-1.0)));
+    for contact in &grasp.contacts {
+        numbers.extend(contact.position.to_array());
+        numbers.extend(contact.normal.to_array());
+    }
+    numbers.extend(grasp.forces.iter().flat_map(Vec3::to_array));
+    numbers
+}
+
+/// What the searches of [`reproducible_searches_are_the_same_for_any_number_of_workers`] answer, bit for bit. It
+/// changes with anything that changes a draw or a rounding.
+const GOLDEN: u64 = 0x1594_CA74_F345_7B4E;
+
+/// Grasp and report are the same for 1, 2, 4 and 7 workers, whatever the pool, and the same as ever.
+#[test]
+fn reproducible_searches_are_the_same_for_any_number_of_workers() {
+    let mut hashes = Vec::new();
+    for (holdout, strategy) in [
+        (held(bar()), Strategy::F),
+        (held(rod()), Strategy::E),
+        (floating(plate()), Strategy::B),
+    ] {
+        let one = search(&holdout, &settings(strategy), 1);
+        assert_eq!(one.end, SearchEnd::Found);
+        for (workers, threads) in [(2, 1), (2, 2), (4, 4), (7, 3)] {
+            let settings = SearchSettings {
+                workers,
+                ..settings(strategy)
+            };
+            let many = search(&holdout, &settings, threads);
+            assert_eq!(
+                (many.end, &many.grasp, &many.report),
+                (one.end, &one.grasp, &one.report)
+            );
+        }
+        hashes.push(hash(&one));
+    }
+    let combined = hashes.iter().fold(0_u64, |sum, hash| sum.rotate_left(21) ^ hash);
+    assert_eq!(combined, GOLDEN, "{combined:#x}");
+}
+
+/// The same when no attempt is valid, nearest miss included.
+#[test]
+fn exhausted_searches_are_the_same_for_any_number_of_workers() {
+    let holdout = upright_bar_with_forbidden_ends();
+    // With μ = 1 the printed cone has closed to the normal.
+    let settings = SearchSettings {
+        friction: 1.0,
+        max_attempts: 3000,
+        ..settings(Strategy::F)
+    };
+    let one = search(&holdout, &settings, 1);
+    assert_eq!(one.end, SearchEnd::AttemptsExhausted);
+    assert_eq!(
+        (one.report.attempts, one.report.attempt, &one.grasp),
+        (3000, None, &None)
+    );
+    let miss = one.report.nearest_miss.clone().expect("an attempt failed");
+    assert_eq!(miss.rejection, Rejection::NotImmobilizing);
+    for (workers, threads) in [(2, 2), (4, 2), (7, 3)] {
+        let many = search(
+            &holdout,
+            &SearchSettings {
+                workers,
+                ..settings.clone()
+            },
+            threads,
+        );
+        assert_eq!((many.end, &many.report), (one.end, &one.report));
+    }
+    // It is the nearest: of all attempts one by one, none that got as far has a smaller angle.
+    let lowest = (0..3000)
+        .filter_map(|index| {
+            let alone = SearchSettings {
+                first_attempt: index,
+                max_attempts: 1,
+                ..settings.clone()
+            };
+            let miss = search_alone(&holdout, &alone)
+                .report
+                .nearest_miss
+                .expect("it failed");
+            assert_eq!(miss.attempt, index);
+            miss.wrench_angle.map(|angle| (angle, index))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    assert_eq!(lowest, miss.wrench_angle.map(|angle| (angle, miss.attempt)));
+}
+
+/// A search on a pool that is shared by the calls of one test.
+fn search_alone(holdout: &Holdout, settings: &SearchSettings) -> SearchOutcome {
+    static POOL: std::sync::OnceLock<rayon::ThreadPool> = std::sync::OnceLock::new();
+    let clock = FakeClock::default();
+    find_grasp(
+        POOL.get_or_init(|| pool(1)),
+        holdout,
+        &rig(),
+        settings,
+        &clock,
+        &AtomicBool::new(false),
+    )
+}
+
+/// A search without `reproducible` gives a grasp that its seed and index give again.
+#[test]
+fn any_grasp_can_be_replayed_by_its_index() {
+    let holdout = held(bar());
+    for seed in 0..6 {
+        let race = SearchSettings {
+            seed,
+            reproducible: false,
+            workers: 3,
+            ..settings(Strategy::F)
+        };
+        let first = search(&holdout, &race, 3);
+        assert_eq!(first.end, SearchEnd::Found);
+        let index = first.report.attempt.expect("found");
+        let replay = SearchSettings {
+            first_attempt: index,
+            max_attempts: 1,
+            workers: 1,
+            ..race
+        };
+        let again = search(&holdout, &replay, 1);
+        assert_eq!(again.grasp, first.grasp);
+        assert_eq!((again.report.attempt, again.report.attempts), (Some(index), 1));
+        assert!(first.report.attempts <= first.report.attempt.unwrap_or(0) + 3 + first.report.attempts / 2);
+        assert_eq!(first.report.nearest_miss, None);
+    }
+}
+
+/// Called from a thread of the pool itself, also of a pool of one, it does not wait for itself.
+#[test]
+fn a_search_can_start_inside_its_own_pool() {
+    let holdout = held(bar());
+    let outside = search(&holdout, &settings(Strategy::F), 1);
+    for threads in [1, 2] {
+        let pool = pool(threads);
+        let clock = FakeClock::default();
+        let settings = SearchSettings {
+            workers: 2,
+            ..settings(Strategy::F)
+        };
+        let inside = pool.install(|| {
+            find_grasp(
+                &pool,
+                &holdout,
+                &rig(),
+                &settings,
+                &clock,
+                &AtomicBool::new(false),
+            )
+        });
+        assert_eq!((&inside.grasp, &inside.report), (&outside.grasp, &outside.report));
+    }
+}
+
+/// A flag that is set before the start: nothing runs.
+#[test]
+fn a_set_flag_stops_before_the_first_attempt() {
+    let clock = FakeClock::default();
+    let settings = SearchSettings {
+        workers: 2,
+        ..settings(Strategy::F)
+    };
+    let outcome = find_grasp(
+        &pool(2),
+        &held(bar()),
+        &rig(),
+        &settings,
+        &clock,
+        &AtomicBool::new(true),
+    );
+    assert_eq!(outcome.end, SearchEnd::Stopped);
+    assert_eq!(
+        (outcome.report.attempts, outcome.report.pruned_placements),
+        (0, 0)
+    );
+    assert!(outcome.grasp.is_none() && outcome.report.nearest_miss.is_none());
+}
+
+/// A clock that sets a flag, or panics, when it is looked at for the n-th time.
+struct TrapClock<'a> {
+    looks: AtomicU64,
+    at: u64,
+    stop: Option<&'a AtomicBool>,
+}
+
+impl Clock for TrapClock<'_> {
+    fn now(&self) -> Duration {
+        if self.looks.fetch_add(1, Ordering::SeqCst) == self.at {
+            match self.stop {
+                Some(stop) => stop.store(true, Ordering::SeqCst),
+                None => panic!("the clock fell off the wall"),
+            }
+        }
+        Duration::ZERO
+    }
+}
+
+/// A flag that is set in the middle of an attempt ends it at the next look; the attempt does not count.
+#[test]
+fn a_flag_stops_within_an_attempt() {
+    let holdout = upright_bar_with_forbidden_ends();
+    // Without grasps: as many attempts as there is time for.
+    let endless = SearchSettings {
+        friction: 1.0,
+        max_attempts: u64::MAX,
+        deadline: Some(Duration::MAX),
+        ..settings(Strategy::A)
+    };
+    for at in [1, 2, 5, 17, 100, 1001] {
+        for workers in [1, 3] {
+            let stop = AtomicBool::new(false);
+            let clock = TrapClock {
+                looks: AtomicU64::new(0),
+                at,
+                stop: Some(&stop),
+            };
+            let settings = SearchSettings {
+                workers,
+                ..endless.clone()
+            };
+            let outcome = find_grasp(&pool(workers), &holdout, &rig(), &settings, &clock, &stop);
+            assert_eq!(outcome.end, SearchEnd::Stopped);
+            let looks = clock.looks.into_inner();
+            // Each worker looks at the flag before the clock, so at most one look of each follows.
+            assert!(looks <= at + 1 + workers as u64, "{looks} looks, stopped at {at}");
+            assert_eq!(
+                outcome.report.rejections.iter().sum::<u64>(),
+                outcome.report.attempts
+            );
+            // Strategy A looks once before an attempt and once for each digit.
+            assert!(outcome.report.attempts <= at / 6 + 1);
+        }
+    }
+}
+
+/// A deadline ends the search, and a reproducible search has its grasp or none, never another one.
+#[test]
+fn a_deadline_leaves_the_same_grasp_or_none() {
+    let holdout = held(bar());
+    let whole = search(&holdout, &settings(Strategy::F), 1);
+    // How many looks at the clock it takes one worker.
+    let counting = FakeClock::ticking(1);
+    let patient = SearchSettings {
+        deadline: Some(Duration::MAX),
+        ..settings(Strategy::F)
+    };
+    find_grasp(
+        &pool(1),
+        &holdout,
+        &rig(),
+        &patient,
+        &counting,
+        &AtomicBool::new(false),
+    );
+    let needed = counting.looks();
+    let (mut found, mut missed) = (0, 0);
+    for workers in [1, 2, 3] {
+        let pool = pool(workers);
+        for looks in (1..40).map(|step| step * needed / 20) {
+            let settings = SearchSettings {
+                deadline: Some(Duration::from_nanos(looks)),
+                workers,
+                ..settings(Strategy::F)
+            };
+            let clock = FakeClock::ticking(1);
+            let outcome = find_grasp(
+                &pool,
+                &holdout,
+                &rig(),
+                &settings,
+                &clock,
+                &AtomicBool::new(false),
+            );
+            match outcome.end {
+                SearchEnd::Found => {
+                    assert_eq!((&outcome.grasp, &outcome.report), (&whole.grasp, &whole.report));
+                    found += 1;
+                }
+                SearchEnd::DeadlinePassed => {
+                    assert!(outcome.grasp.is_none() && outcome.report.attempt.is_none());
+                    assert!(clock.looks() <= looks + 2 * workers as u64 + 1);
+                    missed += 1;
+                }
+                other => panic!("ended with {other:?}"),
+            }
+        }
+    }
+    assert!(found > 5 && missed > 5, "{found} found, {missed} missed");
+}
+
+/// A holdout that no placement suits: the search stays inside its first attempt and still ends at the deadline.
+#[test]
+fn a_hopeless_holdout_ends_at_the_deadline() {
+    let mut hopeless = rig();
+    // A palm so far from the wrist that it is never near the object while the wrist is.
+    hopeless.palm = Vec3::new(0.0, 0.0, 5.0);
+    for workers in [1, 2] {
+        let settings = SearchSettings {
+            deadline: Some(Duration::from_nanos(300)),
+            workers,
+            ..settings(Strategy::F)
+        };
+        let clock = FakeClock::ticking(1);
+        let stop = AtomicBool::new(false);
+        let outcome = find_grasp(&pool(workers), &held(bar()), &hopeless, &settings, &clock, &stop);
+        assert_eq!(outcome.end, SearchEnd::DeadlinePassed);
+        assert_eq!(outcome.report.attempts, 0);
+        assert!(outcome.report.pruned_placements > 1000);
+        assert!(clock.looks() <= 300 + 2 * workers as u64 + 1);
+    }
+}
+
+/// A panic in an attempt reaches the caller, stops the other workers and leaves the pool usable.
+#[test]
+fn a_panic_propagates_and_leaves_the_pool_usable() {
+    let (holdout, barren) = (held(bar()), upright_bar_with_forbidden_ends());
+    let endless = SearchSettings {
+        friction: 1.0,
+        max_attempts: u64::MAX,
+        deadline: Some(Duration::MAX),
+        ..settings(Strategy::F)
+    };
+    for workers in [1, 2, 4] {
+        let pool = pool(workers);
+        let stop = AtomicBool::new(false);
+        let trap = TrapClock {
+            looks: AtomicU64::new(0),
+            at: 200,
+            stop: None,
+        };
+        let broken = SearchSettings {
+            workers,
+            ..endless.clone()
+        };
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            find_grasp(&pool, &barren, &rig(), &broken, &trap, &stop)
+        }));
+        assert!(result.is_err());
+        let clock = FakeClock::default();
+        let sound = SearchSettings {
+            workers,
+            ..settings(Strategy::F)
+        };
+        let outcome = find_grasp(&pool, &holdout, &rig(), &sound, &clock, &stop);
+        assert_eq!(outcome.end, SearchEnd::Found);
+    }
+}
+
+/// Step times are there when asked for, add up the clock, and change nothing else.
+#[test]
+fn step_times_are_recorded_on_request() {
+    let holdout = held(bar());
+    let plain = search(&holdout, &settings(Strategy::F), 1);
+    assert_eq!(plain.report.step_times, None);
+    let timed = SearchSettings {
+        record_step_times: true,
+        ..settings(Strategy::F)
+    };
+    let clock = FakeClock::ticking(1);
+    let outcome = find_grasp(
+        &pool(1),
+        &holdout,
+        &rig(),
+        &timed,
+        &clock,
+        &AtomicBool::new(false),
+    );
+    assert_eq!(outcome.grasp, plain.grasp);
+    let times = outcome.report.step_times.expect("asked for");
+    let attempts = outcome.report.attempts;
+    // The clock moves by a nanosecond a look, and without a deadline only the stopwatch looks at it.
+    assert_eq!(times.wrist_placement.as_nanos(), u128::from(attempts));
+    assert_eq!(times.finger_posing.as_nanos(), u128::from(attempts));
+    let later = |kinds: &[Rejection]| {
+        kinds
+            .iter()
+            .map(|kind| outcome.report.rejections[kind.index()])
+            .sum::<u64>()
+    };
+    let immobility = 1 + later(&[Rejection::NotImmobilizing]);
+    let contact = immobility + later(&[Rejection::UnwantedContact]);
+    let collision = contact + later(&[Rejection::PalmCollision, Rejection::FingerCollision]);
+    assert_eq!(times.immobility_validation.as_nanos(), u128::from(immobility));
+    assert_eq!(times.contact_validation.as_nanos(), u128::from(contact));
+    assert_eq!(times.collision_validation.as_nanos(), u128::from(collision));
+}
+
+/// No attempts allowed: none made.
+#[test]
+fn zero_attempts_are_exhausted_at_once() {
+    let none = SearchSettings {
+        max_attempts: 0,
+        ..settings(Strategy::F)
+    };
+    let outcome = search(&held(bar()), &none, 1);
+    assert_eq!(
+        (outcome.end, outcome.report.attempts),
+        (SearchEnd::AttemptsExhausted, 0)
+    );
+    // The last index there is.
+    let last = SearchSettings {
+        first_attempt: u64::MAX - 1,
+        max_attempts: 10,
+        ..settings(Strategy::F)
+    };
+    let outcome = search(&held(bar()), &last, 1);
+    assert_eq!(outcome.report.attempts, 1);
+}
