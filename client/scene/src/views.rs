@@ -1,6 +1,7 @@
 //! Where to look from: the directions from which most of what matters is visible.
 
 use glam::{Quat, Vec3};
+use rayon::prelude::*;
 
 use crate::{
     camera::Camera,
@@ -32,6 +33,9 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
         let points = framed.flat_map(|(part, _)| part.positions.iter().copied());
         Camera::framing_points(points, direction, up, aspect)
     };
+    let centre = scene
+        .bounds()
+        .map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5);
     let to_up = Quat::from_rotation_arc(Vec3::Y, up.normalize_or(Vec3::Y));
     let mut directions = Vec::new();
     for (elevation, welcome) in ELEVATIONS {
@@ -42,9 +46,19 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
         }
     }
 
+    // Every candidate fills its picture, so that pixels are compared as the area that they stand for in the scene:
+    // else the short end of a long thing, seen from near, would count as much as its side.
     let areas: Vec<Vec<f32>> = directions
-        .iter()
-        .map(|&(direction, _)| visible_areas(&triangles, scene.parts.len(), &frame(direction)))
+        .par_iter()
+        .map(|&(direction, _)| {
+            let camera = frame(direction);
+            let metres_per_view = camera.world_from_camera.position.distance(centre);
+            let mut areas = visible_areas(&triangles, scene.parts.len(), &camera);
+            areas
+                .iter_mut()
+                .for_each(|area| *area *= metres_per_view * metres_per_view);
+            areas
+        })
         .collect();
     let largest: Vec<f32> = (0..scene.parts.len())
         .map(|part| areas.iter().map(|a| a[part]).fold(0.0, f32::max))
@@ -103,7 +117,23 @@ fn visible_areas(triangles: &[Triangle], parts: usize, camera: &Camera) -> Vec<f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::primitives::sphere;
+    use crate::primitives::{capsule, sphere};
+
+    #[test]
+    fn long_things_are_seen_from_the_side() {
+        let rod = capsule(
+            "rod",
+            Vec3::new(-0.2, 0.0, 0.0),
+            Vec3::new(0.2, 0.0, 0.0),
+            0.02,
+            [1.0; 4],
+        );
+        let scene = Scene { parts: vec![rod] };
+        for camera in choose_views(&scene, |_| 1.0, Vec3::Y, 1.3) {
+            let along = camera.world_from_camera.transform_vector(Vec3::Z).x.abs();
+            assert!(along < 0.75, "looks along the rod: {along}");
+        }
+    }
 
     #[test]
     fn the_first_view_looks_at_what_the_wall_does_not_hide() {
