@@ -7,6 +7,7 @@ use crate::{
     normals::corner_normals,
     scene::{Finish, Part, linear_from_srgb},
     shading::smoothstep,
+    surface::curved_point,
 };
 
 /// The colours of a person's hands, sRGB.
@@ -32,7 +33,7 @@ impl Complexion {
         back: [138, 92, 68],
         palm: [186, 136, 108],
         flush: [122, 74, 54],
-        nail: [196, 150, 128],
+        nail: [184, 138, 118],
     };
 }
 
@@ -132,14 +133,14 @@ fn nails(who: &str, skin: &Skin, hand: &Part, complexion: Complexion) -> Option<
         let first = positions.len() as u32;
         for (i, place) in places.iter().enumerate() {
             let corners = hand.triangles[place.triangle].map(|v| v as usize);
-            let mix = |values: &[Vec3]| {
-                let [a, b, c] = corners.map(|v| values[v]);
-                a * (1.0 - place.share.x - place.share.y) + b * place.share.x + c * place.share.y
-            };
+            let shares = Vec3::new(1.0 - place.share.x - place.share.y, place.share.x, place.share.y);
+            let normals = corners.map(|v| posed_normals[v]);
+            let on_skin = curved_point(corners.map(|v| hand.positions[v]), normals, shares);
+            let normal = normals[0] * shares.x + normals[1] * shares.y + normals[2] * shares.z;
             let (row, column) = (i / NAIL_COLUMNS, i % NAIL_COLUMNS);
             let rim = row == 0 || row + 1 == NAIL_ROWS || column == 0 || column + 1 == NAIL_COLUMNS;
             let lift = if rim { -NAIL_LIFT } else { NAIL_LIFT };
-            positions.push(mix(&hand.positions) + mix(&posed_normals).normalize_or_zero() * lift);
+            positions.push(on_skin + normal.normalize_or_zero() * lift);
         }
         for row in 1..NAIL_ROWS {
             for column in 1..NAIL_COLUMNS {

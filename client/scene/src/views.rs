@@ -7,7 +7,7 @@ use crate::{
     camera::Camera,
     raster::{self, NOTHING},
     scene::{Finish, Part, Scene},
-    surface::{Triangle, project, triangles_of},
+    surface::{Triangle, flat_triangles_of, project},
 };
 
 /// Candidate directions: so many around the vertical …
@@ -26,7 +26,7 @@ pub const MIN_ANGLE_BETWEEN_VIEWS: f32 = 1.222;
 /// [`MIN_ANGLE_BETWEEN_VIEWS`] away from it. `importance` says how much it matters to see a part; what counts is the
 /// part's visible area compared with the largest that any candidate shows of it.
 pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, aspect: f32) -> [Camera; 2] {
-    let triangles = triangles_of(scene);
+    let triangles = flat_triangles_of(scene);
     let importances: Vec<f32> = scene.parts.iter().map(importance).collect();
     let frame = |direction: Vec3| {
         let framed = scene.parts.iter().zip(&importances).filter(|(_, i)| **i > 0.0);
@@ -54,9 +54,9 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
             let camera = frame(direction);
             let metres_per_view = camera.world_from_camera.position.distance(centre);
             let mut areas = visible_areas(&triangles, scene.parts.len(), &camera);
-            areas
-                .iter_mut()
-                .for_each(|area| *area *= metres_per_view * metres_per_view);
+            for area in &mut areas {
+                *area *= metres_per_view * metres_per_view;
+            }
             areas
         })
         .collect();
