@@ -1,6 +1,7 @@
 //! The commands of `grasp`, one file each, and what they share.
 
 mod completions;
+mod demo;
 mod failure;
 mod figures;
 mod find;
@@ -8,6 +9,7 @@ mod health;
 mod holdout;
 mod objects;
 mod output;
+mod picture;
 mod server;
 mod values;
 
@@ -43,6 +45,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::Arguments),
     Find(Box<find::Arguments>),
     #[command(subcommand)]
     Objects(objects::Command),
@@ -108,6 +111,7 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
 
 async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
     match command {
+        Command::Demo(arguments) => demo::run(arguments, output).await,
         Command::Find(arguments) => find::run(*arguments, output).await,
         Command::Objects(command) => objects::run(command, output).await,
         Command::Health(arguments) => health::run(arguments, output).await,

@@ -17,6 +17,7 @@ use super::{
     failure::Failure,
     holdout,
     output::{Output, write_json},
+    picture::{Model, Picture, write_file},
     server::ServerOptions,
     values::{BendRatiosName, HandName, StrategyName, parse_duration},
 };
@@ -96,9 +97,24 @@ pub(super) struct Arguments {
     /// Write the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
+    /// Write a picture of the grasp, if one is found.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
+    png: Option<PathBuf>,
+    /// Write the scene as a binary glTF file, if a grasp is found.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
+    glb: Option<PathBuf>,
+    /// The object's mesh (OBJ), for pictures of objects that are not built in.
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// Metres per unit of the mesh: 0.001 for millimetres.
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, requires = "mesh")]
+    mesh_unit_metres: f32,
     #[command(flatten)]
     server: ServerOptions,
 }
+
+/// Pixels of each of the two views of a picture.
+const VIEW: (u32, u32) = (900, 700);
 
 /// What `--json` writes.
 #[derive(Serialize)]
@@ -114,6 +130,8 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         write_json(&request)?;
         return Ok(Ending::Done);
     }
+    // Before the search, so that a missing mesh is told at once.
+    let picture = arguments.picture(&request)?;
     let client = arguments.server.connect().await?;
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
@@ -121,6 +139,12 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         answer,
         round_trip_seconds: start.elapsed().as_secs_f64(),
     };
+    if let Some(picture) = picture
+        && let Some(grasp) = &timed.answer.grasp
+    {
+        let picture = picture.with_grasp(Some(grasp.clone()));
+        draw(picture, arguments.png, arguments.glb).await?;
+    }
     output.write(&timed, |timed| {
         report::describe(&request, &timed.answer, timed.round_trip_seconds)
     })?;
@@ -131,6 +155,23 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 impl Arguments {
+    /// The holdout as it will be drawn, if that was asked for.
+    fn picture(&self, request: &FindRequest) -> Result<Option<Picture>, Failure> {
+        if self.png.is_none() && self.glb.is_none() {
+            return Ok(None);
+        }
+        let model = match &self.mesh {
+            Some(path) => Model::from_file(path, self.mesh_unit_metres)?,
+            None => Model::built_in(&request.object).ok_or_else(|| {
+                Failure::Usage(format!(
+                    "{} is not built in; to draw it, name its mesh with --mesh",
+                    request.object
+                ))
+            })?,
+        };
+        Picture::new(model, request.clone()).map(Some)
+    }
+
     /// The request of the holdout or the file, with the options laid over it.
     fn to_request(&self) -> Result<FindRequest, Failure> {
         let mut request = match (&self.holdout, &self.request) {
@@ -156,6 +197,21 @@ impl Arguments {
         receiver.rig = self.receiving_rig.clone().or(receiver.rig.take());
         Ok(request)
     }
+}
+
+/// Writes what was asked for, beside the runtime, so that an interrupt is heard meanwhile.
+async fn draw(picture: Picture, png: Option<PathBuf>, glb: Option<PathBuf>) -> Result<(), Failure> {
+    tokio::task::spawn_blocking(move || {
+        if let Some(path) = png {
+            write_file(&path, &picture.draw(VIEW.0, VIEW.1)?.to_png())?;
+        }
+        if let Some(path) = glb {
+            write_file(&path, &picture.to_glb()?)?;
+        }
+        Ok(())
+    })
+    .await
+    .map_err(|error| Failure::other("drawing broke down", error))?
 }
 
 /// Reads a request from a file or, for `-`, from standard input.

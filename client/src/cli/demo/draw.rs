@@ -1,0 +1,94 @@
+//! The pictures and scenes of the demo.
+
+use std::path::{Path, PathBuf};
+
+use grasp_client::Outcome;
+use grasp_scene::{Image, contact_sheet};
+
+use super::{Asked, progress::Progress};
+use crate::cli::{
+    failure::Failure,
+    picture::{Model, Picture, write_file},
+};
+
+/// Pixels of each of the two views of a picture.
+const VIEW: (u32, u32) = (900, 700);
+
+/// Pixels of each of the two views of a picture in the overview.
+const SMALL_VIEW: (u32, u32) = (400, 330);
+
+/// Pictures in a row of the overview: as many as the thesis has holdouts for an object, so that each object has a row.
+const COLUMNS: usize = 5;
+
+/// Where everything was written.
+#[derive(Debug)]
+pub(super) struct Drawn {
+    pub(super) pictures: Vec<PathBuf>,
+    pub(super) scenes: Vec<PathBuf>,
+    pub(super) overview: Option<PathBuf>,
+}
+
+/// Writes a picture and a scene of each answer, and one picture with all of them.
+pub(super) async fn draw_all(asked: &[Asked], folder: &Path, progress: &Progress) -> Result<Drawn, Failure> {
+    let mut drawn = Drawn {
+        pictures: Vec::new(),
+        scenes: Vec::new(),
+        overview: None,
+    };
+    let mut small_pictures = Vec::new();
+    for asked in asked {
+        let name = &asked.holdout.name;
+        progress.step(&format!("drawing {name}"));
+        let png = folder.join(format!("{name}.png"));
+        let glb = folder.join(format!("{name}.glb"));
+        let picture = picture_of(asked)?;
+        let (png_path, glb_path) = (png.clone(), glb.clone());
+        let small = blocking(move || {
+            write_file(&png_path, &picture.draw(VIEW.0, VIEW.1)?.to_png())?;
+            write_file(&glb_path, &picture.to_glb()?)?;
+            picture.draw(SMALL_VIEW.0, SMALL_VIEW.1)
+        })
+        .await?;
+        small_pictures.push((small, caption(asked)));
+        drawn.pictures.push(png);
+        drawn.scenes.push(glb);
+    }
+    progress.step("drawing the overview");
+    drawn.overview = write_overview(small_pictures, folder).await?;
+    Ok(drawn)
+}
+
+async fn write_overview(pictures: Vec<(Image, String)>, folder: &Path) -> Result<Option<PathBuf>, Failure> {
+    let path = folder.join("overview.png");
+    blocking(move || {
+        let Some(sheet) = contact_sheet(&pictures, COLUMNS) else {
+            return Ok(None);
+        };
+        write_file(&path, &sheet.to_png())?;
+        Ok(Some(path))
+    })
+    .await
+}
+
+fn picture_of(asked: &Asked) -> Result<Picture, Failure> {
+    let object = &asked.request.object;
+    let model = Model::built_in(object)
+        .ok_or_else(|| Failure::Usage(format!("{object} is not built in, so it cannot be drawn")))?;
+    Ok(Picture::new(model, asked.request.clone())?.with_grasp(asked.answer.grasp.clone()))
+}
+
+fn caption(asked: &Asked) -> String {
+    match asked.answer.outcome {
+        Outcome::Found => asked.holdout.name.clone(),
+        Outcome::BudgetExhausted => format!("{}: no grasp", asked.holdout.name),
+    }
+}
+
+/// Runs what takes long beside the runtime, so that an interrupt is heard meanwhile.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
+) -> Result<T, Failure> {
+    tokio::task::spawn_blocking(work)
+        .await
+        .map_err(|error| Failure::other("drawing broke down", error))?
+}

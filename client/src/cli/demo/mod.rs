@@ -1,0 +1,104 @@
+//! `grasp demo`
+
+mod draw;
+mod progress;
+mod report;
+mod server;
+
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
+use grasp_client::{FindAnswer, FindRequest, GraspClient, Handedness, Outcome, ReceivingHand};
+
+use super::{
+    EXIT_CODES, Ending,
+    failure::Failure,
+    holdout,
+    output::Output,
+    values::{StrategyName, parse_duration},
+};
+use progress::Progress;
+
+const ABOUT: &str = r#"Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
+
+The server listens on a free port of the loopback interface and is asked over real gRPC. A table tells how each search
+went; the output folder gets a picture (PNG) and a scene (GLB) of each holdout, and overview.png with all of them.
+
+With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "outcome", "grasp",
+"report", "round_trip_seconds"}]}, the last four as `grasp find --json` writes them."#;
+
+/// Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
+#[derive(Args, Debug)]
+#[command(long_about = ABOUT, after_help = EXIT_CODES)]
+pub(super) struct Arguments {
+    /// The folder for pictures and scenes.
+    #[arg(long, value_name = "FOLDER", default_value = "target/demo")]
+    out: PathBuf,
+    /// Start of every random stream. Each search gives the valid attempt of the lowest index, so the same seed shows the
+    /// same grasps.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// How to search.
+    #[arg(long, ignore_case = true, default_value = "F")]
+    strategy: StrategyName,
+    /// How long each search may take.
+    #[arg(long, value_name = "DURATION", default_value = "10s", value_parser = parse_duration)]
+    budget: Duration,
+}
+
+/// What became of one holdout.
+#[derive(Clone, Debug)]
+struct Asked {
+    holdout: &'static BuiltInHoldout,
+    request: FindRequest,
+    answer: FindAnswer,
+    round_trip: Duration,
+}
+
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let server = server::start(arguments.budget).await?;
+    let progress = Progress::new(2 * holdouts().len() as u64 + 1);
+    let asked = ask_all(&arguments, &server.client, &progress).await?;
+    server.stop().await?;
+    let drawn = draw::draw_all(&asked, &arguments.out, &progress).await?;
+    progress.finish();
+    report::write(&arguments.out, &asked, &drawn, output)?;
+    let all_found = asked.iter().all(|asked| asked.answer.outcome == Outcome::Found);
+    Ok(if all_found { Ending::Done } else { Ending::NoGrasp })
+}
+
+/// Asks for one grasp after the other, so that each search has the machine for itself.
+async fn ask_all(
+    arguments: &Arguments,
+    client: &GraspClient,
+    progress: &Progress,
+) -> Result<Vec<Asked>, Failure> {
+    let mut all = Vec::new();
+    for holdout in holdouts() {
+        progress.step(&format!("asking for {}", holdout.name));
+        let request = FindRequest {
+            receiving_hand: ReceivingHand {
+                rig: Some("thesis".to_owned()),
+                handedness: Some(Handedness::Right),
+            },
+            budget: Some(arguments.budget),
+            strategy: Some(arguments.strategy.into()),
+            seed: Some(arguments.seed),
+            reproducible: true,
+            ..holdout::request_for(holdout)
+        };
+        let start = Instant::now();
+        let answer = client.find_grasp(&request).await?;
+        all.push(Asked {
+            holdout,
+            request,
+            answer,
+            round_trip: start.elapsed(),
+        });
+    }
+    Ok(all)
+}
