@@ -12,8 +12,12 @@ use glam::Vec3;
 use grasp_synthesis::{
     geometry::Segment,
     hand::{
-        DigitAngles, HandPose, Handedness, description::RigDescription, joints::HandJoints, kinematics,
-        rig::Rig, skin::Skin,
+        DigitAngles, HandPose, Handedness,
+        description::RigDescription,
+        joints::{HandJoints, index},
+        kinematics,
+        rig::Rig,
+        skin::Skin,
     },
     pose::Pose,
 };
@@ -102,6 +106,10 @@ fn right_hand(kind: RigKind) -> (Rig, Skin) {
     }
     let fine = polygonise::polygonise(|p| field.value(p), low, high, GRID_MM * mm);
     let mesh = remesh::remesh(&fine, &field, |p| mm * edge_mm(&bind, p, mm));
+    for joint in index::FIRST_OF_DIGIT.into_iter().chain([index::WRIST]) {
+        rig.joint_radii[joint] = nearest(&mesh.positions, bind.joints[joint].pose.position);
+    }
+    let bind = HandJoints::of_pose(&rig, &pose);
     let (joint_indices, weights) = weights::skin_weights(&rig, &bind, &mesh.positions)
         .into_iter()
         .unzip();
@@ -113,6 +121,15 @@ fn right_hand(kind: RigKind) -> (Rig, Skin) {
         bind,
     };
     (rig, skin)
+}
+
+/// Distance from a joint inside the hand to the skin in metres, in tenths of a millimetre.
+fn nearest(skin: &[Vec3], joint: Vec3) -> f32 {
+    let distance = skin
+        .iter()
+        .map(|p| p.distance(joint))
+        .fold(f32::INFINITY, f32::min);
+    (1e4 * distance).round() / 1e4
 }
 
 /// The wanted edge length at a point: short on the digits, longer on the palm and longest on the forearm.
@@ -141,13 +158,20 @@ fn palm_segments(rig: &Rig, field: &HandField, mm: f32) -> [Segment; 10] {
         // From the carpus' near row, 20 mm behind the metacarpals.
         lines[finger + 1] = (start - (end - start).normalize_or(Vec3::Y) * 20.0 * mm, end);
     }
-    let under = |point: Vec3, direction: Vec3| {
-        point + direction * (field.distance_to_skin(point, direction) - COLLISION_DEPTH_MM * mm)
-    };
+    let depth = COLLISION_DEPTH_MM * mm;
     std::array::from_fn(|i| {
         let direction = if i < 5 { Vec3::Z } else { Vec3::NEG_Z };
-        let (start, end) = lines[i % 5];
-        Segment::new(under(start, direction), under(end, direction))
+        let over = |point: Vec3| field.distance_to_skin(point, direction) - depth;
+        let (mut start, end) = lines[i % 5];
+        if i == 1 {
+            // The ball of the thumb covers the palmar side of the index finger's metacarpal up to here.
+            start = rig.finger_metacarpals[0].lerp(end, 0.45);
+        }
+        let (start, end) = (start + direction * over(start), end + direction * over(end));
+        // A straight line under a round skin: half of what it lies too deep in the middle, at most 2 mm, is taken off
+        // its whole length.
+        let lift = (0.5 * over(start.midpoint(end))).clamp(0.0, 2.0 * mm);
+        Segment::new(start + direction * lift, end + direction * lift)
     })
 }
 

@@ -96,11 +96,6 @@ pub(super) fn tip_radius_mm(digit: usize) -> f32 {
 
 /// Distance from the palm joint to the palm's skin in millimetres: half of the palm's thickness of about 28 mm.
 pub(super) const PALM_RADIUS_MM: f32 = 14.0;
-/// Distance from the wrist joint to the skin in front in millimetres.
-pub(super) const WRIST_RADIUS_MM: f32 = 19.0;
-/// Distance from the starts of the finger metacarpals to the skin in front in millimetres.
-pub(super) const METACARPAL_RADIUS_MM: [f32; 4] = [17.0, 16.0, 16.0, 15.0];
-
 /// Limits of one digit in degrees: base yaw, base pitch, second pitch, third pitch.
 pub(super) type LimitsDegrees = [[f32; 2]; 4];
 

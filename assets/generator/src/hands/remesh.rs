@@ -167,11 +167,10 @@ impl<'a> Work<'a> {
             if c == d || nc.binary_search(&d).is_ok() {
                 continue;
             }
-            let excess = |count: usize, change: isize| (count as isize + change - 6).unsigned_abs();
-            let before =
-                excess(na.len(), 0) + excess(nb.len(), 0) + excess(nc.len(), 0) + excess(nd.len(), 0);
+            let excess = |neighbours: usize| neighbours.abs_diff(6);
+            let before = excess(na.len()) + excess(nb.len()) + excess(nc.len()) + excess(nd.len());
             let after =
-                excess(na.len(), -1) + excess(nb.len(), -1) + excess(nc.len(), 1) + excess(nd.len(), 1);
+                excess(na.len() - 1) + excess(nb.len() - 1) + excess(nc.len() + 1) + excess(nd.len() + 1);
             let normal = |[p, q, r]: [u32; 3]| {
                 (self.at(q) - self.at(p))
                     .cross(self.at(r) - self.at(p))

@@ -88,7 +88,7 @@ fn thumb_orientation() -> Quat {
     Quat::from_mat3(&Mat3::from_cols(along.cross(pad), along, pad)).normalize()
 }
 
-/// The right-handed rig. Its palm segments lie on the metacarpals' axes until the skin is known.
+/// The right-handed rig. Its palm segments and the radii of wrist and metacarpals are missing until the skin is known.
 pub(super) fn right_rig(kind: RigKind) -> Rig {
     let metres = kind.metres_per_mm();
     let digits = std::array::from_fn(|digit| {
@@ -115,18 +115,12 @@ pub(super) fn right_rig(kind: RigKind) -> Rig {
     let finger_metacarpals = anatomy::METACARPAL_START_MM.map(|mm| metres * Vec3::from(mm));
     let mut joint_radii = [0.0; JOINT_COUNT];
     joint_radii[index::PALM] = anatomy::PALM_RADIUS_MM * metres;
-    joint_radii[index::WRIST] = anatomy::WRIST_RADIUS_MM * metres;
     for digit in 0..5 {
-        let mut next = index::FIRST_OF_DIGIT[digit];
-        if digit > 0 {
-            joint_radii[next] = anatomy::METACARPAL_RADIUS_MM[digit - 1] * metres;
-            next += 1;
+        let tip = index::TIP_OF_DIGIT[digit];
+        for (i, diameter) in anatomy::joint_diameters_mm(digit).into_iter().enumerate() {
+            joint_radii[tip - 3 + i] = 0.5 * diameter * metres;
         }
-        for diameter in anatomy::joint_diameters_mm(digit) {
-            joint_radii[next] = 0.5 * diameter * metres;
-            next += 1;
-        }
-        joint_radii[next] = anatomy::tip_radius_mm(digit) * metres;
+        joint_radii[tip] = anatomy::tip_radius_mm(digit) * metres;
     }
     let middle_start = finger_metacarpals[1];
     let middle_knuckle = metres * knuckle_mm(1);

@@ -38,12 +38,7 @@ fn weights_at(rig: &Rig, bind: &HandJoints, p: Vec3) -> [f32; JOINT_COUNT] {
     } else {
         0.0
     };
-    let near_web = smooth_step(
-        24.0 * scale,
-        16.0 * scale,
-        past_joint(bind, bent_joints(digit)[0], p),
-    );
-    let share = web * near_web;
+    let share = web * before_web_end(bind, digit, p).min(before_web_end(bind, next_digit, p));
     let digit_share = (1.0 - share) * root_share(bind, digit, over, scale, p);
     let next_share = share * root_share(bind, next_digit, next_over, scale, p);
     for weight in &mut weights {
@@ -52,6 +47,16 @@ fn weights_at(rig: &Rig, bind: &HandJoints, p: Vec3) -> [f32; JOINT_COUNT] {
     add_digit(&mut weights, bind, digit, digit_share, p);
     add_digit(&mut weights, bind, next_digit, next_share, p);
     weights
+}
+
+/// 1 up to a third of a digit's first phalanx, where its webs are, 0 beyond its middle.
+fn before_web_end(bind: &HandJoints, digit: usize, p: Vec3) -> f32 {
+    let [first, second] = [0, 1].map(|i| bind.joints[bent_joints(digit)[i]].pose.position);
+    smooth_step(
+        0.56,
+        0.36,
+        past_joint(bind, bent_joints(digit)[0], p) / first.distance(second),
+    )
 }
 
 /// How far a point belongs to a digit and not to the palm: a blend across the digit's root. Skin far from the

@@ -1,6 +1,6 @@
 //! The hand's skin: a closed mesh that follows the joints by linear blend skinning.
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Quat, Vec3};
 
 use super::joints::{HandJoints, JOINT_COUNT, index};
 
@@ -19,15 +19,25 @@ pub struct Skin {
     pub bind: HandJoints,
 }
 
+/// The largest change of a digit's thickness that is followed, as a factor beside the change of the hand's size.
+/// Trackers differ in what they call a joint's radius; a hand twice as thick as long is their mistake.
+const THICKNESS_CHANGE: f32 = 1.35;
+
+/// Lengths below this are no lengths, in metres.
+const SHORTEST: f32 = 1e-4;
+
 impl Skin {
     /// The vertex positions when the joints are at `joints`, in their frame. A hand whose bones are longer or thicker
     /// than the bind pose's stretches the skin along and across each bone.
     pub fn posed(&self, joints: &HandJoints) -> Vec<Vec3> {
-        let matrices: [Affine3A; JOINT_COUNT] = std::array::from_fn(|i| {
-            let scale = joint_scale(&self.bind, joints, i);
-            joints.joints[i].pose.to_affine()
+        let size = ratio(hand_length(joints), hand_length(&self.bind));
+        let matrices: [Affine3A; JOINT_COUNT] = std::array::from_fn(|joint| {
+            let target = joints.joints[joint].pose;
+            let bind = self.bind.joints[joint].pose;
+            let scale = joint_scale(&self.bind, joints, joint, size);
+            Affine3A::from_rotation_translation(aimed(joints, joint), target.position)
                 * Affine3A::from_scale(scale)
-                * self.bind.joints[i].pose.inverse().to_affine()
+                * Affine3A::from_rotation_translation(aimed(&self.bind, joint), bind.position).inverse()
         });
         self.positions
             .iter()
@@ -45,36 +55,55 @@ impl Skin {
     }
 }
 
-/// How much a joint's part of the skin grows across (x, y) and along (z) its bone from the bind pose to `target`.
-fn joint_scale(bind: &HandJoints, target: &HandJoints, joint: usize) -> Vec3 {
-    let length = |hand: &HandJoints| {
-        let (from, to) = bone_of(joint);
-        hand.joints[from]
-            .pose
-            .position
-            .distance(hand.joints[to].pose.position)
-    };
-    let ratio = |target: f32, bind: f32| {
-        if bind > 1e-4 && target > 1e-4 {
-            target / bind
-        } else {
-            1.0
-        }
-    };
-    let along = ratio(length(target), length(bind));
+/// How much a joint's part of the skin grows across (x, y) and along (z) its bone from the bind pose to `target`, a
+/// hand of `size` times the length.
+fn joint_scale(bind: &HandJoints, target: &HandJoints, joint: usize, size: f32) -> Vec3 {
+    let along = ratio(bone(target, joint).length(), bone(bind, joint).length());
     if joint == index::WRIST || joint == index::PALM {
+        return Vec3::splat(size);
+    }
+    if index::FIRST_OF_DIGIT.contains(&joint) {
         // The palm is one piece: it grows with the hand, not with the tracked radius of one joint.
-        return Vec3::splat(along);
+        return Vec3::new(size, size, along);
     }
     let across = ratio(target.joints[joint].radius, bind.joints[joint].radius);
+    let across = across.clamp(size / THICKNESS_CHANGE, size * THICKNESS_CHANGE);
     Vec3::new(across, across, along)
 }
 
-/// The joints between which a joint's bone runs; tips share the distal bone.
-fn bone_of(joint: usize) -> (usize, usize) {
-    match joint {
+/// A joint's orientation, turned as little as possible so that its -Z axis runs along its bone. Trackers report
+/// metacarpals up to 15 degrees off their bones, which would tear the fingers off the palm.
+fn aimed(hand: &HandJoints, joint: usize) -> Quat {
+    let orientation = hand.joints[joint].pose.orientation;
+    let bone = bone(hand, joint);
+    let on_its_own = joint == index::WRIST || joint == index::PALM || index::TIP_OF_DIGIT.contains(&joint);
+    if on_its_own || bone.length() < SHORTEST {
+        return orientation;
+    }
+    let forward = orientation * Vec3::NEG_Z;
+    Quat::from_rotation_arc(forward, bone.normalize_or(forward)) * orientation
+}
+
+/// From wrist to the knuckle of the middle finger in metres.
+fn hand_length(hand: &HandJoints) -> f32 {
+    bone(hand, index::WRIST).length()
+}
+
+/// The bone that a joint carries, in metres. Tips share the distal bone, wrist and palm the way to the middle knuckle.
+fn bone(hand: &HandJoints, joint: usize) -> Vec3 {
+    let (from, to) = match joint {
         index::PALM | index::WRIST => (index::WRIST, index::FIRST_OF_DIGIT[2] + 1),
         tip if index::TIP_OF_DIGIT.contains(&tip) => (tip - 1, tip),
         other => (other, other + 1),
+    };
+    hand.joints[to].pose.position - hand.joints[from].pose.position
+}
+
+/// `target` per `bind`, one where either is nothing.
+fn ratio(target: f32, bind: f32) -> f32 {
+    if bind > SHORTEST && target > SHORTEST {
+        target / bind
+    } else {
+        1.0
     }
 }
