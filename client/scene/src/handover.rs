@@ -128,6 +128,7 @@ impl<'a> HandoverScene<'a> {
     pub fn render(&self, options: RenderOptions) -> Image {
         let scene = self.to_scene();
         let aspect = options.width.max(1) as f32 / options.height.max(1) as f32;
+        let importance = |part: &Part| importance(part, self.contacts.len());
         let [first, second] = choose_views(&scene, importance, options.up, aspect);
         side_by_side(
             &render(&scene, &first, options),
@@ -232,12 +233,14 @@ impl ContactMark {
     }
 }
 
-/// How much it matters to see a part: the contacts together as much as the object or the receiving hand.
-fn importance(part: &Part) -> f32 {
+/// How much it matters to see a part: the object, which hands mostly hide, and all contacts together more than the
+/// hands, of which there is always something to see.
+fn importance(part: &Part, contacts: usize) -> f32 {
     match part.name.as_str() {
-        "object" | "receiver_hand" => 1.0,
+        "object" => 2.0,
+        "receiver_hand" => 1.0,
         "giver_hand" => 0.6,
-        name if name.starts_with("contact_") => 0.25,
+        name if name.starts_with("contact_") => 2.0 / contacts.max(1) as f32,
         _ => 0.0,
     }
 }

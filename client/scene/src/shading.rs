@@ -53,19 +53,22 @@ struct Response {
     exponent: f32,
     /// Strength of the mirrored studio, 0 to 1.
     mirror: f32,
+    /// Reflectance at grazing incidence: rough surfaces stay far below the 1 of a mirror.
+    grazing: f32,
 }
 
 fn response(finish: Finish) -> Response {
-    let (reflectance, exponent, mirror) = match finish {
-        Finish::Satin => (0.045, 48.0, 0.55),
-        Finish::Metal => (0.9, 60.0, 1.0),
-        Finish::Skin => (0.028, 18.0, 0.30),
-        Finish::Cloth | Finish::Marker => (0.0, 1.0, 0.0),
+    let (reflectance, exponent, mirror, grazing) = match finish {
+        Finish::Satin => (0.045, 48.0, 0.55, 0.6),
+        Finish::Metal => (0.9, 60.0, 1.0, 1.0),
+        Finish::Skin => (0.028, 18.0, 0.30, 0.3),
+        Finish::Cloth | Finish::Marker => (0.0, 1.0, 0.0, 0.0),
     };
     Response {
         reflectance,
         exponent,
         mirror,
+        grazing,
     }
 }
 
@@ -105,6 +108,7 @@ impl Studio {
             reflectance,
             exponent,
             mirror,
+            grazing,
         } = response(point.finish);
         let metal = point.finish == Finish::Metal;
         let diffuse_colour = if metal { point.colour * 0.15 } else { point.colour };
@@ -129,12 +133,12 @@ impl Studio {
                 let half = (light.direction + point.to_camera).normalize_or(normal);
                 // Normalised Blinn-Phong with Schlick's Fresnel term.
                 let lobe = (exponent + 8.0) / 8.0 * normal.dot(half).max(0.0).powf(exponent);
-                specular += strength * fresnel(f0, half.dot(point.to_camera)) * lobe * cosine;
+                specular += strength * fresnel(f0, grazing, half.dot(point.to_camera)) * lobe * cosine;
             }
         }
         diffuse += self.sky(normal) * occlusion_tint(point.finish, openness);
         let bounce = (normal * (2.0 * facing) - point.to_camera).normalize_or(normal);
-        let mirrored = self.mirrored(bounce) * fresnel(f0, facing) * mirror * (0.2 + 0.8 * openness);
+        let mirrored = self.mirrored(bounce) * fresnel(f0, grazing, facing) * mirror * (0.2 + 0.8 * openness);
         let sheen = if point.finish == Finish::Cloth {
             point.colour * (0.35 * (1.0 - facing).powi(3) * openness)
         } else {
@@ -189,8 +193,9 @@ fn occlusion_tint(finish: Finish, openness: f32) -> Vec3 {
     }
 }
 
-fn fresnel(f0: Vec3, cosine: f32) -> Vec3 {
-    f0 + (Vec3::ONE - f0).max(Vec3::ZERO) * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
+/// Schlick's approximation between the reflectances at normal and at grazing incidence.
+fn fresnel(f0: Vec3, grazing: f32, cosine: f32) -> Vec3 {
+    f0 + (Vec3::splat(grazing) - f0).max(Vec3::ZERO) * (1.0 - cosine.clamp(0.0, 1.0)).powi(5)
 }
 
 /// 0 below `from`, 1 beyond `to`, smooth between (`from` may be the larger one).
