@@ -30,7 +30,7 @@ use crate::AssetFile;
 const GRID_MM: f32 = 1.7;
 
 /// Edge lengths of the finished skin in millimetres of the figures: on the digits, on the palm, on the forearm.
-const EDGE_MM: [f32; 3] = [3.7, 6.0, 8.0];
+const EDGE_MM: [f32; 3] = [3.7, 6.0, 6.5];
 
 /// How deep the palm's collision segments lie under the skin in millimetres (thesis 4.5: "about half a centimetre").
 const COLLISION_DEPTH_MM: f32 = 5.0;

@@ -293,15 +293,17 @@ fn web_shapes(rig: &Rig, frames: &kinematics::HandFrames, mm: f32) -> Vec<Shape>
     for finger in 1..4 {
         let [a, b] = [finger, finger + 1].map(|digit| frames.digits[digit].links[0]);
         let end = |frame: Pose, digit: usize| {
-            frame.transform_point(Vec3::new(0.0, 0.25 * rig.digits[digit].lengths[0], 2.0 * mm))
+            frame.transform_point(Vec3::new(0.0, 0.25 * rig.digits[digit].lengths[0], 2.5 * mm))
         };
         let (c, d) = (end(a, finger), end(b, finger + 1));
+        // Lower than the knuckles' backs, which stand out between them.
+        let [a, b] = [a, b].map(|frame| frame.transform_point(mm * Vec3::new(0.0, 0.0, 2.5)));
         shapes.push(Shape::Sheet {
-            corners: [a.position, b.position, c],
+            corners: [a, b, c],
             radius,
         });
         shapes.push(Shape::Sheet {
-            corners: [b.position, d, c],
+            corners: [b, d, c],
             radius,
         });
     }

@@ -77,7 +77,9 @@ pub struct Rig {
     pub finger_metacarpals: [Vec3; 4],
     /// The ten collision segments under the palm's skin (thesis 4.5, Figure 4.4).
     pub palm_segments: [Segment; 10],
-    /// Distance from joint to skin for the 26 `OpenXR` joints in their order, in metres.
+    /// Distance from joint to skin for the 26 `OpenXR` joints in their order, in metres. The tips lie on the skin
+    /// themselves, as in trackers' data; their radius is that of the fingertip's rounding, so that a capsule around
+    /// the last phalanx must end one radius before the tip.
     pub joint_radii: [f32; 26],
 }
 
