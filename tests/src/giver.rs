@@ -46,7 +46,11 @@ fn balls(joints: &HandJoints) -> Vec<Ball> {
             let (centre, radius) = at(joint);
             // A finger's metacarpal belongs to the palm.
             let owner = (digit == 0 || joint > first).then_some(digit);
-            balls.push(Ball { centre, radius, digit: owner });
+            balls.push(Ball {
+                centre,
+                radius,
+                digit: owner,
+            });
             if joint < index::TIP_OF_DIGIT[digit] {
                 let (next, next_radius) = at(joint + 1);
                 balls.push(Ball {
@@ -67,8 +71,15 @@ fn signed_distance(object: &GraspObject, point: Vec3) -> f32 {
     if outside_box > FAR {
         return outside_box;
     }
-    let distance = object.surface.closest_point_within(point, FAR).map_or(FAR, |closest| closest.distance);
-    if object.surface.contains(point) { -distance } else { distance }
+    let distance = object
+        .surface
+        .closest_point_within(point, FAR)
+        .map_or(FAR, |closest| closest.distance);
+    if object.surface.contains(point) {
+        -distance
+    } else {
+        distance
+    }
 }
 
 struct Judged {
@@ -82,8 +93,7 @@ fn judge(object: &GraspObject, balls: &[Ball], object_from_wrist: Pose) -> Judge
     let mut sunk = 0.0;
     let mut penetration: f32 = 0.0;
     for ball in balls {
-        let gap =
-            signed_distance(object, object_from_wrist.transform_point(ball.centre)) - ball.radius;
+        let gap = signed_distance(object, object_from_wrist.transform_point(ball.centre)) - ball.radius;
         let slot = ball.digit.map_or(&mut palm_gap, |digit| &mut gap_of_digit[digit]);
         *slot = slot.min(gap);
         if gap < 0.0 {
@@ -100,7 +110,11 @@ fn judge(object: &GraspObject, balls: &[Ball], object_from_wrist: Pose) -> Judge
     Judged {
         // 1 mm of gap weighs as much as 1 mm of depth of ten spheres.
         cost: reach + 100.0 * sunk,
-        placement: GiverPlacement { object_from_wrist, penetration, touching_digits },
+        placement: GiverPlacement {
+            object_from_wrist,
+            penetration,
+            touching_digits,
+        },
     }
 }
 
@@ -130,9 +144,16 @@ pub fn place_giver(object: &GraspObject, joints: &HandJoints, seed: u64) -> Give
             let mut unit = || random.random::<f32>();
             let along = end * (0.3 + 0.5 * unit()) * half.dot(long_axis);
             let across = (Vec3::new(unit(), unit(), unit()) - 0.5) * half * (Vec3::ONE - long_axis);
-            let target = object.bounding_box.object_from_box.transform_point(along * long_axis + across);
+            let target = object
+                .bounding_box
+                .object_from_box
+                .transform_point(along * long_axis + across);
             let orientation = random_rotation(&mut random);
-            judge(object, &balls, Pose::new(target - orientation * grip, orientation))
+            judge(
+                object,
+                &balls,
+                Pose::new(target - orientation * grip, orientation),
+            )
         })
         .collect();
     starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -156,7 +177,8 @@ fn refine(object: &GraspObject, balls: &[Ball], start: Judged) -> Judged {
             for sign in [-1.0, 1.0] {
                 let moved = Pose::new(from.position + sign * shift * axis, from.orientation);
                 // Turned about the middle of the hand's balls, not about the wrist.
-                let pivot = from.transform_point(balls.iter().map(|b| b.centre).sum::<Vec3>() / balls.len() as f32);
+                let pivot =
+                    from.transform_point(balls.iter().map(|b| b.centre).sum::<Vec3>() / balls.len() as f32);
                 let rotation = Quat::from_axis_angle(axis, sign * turn);
                 let turned = Pose::new(
                     pivot + rotation * (from.position - pivot),
@@ -182,7 +204,11 @@ fn refine(object: &GraspObject, balls: &[Ball], start: Judged) -> Judged {
 /// Uniform over all rotations (Shoemake 1992, "Uniform random rotations").
 fn random_rotation(random: &mut Xoshiro256PlusPlus) -> Quat {
     use std::f32::consts::TAU;
-    let (u, v, w) = (random.random::<f32>(), TAU * random.random::<f32>(), TAU * random.random::<f32>());
+    let (u, v, w) = (
+        random.random::<f32>(),
+        TAU * random.random::<f32>(),
+        TAU * random.random::<f32>(),
+    );
     let (a, b) = ((1.0 - u).sqrt(), u.sqrt());
     Quat::from_xyzw(a * v.sin(), a * v.cos(), b * w.sin(), b * w.cos())
 }

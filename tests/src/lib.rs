@@ -1,1 +1,8 @@
-//! To come.
+//! What the integration tests, experiments and benches share: a server inside the process, recorded hands and the
+//! placing of givers.
+
+pub mod giver;
+mod harness;
+pub mod recorded;
+
+pub use harness::{StoppingServer, TestServer};

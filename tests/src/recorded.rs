@@ -68,7 +68,10 @@ struct JointEntry {
 pub fn read_poses(file: &Path, radii: &[f32; JOINT_COUNT]) -> Vec<RecordedPose> {
     let text = std::fs::read_to_string(file).expect("the pose file can be read");
     let file: PoseFile = serde_json::from_str(&text).expect("the pose file has the documented form");
-    file.poses.iter().map(|entry| recorded_pose(entry, radii)).collect()
+    file.poses
+        .iter()
+        .map(|entry| recorded_pose(entry, radii))
+        .collect()
 }
 
 fn recorded_pose(entry: &PoseEntry, radii: &[f32; JOINT_COUNT]) -> RecordedPose {

@@ -14,7 +14,7 @@ pub mod image;
 mod normals;
 mod occlusion;
 pub mod primitives;
-mod raster;
+pub mod raster;
 pub mod render;
 pub mod scene;
 mod shading;

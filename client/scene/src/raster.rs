@@ -4,7 +4,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 /// No triangle is seen at a sample.
-pub(crate) const NOTHING: u32 = u32::MAX;
+pub const NOTHING: u32 = u32::MAX;
 
 /// Rows of samples that one task draws. Fewer balance better over threads, more repeat less work at the borders.
 const BAND_ROWS: usize = 48;
@@ -18,30 +18,30 @@ const COORDINATE_LIMIT: f32 = 1.0e6;
 
 /// A triangle on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct ScreenTriangle {
+pub struct ScreenTriangle {
     /// x to the right and y down in samples; z is larger for what is nearer and linear over the screen (such as the
     /// reciprocal of the distance for a perspective camera).
-    pub(crate) corners: [Vec3; 3],
+    pub corners: [Vec3; 3],
     /// What the samples that it covers are marked with; not [`NOTHING`].
-    pub(crate) id: u32,
+    pub id: u32,
 }
 
 /// What is seen at every sample, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Coverage {
+pub struct Coverage {
     /// Samples in a row.
-    pub(crate) width: usize,
+    pub width: usize,
     /// Rows.
-    pub(crate) height: usize,
+    pub height: usize,
     /// The id of the nearest triangle, or [`NOTHING`].
-    pub(crate) ids: Vec<u32>,
+    pub ids: Vec<u32>,
     /// Its z at the sample; negative infinity where nothing is.
-    pub(crate) depths: Vec<f32>,
+    pub depths: Vec<f32>,
 }
 
 /// Draws triangles, seen from either side. A sample lies in the middle of its cell. Of two triangles at the same depth
 /// the earlier one is seen. `admits(id, x, y)` can make triangles transparent at some samples.
-pub(crate) fn rasterise(
+pub fn rasterise(
     width: usize,
     height: usize,
     triangles: &[ScreenTriangle],

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Largest edge of an object's bounding box, in metres; above it, the unit is wrong.
-const LARGEST_EXTENT: f32 = 100.0;
+const LARGEST_EXTENT: f32 = 10.0;
 
 /// Smallest edge of an object along its longest axis, in metres; below it, the unit is wrong.
 const SMALLEST_EXTENT: f32 = 1e-3;

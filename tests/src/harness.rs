@@ -1,0 +1,129 @@
+//! A server inside the test, on a port of its own.
+
+use std::net::{Ipv6Addr, SocketAddr};
+
+use grasp_client::GraspClient;
+use grasp_proto::v1::{grasp_service_client::GraspServiceClient, object_service_client::ObjectServiceClient};
+use grasp_server::{Config, Gauges, ServeError, Server};
+use tokio::{net::TcpListener, task::JoinHandle};
+use tokio_util::sync::{CancellationToken, DropGuard};
+use tonic::transport::{Channel, Endpoint};
+
+/// Workers of a test's server: enough to race, few enough for tests that run side by side.
+const WORKERS: usize = 2;
+
+/// A running server. Dropped, it is told to stop; [`TestServer::stop`] waits until it has.
+#[derive(Debug)]
+pub struct TestServer {
+    address: SocketAddr,
+    gauges: Gauges,
+    stop: DropGuard,
+    serving: JoinHandle<Result<(), ServeError>>,
+}
+
+impl TestServer {
+    /// Starts a server with the default configuration and two workers.
+    pub async fn start() -> Self {
+        Self::start_with(|_| {}).await
+    }
+
+    /// Starts a server whose configuration `adapt` changes.
+    pub async fn start_with(adapt: impl FnOnce(&mut Config)) -> Self {
+        let mut config = Config {
+            workers: WORKERS.try_into().expect("there are workers"),
+            ..Config::default()
+        };
+        adapt(&mut config);
+        let listener = TcpListener::bind((Ipv6Addr::LOCALHOST, 0))
+            .await
+            .expect("a free port of the loopback interface");
+        let address = listener.local_addr().expect("a bound socket has an address");
+        let server = Server::new(config).expect("the server starts");
+        let gauges = server.gauges();
+        let stop = CancellationToken::new();
+        let serving = tokio::spawn(server.serve(listener, stop.clone().cancelled_owned()));
+        Self {
+            address,
+            gauges,
+            stop: stop.drop_guard(),
+            serving,
+        }
+    }
+
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Where it listens, as clients write it.
+    pub fn endpoint(&self) -> String {
+        format!("http://{}", self.address)
+    }
+
+    /// What it is doing.
+    pub fn gauges(&self) -> &Gauges {
+        &self.gauges
+    }
+
+    /// A new connection.
+    pub async fn channel(&self) -> Channel {
+        Endpoint::from_shared(self.endpoint())
+            .expect("an address makes an endpoint")
+            .connect()
+            .await
+            .expect("the server accepts connections")
+    }
+
+    /// The project's own client, on a new connection.
+    pub async fn client(&self) -> GraspClient {
+        GraspClient::connect(&self.endpoint())
+            .await
+            .expect("the server accepts connections")
+    }
+
+    /// The generated client of `GraspService`, on a new connection.
+    pub async fn grasps(&self) -> GraspServiceClient<Channel> {
+        GraspServiceClient::new(self.channel().await)
+    }
+
+    /// The generated client of `ObjectService`, on a new connection.
+    pub async fn objects(&self) -> ObjectServiceClient<Channel> {
+        ObjectServiceClient::new(self.channel().await)
+    }
+
+    /// Tells the server to stop, without waiting for it.
+    pub fn begin_stop(self) -> StoppingServer {
+        drop(self.stop);
+        StoppingServer {
+            gauges: self.gauges,
+            serving: self.serving,
+        }
+    }
+
+    /// Tells the server to stop and waits until it has.
+    pub async fn stop(self) {
+        self.begin_stop().stopped().await;
+    }
+}
+
+/// A server that was told to stop.
+#[derive(Debug)]
+pub struct StoppingServer {
+    gauges: Gauges,
+    serving: JoinHandle<Result<(), ServeError>>,
+}
+
+impl StoppingServer {
+    /// What it is doing.
+    pub fn gauges(&self) -> &Gauges {
+        &self.gauges
+    }
+
+    /// Waits until it has stopped.
+    pub async fn stopped(self) {
+        self.serving
+            .await
+            .expect("the server does not panic")
+            .expect("the server stops without an error");
+    }
+}

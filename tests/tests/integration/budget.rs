@@ -1,0 +1,155 @@
+//! Budgets, deadlines and calls that are dropped.
+
+use std::time::Duration;
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+use tonic::Request;
+
+use crate::support::{bounded, floating_remote, impossible, milliseconds, seconds, until};
+
+fn sum_of_rejections(report: &v1::SearchReport) -> u64 {
+    report.rejections.iter().map(|rejection| rejection.count).sum()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_exhausted_number_of_attempts_is_an_answer_with_a_report() {
+    let server = TestServer::start().await;
+    let request = v1::FindGraspRequest {
+        max_attempts: Some(300),
+        budget: Some(seconds(10)),
+        record_step_times: true,
+        reproducible: true,
+        ..impossible(&server).await
+    };
+    let answer = server
+        .grasps()
+        .await
+        .find_grasp(request)
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
+    assert_eq!(answer.grasp, None);
+    let report = answer.report.unwrap();
+    assert_eq!((report.attempts, report.seed, report.workers), (300, 7, 2));
+    assert_eq!(sum_of_rejections(&report), 300);
+    assert_eq!(
+        (report.strategy(), report.validity()),
+        (v1::Strategy::F, v1::Validity::Thesis)
+    );
+    assert_eq!(report.budget, Some(seconds(10)));
+    assert_eq!(report.step_times.len(), 5);
+    assert_eq!(report.attempt, None);
+    let miss = report.nearest_miss.expect("an attempt came closest");
+    assert!(miss.attempt < 300 && miss.client_from_wrist.is_some());
+    assert!(
+        report
+            .rejections
+            .iter()
+            .any(|count| count.rejection == miss.rejection)
+    );
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_exhausted_budget_is_an_answer() {
+    let server = TestServer::start().await;
+    let request = v1::FindGraspRequest {
+        budget: Some(milliseconds(80)),
+        ..impossible(&server).await
+    };
+    let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
+    let answer = answer.unwrap().into_inner();
+    assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
+    assert_eq!(answer.report.unwrap().budget, Some(milliseconds(80)));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_servers_default_and_maximum_bound_the_budget() {
+    let server = TestServer::start_with(|config| {
+        config.budgets.default = Duration::from_millis(30);
+        config.budgets.maximum = Duration::from_millis(60);
+    })
+    .await;
+    let request = impossible(&server).await;
+    for (asked, in_force) in [(None, 30), (Some(seconds(100)), 60)] {
+        let request = v1::FindGraspRequest {
+            budget: asked,
+            ..request.clone()
+        };
+        let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
+        let report = answer.unwrap().into_inner().report.unwrap();
+        assert_eq!(report.budget, Some(milliseconds(in_force)));
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_calls_deadline_less_the_reserve_bounds_the_budget() {
+    let server = TestServer::start_with(|config| config.budgets.reserve = Duration::from_millis(1400)).await;
+    let mut request = Request::new(v1::FindGraspRequest {
+        budget: Some(seconds(10)),
+        ..impossible(&server).await
+    });
+    request.set_timeout(Duration::from_secs(2));
+    let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
+    let answer = answer.expect("the answer comes before the deadline").into_inner();
+    assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
+    // Half of what is left when the reserve would take more.
+    assert_eq!(answer.report.unwrap().budget, Some(seconds(1)));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_dropped_call_stops_the_work() {
+    let server = TestServer::start().await;
+    let request = v1::FindGraspRequest {
+        budget: Some(seconds(10)),
+        ..impossible(&server).await
+    };
+    let mut client = server.grasps().await;
+    let call = tokio::spawn(async move { client.find_grasp(request).await });
+    until("the search", || server.gauges().searches() == 1).await;
+    call.abort();
+    // Within the test's patience of a minute, but its budget alone would have ended it within 10 s: what is checked
+    // is the order of events, with the clock left to the search.
+    until("the end of the search", || server.gauges().searches() == 0).await;
+    until("the end of the call", || server.gauges().calls() == 0).await;
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_found_grasp_is_complete() {
+    let server = TestServer::start().await;
+    let answer = server
+        .grasps()
+        .await
+        .find_grasp(floating_remote())
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(answer.outcome(), v1::Outcome::Found);
+    let grasp = answer.grasp.unwrap();
+    assert_eq!(
+        (grasp.rig.as_str(), grasp.handedness()),
+        ("thesis", v1::Handedness::Right)
+    );
+    assert_eq!((grasp.digits.len(), grasp.joints.len()), (5, 26));
+    // Without a pose of the object, both frames are one; the wrist is the second joint.
+    assert_eq!(grasp.client_from_wrist, grasp.object_from_wrist);
+    assert_eq!(grasp.joints[1].client_from_joint, grasp.client_from_wrist);
+    assert!(grasp.joints.iter().all(|joint| joint.radius > 0.0));
+    assert!(grasp.contacts.len() >= 2);
+    assert_eq!(grasp.contacts[0].digit(), v1::Digit::Thumb);
+    assert!(
+        grasp
+            .contacts
+            .iter()
+            .any(|contact| contact.digit() != v1::Digit::Thumb)
+    );
+    let report = answer.report.unwrap();
+    assert!(report.attempt.is_some() && report.nearest_miss.is_none());
+    server.stop().await;
+}

@@ -1,0 +1,98 @@
+//! Many calls at once, and more than fit.
+
+use std::time::Duration;
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+use tonic::Code;
+use tonic_types::StatusExt as _;
+
+use crate::support::{bounded, floating_remote, impossible, milliseconds, reason, seconds, until};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn concurrent_calls_are_all_answered() {
+    let server = TestServer::start().await;
+    let client = server.grasps().await;
+    let calls: Vec<_> = (0..32_u64)
+        .map(|seed| {
+            let mut client = client.clone();
+            tokio::spawn(async move {
+                client
+                    .find_grasp(v1::FindGraspRequest {
+                        seed: Some(seed),
+                        ..floating_remote()
+                    })
+                    .await
+            })
+        })
+        .collect();
+    for (seed, call) in calls.into_iter().enumerate() {
+        let answer = bounded("an answer", call).await.unwrap().unwrap().into_inner();
+        assert_eq!(answer.outcome(), v1::Outcome::Found);
+        assert_eq!(answer.report.unwrap().seed, seed as u64);
+    }
+    until("the end of all searches", || server.gauges().searches() == 0).await;
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_long_search_does_not_block_others() {
+    let server = TestServer::start().await;
+    let hopeless = v1::FindGraspRequest {
+        budget: Some(seconds(10)),
+        ..impossible(&server).await
+    };
+    let mut client = server.grasps().await;
+    let long = tokio::spawn(async move { client.find_grasp(hopeless).await });
+    until("the long search", || server.gauges().searches() == 1).await;
+    let answer = server
+        .grasps()
+        .await
+        .find_grasp(floating_remote())
+        .await
+        .unwrap()
+        .into_inner();
+    assert_eq!(answer.outcome(), v1::Outcome::Found);
+    assert!(
+        !long.is_finished(),
+        "the short search was answered only after the long one"
+    );
+    long.abort();
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_search_too_many_is_turned_away_with_a_hint() {
+    let server = TestServer::start_with(|config| config.maximum_searches = 1.try_into().unwrap()).await;
+    let request = v1::FindGraspRequest {
+        budget: Some(seconds(10)),
+        ..impossible(&server).await
+    };
+    let mut client = server.grasps().await;
+    let first = tokio::spawn({
+        let request = request.clone();
+        async move { client.find_grasp(request).await }
+    });
+    until("the first search", || server.gauges().searches() == 1).await;
+    let status = server.grasps().await.find_grasp(request).await.unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::ResourceExhausted, "TOO_MANY_SEARCHES".to_owned())
+    );
+    let details = status.get_error_details();
+    assert!(details.retry_info().unwrap().retry_delay > Some(Duration::ZERO));
+    assert!(status.metadata().contains_key("grpc-retry-pushback-ms"));
+    first.abort();
+    until("the end of the search", || server.gauges().searches() == 0).await;
+    let after = v1::FindGraspRequest {
+        budget: Some(milliseconds(500)),
+        ..floating_remote()
+    };
+    server
+        .grasps()
+        .await
+        .find_grasp(after)
+        .await
+        .expect("the place is free again");
+    server.stop().await;
+}

@@ -1,0 +1,207 @@
+//! `ObjectService`: create, get, list.
+
+use grasp_proto::v1;
+use grasp_tests::{TestServer, recorded::data_folder_or_skip};
+use tonic::{Code, Request};
+use tonic_types::StatusExt as _;
+
+use crate::support::{BOX_OBJ, bounded, box_request, reason};
+
+async fn get(server: &TestServer, name: &str) -> Result<v1::Object, tonic::Status> {
+    let request = v1::GetObjectRequest {
+        name: name.to_owned(),
+    };
+    let answer = server.objects().await.get_object(request).await?;
+    Ok(answer.into_inner().object.expect("an answer has the object"))
+}
+
+async fn all_names(server: &TestServer, page_size: i32) -> Vec<String> {
+    let mut client = server.objects().await;
+    let mut names = Vec::new();
+    let mut page_token = String::new();
+    loop {
+        let request = v1::ListObjectsRequest {
+            page_size,
+            page_token,
+        };
+        let page = client.list_objects(request).await.unwrap().into_inner();
+        names.extend(page.objects.into_iter().map(|object| object.name));
+        page_token = page.next_page_token;
+        if page_token.is_empty() {
+            return names;
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_built_in_objects_are_there() {
+    let server = TestServer::start().await;
+    assert_eq!(
+        all_names(&server, 0).await,
+        ["objects/remote", "objects/scalpel", "objects/scissors"]
+    );
+    for (name, mass) in [("remote", 0.13), ("scalpel", 0.02), ("scissors", 0.05)] {
+        let object = get(&server, &format!("objects/{name}")).await.unwrap();
+        assert!(object.built_in);
+        assert_eq!(object.mass_kg, mass);
+        assert!(object.triangle_count > 100 && object.vertex_count > 50);
+        assert_eq!(object.content_hash.len(), 64);
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_created_object_is_what_was_sent() {
+    let server = TestServer::start().await;
+    let request = v1::CreateObjectRequest {
+        forbidden: Some(v1::ForbiddenSurfaces {
+            groups: vec![],
+            triangles: vec![0, 1, 1],
+        }),
+        friction: Some(0.6),
+        unit_metres: Some(2.0),
+        ..box_request("crate")
+    };
+    let created = server
+        .objects()
+        .await
+        .create_object(request)
+        .await
+        .unwrap()
+        .into_inner();
+    let object = created.object.unwrap();
+    assert_eq!(object, get(&server, "objects/crate").await.unwrap());
+    assert!(!object.built_in);
+    assert_eq!((object.triangle_count, object.vertex_count), (12, 8));
+    assert_eq!(object.forbidden_triangle_count, 2);
+    assert_eq!((object.mass_kg, object.friction), (0.1, 0.6));
+    let centre = object.centre_of_mass.unwrap();
+    assert!(
+        centre.x.abs() < 1e-6 && centre.y.abs() < 1e-6 && centre.z.abs() < 1e-6,
+        "{centre:?}"
+    );
+    let half = object.box_half_extents.unwrap();
+    let mut edges = [half.x, half.y, half.z];
+    edges.sort_by(f32::total_cmp);
+    for (edge, expected) in edges.into_iter().zip([0.02, 0.03, 0.04]) {
+        assert!((edge - expected).abs() < 1e-4, "{edges:?}");
+    }
+    assert_eq!(all_names(&server, 1).await.len(), 4);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_name_is_given_once() {
+    let server = TestServer::start().await;
+    let mut client = server.objects().await;
+    client.create_object(box_request("crate")).await.unwrap();
+    for id in ["crate", "remote"] {
+        let status = client.create_object(box_request(id)).await.unwrap_err();
+        assert_eq!(
+            (status.code(), reason(&status)),
+            (Code::AlreadyExists, "OBJECT_EXISTS".to_owned())
+        );
+        let details = status.get_error_details();
+        assert_eq!(
+            details.resource_info().unwrap().resource_name,
+            format!("objects/{id}")
+        );
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_does_not_exist_is_not_found() {
+    let server = TestServer::start().await;
+    let status = get(&server, "objects/nothing").await.unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::NotFound, "OBJECT_NOT_FOUND".to_owned())
+    );
+    let find = v1::FindGraspRequest {
+        object: "objects/nothing".into(),
+        ..Default::default()
+    };
+    let status = server.grasps().await.find_grasp(find).await.unwrap_err();
+    assert_eq!(status.code(), Code::NotFound);
+    let details = status.get_error_details();
+    assert_eq!(details.resource_info().unwrap().resource_type, "grasp.v1.Object");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_evicted_object_is_told_apart() {
+    let server = TestServer::start_with(|config| config.store.objects = 2).await;
+    let mut client = server.objects().await;
+    for id in ["a", "b", "c"] {
+        client.create_object(box_request(id)).await.unwrap();
+    }
+    let status = get(&server, "objects/a").await.unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::NotFound, "OBJECT_EVICTED".to_owned())
+    );
+    assert!(
+        status.message().contains("create it again"),
+        "{}",
+        status.message()
+    );
+    get(&server, "objects/b").await.unwrap();
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_mesh_above_the_limits_is_refused() {
+    let server = TestServer::start_with(|config| {
+        config.maximum_object_bytes = 4096.try_into().unwrap();
+        config.maximum_object_triangles = 10.try_into().unwrap();
+    })
+    .await;
+    let mut client = server.objects().await;
+    let status = client.create_object(box_request("triangles")).await.unwrap_err();
+    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
+    let padded = |bytes: usize| v1::CreateObjectRequest {
+        obj: format!("{BOX_OBJ}{}", "#\n".repeat(bytes / 2)).into_bytes(),
+        ..box_request("bytes")
+    };
+    let status = client.create_object(padded(8192)).await.unwrap_err();
+    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
+    // Beyond what the transport accepts at all.
+    let status = client.create_object(padded(4 << 20)).await.unwrap_err();
+    assert_eq!(status.code(), Code::OutOfRange, "{status}");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_file_breaks_the_server() {
+    let Some(folder) = data_folder_or_skip("no_file_breaks_the_server") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    let mut client = server.objects().await;
+    let mut files: Vec<_> = std::fs::read_dir(folder.join("ugly"))
+        .expect("the folder of ugly files")
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    files.sort();
+    for (number, path) in files.iter().enumerate() {
+        let request = v1::CreateObjectRequest {
+            obj: std::fs::read(path).unwrap(),
+            ..box_request(&format!("ugly-{number}"))
+        };
+        match bounded("an answer", client.create_object(Request::new(request))).await {
+            Ok(answer) => assert!(answer.into_inner().object.unwrap().triangle_count > 0),
+            Err(status) => assert_eq!(
+                status.code(),
+                Code::InvalidArgument,
+                "{}: {status}",
+                path.display()
+            ),
+        }
+    }
+    client
+        .create_object(box_request("after"))
+        .await
+        .expect("the server is in order");
+    server.stop().await;
+}

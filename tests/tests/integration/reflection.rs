@@ -1,0 +1,73 @@
+//! Reflection, in the version that tools ask for today and in the one that many still ask for.
+
+use grasp_tests::TestServer;
+use prost::Message as _;
+use tokio_stream::once;
+
+/// Services that have to be listed.
+const SERVICES: [&str; 3] = [
+    "grasp.v1.GraspService",
+    "grasp.v1.ObjectService",
+    "grpc.health.v1.Health",
+];
+
+/// A test of one version of the protocol; both have the same messages, in different packages.
+macro_rules! reflection_test {
+    ($version:ident) => {
+        #[tokio::test(flavor = "multi_thread")]
+        async fn $version() {
+            use tonic_reflection::pb::$version::{
+                ServerReflectionRequest, server_reflection_client::ServerReflectionClient,
+                server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
+            };
+            let server = TestServer::start().await;
+            let mut client = ServerReflectionClient::new(server.channel().await);
+            let mut requests = vec![MessageRequest::ListServices(String::new())];
+            requests.extend(SERVICES.map(|name| MessageRequest::FileContainingSymbol(name.to_owned())));
+            let mut responses = Vec::new();
+            for request in requests {
+                let request = ServerReflectionRequest {
+                    host: String::new(),
+                    message_request: Some(request),
+                };
+                let mut stream = client
+                    .server_reflection_info(once(request))
+                    .await
+                    .unwrap()
+                    .into_inner();
+                responses.push(
+                    stream
+                        .message()
+                        .await
+                        .unwrap()
+                        .unwrap()
+                        .message_response
+                        .unwrap(),
+                );
+            }
+            let MessageResponse::ListServicesResponse(list) = &responses[0] else {
+                panic!("not a list: {:?}", responses[0]);
+            };
+            for name in SERVICES {
+                assert!(
+                    list.service.iter().any(|service| service.name == name),
+                    "{name} is not listed"
+                );
+            }
+            for (name, response) in SERVICES.iter().zip(&responses[1..]) {
+                let MessageResponse::FileDescriptorResponse(files) = response else {
+                    panic!("no file for {name}: {response:?}");
+                };
+                let (package, service) = name.rsplit_once('.').unwrap();
+                let file =
+                    prost_types::FileDescriptorProto::decode(&*files.file_descriptor_proto[0]).unwrap();
+                assert_eq!(file.package(), package);
+                assert!(file.service.iter().any(|s| s.name() == service));
+            }
+            server.stop().await;
+        }
+    };
+}
+
+reflection_test!(v1);
+reflection_test!(v1alpha);

@@ -1,0 +1,105 @@
+//! The same question gets the same answer, whoever asks whomever.
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+use prost::Message as _;
+
+use crate::support::{floating_remote, held_remote, impossible, seconds};
+
+async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
+    server
+        .grasps()
+        .await
+        .find_grasp(request)
+        .await
+        .expect("the request is valid")
+        .into_inner()
+}
+
+/// What has to be the same for any number of workers.
+fn unchanging(answer: v1::FindGraspResponse) -> Vec<u8> {
+    let report = answer.report.expect("every answer has a report");
+    v1::FindGraspResponse {
+        report: Some(v1::SearchReport {
+            workers: 0,
+            search_time: None,
+            ..report
+        }),
+        ..answer
+    }
+    .encode_to_vec()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn any_number_of_workers_gives_the_same_bytes() {
+    for request in [floating_remote(), held_remote()] {
+        let request = v1::FindGraspRequest {
+            reproducible: true,
+            ..request
+        };
+        let mut answers = Vec::new();
+        for workers in [1, 2, 3, 8] {
+            let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
+            let answer = ask(&server, request.clone()).await;
+            assert_eq!(answer.outcome(), v1::Outcome::Found, "{}", request.object);
+            answers.push(unchanging(answer));
+            server.stop().await;
+        }
+        assert!(answers.windows(2).all(|pair| pair[0] == pair[1]));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn any_number_of_workers_comes_as_close() {
+    let mut answers = Vec::new();
+    for workers in [1, 3] {
+        let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
+        let request = v1::FindGraspRequest {
+            reproducible: true,
+            max_attempts: Some(1000),
+            budget: Some(seconds(10)),
+            ..impossible(&server).await
+        };
+        answers.push(unchanging(ask(&server, request).await));
+        server.stop().await;
+    }
+    assert_eq!(answers[0], answers[1]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_told_seed_and_attempt_replay_the_grasp() {
+    let server = TestServer::start().await;
+    let first = ask(
+        &server,
+        v1::FindGraspRequest {
+            seed: None,
+            ..floating_remote()
+        },
+    )
+    .await;
+    let report = first.report.unwrap();
+    let replay = v1::FindGraspRequest {
+        seed: Some(report.seed),
+        only_attempt: report.attempt,
+        ..floating_remote()
+    };
+    let second = ask(&server, replay).await;
+    assert_eq!(second.grasp, first.grasp);
+    let replayed = second.report.unwrap();
+    assert_eq!((replayed.attempts, replayed.attempt), (1, report.attempt));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_absent_seed_is_drawn_anew() {
+    let server = TestServer::start().await;
+    let request = v1::FindGraspRequest {
+        seed: None,
+        max_attempts: Some(1),
+        ..floating_remote()
+    };
+    let first = ask(&server, request.clone()).await.report.unwrap().seed;
+    let second = ask(&server, request).await.report.unwrap().seed;
+    assert_ne!(first, second);
+    server.stop().await;
+}

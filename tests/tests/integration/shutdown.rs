@@ -1,0 +1,72 @@
+//! The end of a server: quick when idle, patient with running calls, but not for ever.
+
+use std::time::Duration;
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+use tokio::{io::AsyncReadExt as _, net::TcpStream};
+use tonic::Code;
+
+use crate::support::{bounded, impossible, milliseconds, seconds, until};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn idle_connections_do_not_keep_the_server() {
+    let server = TestServer::start_with(|config| config.drain = Duration::from_hours(1)).await;
+    let mut silent = TcpStream::connect(server.address()).await.unwrap();
+    let mut idle = server.objects().await;
+    idle.list_objects(v1::ListObjectsRequest::default())
+        .await
+        .unwrap();
+    let address = server.address();
+    bounded("the end", server.stop()).await;
+    // The server's end of the silent connection is closed, and the port is free.
+    let mut buffer = Vec::new();
+    bounded("the end of the connection", silent.read_to_end(&mut buffer))
+        .await
+        .ok();
+    assert!(TcpStream::connect(address).await.is_err());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn running_calls_are_answered() {
+    let server = TestServer::start().await;
+    let request = v1::FindGraspRequest {
+        budget: Some(milliseconds(700)),
+        ..impossible(&server).await
+    };
+    let mut client = server.grasps().await;
+    let call = tokio::spawn(async move { client.find_grasp(request).await });
+    until("the search", || server.gauges().searches() == 1).await;
+    let stopping = server.begin_stop();
+    let answer = call
+        .await
+        .unwrap()
+        .expect("the call is answered while the server drains");
+    assert_eq!(answer.into_inner().outcome(), v1::Outcome::BudgetExhausted);
+    bounded("the end", stopping.stopped()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn calls_that_outlast_the_drain_are_cut() {
+    let server = TestServer::start_with(|config| {
+        config.drain = Duration::from_millis(50);
+        config.budgets.maximum = Duration::from_mins(10);
+    })
+    .await;
+    let request = v1::FindGraspRequest {
+        budget: Some(seconds(600)),
+        ..impossible(&server).await
+    };
+    let mut client = server.grasps().await;
+    let call = tokio::spawn(async move { client.find_grasp(request).await });
+    until("the search", || server.gauges().searches() == 1).await;
+    let stopping = server.begin_stop();
+    let gauges = stopping.gauges().clone();
+    bounded("the end", stopping.stopped()).await;
+    let status = bounded("the end of the call", call).await.unwrap().unwrap_err();
+    assert!(
+        matches!(status.code(), Code::Unavailable | Code::Unknown | Code::Cancelled),
+        "{status}"
+    );
+    until("the end of the search", || gauges.searches() == 0).await;
+}
