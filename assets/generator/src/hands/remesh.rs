@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{field::HandField, polygonise::RawMesh};
 
-/// Rounds of collapse, flip and relax. After four the numbers change by less than 1 %; more cost time only.
+/// Rounds of collapse, flip and relax. Four leave 5 % more triangles of less even shape, ten take off another 1 %.
 const ROUNDS: usize = 7;
 
 /// A mesh that is being changed: removed triangles are `None`.
