@@ -11,6 +11,7 @@ use grasp_synthesis::{
 use serde_json::json;
 
 use crate::{
+    camera::Camera,
     image::{Image, side_by_side},
     primitives,
     render::{RenderOptions, render},
@@ -127,13 +128,24 @@ impl<'a> HandoverScene<'a> {
     /// The two views that show most, side by side; `options` is for each of them.
     pub fn render(&self, options: RenderOptions) -> Image {
         let scene = self.to_scene();
-        let aspect = options.width.max(1) as f32 / options.height.max(1) as f32;
-        let importance = |part: &Part| importance(part, self.contacts.len());
-        let [first, second] = choose_views(&scene, importance, options.up, aspect);
+        let [first, second] = self.views(&scene, options);
         side_by_side(
             &render(&scene, &first, options),
             &render(&scene, &second, options),
         )
+    }
+
+    /// The view that shows most.
+    pub fn render_best_view(&self, options: RenderOptions) -> Image {
+        let scene = self.to_scene();
+        let [best, _] = self.views(&scene, options);
+        render(&scene, &best, options)
+    }
+
+    fn views(&self, scene: &Scene, options: RenderOptions) -> [Camera; 2] {
+        let aspect = options.width.max(1) as f32 / options.height.max(1) as f32;
+        let importance = |part: &Part| importance(part, self.contacts.len());
+        choose_views(scene, importance, options.up, aspect)
     }
 
     fn object_part(&self) -> Part {

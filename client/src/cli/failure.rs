@@ -106,10 +106,24 @@ impl Failure {
     }
 
     fn to_text(&self) -> String {
-        let mut text = format!("error: {}", self.message());
-        let Self::Client(error) = self else { return text };
-        let Some(call) = error.call() else { return text };
-        for violation in &call.details.field_violations {
+        let message = self.message();
+        let Self::Client(error) = self else {
+            return format!("error: {message}");
+        };
+        let Some(call) = error.call() else {
+            return format!("error: {message}");
+        };
+        // A message that tells the first violation would only repeat the list below it.
+        let violations = &call.details.field_violations;
+        let repeats = violations
+            .first()
+            .is_some_and(|first| message.contains(&first.description));
+        let mut text = if repeats {
+            format!("error: the request has {} wrong", count_of(violations.len()))
+        } else {
+            format!("error: {message}")
+        };
+        for violation in violations {
             let _ = write!(text, "\n  {}: {}", violation.field, violation.description);
         }
         if let Some(resource) = &call.details.resource
@@ -159,6 +173,12 @@ pub(super) fn report_usage(error: &clap::Error) -> ExitCode {
     // A closed pipe leaves nobody to tell.
     let _ = error.print();
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+}
+
+/// "1 field" or "3 fields".
+fn count_of(fields: usize) -> String {
+    let plural = if fields == 1 { "" } else { "s" };
+    format!("{fields} field{plural}")
 }
 
 /// An error and its causes, separated by colons; causes that repeat the error before are left out.

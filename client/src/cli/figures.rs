@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-use grasp_client::SearchReport;
+use grasp_client::{Rejection, SearchReport};
 use serde::Serialize;
 
 /// The name of an enumeration's value as JSON writes it, with blanks.
@@ -30,8 +30,30 @@ pub(super) fn human_time(seconds: f64) -> String {
     format!("{value:.decimals$} {unit}")
 }
 
-/// The `most` frequent rejections with their share of the attempts, most frequent first.
-pub(super) fn rejections_at_a_glance(report: &SearchReport, most: usize) -> String {
+/// All rejections with their share of the attempts, most frequent first.
+pub(super) fn all_rejections(report: &SearchReport) -> String {
+    rejections(report, usize::MAX, |rejection| name_of(&rejection))
+}
+
+/// The three most frequent rejections in few words, with their share of the attempts.
+pub(super) fn rejections_at_a_glance(report: &SearchReport) -> String {
+    rejections(report, 3, |rejection| {
+        match rejection {
+            Rejection::NoContacts => "no contacts",
+            Rejection::NoThumb => "no thumb",
+            Rejection::NoThumbEarlyStop => "early stop",
+            Rejection::NoFingers => "no fingers",
+            Rejection::PalmCollision => "palm",
+            Rejection::FingerCollision => "finger",
+            Rejection::UnwantedContact => "unwanted",
+            Rejection::NotImmobilizing => "not immobile",
+            Rejection::Unrecognised => "other",
+        }
+        .to_owned()
+    })
+}
+
+fn rejections(report: &SearchReport, most: usize, name: impl Fn(Rejection) -> String) -> String {
     let mut counts: Vec<_> = report.rejections.iter().filter(|count| count.count > 0).collect();
     counts.sort_by_key(|count| Reverse(count.count));
     if counts.is_empty() {
@@ -42,7 +64,7 @@ pub(super) fn rejections_at_a_glance(report: &SearchReport, most: usize) -> Stri
         .take(most)
         .map(|count| {
             let percent = 100.0 * count.count as f64 / report.attempts.max(1) as f64;
-            format!("{} {percent:.0} %", name_of(&count.rejection))
+            format!("{} {percent:.0}%", name(count.rejection))
         })
         .collect();
     shares.join(", ")
@@ -52,7 +74,7 @@ pub(super) fn rejections_at_a_glance(report: &SearchReport, most: usize) -> Stri
 mod tests {
     use std::time::Duration;
 
-    use grasp_client::{Digit, Rejection, RejectionCount};
+    use grasp_client::{Digit, RejectionCount};
 
     use super::*;
 
@@ -82,7 +104,7 @@ mod tests {
                 count(Rejection::NoContacts, 20),
                 count(Rejection::PalmCollision, 130),
                 count(Rejection::NoThumb, 0),
-                count(Rejection::NotImmobilizing, 49),
+                count(Rejection::NotImmobilizing, 50),
             ],
             step_times: Vec::new(),
             seed: 0,
@@ -94,11 +116,15 @@ mod tests {
             strategy: None,
             validity: None,
         };
+        let at_a_glance = rejections_at_a_glance(&report);
+        assert_eq!(at_a_glance, "palm 65%, not immobile 25%, no contacts 10%");
+        report.rejections[2].count = 1;
+        assert_eq!(rejections_at_a_glance(&report), at_a_glance);
         assert_eq!(
-            rejections_at_a_glance(&report, 2),
-            "palm collision 65 %, not immobilizing 24 %"
+            all_rejections(&report),
+            "palm collision 65%, not immobilizing 25%, no contacts 10%, no thumb 0%"
         );
         report.rejections.clear();
-        assert_eq!(rejections_at_a_glance(&report, 2), "none");
+        assert_eq!(all_rejections(&report), "none");
     }
 }

@@ -2,10 +2,14 @@
 
 use std::io::{self, Write as _};
 
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use serde::Serialize;
 
 use super::failure::Failure;
+
+/// A line below the header and none elsewhere: rows stay together, and the table survives being pasted.
+const LINE_BELOW_HEADER: TableStyle =
+    TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
 /// Where results go and in which form.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +63,7 @@ fn write_line(text: &str) -> Result<(), Failure> {
 pub(super) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table
-        .load_style(presets::UTF8_HORIZONTAL_ONLY)
+        .load_style(LINE_BELOW_HEADER)
         .set_content_arrangement(ContentArrangement::Dynamic)
         .set_header(header.iter().map(|name| name.trim_start_matches('>')));
     for (name, column) in header.iter().zip(table.column_iter_mut()) {

@@ -39,6 +39,32 @@ pub(super) fn parse_vector(text: &str) -> Result<Vec3, String> {
     Ok(Vec3::new(x, y, z))
 }
 
+/// Pixels of each of a picture's two views.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ViewSize {
+    /// Pixels in a row.
+    pub(super) width: u32,
+    /// Rows.
+    pub(super) height: u32,
+}
+
+/// Reads a size such as `900x700`; each side from 16 to 8192 pixels.
+pub(super) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
+    let side = |text: &str| {
+        text.parse::<u32>()
+            .ok()
+            .filter(|pixels| (16..=8192).contains(pixels))
+    };
+    text.split_once('x')
+        .and_then(|(width, height)| {
+            Some(ViewSize {
+                width: side(width)?,
+                height: side(height)?,
+            })
+        })
+        .ok_or_else(|| format!("{text:?} is no size; write one like 900x700, each side from 16 to 8192"))
+}
+
 /// Triangle indices such as `7` or `10-20`, both ends included.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct TriangleRange(pub(super) std::ops::RangeInclusive<u32>);
@@ -167,6 +193,27 @@ mod tests {
         assert_eq!(parse_vector("0, 0.5,-2"), Ok(Vec3::new(0.0, 0.5, -2.0)));
         for wrong in ["", "1,2", "1,2,3,4", "a,b,c", "1;2;3"] {
             assert!(parse_vector(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn sizes_have_two_sides_that_can_be_drawn() {
+        let size = ViewSize {
+            width: 900,
+            height: 700,
+        };
+        assert_eq!(parse_view_size("900x700"), Ok(size));
+        for wrong in [
+            "",
+            "900",
+            "900x",
+            "x700",
+            "15x700",
+            "900x8193",
+            "900x700x3",
+            "-900x700",
+        ] {
+            assert!(parse_view_size(wrong).is_err(), "{wrong:?}");
         }
     }
 

@@ -25,7 +25,7 @@ fn grasp(arguments: &[&str]) -> Command {
 }
 
 /// Runs the command line while the test's runtime serves.
-fn run(arguments: &[&str]) -> Output {
+pub(crate) fn run(arguments: &[&str]) -> Output {
     run_with_input(arguments, "")
 }
 
@@ -38,15 +38,15 @@ fn run_with_input(arguments: &[&str], input: &str) -> Output {
     })
 }
 
-fn code(output: &Output) -> i32 {
+pub(crate) fn code(output: &Output) -> i32 {
     output.status.code().unwrap()
 }
 
-fn text(bytes: &[u8]) -> &str {
+pub(crate) fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-fn json(bytes: &[u8]) -> Value {
+pub(crate) fn json(bytes: &[u8]) -> Value {
     serde_json::from_slice(bytes).unwrap_or_else(|error| panic!("{error} in {:?}", text(bytes)))
 }
 
@@ -102,7 +102,7 @@ async fn an_object_is_made_and_named_after_its_file() {
 }
 
 /// A fresh folder for one test, below the folder that cargo gives to integration tests.
-fn tempfile(name: &str) -> std::path::PathBuf {
+pub(crate) fn tempfile(name: &str) -> std::path::PathBuf {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
@@ -148,6 +148,19 @@ async fn a_refusal_lists_every_violation_on_its_own_line() {
     assert_eq!(error["kind"], "invalid_argument");
     assert_eq!(error["code"], "INVALID_ARGUMENT");
     assert_eq!(error["field_violations"][1]["field"], "obj");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_message_that_repeats_its_only_violation_is_not_shown_twice() {
+    let details = ErrorDetails::with_bad_request_violation("name", "is \"anvil/1\"");
+    let message = "name: is \"anvil/1\"";
+    let status = Status::with_error_details(Code::InvalidArgument, message, details);
+    let url = Scripted::new([Act::Fail(status)]).serve().await;
+    let output = run(&["objects", "get", "anvil/1", "--server", &url]);
+    assert_eq!(
+        text(&output.stderr),
+        "error: the request has 1 field wrong\n  name: is \"anvil/1\"\n"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

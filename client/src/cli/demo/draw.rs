@@ -9,13 +9,15 @@ use super::{Asked, progress::Progress};
 use crate::cli::{
     failure::Failure,
     picture::{Model, Picture, write_file},
+    values::ViewSize,
 };
 
-/// Pixels of each of the two views of a picture.
-const VIEW: (u32, u32) = (900, 700);
-
-/// Pixels of each of the two views of a picture in the overview.
-const SMALL_VIEW: (u32, u32) = (400, 330);
+/// Pixels of a view in the overview, unless the pictures themselves are smaller: five of them beside each other fill a
+/// wide screen.
+const SMALL_VIEW: ViewSize = ViewSize {
+    width: 480,
+    height: 400,
+};
 
 /// Pictures in a row of the overview: as many as the thesis has holdouts for an object, so that each object has a row.
 const COLUMNS: usize = 5;
@@ -29,7 +31,16 @@ pub(super) struct Drawn {
 }
 
 /// Writes a picture and a scene of each answer, and one picture with all of them.
-pub(super) async fn draw_all(asked: &[Asked], folder: &Path, progress: &Progress) -> Result<Drawn, Failure> {
+pub(super) async fn draw_all(
+    asked: &[Asked],
+    folder: &Path,
+    size: ViewSize,
+    progress: &Progress,
+) -> Result<Drawn, Failure> {
+    let small_size = ViewSize {
+        width: size.width.min(SMALL_VIEW.width),
+        height: size.height.min(SMALL_VIEW.height),
+    };
     let mut drawn = Drawn {
         pictures: Vec::new(),
         scenes: Vec::new(),
@@ -44,9 +55,9 @@ pub(super) async fn draw_all(asked: &[Asked], folder: &Path, progress: &Progress
         let picture = picture_of(asked)?;
         let (png_path, glb_path) = (png.clone(), glb.clone());
         let small = blocking(move || {
-            write_file(&png_path, &picture.draw(VIEW.0, VIEW.1)?.to_png())?;
+            write_file(&png_path, &picture.draw(size)?.to_png())?;
             write_file(&glb_path, &picture.to_glb()?)?;
-            picture.draw(SMALL_VIEW.0, SMALL_VIEW.1)
+            picture.draw_best_view(small_size)
         })
         .await?;
         small_pictures.push((small, caption(asked)));

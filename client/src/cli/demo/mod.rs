@@ -19,7 +19,7 @@ use super::{
     failure::Failure,
     holdout,
     output::Output,
-    values::{StrategyName, parse_duration},
+    values::{StrategyName, ViewSize, parse_duration, parse_view_size},
 };
 use progress::Progress;
 
@@ -45,6 +45,12 @@ pub(super) struct Arguments {
     /// How to search.
     #[arg(long, ignore_case = true, default_value = "F")]
     strategy: StrategyName,
+    /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
+    #[arg(long, value_name = "NAME")]
+    holdout: Vec<String>,
+    /// Pixels of each of a picture's two views.
+    #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
+    view_size: ViewSize,
     /// How long each search may take.
     #[arg(long, value_name = "DURATION", default_value = "10s", value_parser = parse_duration)]
     budget: Duration,
@@ -60,25 +66,36 @@ struct Asked {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let chosen = arguments.chosen()?;
     let server = server::start(arguments.budget).await?;
-    let progress = Progress::new(2 * holdouts().len() as u64 + 1);
-    let asked = ask_all(&arguments, &server.client, &progress).await?;
+    let progress = Progress::new(2 * chosen.len() as u64 + 1);
+    let asked = ask_all(&arguments, &chosen, &server.client, &progress).await?;
     server.stop().await?;
-    let drawn = draw::draw_all(&asked, &arguments.out, &progress).await?;
+    let drawn = draw::draw_all(&asked, &arguments.out, arguments.view_size, &progress).await?;
     progress.finish();
     report::write(&arguments.out, &asked, &drawn, output)?;
     let all_found = asked.iter().all(|asked| asked.answer.outcome == Outcome::Found);
     Ok(if all_found { Ending::Done } else { Ending::NoGrasp })
 }
 
+impl Arguments {
+    fn chosen(&self) -> Result<Vec<&'static BuiltInHoldout>, Failure> {
+        if self.holdout.is_empty() {
+            return Ok(holdouts().iter().collect());
+        }
+        self.holdout.iter().map(|name| holdout::built_in(name)).collect()
+    }
+}
+
 /// Asks for one grasp after the other, so that each search has the machine for itself.
 async fn ask_all(
     arguments: &Arguments,
+    chosen: &[&'static BuiltInHoldout],
     client: &GraspClient,
     progress: &Progress,
 ) -> Result<Vec<Asked>, Failure> {
     let mut all = Vec::new();
-    for holdout in holdouts() {
+    for &holdout in chosen {
         progress.step(&format!("asking for {}", holdout.name));
         let request = FindRequest {
             receiving_hand: ReceivingHand {

@@ -12,9 +12,6 @@ use crate::cli::{
     output::{Output, table},
 };
 
-/// How many kinds of rejection the table names.
-const REJECTIONS_AT_A_GLANCE: usize = 3;
-
 /// What `--json` writes.
 #[derive(Serialize)]
 struct Results<'a> {
@@ -61,6 +58,14 @@ pub(super) fn write(folder: &Path, asked: &[Asked], drawn: &Drawn, output: Outpu
     output.write(&results, describe)
 }
 
+/// The holdout's name without its object, which has a column of its own.
+fn short_name<'a>(row: &Row<'a>) -> &'a str {
+    row.holdout
+        .strip_prefix(row.object)
+        .and_then(|rest| rest.strip_prefix('-'))
+        .unwrap_or(row.holdout)
+}
+
 fn describe(results: &Results<'_>) -> String {
     let mut table = table(&[
         "object",
@@ -77,14 +82,14 @@ fn describe(results: &Results<'_>) -> String {
         let grasp = row.answer.grasp.as_ref();
         table.add_row([
             row.object.to_owned(),
-            row.holdout.to_owned(),
+            short_name(row).to_owned(),
             match row.answer.outcome {
                 Outcome::Found => "found",
                 Outcome::BudgetExhausted => "none in time",
             }
             .to_owned(),
             report.attempts.to_string(),
-            rejections_at_a_glance(report, REJECTIONS_AT_A_GLANCE),
+            rejections_at_a_glance(report),
             grasp.map_or_else(|| "-".to_owned(), |grasp| format!("{:.4}", grasp.comfort)),
             human_time(report.search_time.as_secs_f64()),
             human_time(row.round_trip_seconds),

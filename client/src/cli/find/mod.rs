@@ -19,7 +19,7 @@ use super::{
     output::{Output, write_json},
     picture::{Model, Picture, write_file},
     server::ServerOptions,
-    values::{BendRatiosName, HandName, StrategyName, parse_duration},
+    values::{BendRatiosName, HandName, StrategyName, ViewSize, parse_duration, parse_view_size},
 };
 
 /// The long help: the shapes of requests and answers as JSON.
@@ -103,6 +103,9 @@ pub(super) struct Arguments {
     /// Write the scene as a binary glTF file, if a grasp is found.
     #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
     glb: Option<PathBuf>,
+    /// Pixels of each of the picture's two views.
+    #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
+    view_size: ViewSize,
     /// The object's mesh (OBJ), for pictures of objects that are not built in.
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
@@ -112,9 +115,6 @@ pub(super) struct Arguments {
     #[command(flatten)]
     server: ServerOptions,
 }
-
-/// Pixels of each of the two views of a picture.
-const VIEW: (u32, u32) = (900, 700);
 
 /// What `--json` writes.
 #[derive(Serialize)]
@@ -143,7 +143,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         && let Some(grasp) = &timed.answer.grasp
     {
         let picture = picture.with_grasp(Some(grasp.clone()));
-        draw(picture, arguments.png, arguments.glb).await?;
+        draw(picture, arguments.view_size, arguments.png, arguments.glb).await?;
     }
     output.write(&timed, |timed| {
         report::describe(&request, &timed.answer, timed.round_trip_seconds)
@@ -200,10 +200,15 @@ impl Arguments {
 }
 
 /// Writes what was asked for, beside the runtime, so that an interrupt is heard meanwhile.
-async fn draw(picture: Picture, png: Option<PathBuf>, glb: Option<PathBuf>) -> Result<(), Failure> {
+async fn draw(
+    picture: Picture,
+    size: ViewSize,
+    png: Option<PathBuf>,
+    glb: Option<PathBuf>,
+) -> Result<(), Failure> {
     tokio::task::spawn_blocking(move || {
         if let Some(path) = png {
-            write_file(&path, &picture.draw(VIEW.0, VIEW.1)?.to_png())?;
+            write_file(&path, &picture.draw(size)?.to_png())?;
         }
         if let Some(path) = glb {
             write_file(&path, &picture.to_glb()?)?;

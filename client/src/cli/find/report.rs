@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use grasp_client::{FindAnswer, FindRequest, Grasp, Outcome, SearchReport};
 
 use crate::cli::{
-    figures::{human_time, name_of, rejections_at_a_glance},
+    figures::{all_rejections, human_time, name_of},
     output::{pairs, table},
 };
 
@@ -63,7 +63,7 @@ fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
                 report.attempts, report.pruned_placements
             ),
         ),
-        ("rejections", rejections_at_a_glance(report, usize::MAX)),
+        ("rejections", all_rejections(report)),
     ];
     if let Some(miss) = &report.nearest_miss {
         let angle = miss.wrench_angle.map_or_else(String::new, |angle| {

@@ -6,11 +6,12 @@ mod object;
 
 use std::path::Path;
 
+use glam::Vec3;
 use grasp_client::{Contact, Convention, Digit, FindRequest, Grasp, Phalanx};
 use grasp_scene::{ContactMark, HandoverScene, Image, PosedHand, RenderOptions, to_glb};
 use grasp_synthesis::hand;
 
-use super::failure::Failure;
+use super::{failure::Failure, values::ViewSize};
 pub(super) use object::Model;
 
 /// A holdout and, if there is one, the grasp on it.
@@ -41,20 +42,28 @@ impl Picture {
         Self { grasp, ..self }
     }
 
-    /// Two views side by side, each of `width` × `height` pixels.
-    pub(super) fn draw(&self, width: u32, height: u32) -> Result<Image, Failure> {
-        let up = self.request.up.unwrap_or(glam::Vec3::Y);
-        Ok(self.scene()?.render(RenderOptions {
-            width,
-            height,
-            up: up.normalize_or(glam::Vec3::Y),
-            ..RenderOptions::default()
-        }))
+    /// Two views side by side, each of this size.
+    pub(super) fn draw(&self, size: ViewSize) -> Result<Image, Failure> {
+        Ok(self.scene()?.render(self.options(size)))
+    }
+
+    /// One view of this size, the one that shows most.
+    pub(super) fn draw_best_view(&self, size: ViewSize) -> Result<Image, Failure> {
+        Ok(self.scene()?.render_best_view(self.options(size)))
     }
 
     /// The scene as a binary glTF file.
     pub(super) fn to_glb(&self) -> Result<Vec<u8>, Failure> {
         Ok(to_glb(&self.scene()?.to_scene()))
+    }
+
+    fn options(&self, ViewSize { width, height }: ViewSize) -> RenderOptions {
+        RenderOptions {
+            width,
+            height,
+            up: self.request.up.unwrap_or(Vec3::Y).normalize_or(Vec3::Y),
+            ..RenderOptions::default()
+        }
     }
 
     fn scene(&self) -> Result<HandoverScene<'_>, Failure> {
