@@ -1,6 +1,6 @@
 //! The binary: configuration, log, runtime, listener, signals.
 
-use std::{path::PathBuf, process::ExitCode, time::Duration};
+use std::{io::IsTerminal as _, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::{CommandFactory as _, Parser};
 use grasp_server::{
@@ -87,6 +87,7 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
 fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     let log = tracing_subscriber::fmt()
         .with_env_filter(EnvFilter::try_new(&config.log)?)
+        .with_ansi(std::io::stderr().is_terminal())
         .with_writer(std::io::stderr);
     match config.log_format {
         LogFormat::Text => log.init(),

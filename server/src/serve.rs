@@ -2,8 +2,12 @@
 
 use std::{future::Future, num::NonZeroUsize, sync::Arc, time::Duration};
 
-use grasp_assets::obj::ObjLimits;
+use grasp_assets::{
+    hands::{self, RIG_NAMES},
+    obj::ObjLimits,
+};
 use grasp_proto::v1::{grasp_service_server::GraspServiceServer, object_service_server::ObjectServiceServer};
+use grasp_synthesis::hand::Handedness;
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
 use tonic::{server::NamedService, transport};
@@ -113,11 +117,12 @@ pub async fn run(
 }
 
 impl Server {
-    /// Starts the search workers and reads the built-in objects.
+    /// Starts the search workers and reads the built-in objects and hands.
     ///
     /// # Errors
     /// [`ServeError::Workers`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
+        read_hands();
         let triangles = config.maximum_object_triangles.get();
         let shared = Shared {
             objects: ObjectStore::new(config.store),
@@ -219,6 +224,15 @@ impl Server {
         }
         tracing::info!("stopped");
         Ok(())
+    }
+}
+
+/// Has the built-in hands read now, which takes milliseconds, instead of by the first call that names them.
+fn read_hands() {
+    for rig in RIG_NAMES {
+        for handedness in [Handedness::Left, Handedness::Right] {
+            hands::hand(rig, handedness);
+        }
     }
 }
 
