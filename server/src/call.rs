@@ -305,6 +305,8 @@ impl fmt::Display for Shouted {
 
 #[cfg(test)]
 mod tests {
+    use std::{convert::Infallible, sync::Mutex};
+
     use super::*;
 
     #[test]
@@ -327,5 +329,74 @@ mod tests {
         assert!(!waiting.is_finished());
         drop(second);
         waiting.await.unwrap();
+    }
+
+    /// A service that keeps every request without an answer.
+    #[derive(Clone, Default)]
+    struct Keeper(Arc<Mutex<Vec<Request<()>>>>);
+
+    impl Service<Request<()>> for Keeper {
+        type Response = Response<()>;
+        type Error = Infallible;
+        type Future = std::future::Pending<Result<Response<()>, Infallible>>;
+
+        fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+            Poll::Ready(Ok(()))
+        }
+
+        fn call(&mut self, request: Request<()>) -> Self::Future {
+            self.0.lock().unwrap().push(request);
+            std::future::pending()
+        }
+    }
+
+    fn request(path: &str) -> Request<()> {
+        Request::builder()
+            .uri(path)
+            .header("grpc-timeout", "3S")
+            .body(())
+            .unwrap()
+    }
+
+    #[tokio::test]
+    async fn an_upload_too_many_is_turned_away_before_it_is_received() {
+        let layer = CallLayer {
+            in_flight: CallsInFlight::default(),
+            uploads: Arc::new(Semaphore::new(1)),
+            maximum_uploads: 1,
+        };
+        let keeper = Keeper::default();
+        let mut service = layer.layer(keeper.clone());
+        let first = service.call(request(UPLOAD_METHOD));
+        let second = service.call(request(UPLOAD_METHOD)).await.unwrap();
+        assert_eq!(code_of(&second), Code::ResourceExhausted);
+        // Calls of other methods are not uploads.
+        let other = service.call(request("/grasp.v1.GraspService/FindGrasp"));
+        assert_eq!(layer.in_flight.count(), 2);
+        drop((first, other));
+        assert_eq!(layer.in_flight.count(), 0);
+        // The permit goes with the request, which the keeper still works on.
+        assert_eq!(layer.uploads.available_permits(), 0);
+        assert_eq!(keeper.0.lock().unwrap().len(), 2);
+        keeper.0.lock().unwrap().clear();
+        assert_eq!(layer.uploads.available_permits(), 1);
+    }
+
+    #[tokio::test]
+    async fn a_handler_learns_when_its_call_arrived_and_ends() {
+        let keeper = Keeper::default();
+        let layer = CallLayer {
+            in_flight: CallsInFlight::default(),
+            uploads: Arc::new(Semaphore::new(1)),
+            maximum_uploads: 1,
+        };
+        let before = Instant::now();
+        let _call = layer
+            .layer(keeper.clone())
+            .call(request("/grasp.v1.GraspService/FindGrasp"));
+        let kept = keeper.0.lock().unwrap();
+        let context = kept[0].extensions().get::<CallContext>().unwrap();
+        assert!(before <= context.arrived && context.arrived <= Instant::now());
+        assert_eq!(context.deadline, Some(context.arrived + Duration::from_secs(3)));
     }
 }

@@ -91,6 +91,12 @@ impl TestServer {
         ObjectServiceClient::new(self.channel().await)
     }
 
+    /// The generated client of `ObjectService`, on a connection that is made by its first call.
+    pub fn objects_lazily(&self) -> ObjectServiceClient<Channel> {
+        let endpoint = Endpoint::from_shared(self.endpoint()).expect("an address makes an endpoint");
+        ObjectServiceClient::new(endpoint.connect_lazy())
+    }
+
     /// Tells the server to stop, without waiting for it.
     pub fn begin_stop(self) -> StoppingServer {
         drop(self.stop);

@@ -114,3 +114,53 @@ impl AsyncWrite for Connection {
         Pin::new(&mut self.stream).poll_shutdown(cx)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tokio::{
+        io::{AsyncReadExt as _, AsyncWriteExt as _},
+        net::TcpListener,
+        sync::Semaphore,
+    };
+
+    use super::*;
+
+    /// A client's end, and the server's end of the same connection.
+    async fn connected(close: CancellationToken, preface_time: Duration) -> (TcpStream, Connection) {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
+        let (stream, _) = listener.accept().await.unwrap();
+        let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
+        (client, Connection::new(stream, place, close, preface_time))
+    }
+
+    #[tokio::test]
+    async fn a_client_without_a_preface_is_left() {
+        let (mut client, mut connection) =
+            connected(CancellationToken::new(), Duration::from_millis(20)).await;
+        client.write_all(b"PRI * HTTP/2.0").await.unwrap();
+        let mut read = Vec::new();
+        let error = connection.read_to_end(&mut read).await.unwrap_err();
+        assert_eq!(
+            (error.kind(), read.as_slice()),
+            (io::ErrorKind::TimedOut, &b"PRI * HTTP/2.0"[..])
+        );
+    }
+
+    #[tokio::test]
+    async fn after_the_preface_there_is_all_the_time_until_the_end() {
+        let close = CancellationToken::new();
+        let (mut client, mut connection) = connected(close.clone(), Duration::from_millis(20)).await;
+        client.write_all(&[b'x'; PREFACE_BYTES]).await.unwrap();
+        connection.read_exact(&mut [0; PREFACE_BYTES]).await.unwrap();
+        let reading = tokio::spawn(async move { connection.read_to_end(&mut Vec::new()).await });
+        // Longer than the preface may take.
+        tokio::time::sleep(Duration::from_millis(60)).await;
+        assert!(!reading.is_finished());
+        close.cancel();
+        assert_eq!(reading.await.unwrap().unwrap(), 0);
+        drop(client);
+    }
+}

@@ -87,7 +87,7 @@ fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>, violations: &mu
     if !(SMALLEST_EXTENT..=LARGEST_EXTENT).contains(&extent) {
         violations.add(
             Field::root("obj"),
-            format!(
+            format_args!(
                 "is {extent} m long; {SMALLEST_EXTENT} m to {LARGEST_EXTENT} m are allowed (is unit_metres right?)"
             ),
         );
@@ -110,7 +110,7 @@ fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Vi
             Some(triangles) => forbidden.extend_from_slice(triangles),
             None => violations.add(
                 field.child("groups").at(place),
-                format!("is {}; {}", quoted(name), known_groups(obj)),
+                format_args!("is {}; {}", quoted(name), known_groups(obj)),
             ),
         }
     }
@@ -121,7 +121,7 @@ fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Vi
         } else {
             violations.add(
                 field.child("triangles").at(place),
-                format!("is {triangle}; the mesh has {triangles} triangles, counted from 0"),
+                format_args!("is {triangle}; the mesh has {triangles} triangles, counted from 0"),
             );
         }
     }

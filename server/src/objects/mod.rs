@@ -23,7 +23,7 @@ pub(crate) struct StoredObject {
     pub id: String,
     /// Does it come with the server?
     pub built_in: bool,
-    /// Ready to be grasped.
+    /// Ready to be grasped; a search holds a clone of its own.
     pub object: Arc<GraspObject>,
     /// SHA-256 of vertices, triangles and forbidden set, hexadecimal.
     pub content_hash: String,
@@ -46,6 +46,11 @@ impl StoredObject {
     /// "objects/{object}".
     pub(crate) fn name(&self) -> String {
         name_of(&self.id)
+    }
+
+    /// Does a search hold it? Then evicting it would free nothing.
+    pub(crate) fn is_in_use(&self) -> bool {
+        Arc::strong_count(&self.object) > 1
     }
 
     /// About how many bytes it takes.

@@ -76,7 +76,7 @@ impl ObjectStore {
         self.built_in.contains_key(id) || self.created().objects.contains_key(id)
     }
 
-    /// The object with this id, for use: while the answer is kept, the object is not evicted.
+    /// The object with this id. While its `object` is held, it is not evicted.
     ///
     /// # Errors
     /// [`ServiceError::ObjectNotFound`].
@@ -178,7 +178,7 @@ impl Created {
         let oldest = self
             .objects
             .iter()
-            .filter(|(_, entry)| Arc::strong_count(&entry.object) == 1)
+            .filter(|(_, entry)| !entry.object.is_in_use())
             .min_by_key(|(_, entry)| entry.last_used)
             .map(|(id, _)| id.clone());
         let Some((id, entry)) = oldest.and_then(|id| self.objects.remove_entry(&id)) else {
@@ -240,8 +240,10 @@ mod tests {
         let store = store(2, 100);
         insert(&store, "a").unwrap();
         insert(&store, "b").unwrap();
-        let a = store.get("a").unwrap();
-        let b = store.get("b").unwrap();
+        let a = Arc::clone(&store.get("a").unwrap().object);
+        let b = Arc::clone(&store.get("b").unwrap().object);
+        // To look at an object is not to use it.
+        let looked_at = store.page(None, 10);
         assert!(matches!(
             insert(&store, "c"),
             Err(ServiceError::Overloaded {
@@ -251,6 +253,7 @@ mod tests {
         ));
         drop(b);
         insert(&store, "c").unwrap();
+        drop(looked_at);
         assert!(store.contains("a") && !store.contains("b"));
         drop(a);
     }

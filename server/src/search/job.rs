@@ -9,6 +9,7 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     clock::Clock,
     holdout::{Holdout, PresentingHand},
+    object::GraspObject,
     search::SearchSettings,
 };
 use rayon::ThreadPool;
@@ -17,7 +18,6 @@ use super::race::race;
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     error::ServiceError,
-    objects::StoredObject,
     validate::FindQuery,
 };
 
@@ -26,8 +26,8 @@ use crate::{
 pub(crate) struct FindJob {
     /// What was asked for.
     pub query: FindQuery,
-    /// The object; held so that it is not evicted meanwhile.
-    pub object: Arc<StoredObject>,
+    /// The object; held, it is not evicted.
+    pub object: Arc<GraspObject>,
     /// The seed that was asked for or drawn.
     pub seed: u64,
     /// When the call arrived: the budget counts from here.
@@ -68,7 +68,7 @@ impl FindJob {
             ),
         };
         let holdout = Holdout {
-            object: Arc::clone(&self.object.object),
+            object: self.object,
             presenting_hand,
             up: object_from_client.transform_vector(query.up),
         };

@@ -38,7 +38,7 @@ impl GraspHandler {
         let shared = &self.shared;
         let query = find_query(request, &shared.default_rig, |id| shared.objects.contains(id))?;
         call.tell_object(&query.object_id);
-        let object = shared.objects.get(&query.object_id)?;
+        let object = Arc::clone(&shared.objects.get(&query.object_id)?.object);
         let budget = effective_budget(query.budget, shared.budgets, call.arrived, call.deadline);
         if budget.is_zero() {
             return Err(ServiceError::DeadlineExceeded);

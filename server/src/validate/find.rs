@@ -100,7 +100,7 @@ pub(crate) fn find_query(
     if let (false, Some(id)) = (violations.is_empty(), &object_id)
         && !object_exists(id)
     {
-        violations.add(Field::root("object"), format!("objects/{id} does not exist"));
+        violations.add(Field::root("object"), format_args!("objects/{id} does not exist"));
     }
     let (Some(object_id), Some(receiving_hand)) = (object_id, receiving_hand) else {
         // Whatever is missing was reported by the function that returned nothing.
@@ -135,7 +135,7 @@ fn attempts(max_attempts: Option<u64>, only_attempt: Option<u64>, violations: &m
             if only > LAST_ATTEMPT {
                 violations.add(
                     Field::root("only_attempt"),
-                    format!("is {only}; it must be at most {LAST_ATTEMPT}"),
+                    format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
                 );
             }
             (only, 1)
@@ -156,14 +156,14 @@ fn positive_duration(
     if !in_range || !one_sign {
         violations.add(
             field,
-            format!("is {}, which is no valid google.protobuf.Duration", text()),
+            format_args!("is {}, which is no valid google.protobuf.Duration", text()),
         );
         return None;
     }
     match (u64::try_from(sent.seconds), u32::try_from(sent.nanos)) {
         (Ok(seconds), Ok(nanos)) if seconds > 0 || nanos > 0 => Some(Duration::new(seconds, nanos)),
         _ => {
-            violations.add(field, format!("is {}; it must be more than 0", text()));
+            violations.add(field, format_args!("is {}; it must be more than 0", text()));
             None
         }
     }

@@ -97,7 +97,7 @@ fn built_in(
     if hand.is_none() {
         violations.add(
             field,
-            format!(
+            format_args!(
                 "is {}; the built-in rigs are {}",
                 quoted(rig),
                 RIG_NAMES.join(" and ")
@@ -144,7 +144,7 @@ fn angled_hand(
     if angles.digits.len() != 5 {
         violations.add(
             digits_field,
-            format!("has {} digits; 5 are needed, thumb first", angles.digits.len()),
+            format_args!("has {} digits; 5 are needed, thumb first", angles.digits.len()),
         );
     }
     let hand = hand?;
@@ -175,7 +175,7 @@ fn digit_angles(
         if !range.contains(angle, ANGLE_SLACK) {
             violations.add(
                 field.child(name),
-                format!("is {angle} rad; the rig allows {} to {}", range.min, range.max),
+                format_args!("is {angle} rad; the rig allows {} to {}", range.min, range.max),
             );
             return range.min;
         }
@@ -278,7 +278,7 @@ fn joint_pose(
     if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
         violations.add(
             field.child("radius"),
-            format!(
+            format_args!(
                 "is {}; it must be more than 0 and at most {}",
                 sent.radius,
                 convention.length_from_openxr(LARGEST_RADIUS)
@@ -312,14 +312,14 @@ fn proportions(field: Field<'_>, joints: &[Joint; JOINT_COUNT], violations: &mut
     if farthest > LARGEST_REACH {
         violations.add(
             field,
-            format!("reach {farthest} m from the wrist; a hand reaches at most {LARGEST_REACH} m"),
+            format_args!("reach {farthest} m from the wrist; a hand reaches at most {LARGEST_REACH} m"),
         );
     }
     let knuckle = from_wrist(&joints[index::FIRST_OF_DIGIT[2] + 1]);
     if knuckle < SMALLEST_PALM {
         violations.add(
             field,
-            format!(
+            format_args!(
                 "have the middle finger's proximal joint {knuckle} m from the wrist; at least {SMALLEST_PALM} m \
                  are needed"
             ),
@@ -343,8 +343,131 @@ pub(super) fn up(
     match unit {
         Some(unit) if up.is_finite() => convention.direction_to_openxr(unit),
         _ => {
-            violations.add(field, format!("is {up}; it must be finite and point somewhere"));
+            violations.add(
+                field,
+                format_args!("is {up}; it must be finite and point somewhere"),
+            );
             convention.up_in_openxr()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+    use crate::answer::wire_pose;
+
+    const FIELD: Field<'static> = Field::root("presenting_hand");
+
+    /// A bent hand somewhere, as `OpenXR` joints.
+    fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
+        let hand = hands::hand("adult", handedness).expect("the rig is built in");
+        let mut digits = hand.rig.stretched();
+        for digit in &mut digits[1..] {
+            *digit = DigitAngles::coupled(0.05, 0.4, 0.6);
+        }
+        let pose = HandPose {
+            frame_from_wrist: Pose::new(Vec3::new(0.4, 1.1, -0.3), Quat::from_rotation_y(0.7)),
+            digits,
+        };
+        HandJoints::of_pose(&hand.rig, &pose)
+    }
+
+    /// The same joints as a client of the convention sends them.
+    fn sent(joints: &HandJoints, convention: Convention, set: v1::JointSet) -> v1::PresentingHand {
+        let places = match set {
+            v1::JointSet::Webxr25 => 1..JOINT_COUNT,
+            _ => 0..JOINT_COUNT,
+        };
+        let handedness = match joints.handedness {
+            Handedness::Left => v1::Handedness::Left,
+            Handedness::Right => v1::Handedness::Right,
+        };
+        let joint_of = |place| match set {
+            v1::JointSet::Webxr25 => place,
+            _ => convention.joint_at(place),
+        };
+        let hand = v1::HandJoints {
+            handedness: handedness.into(),
+            joint_set: set.into(),
+            joints: places
+                .map(|place| joints.joints[joint_of(place)])
+                .map(|joint| v1::JointPose {
+                    client_from_joint: Some(wire_pose(convention.joint_from_openxr(joint.pose))),
+                    radius: convention.length_from_openxr(joint.radius),
+                })
+                .collect(),
+        };
+        v1::PresentingHand {
+            form: Some(v1::presenting_hand::Form::Joints(hand)),
+        }
+    }
+
+    #[test]
+    fn joints_are_the_same_in_every_convention_and_set() {
+        for convention in [
+            Convention::OpenXr,
+            Convention::Unity,
+            Convention::Unreal,
+            Convention::Godot,
+        ] {
+            for set in [v1::JointSet::Openxr26, v1::JointSet::Webxr25] {
+                for handedness in [Handedness::Left, Handedness::Right] {
+                    let expected = joints_of_a_rig(handedness);
+                    let mut violations = Violations::default();
+                    let hand = presenting_hand(
+                        FIELD,
+                        sent(&expected, convention, set),
+                        convention,
+                        &mut violations,
+                    );
+                    assert!(violations.is_empty(), "{violations:?}");
+                    let read = hand.expect("a right hand is read").joints;
+                    assert_eq!(read.handedness, handedness);
+                    for (joint, (read, expected)) in read.joints.iter().zip(&expected.joints).enumerate() {
+                        let told = format!("{convention:?} {set:?} {joint}: {read:?} {expected:?}");
+                        assert!(
+                            read.pose.position.distance(expected.pose.position) < 1e-5,
+                            "{told}"
+                        );
+                        assert!(
+                            read.pose.orientation.dot(expected.pose.orientation).abs() > 1.0 - 1e-5,
+                            "{told}"
+                        );
+                        // The palm's own radius is not sent in WebXR's set.
+                        if joint != index::PALM || set == v1::JointSet::Openxr26 {
+                            assert!((read.radius - expected.radius).abs() < 1e-6, "{told}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn angles_are_clamped_within_the_slack_and_coupled_when_absent() {
+        let hand = hands::hand("thesis", Handedness::Right).expect("the rig is built in");
+        let rig = &hand.rig.digits[1];
+        let limit = rig.limits.second_pitch.max;
+        let angles = v1::DigitAngles {
+            base_yaw: 0.0,
+            base_pitch: 0.1,
+            second_pitch: limit + 0.5 * ANGLE_SLACK,
+            third_pitch: None,
+        };
+        let mut violations = Violations::default();
+        let read = digit_angles(FIELD, &angles, rig, &mut violations);
+        assert!(violations.is_empty());
+        assert_eq!(read.second_pitch, limit);
+        let coupled = (limit * 2.0 / 3.0).min(rig.limits.third_pitch.max);
+        assert!((read.third_pitch - coupled).abs() < 1e-6);
+        let over = v1::DigitAngles {
+            second_pitch: limit + 2.0 * ANGLE_SLACK,
+            ..angles
+        };
+        digit_angles(FIELD, &over, rig, &mut violations);
+        assert_eq!(violations.len(), 1);
     }
 }

@@ -45,12 +45,12 @@ pub(crate) struct Violations {
 }
 
 impl Violations {
-    /// Adds one.
-    pub(crate) fn add(&mut self, field: impl fmt::Display, description: impl Into<String>) {
+    /// Adds one; texts are written out only if they are told.
+    pub(crate) fn add(&mut self, field: impl fmt::Display, description: impl fmt::Display) {
         if self.told.len() < MAXIMUM_TOLD {
             self.told.push(Violation {
                 field: field.to_string(),
-                description: description.into(),
+                description: description.to_string(),
             });
         } else {
             self.untold += 1;
@@ -159,7 +159,7 @@ fn finite(field: Field<'_>, v: v1::Vector3, violations: &mut Violations) -> Vec3
     if vector.is_finite() {
         vector
     } else {
-        violations.add(field, format!("is {vector}; every number must be finite"));
+        violations.add(field, format_args!("is {vector}; every number must be finite"));
         Vec3::ZERO
     }
 }
@@ -171,7 +171,7 @@ fn point(field: Field<'_>, v: v1::Vector3, metres_per_unit: f32, violations: &mu
     if point.abs().max_element() > farthest {
         violations.add(
             field,
-            format!("is {point}; no coordinate may be more than {farthest} from 0 (1 km)"),
+            format_args!("is {point}; no coordinate may be more than {farthest} from 0 (1 km)"),
         );
         return Vec3::ZERO;
     }
@@ -188,7 +188,7 @@ fn orientation(field: Field<'_>, q: v1::Quaternion, violations: &mut Violations)
     // Also reached by NaN and infinity, for which the comparison is false.
     violations.add(
         field,
-        format!("is {quaternion}, of norm {norm}; a unit quaternion is needed, within 1 %"),
+        format_args!("is {quaternion}, of norm {norm}; a unit quaternion is needed, within 1 %"),
     );
     Quat::IDENTITY
 }
@@ -213,7 +213,7 @@ fn friction(field: Field<'_>, value: f32, violations: &mut Violations) -> f32 {
     if !(value > 0.0 && value <= MAXIMUM_FRICTION) {
         violations.add(
             field,
-            format!("is {value}; it must be more than 0 and at most {MAXIMUM_FRICTION}"),
+            format_args!("is {value}; it must be more than 0 and at most {MAXIMUM_FRICTION}"),
         );
     }
     value
@@ -222,7 +222,10 @@ fn friction(field: Field<'_>, value: f32, violations: &mut Violations) -> f32 {
 /// The value of an enum that the contract knows; its default otherwise.
 fn known<E: TryFrom<i32> + Default>(field: Field<'_>, value: i32, violations: &mut Violations) -> E {
     E::try_from(value).unwrap_or_else(|_| {
-        violations.add(field, format!("is {value}, which the contract does not define"));
+        violations.add(
+            field,
+            format_args!("is {value}, which the contract does not define"),
+        );
         E::default()
     })
 }

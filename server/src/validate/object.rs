@@ -66,7 +66,7 @@ pub(crate) fn object_fields(
     if !is_object_id(&request.object_id) {
         violations.add(
             Field::root("object_id"),
-            format!(
+            format_args!(
                 "is {}; it must be 1 to {LONGEST_ID} of a-z, 0-9 and -, starting with a letter",
                 quoted(&request.object_id)
             ),
@@ -80,7 +80,7 @@ pub(crate) fn object_fields(
     } else if request.obj.len() > maximum_bytes {
         violations.add(
             Field::root("obj"),
-            format!(
+            format_args!(
                 "has {} bytes; at most {maximum_bytes} are allowed",
                 request.obj.len()
             ),
@@ -92,7 +92,7 @@ pub(crate) fn object_fields(
         Some(unit) => {
             violations.add(
                 Field::root("unit_metres"),
-                format!(
+                format_args!(
                     "is {unit}; it must be {} to {}",
                     UNIT_RANGE.start(),
                     UNIT_RANGE.end()
@@ -105,7 +105,7 @@ pub(crate) fn object_fields(
     if !(request.mass_kg > 0.0 && request.mass_kg <= LARGEST_MASS) {
         violations.add(
             Field::root("mass_kg"),
-            format!(
+            format_args!(
                 "is {}; it must be more than 0 and at most {LARGEST_MASS}",
                 request.mass_kg
             ),

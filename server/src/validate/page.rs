@@ -35,7 +35,7 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
         Err(_) => {
             violations.add(
                 Field::root("page_size"),
-                format!("is {}; it must not be negative", request.page_size),
+                format_args!("is {}; it must not be negative", request.page_size),
             );
             DEFAULT_PAGE_SIZE
         }
@@ -47,7 +47,7 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
         if after.is_none() {
             violations.add(
                 Field::root("page_token"),
-                format!(
+                format_args!(
                     "is {}; it must be the next_page_token of an earlier answer",
                     quoted(&request.page_token)
                 ),

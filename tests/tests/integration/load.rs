@@ -96,3 +96,32 @@ async fn a_search_too_many_is_turned_away_with_a_hint() {
         .expect("the place is free again");
     server.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_too_many_waits_for_its_place() {
+    let server = TestServer::start_with(|config| config.maximum_connections = 1.try_into().unwrap()).await;
+    let mut first = server.objects().await;
+    let list = v1::ListObjectsRequest::default;
+    first
+        .list_objects(list())
+        .await
+        .expect("the first connection has a place");
+    let mut second = server.objects_lazily();
+    let waiting = tokio::spawn(async move { second.list_objects(list()).await });
+    for _ in 0..50 {
+        first
+            .list_objects(list())
+            .await
+            .expect("the first connection keeps its place");
+    }
+    assert!(
+        !waiting.is_finished(),
+        "the second connection was served beside the first"
+    );
+    drop(first);
+    bounded("the second connection's answer", waiting)
+        .await
+        .unwrap()
+        .expect("the place is free");
+    server.stop().await;
+}
