@@ -119,6 +119,15 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
     }
 }
 
+/// Runs what blocks or takes long beside the runtime, so that an interrupt is heard meanwhile.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
+) -> Result<T, Failure> {
+    tokio::task::spawn_blocking(work)
+        .await
+        .map_err(|error| Failure::other("the command broke down", error))?
+}
+
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory as _;

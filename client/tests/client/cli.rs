@@ -3,6 +3,7 @@
 use std::{
     io::Write as _,
     process::{Child, Command, Output, Stdio},
+    time::Duration,
 };
 
 use serde_json::Value;
@@ -314,27 +315,45 @@ async fn a_closed_pipe_ends_the_command_quietly() {
     }
 }
 
+/// Interrupts a process as Ctrl-C does and waits for its end.
+#[cfg(unix)]
+fn interrupt(child: Child) -> Output {
+    let id = child.id().to_string();
+    tokio::task::block_in_place(|| {
+        let interrupted = Command::new("kill").args(["-INT", &id]).status().unwrap();
+        assert!(interrupted.success());
+        child.wait_with_output().unwrap()
+    })
+}
+
 #[cfg(unix)]
 #[tokio::test(flavor = "multi_thread")]
 async fn an_interrupt_ends_the_command_with_130() {
     let service = Scripted::new([Act::Hang]);
     let url = service.serve().await;
-    let child: Child = grasp(&["objects", "get", "remote", "--timeout", "5m", "--server", &url])
+    let child = grasp(&["objects", "get", "remote", "--timeout", "5m", "--server", &url])
         .spawn()
         .unwrap();
     while service.calls() == 0 {
-        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        tokio::time::sleep(Duration::from_millis(5)).await;
     }
-    let output = tokio::task::block_in_place(|| {
-        let interrupted = Command::new("kill")
-            .args(["-INT", &child.id().to_string()])
-            .status()
-            .unwrap();
-        assert!(interrupted.success());
-        child.wait_with_output().unwrap()
-    });
+    let output = interrupt(child);
     assert_eq!(
         (code(&output), text(&output.stderr)),
         (130, "error: interrupted\n")
     );
+}
+
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread")]
+async fn an_interrupt_is_heard_while_the_request_is_typed() {
+    let mut child = grasp(&["find", "--request", "-"]).spawn().unwrap();
+    // Kept open: the command waits for the rest of the request.
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(b"{").unwrap();
+    // A process that was not yet ready for the interrupt is ended by it all the same.
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let output = interrupt(child);
+    assert!(!output.status.success());
+    drop(input);
 }

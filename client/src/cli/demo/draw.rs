@@ -7,6 +7,7 @@ use grasp_scene::{Image, contact_sheet};
 
 use super::{Asked, progress::Progress};
 use crate::cli::{
+    blocking,
     failure::Failure,
     picture::{Model, Picture, write_file},
     values::ViewSize,
@@ -93,13 +94,4 @@ fn caption(asked: &Asked) -> String {
         Outcome::Found => asked.holdout.name.clone(),
         Outcome::BudgetExhausted => format!("{}: no grasp", asked.holdout.name),
     }
-}
-
-/// Runs what takes long beside the runtime, so that an interrupt is heard meanwhile.
-async fn blocking<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
-) -> Result<T, Failure> {
-    tokio::task::spawn_blocking(work)
-        .await
-        .map_err(|error| Failure::other("drawing broke down", error))?
 }

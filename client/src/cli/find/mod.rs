@@ -13,7 +13,7 @@ use grasp_client::{FindAnswer, FindRequest, Outcome};
 use serde::Serialize;
 
 use super::{
-    EXIT_CODES, Ending,
+    EXIT_CODES, Ending, blocking,
     failure::Failure,
     holdout,
     output::{Output, write_json},
@@ -125,7 +125,7 @@ struct TimedAnswer {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let request = arguments.to_request()?;
+    let request = arguments.to_request().await?;
     if arguments.print_request {
         write_json(&request)?;
         return Ok(Ending::Done);
@@ -173,10 +173,13 @@ impl Arguments {
     }
 
     /// The request of the holdout or the file, with the options laid over it.
-    fn to_request(&self) -> Result<FindRequest, Failure> {
+    async fn to_request(&self) -> Result<FindRequest, Failure> {
         let mut request = match (&self.holdout, &self.request) {
             (Some(name), _) => holdout::request_for(holdout::built_in(name)?),
-            (None, Some(path)) => read_request(path)?,
+            (None, Some(path)) => {
+                let path = path.clone();
+                blocking(move || read_request(&path)).await?
+            }
             (None, None) => {
                 return Err(Failure::Usage(
                     "neither --holdout nor --request was given".to_owned(),
@@ -199,14 +202,14 @@ impl Arguments {
     }
 }
 
-/// Writes what was asked for, beside the runtime, so that an interrupt is heard meanwhile.
+/// Writes what was asked for.
 async fn draw(
     picture: Picture,
     size: ViewSize,
     png: Option<PathBuf>,
     glb: Option<PathBuf>,
 ) -> Result<(), Failure> {
-    tokio::task::spawn_blocking(move || {
+    blocking(move || {
         if let Some(path) = png {
             write_file(&path, &picture.draw(size)?.to_png())?;
         }
@@ -216,7 +219,6 @@ async fn draw(
         Ok(())
     })
     .await
-    .map_err(|error| Failure::other("drawing broke down", error))?
 }
 
 /// Reads a request from a file or, for `-`, from standard input.
