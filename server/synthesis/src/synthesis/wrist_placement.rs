@@ -105,7 +105,7 @@ impl<'a> WristPlacer<'a> {
             });
         let cos = |degrees: f32| degrees.to_radians().cos();
         let near = if strategy.prunes_by_object() {
-            WRIST_DISTANCE.max + BOUND_SLACK
+            rig.reach.min(WRIST_DISTANCE.max + BOUND_SLACK)
         } else {
             rig.reach
         };
@@ -137,7 +137,7 @@ impl<'a> WristPlacer<'a> {
         interrupted: &impl Fn() -> bool,
         pruned: &mut u64,
     ) -> Option<WristFrame> {
-        let mut far = 0;
+        let mut refused = 0;
         loop {
             for _ in 0..DRAWS_PER_LOOK {
                 // Uniform in the box around C. A position outside C - B is drawn again. One in there but too far from
@@ -146,21 +146,20 @@ impl<'a> WristPlacer<'a> {
                 let position = stream.in_cube() * (self.half_extents + self.reach);
                 let outside = (position.abs() - self.half_extents).max(Vec3::ZERO);
                 let squared = outside.length_squared();
-                let in_shell = (squared > 0.0) & (squared <= self.squared_reach);
-                if in_shell & (squared <= self.squared_near) {
+                if squared <= self.squared_near && squared > 0.0 {
                     let draft = Draft {
                         position,
                         box_distance: squared.sqrt(),
                     };
                     if let Some(wrist) = self.accept(&draft, stream.rotation()) {
-                        *pruned += far;
+                        *pruned += refused;
                         return Some(wrist);
                     }
                 }
-                far += u64::from(in_shell);
+                refused += u64::from(squared > 0.0) & u64::from(squared <= self.squared_reach);
             }
             if interrupted() {
-                *pruned += far;
+                *pruned += refused;
                 return None;
             }
         }

@@ -188,6 +188,27 @@ fn the_cheap_order_accepts_what_the_plain_order_accepts() {
     assert!(compared > 10_000, "only {compared} placements compared");
 }
 
+/// A hand that reaches less far than the measures allow stays within its reach.
+#[test]
+fn a_short_hand_stays_within_its_reach() {
+    let short = Rig {
+        reach: 0.07,
+        palm: Vec3::new(0.0, 0.02, 0.005),
+        ..rig()
+    };
+    let holdout = floating(bar());
+    let outside = |strategy, attempt| {
+        let (pose, _) = place(&holdout, &short, strategy, attempt);
+        holdout.object.bounding_box.distance(pose.position)
+    };
+    for strategy in [Strategy::A, Strategy::B] {
+        let farthest = (0..300)
+            .map(|attempt| outside(strategy, attempt))
+            .fold(0.0, f32::max);
+        assert!(farthest > 0.05 && farthest <= short.reach * 1.0001, "{farthest}");
+    }
+}
+
 /// Later strategies prune more.
 #[test]
 fn the_palm_angle_needs_a_giver() {
