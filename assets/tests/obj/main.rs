@@ -1,0 +1,35 @@
+//! The OBJ reader: what it takes, what it refuses, and that nothing brings it down.
+
+mod files;
+mod plain;
+mod properties;
+mod reading;
+mod refusing;
+
+use grasp_assets::obj::{ObjError, ObjLimits, ObjMesh, read_obj};
+
+/// Enough for all that is read here.
+const LIMITS: ObjLimits = ObjLimits {
+    bytes: 16 << 20,
+    vertices: 100_000,
+    triangles: 100_000,
+};
+
+fn read(text: &str) -> Result<ObjMesh, Vec<ObjError>> {
+    read_obj(text.as_bytes(), 1.0, LIMITS)
+}
+
+/// A cube of 2 m, by quads, wound outward.
+const CUBE: &str = "\
+v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
+f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+/// The volume that a mesh encloses, by the divergence theorem.
+fn volume(read: &ObjMesh) -> f64 {
+    (0..read.mesh.triangles().len())
+        .map(|triangle| {
+            let [a, b, c] = read.mesh.corners(triangle).map(glam::Vec3::as_dvec3);
+            a.dot(b.cross(c)) / 6.0
+        })
+        .sum()
+}
