@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use grasp_synthesis::object::GraspObject;
 use serde::{Deserialize, Serialize};
 
@@ -43,6 +43,8 @@ pub struct Manifest {
     pub friction: f32,
     /// Groups of the mesh that may not be touched.
     pub forbidden_groups: Vec<String>,
+    /// The snug box around the mesh, B of thesis 4.3, rounded to micrometres.
+    pub oriented_box: ManifestBox,
     /// Triangles of the mesh.
     pub triangles: usize,
     /// Vertices of the mesh.
@@ -51,6 +53,18 @@ pub struct Manifest {
     pub source: String,
     /// Under which terms they may be used, as an SPDX expression.
     pub licence: String,
+}
+
+/// A box in the object's frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ManifestBox {
+    /// Its centre, in metres.
+    pub centre_m: Vec3,
+    /// How its axes are turned in the object's frame: a unit quaternion x, y, z, w.
+    pub orientation: Quat,
+    /// Half of its edge lengths along its own axes, in metres.
+    pub half_extents_m: Vec3,
 }
 
 impl Manifest {

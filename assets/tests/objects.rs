@@ -308,6 +308,19 @@ fn manifests_tell_the_truth_about_the_mesh() {
         assert_eq!(manifest.vertices, mesh(object).positions().len());
         assert_eq!(manifest.mass_kg, object.object.mass);
         assert_eq!(manifest.centre_of_mass_m, object.object.centre_of_mass);
+        let stated = manifest.oriented_box;
+        let fitted = object.object.bounding_box;
+        let difference = (stated.centre_m - fitted.object_from_box.position)
+            .abs()
+            .max((stated.half_extents_m - fitted.half_extents).abs());
+        assert!(difference.max_element() < 2e-6, "{}: {stated:?}", object.name);
+        assert!(stated.orientation.is_normalized());
+        assert!(
+            stated
+                .orientation
+                .angle_between(fitted.object_from_box.orientation)
+                < 1e-3
+        );
         for group in &manifest.forbidden_groups {
             assert!(
                 object.groups.iter().any(|(name, _)| name == group),

@@ -7,9 +7,9 @@ mod scissors;
 
 use std::fmt::Write as _;
 
-use glam::Vec3;
-use grasp_assets::objects::Manifest;
-use grasp_synthesis::object::THESIS_FRICTION;
+use glam::{Quat, Vec3};
+use grasp_assets::objects::{Manifest, ManifestBox};
+use grasp_synthesis::{geometry::oriented_box::OrientedBox, object::THESIS_FRICTION};
 
 use crate::AssetFile;
 use builder::Shape;
@@ -77,6 +77,7 @@ fn files(about: &About) -> [AssetFile; 2] {
         centre_of_mass_m: about.centre_of_mass_m,
         friction: THESIS_FRICTION,
         forbidden_groups: about.forbidden_groups.iter().map(|&group| group.to_owned()).collect(),
+        oriented_box: oriented_box(&shape),
         triangles: shape.groups.iter().map(|(_, triangles)| triangles.len()).sum(),
         vertices: shape.micrometres.len(),
         source: "grasp-assets-generator; mass, friction and centre of mass after Table 5.1 and section 4.5 of the thesis"
@@ -89,6 +90,22 @@ fn files(about: &About) -> [AssetFile; 2] {
         (format!("objects/{name}.obj"), obj(name, &shape).into_bytes()),
         (format!("objects/{name}.json"), json),
     ]
+}
+
+/// The snug box, rounded like the mesh so that the last bits of the fit do not show.
+fn oriented_box(shape: &Shape) -> ManifestBox {
+    const PER_METRE: f32 = 1e6;
+    // Adding zero turns −0 into 0.
+    let rounded = |value: f32| (value * PER_METRE).round() / PER_METRE + 0.0;
+    let OrientedBox {
+        object_from_box,
+        half_extents,
+    } = OrientedBox::around(&shape.mesh());
+    ManifestBox {
+        centre_m: object_from_box.position.to_array().map(rounded).into(),
+        orientation: Quat::from_array(object_from_box.orientation.to_array().map(rounded)),
+        half_extents_m: half_extents.to_array().map(rounded).into(),
+    }
 }
 
 /// The mesh as OBJ text in metres with six decimals.

@@ -16,6 +16,8 @@ pub(super) struct Cleaned {
     pub(super) mesh: TriangleMesh,
     /// For each triangle the index of the face it came from.
     pub(super) faces: Vec<usize>,
+    /// For each triangle its index before any were dropped.
+    pub(super) places: Vec<u32>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -54,9 +56,10 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
     let mut seen = HashSet::new();
     let mut triangles = Vec::new();
     let mut faces = Vec::new();
+    let mut places = Vec::new();
     // Slivers of three distinct vertices have no area but do close the gap between their neighbours.
     let mut joined = Vec::new();
-    for (triangle, face) in corners.into_iter().zip(origins) {
+    for (place, (triangle, face)) in corners.into_iter().zip(origins).enumerate() {
         let line = scan.faces[face].line;
         if has_repeated_corner(triangle) {
             dropped.without_area.note(line);
@@ -67,6 +70,7 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
             if has_area(&positions, triangle) {
                 triangles.push(triangle);
                 faces.push(face);
+                places.push(place as u32);
             } else {
                 dropped.without_area.note(line);
             }
@@ -90,20 +94,22 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
     }
     let joints = Joints::of(&joined, positions.len());
     warnings.extend(joints.warnings());
-    if joints.is_closed() && signed_volume(&positions, &triangles) < 0.0 {
-        for [_, second, third] in &mut triangles {
-            std::mem::swap(second, third);
-        }
+    let mut mesh = usable(positions, triangles)?;
+    if joints.is_closed() && mesh.signed_volume() < 0.0 {
+        let turned = mesh.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
+        mesh = usable(mesh.positions().to_vec(), turned)?;
         warnings.push("the mesh was inside out; all triangles were turned".to_owned());
     }
-    // The checks above are those of the mesh, so it cannot refuse.
-    let mesh = TriangleMesh::new(positions, triangles)
-        .map_err(|_| vec![ObjError::Unreadable(tobj::LoadError::GenericFailure)])?;
     Ok(Cleaned {
         mesh,
         faces,
+        places,
         warnings,
     })
+}
+
+fn usable(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<TriangleMesh, Vec<ObjError>> {
+    TriangleMesh::new(positions, triangles).map_err(|error| vec![ObjError::Unusable(error)])
 }
 
 /// What was left out.
@@ -173,8 +179,7 @@ fn smallest_first([a, b, c]: [u32; 3]) -> [u32; 3] {
 /// Whether [`TriangleMesh`] takes it.
 fn has_area(positions: &[Vec3], triangle: [u32; 3]) -> bool {
     let [a, b, c] = triangle.map(|vertex| positions[vertex as usize]);
-    let doubled_area = (b - a).cross(c - a).length();
-    doubled_area.is_finite() && doubled_area > 0.0
+    (b - a).cross(c - a).length().is_normal()
 }
 
 /// The line of the first polygon with a triangle in its fan that is wound against the others.
@@ -199,19 +204,6 @@ fn first_concave_polygon(scan: &Scan, parsed: &tobj::Mesh) -> Option<usize> {
             .any(|normal| normal.dot(mean) < 0.0)
             .then_some(face.line)
     })
-}
-
-/// Volume in m³ by the divergence theorem: signed tetrahedra from the first vertex.
-fn signed_volume(positions: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
-    let origin = positions[0].as_dvec3();
-    triangles
-        .iter()
-        .map(|triangle| {
-            let [a, b, c] = triangle.map(|vertex| positions[vertex as usize].as_dvec3() - origin);
-            a.dot(b.cross(c))
-        })
-        .sum::<f64>()
-        / 6.0
 }
 
 /// How triangles join at their edges.

@@ -10,7 +10,7 @@ mod clean;
 mod lines;
 mod scan;
 
-use grasp_synthesis::geometry::mesh::TriangleMesh;
+use grasp_synthesis::geometry::mesh::{MeshError, TriangleMesh};
 
 use clean::Cleaned;
 use scan::Scan;
@@ -42,6 +42,11 @@ pub struct ObjMesh {
     /// Vertices (welded, in order of first use) and triangles (in file order, polygons as fans from their first
     /// corner); scaled to metres.
     pub mesh: TriangleMesh,
+    /// For every triangle its place in the file, counted from 0 after polygons were split and before triangles were
+    /// dropped; ascending. It tells which triangles somebody means who counts those of the file.
+    pub places: Vec<u32>,
+    /// How many triangles the file has, with those that were dropped.
+    pub places_in_file: usize,
     /// For every group (`g`), object (`o`) and material (`usemtl`) name: its triangles, ascending. Sorted by name.
     pub groups: Vec<(String, Vec<u32>)>,
     /// What was odd but could be used: dropped triangles without area, unused vertices, open edges, …
@@ -154,6 +159,9 @@ pub enum ObjError {
     /// The parser refused what the scan let pass.
     #[error("the mesh cannot be parsed")]
     Unreadable(#[source] tobj::LoadError),
+    /// The mesh that remains cannot be used.
+    #[error("the mesh cannot be used")]
+    Unusable(#[source] MeshError),
     /// The list is too long.
     #[error("and {0} more violations")]
     More(usize),
@@ -180,11 +188,14 @@ pub fn read_obj(text: &[u8], unit_metres: f32, limits: ObjLimits) -> Result<ObjM
     let Cleaned {
         mesh,
         faces,
+        places,
         warnings,
     } = clean::clean(&scan, unit_metres)?;
     Ok(ObjMesh {
-        groups: scan.groups(&faces),
         mesh,
+        places,
+        places_in_file: scan.triangles,
+        groups: scan.groups(&faces),
         warnings,
     })
 }

@@ -41,6 +41,8 @@ pub(super) struct Scan {
     pub(super) plain: String,
     /// The faces of `plain`.
     pub(super) faces: Vec<Face>,
+    /// The triangles that the faces make.
+    pub(super) triangles: usize,
     /// The vertices of `plain`.
     pub(super) vertices: usize,
     /// Points, lines, and faces of less than three corners.
@@ -61,7 +63,6 @@ impl Scan {
             limits,
             scan: Self::default(),
             violations: Violations::default(),
-            triangles: 0,
             over_limit: false,
             forward: Vec::new(),
             names: HashMap::new(),
@@ -105,7 +106,6 @@ struct Scanner {
     limits: ObjLimits,
     scan: Scan,
     violations: Violations,
-    triangles: usize,
     /// Reading stopped; what comes after is unknown.
     over_limit: bool,
     /// Line and index of corners that name a vertex which had not been read yet.
@@ -187,8 +187,8 @@ impl Scanner {
         if corners.len() < 3 {
             return self.scan.without_area.note(line);
         }
-        self.triangles += corners.len() - 2;
-        if self.triangles > self.limits.triangles {
+        self.scan.triangles += corners.len() - 2;
+        if self.scan.triangles > self.limits.triangles {
             self.over_limit = true;
             let limit = self.limits.triangles;
             return self.violations.push(ObjError::TooManyTriangles { line, limit });

@@ -34,7 +34,13 @@ pub(crate) fn read(text: &str, unit_metres: f32) -> Plain {
     for line in text.lines().map(str::trim) {
         let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
-        let whole = || vec![rest.to_owned()];
+        let whole = || {
+            if rest.is_empty() {
+                vec![]
+            } else {
+                vec![rest.to_owned()]
+            }
+        };
         match keyword {
             "v" => before += 1,
             "g" => group = rest.split_whitespace().map(str::to_owned).collect(),

@@ -30,6 +30,10 @@ fn assert_sound(read: &ObjMesh, limits: ObjLimits) {
     let triangles = read.mesh.triangles().len();
     assert!((1..=limits.triangles).contains(&triangles));
     assert!(read.mesh.positions().len() <= limits.vertices);
+    assert_eq!(read.places.len(), triangles);
+    assert!(read.places.is_sorted_by(|a, b| a < b));
+    assert!((read.places[triangles - 1] as usize) < read.places_in_file);
+    assert!(read.places_in_file <= limits.triangles);
     let mut bits: Vec<_> = read
         .mesh
         .positions()

@@ -120,6 +120,8 @@ fn groups_objects_and_materials_hold_until_replaced() {
         read.groups,
         expected.map(|(name, triangles)| (name.to_owned(), triangles))
     );
+    assert_eq!(read.places, [0, 1, 2, 3, 5]);
+    assert_eq!(read.places_in_file, 6);
 }
 
 #[test]

@@ -3,7 +3,8 @@
 //! A ring runs counter-clockwise about the direction in which the surface is built. Strips between rings then face
 //! outward without further thought. Lengths are millimetres until [`MeshBuilder::finish`].
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
+use grasp_synthesis::geometry::mesh::TriangleMesh;
 
 /// Vertices of a closed curve, in order.
 pub(crate) type Ring = Vec<usize>;
@@ -15,6 +16,24 @@ pub(crate) struct Shape {
     pub(crate) micrometres: Vec<[i64; 3]>,
     /// Group names and their triangles, in the order of the file.
     pub(crate) groups: Vec<(&'static str, Vec<[usize; 3]>)>,
+}
+
+impl Shape {
+    /// The mesh as the synthesis takes it.
+    pub(crate) fn mesh(&self) -> TriangleMesh {
+        let positions = self
+            .micrometres
+            .iter()
+            .map(|vertex| Vec3::from(vertex.map(|coordinate| (coordinate as f64 * 1e-6) as f32)))
+            .collect();
+        let triangles = self
+            .groups
+            .iter()
+            .flat_map(|(_, triangles)| triangles)
+            .map(|triangle| triangle.map(|vertex| vertex as u32))
+            .collect();
+        TriangleMesh::new(positions, triangles).expect("the shapes have sound triangles")
+    }
 }
 
 /// A mesh under construction.

@@ -91,7 +91,6 @@ pub(crate) fn build() -> Shape {
 
     let [heel, belly, tip] = BLADE_Y;
     let [half_width, _] = BLADE;
-    // The heel is cut at a slant, as on real blades: from the back it begins a little later.
     let straight = [heel, heel + 2.0, heel + 8.0, belly].map(|y| (y, half_width));
     let curved = (1..=BELLY_SECTIONS).map(|step| {
         let (sine, cosine) = sin_cos_degrees(BELLY_STEP_DEGREES * step as f64);
@@ -118,7 +117,7 @@ fn blade_group(k: usize) -> &'static str {
     }
 }
 
-/// A rounded rectangle, counter-clockwise about +y, starting on +x just above the middle plane (seen with −z up).
+/// A rounded rectangle, counter-clockwise about +y: from the side at +x over −z.
 fn handle_section(y: f64, half_size: DVec2, radius: f64) -> [DVec3; 16] {
     std::array::from_fn(|k| {
         // Four vertices a corner, 30° apart on its arc.

@@ -71,7 +71,10 @@ const SHANK: [[f64; 5]; 3] = [
 ];
 
 /// Centre of the right finger ring, in millimetres.
-const RING_CENTRE: DVec2 = DVec2::new(17.4, -73.0);
+const RING_CENTRE: DVec2 = DVec2::new(17.7, -73.0);
+
+/// How far the ring's long axis leans outward, in line with the shank, in degrees.
+const RING_LEAN_DEGREES: f64 = 10.0;
 
 /// Half axes of the finger ring's middle line in millimetres. Less the band's half width they leave a hole of
 /// 23 by 33 mm, which a finger of the 95th percentile (about 20 mm at the knuckle) fits through.
@@ -80,8 +83,8 @@ const RING_HALF_AXES: DVec2 = DVec2::new(13.9, 18.9);
 /// Half width and half thickness of the finger ring's band in millimetres.
 const BAND: DVec2 = DVec2::new(2.4, 2.2);
 
-/// Where on the ring the shank meets it, in degrees from +x.
-const RING_FORK_DEGREES: f64 = 114.0;
+/// Where on the ring the shank meets it, in degrees from the ring's short axis on the right.
+const RING_FORK_DEGREES: f64 = 106.0;
 
 /// How far from the fork, in degrees, the ring's own cross-sections begin.
 const RING_START_DEGREES: f64 = 33.0;
@@ -232,7 +235,7 @@ fn handle(mesh: &mut MeshBuilder, start: Ring, side: f64) {
             RING_FORK_DEGREES - RING_START_DEGREES - span * index as f64 / (RING_SECTIONS - 1) as f64;
         let (sine, cosine) = sin_cos_degrees(degrees);
         // Clockwise, so that the outside of the ring is on the left.
-        let forward = DVec2::new(RING_HALF_AXES.x * sine, -RING_HALF_AXES.y * cosine);
+        let forward = leaning(DVec2::new(sine, -cosine) * RING_HALF_AXES);
         let section = section(ring_point(degrees).extend(0.0), forward, BAND);
         let ring = mesh.ring(section.map(turned));
         mesh.strip(&branch, &ring, whole);
@@ -246,7 +249,13 @@ fn handle(mesh: &mut MeshBuilder, start: Ring, side: f64) {
 /// A point of the right finger ring's middle line.
 fn ring_point(degrees: f64) -> DVec2 {
     let (sine, cosine) = sin_cos_degrees(degrees);
-    RING_CENTRE + RING_HALF_AXES * DVec2::new(cosine, sine)
+    RING_CENTRE + leaning(RING_HALF_AXES * DVec2::new(cosine, sine))
+}
+
+/// Turns a direction along the ring's axes as the right ring leans.
+fn leaning(along_axes: DVec2) -> DVec2 {
+    let (sine, cosine) = sin_cos_degrees(RING_LEAN_DEGREES);
+    DVec2::new(cosine, sine).rotate(along_axes)
 }
 
 /// An octagon across `forward`, counter-clockwise about it, starting at its lowest vertex.
