@@ -1,6 +1,9 @@
 //! The first pass over OBJ text: limits, violations, groups, and the plain text that `tobj` is given.
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    collections::{BTreeMap, HashMap},
+    ops::Range,
+};
 
 use super::{
     MAX_COORDINATE_METRES, MAX_NAMES_IN_A_LINE, ObjError, ObjLimits, Violations,
@@ -51,8 +54,10 @@ pub(super) struct Scan {
     pub(super) unknown: Oddity,
     /// Names by index.
     names: Vec<String>,
-    /// Sets of names that faces have in common.
-    name_sets: Vec<Vec<usize>>,
+    /// Sets of names that faces have in common, as ranges of the list below.
+    name_sets: Vec<Range<usize>>,
+    /// Indices of names, set after set.
+    listed_names: Vec<u32>,
 }
 
 impl Scan {
@@ -82,8 +87,11 @@ impl Scan {
     pub(super) fn groups(&self, faces: &[usize]) -> Vec<(String, Vec<u32>)> {
         let mut groups = BTreeMap::<&str, Vec<u32>>::new();
         for (triangle, &face) in faces.iter().enumerate() {
-            for &name in &self.name_sets[self.faces[face].names] {
-                groups.entry(&self.names[name]).or_default().push(triangle as u32);
+            for &name in &self.listed_names[self.name_sets[self.faces[face].names].clone()] {
+                groups
+                    .entry(&self.names[name as usize])
+                    .or_default()
+                    .push(triangle as u32);
             }
         }
         groups
@@ -96,9 +104,9 @@ impl Scan {
 /// The names that hold at a line, as indices.
 #[derive(Debug, Default)]
 struct Names {
-    groups: Vec<usize>,
-    object: Option<usize>,
-    material: Option<usize>,
+    groups: Vec<u32>,
+    object: Option<u32>,
+    material: Option<u32>,
 }
 
 struct Scanner {
@@ -110,7 +118,7 @@ struct Scanner {
     over_limit: bool,
     /// Line and index of corners that name a vertex which had not been read yet.
     forward: Vec<(usize, usize)>,
-    names: HashMap<String, usize>,
+    names: HashMap<String, u32>,
     current: Names,
     names_changed: bool,
 }
@@ -123,7 +131,7 @@ impl Scanner {
         };
         match keyword {
             b"v" => self.vertex(number, &words.collect::<Vec<_>>()),
-            b"f" => self.face(number, &words.collect::<Vec<_>>()),
+            b"f" => self.face(number, words),
             b"p" | b"l" => self.scan.without_area.note(number),
             b"g" => self.groups(number, words.map(String::from_utf8_lossy)),
             b"o" => self.current.object = self.rest_of_line(line, keyword),
@@ -183,18 +191,19 @@ impl Scanner {
         self.pass_on(&numbers[..read]);
     }
 
-    fn face(&mut self, line: usize, corners: &[&[u8]]) {
-        if corners.len() < 3 {
+    fn face<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]> + Clone) {
+        let corners = words.clone().count();
+        if corners < 3 {
             return self.scan.without_area.note(line);
         }
-        self.scan.triangles += corners.len() - 2;
+        self.scan.triangles += corners - 2;
         if self.scan.triangles > self.limits.triangles {
             self.over_limit = true;
             let limit = self.limits.triangles;
             return self.violations.push(ObjError::TooManyTriangles { line, limit });
         }
         self.scan.plain.push('f');
-        for corner in corners {
+        for corner in words {
             match vertex_index(corner) {
                 None => {
                     let text = shown(corner);
@@ -210,15 +219,17 @@ impl Scanner {
                 object,
                 material,
             } = &self.current;
-            let mut set: Vec<usize> = groups.iter().chain(object).chain(material).copied().collect();
+            let mut set: Vec<u32> = groups.iter().chain(object).chain(material).copied().collect();
             set.sort_unstable();
             set.dedup();
-            self.scan.name_sets.push(set);
+            let start = self.scan.listed_names.len();
+            self.scan.listed_names.extend(set);
+            self.scan.name_sets.push(start..self.scan.listed_names.len());
             self.names_changed = false;
         }
         self.scan.faces.push(Face {
             line,
-            corners: corners.len(),
+            corners,
             names: self.scan.name_sets.len() - 1,
         });
     }
@@ -263,18 +274,17 @@ impl Scanner {
     }
 
     /// The name that follows a keyword, which may hold spaces.
-    fn rest_of_line(&mut self, line: &[u8], keyword: &[u8]) -> Option<usize> {
+    fn rest_of_line(&mut self, line: &[u8], keyword: &[u8]) -> Option<u32> {
         let line = line.trim_ascii();
         let name = String::from_utf8_lossy(line[keyword.len()..].trim_ascii());
         (!name.is_empty()).then(|| self.intern(&name))
     }
 
-    fn intern(&mut self, name: &str) -> usize {
+    fn intern(&mut self, name: &str) -> u32 {
         if let Some(&index) = self.names.get(name) {
             return index;
         }
-        let index = self.scan.names.len();
-        self.scan.names.push(name.to_owned());
+        let index = self.names.len() as u32;
         self.names.insert(name.to_owned(), index);
         index
     }
@@ -302,6 +312,10 @@ impl Scanner {
             });
         }
         self.violations.into_result()?;
+        self.scan.names = vec![String::new(); self.names.len()];
+        for (name, index) in self.names {
+            self.scan.names[index as usize] = name;
+        }
         Ok(self.scan)
     }
 }
