@@ -114,11 +114,12 @@ fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Vi
             ),
         }
     }
-    let triangles = obj.mesh.triangles().len();
+    // The client counts the triangles of its file; some of those may have been dropped and need not be forbidden.
+    let triangles = obj.places_in_file;
     for (place, &triangle) in fields.forbidden_triangles.iter().enumerate() {
-        if (triangle as usize) < triangles {
-            forbidden.push(triangle);
-        } else {
+        if let Ok(index) = obj.places.binary_search(&triangle) {
+            forbidden.push(index as u32);
+        } else if triangle as usize >= triangles {
             violations.add(
                 field.child("triangles").at(place),
                 format_args!("is {triangle}; the mesh has {triangles} triangles, counted from 0"),
@@ -147,4 +148,42 @@ fn known_groups(obj: &ObjMesh) -> String {
         String::new()
     };
     format!("the mesh has {}{more}", names.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: ObjLimits = ObjLimits {
+        bytes: 1000,
+        vertices: 10,
+        triangles: 10,
+    };
+
+    /// A tetrahedron of 10 cm whose second face has no area and is dropped.
+    fn fields(forbidden_triangles: &[u32]) -> ObjectFields {
+        ObjectFields {
+            id: "tetrahedron".to_owned(),
+            obj: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 1 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+                .to_vec(),
+            unit_metres: 0.1,
+            mass: 0.1,
+            centre_of_mass: None,
+            friction: 0.34,
+            forbidden_groups: Vec::new(),
+            forbidden_triangles: forbidden_triangles.to_vec(),
+        }
+    }
+
+    #[test]
+    fn forbidden_triangles_are_counted_as_in_the_file() {
+        let stored = build_object(fields(&[1, 2, 4]), LIMITS, Violations::default()).unwrap();
+        let forbidden: Vec<bool> = (0..4).map(|t| stored.object.is_forbidden(t)).collect();
+        assert_eq!(forbidden, [false, true, false, true]);
+    }
+
+    #[test]
+    fn triangles_beyond_the_file_are_refused() {
+        assert!(build_object(fields(&[5]), LIMITS, Violations::default()).is_err());
+    }
 }
