@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use super::Segment;
+
 /// A box with its faces square to the axes, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
@@ -35,6 +37,13 @@ impl Aabb {
     /// True if the point lies inside or on a face.
     pub fn contains(&self, point: Vec3) -> bool {
         point.cmpge(self.min).all() && point.cmple(self.max).all()
+    }
+
+    /// False only if the segment certainly passes the box: if all of it lies on the outer side of one face.
+    pub fn may_meet(&self, segment: Segment) -> bool {
+        let low = segment.start.min(segment.end);
+        let high = segment.start.max(segment.end);
+        low.cmple(self.max).all() && high.cmpge(self.min).all()
     }
 
     /// Edge lengths in metres.

@@ -35,7 +35,7 @@ pub(super) struct Query {
     /// By axis: 0 if the segment runs toward larger coordinates, 1 if toward smaller ones.
     near: [usize; 3],
     length: f32,
-    exact: ExactQuery,
+    segment: Segment,
 }
 
 impl Query {
@@ -59,10 +59,7 @@ impl Query {
                 usize::from(inverse.z < 0.0),
             ],
             length: direction.length(),
-            exact: ExactQuery {
-                start: segment.start.as_dvec3(),
-                direction: segment.end.as_dvec3() - segment.start.as_dvec3(),
-            },
+            segment,
         }
     }
 
@@ -210,9 +207,10 @@ pub(super) fn crosses_any(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) 
 /// True if the segment crosses one of the possible triangles of a pack.
 #[cold]
 fn any_crossing(query: &Query, pack: &TrianglePack, possible: BVec4A, mesh: &TriangleMesh) -> bool {
+    let exact = ExactQuery::new(query.segment);
     lanes(possible.bitmask()).any(|lane| {
         let corners = mesh.corners(pack.triangle(lane) as usize);
-        query.exact.crossing(corners).is_some()
+        exact.crossing(corners).is_some()
     })
 }
 
@@ -220,6 +218,7 @@ fn any_crossing(query: &Query, pack: &TrianglePack, possible: BVec4A, mesh: &Tri
 /// with the lowest index.
 pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Option<(u32, Crossing)> {
     let query = Query::new(segment);
+    let exact = ExactQuery::new(segment);
     let mut best: Option<(u32, Crossing)> = None;
     let mut t_max = Vec4::ONE;
     bvh.with_stack(|stack: &mut [ChildRef]| {
@@ -238,7 +237,7 @@ pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Opt
                     let pack = &bvh.packs[index];
                     for lane in lanes(query.filter(pack).1.bitmask()) {
                         let triangle = pack.triangle(lane);
-                        let Some(crossing) = query.exact.crossing(mesh.corners(triangle as usize)) else {
+                        let Some(crossing) = exact.crossing(mesh.corners(triangle as usize)) else {
                             continue;
                         };
                         let nearer = best.is_none_or(|(other, known)| {
@@ -264,6 +263,7 @@ pub(super) fn visit_all(
     mut visit: impl FnMut(ExactCrossing) -> bool,
 ) {
     let query = Query::new(segment);
+    let exact = ExactQuery::new(segment);
     bvh.with_stack(|stack: &mut [ChildRef]| {
         let mut height = 1;
         while height > 0 {
@@ -280,7 +280,7 @@ pub(super) fn visit_all(
                     let pack = &bvh.packs[index];
                     for lane in lanes(query.filter(pack).1.bitmask()) {
                         let corners = mesh.corners(pack.triangle(lane) as usize);
-                        if !visit(query.exact.test(corners)) {
+                        if !visit(exact.test(corners)) {
                             return;
                         }
                     }

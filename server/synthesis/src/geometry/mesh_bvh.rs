@@ -79,12 +79,15 @@ impl MeshBvh {
     /// True if the segment crosses any triangle; its endpoints count. A segment that lies in a triangle's plane does
     /// not cross that triangle, and a segment without length crosses nothing.
     pub fn is_crossed_by(&self, segment: Segment) -> bool {
-        crossing::crosses_any(&self.bvh, &self.mesh, segment)
+        self.aabb.may_meet(segment) && crossing::crosses_any(&self.bvh, &self.mesh, segment)
     }
 
     /// The crossing nearest to the segment's start, by the rules of [`MeshBvh::is_crossed_by`]. Where triangles meet,
     /// the one with the lowest index.
     pub fn first_hit(&self, segment: Segment) -> Option<SegmentHit> {
+        if !self.aabb.may_meet(segment) {
+            return None;
+        }
         let (triangle, crossing) = crossing::first(&self.bvh, &self.mesh, segment)?;
         let start = segment.start.as_dvec3();
         let way = (segment.end.as_dvec3() - start) * crossing.t;
