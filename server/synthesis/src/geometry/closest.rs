@@ -5,17 +5,30 @@ use glam::{DVec3, Vec3, Vec4};
 use super::{
     crossing::{cross, dot, lanes},
     mesh::TriangleMesh,
-    wide_bvh::{Child, ChildRef, Node, TrianglePack, WideBvh},
+    wide_bvh::{Child, ChildRef, Node, TrianglePack, WIDTH, WideBvh},
 };
 
 /// Relative slack of a squared distance to a box: a few roundings, so that a box is never left out by one.
 const BOX_SLACK: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// A child that waits, with the squared distance to its box.
-#[derive(Clone, Copy, Default)]
-struct Waiting {
-    squared_distance: f32,
-    child: ChildRef,
+/// A child that waits, and the squared distance to its box above it in one number, so that sorting needs no branches:
+/// the bits of floats that are not negative sort like the floats. 0, a place that the root never takes, stands for no
+/// child.
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Waiting(u64);
+
+impl Waiting {
+    fn new(squared_distance: f32, child: ChildRef) -> Self {
+        Self(u64::from(squared_distance.to_bits()) << 32 | u64::from(child.to_bits()))
+    }
+
+    fn squared_distance(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
+    }
+
+    fn child(self) -> Child {
+        ChildRef::from_bits(self.0 as u32).child()
+    }
 }
 
 /// The triangle that is closest to a point, the closest point on it and its distance, if that is at most
@@ -37,34 +50,26 @@ pub(super) fn closest(
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let Waiting {
-                squared_distance,
-                child,
-            } = stack[height];
-            if squared_distance > best {
+            let waiting = stack[height];
+            if waiting.squared_distance() > best {
                 continue;
             }
-            match child.child() {
+            match waiting.child() {
                 Child::Node(index) => {
                     let node = &bvh.nodes[index];
                     let distances = box_distances(node, &splat);
                     let near = distances.cmple(Vec4::splat(best)).bitmask();
                     let distances = distances.to_array();
-                    let base = height;
-                    for lane in lanes(near) {
-                        let waiting = Waiting {
-                            squared_distance: distances[lane],
-                            child: node.children[lane],
-                        };
-                        // Insertion by falling distance: the closest child is taken up next.
-                        let mut place = height;
-                        while place > base && stack[place - 1].squared_distance < waiting.squared_distance {
-                            stack[place] = stack[place - 1];
-                            place -= 1;
+                    let children = sorted_falling(std::array::from_fn(|lane| {
+                        if near >> lane & 1 == 1 {
+                            Waiting::new(distances[lane], node.children[lane])
+                        } else {
+                            Waiting::default()
                         }
-                        stack[place] = waiting;
-                        height += 1;
-                    }
+                    }));
+                    // The closest child is taken up next; what is no child is overwritten.
+                    stack[height..height + WIDTH].copy_from_slice(&children);
+                    height += near.count_ones() as usize;
                 }
                 Child::Pack(index) => {
                     let pack = &bvh.packs[index];
@@ -84,6 +89,18 @@ pub(super) fn closest(
     let exact = closest_on_triangle(mesh.corners(triangle as usize), point.as_dvec3());
     let distance = exact.distance(point.as_dvec3());
     (distance <= f64::from(max_distance)).then_some((triangle, exact.as_vec3(), distance as f32))
+}
+
+/// Sorts four children, the farthest first, by the shortest sorting network.
+#[inline]
+fn sorted_falling(mut children: [Waiting; WIDTH]) -> [Waiting; WIDTH] {
+    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
+        (children[i], children[j]) = (
+            children[i].max(children[j]),
+            children[i].min(children[j]),
+        );
+    }
+    children
 }
 
 /// Squared distances to the boxes of a node's children; 0 inside, ∞ for unused children.

@@ -174,7 +174,9 @@ impl ExactQuery {
     }
 }
 
-/// True if the segment crosses any triangle; endpoints count.
+/// True if the segment crosses any triangle; endpoints count. Not inlined, so that the stack is not prepared for the
+/// many segments that pass the mesh's box.
+#[inline(never)]
 pub(super) fn crosses_any(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> bool {
     let query = Query::new(segment);
     bvh.with_stack(|stack: &mut [ChildRef]| {

@@ -78,6 +78,7 @@ impl MeshBvh {
 
     /// True if the segment crosses any triangle; its endpoints count. A segment that lies in a triangle's plane does
     /// not cross that triangle, and a segment without length crosses nothing.
+    #[inline]
     pub fn is_crossed_by(&self, segment: Segment) -> bool {
         self.aabb.may_meet(segment) && crossing::crosses_any(&self.bvh, &self.mesh, segment)
     }

@@ -86,6 +86,16 @@ impl ChildRef {
         }
     }
 
+    /// The four bytes.
+    pub(super) fn to_bits(self) -> u32 {
+        self.0
+    }
+
+    /// The inverse of [`ChildRef::to_bits`].
+    pub(super) fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
     /// What it refers to.
     #[inline]
     pub(super) fn child(self) -> Child {
@@ -239,8 +249,9 @@ impl WideBvh {
             }
             wide.nodes[slot] = node;
         }
-        // Each level leaves at most three siblings behind while the fourth is entered.
-        wide.stack_bound = 3 * depth + 1;
+        // Each level leaves at most three siblings behind while the fourth is entered, and a query may write a whole
+        // node's children at once before it counts them.
+        wide.stack_bound = 3 * depth + WIDTH;
         wide
     }
 
