@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3, Vec4};
 
 use super::{
+    aabb::Aabb,
     crossing::{cross, dot, lanes},
     mesh::TriangleMesh,
     wide_bvh::{Child, ChildRef, Node, TrianglePack, WIDTH, WideBvh},
@@ -31,8 +32,19 @@ impl Waiting {
     }
 }
 
+/// Relative slack of a distance to the mesh's box, for the same reason.
+const AABB_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
+
+/// True if no point of a mesh in this box can be within `max_distance` of the point.
+#[inline]
+pub(super) fn is_beyond(aabb: &Aabb, point: Vec3, max_distance: f32) -> bool {
+    aabb.distance(point) > max_distance * AABB_SLACK
+}
+
 /// The triangle that is closest to a point, the closest point on it and its distance, if that is at most
 /// `max_distance` metres.
+// Not inlined, so that the stack is not prepared for points far away.
+#[inline(never)]
 pub(super) fn closest(
     bvh: &WideBvh,
     mesh: &TriangleMesh,
@@ -95,10 +107,7 @@ pub(super) fn closest(
 #[inline]
 fn sorted_falling(mut children: [Waiting; WIDTH]) -> [Waiting; WIDTH] {
     for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
-        (children[i], children[j]) = (
-            children[i].max(children[j]),
-            children[i].min(children[j]),
-        );
+        (children[i], children[j]) = (children[i].max(children[j]), children[i].min(children[j]));
     }
     children
 }

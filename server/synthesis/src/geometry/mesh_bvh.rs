@@ -102,6 +102,9 @@ impl MeshBvh {
     /// The closest point of the surface, if it is at most `max_distance` metres away. Where several triangles are
     /// equally close within rounding, any of them.
     pub fn closest_point_within(&self, point: Vec3, max_distance: f32) -> Option<ClosestPoint> {
+        if closest::is_beyond(&self.aabb, point, max_distance) {
+            return None;
+        }
         let (triangle, position, distance) = closest::closest(&self.bvh, &self.mesh, point, max_distance)?;
         Some(ClosestPoint {
             position,
