@@ -37,7 +37,7 @@ impl Random {
         loop {
             let v = self.in_cube();
             if (0.01..=1.0).contains(&v.length_squared()) {
-                return v.normalize();
+                return v.normalize_or(Vec3::X);
             }
         }
     }
