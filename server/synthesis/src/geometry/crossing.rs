@@ -127,6 +127,14 @@ pub(super) enum ExactCrossing {
 }
 
 impl ExactQuery {
+    /// Prepares a segment.
+    pub(super) fn new(segment: Segment) -> Self {
+        Self {
+            start: segment.start.as_dvec3(),
+            direction: segment.end.as_dvec3() - segment.start.as_dvec3(),
+        }
+    }
+
     /// Tests a triangle by the signed volumes of the segment's line with its three edges. Two triangles that share an
     /// edge compute the same volume but for its sign, so that nothing slips through between them (S. Woop, C. Benthin,
     /// I. Wald: Watertight Ray/Triangle Intersection, 2013). A segment in the plane of a triangle does not cross it.
@@ -290,16 +298,6 @@ pub(super) fn visit_all(
             }
         }
     });
-}
-
-impl ExactQuery {
-    /// Prepares a segment.
-    pub(super) fn new(segment: Segment) -> Self {
-        Self {
-            start: segment.start.as_dvec3(),
-            direction: segment.end.as_dvec3() - segment.start.as_dvec3(),
-        }
-    }
 }
 
 /// The set bits of a mask, lowest first.
