@@ -1,12 +1,38 @@
-//! The 15 built-in holdouts, named as in the thesis (Figures 5.2 to 5.4). To come; the interface is fixed.
+//! The 15 built-in holdouts, named as in the thesis (Figures 5.2 to 5.4).
+//!
+//! Each is one JSON file under `holdouts/`, written by `grasp-assets-generator`; its fields are those of
+//! [`BuiltInHoldout`]. Lengths are in metres, angles in radians, quaternions in the order x y z w, and transforms
+//! read `a_from_b`:
+//!
+//! ```json
+//! {
+//!   "name": "scalpel-genhold3",
+//!   "object": "scalpel",
+//!   "grasp_type": "Palmar Pinch",
+//!   "origin": { "synthesized": { "seed": 1, "attempt": 2, "strategy": "F", "bend_ratios": "one_random",
+//!                                "friction": 0.34, "up": [0.0, 1.0, 0.0] } },
+//!   "world_from_object": { "position": [0.0, 0.0, 0.0], "orientation": [0.0, 0.0, 0.0, 1.0] },
+//!   "giver_rig": "thesis",
+//!   "giver_handedness": "right",
+//!   "world_from_giver_wrist": { "position": [0.0, 0.0, -0.1], "orientation": [0.0, 0.0, 0.0, 1.0] },
+//!   "giver_digits": [ { "base_yaw": 0.0, "base_pitch": 0.0, "second_pitch": 0.0, "third_pitch": 0.0 }, … ]
+//! }
+//! ```
+//!
+//! `origin` is `"manual"` for the Holds. The digits run from the thumb to the little finger.
+
+use std::sync::LazyLock;
 
 use glam::Vec3;
 use grasp_synthesis::{
-    hand::{DigitAngles, HandPose, Handedness},
-    holdout::{Holdout, PresentingHandError},
+    hand::{DigitAngles, HandPose, Handedness, joints::HandJoints},
+    holdout::{Holdout, PresentingHand, PresentingHandError},
     pose::Pose,
+    strategy::{BendRatioChoice, Strategy},
 };
 use serde::{Deserialize, Serialize};
+
+use crate::{hands, objects};
 
 /// How a holdout came to be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,17 +40,27 @@ use serde::{Deserialize, Serialize};
 pub enum Origin {
     /// Posed by hand after a real-world hold.
     Manual,
-    /// Found by the project's own synthesis.
+    /// Found by the project's own synthesis on the free object, with the giver's rig: what attempt `attempt` of the
+    /// search below returns.
     Synthesized {
         /// The seed of the search.
         seed: u64,
         /// The index of its attempt.
         attempt: u64,
+        /// The step of the ladder.
+        strategy: Strategy,
+        /// Which bend ratios a digit tried.
+        bend_ratios: BendRatioChoice,
+        /// Coefficient of static friction.
+        friction: f32,
+        /// Against gravity, in the object's frame: a unit vector.
+        up: Vec3,
     },
 }
 
 /// An object held out by a giver.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct BuiltInHoldout {
     /// "remote-genhold1" and so on: object, a hyphen, the thesis' name in lower case.
     pub name: String,
@@ -46,6 +82,20 @@ pub struct BuiltInHoldout {
     pub giver_digits: [DigitAngles; 5],
 }
 
+/// Why a holdout cannot be made ready.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum HoldoutError {
+    /// The object is not a built-in one.
+    #[error("object {0:?} does not exist")]
+    UnknownObject(String),
+    /// The giver's rig is not a built-in one.
+    #[error("giver_rig {0:?} does not exist; the rigs are {known:?}", known = hands::RIG_NAMES)]
+    UnknownRig(String),
+    /// The giver's pose collapses the skin.
+    #[error(transparent)]
+    PresentingHand(#[from] PresentingHandError),
+}
+
 impl BuiltInHoldout {
     /// The giver's hand in the world.
     pub fn giver_pose(&self) -> HandPose {
@@ -58,16 +108,55 @@ impl BuiltInHoldout {
     /// The holdout in the object's frame, ready to be searched.
     ///
     /// # Errors
-    /// The giver's pose collapses the skin.
-    pub fn to_holdout(&self) -> Result<Holdout, PresentingHandError> {
-        let _ = Vec3::Y;
-        Err(PresentingHandError::Collapsed)
+    /// The object or the rig is not built in, or the giver's pose collapses the skin. Never for one of
+    /// [`holdouts`].
+    pub fn to_holdout(&self) -> Result<Holdout, HoldoutError> {
+        let built_in =
+            objects::object(&self.object).ok_or_else(|| HoldoutError::UnknownObject(self.object.clone()))?;
+        let hand = hands::hand(&self.giver_rig, self.giver_handedness)
+            .ok_or_else(|| HoldoutError::UnknownRig(self.giver_rig.clone()))?;
+        let object_from_world = self.world_from_object.inverse();
+        let joints_in_world = HandJoints::of_pose(&hand.rig, &self.giver_pose());
+        Ok(Holdout {
+            object: built_in.object.clone(),
+            presenting_hand: Some(PresentingHand::in_frame(
+                &hand.skin,
+                &joints_in_world,
+                object_from_world,
+            )?),
+            up: object_from_world.transform_vector(Vec3::Y),
+        })
     }
 }
 
+/// The files, by object and then by name.
+const FILES: [&str; 15] = [
+    include_str!("../holdouts/remote-genhold1.json"),
+    include_str!("../holdouts/remote-genhold2.json"),
+    include_str!("../holdouts/remote-genhold3.json"),
+    include_str!("../holdouts/remote-hold1.json"),
+    include_str!("../holdouts/remote-hold2.json"),
+    include_str!("../holdouts/scalpel-genhold1.json"),
+    include_str!("../holdouts/scalpel-genhold2.json"),
+    include_str!("../holdouts/scalpel-genhold3.json"),
+    include_str!("../holdouts/scalpel-hold1.json"),
+    include_str!("../holdouts/scalpel-hold2.json"),
+    include_str!("../holdouts/scissors-genhold1.json"),
+    include_str!("../holdouts/scissors-genhold2.json"),
+    include_str!("../holdouts/scissors-genhold3.json"),
+    include_str!("../holdouts/scissors-hold1.json"),
+    include_str!("../holdouts/scissors-hold2.json"),
+];
+
 /// All built-in holdouts, by object and then by name, parsed once.
 pub fn holdouts() -> &'static [BuiltInHoldout] {
-    &[]
+    static HOLDOUTS: LazyLock<Vec<BuiltInHoldout>> = LazyLock::new(|| {
+        FILES
+            .iter()
+            .map(|text| serde_json::from_str(text).expect("the embedded holdouts are valid"))
+            .collect()
+    });
+    &HOLDOUTS
 }
 
 /// A built-in holdout by name.

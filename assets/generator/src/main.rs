@@ -35,6 +35,23 @@ struct Arguments {
     /// Writes nothing; compares with the files that are there and exits with 1 if any differs.
     #[arg(long)]
     check: bool,
+
+    /// Looks for better synthesized holdouts with this many seeds and records what was chosen, instead of making
+    /// anything; takes minutes.
+    #[arg(long, value_name = "SEEDS", num_args = 0..=1, default_missing_value = "200")]
+    search: Option<u64>,
+
+    /// Searches for, measures or draws only the holdouts whose names contain this.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    only: String,
+
+    /// Measures the holdouts, including how many attempts a receiver needs, instead of making anything.
+    #[arg(long)]
+    report: bool,
+
+    /// Draws the holdouts into this folder instead of making anything.
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
 }
 
 /// A part of the assets.
@@ -67,6 +84,16 @@ impl Section {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    if arguments.report {
+        holdouts::report(&arguments.only);
+        return ExitCode::SUCCESS;
+    }
+    if let Some(seeds) = arguments.search {
+        return exit_code("the selection", holdouts::search(seeds, &arguments.only));
+    }
+    if let Some(folder) = &arguments.pictures {
+        return exit_code("the pictures", holdouts::pictures(folder, &arguments.only));
+    }
     let files = arguments.section.generate();
     if arguments.check {
         return check(&arguments.out, &files);
@@ -79,6 +106,17 @@ fn main() -> ExitCode {
         println!("{path}: {} bytes", bytes.len());
     }
     ExitCode::SUCCESS
+}
+
+/// Says what could not be written.
+fn exit_code(what: &str, result: io::Result<()>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{what} cannot be written: {error}");
+            ExitCode::FAILURE
+        }
+    }
 }
 
 /// Writes a file and the folders above it.

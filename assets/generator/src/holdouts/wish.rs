@@ -1,0 +1,95 @@
+//! What a grasp of a type looks like, and how far a grasp of the synthesis is from it.
+
+use glam::Vec3;
+use grasp_synthesis::hand::{Digit, HandPose, Phalanx};
+
+use serde::Deserialize;
+
+use super::{judge::Figures, posing::Side};
+
+/// What the palm does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum PalmWish {
+    /// The object is pressed into it.
+    Touches,
+    /// It stays away, as in every precision grasp.
+    Away,
+    /// Either.
+    Any,
+}
+
+/// How a grasp type looks on an object.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct Wish {
+    /// The links that should touch, and with which side.
+    pub(crate) touching: Vec<(Digit, Phalanx, Side)>,
+    /// The digits that should not.
+    pub(crate) idle: Vec<Digit>,
+    /// The palm.
+    pub(crate) palm: PalmWish,
+    /// Where the object should be held, in millimetres of its frame.
+    pub(crate) held_at_mm: [f32; 3],
+    /// How far from there is as good, in millimetres.
+    pub(crate) near_mm: f32,
+    /// The least share of the surface that the hand should cover, and the most.
+    pub(crate) covered: (f32, f32),
+}
+
+/// How far a hand is from the wish, in about millimetres: 0 is a picture-book grasp, 10 is hard to recognise.
+pub(crate) fn misfit(wish: &Wish, figures: &Figures, pose: &HandPose) -> f32 {
+    let mm = |metres: f32| metres * 1e3;
+    let beyond = |value: f32, allowed: f32| (value - allowed).max(0.0);
+
+    // Nothing sunk into anything.
+    let mut cost = 1.5 * beyond(mm(figures.depth()), 1.0)
+        + 1.0 * beyond(mm(figures.self_overlap), 1.5)
+        + 1.0 * mm(figures.forearm_overlap);
+
+    // The links of the type touch, with the right side.
+    let mut centre = Vec3::ZERO;
+    let (mut thumb, mut fingers) = (Vec3::ZERO, Vec3::ZERO);
+    for &(digit, phalanx, side) in &wish.touching {
+        let link = figures.links[digit.index()][phalanx.index()];
+        cost += beyond(mm(link.clearance), 0.5) + 4.0 * (1.0 - link.side.dot(side.direction()));
+        centre += link.closest / wish.touching.len() as f32;
+        if digit == Digit::Thumb {
+            thumb += link.towards;
+        } else {
+            fingers += link.towards;
+        }
+    }
+    // The thumb opposes the fingers.
+    cost += 5.0 * (1.0 + thumb.normalize_or_zero().dot(fingers.normalize_or_zero()));
+
+    // The others keep away.
+    for digit in &wish.idle {
+        let nearest = figures.links[digit.index()]
+            .iter()
+            .map(|link| link.clearance)
+            .fold(f32::INFINITY, f32::min);
+        cost += 0.7 * beyond(2.0, mm(nearest));
+    }
+    cost += match wish.palm {
+        PalmWish::Touches => 0.4 * beyond(mm(figures.palm), 2.0),
+        PalmWish::Away => 0.3 * beyond(15.0, mm(figures.palm)),
+        PalmWish::Any => 0.0,
+    };
+
+    // Neighbouring fingers that touch bend alike; a touching finger beside a stretched one is hard to hold.
+    let bend = |digit: usize| {
+        let angles = pose.digits[digit];
+        angles.base_pitch + angles.second_pitch
+    };
+    for finger in 1..4 {
+        cost += 1.0 * beyond((bend(finger) - bend(finger + 1)).abs(), 0.35);
+    }
+
+    cost + 0.15 * beyond((centre * 1e3).distance(Vec3::from(wish.held_at_mm)), wish.near_mm)
+}
+
+/// How far a coverage is from the wish, in the units of [`misfit`].
+pub(crate) fn coverage_misfit(wish: &Wish, covered: f32) -> f32 {
+    let (least, most) = wish.covered;
+    30.0 * ((least - covered).max(0.0) + (covered - most).max(0.0))
+}
