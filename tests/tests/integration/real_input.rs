@@ -1,0 +1,173 @@
+//! Real meshes, held by recorded hands, over real gRPC.
+
+use std::path::Path;
+
+use glam::{Quat, Vec3};
+use grasp_assets::hands::hand;
+use grasp_client::{
+    FindAnswer, FindRequest, GraspClient, HandJoints, JointPose, JointSet, NewObject, Outcome, Pose,
+    PresentingHand, Strategy,
+};
+use grasp_synthesis::{
+    hand::{Handedness, joints},
+    object::{GraspObject, THESIS_FRICTION},
+};
+use grasp_tests::{
+    TestServer,
+    giver::{GiverPlacement, place_giver},
+    pictures::{self, Picture},
+    recorded::{RecordedPose, data_folder_or_skip, read_poses},
+};
+
+/// Files of `objects/` with typical masses in kilograms of such things.
+const OBJECTS: [(&str, f32); 11] = [
+    ("osim_banana", 0.12),
+    ("osim_hammer", 0.5),
+    ("osim_knife", 0.08),
+    ("osim_mug", 0.3),
+    ("osim_phone", 0.18),
+    ("osim_scissors", 0.05),
+    ("osim_toothbrush", 0.02),
+    ("osim_wineglass", 0.15),
+    ("xr_google-daydream", 0.04),
+    ("xr_logitech-mx-ink", 0.03),
+    ("xr_oculus-go", 0.11),
+];
+
+/// Recorded poses whose fingers surround something.
+const POSES: [(&str, &str, Handedness); 5] = [
+    ("handy-work_poses.json", "relax", Handedness::Right),
+    ("handy-work_poses.json", "fist", Handedness::Left),
+    ("godot_xr_tools_poses.json", "Grip 5", Handedness::Right),
+    ("godot_xr_tools_poses.json", "Pinch Large", Handedness::Right),
+    ("godot_xr_tools_poses.json", "Cup", Handedness::Left),
+];
+
+/// At least this many of the poses must be answered with a grasp, for every object.
+const ANSWERED_AT_LEAST: usize = 3;
+
+fn recorded_poses(folder: &Path) -> Vec<RecordedPose> {
+    let adult = hand("adult", Handedness::Right).expect("the adult rig is built in");
+    POSES
+        .iter()
+        .map(|&(file, name, handedness)| {
+            read_poses(&folder.join("poses").join(file), &adult.rig.joint_radii)
+                .into_iter()
+                .find(|pose| pose.name == name && pose.joints.handedness == handedness)
+                .unwrap_or_else(|| panic!("{file} has no {handedness:?} {name}"))
+        })
+        .collect()
+}
+
+/// The giver stands at -Z, the forearm comes from there and slightly from below: the object's pose that makes it so.
+fn client_from_object(placement: &GiverPlacement) -> Pose {
+    let forearm = placement.object_from_wrist.transform_vector(Vec3::Z);
+    let orientation = Quat::from_rotation_arc(forearm, Vec3::new(0.0, -0.3, -1.0).normalize_or(Vec3::NEG_Z));
+    Pose { position: Vec3::new(0.1, 1.2, 0.4), orientation }
+}
+
+fn webxr_joints(pose: &RecordedPose, placement: &GiverPlacement, client_from_object: Pose) -> HandJoints {
+    let object_from_wrist = placement.object_from_wrist;
+    HandJoints {
+        handedness: match pose.joints.handedness {
+            Handedness::Left => grasp_client::Handedness::Left,
+            Handedness::Right => grasp_client::Handedness::Right,
+        },
+        joint_set: JointSet::WebXr25,
+        joints: pose.joints.joints[joints::index::WRIST..]
+            .iter()
+            .map(|joint| {
+                let object_from_joint = object_from_wrist * joint.pose;
+                JointPose {
+                    client_from_joint: Pose {
+                        position: client_from_object.transform_point(object_from_joint.position),
+                        orientation: client_from_object.orientation * object_from_joint.orientation,
+                    },
+                    radius: joint.radius,
+                }
+            })
+            .collect(),
+    }
+}
+
+/// The same mesh as the server reads, for placing the giver.
+fn local_object(obj: &[u8], mass: f32) -> GraspObject {
+    let limits = grasp_assets::obj::ObjLimits { bytes: 1 << 24, vertices: 1 << 20, triangles: 1 << 20 };
+    let read = grasp_assets::obj::read_obj(obj, 1.0, limits).expect("the mesh can be read");
+    GraspObject::new(read.mesh, mass, Vec3::ZERO, THESIS_FRICTION, &[]).expect("the object is sound")
+}
+
+async fn ask(client: &GraspClient, object: &str, giver: HandJoints, client_from_object: Pose) -> FindAnswer {
+    let mut answer = None;
+    // D where F finds nothing in its time: they differ in how forces are chosen.
+    for strategy in [Strategy::F, Strategy::D] {
+        let request = FindRequest {
+            client_from_object,
+            presenting_hand: Some(PresentingHand::Joints(giver.clone())),
+            strategy: Some(strategy),
+            budget: Some(std::time::Duration::from_secs(5)),
+            seed: Some(1),
+            ..FindRequest::new(object)
+        };
+        let found = client.find_grasp(&request).await.expect("the request is valid");
+        if found.outcome == Outcome::Found {
+            return found;
+        }
+        answer = Some(found);
+    }
+    answer.expect("both strategies were asked")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_real_mesh_is_grasped_from_recorded_givers() {
+    let Some(folder) = data_folder_or_skip("every_real_mesh_is_grasped_from_recorded_givers") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let poses = recorded_poses(&folder);
+    let mut failures = Vec::new();
+    for (file, mass) in OBJECTS {
+        let obj = std::fs::read(folder.join("objects").join(format!("{file}.obj"))).expect("the mesh is there");
+        let id = file.replace('_', "-");
+        let created = client
+            .create_object(&NewObject::new(id.as_str(), obj.as_slice(), mass))
+            .await
+            .unwrap_or_else(|error| panic!("{file} cannot be created: {error}"));
+        let object = local_object(&obj, mass);
+        assert_eq!(created.triangle_count as usize, object.surface.mesh().triangles().len(), "{file}");
+
+        let mut answered = 0;
+        for (seed, pose) in poses.iter().enumerate() {
+            let placement = place_giver(&object, &pose.joints, seed as u64);
+            let client_from_object = client_from_object(&placement);
+            let giver = webxr_joints(pose, &placement, client_from_object);
+            let answer = ask(&client, &created.name, giver.clone(), client_from_object).await;
+            println!(
+                "{file} held by {:?} {}: {} digits touch, {:.1} mm deep; {:?} after {} attempts",
+                pose.joints.handedness,
+                pose.name,
+                placement.touching_digits,
+                placement.penetration * 1000.0,
+                answer.outcome,
+                answer.report.attempts,
+            );
+            if let Some(grasp) = &answer.grasp {
+                answered += 1;
+                assert!(grasp.contacts.len() >= 2, "{file}, {}", pose.name);
+                pictures::write(&Picture {
+                    name: &format!("{file} {} {:?}", pose.name, pose.joints.handedness),
+                    mesh: object.surface.mesh(),
+                    client_from_object,
+                    giver: &giver,
+                    grasp,
+                });
+            }
+        }
+        if answered < ANSWERED_AT_LEAST {
+            failures.push(format!("{file}: {answered} of {}", poses.len()));
+        }
+    }
+    assert!(failures.is_empty(), "too few givers were answered: {failures:?}");
+    server.stop().await;
+}
