@@ -1,6 +1,9 @@
 //! Real meshes, held by recorded hands, over real gRPC.
+//!
+//! Every request is kept as JSON in cargo's folder for temporary test files, so that a person can look at the answers:
+//! create the object with `grasp objects create`, then `grasp find --request FILE --mesh FILE.obj --png FILE`.
 
-use std::path::Path;
+use std::{path::Path, time::Duration};
 
 use glam::{Quat, Vec3};
 use grasp_assets::hands::hand;
@@ -15,7 +18,6 @@ use grasp_synthesis::{
 use grasp_tests::{
     TestServer,
     giver::{GiverPlacement, place_giver},
-    pictures::{self, Picture},
     recorded::{RecordedPose, data_folder_or_skip, read_poses},
 };
 
@@ -97,25 +99,37 @@ fn local_object(obj: &[u8], mass: f32) -> GraspObject {
     GraspObject::new(read.mesh, mass, Vec3::ZERO, THESIS_FRICTION, &[]).expect("the object is sound")
 }
 
-async fn ask(client: &GraspClient, object: &str, giver: HandJoints, client_from_object: Pose) -> FindAnswer {
-    let mut answer = None;
-    // D where F finds nothing in its time: they differ in how forces are chosen.
-    for strategy in [Strategy::F, Strategy::D] {
-        let request = FindRequest {
-            client_from_object,
-            presenting_hand: Some(PresentingHand::Joints(giver.clone())),
-            strategy: Some(strategy),
-            budget: Some(std::time::Duration::from_secs(5)),
-            seed: Some(1),
-            ..FindRequest::new(object)
-        };
-        let found = client.find_grasp(&request).await.expect("the request is valid");
-        if found.outcome == Outcome::Found {
-            return found;
-        }
-        answer = Some(found);
+/// Asks with strategy F, then with D where F finds nothing in its time.
+async fn ask(
+    client: &GraspClient,
+    object: &str,
+    giver: HandJoints,
+    client_from_object: Pose,
+) -> (FindRequest, FindAnswer) {
+    let mut request = FindRequest {
+        client_from_object,
+        presenting_hand: Some(PresentingHand::Joints(giver)),
+        strategy: Some(Strategy::F),
+        budget: Some(Duration::from_secs(5)),
+        seed: Some(1),
+        ..FindRequest::new(object)
+    };
+    let mut answer = client.find_grasp(&request).await.expect("the request is valid");
+    if answer.outcome != Outcome::Found {
+        request.strategy = Some(Strategy::D);
+        answer = client.find_grasp(&request).await.expect("the request is valid");
     }
-    answer.expect("both strategies were asked")
+    // A replay of the winning attempt gives the same grasp again.
+    request.only_attempt = answer.report.attempt;
+    (request, answer)
+}
+
+/// Keeps a request where a person can find it.
+fn keep(name: &str, request: &FindRequest) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("real-input");
+    std::fs::create_dir_all(&folder).expect("the folder for temporary files can be written");
+    let json = serde_json::to_string_pretty(request).expect("a request is plain data");
+    std::fs::write(folder.join(format!("{}.json", name.replace(' ', "_"))), json).expect("it can be written");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -142,7 +156,8 @@ async fn every_real_mesh_is_grasped_from_recorded_givers() {
             let placement = place_giver(&object, &pose.joints, seed as u64);
             let client_from_object = client_from_object(&placement);
             let giver = webxr_joints(pose, &placement, client_from_object);
-            let answer = ask(&client, &created.name, giver.clone(), client_from_object).await;
+            let (request, answer) = ask(&client, &created.name, giver, client_from_object).await;
+            keep(&format!("{file} {} {:?}", pose.name, pose.joints.handedness), &request);
             println!(
                 "{file} held by {:?} {}: {} digits touch, {:.1} mm deep; {:?} after {} attempts",
                 pose.joints.handedness,
@@ -155,13 +170,6 @@ async fn every_real_mesh_is_grasped_from_recorded_givers() {
             if let Some(grasp) = &answer.grasp {
                 answered += 1;
                 assert!(grasp.contacts.len() >= 2, "{file}, {}", pose.name);
-                pictures::write(&Picture {
-                    name: &format!("{file} {} {:?}", pose.name, pose.joints.handedness),
-                    mesh: object.surface.mesh(),
-                    client_from_object,
-                    giver: &giver,
-                    grasp,
-                });
             }
         }
         if answered < ANSWERED_AT_LEAST {
