@@ -27,6 +27,8 @@
 //! The command line `grasp` (feature `cli`, on by default) is built on this library; games build it with
 //! `default-features = false`.
 
+#[cfg(feature = "cli")]
+pub mod built_in;
 mod client;
 mod error;
 mod hand;

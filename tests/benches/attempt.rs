@@ -2,19 +2,11 @@
 //!
 //! `cargo bench -p grasp-tests --bench attempt`
 
-use std::{
-    sync::atomic::AtomicBool,
-    time::{Duration, Instant},
-};
+use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use grasp_assets::{hands, holdouts::holdouts};
 use grasp_synthesis::{
-    clock::Clock,
-    hand::{Handedness, rig::Rig},
-    holdout::Holdout,
     object::THESIS_FRICTION,
-    search::{SearchSettings, find_grasp},
     strategy::Strategy,
     synthesis::{
         attempt::{Attempt, Scene},
@@ -22,45 +14,23 @@ use grasp_synthesis::{
         stopwatch::NoStopwatch,
     },
 };
+use grasp_tests::searches::Bench;
 
 /// Seed of every search here.
 const SEED: u64 = 20_180_612;
 
-struct MonotonicClock(Instant);
-
-impl Clock for MonotonicClock {
-    fn now(&self) -> Duration {
-        self.0.elapsed()
-    }
-}
-
-fn receiving_rig() -> &'static Rig {
-    &hands::hand("thesis", Handedness::Right)
-        .expect("the thesis' hand is built in")
-        .rig
-}
-
-fn built_in_holdouts() -> Vec<(String, Holdout)> {
-    holdouts()
-        .iter()
-        .map(|built_in| {
-            let holdout = built_in.to_holdout().expect("built-in holdouts are sound");
-            (built_in.name.clone(), holdout)
-        })
-        .collect()
-}
-
 /// One attempt, prunes included, in turn over all holdouts.
 fn attempt(criterion: &mut Criterion) {
-    let holdouts = built_in_holdouts();
+    let bench = Bench::new(1);
     let mut group = criterion.benchmark_group("attempt");
     group.throughput(Throughput::Elements(1));
     for strategy in Strategy::ALL {
-        let scenes: Vec<Scene<'_>> = holdouts
+        let scenes: Vec<Scene<'_>> = bench
+            .holdouts
             .iter()
             .map(|(_, holdout)| {
                 let ratios = strategy.default_bend_ratios();
-                Scene::new(holdout, receiving_rig(), strategy, ratios, THESIS_FRICTION)
+                Scene::new(holdout, bench.rig, strategy, ratios, THESIS_FRICTION)
             })
             .collect();
         let mut attempt = Attempt::default();
@@ -79,32 +49,16 @@ fn attempt(criterion: &mut Criterion) {
 
 /// A valid grasp with strategy F on one and on two threads; every iteration searches on from where the last one ended.
 fn find(criterion: &mut Criterion) {
-    let clock = MonotonicClock(Instant::now());
-    let stop = AtomicBool::new(false);
     for threads in [1, 2] {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads can be started");
+        let bench = Bench::new(threads);
         let mut group = criterion.benchmark_group(format!("find/{threads}"));
         group.sample_size(10).measurement_time(Duration::from_secs(2));
-        for (name, holdout) in built_in_holdouts() {
-            let mut settings = SearchSettings {
-                seed: SEED,
-                strategy: Strategy::F,
-                bend_ratios: Strategy::F.default_bend_ratios(),
-                friction: THESIS_FRICTION,
-                reproducible: false,
-                first_attempt: 0,
-                max_attempts: u64::MAX,
-                deadline: None,
-                workers: threads,
-                record_step_times: false,
-            };
-            group.bench_function(name, |bencher| {
+        for (index, (built_in, _)) in bench.holdouts.iter().enumerate() {
+            let mut next = 0;
+            group.bench_function(&built_in.name, |bencher| {
                 bencher.iter(|| {
-                    let outcome = find_grasp(&pool, &holdout, receiving_rig(), &settings, &clock, &stop);
-                    settings.first_attempt += outcome.report.attempts;
+                    let outcome = bench.search(index, Strategy::F, SEED, next, u64::MAX - next);
+                    next += outcome.report.attempts;
                     outcome.grasp
                 });
             });

@@ -58,10 +58,14 @@ fn measure(bench: &Bench, holdout: usize, strategy: Strategy, grasps: u64) -> Ce
 
 fn main() {
     let grasps = std::env::args().nth(1).map_or(25, |argument| {
-        argument.parse().ok().filter(|&grasps| grasps > 0).unwrap_or_else(|| {
-            eprintln!("GRASPS is {argument}; it must be a whole number of at least 1");
-            std::process::exit(2);
-        })
+        argument
+            .parse()
+            .ok()
+            .filter(|&grasps| grasps > 0)
+            .unwrap_or_else(|| {
+                eprintln!("GRASPS is {argument}; it must be a whole number of at least 1");
+                std::process::exit(2);
+            })
     });
     let benches = [Bench::new(1), Bench::new(2)];
 
@@ -74,11 +78,20 @@ fn main() {
         }
         let attempts = (ATTEMPTS * benches[0].holdouts.len() as u64) as f64;
         let seconds = started.elapsed().as_secs_f64();
-        println!("| {strategy:?} | {:.0} | {:.2} |", attempts / seconds, seconds * 1e6 / attempts);
+        println!(
+            "| {strategy:?} | {:.0} | {:.2} |",
+            attempts / seconds,
+            seconds * 1e6 / attempts
+        );
     }
 
-    println!("\nper valid grasp, {grasps} a cell: attempts; mean (median) ms on one thread; on two threads\n");
-    println!("| holdout | {} | thesis D |", Strategy::ALL.map(|s| format!("{s:?}")).join(" | "));
+    println!(
+        "\nper valid grasp, {grasps} a cell: attempts; mean (median) ms on one thread; on two threads\n"
+    );
+    println!(
+        "| holdout | {} | thesis D |",
+        Strategy::ALL.map(|s| format!("{s:?}")).join(" | ")
+    );
     println!("|---|{}", "---|".repeat(Strategy::ALL.len() + 1));
     let mut sums = [[0.0; 3]; Strategy::ALL.len()];
     for (index, (built_in, _)) in benches[0].holdouts.iter().enumerate() {
@@ -99,7 +112,12 @@ fn main() {
     print!("| **mean** |");
     let count = benches[0].holdouts.len() as f64;
     for [attempts, one, two] in sums {
-        print!(" {:.0}; {:.2}; {:.2} |", attempts / count, one / count, two / count);
+        print!(
+            " {:.0}; {:.2}; {:.2} |",
+            attempts / count,
+            one / count,
+            two / count
+        );
     }
     println!(" 15,410; 11,581 (F: about 15,000; 5,000) |");
 }

@@ -4,5 +4,6 @@
 pub mod giver;
 mod harness;
 pub mod recorded;
+pub mod searches;
 
 pub use harness::{StoppingServer, TestServer};

@@ -49,10 +49,20 @@ impl Bench {
         Self {
             holdouts: holdouts()
                 .iter()
-                .map(|built_in| (built_in, built_in.to_holdout().expect("built-in holdouts are sound")))
+                .map(|built_in| {
+                    (
+                        built_in,
+                        built_in.to_holdout().expect("built-in holdouts are sound"),
+                    )
+                })
                 .collect(),
-            rig: &hand("thesis", Handedness::Right).expect("the thesis rig is built in").rig,
-            pool: rayon::ThreadPoolBuilder::new().num_threads(workers).build().expect("threads can be had"),
+            rig: &hand("thesis", Handedness::Right)
+                .expect("the thesis rig is built in")
+                .rig,
+            pool: rayon::ThreadPoolBuilder::new()
+                .num_threads(workers)
+                .build()
+                .expect("threads can be had"),
             workers,
         }
     }
@@ -67,7 +77,13 @@ impl Bench {
         first_attempt: u64,
         max_attempts: u64,
     ) -> SearchOutcome {
-        self.search_on(&self.holdouts[holdout].1, strategy, seed, first_attempt, max_attempts)
+        self.search_on(
+            &self.holdouts[holdout].1,
+            strategy,
+            seed,
+            first_attempt,
+            max_attempts,
+        )
     }
 
     /// The same on any holdout.
@@ -105,7 +121,10 @@ impl Bench {
     /// Runs exactly `attempts` attempts of one worker on a holdout, going on after each valid grasp; returns how many
     /// were valid.
     pub fn run_attempts(&self, holdout: usize, strategy: Strategy, seed: u64, attempts: u64) -> u64 {
-        assert_eq!(self.workers, 1, "attempt indices are run in order by one worker only");
+        assert_eq!(
+            self.workers, 1,
+            "attempt indices are run in order by one worker only"
+        );
         let (mut next, mut valid) = (0, 0);
         while next < attempts {
             let outcome = self.search(holdout, strategy, seed, next, attempts - next);

@@ -65,7 +65,10 @@ fn recorded_poses(folder: &Path) -> Vec<RecordedPose> {
 fn client_from_object(placement: &GiverPlacement) -> Pose {
     let forearm = placement.object_from_wrist.transform_vector(Vec3::Z);
     let orientation = Quat::from_rotation_arc(forearm, Vec3::new(0.0, -0.3, -1.0).normalize_or(Vec3::NEG_Z));
-    Pose { position: Vec3::new(0.1, 1.2, 0.4), orientation }
+    Pose {
+        position: Vec3::new(0.1, 1.2, 0.4),
+        orientation,
+    }
 }
 
 fn webxr_joints(pose: &RecordedPose, placement: &GiverPlacement, client_from_object: Pose) -> HandJoints {
@@ -94,7 +97,11 @@ fn webxr_joints(pose: &RecordedPose, placement: &GiverPlacement, client_from_obj
 
 /// The same mesh as the server reads, for placing the giver.
 fn local_object(obj: &[u8], mass: f32) -> GraspObject {
-    let limits = grasp_assets::obj::ObjLimits { bytes: 1 << 24, vertices: 1 << 20, triangles: 1 << 20 };
+    let limits = grasp_assets::obj::ObjLimits {
+        bytes: 1 << 24,
+        vertices: 1 << 20,
+        triangles: 1 << 20,
+    };
     let read = grasp_assets::obj::read_obj(obj, 1.0, limits).expect("the mesh can be read");
     GraspObject::new(read.mesh, mass, Vec3::ZERO, THESIS_FRICTION, &[]).expect("the object is sound")
 }
@@ -142,14 +149,19 @@ async fn every_real_mesh_is_grasped_from_recorded_givers() {
     let poses = recorded_poses(&folder);
     let mut failures = Vec::new();
     for (file, mass) in OBJECTS {
-        let obj = std::fs::read(folder.join("objects").join(format!("{file}.obj"))).expect("the mesh is there");
+        let obj =
+            std::fs::read(folder.join("objects").join(format!("{file}.obj"))).expect("the mesh is there");
         let id = file.replace('_', "-");
         let created = client
             .create_object(&NewObject::new(id.as_str(), obj.as_slice(), mass))
             .await
             .unwrap_or_else(|error| panic!("{file} cannot be created: {error}"));
         let object = local_object(&obj, mass);
-        assert_eq!(created.triangle_count as usize, object.surface.mesh().triangles().len(), "{file}");
+        assert_eq!(
+            created.triangle_count as usize,
+            object.surface.mesh().triangles().len(),
+            "{file}"
+        );
 
         let mut answered = 0;
         for (seed, pose) in poses.iter().enumerate() {
@@ -157,7 +169,10 @@ async fn every_real_mesh_is_grasped_from_recorded_givers() {
             let client_from_object = client_from_object(&placement);
             let giver = webxr_joints(pose, &placement, client_from_object);
             let (request, answer) = ask(&client, &created.name, giver, client_from_object).await;
-            keep(&format!("{file} {} {:?}", pose.name, pose.joints.handedness), &request);
+            keep(
+                &format!("{file} {} {:?}", pose.name, pose.joints.handedness),
+                &request,
+            );
             println!(
                 "{file} held by {:?} {}: {} digits touch, {:.1} mm deep; {:?} after {} attempts",
                 pose.joints.handedness,

@@ -12,12 +12,13 @@ use std::{
 
 use clap::Args;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
-use grasp_client::{FindAnswer, FindRequest, GraspClient, Handedness, Outcome, ReceivingHand};
+use grasp_client::{
+    FindAnswer, FindRequest, GraspClient, Handedness, Outcome, ReceivingHand, built_in::request_for,
+};
 
 use super::{
     EXIT_CODES, Ending,
     failure::Failure,
-    holdout,
     output::Output,
     values::{StrategyName, ViewSize, parse_duration, parse_view_size},
 };
@@ -106,7 +107,7 @@ async fn ask_all(
             strategy: Some(arguments.strategy.into()),
             seed: Some(arguments.seed),
             reproducible: true,
-            ..holdout::request_for(holdout)
+            ..request_for(holdout)
         };
         let start = Instant::now();
         let answer = client.find_grasp(&request).await?;

@@ -9,7 +9,7 @@ use std::{
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{FindAnswer, FindRequest, Outcome};
+use grasp_client::{FindAnswer, FindRequest, Outcome, built_in::request_for};
 use serde::Serialize;
 
 use super::{
@@ -175,7 +175,7 @@ impl Arguments {
     /// The request of the holdout or the file, with the options laid over it.
     async fn to_request(&self) -> Result<FindRequest, Failure> {
         let mut request = match (&self.holdout, &self.request) {
-            (Some(name), _) => holdout::request_for(holdout::built_in(name)?),
+            (Some(name), _) => request_for(holdout::built_in(name)?),
             (None, Some(path)) => {
                 let path = path.clone();
                 blocking(move || read_request(&path)).await?

@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn a_built_in_giver_is_drawn_where_its_holdout_has_it() {
         for holdout in holdouts() {
-            let request = crate::cli::holdout::request_for(holdout);
+            let request = grasp_client::built_in::request_for(holdout);
             let drawn = giver(&request.presenting_hand.unwrap()).unwrap();
             let rig = &hand(&holdout.giver_rig, holdout.giver_handedness).unwrap().rig;
             let expected = synthesis::joints::HandJoints::of_pose(rig, &holdout.giver_pose());
