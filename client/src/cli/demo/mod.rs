@@ -19,6 +19,7 @@ use grasp_client::{
 use super::{
     EXIT_CODES, Ending,
     failure::Failure,
+    holdout,
     output::Output,
     values::{StrategyName, ViewSize, parse_duration, parse_view_size},
 };
