@@ -3,4 +3,6 @@
 #[cfg(feature = "cli")]
 mod cli;
 mod library;
+#[cfg(feature = "cli")]
+mod real_server;
 mod scripted;

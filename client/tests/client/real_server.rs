@@ -1,0 +1,138 @@
+//! The command line with the real server: the demo, pictures, replays.
+
+use crate::cli::{code, json, run, tempfile, text};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_demo_asks_for_every_holdout_and_draws_it() {
+    let folder = tempfile("the_demo").join("pictures");
+    let folder = folder.to_str().unwrap();
+    let output = run(&["demo", "--json", "--out", folder, "--view-size", "48x40"]);
+    // A slow machine may run out of time for a hard holdout, but not for all of them.
+    assert!(matches!(code(&output), 0 | 3), "{}", text(&output.stderr));
+    assert_eq!(text(&output.stderr), "");
+    let results = json(&output.stdout);
+    let grasps = results["grasps"].as_array().unwrap();
+    assert_eq!(grasps.len(), grasp_assets::holdouts::holdouts().len());
+    let found = grasps.iter().filter(|grasp| grasp["outcome"] == "found").count();
+    assert_eq!(results["found"], found);
+    assert!(found > 0);
+    assert_eq!(code(&output) == 0, found == grasps.len());
+    for grasp in grasps {
+        let png = std::fs::read(grasp["picture"].as_str().unwrap()).unwrap();
+        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"), "{}", grasp["holdout"]);
+        let glb = std::fs::read(grasp["scene"].as_str().unwrap()).unwrap();
+        assert!(glb.starts_with(b"glTF"), "{}", grasp["holdout"]);
+    }
+    let overview = std::fs::read(results["overview"].as_str().unwrap()).unwrap();
+    assert!(overview.starts_with(b"\x89PNG\r\n\x1a\n"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_demo_shows_a_table_without_a_progress_bar_where_there_is_no_terminal() {
+    let holdout = &grasp_assets::holdouts::holdouts()[0];
+    let folder = tempfile("the_demo_of_one");
+    let output = run(&[
+        "demo",
+        "--holdout",
+        &holdout.name,
+        "--out",
+        folder.to_str().unwrap(),
+        "--view-size",
+        "48x40",
+    ]);
+    assert_eq!(text(&output.stderr), "");
+    let table = text(&output.stdout);
+    let row = table.lines().find(|line| line.contains(&holdout.object)).unwrap();
+    let short_name = holdout.name.strip_prefix(&holdout.object).unwrap();
+    assert!(row.contains(&short_name[1..]) && row.contains("ms"), "{row}");
+    assert!(folder.join(format!("{}.glb", holdout.name)).exists());
+}
+
+/// Starts the real server on a free port until the test's runtime ends; gives its URL.
+async fn real_server() -> String {
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let forever = std::future::pending();
+    tokio::spawn(grasp_server::run(
+        listener,
+        grasp_server::Config::default(),
+        forever,
+    ));
+    url
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_found_grasp_is_drawn_and_can_be_replayed() {
+    let url = real_server().await;
+    let folder = tempfile("a_found_grasp");
+    let (png, glb) = (folder.join("grasp.png"), folder.join("grasp.glb"));
+    let find = |options: &[&str]| {
+        let common = [
+            "find",
+            "--holdout",
+            "scissors-hold1",
+            "--budget",
+            "10s",
+            "--json",
+            "--server",
+            &url,
+        ];
+        let output = run(&[&common[..], options].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        json(&output.stdout)
+    };
+    let answer = find(&[
+        "--png",
+        png.to_str().unwrap(),
+        "--glb",
+        glb.to_str().unwrap(),
+        "--view-size",
+        "48x40",
+    ]);
+    assert!(std::fs::read(png).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
+    let scene = std::fs::read(glb).unwrap();
+    for part in [
+        "object",
+        "giver_hand",
+        "receiver_hand",
+        "contact_thumb",
+        "force_thumb",
+    ] {
+        assert!(
+            scene.windows(part.len()).any(|bytes| bytes == part.as_bytes()),
+            "{part}"
+        );
+    }
+    let report = &answer["report"];
+    let attempt = report["attempt"].to_string();
+    let again = find(&[
+        "--seed",
+        report["seed"].as_str().unwrap(),
+        "--only-attempt",
+        &attempt,
+    ]);
+    assert_eq!(again["grasp"], answer["grasp"]);
+    assert_eq!(again["report"]["attempts"], 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_picture_of_an_object_without_a_mesh_is_refused_before_the_search() {
+    let folder = tempfile("a_picture_without_a_mesh");
+    let request = folder.join("request.json");
+    std::fs::write(&request, r#"{"object": "objects/mug"}"#).unwrap();
+    let output = run(&[
+        "find",
+        "--request",
+        request.to_str().unwrap(),
+        "--png",
+        folder.join("mug.png").to_str().unwrap(),
+        "--server",
+        "http://[::1]:1",
+    ]);
+    assert_eq!(code(&output), 2);
+    assert!(
+        text(&output.stderr).contains("--mesh"),
+        "{}",
+        text(&output.stderr)
+    );
+}
