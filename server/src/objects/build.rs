@@ -152,6 +152,13 @@ fn known_groups(obj: &ObjMesh) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
+    use proptest::{
+        prelude::*,
+        test_runner::{Config, RngSeed, TestRunner},
+    };
+
     use super::*;
 
     const LIMITS: ObjLimits = ObjLimits {
@@ -185,5 +192,83 @@ mod tests {
     #[test]
     fn triangles_beyond_the_file_are_refused() {
         assert!(build_object(fields(&[5]), LIMITS, Violations::default()).is_err());
+    }
+
+    const ROOMY: ObjLimits = ObjLimits {
+        bytes: 1 << 16,
+        vertices: 1000,
+        triangles: 1000,
+    };
+
+    /// Text with a group "lid", whose first triangle is forbidden too.
+    fn text_fields(obj: String, unit_metres: f32) -> ObjectFields {
+        ObjectFields {
+            obj: obj.into_bytes(),
+            unit_metres,
+            forbidden_groups: vec!["lid".to_owned()],
+            ..fields(&[0])
+        }
+    }
+
+    #[test]
+    fn every_text_is_an_object_or_refused() {
+        let lines = "((v|f|g|o|usemtl|vn|l|#)( -?[1-4](\\.[0-9])?){0,5}\\\\?\n){0,12}";
+        let units = prop_oneof![6 => Just(0.01_f32), 1 => Just(1e-6), 1 => Just(1e3)];
+        let config = Config {
+            cases: 1000,
+            rng_seed: RngSeed::Fixed(5),
+            failure_persistence: None,
+            ..Config::default()
+        };
+        let built = Cell::new(0);
+        let outcome = TestRunner::new(config).run(&(lines, units), |(lines, unit_metres)| {
+            let start = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\ng lid\nf 1 2 3\n";
+            match build_object(
+                text_fields(format!("{start}{lines}"), unit_metres),
+                ROOMY,
+                Violations::default(),
+            ) {
+                Ok(stored) => {
+                    built.set(built.get() + 1);
+                    prop_assert!(stored.object.centre_of_mass.is_finite());
+                    prop_assert!(stored.object.forbidden_count() >= 1);
+                }
+                Err(error) => prop_assert!(matches!(error, ServiceError::Invalid(_)), "{}", error),
+            }
+            Ok(())
+        });
+        outcome.unwrap_or_else(|failure| panic!("{failure}"));
+        // The test says something only if texts of both kinds were tried.
+        assert!((100..900).contains(&built.get()), "{built:?}");
+    }
+
+    #[test]
+    fn an_object_without_a_volume_is_warned_about() {
+        let sheet = "g lid\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
+        let stored = build_object(text_fields(sheet, 0.1), ROOMY, Violations::default())
+            .expect("a sheet is an object");
+        assert!(
+            stored
+                .warnings
+                .iter()
+                .any(|warning| warning.contains("centre of mass")),
+            "{:?}",
+            stored.warnings
+        );
+    }
+
+    #[test]
+    fn an_unusually_large_object_is_warned_about() {
+        let beam = "g lid\nv 0 0 0\nv 3 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
+        let stored =
+            build_object(text_fields(beam, 1.0), ROOMY, Violations::default()).expect("a beam is an object");
+        assert!(
+            stored
+                .warnings
+                .iter()
+                .any(|warning| warning.contains("unit_metres")),
+            "{:?}",
+            stored.warnings
+        );
     }
 }
