@@ -26,6 +26,9 @@ pub(crate) struct Wish {
     pub(crate) touching: Vec<(Digit, Phalanx, Side)>,
     /// The digits that should not.
     pub(crate) idle: Vec<Digit>,
+    /// The digits that bend around the object, and by how many degrees at least in their first two joints together.
+    #[serde(default)]
+    pub(crate) bent: Vec<(Digit, f32)>,
     /// The palm.
     pub(crate) palm: PalmWish,
     /// Where the object should be held, in millimetres of its frame.
@@ -51,7 +54,9 @@ pub(crate) fn misfit(wish: &Wish, figures: &Figures, pose: &HandPose) -> f32 {
     let (mut thumb, mut fingers) = (Vec3::ZERO, Vec3::ZERO);
     for &(digit, phalanx, side) in &wish.touching {
         let link = figures.links[digit.index()][phalanx.index()];
-        cost += beyond(mm(link.clearance), 0.5) + 4.0 * (1.0 - link.side.dot(side.direction()));
+        // A side other than the pad is what sets its type apart.
+        let sidedness = if side == Side::Pad { 4.0 } else { 8.0 };
+        cost += beyond(mm(link.clearance), 0.5) + sidedness * (1.0 - link.side.dot(side.direction()));
         centre += link.closest / wish.touching.len() as f32;
         if digit == Digit::Thumb {
             thumb += link.towards;
@@ -71,16 +76,24 @@ pub(crate) fn misfit(wish: &Wish, figures: &Figures, pose: &HandPose) -> f32 {
         cost += 0.7 * beyond(2.0, mm(nearest));
     }
     cost += match wish.palm {
-        PalmWish::Touches => 0.4 * beyond(mm(figures.palm), 2.0),
+        PalmWish::Touches => 0.6 * beyond(mm(figures.palm), 2.0),
         PalmWish::Away => 0.3 * beyond(15.0, mm(figures.palm)),
         PalmWish::Any => 0.0,
     };
 
-    // Neighbouring fingers that touch bend alike; a touching finger beside a stretched one is hard to hold.
     let bend = |digit: usize| {
         let angles = pose.digits[digit];
         angles.base_pitch + angles.second_pitch
     };
+    for &(digit, degrees) in &wish.bent {
+        cost += 0.15 * beyond(degrees, bend(digit.index()).to_degrees());
+    }
+
+    // A thumb that is bent far backward looks broken.
+    let thumb_back = (-pose.digits[0].second_pitch).to_degrees();
+    cost += 0.15 * beyond(thumb_back, 15.0);
+
+    // Neighbouring fingers that touch bend alike; a touching finger beside a stretched one is hard to hold.
     for finger in 1..4 {
         cost += 1.0 * beyond((bend(finger) - bend(finger + 1)).abs(), 0.35);
     }
@@ -91,5 +104,5 @@ pub(crate) fn misfit(wish: &Wish, figures: &Figures, pose: &HandPose) -> f32 {
 /// How far a coverage is from the wish, in the units of [`misfit`].
 pub(crate) fn coverage_misfit(wish: &Wish, covered: f32) -> f32 {
     let (least, most) = wish.covered;
-    30.0 * ((least - covered).max(0.0) + (covered - most).max(0.0))
+    60.0 * ((least - covered).max(0.0) + (covered - most).max(0.0))
 }
