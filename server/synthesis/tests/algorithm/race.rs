@@ -162,6 +162,38 @@ fn exhausted_searches_are_the_same_for_any_number_of_workers() {
     assert_eq!(lowest, miss.wrench_angle.map(|angle| (angle, miss.attempt)));
 }
 
+/// The same for a winner that comes after so many attempts that workers settle their counts on the way.
+#[test]
+fn late_winners_are_the_same_for_any_number_of_workers() {
+    let holdout = held(rod());
+    let (seed, one) = (0..40)
+        .find_map(|seed| {
+            let settings = SearchSettings {
+                seed,
+                ..settings(Strategy::A)
+            };
+            let outcome = search(&holdout, &settings, 1);
+            (outcome.report.attempt? > 15_000).then_some((seed, outcome))
+        })
+        .expect("one of the seeds needs long");
+    assert_eq!(
+        one.report.attempts,
+        one.report.attempt.map_or(0, |index| index + 1)
+    );
+    for (workers, threads) in [(2, 2), (3, 2), (4, 4)] {
+        let settings = SearchSettings {
+            seed,
+            workers,
+            ..settings(Strategy::A)
+        };
+        let many = search(&holdout, &settings, threads);
+        assert_eq!(
+            (many.end, &many.grasp, &many.report),
+            (one.end, &one.grasp, &one.report)
+        );
+    }
+}
+
 /// A search on a pool that is shared by the calls of one test.
 fn search_alone(holdout: &Holdout, settings: &SearchSettings) -> SearchOutcome {
     static POOL: std::sync::OnceLock<rayon::ThreadPool> = std::sync::OnceLock::new();
