@@ -5,5 +5,6 @@ mod placement;
 mod posing;
 mod race;
 mod random;
+mod stopping;
 mod support;
 mod validity;

@@ -1,14 +1,9 @@
-//! The race: reproducible for any number of workers, quick to stop, honest about how it ended.
+//! The race: the same answer for any number of workers, a true report.
 
-use std::{
-    panic::{AssertUnwindSafe, catch_unwind},
-    sync::atomic::{AtomicBool, AtomicU64, Ordering},
-    time::Duration,
-};
+use std::sync::{OnceLock, atomic::AtomicBool};
 
 use glam::Vec3;
 use grasp_synthesis::{
-    clock::Clock,
     grasp::Grasp,
     holdout::Holdout,
     rejection::Rejection,
@@ -20,7 +15,7 @@ use crate::support::{
     FakeClock, bar, floating, held, plate, pool, rig, rod, settings, upright_bar_with_forbidden_ends,
 };
 
-fn search(holdout: &Holdout, settings: &SearchSettings, threads: usize) -> SearchOutcome {
+pub(crate) fn search(holdout: &Holdout, settings: &SearchSettings, threads: usize) -> SearchOutcome {
     let clock = FakeClock::default();
     find_grasp(
         &pool(threads),
@@ -196,7 +191,7 @@ fn late_winners_are_the_same_for_any_number_of_workers() {
 
 /// A search on a pool that is shared by the calls of one test.
 fn search_alone(holdout: &Holdout, settings: &SearchSettings) -> SearchOutcome {
-    static POOL: std::sync::OnceLock<rayon::ThreadPool> = std::sync::OnceLock::new();
+    static POOL: OnceLock<rayon::ThreadPool> = OnceLock::new();
     let clock = FakeClock::default();
     find_grasp(
         POOL.get_or_init(|| pool(1)),
@@ -259,200 +254,6 @@ fn a_search_can_start_inside_its_own_pool() {
             )
         });
         assert_eq!((&inside.grasp, &inside.report), (&outside.grasp, &outside.report));
-    }
-}
-
-/// A flag that is set before the start: nothing runs.
-#[test]
-fn a_set_flag_stops_before_the_first_attempt() {
-    let clock = FakeClock::default();
-    let settings = SearchSettings {
-        workers: 2,
-        ..settings(Strategy::F)
-    };
-    let outcome = find_grasp(
-        &pool(2),
-        &held(bar()),
-        &rig(),
-        &settings,
-        &clock,
-        &AtomicBool::new(true),
-    );
-    assert_eq!(outcome.end, SearchEnd::Stopped);
-    assert_eq!(
-        (outcome.report.attempts, outcome.report.pruned_placements),
-        (0, 0)
-    );
-    assert!(outcome.grasp.is_none() && outcome.report.nearest_miss.is_none());
-}
-
-/// A clock that sets a flag, or panics, when it is looked at for the n-th time.
-struct TrapClock<'a> {
-    looks: AtomicU64,
-    at: u64,
-    stop: Option<&'a AtomicBool>,
-}
-
-impl Clock for TrapClock<'_> {
-    fn now(&self) -> Duration {
-        if self.looks.fetch_add(1, Ordering::SeqCst) == self.at {
-            match self.stop {
-                Some(stop) => stop.store(true, Ordering::SeqCst),
-                None => panic!("the clock fell off the wall"),
-            }
-        }
-        Duration::ZERO
-    }
-}
-
-/// A flag that is set in the middle of an attempt ends it at the next look; the attempt does not count.
-#[test]
-fn a_flag_stops_within_an_attempt() {
-    let holdout = upright_bar_with_forbidden_ends();
-    // Without grasps: as many attempts as there is time for.
-    let endless = SearchSettings {
-        friction: 1.0,
-        max_attempts: u64::MAX,
-        deadline: Some(Duration::MAX),
-        ..settings(Strategy::A)
-    };
-    for at in [1, 2, 5, 17, 100, 1001] {
-        for workers in [1, 3] {
-            let stop = AtomicBool::new(false);
-            let clock = TrapClock {
-                looks: AtomicU64::new(0),
-                at,
-                stop: Some(&stop),
-            };
-            let settings = SearchSettings {
-                workers,
-                ..endless.clone()
-            };
-            let outcome = find_grasp(&pool(workers), &holdout, &rig(), &settings, &clock, &stop);
-            assert_eq!(outcome.end, SearchEnd::Stopped);
-            let looks = clock.looks.into_inner();
-            // Each worker looks at the flag before the clock, so at most one look of each follows.
-            assert!(looks <= at + 1 + workers as u64, "{looks} looks, stopped at {at}");
-            assert_eq!(
-                outcome.report.rejections.iter().sum::<u64>(),
-                outcome.report.attempts
-            );
-            // Strategy A looks once before an attempt and once for each digit.
-            assert!(outcome.report.attempts <= at / 6 + 1);
-        }
-    }
-}
-
-/// A deadline ends the search, and a reproducible search has its grasp or none, never another one.
-#[test]
-fn a_deadline_leaves_the_same_grasp_or_none() {
-    let holdout = held(bar());
-    let whole = search(&holdout, &settings(Strategy::F), 1);
-    // How many looks at the clock it takes one worker.
-    let counting = FakeClock::ticking(1);
-    let patient = SearchSettings {
-        deadline: Some(Duration::MAX),
-        ..settings(Strategy::F)
-    };
-    find_grasp(
-        &pool(1),
-        &holdout,
-        &rig(),
-        &patient,
-        &counting,
-        &AtomicBool::new(false),
-    );
-    let needed = counting.looks();
-    let (mut found, mut missed) = (0, 0);
-    for workers in [1, 2, 3] {
-        let pool = pool(workers);
-        for looks in (1..40).map(|step| step * needed / 20) {
-            let settings = SearchSettings {
-                deadline: Some(Duration::from_nanos(looks)),
-                workers,
-                ..settings(Strategy::F)
-            };
-            let clock = FakeClock::ticking(1);
-            let outcome = find_grasp(
-                &pool,
-                &holdout,
-                &rig(),
-                &settings,
-                &clock,
-                &AtomicBool::new(false),
-            );
-            match outcome.end {
-                SearchEnd::Found => {
-                    assert_eq!((&outcome.grasp, &outcome.report), (&whole.grasp, &whole.report));
-                    found += 1;
-                }
-                SearchEnd::DeadlinePassed => {
-                    assert!(outcome.grasp.is_none() && outcome.report.attempt.is_none());
-                    assert!(clock.looks() <= looks + 2 * workers as u64 + 1);
-                    missed += 1;
-                }
-                other => panic!("ended with {other:?}"),
-            }
-        }
-    }
-    assert!(found > 5 && missed > 5, "{found} found, {missed} missed");
-}
-
-/// A holdout that no placement suits: the search stays inside its first attempt and still ends at the deadline.
-#[test]
-fn a_hopeless_holdout_ends_at_the_deadline() {
-    let mut hopeless = rig();
-    // A palm so far from the wrist that it is never near the object while the wrist is.
-    hopeless.palm = Vec3::new(0.0, 0.0, 5.0);
-    for workers in [1, 2] {
-        let settings = SearchSettings {
-            deadline: Some(Duration::from_nanos(300)),
-            workers,
-            ..settings(Strategy::F)
-        };
-        let clock = FakeClock::ticking(1);
-        let stop = AtomicBool::new(false);
-        let outcome = find_grasp(&pool(workers), &held(bar()), &hopeless, &settings, &clock, &stop);
-        assert_eq!(outcome.end, SearchEnd::DeadlinePassed);
-        assert_eq!(outcome.report.attempts, 0);
-        assert!(outcome.report.pruned_placements > 1000);
-        assert!(clock.looks() <= 300 + 2 * workers as u64 + 1);
-    }
-}
-
-/// A panic in an attempt reaches the caller, stops the other workers and leaves the pool usable.
-#[test]
-fn a_panic_propagates_and_leaves_the_pool_usable() {
-    let (holdout, barren) = (held(bar()), upright_bar_with_forbidden_ends());
-    let endless = SearchSettings {
-        friction: 1.0,
-        max_attempts: u64::MAX,
-        deadline: Some(Duration::MAX),
-        ..settings(Strategy::F)
-    };
-    for workers in [1, 2, 4] {
-        let pool = pool(workers);
-        let stop = AtomicBool::new(false);
-        let trap = TrapClock {
-            looks: AtomicU64::new(0),
-            at: 200,
-            stop: None,
-        };
-        let broken = SearchSettings {
-            workers,
-            ..endless.clone()
-        };
-        let result = catch_unwind(AssertUnwindSafe(|| {
-            find_grasp(&pool, &barren, &rig(), &broken, &trap, &stop)
-        }));
-        assert!(result.is_err());
-        let clock = FakeClock::default();
-        let sound = SearchSettings {
-            workers,
-            ..settings(Strategy::F)
-        };
-        let outcome = find_grasp(&pool, &holdout, &rig(), &sound, &clock, &stop);
-        assert_eq!(outcome.end, SearchEnd::Found);
     }
 }
 

@@ -419,11 +419,22 @@ fn collisions_are_told_apart() {
         collision_at(hall(), None, Vec3::ZERO),
         Some(Rejection::PalmCollision)
     );
-    // One that holds one finger with its bones, and nothing else: a sleeve around the index finger that ends short of
-    // the knuckle's neighbours would be crossed; so a shell around all fingers but not the palm.
-    let shell = object(box_mesh(Vec3::new(0.2, 0.0325, 0.1), 2), &[]);
+    // Bones that lie inside a body as a whole cross nothing either, be it the object or the giver.
+    let rig = rig();
+    let wrist = WristFrame::new(Pose::from_position(far));
+    let mut digits = stretched_hand(&rig, &wrist);
+    assert_eq!(collision(&floating(cube()), &rig, &wrist, &digits), None);
+    digits[3].joints = [-0.01, -0.005, 0.0, 0.01].map(|x| Vec3::new(x, 0.002, 0.003));
+    let inside = collision(&floating(cube()), &rig, &wrist, &digits);
+    assert_eq!(inside, Some(Rejection::FingerCollision));
+    let mut held = held(object(box_mesh(Vec3::splat(0.001), 1), &[]));
+    digits[3].joints = digits[3]
+        .joints
+        .map(|joint| joint + Vec3::new(0.01, -0.07, -0.01));
     assert_eq!(
-        collision_at(shell, None, Vec3::new(0.0, -0.17, 0.0)),
+        collision(&held, &rig, &wrist, &digits),
         Some(Rejection::FingerCollision)
     );
+    held.presenting_hand = None;
+    assert_eq!(collision(&held, &rig, &wrist, &digits), None);
 }
