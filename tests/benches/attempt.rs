@@ -25,13 +25,11 @@ fn attempt(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("attempt");
     group.throughput(Throughput::Elements(1));
     for strategy in Strategy::ALL {
+        let ratios = strategy.default_bend_ratios();
         let scenes: Vec<Scene<'_>> = bench
             .holdouts
             .iter()
-            .map(|(_, holdout)| {
-                let ratios = strategy.default_bend_ratios();
-                Scene::new(holdout, bench.rig, strategy, ratios, THESIS_FRICTION)
-            })
+            .map(|(_, holdout)| Scene::new(holdout, bench.rig, strategy, ratios, THESIS_FRICTION))
             .collect();
         let mut attempt = Attempt::default();
         let mut index = 0;
@@ -53,12 +51,12 @@ fn find(criterion: &mut Criterion) {
         let bench = Bench::new(threads);
         let mut group = criterion.benchmark_group(format!("find/{threads}"));
         group.sample_size(10).measurement_time(Duration::from_secs(2));
-        for (index, (built_in, _)) in bench.holdouts.iter().enumerate() {
-            let mut next = 0;
-            group.bench_function(&built_in.name, |bencher| {
+        for (holdout, (built_in, _)) in bench.holdouts.iter().enumerate() {
+            let mut first_attempt = 0;
+            group.bench_function(built_in.name.as_str(), |bencher| {
                 bencher.iter(|| {
-                    let outcome = bench.search(index, Strategy::F, SEED, next, u64::MAX - next);
-                    next += outcome.report.attempts;
+                    let outcome = bench.search(holdout, Strategy::F, SEED, first_attempt, u64::MAX);
+                    first_attempt += outcome.report.attempts;
                     outcome.grasp
                 });
             });
