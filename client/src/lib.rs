@@ -52,3 +52,8 @@ pub use search::{
     BendRatios, Contact, Convention, FindAnswer, FindRequest, Grasp, NearestMiss, Outcome, Rejection,
     RejectionCount, SearchReport, Step, StepTime, Strategy, Validity,
 };
+
+/// The README's Rust example compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

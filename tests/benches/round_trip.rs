@@ -1,0 +1,52 @@
+//! What gRPC adds: a replayed attempt asked over loopback, against the same replay by a plain call, and a listing.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use grasp_client::{FindRequest, Outcome, built_in::request_for};
+use grasp_synthesis::strategy::Strategy;
+use grasp_tests::{TestServer, searches::Bench};
+
+fn round_trip(criterion: &mut Criterion) {
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime can be had");
+    let server = runtime.block_on(TestServer::start());
+    let client = runtime.block_on(server.client());
+
+    // An attempt that is known to be valid: the search is a few microseconds, the rest is the way there and back.
+    let bench = Bench::new(1);
+    let holdout = bench.holdouts.len() - 1;
+    let attempt = bench
+        .search(holdout, Strategy::F, 1, 0, u64::MAX)
+        .report
+        .attempt
+        .expect("it is receivable");
+    let request = FindRequest {
+        seed: Some(1),
+        only_attempt: Some(attempt),
+        ..request_for(bench.holdouts[holdout].0)
+    };
+
+    let mut group = criterion.benchmark_group("round trip");
+    group.bench_function("replay, plain call", |bencher| {
+        bencher.iter(|| {
+            // The server poses the giver's hand for every request: so must the plain call.
+            let holdout = bench.holdouts[holdout].0.to_holdout().expect("it is sound");
+            let outcome = bench.search_on(&holdout, Strategy::F, 1, attempt, 1);
+            assert!(outcome.grasp.is_some());
+        });
+    });
+    group.bench_function("replay, over gRPC", |bencher| {
+        bencher.to_async(&runtime).iter(|| async {
+            let answer = client.find_grasp(&request).await.expect("the request is valid");
+            assert_eq!(answer.outcome, Outcome::Found);
+        });
+    });
+    group.bench_function("list objects", |bencher| {
+        bencher
+            .to_async(&runtime)
+            .iter(|| async { client.list_objects().await.expect("it is served") });
+    });
+    group.finish();
+    runtime.block_on(server.stop());
+}
+
+criterion_group!(benches, round_trip);
+criterion_main!(benches);
