@@ -1,10 +1,10 @@
 //! Reads Wavefront OBJ text into a mesh.
 //!
-//! The text may come from anyone. A first pass ([`scan`]) goes over its lines, enforces the limits, names every
+//! The text may come from anyone. A first pass (`scan`) goes over its lines, enforces the limits, names every
 //! violation with its line, and passes on only vertices and faces, in plain form, to the parser `tobj`. That keeps
 //! memory proportional to the text, keeps `tobj` away from the file system and from input that it panics on, and
 //! keeps the triangles in the file's order, because `tobj` sees neither groups nor materials to sort them by. What
-//! `tobj` returns is then welded and checked ([`clean`]).
+//! `tobj` returns is then welded and checked (`clean`).
 
 mod clean;
 mod lines;
