@@ -13,6 +13,10 @@ pub struct BudgetLimits {
     pub reserve: Duration,
 }
 
+/// From here on, clients of gRPC's C++ core (Python, Ruby, PHP …) write a deadline with three digits, rounded up: their
+/// own clock ends the call up to 1 % before the deadline that they send.
+const ROUNDED_FROM: Duration = Duration::from_secs(1);
+
 /// The budget that is in force: the smallest of the request's (or the default), the server's maximum, and what the
 /// call's deadline leaves after the reserve. All count from the call's arrival, so that waiting for a free worker
 /// is part of the budget. Of a deadline that is shorter than two reserves, half is searched: a grasp may still be
@@ -28,7 +32,12 @@ pub(crate) fn effective_budget(
         None => wanted,
         Some(deadline) => {
             let allowed = deadline.saturating_duration_since(arrived);
-            let left = allowed.saturating_sub(limits.reserve).max(allowed / 2);
+            let rounding = if allowed >= ROUNDED_FROM {
+                allowed / 100
+            } else {
+                Duration::ZERO
+            };
+            let left = allowed.saturating_sub(limits.reserve + rounding).max(allowed / 2);
             wanted.min(left)
         }
     }
@@ -84,6 +93,11 @@ mod tests {
             budget(Some(8), Some(16)),
             ms(8),
             "the request's below the deadline's"
+        );
+        assert_eq!(
+            budget(Some(9000), Some(2000)),
+            ms(1975),
+            "a deadline of seconds may have been rounded up by 1 %"
         );
         assert_eq!(
             budget(None, Some(4)),

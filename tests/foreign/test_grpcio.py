@@ -100,7 +100,9 @@ def test_a_created_box_is_measured_right_and_can_be_grasped(objects, grasps):
 
 
 def test_creating_the_same_object_twice_is_refused(objects):
-    request = object_service_pb2.CreateObjectRequest(object_id="twice", obj=BOX_OBJ.encode(), mass_kg=0.1)
+    request = object_service_pb2.CreateObjectRequest(
+        object_id="twice", obj=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1
+    )
     objects.CreateObject(request)
     with pytest.raises(grpc.RpcError) as refused:
         objects.CreateObject(request)
