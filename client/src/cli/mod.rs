@@ -2,6 +2,7 @@
 
 mod completions;
 mod demo;
+mod experiment;
 mod failure;
 mod figures;
 mod find;
@@ -49,6 +50,7 @@ enum Command {
     Find(Box<find::Arguments>),
     #[command(subcommand)]
     Objects(objects::Command),
+    Experiment(experiment::Arguments),
     Health(health::Arguments),
     Completions(completions::Arguments),
 }
@@ -114,6 +116,7 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Demo(arguments) => demo::run(arguments, output).await,
         Command::Find(arguments) => find::run(*arguments, output).await,
         Command::Objects(command) => objects::run(command, output).await,
+        Command::Experiment(arguments) => experiment::run(arguments, output).await,
         Command::Health(arguments) => health::run(arguments, output).await,
         Command::Completions(arguments) => completions::run(&arguments, output),
     }

@@ -1,7 +1,10 @@
 //! Why attempts fail (thesis Table 5.2).
 
+use serde::{Deserialize, Serialize};
+
 /// An attempt's failure. A rejection is data, never an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Rejection {
     /// No digit has a contact.
     NoContacts,

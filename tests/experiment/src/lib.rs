@@ -1,3 +1,14 @@
 //! The experiments of the thesis' chapter 5, on the crate that the server searches with.
 
+pub mod data;
+pub mod folder;
+pub mod machine;
+pub mod make;
+pub mod plan;
 pub mod plot;
+pub mod record;
+pub mod run;
+pub mod stats;
+pub mod table;
+pub mod tables;
+pub mod thesis;

@@ -116,6 +116,17 @@ impl Attempt {
         self.pruned_placements
     }
 
+    /// Where the attempt placed the wrist.
+    pub fn wrist(&self) -> &WristFrame {
+        &self.wrist
+    }
+
+    /// The digits that the attempt posed, thumb first: all five, or none, or the thumb alone where the search stops
+    /// without it.
+    pub fn posed_digits(&self) -> &[PosedDigit] {
+        &self.digits[..self.posed]
+    }
+
     /// The hand as far as the attempt came; digits that it did not pose are stretched.
     pub fn pose(&self, scene: &Scene<'_>) -> HandPose {
         let mut digits = scene.rig.stretched();

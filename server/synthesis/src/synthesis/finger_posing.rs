@@ -117,6 +117,18 @@ pub fn find_touching_finger_pose(
     } else {
         ratios
     };
+    close_digit(object, wrist, motion, base_yaw, ratios)
+}
+
+/// The rest of `FINDTOUCHINGFINGERPOSE`, with nothing left to chance: closes a digit at a yaw in radians with bend ratios
+/// tried in turn, given as indices into [`BEND_RATIOS`].
+pub fn close_digit(
+    object: &GraspObject,
+    wrist: &WristFrame,
+    motion: &DigitMotion,
+    base_yaw: f32,
+    ratios: &[usize],
+) -> PosedDigit {
     let plane = DigitPlane::new(motion, wrist, base_yaw);
     if let Some(distance) = distance_in_reach(object, motion, &plane) {
         let closing = Closing {

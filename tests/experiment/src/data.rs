@@ -1,0 +1,102 @@
+//! A run's records, as the figures ask for them.
+
+use grasp_synthesis::strategy::Strategy;
+
+use crate::{
+    plan::{Cell, Set, Settings},
+    record::{Details, Record, SearchFigures},
+};
+
+/// The records that were asked for: a folder can have more.
+#[derive(Clone, Debug)]
+pub struct Data<'a> {
+    /// What was asked for.
+    pub settings: &'a Settings,
+    records: Vec<&'a Record>,
+}
+
+impl<'a> Data<'a> {
+    /// Chooses.
+    pub fn new(settings: &'a Settings, records: &'a [Record]) -> Self {
+        let cells = settings.cells();
+        let is_asked = |record: &&Record| {
+            let limit = if record.rejection.is_some() {
+                settings.invalid_of(&record.cell)
+            } else {
+                settings.valid
+            };
+            record.number < limit && cells.contains(&record.cell)
+        };
+        let mut records: Vec<_> = records.iter().filter(is_asked).collect();
+        let place = |record: &Record| cells.iter().position(|cell| *cell == record.cell);
+        records.sort_by_key(|record| (place(record), record.rejection.is_some(), record.number));
+        Self { settings, records }
+    }
+
+    /// All records: cell by cell, valid ones first, by number.
+    pub fn records(&self) -> impl Iterator<Item = &'a Record> {
+        self.records.iter().copied()
+    }
+
+    /// The strategies of the ladder that were asked for.
+    pub fn ladder(&self) -> impl Iterator<Item = Strategy> + use<'a> {
+        self.settings.strategies.iter().copied()
+    }
+
+    /// The most threads that were asked for, if that is more than one.
+    pub fn more_threads(&self) -> Option<usize> {
+        self.settings.threads.iter().copied().max().filter(|threads| *threads > 1)
+    }
+
+    /// The positive grasp set, on one thread.
+    pub fn valid(&self, set: Set) -> impl Iterator<Item = &'a Record> {
+        self.of_set(set).filter(|record| record.rejection.is_none())
+    }
+
+    /// The negative grasp set.
+    pub fn invalid(&self, set: Set) -> impl Iterator<Item = &'a Record> {
+        self.of_set(set).filter(|record| record.rejection.is_some())
+    }
+
+    /// Positive and negative grasp set together, with their details.
+    pub fn both(&self, set: Set) -> impl Iterator<Item = (&'a Record, &'a Details)> {
+        self.of_set(set)
+            .filter_map(|record| Some((record, record.details.as_ref()?)))
+    }
+
+    fn of_set(&self, set: Set) -> impl Iterator<Item = &'a Record> {
+        self.records()
+            .filter(move |record| record.cell.set == set && record.cell.threads == 1)
+    }
+
+    /// What the searches of a cell took.
+    pub fn searches(&self, cell: Cell) -> Vec<SearchFigures> {
+        let own = self.records().filter(|record| record.cell == cell);
+        own.filter_map(|record| record.search).collect()
+    }
+
+    /// What the searches of a set took, holdout by holdout.
+    pub fn searches_by_holdout(&self, set: Set, threads: usize) -> Vec<Vec<SearchFigures>> {
+        let of_holdout = |&holdout: &usize| {
+            self.searches(Cell {
+                set,
+                threads,
+                holdout,
+            })
+        };
+        self.settings.holdouts.iter().map(of_holdout).collect()
+    }
+}
+
+/// Attempts of some searches.
+pub fn attempts(searches: &[SearchFigures]) -> Vec<f64> {
+    searches.iter().map(|search| search.attempts as f64).collect()
+}
+
+/// Times of some searches in milliseconds.
+pub fn milliseconds(searches: &[SearchFigures]) -> Vec<f64> {
+    searches
+        .iter()
+        .map(|search| search.nanoseconds as f64 / 1e6)
+        .collect()
+}

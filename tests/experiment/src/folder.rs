@@ -1,0 +1,260 @@
+//! The folder of a run: what was made so far, so that a run that was cut short goes on where it was.
+//!
+//! `manifest.json` says what all records have in common; `records.jsonl` has a record a line, each written at once. A
+//! last line that was cut off is dropped.
+
+use std::{
+    fs::{self, File, OpenOptions, TryLockError},
+    io::{self, BufRead as _, BufReader, Seek as _, Write as _},
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{machine::Machine, make::RECEIVING_RIG, record::Record};
+
+/// The layout of the records. It grows when what is recorded changes.
+const FORMAT: u32 = 1;
+
+const MANIFEST: &str = "manifest.json";
+const RECORDS: &str = "records.jsonl";
+
+/// What all records of a folder have in common.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    format: u32,
+    /// Start of all randomness.
+    pub seed: u64,
+    /// The receiving hand.
+    pub rig: String,
+    /// Where it was measured.
+    pub machine: Machine,
+}
+
+impl Manifest {
+    /// That of a run on this machine.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            format: FORMAT,
+            seed,
+            rig: RECEIVING_RIG.to_owned(),
+            machine: Machine::this(),
+        }
+    }
+
+    /// What keeps records of `self` and of `other` from standing in one table.
+    fn differences(&self, other: &Self) -> Vec<String> {
+        let mut differences = Vec::new();
+        if self.format != other.format {
+            differences.push(format!("its format is {}, now it is {}", self.format, other.format));
+        }
+        if self.seed != other.seed {
+            differences.push(format!("its seed is {}, now it is {}", self.seed, other.seed));
+        }
+        if self.rig != other.rig {
+            differences.push(format!("its rig is {:?}, now it is {:?}", self.rig, other.rig));
+        }
+        if !self.machine.is_like(&other.machine) {
+            differences.push(format!(
+                "it was made on {}, this is {}",
+                self.machine, other.machine
+            ));
+        }
+        differences
+    }
+}
+
+/// Why a folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// A file cannot be read or written.
+    #[error("cannot {what} {}", path.display())]
+    Io {
+        /// "read" and so on.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A file has something else in it.
+    #[error("{} is not what a run writes (line {line}); give another folder, or start afresh", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Where, from 1.
+        line: usize,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// There are records, and nothing says what they are.
+    #[error("{} has {RECORDS} but no {MANIFEST}; give another folder, or start afresh", .0.display())]
+    NoManifest(PathBuf),
+    /// The folder is another run's.
+    #[error(
+        "{} belongs to another run: {}; give another folder, or start afresh",
+        path.display(),
+        differences.join("; ")
+    )]
+    OtherRun {
+        /// The folder.
+        path: PathBuf,
+        /// All that differs.
+        differences: Vec<String>,
+    },
+    /// Somebody else writes here.
+    #[error("another run is writing to {}", .0.display())]
+    Busy(PathBuf),
+    /// The algorithm is no longer the one that made the records.
+    #[error(
+        "attempt {attempt} of seed {seed} on {holdout} in {} ends otherwise than recorded: the search has changed \
+         since; give another folder, or start afresh",
+        path.display()
+    )]
+    Outdated {
+        /// The folder.
+        path: PathBuf,
+        /// The record's holdout.
+        holdout: String,
+        /// The record's seed.
+        seed: u64,
+        /// The record's attempt.
+        attempt: u64,
+    },
+}
+
+/// An open folder.
+#[derive(Debug)]
+pub struct Folder {
+    path: PathBuf,
+    /// What all records have in common.
+    pub manifest: Manifest,
+    records: Vec<Record>,
+    /// Locked while the folder is open.
+    file: File,
+}
+
+impl Folder {
+    /// Opens a run's folder, or begins one. With `fresh`, what is there is forgotten.
+    ///
+    /// # Errors
+    /// The folder cannot be written, is in use, or has another run in it.
+    pub fn open(path: &Path, manifest: Manifest, fresh: bool) -> Result<Self, FolderError> {
+        fs::create_dir_all(path).map_err(failed_to("make", path))?;
+        let records_path = path.join(RECORDS);
+        let mut file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .read(true)
+            .write(true)
+            .open(&records_path)
+            .map_err(failed_to("open", &records_path))?;
+        file.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => FolderError::Busy(path.to_owned()),
+            TryLockError::Error(error) => failed_to("lock", &records_path)(error),
+        })?;
+        let manifest_path = path.join(MANIFEST);
+        let earlier = if fresh { None } else { read_manifest(&manifest_path)? };
+        let Some(earlier) = earlier else {
+            let bytes = file.metadata().map_err(failed_to("look at", &records_path))?.len();
+            if bytes > 0 && !fresh {
+                return Err(FolderError::NoManifest(path.to_owned()));
+            }
+            file.set_len(0).map_err(failed_to("empty", &records_path))?;
+            let text = serde_json::to_string_pretty(&manifest).unwrap_or_default() + "\n";
+            fs::write(&manifest_path, text).map_err(failed_to("write", &manifest_path))?;
+            return Ok(Self {
+                path: path.to_owned(),
+                manifest,
+                records: Vec::new(),
+                file,
+            });
+        };
+        let differences = earlier.differences(&manifest);
+        if !differences.is_empty() {
+            return Err(FolderError::OtherRun {
+                path: path.to_owned(),
+                differences,
+            });
+        }
+        let (records, whole_bytes) = read_records(&records_path, &file)?;
+        file.set_len(whole_bytes)
+            .and_then(|()| file.seek(io::SeekFrom::End(0)))
+            .map_err(failed_to("continue", &records_path))?;
+        Ok(Self {
+            path: path.to_owned(),
+            manifest: earlier,
+            records,
+            file,
+        })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// All records so far.
+    pub fn records(&self) -> &[Record] {
+        &self.records
+    }
+
+    /// Keeps records. After this they are in the file.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn add(&mut self, records: Vec<Record>) -> Result<(), FolderError> {
+        let mut text = Vec::new();
+        for record in &records {
+            serde_json::to_writer(&mut text, record)
+                .map_err(|error| failed_to("write", &self.path.join(RECORDS))(error.into()))?;
+            text.push(b'\n');
+        }
+        self.file
+            .write_all(&text)
+            .map_err(failed_to("write", &self.path.join(RECORDS)))?;
+        self.records.extend(records);
+        Ok(())
+    }
+}
+
+fn failed_to(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FolderError {
+    let path = path.to_owned();
+    move |source| FolderError::Io { what, path, source }
+}
+
+fn read_manifest(path: &Path) -> Result<Option<Manifest>, FolderError> {
+    match fs::read_to_string(path) {
+        Ok(text) => serde_json::from_str(&text).map(Some).map_err(|source| FolderError::Malformed {
+            path: path.to_owned(),
+            line: source.line(),
+            source,
+        }),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(failed_to("read", path)(error)),
+    }
+}
+
+/// The records, and the bytes that they take without a line that was cut off.
+fn read_records(path: &Path, file: &File) -> Result<(Vec<Record>, u64), FolderError> {
+    let mut reader = BufReader::new(file);
+    let mut records = Vec::new();
+    let mut whole_bytes = 0;
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        let bytes = reader
+            .read_until(b'\n', &mut line)
+            .map_err(failed_to("read", path))?;
+        if line.last() != Some(&b'\n') {
+            return Ok((records, whole_bytes));
+        }
+        let record = serde_json::from_slice(&line).map_err(|source| FolderError::Malformed {
+            path: path.to_owned(),
+            line: records.len() + 1,
+            source,
+        })?;
+        records.push(record);
+        whole_bytes += bytes as u64;
+    }
+}

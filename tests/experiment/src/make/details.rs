@@ -1,0 +1,172 @@
+//! A closer look at one attempt.
+
+use grasp_synthesis::{
+    grasp::{Contact, Grasp},
+    synthesis::{
+        attempt::{Attempt, AttemptEnd},
+        closing_motion::hand_motion,
+        comfort::comfort,
+        finger_posing::{PosedDigit, close_digit},
+        force_distribution::{ForceDistribution, contact_counts},
+        immobility_validation::{
+            ACCEPTED_WRENCH_ANGLE_DEGREES, DISTRIBUTION_TRIES, DistributionChoice, Immobility,
+            ImmobilityBuffers, Load,
+        },
+        placement_measures::PlacementMeasures,
+        random::AttemptStream,
+        stopwatch::{StepStopwatch, StepTimes, Stopwatch as _},
+        wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
+    },
+};
+
+use super::{Maker, nanoseconds};
+use crate::{
+    plan::Cell,
+    record::{Details, DigitFigures, GraspFigures},
+};
+
+/// Runs of an attempt of which the median time is taken: the first ones find nothing in the processor's caches, and
+/// some are interrupted by the machine's other work. More take longer.
+const REPLAYS: usize = 5;
+
+/// Force distributions that are drawn anew for each valid grasp, to see how much of E is the draw. More give a better
+/// estimate of the spread and make longer records.
+const COMFORT_REPEATS: u64 = 8;
+
+/// Added to a seed for what is drawn about a grasp after it was found, so that it has nothing to do with how it was
+/// found. Any number that is far from those of other seeds will do.
+const SEED_OF_AFTERTHOUGHTS: u64 = 1 << 60;
+
+/// An attempt that was looked at.
+pub(super) struct Closer {
+    pub(super) end: AttemptEnd,
+    pub(super) details: Details,
+}
+
+impl Maker {
+    /// Runs an attempt some times for its times, and tells everything about it.
+    pub(super) fn closer_look(&self, cell: &Cell, seed: u64, index: u64) -> Closer {
+        let scene = self.scene(cell);
+        let mut attempt = Attempt::default();
+        let mut times = Vec::with_capacity(REPLAYS);
+        let mut end = AttemptEnd::Interrupted;
+        for _ in 0..REPLAYS {
+            let mut stopwatch = StepStopwatch::new(&self.clock);
+            let mut stream = AttemptStream::new(seed, index);
+            end = attempt.try_synthesize_grasp(&scene, &mut stream, &mut stopwatch, &|| false);
+            times.extend(stopwatch.times().map(in_order));
+        }
+        let contacts = match &end {
+            AttemptEnd::Valid(grasp) => Some(&grasp.contacts[..]),
+            AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
+        };
+        let measures = PlacementMeasures::of(
+            &self.holdouts[cell.holdout],
+            self.rig,
+            attempt.wrist().object_from_wrist,
+        );
+        let details = Details {
+            measures: measures.into(),
+            digits: self.digits(cell, &attempt, contacts.is_some()),
+            step_nanoseconds: std::array::from_fn(|step| median(times.iter().map(|times| times[step]))),
+            grasp: match &end {
+                AttemptEnd::Valid(grasp) => Some(self.grasp_figures(cell, grasp, seed, index)),
+                AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
+            },
+        };
+        Closer { end, details }
+    }
+
+    fn digits(&self, cell: &Cell, attempt: &Attempt, is_valid: bool) -> Vec<DigitFigures> {
+        let object = &self.holdouts[cell.holdout].object;
+        let motions = hand_motion(self.rig);
+        let touches_with = |digit: usize, posed: &PosedDigit| {
+            // Figure 5.19: wrist and yaw are kept, and the digit closes with each ratio alone.
+            std::array::from_fn(|ratio| {
+                let yaw = posed.angles.base_yaw;
+                close_digit(object, attempt.wrist(), &motions[digit], yaw, &[ratio]).touches()
+            })
+        };
+        let digits = attempt.posed_digits().iter().enumerate();
+        digits
+            .map(|(digit, posed)| DigitFigures {
+                yaw_degrees: posed.angles.base_yaw.to_degrees(),
+                bend_degrees: posed.angles.base_pitch.to_degrees(),
+                bend_ratio: posed.bend_ratio,
+                contacts: posed.hits.iter().flatten().count() as u32,
+                touches_with: (is_valid && posed.touches()).then(|| touches_with(digit, posed)),
+            })
+            .collect()
+    }
+
+    /// What there is to tell of a grasp, with force distributions for its contacts drawn anew.
+    fn grasp_figures(&self, cell: &Cell, grasp: &Grasp, seed: u64, index: u64) -> GraspFigures {
+        let contacts = &grasp.contacts;
+        let holdout = &self.holdouts[cell.holdout];
+        let load = Load {
+            gravity: Wrench::of_gravity(holdout.object.mass, holdout.up),
+            centre_of_mass: holdout.object.centre_of_mass,
+            friction: holdout.object.friction,
+        };
+        let choice = if cell.set.strategy.takes_first_force_distribution() {
+            DistributionChoice::FirstSufficient
+        } else {
+            DistributionChoice::Best
+        };
+        let stream_of = |draw: u64| {
+            AttemptStream::new(seed.wrapping_add(SEED_OF_AFTERTHOUGHTS).wrapping_add(draw), index)
+        };
+        let mut buffers = ImmobilityBuffers::default();
+        let comfort_again = (1..=COMFORT_REPEATS)
+            .filter_map(|draw| {
+                let end = buffers.validate(contacts, &load, choice, &mut stream_of(draw), &|| false);
+                match end {
+                    Immobility::Immobilizing(_) => Some(comfort(buffers.digit_totals(contacts))),
+                    Immobility::NotImmobilizing(_) | Immobility::Interrupted => None,
+                }
+            })
+            .collect();
+        GraspFigures {
+            wrench_angle_degrees: grasp.wrench_angle.to_degrees(),
+            comfort: grasp.comfort,
+            sufficient_distributions: count_sufficient(contacts, &load, &mut stream_of(0)),
+            comfort_again,
+        }
+    }
+}
+
+/// How many of 100 random force distributions oppose gravity within the accepted angle.
+fn count_sufficient(contacts: &[Contact], load: &Load, stream: &mut AttemptStream) -> u32 {
+    let cone_cos = printed_cone_cos(load.friction);
+    let unit_wrenches: Vec<_> = contacts
+        .iter()
+        .map(|contact| four_unit_wrenches(contact, load.centre_of_mass, cone_cos))
+        .collect();
+    let counts = contact_counts(contacts);
+    let accepted = ACCEPTED_WRENCH_ANGLE_DEGREES.to_radians().cos();
+    let mut distribution = ForceDistribution::default();
+    let suffices = |_: &usize| {
+        distribution.sample(contacts, counts, stream);
+        let wrench = distribution.summed_wrench(&unit_wrenches);
+        wrench.cos_angle(load.gravity * -1.0) > accepted
+    };
+    (0..DISTRIBUTION_TRIES).filter(suffices).count() as u32
+}
+
+/// The times in the order of [`crate::record::STEP_NAMES`], in nanoseconds.
+fn in_order(times: StepTimes) -> [u64; 5] {
+    [
+        times.wrist_placement,
+        times.finger_posing,
+        times.collision_validation,
+        times.contact_validation,
+        times.immobility_validation,
+    ]
+    .map(nanoseconds)
+}
+
+fn median(values: impl Iterator<Item = u64>) -> u64 {
+    let mut sorted: Vec<_> = values.collect();
+    sorted.sort_unstable();
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0)
+}

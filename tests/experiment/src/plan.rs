@@ -1,0 +1,247 @@
+//! What a run makes: sets of grasps, cell by cell.
+
+use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
+use grasp_synthesis::strategy::{BendRatioChoice, Strategy};
+use serde::{Deserialize, Serialize};
+
+/// Distance between the seeds of two holdouts, and with it one more than the most grasps that a cell can have.
+const SEEDS_PER_HOLDOUT: u64 = 1_000_000;
+
+/// The most grasps, and the most invalid attempts, of a cell: far more than there is time for.
+pub const MOST_PER_CELL: u64 = SEEDS_PER_HOLDOUT - 1;
+
+/// A way to synthesize: one grasp set of the thesis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Set {
+    /// The step of the ladder.
+    pub strategy: Strategy,
+    /// Which bend ratios a digit tries.
+    pub bend_ratios: BendRatioChoice,
+}
+
+impl Set {
+    /// Grasp set A to F.
+    pub fn ladder(strategy: Strategy) -> Self {
+        Self {
+            strategy,
+            bend_ratios: strategy.default_bend_ratios(),
+        }
+    }
+
+    /// The columns of Figure 5.20 in its order, (a) to (f). Column (a) is set D and column (c) set E: the thesis names
+    /// them so.
+    pub const BEND_RATIO_COLUMNS: [Self; 6] = [
+        Self::column(Strategy::D, BendRatioChoice::All),
+        Self::column(Strategy::D, BendRatioChoice::AllFingersWithoutLow),
+        Self::column(Strategy::E, BendRatioChoice::OneRandom),
+        Self::column(Strategy::D, BendRatioChoice::OneRandomFingersWithoutLow),
+        Self::column(Strategy::D, BendRatioChoice::OnlyOne),
+        Self::column(Strategy::D, BendRatioChoice::OnlyHigh),
+    ];
+
+    const fn column(strategy: Strategy, bend_ratios: BendRatioChoice) -> Self {
+        Self { strategy, bend_ratios }
+    }
+
+    /// True for the sets A to F.
+    pub fn is_ladder(self) -> bool {
+        self == Self::ladder(self.strategy)
+    }
+
+    /// "A" to "F", or "D, only 1.0" and so on.
+    pub fn name(self) -> String {
+        if self.is_ladder() {
+            format!("{:?}", self.strategy)
+        } else {
+            format!("{:?}, {}", self.strategy, choice_name(self.bend_ratios))
+        }
+    }
+}
+
+/// What Figure 5.20 calls a choice of bend ratios, in short.
+pub fn choice_name(choice: BendRatioChoice) -> &'static str {
+    match choice {
+        BendRatioChoice::All => "all",
+        BendRatioChoice::AllFingersWithoutLow => "fingers without 0.7",
+        BendRatioChoice::OneRandom => "one random",
+        BendRatioChoice::OneRandomFingersWithoutLow => "one random, fingers without 0.7",
+        BendRatioChoice::OnlyOne => "only 1.0",
+        BendRatioChoice::OnlyHigh => "only 1.42",
+    }
+}
+
+/// A set on one holdout with a number of threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Cell {
+    /// The way to synthesize.
+    #[serde(flatten)]
+    pub set: Set,
+    /// Workers that race.
+    pub threads: usize,
+    /// Index among the built-in holdouts; written as its name.
+    #[serde(with = "holdout_name")]
+    pub holdout: usize,
+}
+
+impl Cell {
+    /// The holdout.
+    pub fn built_in(&self) -> &'static BuiltInHoldout {
+        &holdouts()[self.holdout]
+    }
+}
+
+mod holdout_name {
+    use grasp_assets::holdouts::holdouts;
+    use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _, ser::Error as _};
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+    pub(super) fn serialize<S: Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+        match holdouts().get(*index) {
+            Some(holdout) => serializer.serialize_str(&holdout.name),
+            None => Err(S::Error::custom(format!("there is no holdout {index}"))),
+        }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let found = holdouts().iter().position(|holdout| holdout.name == name);
+        found.ok_or_else(|| D::Error::custom(format!("there is no holdout {name:?}")))
+    }
+}
+
+/// What is asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Start of all randomness.
+    pub seed: u64,
+    /// Valid grasps of each cell; the thesis made 25.
+    pub valid: u64,
+    /// Invalid attempts of each set and holdout; the thesis kept 100.
+    pub invalid: u64,
+    /// The sets of the ladder.
+    pub strategies: Vec<Strategy>,
+    /// The holdouts, as indices.
+    pub holdouts: Vec<usize>,
+    /// Also the columns of Figure 5.20?
+    pub bend_ratio_columns: bool,
+    /// Numbers of threads with which the ladder is run; the first is the one that all but the times is taken from.
+    pub threads: Vec<usize>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            valid: 25,
+            invalid: 100,
+            strategies: Strategy::ALL.to_vec(),
+            holdouts: (0..holdouts().len()).collect(),
+            bend_ratio_columns: true,
+            threads: vec![1, 2],
+        }
+    }
+}
+
+impl Settings {
+    /// The cells in the order in which they are made.
+    ///
+    /// Sets come before each other as the ladder has them, so that what a holdout took in one set tells how long it
+    /// will take in the next.
+    pub fn cells(&self) -> Vec<Cell> {
+        let mut runs: Vec<(Set, usize)> = Vec::new();
+        for &strategy in &self.strategies {
+            runs.extend(self.threads.iter().map(|&threads| (Set::ladder(strategy), threads)));
+        }
+        if self.bend_ratio_columns {
+            runs.extend(Set::BEND_RATIO_COLUMNS.map(|set| (set, 1)));
+        }
+        let mut cells = Vec::new();
+        for (index, &(set, threads)) in runs.iter().enumerate() {
+            if runs[..index].contains(&(set, threads)) {
+                continue;
+            }
+            cells.extend(self.holdouts.iter().map(|&holdout| Cell {
+                set,
+                threads,
+                holdout,
+            }));
+        }
+        cells
+    }
+
+    /// How many invalid attempts a cell keeps: on one thread, in the sets of the ladder that were asked for.
+    pub fn invalid_of(&self, cell: &Cell) -> u64 {
+        let is_asked = cell.set.is_ladder() && self.strategies.contains(&cell.set.strategy);
+        if is_asked && cell.threads == 1 { self.invalid } else { 0 }
+    }
+
+    /// The seed of a cell's grasp. It is the same in all sets: what differs between two sets is then the way to
+    /// synthesize and not luck as well.
+    pub fn seed_of_valid(&self, cell: &Cell, number: u64) -> u64 {
+        debug_assert!(number < MOST_PER_CELL, "grasp {number} of a cell");
+        self.seed_of_holdout(cell).wrapping_add(number)
+    }
+
+    /// The seed of a cell's invalid attempts.
+    pub fn seed_of_invalid(&self, cell: &Cell) -> u64 {
+        self.seed_of_holdout(cell).wrapping_add(SEEDS_PER_HOLDOUT - 1)
+    }
+
+    fn seed_of_holdout(&self, cell: &Cell) -> u64 {
+        self.seed
+            .wrapping_add(SEEDS_PER_HOLDOUT.wrapping_mul(cell.holdout as u64))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn every_cell_is_made_once() {
+        let cells = Settings::default().cells();
+        // Six sets on one and two threads, and four columns of Figure 5.20 that are no set of their own.
+        assert_eq!(cells.len(), (6 * 2 + 4) * 15);
+        assert_eq!(cells.iter().collect::<HashSet<_>>().len(), cells.len());
+    }
+
+    #[test]
+    fn the_columns_are_those_of_the_thesis() {
+        let names = Set::BEND_RATIO_COLUMNS.map(Set::name);
+        assert_eq!(names[0], "D");
+        assert_eq!(names[2], "E");
+        assert_eq!(names[4], "D, only 1.0");
+        assert_eq!(names.iter().collect::<HashSet<_>>().len(), 6);
+    }
+
+    #[test]
+    fn no_two_searches_of_a_set_share_a_seed() {
+        let settings = Settings::default();
+        let mut seeds = HashSet::new();
+        for cell in settings
+            .cells()
+            .iter()
+            .filter(|cell| cell.set.name() == "B" && cell.threads == 1)
+        {
+            for number in [0, 1, MOST_PER_CELL - 1] {
+                assert!(seeds.insert(settings.seed_of_valid(cell, number)));
+            }
+            assert!(seeds.insert(settings.seed_of_invalid(cell)));
+        }
+        assert_eq!(seeds.len(), 4 * 15);
+    }
+
+    #[test]
+    fn invalid_attempts_are_kept_where_the_ladder_was_asked_for() {
+        let settings = Settings {
+            strategies: vec![Strategy::F],
+            ..Settings::default()
+        };
+        for cell in settings.cells() {
+            let expected = if cell.set.name() == "F" && cell.threads == 1 { 100 } else { 0 };
+            assert_eq!(settings.invalid_of(&cell), expected, "{cell:?}");
+        }
+    }
+}

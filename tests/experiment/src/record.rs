@@ -1,0 +1,141 @@
+//! What is kept of a grasp or a failed attempt.
+
+use grasp_synthesis::{rejection::Rejection, synthesis::placement_measures::PlacementMeasures};
+use serde::{Deserialize, Serialize};
+
+use crate::plan::Cell;
+
+/// One attempt: the last one of a search, valid, or one of those that failed.
+///
+/// Set, holdout, seed and attempt make it again:
+/// `grasp find --holdout H --strategy S --bend-ratios R --seed N --only-attempt I`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Where it belongs.
+    #[serde(flatten)]
+    pub cell: Cell,
+    /// Counts the valid ones of the cell, and the invalid ones for themselves, from 0.
+    pub number: u64,
+    /// The seed of its search.
+    pub seed: u64,
+    /// Its index.
+    pub attempt: u64,
+    /// Why it failed; none if it is valid.
+    pub rejection: Option<Rejection>,
+    /// What the search took that ended with it; none for a failed attempt.
+    pub search: Option<SearchFigures>,
+    /// Its details; none of searches on more than one thread, which are made for their times.
+    pub details: Option<Details>,
+}
+
+/// What it took to find a valid grasp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SearchFigures {
+    /// Attempts, the valid one included: accepted placements, as the thesis counts.
+    pub attempts: u64,
+    /// Placements that the measures pruned.
+    pub pruned_placements: u64,
+    /// Failed attempts by kind, in the order of [`Rejection::ALL`].
+    pub rejections: [u64; 8],
+    /// Wall-clock time in nanoseconds.
+    pub nanoseconds: u64,
+}
+
+/// What an attempt was like.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Details {
+    /// Of its wrist placement.
+    pub measures: Measures,
+    /// The digits that were posed, thumb first.
+    pub digits: Vec<DigitFigures>,
+    /// Median time of each step in nanoseconds over some replays, in the order of [`STEP_NAMES`].
+    pub step_nanoseconds: [u64; 5],
+    /// Of a valid grasp.
+    pub grasp: Option<GraspFigures>,
+}
+
+/// The steps of Algorithm 1, as the thesis' figures name them.
+pub const STEP_NAMES: [&str; 5] = [
+    "Wrist Placement",
+    "Finger Posing",
+    "Collision Validation",
+    "Contact Validation",
+    "Immobility Validation",
+];
+
+/// The measures of a wrist placement (thesis 5.3), centimetres and degrees as there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    /// From the wrist to the object.
+    pub wrist_distance_cm: f32,
+    /// From the palm to the object.
+    pub palm_distance_cm: f32,
+    /// Upwards wrist angle.
+    pub upward_degrees: f32,
+    /// Forward wrist angle.
+    pub forward_degrees: f32,
+    /// Palm-CoM-palm angle; none where a palm is straight above or below the centre of mass.
+    pub palm_com_palm_degrees: Option<f32>,
+}
+
+impl From<PlacementMeasures> for Measures {
+    fn from(measures: PlacementMeasures) -> Self {
+        Self {
+            wrist_distance_cm: measures.wrist_distance * 100.0,
+            palm_distance_cm: measures.palm_distance * 100.0,
+            upward_degrees: measures.upward_angle_degrees,
+            forward_degrees: measures.forward_angle_degrees,
+            palm_com_palm_degrees: measures.palm_com_palm_angle_degrees,
+        }
+    }
+}
+
+/// A posed digit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DigitFigures {
+    /// ψ1.
+    pub yaw_degrees: f32,
+    /// θ1: the bend angle.
+    pub bend_degrees: f32,
+    /// With which it touches; none if it does not.
+    pub bend_ratio: Option<f32>,
+    /// Links that touch.
+    pub contacts: u32,
+    /// If it touches: does it also with 0.7, 1 and 1.42 alone, at the same wrist and yaw (Figure 5.19)?
+    pub touches_with: Option<[bool; 3]>,
+}
+
+/// What only a valid grasp has.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GraspFigures {
+    /// Angle of Eq. 4.5.
+    pub wrench_angle_degrees: f32,
+    /// E of Eq. 4.6.
+    pub comfort: f32,
+    /// How many of 100 further random force distributions oppose gravity (5.6).
+    pub sufficient_distributions: u32,
+    /// E again for the same contacts, each from force distributions drawn anew. Empty if none sufficed.
+    pub comfort_again: Vec<f32>,
+}
+
+impl Record {
+    /// The details, of which every record on one thread has some.
+    pub fn grasp(&self) -> Option<&GraspFigures> {
+        self.details.as_ref()?.grasp.as_ref()
+    }
+}
+
+/// The name of an output type as Table 5.2 has it.
+pub fn output_type(rejection: Option<Rejection>) -> &'static str {
+    match rejection {
+        Some(Rejection::NoContacts) => "NoContacts",
+        Some(Rejection::NoThumb) => "NoThumb",
+        Some(Rejection::NoThumbEarlyStop) => "NoThumbEarlystop",
+        Some(Rejection::NoFingers) => "NoFingers",
+        Some(Rejection::PalmCollision) => "PalmCollision",
+        Some(Rejection::FingerCollision) => "FingerCollision",
+        Some(Rejection::UnwantedContact) => "UnwantedContact",
+        Some(Rejection::NotImmobilizing) => "NotImmobilizing",
+        None => "Valid",
+    }
+}

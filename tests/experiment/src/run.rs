@@ -1,0 +1,161 @@
+//! Runs what is missing.
+
+use std::{
+    collections::HashMap,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Duration,
+};
+
+use crate::{
+    folder::{Folder, FolderError},
+    make::Maker,
+    plan::{Cell, Settings},
+    record::Record,
+};
+
+/// How far a run is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Progress {
+    /// Valid grasps that were made, in this run or before.
+    pub done: u64,
+    /// All valid grasps that were asked for.
+    pub total: u64,
+    /// What is being made.
+    pub cell: Cell,
+    /// About how long it will take from here; none before anything is known.
+    pub left: Option<Duration>,
+}
+
+/// How a run ended that did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunEnd {
+    /// Everything that was asked for is in the folder.
+    Complete,
+    /// It was told to stop; what was made is in the folder.
+    Stopped,
+}
+
+/// What a folder has of one cell.
+#[derive(Clone, Copy, Debug, Default)]
+struct Made {
+    valid: u64,
+    invalid: u64,
+    next_invalid_attempt: u64,
+    nanoseconds: u64,
+}
+
+/// Makes what the folder does not have yet.
+///
+/// # Errors
+/// The folder cannot be written, or its records were made by another algorithm.
+pub fn run(
+    settings: &Settings,
+    maker: &Maker,
+    folder: &mut Folder,
+    stop: &AtomicBool,
+    mut progress: impl FnMut(Progress),
+) -> Result<RunEnd, FolderError> {
+    check_earlier_records(maker, folder)?;
+    let cells = settings.cells();
+    let mut made: HashMap<Cell, Made> = HashMap::new();
+    for record in folder.records() {
+        made.entry(record.cell).or_default().count(record);
+    }
+    for cell in &cells {
+        loop {
+            progress(progress_at(settings, &cells, &made, *cell));
+            if stop.load(Ordering::Relaxed) {
+                return Ok(RunEnd::Stopped);
+            }
+            let so_far = made.entry(*cell).or_default();
+            let wanted_invalid = settings.invalid_of(cell);
+            let records = if so_far.invalid < wanted_invalid {
+                let numbers = so_far.invalid..wanted_invalid;
+                maker.invalid(settings, cell, numbers, so_far.next_invalid_attempt)
+            } else if so_far.valid < settings.valid {
+                match maker.valid(settings, cell, so_far.valid, stop) {
+                    Some(record) => vec![record],
+                    None => return Ok(RunEnd::Stopped),
+                }
+            } else {
+                break;
+            };
+            for record in &records {
+                so_far.count(record);
+            }
+            folder.add(records)?;
+        }
+    }
+    Ok(RunEnd::Complete)
+}
+
+impl Made {
+    /// Records of a cell come in the order of their numbers.
+    fn count(&mut self, record: &Record) {
+        if record.rejection.is_some() {
+            self.invalid += 1;
+            self.next_invalid_attempt = record.attempt + 1;
+        } else {
+            self.valid += 1;
+            self.nanoseconds += record.search.map_or(0, |search| search.nanoseconds);
+        }
+    }
+
+    /// Mean time of a valid grasp, in nanoseconds.
+    fn mean(&self) -> Option<f64> {
+        (self.valid > 0).then(|| self.nanoseconds as f64 / self.valid as f64)
+    }
+}
+
+/// Records that an earlier run made are made again, the first and the last of each cell: what the search does may have
+/// changed since.
+fn check_earlier_records(maker: &Maker, folder: &Folder) -> Result<(), FolderError> {
+    let mut ends: HashMap<(Cell, bool), [&Record; 2]> = HashMap::new();
+    for record in folder.records() {
+        let key = (record.cell, record.rejection.is_some());
+        ends.entry(key).or_insert([record; 2])[1] = record;
+    }
+    let mut checked: Vec<_> = ends.into_values().flatten().collect();
+    // Always the same one is named, whatever order the map had.
+    checked.sort_by_key(|record| (record.cell.holdout, record.seed, record.attempt));
+    match checked.into_iter().find(|record| !maker.comes_out_again(record)) {
+        None => Ok(()),
+        Some(record) => Err(FolderError::Outdated {
+            path: folder.path().to_owned(),
+            holdout: record.cell.built_in().name.clone(),
+            seed: record.seed,
+            attempt: record.attempt,
+        }),
+    }
+}
+
+fn progress_at(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>, cell: Cell) -> Progress {
+    let valid = |cell: &Cell| made.get(cell).map_or(0, |made| made.valid.min(settings.valid));
+    Progress {
+        done: cells.iter().map(valid).sum(),
+        total: settings.valid * cells.len() as u64,
+        cell,
+        left: time_left(settings, cells, made),
+    }
+}
+
+/// A cell takes as long a grasp as it took so far; if it has none, as long as its holdout took in the latest cell that
+/// has some; if there is none, as long as all took on average.
+fn time_left(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>) -> Option<Duration> {
+    let means: Vec<_> = cells.iter().filter_map(|cell| made.get(cell)?.mean()).collect();
+    if means.is_empty() {
+        return None;
+    }
+    let overall = means.iter().sum::<f64>() / means.len() as f64;
+    let mut of_holdout: HashMap<usize, f64> = HashMap::new();
+    let mut left = 0.0;
+    for cell in cells {
+        let made = made.get(cell).copied().unwrap_or_default();
+        if let Some(mean) = made.mean() {
+            of_holdout.insert(cell.holdout, mean);
+        }
+        let mean = of_holdout.get(&cell.holdout).copied().unwrap_or(overall);
+        left += mean * settings.valid.saturating_sub(made.valid) as f64;
+    }
+    Some(Duration::from_nanos(left as u64))
+}

@@ -1,0 +1,20 @@
+//! The tables of chapter 5 from a run's records, beside the thesis' own figures.
+
+mod bend_ratios;
+mod comfort;
+mod ladder;
+mod lists;
+mod outputs;
+mod placement;
+
+pub use bend_ratios::{bend_angles, columns, lost_contacts, ratio_counts};
+pub(crate) use bend_ratios::{BEND_BIN_DEGREES, bend_angle_bins, column_means, lost};
+pub use comfort::{comfort_spread, contact_counts};
+pub(crate) use comfort::valid_with_figures;
+pub(crate) use ladder::mean_of_means;
+pub use ladder::{ladder, per_holdout};
+pub use lists::{attempt_list, grasp_list};
+pub(crate) use outputs::{mean_step_times, negative_counts, step_shares};
+pub use outputs::{output_types, step_times, step_totals};
+pub(crate) use placement::{MEASURES, PALM_ANGLE_BIN_DEGREES, palm_angle_counts};
+pub use placement::{measure_ranges, palm_angle_bins, yaw_spread};

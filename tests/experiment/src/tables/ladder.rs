@@ -1,0 +1,143 @@
+//! Attempts and time per valid grasp (Figures 5.5a, 5.12a, 5.14a, 5.16a, 5.21a).
+
+use grasp_synthesis::strategy::Strategy;
+
+use crate::{
+    data::{Data, attempts, milliseconds},
+    plan::Set,
+    stats::{mean, quantile, standard_error_of_group_means},
+    table::{Table, Value},
+    thesis,
+};
+
+/// Half the width of an interval that has the true mean in it 19 times of 20, in standard errors.
+const STANDARD_ERRORS: f64 = 1.96;
+
+/// One row for each set of the ladder: means over the holdouts, each of which counts the same.
+pub fn ladder(data: &Data<'_>) -> Table {
+    let more = data.more_threads();
+    let mut header = vec![
+        "set".to_owned(),
+        "grasps".to_owned(),
+        "attempts".to_owned(),
+        "± (95 %)".to_owned(),
+        "thesis: attempts".to_owned(),
+        "ms".to_owned(),
+        "± (95 %)".to_owned(),
+        "median ms".to_owned(),
+        "thesis: ms".to_owned(),
+        "µs per attempt".to_owned(),
+        "prunes per attempt".to_owned(),
+    ];
+    header.extend(more.map(|threads| format!("ms on {threads} threads")));
+    header.extend(more.map(|_| "times as fast".to_owned()));
+    let mut table = Table::new("ladder", "Attempts and time per valid grasp", header);
+    for strategy in data.ladder() {
+        let set = Set::ladder(strategy);
+        let searches = data.searches_by_holdout(set, 1);
+        let attempts: Vec<_> = searches.iter().map(|own| attempts(own)).collect();
+        let times: Vec<_> = searches.iter().map(|own| milliseconds(own)).collect();
+        let all: Vec<_> = searches.concat();
+        let total_attempts: u64 = all.iter().map(|search| search.attempts).sum();
+        let total_prunes: u64 = all.iter().map(|search| search.pruned_placements).sum();
+        let total_ms: f64 = times.iter().flatten().sum();
+        let thesis = thesis::ladder(strategy);
+        let mean_ms = mean_of_means(&times);
+        let error = |groups: &[Vec<f64>]| {
+            standard_error_of_group_means(groups).map(|error| STANDARD_ERRORS * error)
+        };
+        let mut row = vec![
+            Value::from(set.name()),
+            (all.len() as u64).into(),
+            Value::number(mean_of_means(&attempts)),
+            Value::number(error(&attempts)),
+            Value::number(thesis.attempts),
+            Value::number(mean_ms),
+            Value::number(error(&times)),
+            Value::number(quantile(&times.concat(), 0.5)),
+            Value::number(thesis.milliseconds),
+            Value::number(total_ms * 1e3 / total_attempts as f64),
+            Value::number(total_prunes as f64 / total_attempts as f64),
+        ];
+        if let Some(threads) = more {
+            let raced: Vec<_> = data
+                .searches_by_holdout(set, threads)
+                .iter()
+                .map(|own| milliseconds(own))
+                .collect();
+            let raced_ms = mean_of_means(&raced);
+            row.push(Value::number(raced_ms));
+            row.push(Value::number(mean_ms.zip(raced_ms).map(|(one, more)| one / more)));
+        }
+        table.push(row);
+    }
+    table
+}
+
+/// Mean over the holdouts of their means; none if a holdout has nothing.
+pub(crate) fn mean_of_means(groups: &[Vec<f64>]) -> Option<f64> {
+    let means: Option<Vec<_>> = groups.iter().map(|group| mean(group)).collect();
+    mean(&means?)
+}
+
+/// A row for each holdout and for each object, a pair of columns for each set, and the thesis' where it has them.
+pub fn per_holdout(data: &Data<'_>) -> Table {
+    let strategies: Vec<Strategy> = data.ladder().collect();
+    let in_thesis: Vec<_> = strategies
+        .iter()
+        .copied()
+        .filter(|&strategy| thesis::by_holdout(strategy, 0).is_some())
+        .collect();
+    let mut header = vec!["holdout".to_owned()];
+    for strategy in &strategies {
+        header.extend([format!("{strategy:?}: attempts"), format!("{strategy:?}: ms")]);
+    }
+    for strategy in &in_thesis {
+        header.extend([
+            format!("thesis {strategy:?}: attempts"),
+            format!("thesis {strategy:?}: ms"),
+        ]);
+    }
+    let mut table = Table::new("per-holdout", "Attempts and time per valid grasp, by holdout", header);
+    let holdouts = &data.settings.holdouts;
+    let columns: Vec<Vec<f64>> = strategies
+        .iter()
+        .flat_map(|&strategy| {
+            let searches = data.searches_by_holdout(Set::ladder(strategy), 1);
+            let means = |of: fn(&[crate::record::SearchFigures]) -> Vec<f64>| {
+                searches.iter().map(|own| mean(&of(own)).unwrap_or(f64::NAN)).collect()
+            };
+            [means(attempts), means(milliseconds)]
+        })
+        .chain(in_thesis.iter().flat_map(|&strategy| {
+            let printed = |of: fn(thesis::PerGrasp) -> f64| {
+                holdouts
+                    .iter()
+                    .map(|&holdout| thesis::by_holdout(strategy, holdout).map_or(f64::NAN, of))
+                    .collect()
+            };
+            [printed(|grasp| grasp.attempts), printed(|grasp| grasp.milliseconds)]
+        }))
+        .collect();
+    let built_in = grasp_assets::holdouts::holdouts();
+    let row_of = |name: &str, rows: &[usize]| {
+        let means = columns.iter().map(|column| {
+            let values: Vec<_> = rows.iter().map(|&row| column[row]).collect();
+            Value::number(mean(&values))
+        });
+        std::iter::once(name.into()).chain(means).collect()
+    };
+    for (row, &holdout) in holdouts.iter().enumerate() {
+        table.push(row_of(&built_in[holdout].name, &[row]));
+    }
+    let mut objects: Vec<_> = holdouts.iter().map(|&holdout| &built_in[holdout].object).collect();
+    objects.dedup();
+    for object in objects {
+        let rows: Vec<_> = (0..holdouts.len())
+            .filter(|&row| built_in[holdouts[row]].object == *object)
+            .collect();
+        table.push(row_of(&format!("mean of {object}"), &rows));
+    }
+    table.push(row_of("mean of all", &(0..holdouts.len()).collect::<Vec<_>>()));
+    table
+}

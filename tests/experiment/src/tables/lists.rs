@@ -1,0 +1,130 @@
+//! Everything, row by row: what the figures are drawn from, and what makes every row again.
+
+use grasp_synthesis::{hand::Digit, rejection::Rejection};
+
+use super::comfort::{contacts_of, touching_digits};
+use crate::{
+    data::Data,
+    plan::Cell,
+    record::{Details, Record, STEP_NAMES, output_type},
+    table::{Table, Value},
+};
+
+/// All valid grasps, also those of more threads and of Figure 5.20's columns.
+pub fn grasp_list(data: &Data<'_>) -> Table {
+    let mut header = vec![
+        "strategy", "bend_ratios", "threads", "holdout", "number", "seed", "attempt", "attempts", "prunes",
+        "milliseconds",
+    ];
+    header.extend(Rejection::ALL.map(|rejection| output_type(Some(rejection))));
+    header.extend([
+        "touching_digits",
+        "contacts",
+        "wrench_angle_degrees",
+        "comfort",
+        "sufficient_distributions",
+    ]);
+    let mut table = Table::new("grasps", "All valid grasps", header);
+    for record in data.records() {
+        let Some(search) = record.search else {
+            continue;
+        };
+        let mut row = origin(record);
+        row.extend([
+            search.attempts.into(),
+            search.pruned_placements.into(),
+            Value::number(search.nanoseconds as f64 / 1e6),
+        ]);
+        row.extend(search.rejections.map(Value::from));
+        let details = record.details.as_ref();
+        row.push(Value::decimals(details.map(touching_digits), 0));
+        row.push(Value::decimals(details.map(contacts_of), 0));
+        let grasp = record.grasp();
+        row.push(Value::number(grasp.map(|grasp| f64::from(grasp.wrench_angle_degrees))));
+        row.push(Value::number(grasp.map(|grasp| f64::from(grasp.comfort))));
+        row.push(grasp.map_or(Value::Missing, |grasp| {
+            u64::from(grasp.sufficient_distributions).into()
+        }));
+        table.push(row);
+    }
+    table
+}
+
+/// All attempts that were looked at closely: the positive and the negative sets on one thread.
+pub fn attempt_list(data: &Data<'_>) -> Table {
+    let mut header: Vec<String> = [
+        "strategy",
+        "bend_ratios",
+        "threads",
+        "holdout",
+        "number",
+        "seed",
+        "attempt",
+        "output_type",
+        "wrist_distance_cm",
+        "palm_distance_cm",
+        "upward_wrist_angle_degrees",
+        "forward_wrist_angle_degrees",
+        "palm_com_palm_angle_degrees",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    for digit in Digit::ALL {
+        let name = format!("{digit:?}").to_lowercase();
+        header.extend(["yaw_degrees", "bend_degrees", "bend_ratio", "contacts"].map(|of| format!("{name}_{of}")));
+    }
+    header.extend(STEP_NAMES.map(|name| format!("{}_us", name.to_lowercase().replace(' ', "_"))));
+    let mut table = Table::new("attempts", "All attempts of the grasp sets", header);
+    for record in data.records() {
+        if let Some(details) = &record.details {
+            let mut row = origin(record);
+            row.push(output_type(record.rejection).into());
+            row.extend(details_of(details));
+            table.push(row);
+        }
+    }
+    table
+}
+
+/// What makes a record again.
+fn origin(record: &Record) -> Vec<Value> {
+    let Cell { set, threads, .. } = record.cell;
+    let bend_ratios = serde_json::to_value(set.bend_ratios);
+    let bend_ratios = bend_ratios.ok().and_then(|name| name.as_str().map(str::to_owned));
+    vec![
+        format!("{:?}", set.strategy).into(),
+        // As the command line spells it.
+        bend_ratios.map_or(Value::Missing, |name| name.replace('_', "-").into()),
+        (threads as u64).into(),
+        record.cell.built_in().name.clone().into(),
+        record.number.into(),
+        record.seed.into(),
+        record.attempt.into(),
+    ]
+}
+
+fn details_of(details: &Details) -> Vec<Value> {
+    let measures = &details.measures;
+    let mut row: Vec<_> = [
+        Some(measures.wrist_distance_cm),
+        Some(measures.palm_distance_cm),
+        Some(measures.upward_degrees),
+        Some(measures.forward_degrees),
+        measures.palm_com_palm_degrees,
+    ]
+    .map(|value| Value::number(value.map(f64::from)))
+    .to_vec();
+    for digit in 0..5 {
+        match details.digits.get(digit) {
+            Some(posed) => row.extend([
+                Value::number(f64::from(posed.yaw_degrees)),
+                Value::number(f64::from(posed.bend_degrees)),
+                Value::number(posed.bend_ratio.map(f64::from)),
+                u64::from(posed.contacts).into(),
+            ]),
+            None => row.extend([const { Value::Missing }; 4]),
+        }
+    }
+    row.extend(details.step_nanoseconds.map(|time| Value::number(time as f64 / 1e3)));
+    row
+}
