@@ -1,4 +1,26 @@
-//! Charts as SVG.
+//! Charts as SVG: [`figure`] lays panels out in a grid and returns one picture that stands by itself.
+//!
+//! The data says what is shown, each kind of chart has a file that draws it, and all of them share the frame with its
+//! ticks ([`frame`]), the legend ([`legend`]), the words' sizes ([`words`]) and the numbers' spelling ([`numbers`]).
+//! The same data gives the same bytes.
+
+mod chart;
+mod dots;
+mod frame;
+mod grouped_bars;
+mod histogram;
+mod layout;
+mod legend;
+mod numbers;
+pub mod palette;
+mod scale;
+mod scatter;
+mod stacked_bars;
+mod strips;
+mod svg;
+mod words;
+
+pub use layout::figure;
 
 /// A colour: red, green, blue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,18 +37,18 @@ pub struct Series<T> {
     pub values: Vec<T>,
 }
 
-/// An axis.
+/// An axis. Dots beyond its ends are left out, and a note in the corner of the chart says how many.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// What it shows, with the unit.
     pub label: String,
-    /// Its lower end.
+    /// Its lower end. An axis whose ends are the same is widened, one whose ends are swapped is turned round.
     pub min: f64,
     /// Its upper end.
     pub max: f64,
 }
 
-/// One chart.
+/// One chart. Values that are not finite are left out, and so is whatever they would have drawn.
 #[derive(Clone, Debug)]
 pub enum Chart {
     /// Dots; series that come later lie on top.
@@ -38,11 +60,12 @@ pub enum Chart {
         /// Dots as (x, y).
         series: Vec<Series<(f64, f64)>>,
     },
-    /// Values of each series as dots in a strip of its own, spread sideways so that their density shows.
+    /// Values of each series as dots in a strip of its own, the strips below each other, the dots spread across their
+    /// strip so that their density shows. The number of values stands at the end of each strip.
     Strips {
-        /// Along the side.
-        y: Axis,
-        /// One strip each.
+        /// Along the bottom.
+        x: Axis,
+        /// One strip each, from the top.
         series: Vec<Series<f64>>,
     },
     /// Counts in bins of one width, the series on top of each other.
@@ -56,13 +79,14 @@ pub enum Chart {
         /// Counts, bin by bin.
         series: Vec<Series<u64>>,
     },
-    /// A horizontal bar for each row, made of a part for each series.
+    /// A horizontal bar for each row, made of a part for each series. A part that is wide enough bears its value; rows
+    /// that differ in length bear their sum at the end.
     StackedBars {
         /// What the length of a bar means, with the unit.
         label: String,
         /// The rows' names, from the top.
         rows: Vec<String>,
-        /// Parts, row by row.
+        /// Parts, row by row; those that are not more than 0 are left out.
         series: Vec<Series<f64>>,
     },
     /// For each group a bar beside the other for each series, on a logarithmic axis; a value that is missing is NaN.

@@ -1,0 +1,201 @@
+//! The frame that all charts share: axes, ticks, grid, labels.
+
+use plotters::{
+    backend::SVGBackend,
+    chart::{ChartBuilder, ChartContext, LabelAreaPosition},
+    coord::cartesian::Cartesian2d,
+    style::{
+        Color, RGBColor, ShapeStyle,
+        text_anchor::{HPos, VPos},
+    },
+};
+
+use super::{
+    Axis,
+    numbers::{self, Tick},
+    scale::Scale,
+    svg::{Area, Drawn, PIXEL, px},
+    words,
+};
+
+/// A chart to draw in, in the axes' units.
+pub(super) type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scale, Scale>>;
+
+/// Length of a tick, in pixels; its text is twice as far from the axis.
+const TICK: f64 = 4.0;
+/// Width of axes and grid lines, in units of the drawing (tenths of a pixel).
+const HAIRLINE: u32 = 10;
+/// The axes' colour.
+const AXIS: RGBColor = RGBColor(90, 90, 90);
+/// The grid's colour.
+const GRID: RGBColor = RGBColor(226, 226, 226);
+/// Above the plot, for the upper half of the side's last tick's text, in pixels.
+const TOP: f64 = 7.0;
+/// Least space between the texts of two ticks along the bottom, in pixels.
+const TICK_GAP: f64 = 14.0;
+/// Least distance between two ticks along the side, in pixels.
+const TICK_PITCH: f64 = 26.0;
+/// What names of rows may take at most of a chart's width.
+const NAMES_SHARE: f64 = 0.4;
+
+/// What an axis' ticks say.
+pub(super) enum Marks {
+    /// Numbers.
+    Numbers,
+    /// The powers of ten, of which the axis' units are the exponents.
+    Decades,
+    /// Names, each in the middle of a unit, from the axis' upper end down.
+    Names(Vec<String>),
+    /// Nothing: the chart writes below the axis itself, in so many pixels.
+    Own(f64),
+}
+
+/// An axis of the frame.
+pub(super) struct Side {
+    /// Outside the ticks' texts; may be empty.
+    pub label: String,
+    /// Its ends, finite and apart.
+    pub ends: (f64, f64),
+    /// Its ticks.
+    pub marks: Marks,
+}
+
+impl Side {
+    /// A numeric axis.
+    pub(super) fn numbers(axis: &Axis) -> Self {
+        Self {
+            label: axis.label.clone(),
+            ends: numbers::ends(axis.min, axis.max),
+            marks: Marks::Numbers,
+        }
+    }
+
+    /// An axis of rows' names from the top.
+    pub(super) fn names(names: Vec<String>) -> Self {
+        Self {
+            label: String::new(),
+            ends: (0.0, names.len().max(1) as f64),
+            marks: Marks::Names(names),
+        }
+    }
+
+    fn label_height(&self) -> f64 {
+        if self.label.is_empty() {
+            0.0
+        } else {
+            1.6 * words::BODY
+        }
+    }
+
+    fn has_grid(&self) -> bool {
+        matches!(self.marks, Marks::Numbers | Marks::Decades)
+    }
+}
+
+/// The width and height of an area, in pixels.
+pub(super) fn size(area: &Area<'_>) -> (f64, f64) {
+    let (width, height) = area.dim_in_pixel();
+    (
+        f64::from(width) / f64::from(PIXEL),
+        f64::from(height) / f64::from(PIXEL),
+    )
+}
+
+/// What the axis along the bottom takes below the plot, in pixels.
+pub(super) fn bottom(x: &Side) -> f64 {
+    let texts = if let Marks::Own(room) = x.marks {
+        room
+    } else {
+        words::BODY
+    };
+    2.0 * TICK + texts + x.label_height() + 2.0
+}
+
+/// The height of the plot that [`draw`] makes in an area of this height, in pixels.
+pub(super) fn plot_height(height: f64, x: &Side) -> f64 {
+    (height - TOP - bottom(x)).max(1.0)
+}
+
+/// Draws axes, ticks and grid, and returns the plot between them. `right` pixels stay free to the right of it.
+pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -> Drawn<Plot<'a, 'b>> {
+    let (width, height) = size(area);
+    let high = plot_height(height, x);
+    let y_ticks = side_ticks(y, high, width);
+    let widest = y_ticks
+        .iter()
+        .map(|tick| words::width(&tick.text, words::BODY))
+        .fold(0.0, f64::max);
+    let left = widest + 2.0 * TICK + 2.0 + y.label_height();
+    let x_ticks = bottom_ticks(x, width - left - right);
+    // Half of the last tick's text may stick out to the right.
+    let half = x_ticks
+        .last()
+        .map_or(0.0, |tick| words::width(&tick.text, words::BODY) / 2.0);
+    let right = right.max(half + 1.0);
+
+    let mut plot = ChartBuilder::on(area)
+        .margin_top(px(TOP))
+        .margin_right(px(right))
+        .set_label_area_size(LabelAreaPosition::Left, px(left))
+        .set_label_area_size(LabelAreaPosition::Bottom, px(bottom(x)))
+        .build_cartesian_2d(Scale::new(x.ends, x_ticks), Scale::new(y.ends, y_ticks))?;
+    let label_height = words::height_that_fits(&x.label, words::BODY, width - left - right)
+        .min(words::height_that_fits(&y.label, words::BODY, high));
+    let mut mesh = plot.configure_mesh();
+    mesh.bold_line_style(ShapeStyle::from(&GRID).stroke_width(HAIRLINE))
+        .light_line_style(GRID.mix(0.0))
+        .axis_style(ShapeStyle::from(&AXIS).stroke_width(HAIRLINE))
+        .label_style(words::style(words::BODY, words::INK, HPos::Center, VPos::Center))
+        .axis_desc_style(words::style(label_height, words::INK, HPos::Center, VPos::Center))
+        .set_all_tick_mark_size(px(TICK))
+        .x_desc(words::drawable(&x.label))
+        .y_desc(words::drawable(&y.label));
+    if !x.has_grid() {
+        mesh.disable_x_mesh();
+    }
+    if !y.has_grid() {
+        mesh.disable_y_mesh();
+    }
+    mesh.draw()?;
+    Ok(plot)
+}
+
+/// The place of a point of the plot in the area that the plot was made in, in tenths of a pixel.
+pub(super) fn place(area: &Area<'_>, plot: &Plot<'_, '_>, point: (f64, f64)) -> (i32, i32) {
+    let (x, y) = plot.plotting_area().map_coordinate(&point);
+    let (left, top) = area.get_base_pixel();
+    (x - left, y - top)
+}
+
+fn bottom_ticks(x: &Side, wide: f64) -> Vec<Tick> {
+    let (low, high) = x.ends;
+    let fits = |ticks: &[Tick], step: f64| {
+        let widest = ticks
+            .iter()
+            .map(|tick| words::width(&tick.text, words::BODY))
+            .fold(0.0, f64::max);
+        step / (high - low) * wide >= widest + TICK_GAP
+    };
+    match &x.marks {
+        Marks::Numbers => numbers::ticks(low, high, fits),
+        Marks::Decades => numbers::decades(low, high, (wide / 80.0) as usize),
+        Marks::Names(_) | Marks::Own(_) => Vec::new(),
+    }
+}
+
+fn side_ticks(y: &Side, high: f64, width: f64) -> Vec<Tick> {
+    let (bottom, top) = y.ends;
+    match &y.marks {
+        Marks::Numbers => numbers::ticks(bottom, top, |_, step| step / (top - bottom) * high >= TICK_PITCH),
+        Marks::Decades => numbers::decades(bottom, top, (high / 20.0) as usize),
+        Marks::Names(names) => names
+            .iter()
+            .enumerate()
+            .map(|(row, name)| Tick {
+                at: top - row as f64 - 0.5,
+                text: words::shortened(name, words::BODY, NAMES_SHARE * width),
+            })
+            .collect(),
+        Marks::Own(_) => Vec::new(),
+    }
+}

@@ -1,0 +1,63 @@
+//! Counts in bins, the series on top of each other.
+
+use plotters::{element::Rectangle, style::Color};
+
+use super::{
+    Axis, Series, dots,
+    frame::{self, Marks, Side},
+    numbers,
+    svg::{Area, Drawn},
+};
+
+/// What a bar takes of its bin.
+const FILLED: f64 = 0.94;
+/// About how many ticks the side has.
+const TICKS: f64 = 5.0;
+
+/// Draws the chart.
+pub(super) fn draw(
+    area: &Area<'_>,
+    label: &str,
+    (start, width): (f64, f64),
+    series: &[Series<u64>],
+) -> Drawn {
+    let bins = series.iter().map(|series| series.values.len()).max().unwrap_or(0);
+    let usable =
+        start.is_finite() && width.is_finite() && width > 0.0 && (start + width * bins as f64).is_finite();
+    let (start, width) = if usable { (start, width) } else { (0.0, 1.0) };
+    let count = |series: &Series<u64>, bin: usize| series.values.get(bin).map_or(0.0, |count| *count as f64);
+    let highest = (0..bins)
+        .map(|bin| series.iter().map(|series| count(series, bin)).sum())
+        .fold(0.0, f64::max);
+
+    let x = Axis {
+        label: label.to_owned(),
+        min: start,
+        max: start + width * bins.max(1) as f64,
+    };
+    let y = Side {
+        label: "Count".to_owned(),
+        ends: (0.0, numbers::rounded_up(highest, TICKS)),
+        marks: Marks::Numbers,
+    };
+    let mut plot = frame::draw(area, &Side::numbers(&x), &y, 0.0)?;
+    let mut feet = vec![0.0; bins];
+    for series in series {
+        let style = dots::rgb(series.colour).filled();
+        let mut bars = Vec::new();
+        for (bin, foot) in feet.iter_mut().enumerate() {
+            let top = *foot + count(series, bin);
+            if top > *foot {
+                let middle = start + width * (bin as f64 + 0.5);
+                let half = 0.5 * FILLED * width;
+                bars.push(Rectangle::new(
+                    [(middle - half, top), (middle + half, *foot)],
+                    style,
+                ));
+            }
+            *foot = top;
+        }
+        plot.draw_series(bars)?;
+    }
+    Ok(())
+}

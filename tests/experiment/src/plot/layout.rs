@@ -1,0 +1,140 @@
+//! Panels in a grid.
+
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::{
+    Panel, chart, legend,
+    svg::{self, Area, Drawn, px},
+    words,
+};
+
+/// Width of a picture, in pixels.
+const WIDTH: f64 = 900.0;
+/// Around everything, in pixels.
+const MARGIN: f64 = 14.0;
+/// Between panels beside each other, in pixels.
+const GUTTER: f64 = 24.0;
+/// Between panels below each other, in pixels.
+const BETWEEN_ROWS: f64 = 16.0;
+/// Between a title and what it stands above, in pixels.
+const BELOW_TITLE: f64 = 5.0;
+
+/// Where a panel lies and how it is divided, in pixels.
+struct Cell<'a> {
+    panel: &'a Panel,
+    left: f64,
+    top: f64,
+    title: Vec<String>,
+    title_height: f64,
+    chart_height: f64,
+}
+
+/// One picture, 900 pixels wide, of panels in a grid of so many columns (at least 1), row by row.
+///
+/// Panels that have the same legend share one below all of them. The picture is SVG that needs nothing besides itself;
+/// the same panels give the same bytes.
+pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
+    let columns = columns.clamp(1, panels.len().max(1));
+    let room = WIDTH - 2.0 * MARGIN;
+    let wide = (room - (columns - 1) as f64 * GUTTER) / columns as f64;
+    let heading = words::lines(title, words::HEADING, room / BOLD);
+    let first = panels
+        .first()
+        .map(|panel| chart::legend(&panel.chart))
+        .unwrap_or_default();
+    let shared = panels.len() > 1 && panels.iter().all(|panel| chart::legend(&panel.chart) == first);
+
+    let mut cells = Vec::new();
+    let mut top = MARGIN + title_height(&heading, words::HEADING);
+    for row in panels.chunks(columns) {
+        let titles: Vec<_> = row
+            .iter()
+            .map(|panel| words::lines(&panel.title, words::SUBHEADING, wide / BOLD))
+            .collect();
+        // Titles and charts of a row take what the highest of them takes, so that the axes are in line.
+        let title_heights = titles.iter().map(|title| title_height(title, words::SUBHEADING));
+        let title_height = title_heights.fold(0.0, f64::max);
+        let chart_height = row
+            .iter()
+            .map(|panel| chart::height(&panel.chart, wide))
+            .fold(0.0, f64::max);
+        let legends = row
+            .iter()
+            .map(|panel| legend::height(&chart::legend(&panel.chart), wide));
+        let legend_height = if shared { 0.0 } else { legends.fold(0.0, f64::max) };
+        for (column, (panel, title)) in row.iter().zip(titles).enumerate() {
+            let left = MARGIN + column as f64 * (wide + GUTTER);
+            cells.push(Cell {
+                panel,
+                left,
+                top,
+                title,
+                title_height,
+                chart_height,
+            });
+        }
+        top += title_height + chart_height + legend_height + BETWEEN_ROWS;
+    }
+    if !panels.is_empty() {
+        top -= BETWEEN_ROWS;
+    }
+    let shared_height = if shared { legend::height(&first, room) } else { 0.0 };
+    let height = top + shared_height + MARGIN;
+
+    let draw = |area: &Area<'_>| {
+        let middle = (px(WIDTH / 2.0), px(MARGIN));
+        let style = words::bold(words::HEADING, HPos::Center, VPos::Top);
+        words::write_lines(area, &heading, middle, words::HEADING, &style)?;
+        for cell in &cells {
+            draw_cell(area, cell, wide, shared)?;
+        }
+        if shared {
+            legend::draw(
+                &part(area, (MARGIN, top), (room, shared_height)),
+                &first,
+                room / 2.0,
+            )?;
+        }
+        Ok(())
+    };
+    svg::picture((WIDTH as u32, height.ceil() as u32), draw).expect("a string takes all that is drawn")
+}
+
+/// How much wider than regular text bold text is.
+const BOLD: f64 = 1.08;
+
+fn title_height(lines: &[String], height: f64) -> f64 {
+    if lines.is_empty() {
+        0.0
+    } else {
+        lines.len() as f64 * words::LINE * height + BELOW_TITLE
+    }
+}
+
+fn draw_cell(area: &Area<'_>, cell: &Cell<'_>, wide: f64, shared_legend: bool) -> Drawn {
+    // A title of fewer lines than its neighbour's stands at the bottom of the titles' row.
+    let unused = cell.title_height - title_height(&cell.title, words::SUBHEADING);
+    let at = (px(cell.left + wide / 2.0), px(cell.top + unused));
+    let style = words::bold(words::SUBHEADING, HPos::Center, VPos::Top);
+    words::write_lines(area, &cell.title, at, words::SUBHEADING, &style)?;
+
+    let below_title = cell.top + cell.title_height;
+    chart::draw(
+        &part(area, (cell.left, below_title), (wide, cell.chart_height)),
+        &cell.panel.chart,
+    )?;
+    if !shared_legend {
+        let entries = chart::legend(&cell.panel.chart);
+        let at = (cell.left, below_title + cell.chart_height);
+        legend::draw(
+            &part(area, at, (wide, legend::height(&entries, wide))),
+            &entries,
+            wide / 2.0,
+        )?;
+    }
+    Ok(())
+}
+
+fn part<'a>(area: &Area<'a>, (left, top): (f64, f64), (width, height): (f64, f64)) -> Area<'a> {
+    area.clone().shrink((px(left), px(top)), (px(width), px(height)))
+}

@@ -1,0 +1,58 @@
+//! Colours that people with deuteranopia, protanopia or tritanopia can tell apart.
+//!
+//! The hues are those of Okabe and Ito ("Color Universal Design", 2008) and of Tol's bright scheme ("Colour Schemes",
+//! SRON/EPS/TN/09-002, 2021), with an indigo and a grey where eight are not enough.
+
+use super::Colour;
+
+/// Green: valid grasps, as in the thesis (Figure 5.10).
+pub const VALID: Colour = Colour(0, 158, 115);
+
+/// The rejections in the order of the thesis' Table 5.2: `NoContacts`, `NoThumb`, `NoThumbEarlyStop`, `NoFingers`,
+/// `PalmCollision`, `FingerCollision`, `UnwantedContact`, `NotImmobilizing`. Beside [`VALID`] they make nine kinds of
+/// output.
+pub const REJECTIONS: [Colour; 8] = [
+    Colour(230, 159, 0),
+    Colour(86, 180, 233),
+    Colour(0, 114, 178),
+    Colour(204, 121, 167),
+    Colour(213, 94, 0),
+    Colour(240, 228, 66),
+    Colour(160, 160, 160),
+    Colour(51, 34, 136),
+];
+
+/// Orange: grasps without contacts where all other rejections are one kind (Figure 5.10).
+pub const NO_CONTACTS: Colour = REJECTIONS[0];
+
+/// Dark blue: the rejections but `NoContacts`, as one kind (Figure 5.10).
+pub const OTHER_REJECTIONS: Colour = Colour(28, 40, 110);
+
+/// The steps of an attempt: wrist placement, finger posing, contact validation, collision validation, immobility
+/// validation.
+pub const STEPS: [Colour; 5] = [
+    Colour(86, 180, 233),
+    Colour(0, 114, 178),
+    Colour(240, 228, 66),
+    Colour(213, 94, 0),
+    Colour(0, 158, 115),
+];
+
+/// The bend ratios 0.7, 1 and 1.42: purple, green and blue, as in the thesis (Figure 5.15), apart in lightness too.
+pub const BEND_RATIOS: [Colour; 3] = [Colour(98, 24, 118), Colour(0, 158, 115), Colour(86, 180, 233)];
+
+/// The grasp sets A to F.
+pub const SETS: [Colour; 6] = [
+    Colour(68, 119, 170),
+    Colour(238, 102, 119),
+    Colour(34, 136, 51),
+    Colour(204, 187, 68),
+    Colour(102, 204, 238),
+    Colour(170, 51, 119),
+];
+
+/// Blue: what was measured here, beside [`THESIS`].
+pub const HERE: Colour = Colour(0, 114, 178);
+
+/// Grey: what the thesis measured.
+pub const THESIS: Colour = Colour(187, 187, 187);
