@@ -113,6 +113,19 @@ impl From<StrategyName> for Strategy {
     }
 }
 
+impl From<StrategyName> for grasp_synthesis::strategy::Strategy {
+    fn from(name: StrategyName) -> Self {
+        match name {
+            StrategyName::A => Self::A,
+            StrategyName::B => Self::B,
+            StrategyName::C => Self::C,
+            StrategyName::D => Self::D,
+            StrategyName::E => Self::E,
+            StrategyName::F => Self::F,
+        }
+    }
+}
+
 /// The columns of Figure 5.20.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(super) enum BendRatiosName {

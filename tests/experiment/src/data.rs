@@ -45,7 +45,12 @@ impl<'a> Data<'a> {
 
     /// The most threads that were asked for, if that is more than one.
     pub fn more_threads(&self) -> Option<usize> {
-        self.settings.threads.iter().copied().max().filter(|threads| *threads > 1)
+        self.settings
+            .threads
+            .iter()
+            .copied()
+            .max()
+            .filter(|threads| *threads > 1)
     }
 
     /// The positive grasp set, on one thread.

@@ -5,7 +5,10 @@ mod ladder;
 mod outputs;
 mod placement;
 
-use grasp_synthesis::rejection::Rejection;
+use grasp_synthesis::{
+    rejection::Rejection,
+    strategy::Strategy::{A, B, C, D, F},
+};
 
 use crate::{
     data::Data,
@@ -30,18 +33,36 @@ pub struct Figure {
 /// All figures for which there is something to draw, in the thesis' order.
 pub fn figures(data: &Data<'_>) -> Vec<Figure> {
     let has = |strategy| data.ladder().any(|asked| asked == strategy);
-    use grasp_synthesis::strategy::Strategy::{A, B, C, D, F};
-    let mut figures = vec![ladder::ladder(data), outputs::output_types(data), outputs::totals(data)];
+    let mut figures = vec![
+        ladder::ladder(data),
+        outputs::output_types(data),
+        outputs::totals(data),
+    ];
     if has(A) {
         figures.extend([
-            outputs::steps(data, A, "figure-5-06", "Figure 5.6: time by step and output type, grasp set A"),
+            outputs::steps(
+                data,
+                A,
+                "figure-5-06",
+                "Figure 5.6: time by step and output type, grasp set A",
+            ),
             placement::by_output_type(data),
-            placement::pairs(data, A, "figure-5-10", "Figure 5.10: pairs of measures, grasp set A"),
+            placement::pairs(
+                data,
+                A,
+                "figure-5-10",
+                "Figure 5.10: pairs of measures, grasp set A",
+            ),
         ]);
     }
     if has(B) {
         figures.extend([
-            placement::pairs(data, B, "figure-5-11", "Figure 5.11: pairs of measures, grasp set B"),
+            placement::pairs(
+                data,
+                B,
+                "figure-5-11",
+                "Figure 5.11: pairs of measures, grasp set B",
+            ),
             placement::palm_angles(data),
         ]);
     }
@@ -49,7 +70,11 @@ pub fn figures(data: &Data<'_>) -> Vec<Figure> {
         figures.push(bend::yaw_and_bend(data));
     }
     if has(C) {
-        figures.extend([bend::bend_angles(data), bend::ratios_used(data), bend::lost_contacts(data)]);
+        figures.extend([
+            bend::bend_angles(data),
+            bend::ratios_used(data),
+            bend::lost_contacts(data),
+        ]);
     }
     if data.settings.bend_ratio_columns {
         figures.push(bend::choices(data));

@@ -46,7 +46,10 @@ impl Manifest {
     fn differences(&self, other: &Self) -> Vec<String> {
         let mut differences = Vec::new();
         if self.format != other.format {
-            differences.push(format!("its format is {}, now it is {}", self.format, other.format));
+            differences.push(format!(
+                "its format is {}, now it is {}",
+                self.format, other.format
+            ));
         }
         if self.seed != other.seed {
             differences.push(format!("its seed is {}, now it is {}", self.seed, other.seed));
@@ -154,9 +157,16 @@ impl Folder {
             TryLockError::Error(error) => failed_to("lock", &records_path)(error),
         })?;
         let manifest_path = path.join(MANIFEST);
-        let earlier = if fresh { None } else { read_manifest(&manifest_path)? };
+        let earlier = if fresh {
+            None
+        } else {
+            read_manifest(&manifest_path)?
+        };
         let Some(earlier) = earlier else {
-            let bytes = file.metadata().map_err(failed_to("look at", &records_path))?.len();
+            let bytes = file
+                .metadata()
+                .map_err(failed_to("look at", &records_path))?
+                .len();
             if bytes > 0 && !fresh {
                 return Err(FolderError::NoManifest(path.to_owned()));
             }
@@ -225,11 +235,13 @@ fn failed_to(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Folde
 
 fn read_manifest(path: &Path) -> Result<Option<Manifest>, FolderError> {
     match fs::read_to_string(path) {
-        Ok(text) => serde_json::from_str(&text).map(Some).map_err(|source| FolderError::Malformed {
-            path: path.to_owned(),
-            line: source.line(),
-            source,
-        }),
+        Ok(text) => serde_json::from_str(&text)
+            .map(Some)
+            .map_err(|source| FolderError::Malformed {
+                path: path.to_owned(),
+                line: source.line(),
+                source,
+            }),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(failed_to("read", path)(error)),
     }

@@ -1,13 +1,17 @@
 //! The experiments of the thesis' chapter 5, on the crate that the server searches with.
 
+pub mod claims;
 pub mod data;
+pub mod figures;
 pub mod folder;
 pub mod machine;
 pub mod make;
 pub mod plan;
 pub mod plot;
 pub mod record;
+pub mod report;
 pub mod run;
+pub mod sheet;
 pub mod stats;
 pub mod table;
 pub mod tables;

@@ -190,8 +190,7 @@ impl Maker {
     pub fn grasp_of(&self, record: &Record) -> Option<Box<grasp_synthesis::grasp::Grasp>> {
         let scene = self.scene(&record.cell);
         let mut stream = AttemptStream::new(record.seed, record.attempt);
-        let end =
-            Attempt::default().try_synthesize_grasp(&scene, &mut stream, &mut NoStopwatch, &|| false);
+        let end = Attempt::default().try_synthesize_grasp(&scene, &mut stream, &mut NoStopwatch, &|| false);
         match end {
             AttemptEnd::Valid(grasp) => Some(grasp),
             AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
@@ -200,7 +199,10 @@ impl Maker {
 
     fn scene(&self, cell: &Cell) -> Scene<'_> {
         let holdout = &self.holdouts[cell.holdout];
-        let Set { strategy, bend_ratios } = cell.set;
+        let Set {
+            strategy,
+            bend_ratios,
+        } = cell.set;
         Scene::new(holdout, self.rig, strategy, bend_ratios, holdout.object.friction)
     }
 }

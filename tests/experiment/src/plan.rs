@@ -40,7 +40,10 @@ impl Set {
     ];
 
     const fn column(strategy: Strategy, bend_ratios: BendRatioChoice) -> Self {
-        Self { strategy, bend_ratios }
+        Self {
+            strategy,
+            bend_ratios,
+        }
     }
 
     /// True for the sets A to F.
@@ -150,7 +153,11 @@ impl Settings {
     pub fn cells(&self) -> Vec<Cell> {
         let mut runs: Vec<(Set, usize)> = Vec::new();
         for &strategy in &self.strategies {
-            runs.extend(self.threads.iter().map(|&threads| (Set::ladder(strategy), threads)));
+            runs.extend(
+                self.threads
+                    .iter()
+                    .map(|&threads| (Set::ladder(strategy), threads)),
+            );
         }
         if self.bend_ratio_columns {
             runs.extend(Set::BEND_RATIO_COLUMNS.map(|set| (set, 1)));
@@ -172,7 +179,11 @@ impl Settings {
     /// How many invalid attempts a cell keeps: on one thread, in the sets of the ladder that were asked for.
     pub fn invalid_of(&self, cell: &Cell) -> u64 {
         let is_asked = cell.set.is_ladder() && self.strategies.contains(&cell.set.strategy);
-        if is_asked && cell.threads == 1 { self.invalid } else { 0 }
+        if is_asked && cell.threads == 1 {
+            self.invalid
+        } else {
+            0
+        }
     }
 
     /// The seed of a cell's grasp. It is the same in all sets: what differs between two sets is then the way to
@@ -240,7 +251,11 @@ mod tests {
             ..Settings::default()
         };
         for cell in settings.cells() {
-            let expected = if cell.set.name() == "F" && cell.threads == 1 { 100 } else { 0 };
+            let expected = if cell.set.name() == "F" && cell.threads == 1 {
+                100
+            } else {
+                0
+            };
             assert_eq!(settings.invalid_of(&cell), expected, "{cell:?}");
         }
     }

@@ -63,7 +63,11 @@ impl Value {
                 let text = format!("{value:.decimals$}");
                 // No "-0.0".
                 let is_zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
-                with_separators(if is_zero { text.trim_start_matches('-') } else { &text })
+                with_separators(if is_zero {
+                    text.trim_start_matches('-')
+                } else {
+                    &text
+                })
             }
             Self::Missing => "–".to_owned(),
         }
@@ -152,7 +156,11 @@ impl Table {
 
     /// True if all that a column says are numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
-        let mut said = self.rows.iter().map(|row| &row[column]).filter(|value| **value != Value::Missing);
+        let mut said = self
+            .rows
+            .iter()
+            .map(|row| &row[column])
+            .filter(|value| **value != Value::Missing);
         said.all(Value::is_number)
     }
 
@@ -176,11 +184,16 @@ impl Table {
     /// As CSV with a header.
     pub fn to_csv(&self) -> String {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        let records = std::iter::once(self.header.clone())
-            .chain(self.rows.iter().map(|row| row.iter().map(Value::to_csv).collect()));
+        let records = std::iter::once(self.header.clone()).chain(
+            self.rows
+                .iter()
+                .map(|row| row.iter().map(Value::to_csv).collect()),
+        );
         for record in records {
             // Writing to memory fails only for rows of different lengths.
-            writer.write_record(record).expect("rows are as long as the header");
+            writer
+                .write_record(record)
+                .expect("rows are as long as the header");
         }
         let bytes = writer.into_inner().expect("memory can be written");
         String::from_utf8(bytes).expect("text stays text")
@@ -221,7 +234,10 @@ mod tests {
     fn csv_comes_back() {
         let text = table().to_csv();
         let mut reader = csv::Reader::from_reader(text.as_bytes());
-        assert_eq!(reader.headers().expect("a header"), &["name", "count", "share"][..]);
+        assert_eq!(
+            reader.headers().expect("a header"),
+            &["name", "count", "share"][..]
+        );
         let rows: Vec<_> = reader.records().map(|row| row.expect("a row")).collect();
         assert_eq!(&rows[0][0], "a, \"b\" | c");
         assert_eq!(&rows[0][1], "1234567");

@@ -7,14 +7,17 @@ mod lists;
 mod outputs;
 mod placement;
 
-pub use bend_ratios::{bend_angles, columns, lost_contacts, ratio_counts};
 pub(crate) use bend_ratios::{BEND_BIN_DEGREES, bend_angle_bins, column_means, lost};
+pub use bend_ratios::{bend_angles, columns, lost_contacts, ratio_counts};
 pub use comfort::{comfort_spread, contact_counts};
-pub(crate) use comfort::valid_with_figures;
-pub(crate) use ladder::mean_of_means;
+pub(crate) use comfort::{contacts_of, valid_with_figures};
+pub(crate) use ladder::{holdout_means, mean_of_means};
 pub use ladder::{ladder, per_holdout};
 pub use lists::{attempt_list, grasp_list};
 pub(crate) use outputs::{mean_step_times, negative_counts, step_shares};
 pub use outputs::{output_types, step_times, step_totals};
-pub(crate) use placement::{MEASURES, PALM_ANGLE_BIN_DEGREES, palm_angle_counts};
+pub(crate) use placement::{
+    MEASURES, PALM_ANGLE_BIN_DEGREES, palm_angle_counts, share_in_range, touching_yaws, valid_values,
+    yaw_distance,
+};
 pub use placement::{measure_ranges, palm_angle_bins, yaw_spread};

@@ -118,8 +118,14 @@ mod tests {
         for (set, strategy) in [(SET_A, Strategy::A), (SET_D, Strategy::D)] {
             let mean = |of: fn(&PerGrasp) -> f64| set.iter().map(of).sum::<f64>() / 15.0;
             let printed = ladder(strategy);
-            assert!((mean(|grasp| grasp.attempts) - printed.attempts).abs() <= 1.0, "{strategy:?}");
-            assert!((mean(|grasp| grasp.milliseconds) - printed.milliseconds).abs() <= 1.0, "{strategy:?}");
+            assert!(
+                (mean(|grasp| grasp.attempts) - printed.attempts).abs() <= 1.0,
+                "{strategy:?}"
+            );
+            assert!(
+                (mean(|grasp| grasp.milliseconds) - printed.milliseconds).abs() <= 1.0,
+                "{strategy:?}"
+            );
         }
     }
 
@@ -136,6 +142,9 @@ mod tests {
             digits.iter().flatten().map(|old| old[new]).sum()
         };
         assert_eq!([0, 1, 2].map(|new| lost_on(&LOST_CONTACTS, new)), [278, 152, 123]);
-        assert_eq!([0, 1, 2].map(|new| lost_on(&LOST_CONTACTS[1..], new)), [195, 75, 66]);
+        assert_eq!(
+            [0, 1, 2].map(|new| lost_on(&LOST_CONTACTS[1..], new)),
+            [195, 75, 66]
+        );
     }
 }

@@ -28,7 +28,9 @@ fn by_ratio<T>(values: [Vec<T>; 3]) -> Vec<Series<T>> {
 /// Figure 5.15, for the index finger.
 pub(super) fn yaw_and_bend(data: &Data<'_>) -> Figure {
     let mut dots: [Vec<(f64, f64)>; 3] = [const { Vec::new() }; 3];
-    let details = data.valid(Set::ladder(Strategy::D)).filter_map(|record| record.details.as_ref());
+    let details = data
+        .valid(Set::ladder(Strategy::D))
+        .filter_map(|record| record.details.as_ref());
     for posed in details.filter_map(|details| details.digits.get(Digit::Index.index())) {
         let ratio = match posed.bend_ratio {
             None => continue,
@@ -87,7 +89,11 @@ pub(super) fn bend_angles(data: &Data<'_>) -> Figure {
 
 /// Figure 5.18.
 pub(super) fn ratios_used(data: &Data<'_>) -> Figure {
-    let sums = Digit::ALL.map(|digit| bend_angle_bins(data, digit).1.map(|bins| bins.iter().sum::<u64>() as f64));
+    let sums = Digit::ALL.map(|digit| {
+        bend_angle_bins(data, digit)
+            .1
+            .map(|bins| bins.iter().sum::<u64>() as f64)
+    });
     Figure {
         file: "figure-5-18",
         title: "Figure 5.18: bend ratios of touching digits, grasp set C",
@@ -143,7 +149,8 @@ pub(super) fn choices(data: &Data<'_>) -> Figure {
         (attempts, ms)
     });
     let panel = |title: &str, of: fn((f64, f64)) -> f64| {
-        let relative = |columns: [(f64, f64); 6]| columns.map(|column| 100.0 * of(column) / of(columns[0])).to_vec();
+        let relative =
+            |columns: [(f64, f64); 6]| columns.map(|column| 100.0 * of(column) / of(columns[0])).to_vec();
         Panel {
             title: title.to_owned(),
             chart: Chart::GroupedBars {
@@ -152,7 +159,11 @@ pub(super) fn choices(data: &Data<'_>) -> Figure {
                     .iter()
                     .enumerate()
                     .map(|(index, set)| {
-                        format!("({}) {}", char::from(b'a' + index as u8), choice_name(set.bend_ratios))
+                        format!(
+                            "({}) {}",
+                            char::from(b'a' + index as u8),
+                            choice_name(set.bend_ratios)
+                        )
                     })
                     .collect(),
                 series: vec![
@@ -163,7 +174,7 @@ pub(super) fn choices(data: &Data<'_>) -> Figure {
                     },
                     Series {
                         name: "this run".to_owned(),
-                        colour: palette::ONE_THREAD,
+                        colour: palette::HERE,
                         values: relative(ours),
                     },
                 ],

@@ -30,18 +30,21 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
             Series {
                 name: "thesis, one thread".to_owned(),
                 colour: palette::THESIS,
-                values: data.ladder().map(|strategy| printed(thesis::ladder(strategy))).collect(),
+                values: data
+                    .ladder()
+                    .map(|strategy| printed(thesis::ladder(strategy)))
+                    .collect(),
             },
             Series {
                 name: "this run, one thread".to_owned(),
-                colour: palette::ONE_THREAD,
+                colour: palette::HERE,
                 values: ours(1),
             },
         ];
         if let Some(threads) = data.more_threads().filter(|_| is_time) {
             series.push(Series {
                 name: format!("this run, {threads} threads"),
-                colour: palette::MORE_THREADS,
+                colour: palette::HERE_ON_MORE_THREADS,
                 values: ours(threads),
             });
         }
@@ -59,8 +62,20 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
         title: "Attempts and time per valid grasp (Figures 5.5a, 5.12a, 5.14a, 5.16a, 5.21a)",
         data: "ladder",
         panels: vec![
-            panel("Attempts per valid grasp", "attempts", attempts, |printed| printed.attempts, false),
-            panel("Time per valid grasp", "ms", milliseconds, |printed| printed.milliseconds, true),
+            panel(
+                "Attempts per valid grasp",
+                "attempts",
+                attempts,
+                |printed| printed.attempts,
+                false,
+            ),
+            panel(
+                "Time per valid grasp",
+                "ms",
+                milliseconds,
+                |printed| printed.milliseconds,
+                true,
+            ),
         ],
         columns: 2,
     }

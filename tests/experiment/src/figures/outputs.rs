@@ -13,7 +13,10 @@ use crate::{
 
 /// Figures 5.5b, 5.12b, 5.14b, 5.16b and 5.21b in one.
 pub(super) fn output_types(data: &Data<'_>) -> Figure {
-    let counts: Vec<_> = data.ladder().map(|strategy| negative_counts(data, Set::ladder(strategy))).collect();
+    let counts: Vec<_> = data
+        .ladder()
+        .map(|strategy| negative_counts(data, Set::ladder(strategy)))
+        .collect();
     let series = Rejection::ALL.map(|rejection| Series {
         name: output_type(Some(rejection)).to_owned(),
         colour: palette::REJECTIONS[rejection.index()],
@@ -40,7 +43,10 @@ pub(super) fn output_types(data: &Data<'_>) -> Figure {
 
 /// Figure 5.7, for every set.
 pub(super) fn totals(data: &Data<'_>) -> Figure {
-    let shares: Vec<_> = data.ladder().map(|strategy| step_shares(data, Set::ladder(strategy)).1).collect();
+    let shares: Vec<_> = data
+        .ladder()
+        .map(|strategy| step_shares(data, Set::ladder(strategy)).1)
+        .collect();
     Figure {
         file: "figure-5-07",
         title: "Figure 5.7: time of the negative grasp sets by step",
@@ -58,12 +64,7 @@ pub(super) fn totals(data: &Data<'_>) -> Figure {
 }
 
 /// Figures 5.6 and 5.22. Types of which there is no attempt are left out.
-pub(super) fn steps(
-    data: &Data<'_>,
-    strategy: Strategy,
-    file: &'static str,
-    title: &'static str,
-) -> Figure {
+pub(super) fn steps(data: &Data<'_>, strategy: Strategy, file: &'static str, title: &'static str) -> Figure {
     let set = Set::ladder(strategy);
     let rows: Vec<_> = KINDS
         .iter()

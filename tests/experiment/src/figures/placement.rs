@@ -58,7 +58,7 @@ pub(super) fn by_output_type(data: &Data<'_>) -> Figure {
         Panel {
             title: MEASURES[measure].name.to_owned(),
             chart: Chart::Strips {
-                y: axis(measure),
+                x: axis(measure),
                 series: series.filter(|series| !series.values.is_empty()).collect(),
             },
         }
@@ -73,12 +73,7 @@ pub(super) fn by_output_type(data: &Data<'_>) -> Figure {
 }
 
 /// Figures 5.10 and 5.11.
-pub(super) fn pairs(
-    data: &Data<'_>,
-    strategy: Strategy,
-    file: &'static str,
-    title: &'static str,
-) -> Figure {
+pub(super) fn pairs(data: &Data<'_>, strategy: Strategy, file: &'static str, title: &'static str) -> Figure {
     let placements = placements(data, Set::ladder(strategy));
     let scatter = |x: usize, y: usize| {
         let series = |name: &str, colour, is_own: fn(Option<Rejection>) -> bool| Series {
@@ -96,10 +91,10 @@ pub(super) fn pairs(
                 x: axis(x),
                 y: axis(y),
                 series: vec![
-                    series("NoContacts", palette::NO_CONTACTS_DOTS, |kind| {
+                    series("NoContacts", palette::NO_CONTACTS, |kind| {
                         kind == Some(Rejection::NoContacts)
                     }),
-                    series("other failures", palette::OTHER_DOTS, |kind| {
+                    series("other failures", palette::OTHER_REJECTIONS, |kind| {
                         kind.is_some_and(|kind| kind != Rejection::NoContacts)
                     }),
                     series("valid", palette::VALID, |kind| kind.is_none()),

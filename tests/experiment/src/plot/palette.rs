@@ -28,31 +28,24 @@ pub const NO_CONTACTS: Colour = REJECTIONS[0];
 /// Dark blue: the rejections but `NoContacts`, as one kind (Figure 5.10).
 pub const OTHER_REJECTIONS: Colour = Colour(28, 40, 110);
 
-/// The steps of an attempt: wrist placement, finger posing, contact validation, collision validation, immobility
+/// The steps of an attempt: wrist placement, finger posing, collision validation, contact validation, immobility
 /// validation.
 pub const STEPS: [Colour; 5] = [
     Colour(86, 180, 233),
     Colour(0, 114, 178),
-    Colour(240, 228, 66),
     Colour(213, 94, 0),
+    Colour(240, 228, 66),
     Colour(0, 158, 115),
 ];
 
 /// The bend ratios 0.7, 1 and 1.42: purple, green and blue, as in the thesis (Figure 5.15), apart in lightness too.
 pub const BEND_RATIOS: [Colour; 3] = [Colour(98, 24, 118), Colour(0, 158, 115), Colour(86, 180, 233)];
 
-/// The grasp sets A to F.
-pub const SETS: [Colour; 6] = [
-    Colour(68, 119, 170),
-    Colour(238, 102, 119),
-    Colour(34, 136, 51),
-    Colour(204, 187, 68),
-    Colour(102, 204, 238),
-    Colour(170, 51, 119),
-];
-
 /// Blue: what was measured here, beside [`THESIS`].
 pub const HERE: Colour = Colour(0, 114, 178);
 
 /// Grey: what the thesis measured.
 pub const THESIS: Colour = Colour(187, 187, 187);
+
+/// Dark blue: what was measured here on more threads than one.
+pub const HERE_ON_MORE_THREADS: Colour = Colour(28, 40, 110);

@@ -30,7 +30,9 @@ fn ratio_index(ratio: f32) -> Option<usize> {
 /// returned first: for each ratio, bin by bin.
 pub(crate) fn bend_angle_bins(data: &Data<'_>, digit: Digit) -> (f64, [Vec<u64>; 3]) {
     let bin_of = |posed: &DigitFigures| (f64::from(posed.bend_degrees) / BEND_BIN_DEGREES).floor() as i64;
-    let bins: Vec<_> = touching(data, digit).map(|posed| (bin_of(posed), posed.bend_ratio)).collect();
+    let bins: Vec<_> = touching(data, digit)
+        .map(|posed| (bin_of(posed), posed.bend_ratio))
+        .collect();
     let first = bins.iter().map(|(bin, _)| *bin).min().unwrap_or(0);
     let last = bins.iter().map(|(bin, _)| *bin).max().unwrap_or(0);
     let mut counts = [(); 3].map(|()| vec![0; (last - first + 1) as usize]);
@@ -50,16 +52,16 @@ pub fn bend_angles(data: &Data<'_>) -> Table {
         ["digit", "from, °", "to, °", "0.7", "1.0", "1.42"],
     );
     for digit in Digit::ALL {
-        let (start, counts) = bend_angle_bins(data, digit);
-        for bin in 0..counts[0].len() {
+        let (start, [low, one, high]) = bend_angle_bins(data, digit);
+        for (bin, ((low, one), high)) in low.into_iter().zip(one).zip(high).enumerate() {
             let from = start + BEND_BIN_DEGREES * bin as f64;
             table.push(vec![
                 format!("{digit:?}").into(),
                 Value::decimals(from, 0),
                 Value::decimals(from + BEND_BIN_DEGREES, 0),
-                counts[0][bin].into(),
-                counts[1][bin].into(),
-                counts[2][bin].into(),
+                low.into(),
+                one.into(),
+                high.into(),
             ]);
         }
     }
@@ -75,7 +77,9 @@ pub fn ratio_counts(data: &Data<'_>) -> Table {
     );
     let mut sums = [0; 3];
     for digit in Digit::ALL {
-        let counts = bend_angle_bins(data, digit).1.map(|bins| bins.iter().sum::<u64>());
+        let counts = bend_angle_bins(data, digit)
+            .1
+            .map(|bins| bins.iter().sum::<u64>());
         for (sum, count) in sums.iter_mut().zip(counts) {
             *sum += count;
         }
@@ -139,7 +143,13 @@ pub fn lost_contacts(data: &Data<'_>) -> Table {
                 touching[old].into(),
             ];
             for counts in [lost[old], printed[old]] {
-                row.extend((0..3).map(|new| if new == old { Value::Missing } else { counts[new].into() }));
+                row.extend((0..3).map(|new| {
+                    if new == old {
+                        Value::Missing
+                    } else {
+                        counts[new].into()
+                    }
+                }));
             }
             table.push(row);
             for new in 0..3 {

@@ -29,7 +29,10 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
     for strategy in data.ladder() {
         let set = Set::ladder(strategy);
         let grasps: Vec<_> = valid_with_figures(data, set).collect();
-        let contacts: Vec<_> = grasps.iter().map(|(_, details, _)| contacts_of(details)).collect();
+        let contacts: Vec<_> = grasps
+            .iter()
+            .map(|(_, details, _)| contacts_of(details))
+            .collect();
         let two_digits = grasps
             .iter()
             .filter(|(_, details, _)| touching_digits(details) == 2.0)
@@ -76,7 +79,10 @@ pub fn comfort_spread(data: &Data<'_>) -> Table {
     for strategy in data.ladder() {
         let set = Set::ladder(strategy);
         let grasps: Vec<_> = valid_with_figures(data, set).collect();
-        let comforts: Vec<_> = grasps.iter().map(|(.., grasp)| f64::from(grasp.comfort)).collect();
+        let comforts: Vec<_> = grasps
+            .iter()
+            .map(|(.., grasp)| f64::from(grasp.comfort))
+            .collect();
         let correlation = |of: &dyn Fn(&Details, &GraspFigures) -> f64| {
             let pairs: Vec<_> = grasps
                 .iter()
@@ -112,9 +118,19 @@ fn draws(grasp: &GraspFigures) -> Vec<f64> {
 /// the groups' means would be without it (analysis of variance for random effects).
 pub(crate) fn share_by_draw(groups: &[Vec<f64>]) -> Option<f64> {
     let drawn: Vec<_> = groups.iter().filter(|group| group.len() > 1).collect();
-    let within = mean(&drawn.iter().filter_map(|group| variance(group)).collect::<Vec<_>>())?;
+    let within = mean(
+        &drawn
+            .iter()
+            .filter_map(|group| variance(group))
+            .collect::<Vec<_>>(),
+    )?;
     let means: Vec<_> = drawn.iter().filter_map(|group| mean(group)).collect();
-    let from_draws = mean(&drawn.iter().map(|group| within / group.len() as f64).collect::<Vec<_>>())?;
+    let from_draws = mean(
+        &drawn
+            .iter()
+            .map(|group| within / group.len() as f64)
+            .collect::<Vec<_>>(),
+    )?;
     let between = (variance(&means)? - from_draws).max(0.0);
     (within + between > 0.0).then(|| within / (within + between))
 }

@@ -20,10 +20,10 @@ pub fn ladder(data: &Data<'_>) -> Table {
         "set".to_owned(),
         "grasps".to_owned(),
         "attempts".to_owned(),
-        "± (95 %)".to_owned(),
+        "attempts ± (95 %)".to_owned(),
         "thesis: attempts".to_owned(),
         "ms".to_owned(),
-        "± (95 %)".to_owned(),
+        "ms ± (95 %)".to_owned(),
         "median ms".to_owned(),
         "thesis: ms".to_owned(),
         "µs per attempt".to_owned(),
@@ -43,9 +43,8 @@ pub fn ladder(data: &Data<'_>) -> Table {
         let total_ms: f64 = times.iter().flatten().sum();
         let thesis = thesis::ladder(strategy);
         let mean_ms = mean_of_means(&times);
-        let error = |groups: &[Vec<f64>]| {
-            standard_error_of_group_means(groups).map(|error| STANDARD_ERRORS * error)
-        };
+        let error =
+            |groups: &[Vec<f64>]| standard_error_of_group_means(groups).map(|error| STANDARD_ERRORS * error);
         let mut row = vec![
             Value::from(set.name()),
             (all.len() as u64).into(),
@@ -98,14 +97,21 @@ pub fn per_holdout(data: &Data<'_>) -> Table {
             format!("thesis {strategy:?}: ms"),
         ]);
     }
-    let mut table = Table::new("per-holdout", "Attempts and time per valid grasp, by holdout", header);
+    let mut table = Table::new(
+        "per-holdout",
+        "Attempts and time per valid grasp, by holdout",
+        header,
+    );
     let holdouts = &data.settings.holdouts;
     let columns: Vec<Vec<f64>> = strategies
         .iter()
         .flat_map(|&strategy| {
             let searches = data.searches_by_holdout(Set::ladder(strategy), 1);
             let means = |of: fn(&[crate::record::SearchFigures]) -> Vec<f64>| {
-                searches.iter().map(|own| mean(&of(own)).unwrap_or(f64::NAN)).collect()
+                searches
+                    .iter()
+                    .map(|own| mean(&of(own)).unwrap_or(f64::NAN))
+                    .collect()
             };
             [means(attempts), means(milliseconds)]
         })
@@ -116,7 +122,10 @@ pub fn per_holdout(data: &Data<'_>) -> Table {
                     .map(|&holdout| thesis::by_holdout(strategy, holdout).map_or(f64::NAN, of))
                     .collect()
             };
-            [printed(|grasp| grasp.attempts), printed(|grasp| grasp.milliseconds)]
+            [
+                printed(|grasp| grasp.attempts),
+                printed(|grasp| grasp.milliseconds),
+            ]
         }))
         .collect();
     let built_in = grasp_assets::holdouts::holdouts();
@@ -130,7 +139,10 @@ pub fn per_holdout(data: &Data<'_>) -> Table {
     for (row, &holdout) in holdouts.iter().enumerate() {
         table.push(row_of(&built_in[holdout].name, &[row]));
     }
-    let mut objects: Vec<_> = holdouts.iter().map(|&holdout| &built_in[holdout].object).collect();
+    let mut objects: Vec<_> = holdouts
+        .iter()
+        .map(|&holdout| &built_in[holdout].object)
+        .collect();
     objects.dedup();
     for object in objects {
         let rows: Vec<_> = (0..holdouts.len())
@@ -140,4 +152,14 @@ pub fn per_holdout(data: &Data<'_>) -> Table {
     }
     table.push(row_of("mean of all", &(0..holdouts.len()).collect::<Vec<_>>()));
     table
+}
+
+/// Mean attempts of each holdout that has grasps, with the holdout's index.
+pub(crate) fn holdout_means(data: &Data<'_>, set: Set) -> Vec<(usize, f64)> {
+    let searches = data.searches_by_holdout(set, 1);
+    let means = searches.iter().map(|own| mean(&attempts(own)));
+    let pairs = data.settings.holdouts.iter().copied().zip(means);
+    pairs
+        .filter_map(|(holdout, mean)| Some((holdout, mean?)))
+        .collect()
 }

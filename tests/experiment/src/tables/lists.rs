@@ -13,7 +13,15 @@ use crate::{
 /// All valid grasps, also those of more threads and of Figure 5.20's columns.
 pub fn grasp_list(data: &Data<'_>) -> Table {
     let mut header = vec![
-        "strategy", "bend_ratios", "threads", "holdout", "number", "seed", "attempt", "attempts", "prunes",
+        "strategy",
+        "bend_ratios",
+        "threads",
+        "holdout",
+        "number",
+        "seed",
+        "attempt",
+        "attempts",
+        "prunes",
         "milliseconds",
     ];
     header.extend(Rejection::ALL.map(|rejection| output_type(Some(rejection))));
@@ -40,7 +48,9 @@ pub fn grasp_list(data: &Data<'_>) -> Table {
         row.push(Value::decimals(details.map(touching_digits), 0));
         row.push(Value::decimals(details.map(contacts_of), 0));
         let grasp = record.grasp();
-        row.push(Value::number(grasp.map(|grasp| f64::from(grasp.wrench_angle_degrees))));
+        row.push(Value::number(
+            grasp.map(|grasp| f64::from(grasp.wrench_angle_degrees)),
+        ));
         row.push(Value::number(grasp.map(|grasp| f64::from(grasp.comfort))));
         row.push(grasp.map_or(Value::Missing, |grasp| {
             u64::from(grasp.sufficient_distributions).into()
@@ -71,7 +81,9 @@ pub fn attempt_list(data: &Data<'_>) -> Table {
     .to_vec();
     for digit in Digit::ALL {
         let name = format!("{digit:?}").to_lowercase();
-        header.extend(["yaw_degrees", "bend_degrees", "bend_ratio", "contacts"].map(|of| format!("{name}_{of}")));
+        header.extend(
+            ["yaw_degrees", "bend_degrees", "bend_ratio", "contacts"].map(|of| format!("{name}_{of}")),
+        );
     }
     header.extend(STEP_NAMES.map(|name| format!("{}_us", name.to_lowercase().replace(' ', "_"))));
     let mut table = Table::new("attempts", "All attempts of the grasp sets", header);
@@ -125,6 +137,10 @@ fn details_of(details: &Details) -> Vec<Value> {
             None => row.extend([const { Value::Missing }; 4]),
         }
     }
-    row.extend(details.step_nanoseconds.map(|time| Value::number(time as f64 / 1e3)));
+    row.extend(
+        details
+            .step_nanoseconds
+            .map(|time| Value::number(time as f64 / 1e3)),
+    );
     row
 }

@@ -73,16 +73,17 @@ pub(crate) const MEASURES: [Measure; 6] = [
 /// The values of a measure in a positive set.
 pub(crate) fn valid_values(data: &Data<'_>, set: Set, measure: &Measure) -> Vec<f64> {
     let details = data.valid(set).filter_map(|record| record.details.as_ref());
-    details.filter_map(|details| (measure.of)(&details.measures)).collect()
+    details
+        .filter_map(|details| (measure.of)(&details.measures))
+        .collect()
 }
 
 /// Share of the values that Table 5.3 allows.
 pub(crate) fn share_in_range(values: &[f64], allowed: MeasureRange) -> Option<f64> {
     // The measures are kept with rounding; a value on the boundary is in.
     const SLACK: f64 = 1e-3;
-    let is_in = |value: &&f64| {
-        **value >= f64::from(allowed.min) - SLACK && **value <= f64::from(allowed.max) + SLACK
-    };
+    let is_in =
+        |value: &&f64| **value >= f64::from(allowed.min) - SLACK && **value <= f64::from(allowed.max) + SLACK;
     (!values.is_empty()).then(|| values.iter().filter(is_in).count() as f64 / values.len() as f64)
 }
 
@@ -167,11 +168,7 @@ pub fn yaw_spread(data: &Data<'_>) -> Table {
         let yaws = touching_yaws(data, digit);
         // Quantile of the Kolmogorov distribution; holds from some 35 values on.
         let by_chance = 1.36 / (yaws.len() as f64).sqrt();
-        let distance = hand(RECEIVING_RIG, Handedness::Right).and_then(|hand| {
-            let range = hand.rig.digit(digit).limits.base_yaw;
-            let [min, max] = [range.min, range.max].map(|angle| f64::from(angle.to_degrees()));
-            distance_from_uniform(&yaws, min, max)
-        });
+        let distance = yaw_distance(data, digit);
         table.push(vec![
             format!("{digit:?}").into(),
             (yaws.len() as u64).into(),
@@ -183,6 +180,17 @@ pub fn yaw_spread(data: &Data<'_>) -> Table {
         ]);
     }
     table
+}
+
+/// The Kolmogorov-Smirnov distance of those angles from an even spread over the digit's range.
+pub(crate) fn yaw_distance(data: &Data<'_>, digit: Digit) -> Option<f64> {
+    let range = hand(RECEIVING_RIG, Handedness::Right)?
+        .rig
+        .digit(digit)
+        .limits
+        .base_yaw;
+    let [min, max] = [range.min, range.max].map(|angle| f64::from(angle.to_degrees()));
+    distance_from_uniform(&touching_yaws(data, digit), min, max)
 }
 
 /// Yaw angles in degrees with which a digit touches in the positive set D.

@@ -1,0 +1,70 @@
+//! The progress bar of the run; hidden where standard error is no terminal.
+
+use std::time::{Duration, Instant};
+
+use grasp_experiment::run;
+use indicatif::{HumanDuration, ProgressBar, ProgressFinish, ProgressStyle};
+
+/// How often the bar is drawn anew while a search takes long, so that it is seen to live.
+const TICK: Duration = Duration::from_millis(100);
+
+/// How often the message changes at most: grasps can be found by the thousand a second.
+const MESSAGE_EVERY: Duration = Duration::from_millis(50);
+
+/// A bar that counts valid grasps.
+#[derive(Debug, Default)]
+pub(super) struct Progress {
+    bar: Option<ProgressBar>,
+    last_message: Option<Instant>,
+}
+
+impl Progress {
+    /// Shows how far the run is.
+    pub(super) fn show(&mut self, now: &run::Progress) {
+        let bar = self.bar.get_or_insert_with(|| new_bar(now.total));
+        let is_due = self
+            .last_message
+            .is_none_or(|last| last.elapsed() >= MESSAGE_EVERY);
+        if !is_due && now.done < now.total {
+            return;
+        }
+        self.last_message = Some(Instant::now());
+        bar.set_position(now.done);
+        let threads = match now.cell.threads {
+            1 => "1 thread".to_owned(),
+            threads => format!("{threads} threads"),
+        };
+        let left = now.left.map_or_else(String::new, |left| {
+            format!(", about {} left", HumanDuration(left))
+        });
+        bar.set_message(format!(
+            "set {} on {}, {threads}{left}",
+            now.cell.set.name(),
+            now.cell.built_in().name
+        ));
+    }
+
+    /// The report is being written.
+    pub(super) fn report(&self) {
+        if let Some(bar) = &self.bar {
+            bar.set_message("writing the report");
+        }
+    }
+
+    /// Makes room for the results.
+    pub(super) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+fn new_bar(total: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:32} {human_pos:>6}/{human_len} {elapsed:>4} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(total)
+        .with_style(style)
+        .with_finish(ProgressFinish::AndClear);
+    bar.enable_steady_tick(TICK);
+    bar
+}

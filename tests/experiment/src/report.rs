@@ -1,0 +1,277 @@
+//! The report of a run: a page, its pictures, and every table as CSV.
+
+use std::{
+    fmt::Write as _,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use crate::{
+    claims::{self, Claim, Verdict, claims},
+    data::Data,
+    figures::{Figure, figures},
+    folder::Folder,
+    make::Maker,
+    plan::{Set, Settings},
+    plot::figure,
+    sheet::comfort_sheet,
+    table::Table,
+    tables,
+};
+
+const PAGE: &str = "README.md";
+const SHEET: &str = "comfort.png";
+const CSV_FOLDER: &str = "csv";
+
+/// A report that was written.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The page.
+    pub page: PathBuf,
+    /// Attempts and time per valid grasp.
+    pub ladder: Table,
+    /// What chapter 5 says, and what the run shows.
+    pub claims: Vec<Claim>,
+}
+
+/// A file of the report cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}", path.display())]
+pub struct ReportError {
+    /// The file.
+    pub path: PathBuf,
+    /// Why.
+    pub source: io::Error,
+}
+
+/// Writes the report of what a folder has: the page with its pictures and tables to `target`, and the lists of all
+/// grasps and attempts to the folder itself.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(
+    settings: &Settings,
+    folder: &Folder,
+    maker: &Maker,
+    target: &Path,
+) -> Result<Report, ReportError> {
+    let data = Data::new(settings, folder.records());
+    for list in [tables::grasp_list(&data), tables::attempt_list(&data)] {
+        write_file(
+            &folder.path().join(format!("{}.csv", list.file)),
+            list.to_csv().as_bytes(),
+        )?;
+    }
+    let claims = claims(&data);
+    let ladder = tables::ladder(&data);
+    let sections = sections(&data, &claims, &ladder);
+    for table in sections.iter().flat_map(|section| &section.tables) {
+        let path = target.join(CSV_FOLDER).join(format!("{}.csv", table.file));
+        write_file(&path, table.to_csv().as_bytes())?;
+    }
+    for drawn in sections.iter().flat_map(|section| &section.figures) {
+        let svg = figure(drawn.title, &drawn.panels, drawn.columns);
+        write_file(&target.join(format!("{}.svg", drawn.file)), svg.as_bytes())?;
+    }
+    let sheet_set = data.ladder().last().map(Set::ladder);
+    let sheet = sheet_set.and_then(|set| Some((set, comfort_sheet(&data, maker, set)?)));
+    if let Some((_, image)) = &sheet {
+        write_file(&target.join(SHEET), &image.to_png())?;
+    }
+    let page = target.join(PAGE);
+    let text = page_text(&data, folder, &sections, sheet.map(|(set, _)| set));
+    write_file(&page, text.as_bytes())?;
+    Ok(Report { page, ladder, claims })
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    let parent = path.parent().unwrap_or(Path::new(""));
+    fs::create_dir_all(parent)
+        .and_then(|()| fs::write(path, bytes))
+        .map_err(|source| ReportError {
+            path: path.to_owned(),
+            source,
+        })
+}
+
+/// A part of the page.
+struct Section {
+    title: &'static str,
+    text: &'static str,
+    figures: Vec<Figure>,
+    tables: Vec<Table>,
+}
+
+/// The page without what stands around it. Figures go to the section that has the table they are drawn from.
+fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table) -> Vec<Section> {
+    let mut sections = vec![
+        Section {
+            title: "The ladder",
+            text: "Means over the holdouts, of which each counts the same. An attempt is one accepted placement, as \
+                   the thesis counts; placements that the measures pruned before it stand beside it. Times are \
+                   wall-clock times of whole searches. ± is half of a 95 % interval.",
+            figures: Vec::new(),
+            tables: vec![ladder.clone(), tables::per_holdout(data)],
+        },
+        Section {
+            title: "What chapter 5 says",
+            text: "\"In part\" means: in the same direction, but not of the same size.",
+            figures: Vec::new(),
+            tables: vec![claims::table(claims)],
+        },
+        Section {
+            title: "How attempts end",
+            text: "The negative sets are the first failed attempts of each holdout, as in the thesis. \"% of all\" is \
+                   the share in all failed attempts that the searches made.",
+            figures: Vec::new(),
+            tables: vec![tables::output_types(data)],
+        },
+        Section {
+            title: "What the steps take",
+            text: "Each attempt of the positive and negative sets was replayed alone; a step's time is the median of \
+                   the replays, with one reading of the clock in it. Wrist Placement includes the pruned placements.",
+            figures: Vec::new(),
+            tables: vec![tables::step_times(data), tables::step_totals(data)],
+        },
+        Section {
+            title: "Wrist placement",
+            text: "Of failed attempts the plots show at most as many as the thesis had; the CSV has all.",
+            figures: Vec::new(),
+            tables: vec![tables::measure_ranges(data), tables::palm_angle_bins(data)],
+        },
+        Section {
+            title: "Finger posing",
+            text: "Lost contacts: wrist and yaw of every valid grasp of set C are kept, and each touching digit \
+                   closes with another bend ratio alone.",
+            figures: Vec::new(),
+            tables: vec![
+                tables::yaw_spread(data),
+                tables::bend_angles(data),
+                tables::ratio_counts(data),
+                tables::lost_contacts(data),
+                tables::columns(data),
+            ],
+        },
+        Section {
+            title: "Contacts, forces and comfort",
+            text: "\"By the draw\" is the share of E's variance that stays when the grasp is kept and only the random \
+                   force distributions are drawn anew: E cannot tell grasps apart by that share.",
+            figures: Vec::new(),
+            tables: vec![tables::contact_counts(data), tables::comfort_spread(data)],
+        },
+    ];
+    for figure in figures(data) {
+        let owner = match figure.data {
+            "attempts" if figure.file.ends_with("15") => "yaw",
+            "attempts" => "measures",
+            table => table,
+        };
+        let section = sections
+            .iter_mut()
+            .find(|section| section.tables.iter().any(|table| table.file == owner));
+        if let Some(section) = section {
+            section.figures.push(figure);
+        }
+    }
+    for section in &mut sections {
+        section.tables.retain(|table| !table.rows.is_empty());
+    }
+    sections.retain(|section| !section.tables.is_empty());
+    sections
+}
+
+fn page_text(data: &Data<'_>, folder: &Folder, sections: &[Section], sheet: Option<Set>) -> String {
+    let settings = data.settings;
+    let mut text = String::from("# Chapter 5, made again\n\n");
+    let sets: Vec<_> = data.ladder().map(|strategy| format!("{strategy:?}")).collect();
+    let _ = writeln!(
+        text,
+        "Made by `{}`: grasp sets {} over {} holdouts, {} valid grasps and {} invalid attempts each; seed {}, \
+         receiving rig `{}`, as valid counts what the thesis prints. Measured on {}; reading the clock takes {} ns. \
+         `grasps.csv` and `attempts.csv` in the run's folder list every grasp and attempt with its seed and index: \
+         `grasp find --holdout H --strategy S --bend-ratios R --seed N --only-attempt I` makes it again.",
+        command_line(settings),
+        sets.join(", "),
+        settings.holdouts.len(),
+        settings.valid,
+        settings.invalid,
+        folder.manifest.seed,
+        folder.manifest.rig,
+        folder.manifest.machine,
+        folder.manifest.machine.clock_nanoseconds,
+    );
+    for section in sections {
+        let _ = write!(text, "\n## {}\n\n{}\n", section.title, section.text);
+        for figure in &section.figures {
+            let _ = write!(text, "\n![{}]({}.svg)\n", figure.title, figure.file);
+        }
+        for table in &section.tables {
+            let _ = write!(
+                text,
+                "\n**{}** ([CSV]({CSV_FOLDER}/{}.csv))\n\n{}",
+                table.title,
+                table.file,
+                table.to_markdown()
+            );
+        }
+    }
+    if let Some(set) = sheet {
+        let _ = write!(
+            text,
+            "\n## Valid grasps in the order of comfort E\n\nGrasp set {}, object by object, row by row from the most \
+             comfortable to the least, spread evenly over the ranks.\n\n![Valid grasps ordered by comfort]({SHEET})\n",
+            set.name()
+        );
+    }
+    text
+}
+
+/// The command that gives this run, without what is as always.
+pub fn command_line(settings: &Settings) -> String {
+    let usual = Settings::default();
+    let mut text = "grasp experiment".to_owned();
+    if settings.strategies != usual.strategies {
+        for strategy in &settings.strategies {
+            let _ = write!(text, " --strategy {strategy:?}");
+        }
+    }
+    if settings.holdouts != usual.holdouts {
+        for &holdout in &settings.holdouts {
+            let _ = write!(
+                text,
+                " --holdout {}",
+                grasp_assets::holdouts::holdouts()[holdout].name
+            );
+        }
+    }
+    for (name, value, usual) in [
+        ("valid", settings.valid, usual.valid),
+        ("invalid", settings.invalid, usual.invalid),
+        ("seed", settings.seed, usual.seed),
+    ] {
+        if value != usual {
+            let _ = write!(text, " --{name} {value}");
+        }
+    }
+    if settings.threads != usual.threads {
+        let _ = write!(
+            text,
+            " --threads {}",
+            settings.threads.last().copied().unwrap_or(1)
+        );
+    }
+    if !settings.bend_ratio_columns {
+        text.push_str(" --no-bend-ratio-columns");
+    }
+    text
+}
+
+/// "17 agree, 4 in part, 3 differ".
+pub fn verdicts_at_a_glance(claims: &[Claim]) -> String {
+    format!(
+        "{} agree, {} in part, {} differ",
+        claims::count(claims, Verdict::Agrees),
+        claims::count(claims, Verdict::InPart),
+        claims::count(claims, Verdict::Differs)
+    )
+}
