@@ -5,22 +5,21 @@ use plotters::{element::Rectangle, style::Color};
 use super::{
     Axis, Series, dots,
     frame::{self, Marks, Side},
-    numbers,
     svg::{Area, Drawn},
 };
 
 /// What a bar takes of its bin.
 const FILLED: f64 = 0.94;
-/// About how many ticks the side has.
-const TICKS: f64 = 5.0;
+/// How much higher than the highest bar the plot is.
+const HEADROOM: f64 = 1.05;
 
-/// Draws the chart.
+/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
 pub(super) fn draw(
     area: &Area<'_>,
     label: &str,
     (start, width): (f64, f64),
     series: &[Series<u64>],
-) -> Drawn {
+) -> Drawn<(f64, f64)> {
     let bins = series.iter().map(|series| series.values.len()).max().unwrap_or(0);
     let usable =
         start.is_finite() && width.is_finite() && width > 0.0 && (start + width * bins as f64).is_finite();
@@ -37,8 +36,8 @@ pub(super) fn draw(
     };
     let y = Side {
         label: "Count".to_owned(),
-        ends: (0.0, numbers::rounded_up(highest, TICKS)),
-        marks: Marks::Numbers,
+        ends: (0.0, if highest > 0.0 { HEADROOM * highest } else { 1.0 }),
+        marks: Marks::Counts,
     };
     let mut plot = frame::draw(area, &Side::numbers(&x), &y, 0.0)?;
     let mut feet = vec![0.0; bins];
@@ -59,5 +58,5 @@ pub(super) fn draw(
         }
         plot.draw_series(bars)?;
     }
-    Ok(())
+    Ok(frame::span(area, &plot))
 }

@@ -37,7 +37,7 @@ pub struct Series<T> {
     pub values: Vec<T>,
 }
 
-/// An axis. Dots beyond its ends are left out, and a note in the corner of the chart says how many.
+/// An axis. Dots beyond its ends are left out, and a note above the chart's corner says how many.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// What it shows, with the unit.

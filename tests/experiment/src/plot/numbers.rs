@@ -90,20 +90,13 @@ pub(super) fn ticks(low: f64, high: f64, fits: impl Fn(&[Tick], f64) -> bool) ->
     Vec::new()
 }
 
-/// The least multiple of a step that [`ticks`] would take for about `count` ticks, and not less than `top`: where an
-/// axis from 0 to `top` ends.
-pub(super) fn rounded_up(top: f64, count: f64) -> f64 {
-    if !(top.is_finite() && top > 0.0) {
-        return 1.0;
+/// The decimals with which to spell values that stand beside each other, the largest of which is `largest`: none for
+/// whole numbers, else three digits for the largest, but at least one decimal.
+pub(super) fn common_decimals(mut values: impl Iterator<Item = f64>, largest: f64) -> usize {
+    if values.all(|value| value.fract() == 0.0) || largest >= 1000.0 {
+        return 0;
     }
-    let raw = top / count;
-    let power = 10_f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0]
-        .map(|factor| factor * power)
-        .into_iter()
-        .find(|step| *step >= raw);
-    let step = step.unwrap_or(10.0 * power);
-    (top / step - 1e-9).ceil() * step
+    (2 - magnitude(largest)).clamp(1, 10) as usize
 }
 
 /// Ticks at powers of ten, at most so many. `low` and `high` are exponents, and so are the places of the ticks.
@@ -117,6 +110,15 @@ pub(super) fn decades(low: f64, high: f64, at_most: usize) -> Vec<Tick> {
             text: significant(10_f64.powi(exponent)),
         })
         .collect()
+}
+
+/// The power of ten of the first digit of a size.
+fn magnitude(size: f64) -> i32 {
+    if size > 0.0 {
+        size.log10().floor() as i32
+    } else {
+        0
+    }
 }
 
 /// The whole numbers whose `step`-fold lies between the ends, which count as between.
