@@ -32,9 +32,13 @@ const GRID: RGBColor = RGBColor(226, 226, 226);
 /// Above the plot, for a note and for the upper half of the side's last tick's text, in pixels.
 const TOP: f64 = 13.0;
 /// Least space between the texts of two ticks along the bottom, in pixels.
-const TICK_GAP: f64 = 16.0;
-/// Least distance between two ticks along the bottom and along the side, in pixels.
-const TICK_PITCH: [f64; 2] = [48.0, 28.0];
+const TICK_GAP: f64 = 14.0;
+/// The most ticks that the bottom has room for, however wide it is: more would be a comb.
+const MOST_TICKS: f64 = 14.0;
+/// Least distance between two ticks along the side, in pixels.
+const TICK_PITCH: f64 = 28.0;
+/// Axes' labels that are too long are written in text of this height at least, in pixels, and then shortened.
+const LEAST_LABEL: f64 = 9.5;
 /// What names of rows may take at most of a chart's width.
 const NAMES_SHARE: f64 = 0.4;
 
@@ -141,8 +145,11 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
         .set_label_area_size(LabelAreaPosition::Left, px(left))
         .set_label_area_size(LabelAreaPosition::Bottom, px(bottom(x)))
         .build_cartesian_2d(Scale::new(x.ends, x_ticks), Scale::new(y.ends, y_ticks))?;
-    let label_height = words::height_that_fits(&x.label, words::BODY, width - left - right)
-        .min(words::height_that_fits(&y.label, words::BODY, high));
+    let wide = width - left - right;
+    let label_height = words::height_that_fits(&x.label, words::BODY, wide)
+        .min(words::height_that_fits(&y.label, words::BODY, high))
+        .max(LEAST_LABEL);
+    let label = |text: &str, room: f64| words::drawable(&words::shortened(text, label_height, room));
     let mut mesh = plot.configure_mesh();
     mesh.bold_line_style(ShapeStyle::from(&GRID).stroke_width(HAIRLINE))
         .light_line_style(GRID.mix(0.0))
@@ -150,8 +157,8 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
         .label_style(words::style(words::BODY, words::INK, HPos::Center, VPos::Center))
         .axis_desc_style(words::style(label_height, words::INK, HPos::Center, VPos::Center))
         .set_all_tick_mark_size(px(TICK))
-        .x_desc(words::drawable(&x.label))
-        .y_desc(words::drawable(&y.label));
+        .x_desc(label(&x.label, wide))
+        .y_desc(label(&y.label, high));
     if !x.has_grid() {
         mesh.disable_x_mesh();
     }
@@ -186,7 +193,7 @@ fn bottom_ticks(x: &Side, wide: f64) -> Vec<Tick> {
             .iter()
             .map(|tick| words::width(&tick.text, words::BODY))
             .fold(0.0, f64::max);
-        step / (high - low) * wide >= (widest + TICK_GAP).max(TICK_PITCH[0])
+        step / (high - low) * wide >= (widest + TICK_GAP).max(wide / MOST_TICKS)
     };
     match &x.marks {
         Marks::Numbers => numbers::ticks(low, high, fits),
@@ -198,7 +205,7 @@ fn bottom_ticks(x: &Side, wide: f64) -> Vec<Tick> {
 
 fn side_ticks(y: &Side, high: f64, width: f64) -> Vec<Tick> {
     let (bottom, top) = y.ends;
-    let fits = |step: f64| step / (top - bottom) * high >= TICK_PITCH[1];
+    let fits = |step: f64| step / (top - bottom) * high >= TICK_PITCH;
     match &y.marks {
         Marks::Numbers => numbers::ticks(bottom, top, |_, step| fits(step)),
         Marks::Counts => numbers::ticks(bottom, top, |_, step| step >= 1.0 && fits(step)),

@@ -5,11 +5,12 @@ use plotters::{element::Rectangle, style::Color};
 use super::{
     Axis, Series, dots,
     frame::{self, Marks, Side},
+    numbers,
     svg::{Area, Drawn},
 };
 
 /// What a bar takes of its bin.
-const FILLED: f64 = 0.94;
+const FILLED: f64 = 0.96;
 /// How much higher than the highest bar the plot is.
 const HEADROOM: f64 = 1.05;
 
@@ -21,9 +22,10 @@ pub(super) fn draw(
     series: &[Series<u64>],
 ) -> Drawn<(f64, f64)> {
     let bins = series.iter().map(|series| series.values.len()).max().unwrap_or(0);
-    let usable =
-        start.is_finite() && width.is_finite() && width > 0.0 && (start + width * bins as f64).is_finite();
-    let (start, width) = if usable { (start, width) } else { (0.0, 1.0) };
+    let end = |start: f64, width: f64| start + width * bins.max(1) as f64;
+    // Bins that an axis cannot show are numbered.
+    let can_be_shown = width > 0.0 && numbers::ends(start, end(start, width)) == (start, end(start, width));
+    let (start, width) = if can_be_shown { (start, width) } else { (0.0, 1.0) };
     let count = |series: &Series<u64>, bin: usize| series.values.get(bin).map_or(0.0, |count| *count as f64);
     let highest = (0..bins)
         .map(|bin| series.iter().map(|series| count(series, bin)).sum())
@@ -32,7 +34,7 @@ pub(super) fn draw(
     let x = Axis {
         label: label.to_owned(),
         min: start,
-        max: start + width * bins.max(1) as f64,
+        max: end(start, width),
     };
     let y = Side {
         label: "Count".to_owned(),

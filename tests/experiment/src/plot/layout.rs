@@ -16,8 +16,8 @@ const MARGIN: f64 = 14.0;
 const GUTTER: f64 = 24.0;
 /// Between panels below each other, in pixels.
 const BETWEEN_ROWS: f64 = 16.0;
-/// Between a title and what it stands above, in pixels.
-const BELOW_TITLE: f64 = 1.0;
+/// Between the figure's title and what it stands above, in pixels.
+const BELOW_HEADING: f64 = 7.0;
 
 /// Where a panel lies and how it is divided, in pixels.
 struct Cell<'a> {
@@ -45,7 +45,10 @@ pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
     let shared = panels.len() > 1 && panels.iter().all(|panel| chart::legend(&panel.chart) == first);
 
     let mut cells = Vec::new();
-    let mut top = MARGIN + title_height(&heading, words::HEADING);
+    let mut top = MARGIN;
+    if !heading.is_empty() {
+        top += title_height(&heading, words::HEADING) + BELOW_HEADING;
+    }
     for row in panels.chunks(columns) {
         let titles: Vec<_> = row
             .iter()
@@ -104,11 +107,7 @@ pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
 const BOLD: f64 = 1.08;
 
 fn title_height(lines: &[String], height: f64) -> f64 {
-    if lines.is_empty() {
-        0.0
-    } else {
-        lines.len() as f64 * words::LINE * height + BELOW_TITLE
-    }
+    lines.len() as f64 * words::LINE * height
 }
 
 fn draw_cell(area: &Area<'_>, cell: &Cell<'_>, wide: f64, shared_legend: bool) -> Drawn {

@@ -37,11 +37,7 @@ pub(super) fn draw(
         .map(|row| series.iter().map(|series| part(series, row)).sum())
         .collect();
     let longest = sums.iter().copied().fold(0.0, f64::max);
-    let longest = if longest.is_finite() && longest > 0.0 {
-        longest
-    } else {
-        1.0
-    };
+    let longest = if longest > 0.0 { longest } else { 1.0 };
     // Sums that are all the same say nothing, and a single series' parts are the sums.
     let differ = sums.iter().any(|sum| (sum - longest).abs() > 1e-9 * longest);
     let decimals = numbers::common_decimals(
@@ -138,7 +134,7 @@ fn part(series: &Series<f64>, row: usize) -> f64 {
         .values
         .get(row)
         .copied()
-        .filter(|value| value.is_finite() && *value > 0.0)
+        .filter(|value| numbers::is_drawable(*value) && *value > 0.0)
         .unwrap_or(0.0)
 }
 
