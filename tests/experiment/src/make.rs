@@ -2,6 +2,8 @@
 
 mod details;
 
+pub(crate) use details::COMFORT_REPEATS;
+
 use std::{
     sync::atomic::AtomicBool,
     time::{Duration, Instant},

@@ -129,7 +129,7 @@ fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table) -> Vec<Section> {
         Section {
             title: "What the steps take",
             text: "Each attempt of the positive and negative sets was replayed alone; a step's time is the median of \
-                   the replays, with one reading of the clock in it. Wrist Placement includes the pruned placements.",
+                   the replays, with one reading of the clock in it and everything already in the processor's caches. Wrist Placement includes the pruned placements.",
             figures: Vec::new(),
             tables: vec![tables::step_times(data), tables::step_totals(data)],
         },
@@ -154,7 +154,8 @@ fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table) -> Vec<Section> {
         },
         Section {
             title: "Contacts, forces and comfort",
-            text: "\"By the draw\" is the share of E's variance that stays when the grasp is kept and only the random \
+            text: "\"Valid again\" is how often Immobility Validation passes when it is repeated for the same contacts. \
+                   \"By the draw\" is the share of E's variance that stays when the grasp is kept and only the random \
                    force distributions are drawn anew: E cannot tell grasps apart by that share.",
             figures: Vec::new(),
             tables: vec![tables::contact_counts(data), tables::comfort_spread(data)],

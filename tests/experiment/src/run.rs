@@ -2,6 +2,7 @@
 
 use std::{
     collections::HashMap,
+    ops::Range,
     sync::atomic::{AtomicBool, Ordering},
     time::Duration,
 };
@@ -62,24 +63,22 @@ pub fn run(
         made.entry(record.cell).or_default().count(record);
     }
     for cell in &cells {
-        loop {
+        while let Some(part) = missing(settings, cell, made.get(cell)) {
             progress(progress_at(settings, &cells, &made, *cell));
             if stop.load(Ordering::Relaxed) {
                 return Ok(RunEnd::Stopped);
             }
-            let so_far = made.entry(*cell).or_default();
-            let wanted_invalid = settings.invalid_of(cell);
-            let records = if so_far.invalid < wanted_invalid {
-                let numbers = so_far.invalid..wanted_invalid;
-                maker.invalid(settings, cell, numbers, so_far.next_invalid_attempt)
-            } else if so_far.valid < settings.valid {
-                match maker.valid(settings, cell, so_far.valid, stop) {
+            let records = match part {
+                Part::Invalid {
+                    numbers,
+                    first_attempt,
+                } => maker.invalid(settings, cell, numbers, first_attempt),
+                Part::Valid { number } => match maker.valid(settings, cell, number, stop) {
                     Some(record) => vec![record],
                     None => return Ok(RunEnd::Stopped),
-                }
-            } else {
-                break;
+                },
             };
+            let so_far = made.entry(*cell).or_default();
             for record in &records {
                 so_far.count(record);
             }
@@ -87,6 +86,28 @@ pub fn run(
         }
     }
     Ok(RunEnd::Complete)
+}
+
+/// What is made at once.
+enum Part {
+    /// Some failed attempts.
+    Invalid { numbers: Range<u64>, first_attempt: u64 },
+    /// A valid grasp.
+    Valid { number: u64 },
+}
+
+/// What a cell lacks first.
+fn missing(settings: &Settings, cell: &Cell, made: Option<&Made>) -> Option<Part> {
+    let made = made.copied().unwrap_or_default();
+    let invalid = settings.invalid_of(cell);
+    if made.invalid < invalid {
+        Some(Part::Invalid {
+            numbers: made.invalid..invalid,
+            first_attempt: made.next_invalid_attempt,
+        })
+    } else {
+        (made.valid < settings.valid).then_some(Part::Valid { number: made.valid })
+    }
 }
 
 impl Made {

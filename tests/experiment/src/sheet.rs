@@ -20,7 +20,7 @@ const GRASPS_PER_OBJECT: usize = 12;
 const COLUMNS: usize = 6;
 
 /// Pixels of a picture.
-const SIZE: [u32; 2] = [420, 360];
+const SIZE: [u32; 2] = [330, 280];
 
 /// Grasps of a set, object by object, each row from the most comfortable to the least; the grasps are spread evenly over
 /// the ranks. None if the set has no grasps.

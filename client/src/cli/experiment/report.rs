@@ -82,8 +82,16 @@ fn drawn(table: &Table) -> String {
 /// The claims that do not come out, a line each.
 fn departures(report: &Report) -> String {
     let mut text = String::new();
-    for claim in report.claims.iter().filter(|claim| claim.verdict == Verdict::Differs) {
-        let _ = writeln!(text, "differs ({}): {}; here {}", claim.source, claim.thesis, claim.run);
+    for claim in report
+        .claims
+        .iter()
+        .filter(|claim| claim.verdict == Verdict::Differs)
+    {
+        let _ = writeln!(
+            text,
+            "differs ({}): {}; here {}",
+            claim.source, claim.thesis, claim.run
+        );
     }
     text
 }

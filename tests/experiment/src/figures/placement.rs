@@ -15,10 +15,10 @@ use crate::{
 /// and CSV have all.
 const MOST_DOTS: usize = 1500;
 
-/// Ends of the axes: wrists are placed at most one reach from the box, palms lie a little further out; angles are what
-/// they can be.
-const WRIST_DISTANCE_AXIS_CM: f64 = 22.0;
-const PALM_DISTANCE_AXIS_CM: f64 = 30.0;
+/// Ends of the axes: wrists are placed at most one reach, 22 cm, from the box, which is a little further from the object
+/// in it, and palms lie a palm's length further out; angles are what they can be.
+const WRIST_DISTANCE_AXIS_CM: f64 = 26.0;
+const PALM_DISTANCE_AXIS_CM: f64 = 36.0;
 
 /// A measure along an axis.
 fn axis(measure: usize) -> Axis {

@@ -29,9 +29,9 @@ use crate::{
 /// some are interrupted by the machine's other work. More take longer.
 const REPLAYS: usize = 5;
 
-/// Force distributions that are drawn anew for each valid grasp, to see how much of E is the draw. More give a better
-/// estimate of the spread and make longer records.
-const COMFORT_REPEATS: u64 = 8;
+/// How often Immobility Validation is repeated with new draws for each valid grasp, to see how much of E is the draw.
+/// More give a better estimate of the spread and make longer records.
+pub(crate) const COMFORT_REPEATS: u64 = 8;
 
 /// Added to a seed for what is drawn about a grasp after it was found, so that it has nothing to do with how it was
 /// found. Any number that is far from those of other seeds will do.

@@ -39,8 +39,8 @@ fn entries<T>(series: &[Series<T>]) -> Vec<Entry<'_>> {
         .collect()
 }
 
-/// Draws it without title and legend.
-pub(super) fn draw(area: &Area<'_>, chart: &Chart) -> Drawn {
+/// Draws it without title and legend, and returns where its plot begins and ends from left to right, in pixels.
+pub(super) fn draw(area: &Area<'_>, chart: &Chart) -> Drawn<(f64, f64)> {
     match chart {
         Chart::Scatter { x, y, series } => scatter::draw(area, x, y, series),
         Chart::Strips { x, series } => strips::draw(area, x, series),

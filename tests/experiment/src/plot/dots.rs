@@ -19,9 +19,12 @@ use super::{
 };
 
 /// A dot's radius, in pixels.
-pub(super) const RADIUS: f64 = 1.7;
-/// A dot's opacity, from 0 to 1.
-const OPACITY: f64 = 0.55;
+pub(super) const RADIUS: f64 = 1.8;
+/// The opacity of a series' dots, from 0 to 1, if they are few and if they are many: few hardly overlap, and would be
+/// pale.
+const OPACITIES: (f64, f64) = (0.8, 0.5);
+/// How many are many.
+const MANY: usize = 250;
 
 /// Draws dots of one colour, of those on the same pixel the first only.
 pub(super) fn draw(
@@ -29,7 +32,6 @@ pub(super) fn draw(
     dots: impl IntoIterator<Item = (f64, f64)>,
     colour: Colour,
 ) -> Drawn {
-    let style = rgb(colour).mix(OPACITY).filled();
     let mut taken = BTreeSet::new();
     let first: Vec<_> = dots
         .into_iter()
@@ -38,6 +40,12 @@ pub(super) fn draw(
             taken.insert((x.div_euclid(PIXEL), y.div_euclid(PIXEL)))
         })
         .collect();
+    let opacity = if first.len() < MANY {
+        OPACITIES.0
+    } else {
+        OPACITIES.1
+    };
+    let style = rgb(colour).mix(opacity).filled();
     plot.draw_series(first.into_iter().map(|dot| Circle::new(dot, px(RADIUS), style)))?;
     Ok(())
 }
@@ -48,7 +56,7 @@ pub(super) fn is_on(axis: &Axis, value: f64) -> bool {
     (low..=high).contains(&value)
 }
 
-/// Says in the upper right corner of the plot how many finite values lie beyond the axes, if any do.
+/// Says above the upper right corner of the plot how many finite values lie beyond the axes, if any do.
 pub(super) fn note_missing(area: &Area<'_>, plot: &Plot<'_, '_>, missing: usize) -> Drawn {
     if missing == 0 {
         return Ok(());
@@ -59,8 +67,8 @@ pub(super) fn note_missing(area: &Area<'_>, plot: &Plot<'_, '_>, missing: usize)
     );
     let (right, top) = frame::place(area, plot, (x, y));
     let text = format!("{} beyond the axes", numbers::spelled(missing as f64, 0));
-    let style = words::style(words::SMALL, words::FAINT, HPos::Right, VPos::Top);
-    words::write(area, &text, (right - px(3.0), top + px(2.0)), style)
+    let style = words::style(words::SMALL, words::FAINT, HPos::Right, VPos::Bottom);
+    words::write(area, &text, (right, top), style)
 }
 
 /// As plotters has it.

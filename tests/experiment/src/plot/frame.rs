@@ -29,12 +29,16 @@ const HAIRLINE: u32 = 10;
 const AXIS: RGBColor = RGBColor(90, 90, 90);
 /// The grid's colour.
 const GRID: RGBColor = RGBColor(226, 226, 226);
-/// Above the plot, for the upper half of the side's last tick's text, in pixels.
-const TOP: f64 = 7.0;
+/// Above the plot, for a note and for the upper half of the side's last tick's text, in pixels.
+const TOP: f64 = 13.0;
 /// Least space between the texts of two ticks along the bottom, in pixels.
 const TICK_GAP: f64 = 14.0;
+/// The most ticks that the bottom has room for, however wide it is: more would be a comb.
+const MOST_TICKS: f64 = 14.0;
 /// Least distance between two ticks along the side, in pixels.
-const TICK_PITCH: f64 = 26.0;
+const TICK_PITCH: f64 = 28.0;
+/// Axes' labels that are too long are written in text of this height at least, in pixels, and then shortened.
+const LEAST_LABEL: f64 = 9.5;
 /// What names of rows may take at most of a chart's width.
 const NAMES_SHARE: f64 = 0.4;
 
@@ -42,10 +46,12 @@ const NAMES_SHARE: f64 = 0.4;
 pub(super) enum Marks {
     /// Numbers.
     Numbers,
+    /// Whole numbers.
+    Counts,
     /// The powers of ten, of which the axis' units are the exponents.
     Decades,
-    /// Names, each in the middle of a unit, from the axis' upper end down.
-    Names(Vec<String>),
+    /// Names, each in the middle of a unit, from the axis' upper end down; with lines of the grid or without.
+    Names(Vec<String>, bool),
     /// Nothing: the chart writes below the axis itself, in so many pixels.
     Own(f64),
 }
@@ -70,12 +76,12 @@ impl Side {
         }
     }
 
-    /// An axis of rows' names from the top.
-    pub(super) fn names(names: Vec<String>) -> Self {
+    /// An axis of rows' names from the top, with lines of the grid or without.
+    pub(super) fn names(names: Vec<String>, grid: bool) -> Self {
         Self {
             label: String::new(),
             ends: (0.0, names.len().max(1) as f64),
-            marks: Marks::Names(names),
+            marks: Marks::Names(names, grid),
         }
     }
 
@@ -88,7 +94,7 @@ impl Side {
     }
 
     fn has_grid(&self) -> bool {
-        matches!(self.marks, Marks::Numbers | Marks::Decades)
+        !matches!(self.marks, Marks::Names(_, false) | Marks::Own(_))
     }
 }
 
@@ -139,8 +145,11 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
         .set_label_area_size(LabelAreaPosition::Left, px(left))
         .set_label_area_size(LabelAreaPosition::Bottom, px(bottom(x)))
         .build_cartesian_2d(Scale::new(x.ends, x_ticks), Scale::new(y.ends, y_ticks))?;
-    let label_height = words::height_that_fits(&x.label, words::BODY, width - left - right)
-        .min(words::height_that_fits(&y.label, words::BODY, high));
+    let wide = width - left - right;
+    let label_height = words::height_that_fits(&x.label, words::BODY, wide)
+        .min(words::height_that_fits(&y.label, words::BODY, high))
+        .max(LEAST_LABEL);
+    let label = |text: &str, room: f64| words::drawable(&words::shortened(text, label_height, room));
     let mut mesh = plot.configure_mesh();
     mesh.bold_line_style(ShapeStyle::from(&GRID).stroke_width(HAIRLINE))
         .light_line_style(GRID.mix(0.0))
@@ -148,8 +157,8 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
         .label_style(words::style(words::BODY, words::INK, HPos::Center, VPos::Center))
         .axis_desc_style(words::style(label_height, words::INK, HPos::Center, VPos::Center))
         .set_all_tick_mark_size(px(TICK))
-        .x_desc(words::drawable(&x.label))
-        .y_desc(words::drawable(&y.label));
+        .x_desc(label(&x.label, wide))
+        .y_desc(label(&y.label, high));
     if !x.has_grid() {
         mesh.disable_x_mesh();
     }
@@ -158,6 +167,16 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
     }
     mesh.draw()?;
     Ok(plot)
+}
+
+/// Where the plot's left and right ends lie in the area that it was made in, in pixels.
+pub(super) fn span(area: &Area<'_>, plot: &Plot<'_, '_>) -> (f64, f64) {
+    let across = plot.plotting_area().get_x_axis_pixel_range();
+    let left = area.get_base_pixel().0;
+    (
+        f64::from(across.start - left) / f64::from(PIXEL),
+        f64::from(across.end - left) / f64::from(PIXEL),
+    )
 }
 
 /// The place of a point of the plot in the area that the plot was made in, in tenths of a pixel.
@@ -174,21 +193,24 @@ fn bottom_ticks(x: &Side, wide: f64) -> Vec<Tick> {
             .iter()
             .map(|tick| words::width(&tick.text, words::BODY))
             .fold(0.0, f64::max);
-        step / (high - low) * wide >= widest + TICK_GAP
+        step / (high - low) * wide >= (widest + TICK_GAP).max(wide / MOST_TICKS)
     };
     match &x.marks {
         Marks::Numbers => numbers::ticks(low, high, fits),
+        Marks::Counts => numbers::ticks(low, high, |ticks, step| step >= 1.0 && fits(ticks, step)),
         Marks::Decades => numbers::decades(low, high, (wide / 80.0) as usize),
-        Marks::Names(_) | Marks::Own(_) => Vec::new(),
+        Marks::Names(..) | Marks::Own(_) => Vec::new(),
     }
 }
 
 fn side_ticks(y: &Side, high: f64, width: f64) -> Vec<Tick> {
     let (bottom, top) = y.ends;
+    let fits = |step: f64| step / (top - bottom) * high >= TICK_PITCH;
     match &y.marks {
-        Marks::Numbers => numbers::ticks(bottom, top, |_, step| step / (top - bottom) * high >= TICK_PITCH),
+        Marks::Numbers => numbers::ticks(bottom, top, |_, step| fits(step)),
+        Marks::Counts => numbers::ticks(bottom, top, |_, step| step >= 1.0 && fits(step)),
         Marks::Decades => numbers::decades(bottom, top, (high / 20.0) as usize),
-        Marks::Names(names) => names
+        Marks::Names(names, _) => names
             .iter()
             .enumerate()
             .map(|(row, name)| Tick {

@@ -33,8 +33,13 @@ enum Values {
     None,
 }
 
-/// Draws the chart.
-pub(super) fn draw(area: &Area<'_>, label: &str, groups: &[String], series: &[Series<f64>]) -> Drawn {
+/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+pub(super) fn draw(
+    area: &Area<'_>,
+    label: &str,
+    groups: &[String],
+    series: &[Series<f64>],
+) -> Drawn<(f64, f64)> {
     let (width, height) = frame::size(area);
     let slot = (width - SIDE) / groups.len().max(1) as f64;
     let bar = slot * FILLED / series.len().max(1) as f64;
@@ -56,12 +61,9 @@ pub(super) fn draw(area: &Area<'_>, label: &str, groups: &[String], series: &[Se
         Values::None
     };
 
-    let names: Vec<_> = groups
-        .iter()
-        .map(|name| words::lines(name, words::BODY, slot - 4.0))
-        .collect();
+    let (names, name_height) = names(groups, slot - 4.0);
     let rows = names.iter().map(Vec::len).max().unwrap_or(0).max(1);
-    let room = (rows as f64 - 1.0) * words::LINE * words::BODY + words::BODY;
+    let room = (rows as f64 - 1.0) * words::LINE * name_height + words::BODY;
     let x = Side {
         label: String::new(),
         ends: (0.0, groups.len().max(1) as f64),
@@ -109,12 +111,29 @@ pub(super) fn draw(area: &Area<'_>, label: &str, groups: &[String], series: &[Se
             Values::None => {}
         }
     }
-    let style = words::style(words::BODY, words::INK, HPos::Center, VPos::Top);
+    let style = words::style(name_height, words::INK, HPos::Center, VPos::Top);
     for (group, lines) in names.iter().enumerate() {
         let (x, y) = frame::place(area, &plot, (group as f64 + 0.5, ends.0));
-        words::write_lines(area, lines, (x, y + px(6.0)), words::BODY, &style)?;
+        words::write_lines(area, lines, (x, y + px(6.0)), name_height, &style)?;
     }
-    Ok(())
+    Ok(frame::span(area, &plot))
+}
+
+/// The groups' names in lines that are no wider than `room` pixels, and the height of their text: less than the usual
+/// where a word would be cut otherwise.
+fn names(groups: &[String], room: f64) -> (Vec<Vec<String>>, f64) {
+    let words = groups.iter().flat_map(|name| name.split_whitespace());
+    let height = words
+        .map(|word| words::height_that_fits(word, words::BODY, room))
+        .fold(words::BODY, f64::min);
+    let height = height.max(words::SMALL);
+    (
+        groups
+            .iter()
+            .map(|name| words::lines(name, height, room))
+            .collect(),
+        height,
+    )
 }
 
 fn value_style(across: HPos, upright: VPos) -> TextStyle<'static> {

@@ -10,21 +10,22 @@ use super::{
 };
 
 /// What a bar takes of its bin.
-const FILLED: f64 = 0.94;
-/// About how many ticks the side has.
-const TICKS: f64 = 5.0;
+const FILLED: f64 = 0.96;
+/// How much higher than the highest bar the plot is.
+const HEADROOM: f64 = 1.05;
 
-/// Draws the chart.
+/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
 pub(super) fn draw(
     area: &Area<'_>,
     label: &str,
     (start, width): (f64, f64),
     series: &[Series<u64>],
-) -> Drawn {
+) -> Drawn<(f64, f64)> {
     let bins = series.iter().map(|series| series.values.len()).max().unwrap_or(0);
-    let usable =
-        start.is_finite() && width.is_finite() && width > 0.0 && (start + width * bins as f64).is_finite();
-    let (start, width) = if usable { (start, width) } else { (0.0, 1.0) };
+    let end = |start: f64, width: f64| start + width * bins.max(1) as f64;
+    // Bins that an axis cannot show are numbered.
+    let can_be_shown = width > 0.0 && numbers::ends(start, end(start, width)) == (start, end(start, width));
+    let (start, width) = if can_be_shown { (start, width) } else { (0.0, 1.0) };
     let count = |series: &Series<u64>, bin: usize| series.values.get(bin).map_or(0.0, |count| *count as f64);
     let highest = (0..bins)
         .map(|bin| series.iter().map(|series| count(series, bin)).sum())
@@ -33,12 +34,12 @@ pub(super) fn draw(
     let x = Axis {
         label: label.to_owned(),
         min: start,
-        max: start + width * bins.max(1) as f64,
+        max: end(start, width),
     };
     let y = Side {
         label: "Count".to_owned(),
-        ends: (0.0, numbers::rounded_up(highest, TICKS)),
-        marks: Marks::Numbers,
+        ends: (0.0, if highest > 0.0 { HEADROOM * highest } else { 1.0 }),
+        marks: Marks::Counts,
     };
     let mut plot = frame::draw(area, &Side::numbers(&x), &y, 0.0)?;
     let mut feet = vec![0.0; bins];
@@ -59,5 +60,5 @@ pub(super) fn draw(
         }
         plot.draw_series(bars)?;
     }
-    Ok(())
+    Ok(frame::span(area, &plot))
 }

@@ -16,8 +16,8 @@ const MARGIN: f64 = 14.0;
 const GUTTER: f64 = 24.0;
 /// Between panels below each other, in pixels.
 const BETWEEN_ROWS: f64 = 16.0;
-/// Between a title and what it stands above, in pixels.
-const BELOW_TITLE: f64 = 5.0;
+/// Between the figure's title and what it stands above, in pixels.
+const BELOW_HEADING: f64 = 7.0;
 
 /// Where a panel lies and how it is divided, in pixels.
 struct Cell<'a> {
@@ -45,7 +45,10 @@ pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
     let shared = panels.len() > 1 && panels.iter().all(|panel| chart::legend(&panel.chart) == first);
 
     let mut cells = Vec::new();
-    let mut top = MARGIN + title_height(&heading, words::HEADING);
+    let mut top = MARGIN;
+    if !heading.is_empty() {
+        top += title_height(&heading, words::HEADING) + BELOW_HEADING;
+    }
     for row in panels.chunks(columns) {
         let titles: Vec<_> = row
             .iter()
@@ -104,32 +107,34 @@ pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
 const BOLD: f64 = 1.08;
 
 fn title_height(lines: &[String], height: f64) -> f64 {
-    if lines.is_empty() {
-        0.0
-    } else {
-        lines.len() as f64 * words::LINE * height + BELOW_TITLE
-    }
+    lines.len() as f64 * words::LINE * height
 }
 
 fn draw_cell(area: &Area<'_>, cell: &Cell<'_>, wide: f64, shared_legend: bool) -> Drawn {
-    // A title of fewer lines than its neighbour's stands at the bottom of the titles' row.
-    let unused = cell.title_height - title_height(&cell.title, words::SUBHEADING);
-    let at = (px(cell.left + wide / 2.0), px(cell.top + unused));
-    let style = words::bold(words::SUBHEADING, HPos::Center, VPos::Top);
-    words::write_lines(area, &cell.title, at, words::SUBHEADING, &style)?;
-
     let below_title = cell.top + cell.title_height;
-    chart::draw(
-        &part(area, (cell.left, below_title), (wide, cell.chart_height)),
-        &cell.panel.chart,
-    )?;
+    let chart_area = part(area, (cell.left, below_title), (wide, cell.chart_height));
+    let (left, right) = chart::draw(&chart_area, &cell.panel.chart)?;
+    let middle = left.midpoint(right);
+
+    // A title of fewer lines than its neighbour's stands at the bottom of the titles' row. It is centred on the plot as
+    // far as it then stays inside the panel.
+    let unused = cell.title_height - title_height(&cell.title, words::SUBHEADING);
+    let long = cell
+        .title
+        .iter()
+        .map(|line| BOLD * words::width(line, words::SUBHEADING))
+        .fold(0.0, f64::max);
+    let centre = middle.min(wide - long / 2.0).max(long / 2.0);
+    let style = words::bold(words::SUBHEADING, HPos::Center, VPos::Top);
+    let at = (px(cell.left + centre), px(cell.top + unused));
+    words::write_lines(area, &cell.title, at, words::SUBHEADING, &style)?;
     if !shared_legend {
         let entries = chart::legend(&cell.panel.chart);
         let at = (cell.left, below_title + cell.chart_height);
         legend::draw(
             &part(area, at, (wide, legend::height(&entries, wide))),
             &entries,
-            wide / 2.0,
+            middle,
         )?;
     }
     Ok(())

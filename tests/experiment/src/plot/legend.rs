@@ -64,13 +64,29 @@ pub(super) fn draw(area: &Area<'_>, entries: &[Entry<'_>], centre: f64) -> Drawn
     Ok(())
 }
 
-/// The entries in lines that fit.
+/// The entries in as few lines as fit, of about the same length.
 fn lines<'e, 'n>(entries: &'e [Entry<'n>], room: f64) -> Vec<&'e [Entry<'n>]> {
+    let fewest = filled(entries, room, room).len();
+    // The shortest length that needs no more lines; a line is as long as some run of entries.
+    let mut lengths: Vec<f64> = (0..entries.len())
+        .flat_map(|first| (first + 1..=entries.len()).map(move |end| length(&entries[first..end], room)))
+        .filter(|length| *length <= room)
+        .collect();
+    lengths.sort_by(f64::total_cmp);
+    let even = lengths
+        .into_iter()
+        .map(|longest| filled(entries, longest, room))
+        .find(|lines| lines.len() == fewest);
+    even.unwrap_or_else(|| filled(entries, room, room))
+}
+
+/// The entries in lines each of which takes as many as stay within `longest` pixels, but at least one.
+fn filled<'e, 'n>(entries: &'e [Entry<'n>], longest: f64, room: f64) -> Vec<&'e [Entry<'n>]> {
     let mut lines = Vec::new();
     let mut rest = entries;
     while !rest.is_empty() {
         let fitting = (1..=rest.len())
-            .take_while(|count| length(&rest[..*count], room) <= room)
+            .take_while(|count| length(&rest[..*count], room) <= longest)
             .count();
         let (line, tail) = rest.split_at(fitting.max(1));
         lines.push(line);

@@ -1,8 +1,7 @@
 //! Charts as SVG: [`figure`] lays panels out in a grid and returns one picture that stands by itself.
 //!
-//! The data says what is shown, each kind of chart has a file that draws it, and all of them share the frame with its
-//! ticks ([`frame`]), the legend ([`legend`]), the words' sizes ([`words`]) and the numbers' spelling ([`numbers`]).
-//! The same data gives the same bytes.
+//! The data says what is shown. Each kind of chart has a file that draws it, and all share the frame with its ticks, the
+//! legend, the sizes of words and the spelling of numbers. The same data gives the same bytes.
 
 mod chart;
 mod dots;
@@ -37,7 +36,7 @@ pub struct Series<T> {
     pub values: Vec<T>,
 }
 
-/// An axis. Dots beyond its ends are left out, and a note in the corner of the chart says how many.
+/// An axis. Dots beyond its ends are left out, and a note above the chart's corner says how many.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// What it shows, with the unit.

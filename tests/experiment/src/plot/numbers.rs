@@ -2,6 +2,9 @@
 
 use std::ops::RangeInclusive;
 
+/// Sizes from here on are taken as infinite.
+const LARGEST: f64 = 1e300;
+
 /// A tick: where, and what it says.
 #[derive(Clone, Debug)]
 pub(super) struct Tick {
@@ -11,13 +14,15 @@ pub(super) struct Tick {
     pub text: String,
 }
 
-/// Numbers from here on, and those below its inverse times ten, are spelled with a power of ten.
+/// Sizes from here on are spelled with a power of ten.
 const LONGEST: f64 = 1e9;
+/// Sizes below are spelled with a power of ten where digits count.
+const SHORTEST: f64 = 1e-8;
 
 /// With so many decimals, and with commas between groups of three digits: 456,287.
 pub(super) fn spelled(value: f64, decimals: usize) -> String {
     if value.abs() >= LONGEST {
-        return format!("{value:.2e}").replace('-', "−");
+        return scientific(value);
     }
     let digits = format!("{:.decimals$}", value.abs());
     let (whole, fraction) = digits.split_at(digits.find('.').unwrap_or(digits.len()));
@@ -35,26 +40,42 @@ pub(super) fn spelled(value: f64, decimals: usize) -> String {
 /// With three significant digits, or as a whole number from 100 on: 456,287, 28.4, 5.2, 0.05.
 pub(super) fn significant(value: f64) -> String {
     let size = value.abs();
-    if size > 0.0 && size < 10.0 / LONGEST {
-        return format!("{value:.2e}").replace('-', "−");
+    if size > 0.0 && size < SHORTEST {
+        return scientific(value);
     }
-    let magnitude = if size > 0.0 {
-        size.log10().floor() as i32
-    } else {
-        0
-    };
-    let decimals = (2 - magnitude).clamp(0, 10) as usize;
+    let decimals = (2 - magnitude(size)).clamp(0, 10) as usize;
     let text = spelled(value, decimals);
-    if text.contains('.') && !text.contains('e') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    if text.contains('e') {
+        text
+    } else {
+        without_zeros(&text).to_owned()
+    }
+}
+
+/// With three significant digits at most and a power of ten: 4.56e12.
+fn scientific(value: f64) -> String {
+    let text = format!("{value:.2e}").replace('-', "−");
+    let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    format!("{}e{exponent}", without_zeros(digits))
+}
+
+/// Decimals without the zeros at their end.
+fn without_zeros(text: &str) -> &str {
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
     } else {
         text
     }
 }
 
-/// The ends of an axis in order, finite and apart.
+/// True for numbers that can be drawn: finite, and so far from the largest number that sums stay finite.
+pub(super) fn is_drawable(value: f64) -> bool {
+    value.abs() < LARGEST
+}
+
+/// The ends of an axis in order, drawable and apart.
 pub(super) fn ends(min: f64, max: f64) -> (f64, f64) {
-    if !(min.is_finite() && max.is_finite() && (max - min).is_finite()) {
+    if !(is_drawable(min) && is_drawable(max)) {
         return (0.0, 1.0);
     }
     let (low, high) = (min.min(max), min.max(max));
@@ -90,20 +111,13 @@ pub(super) fn ticks(low: f64, high: f64, fits: impl Fn(&[Tick], f64) -> bool) ->
     Vec::new()
 }
 
-/// The least multiple of a step that [`ticks`] would take for about `count` ticks, and not less than `top`: where an
-/// axis from 0 to `top` ends.
-pub(super) fn rounded_up(top: f64, count: f64) -> f64 {
-    if !(top.is_finite() && top > 0.0) {
-        return 1.0;
+/// The decimals with which to spell values that stand beside each other, the largest of which is `largest`: none for
+/// whole numbers, else three digits for the largest, but at least one decimal.
+pub(super) fn common_decimals(mut values: impl Iterator<Item = f64>, largest: f64) -> usize {
+    if values.all(|value| value.fract() == 0.0) || largest >= 1000.0 {
+        return 0;
     }
-    let raw = top / count;
-    let power = 10_f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0]
-        .map(|factor| factor * power)
-        .into_iter()
-        .find(|step| *step >= raw);
-    let step = step.unwrap_or(10.0 * power);
-    (top / step - 1e-9).ceil() * step
+    (2 - magnitude(largest)).clamp(1, 10) as usize
 }
 
 /// Ticks at powers of ten, at most so many. `low` and `high` are exponents, and so are the places of the ticks.
@@ -119,6 +133,15 @@ pub(super) fn decades(low: f64, high: f64, at_most: usize) -> Vec<Tick> {
         .collect()
 }
 
+/// The power of ten of the first digit of a size.
+fn magnitude(size: f64) -> i32 {
+    if size > 0.0 {
+        size.log10().floor() as i32
+    } else {
+        0
+    }
+}
+
 /// The whole numbers whose `step`-fold lies between the ends, which count as between.
 fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
     let slack = 1e-9;
@@ -126,4 +149,101 @@ fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
     let count = ((high / step + slack).floor() - first + 1.0).max(0.0) as usize;
     // Adding 0 turns −0 into 0.
     (0..count).map(move |index| first + index as f64 + 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_spelled_with_commas_and_a_true_minus() {
+        for (value, decimals, text) in [
+            (456_287.0, 0, "456,287"),
+            (1_000_000.0, 0, "1,000,000"),
+            (999.0, 0, "999"),
+            (-1234.5, 1, "−1,234.5"),
+            (-0.01, 1, "0.0"),
+            (0.0, 2, "0.00"),
+            (2.5e12, 0, "2.5e12"),
+        ] {
+            assert_eq!(spelled(value, decimals), text);
+        }
+    }
+
+    #[test]
+    fn three_digits_are_significant_below_a_hundred() {
+        for (value, text) in [
+            (456_287.4, "456,287"),
+            (28.44, "28.4"),
+            (5.2, "5.2"),
+            (0.05, "0.05"),
+            (51.0, "51"),
+            (1e-9, "1e−9"),
+            (0.0, "0"),
+        ] {
+            assert_eq!(significant(value), text);
+        }
+    }
+
+    #[test]
+    fn values_beside_each_other_have_the_same_decimals() {
+        for (values, decimals) in [
+            (vec![1425.0, 3.0], 0),
+            (vec![74.81, 2.0], 1),
+            (vec![7.48, 0.03], 2),
+            (vec![745.5], 1),
+            (vec![7455.5], 0),
+        ] {
+            let largest = values.iter().copied().fold(0.0, f64::max);
+            assert_eq!(common_decimals(values.into_iter(), largest), decimals);
+        }
+    }
+
+    #[test]
+    fn ticks_are_round_and_between_the_ends() {
+        let texts = |low, high, least: f64| {
+            let ticks = ticks(low, high, |_, step| step >= least);
+            ticks.into_iter().map(|tick| tick.text).collect::<Vec<_>>()
+        };
+        assert_eq!(texts(0.0, 22.0, 3.0), ["0", "5", "10", "15", "20"]);
+        assert_eq!(texts(-0.3, 0.35, 0.2), ["−0.2", "0.0", "0.2"]);
+        assert_eq!(texts(30.0, 34.0, 2.0), ["30", "32", "34"], "the ends are between");
+        assert_eq!(texts(0.0, 1500.0, 400.0), ["0", "500", "1,000", "1,500"]);
+    }
+
+    #[test]
+    fn powers_of_ten_are_thinned_out() {
+        let texts = |at_most| {
+            decades(-2.0, 6.3, at_most)
+                .into_iter()
+                .map(|tick| tick.text)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            texts(9),
+            [
+                "0.01",
+                "0.1",
+                "1",
+                "10",
+                "100",
+                "1,000",
+                "10,000",
+                "100,000",
+                "1,000,000"
+            ]
+        );
+        assert_eq!(texts(3), ["0.01", "10", "10,000"]);
+    }
+
+    #[test]
+    fn ends_of_an_axis_are_in_order_and_apart() {
+        assert_eq!(ends(1.0, 3.0), (1.0, 3.0));
+        assert_eq!(ends(3.0, 1.0), (1.0, 3.0));
+        assert_eq!(ends(2.0, 2.0), (1.5, 2.5));
+        assert_eq!(ends(f64::NAN, 2.0), (0.0, 1.0));
+        assert_eq!(ends(0.0, f64::INFINITY), (0.0, 1.0));
+        let (low, high) = ends(1e12, 1e12);
+        assert!(low < 1e12 && high > 1e12);
+    }
 }

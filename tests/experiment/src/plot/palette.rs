@@ -1,7 +1,8 @@
-//! Colours that people with deuteranopia, protanopia or tritanopia can tell apart.
+//! Colours that people with protanopia, deuteranopia or tritanopia can tell apart: any two of a set are at least 15
+//! apart in CIELAB for each of them, and for everybody else.
 //!
-//! The hues are those of Okabe and Ito ("Color Universal Design", 2008) and of Tol's bright scheme ("Colour Schemes",
-//! SRON/EPS/TN/09-002, 2021), with an indigo and a grey where eight are not enough.
+//! Most are from the palette of Okabe and Ito ("Color Universal Design", 2008), some from the muted and bright schemes
+//! of Tol ("Colour Schemes", SRON/EPS/TN/09-002, 2021).
 
 use super::Colour;
 
@@ -17,9 +18,9 @@ pub const REJECTIONS: [Colour; 8] = [
     Colour(0, 114, 178),
     Colour(204, 121, 167),
     Colour(213, 94, 0),
-    Colour(240, 228, 66),
-    Colour(160, 160, 160),
-    Colour(51, 34, 136),
+    Colour(221, 204, 119),
+    Colour(102, 102, 51),
+    Colour(136, 34, 85),
 ];
 
 /// Orange: grasps without contacts where all other rejections are one kind (Figure 5.10).
@@ -35,11 +36,11 @@ pub const STEPS: [Colour; 5] = [
     Colour(0, 114, 178),
     Colour(213, 94, 0),
     Colour(240, 228, 66),
-    Colour(0, 158, 115),
+    Colour(136, 34, 85),
 ];
 
 /// The bend ratios 0.7, 1 and 1.42: purple, green and blue, as in the thesis (Figure 5.15), apart in lightness too.
-pub const BEND_RATIOS: [Colour; 3] = [Colour(98, 24, 118), Colour(0, 158, 115), Colour(86, 180, 233)];
+pub const BEND_RATIOS: [Colour; 3] = [Colour(93, 26, 117), Colour(34, 136, 51), Colour(86, 180, 233)];
 
 /// Blue: what was measured here, beside [`THESIS`].
 pub const HERE: Colour = Colour(0, 114, 178);

@@ -6,8 +6,8 @@ use super::{
     svg::{Area, Drawn},
 };
 
-/// Draws the chart.
-pub(super) fn draw(area: &Area<'_>, x: &Axis, y: &Axis, series: &[Series<(f64, f64)>]) -> Drawn {
+/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+pub(super) fn draw(area: &Area<'_>, x: &Axis, y: &Axis, series: &[Series<(f64, f64)>]) -> Drawn<(f64, f64)> {
     let mut plot = frame::draw(area, &Side::numbers(x), &Side::numbers(y), 0.0)?;
     let mut missing = 0;
     for series in series {
@@ -21,5 +21,6 @@ pub(super) fn draw(area: &Area<'_>, x: &Axis, y: &Axis, series: &[Series<(f64, f
         missing += unseen.len();
         dots::draw(&mut plot, seen, series.colour)?;
     }
-    dots::note_missing(area, &plot, missing)
+    dots::note_missing(area, &plot, missing)?;
+    Ok(frame::span(area, &plot))
 }

@@ -22,28 +22,35 @@ const FILLED: f64 = 0.72;
 pub(super) const ROW: f64 = 30.0;
 /// Free space beside a value inside its part, in pixels.
 const PADDING: f64 = 3.0;
-/// Parts that are darker than this (relative luminance, WCAG 2) bear white text. At this luminance black and white
-/// have about the same contrast.
-const DARK: f64 = 0.24;
+/// Parts that are darker than this (relative luminance, WCAG 2) bear white text. Black and white have the same contrast
+/// by that formula at 0.18; saturated greens and reds just above it are yet read more easily with white.
+const DARK: f64 = 0.275;
 
-/// Draws the chart.
-pub(super) fn draw(area: &Area<'_>, label: &str, rows: &[String], series: &[Series<f64>]) -> Drawn {
+/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+pub(super) fn draw(
+    area: &Area<'_>,
+    label: &str,
+    rows: &[String],
+    series: &[Series<f64>],
+) -> Drawn<(f64, f64)> {
     let sums: Vec<f64> = (0..rows.len())
         .map(|row| series.iter().map(|series| part(series, row)).sum())
         .collect();
     let longest = sums.iter().copied().fold(0.0, f64::max);
-    let longest = if longest.is_finite() && longest > 0.0 {
-        longest
-    } else {
-        1.0
-    };
+    let longest = if longest > 0.0 { longest } else { 1.0 };
     // Sums that are all the same say nothing, and a single series' parts are the sums.
     let differ = sums.iter().any(|sum| (sum - longest).abs() > 1e-9 * longest);
+    let decimals = numbers::common_decimals(
+        series
+            .iter()
+            .flat_map(|series| (0..rows.len()).map(|row| part(series, row))),
+        longest,
+    );
     let ends: Vec<_> = sums
         .iter()
         .map(|sum| {
-            if *sum > 0.0 && (differ || series.len() == 1) {
-                numbers::significant(*sum)
+            if differ || series.len() == 1 {
+                numbers::spelled(*sum, decimals)
             } else {
                 String::new()
             }
@@ -60,7 +67,7 @@ pub(super) fn draw(area: &Area<'_>, label: &str, rows: &[String], series: &[Seri
         .map(|end| words::width(end, words::SMALL))
         .fold(0.0, f64::max)
         + 6.0;
-    let mut plot = frame::draw(area, &Side::numbers(&x), &Side::names(rows.to_vec()), room)?;
+    let mut plot = frame::draw(area, &Side::numbers(&x), &Side::names(rows.to_vec(), false), room)?;
     let mut from = vec![0.0; rows.len()];
     let mut values = Vec::new();
     for series in series {
@@ -83,7 +90,13 @@ pub(super) fn draw(area: &Area<'_>, label: &str, rows: &[String], series: &[Seri
     }
     if series.len() > 1 {
         for (row, from, value, colour) in values {
-            write_inside(area, &plot, row, (from, value), colour)?;
+            write_inside(
+                area,
+                &plot,
+                row,
+                (from, value),
+                (&numbers::spelled(value, decimals), colour),
+            )?;
         }
     }
     for (row, end) in ends.iter().enumerate() {
@@ -91,7 +104,7 @@ pub(super) fn draw(area: &Area<'_>, label: &str, rows: &[String], series: &[Seri
         let style = words::style(words::SMALL, words::INK, HPos::Left, VPos::Center);
         words::write(area, end, (x + px(4.0), y), style)?;
     }
-    Ok(())
+    Ok(frame::span(area, &plot))
 }
 
 /// The value inside its part, if that is wide enough.
@@ -100,12 +113,11 @@ fn write_inside(
     plot: &Plot<'_, '_>,
     row: usize,
     (from, value): (f64, f64),
-    colour: Colour,
+    (text, colour): (&str, Colour),
 ) -> Drawn {
-    let text = numbers::significant(value);
     let (left, y) = frame::place(area, plot, (from, middle(plot, row)));
     let (right, _) = frame::place(area, plot, (from + value, 0.0));
-    if px(words::width(&text, words::SMALL) + 2.0 * PADDING) > right - left {
+    if px(words::width(text, words::SMALL) + 2.0 * PADDING) > right - left {
         return Ok(());
     }
     let ink = if luminance(colour) < DARK {
@@ -114,7 +126,7 @@ fn write_inside(
         words::INK
     };
     let style = words::style(words::SMALL, ink, HPos::Center, VPos::Center);
-    words::write(area, &text, (left.midpoint(right), y), style)
+    words::write(area, text, (left.midpoint(right), y), style)
 }
 
 fn part(series: &Series<f64>, row: usize) -> f64 {
@@ -122,7 +134,7 @@ fn part(series: &Series<f64>, row: usize) -> f64 {
         .values
         .get(row)
         .copied()
-        .filter(|value| value.is_finite() && *value > 0.0)
+        .filter(|value| numbers::is_drawable(*value) && *value > 0.0)
         .unwrap_or(0.0)
 }
 

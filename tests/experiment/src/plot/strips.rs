@@ -17,8 +17,8 @@ const FILLED: f64 = 0.8;
 /// Height of a strip, in pixels.
 pub(super) const STRIP: f64 = 27.0;
 
-/// Draws the chart.
-pub(super) fn draw(area: &Area<'_>, x: &Axis, series: &[Series<f64>]) -> Drawn {
+/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+pub(super) fn draw(area: &Area<'_>, x: &Axis, series: &[Series<f64>]) -> Drawn<(f64, f64)> {
     let counts: Vec<_> = series
         .iter()
         .map(|series| {
@@ -31,7 +31,7 @@ pub(super) fn draw(area: &Area<'_>, x: &Axis, series: &[Series<f64>]) -> Drawn {
         .map(|count| words::width(count, words::SMALL))
         .fold(0.0, f64::max);
     let names = series.iter().map(|series| series.name.clone()).collect();
-    let mut plot = frame::draw(area, &Side::numbers(x), &Side::names(names), widest + 8.0)?;
+    let mut plot = frame::draw(area, &Side::numbers(x), &Side::names(names, true), widest + 8.0)?;
 
     let mut missing = 0;
     for (row, series) in series.iter().enumerate() {
@@ -49,7 +49,8 @@ pub(super) fn draw(area: &Area<'_>, x: &Axis, series: &[Series<f64>]) -> Drawn {
         let style = words::style(words::SMALL, words::FAINT, HPos::Left, VPos::Center);
         words::write(area, count, (x + px(6.0), y), style)?;
     }
-    dots::note_missing(area, &plot, missing)
+    dots::note_missing(area, &plot, missing)?;
+    Ok(frame::span(area, &plot))
 }
 
 /// Values with places across their strip: those that lie within a dot's width of each other are set apart, alternately

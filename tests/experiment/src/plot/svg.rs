@@ -141,9 +141,7 @@ impl Run {
             [one] => out.push_str(&one.replacen("/>", &format!("{}/>", self.looks), 1)),
             many => {
                 let _ = writeln!(out, "<g{}>", self.looks);
-                for element in many {
-                    out.push_str(element);
-                }
+                out.extend(many.iter().map(String::as_str));
                 out.push_str("</g>\n");
             }
         }

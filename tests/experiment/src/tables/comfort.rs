@@ -2,6 +2,7 @@
 
 use crate::{
     data::Data,
+    make::COMFORT_REPEATS,
     plan::Set,
     record::{Details, GraspFigures, Record},
     stats::{mean, quantile, rank_correlation, variance},
@@ -24,6 +25,7 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             "of 100 distributions suffice: mean",
             "median",
             "thesis: mean",
+            "valid again with new draws, %",
         ],
     );
     for strategy in data.ladder() {
@@ -41,6 +43,8 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             .iter()
             .map(|(.., grasp)| f64::from(grasp.sufficient_distributions))
             .collect();
+        let again: usize = grasps.iter().map(|(.., grasp)| grasp.comfort_again.len()).sum();
+        let tries = grasps.len() * COMFORT_REPEATS as usize;
         table.push(vec![
             set.name().into(),
             (grasps.len() as u64).into(),
@@ -51,6 +55,7 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             Value::number(mean(&sufficient)),
             Value::number(quantile(&sufficient, 0.5)),
             Value::number(thesis::SUFFICIENT_DISTRIBUTIONS),
+            Value::decimals(100.0 * again as f64 / tries as f64, 0),
         ]);
     }
     table

@@ -1,0 +1,6 @@
+//! Small runs, whole, cut short, extended and refused.
+
+mod folder;
+mod made;
+mod reported;
+mod support;

@@ -1,0 +1,180 @@
+//! The report, against the lists that it is made from.
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use grasp_experiment::{
+    claims::Verdict,
+    make::Maker,
+    plan::Settings,
+    report::{self, Report, command_line},
+};
+use grasp_synthesis::strategy::Strategy;
+
+use crate::support::{Scratch, complete, index_of, small};
+
+fn reported(settings: &Settings) -> (Scratch, Report) {
+    let scratch = Scratch::new();
+    let folder = complete(scratch.path(), settings);
+    let maker = Maker::new(settings).expect("built-in holdouts are sound");
+    let report = report::write(settings, &folder, &maker, &scratch.path().join("report")).expect("a report");
+    (scratch, report)
+}
+
+/// A CSV file as rows by the names of their columns.
+fn csv_rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut reader =
+        csv::Reader::from_path(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    reader.deserialize().map(|row| row.expect("a row")).collect()
+}
+
+fn number(row: &BTreeMap<String, String>, column: &str) -> f64 {
+    row[column]
+        .parse()
+        .unwrap_or_else(|_| panic!("{column} is {:?}", row[column]))
+}
+
+#[test]
+fn the_ladder_has_the_means_of_the_listed_grasps() {
+    let (scratch, _) = reported(&small());
+    let grasps = csv_rows(&scratch.path().join("grasps.csv"));
+    for row in csv_rows(&scratch.path().join("report/csv/ladder.csv")) {
+        let own: Vec<_> = grasps
+            .iter()
+            .filter(|grasp| {
+                grasp["strategy"] == row["set"] && grasp["threads"] == "1" && grasp["bend_ratios"] == "all"
+            })
+            .collect();
+        assert_eq!(own.len(), 6);
+        for (column, listed) in [("attempts", "attempts"), ("ms", "milliseconds")] {
+            // Each holdout has as many grasps, so the mean of the means is the mean.
+            let mean = own.iter().map(|grasp| number(grasp, listed)).sum::<f64>() / 6.0;
+            let reported = number(&row, column);
+            assert!(
+                (reported / mean - 1.0).abs() < 1e-4,
+                "{column}: {reported}, not {mean}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_output_types_are_those_of_the_listed_attempts() {
+    let (scratch, _) = reported(&small());
+    let attempts = csv_rows(&scratch.path().join("attempts.csv"));
+    for row in csv_rows(&scratch.path().join("report/csv/output-types.csv")) {
+        let own: Vec<_> = attempts
+            .iter()
+            .filter(|attempt| attempt["strategy"] == row["set"] && attempt["output_type"] != "Valid")
+            .collect();
+        assert_eq!(own.len(), 40);
+        for kind in [
+            "NoContacts",
+            "NoThumb",
+            "NoThumbEarlystop",
+            "PalmCollision",
+            "NotImmobilizing",
+        ] {
+            let count = own
+                .iter()
+                .filter(|attempt| attempt["output_type"] == kind)
+                .count();
+            assert_eq!(number(&row, kind), count as f64, "{kind} of {}", row["set"]);
+        }
+    }
+}
+
+#[test]
+fn the_page_shows_files_that_are_there() {
+    let (scratch, report) = reported(&small());
+    let page = fs::read_to_string(&report.page).expect("the page");
+    let mut linked = 0;
+    for link in page.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        let bytes = fs::read(scratch.path().join("report").join(link))
+            .unwrap_or_else(|error| panic!("{link}: {error}"));
+        assert!(!bytes.is_empty(), "{link} is empty");
+        match link.rsplit('.').next() {
+            Some("svg") => assert!(
+                bytes.starts_with(b"<svg") || bytes.starts_with(b"<?xml"),
+                "{link}"
+            ),
+            Some("png") => assert!(bytes.starts_with(b"\x89PNG"), "{link}"),
+            Some("csv") => assert!(
+                csv::Reader::from_reader(&bytes[..])
+                    .records()
+                    .all(|row| row.is_ok()),
+                "{link}"
+            ),
+            _ => panic!("{link} is of no known kind"),
+        }
+        linked += 1;
+    }
+    assert!(linked > 15, "{linked} links");
+    for figure in [
+        "figure-5-15",
+        "figure-5-17",
+        "figure-5-18",
+        "figure-5-19",
+        "figure-5-20",
+    ] {
+        assert!(page.contains(figure), "no {figure}");
+    }
+    // Sets A, B and F were not asked for.
+    for figure in [
+        "figure-5-06",
+        "figure-5-09",
+        "figure-5-10",
+        "figure-5-11",
+        "figure-5-13",
+        "figure-5-22",
+    ] {
+        assert!(!page.contains(figure), "{figure}");
+    }
+}
+
+#[test]
+fn what_must_hold_by_construction_is_found_to_agree() {
+    let (_scratch, report) = reported(&small());
+    let verdict = |part: &str| {
+        let claim = report.claims.iter().find(|claim| claim.thesis.contains(part));
+        claim.unwrap_or_else(|| panic!("no claim on {part}")).verdict
+    };
+    assert_eq!(verdict("become NoThumbEarlystop"), Verdict::Agrees);
+    // With 0.7 tried first, it cannot be the ratio that is found least.
+    assert_eq!(verdict("touch less often with ratio 0.7"), Verdict::Differs);
+}
+
+#[test]
+fn claims_about_sets_that_were_not_asked_for_are_left_out() {
+    let settings = Settings {
+        strategies: vec![Strategy::F],
+        bend_ratio_columns: false,
+        threads: vec![1],
+        valid: 1,
+        holdouts: vec![index_of("scissors-hold1")],
+        ..small()
+    };
+    let (_scratch, report) = reported(&settings);
+    assert!(!report.claims.is_empty());
+    for claim in &report.claims {
+        assert!(
+            ["5.5", "5.6", "5.6, Figure 5.22"].contains(&claim.source),
+            "{claim:?}"
+        );
+    }
+}
+
+#[test]
+fn the_command_is_written_as_it_must_be_typed() {
+    assert_eq!(command_line(&Settings::default()), "grasp experiment");
+    let settings = Settings {
+        strategies: vec![Strategy::F],
+        threads: vec![1],
+        bend_ratio_columns: false,
+        ..small()
+    };
+    assert_eq!(
+        command_line(&settings),
+        "grasp experiment --strategy F --holdout scalpel-hold2 --holdout scissors-hold1 --valid 3 --invalid 20 --seed 7 \
+         --threads 1 --no-bend-ratio-columns"
+    );
+}
