@@ -2,6 +2,7 @@
 
 #[cfg(feature = "cli")]
 mod cli;
+mod experiments;
 mod library;
 #[cfg(feature = "cli")]
 mod real_server;

@@ -49,7 +49,7 @@ async fn the_demo_shows_a_table_without_a_progress_bar_where_there_is_no_termina
 }
 
 /// Starts the real server on a free port until the test's runtime ends; gives its URL.
-async fn real_server() -> String {
+pub(crate) async fn real_server() -> String {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let forever = std::future::pending();

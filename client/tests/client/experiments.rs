@@ -1,0 +1,134 @@
+//! `grasp experiment` as scripts see it, and its rows made again by a real server.
+
+use std::{collections::HashMap, path::Path};
+
+use crate::{
+    cli::{code, json, run, tempfile, text},
+    real_server::real_server,
+};
+
+/// A run that takes seconds, into this folder.
+fn small_run(folder: &Path, more: &[&str]) -> std::process::Output {
+    let mut arguments = vec![
+        "experiment",
+        "--json",
+        "--strategy",
+        "d",
+        "--strategy",
+        "F",
+        "--holdout",
+        "scissors-hold1",
+        "--holdout",
+        "scalpel-hold2",
+        "--valid",
+        "2",
+        "--invalid",
+        "10",
+        "--threads",
+        "1",
+        "--out",
+        folder.to_str().unwrap(),
+    ];
+    arguments.extend(more);
+    run(&arguments)
+}
+
+/// The rows of a CSV file without quotes, by column.
+fn rows(path: &Path) -> Vec<HashMap<String, String>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned));
+    let header: Vec<_> = lines.next().unwrap().collect();
+    lines
+        .map(|row| header.iter().cloned().zip(row).collect())
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_listed_grasp_is_made_again_by_the_server() {
+    let folder = tempfile("experiment_rows");
+    let output = small_run(&folder, &[]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert_eq!(text(&output.stderr), "", "no bar where there is no terminal");
+    let url = real_server().await;
+    let grasps = rows(&folder.join("grasps.csv"));
+    // Sets D and F, and the five columns of Figure 5.20 beside D, on two holdouts.
+    assert_eq!(grasps.len(), 2 * 2 * (2 + 5));
+    for row in &grasps {
+        let answer = run(&[
+            "find",
+            "--json",
+            "--server",
+            &url,
+            "--holdout",
+            &row["holdout"],
+            "--strategy",
+            &row["strategy"],
+            "--bend-ratios",
+            &row["bend_ratios"],
+            "--seed",
+            &row["seed"],
+            "--only-attempt",
+            &row["attempt"],
+        ]);
+        assert_eq!(code(&answer), 0, "{row:?}: {}", text(&answer.stderr));
+        let answer = json(&answer.stdout);
+        let expected: f64 = row["comfort"].parse().unwrap();
+        let comfort = answer["grasp"]["comfort"].as_f64().unwrap();
+        assert!(
+            (comfort - expected).abs() <= 1e-5 * expected.max(1e-3),
+            "{comfort}, not {expected}"
+        );
+        let contacts = answer["grasp"]["contacts"].as_array().unwrap().len();
+        assert_eq!(contacts.to_string(), row["contacts"]);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_run_reports_its_ladder_and_can_be_asked_again() {
+    let folder = tempfile("experiment_again");
+    let first = small_run(&folder, &[]);
+    assert_eq!(code(&first), 0, "{}", text(&first.stderr));
+    let results = json(&first.stdout);
+    let sets: Vec<_> = results["ladder"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| &row["set"])
+        .collect();
+    assert_eq!(sets, ["D", "F"]);
+    assert!(results["claims"].as_array().unwrap().len() > 5);
+    assert!(Path::new(results["report"].as_str().unwrap()).exists());
+    // Everything is there already: the same grasps with the same measured times.
+    let again = small_run(&folder, &[]);
+    assert_eq!(json(&again.stdout), results);
+    let other = small_run(&folder, &["--seed", "2"]);
+    assert_eq!(code(&other), 1);
+    let message = json(&other.stderr)["error"]["message"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    assert!(message.contains("its seed is 1, now it is 2"), "{message}");
+    let fresh = small_run(&folder, &["--seed", "2", "--fresh"]);
+    assert_eq!(code(&fresh), 0, "{}", text(&fresh.stderr));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_run_that_cannot_be_is_refused_before_it_starts() {
+    let folder = tempfile("experiment_refused");
+    for (wrong, named) in [
+        (["--valid", "0"], "--valid"),
+        (["--invalid", "1000000"], "--invalid"),
+        (["--threads", "65"], "--threads"),
+        (["--holdout", "spoon-hold1"], "spoon-hold1"),
+        (["--strategy", "G"], "--strategy"),
+    ] {
+        let output = small_run(&folder, &wrong);
+        assert_eq!(code(&output), 2, "{wrong:?}");
+        let message = json(&output.stderr)["error"]["message"]
+            .as_str()
+            .unwrap()
+            .to_owned();
+        assert!(message.contains(named), "{message}");
+    }
+    assert!(!folder.join("records.jsonl").exists());
+}
