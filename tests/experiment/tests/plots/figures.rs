@@ -222,7 +222,7 @@ fn text_is_escaped() {
     }
     assert!(picture.dots.is_empty());
     // Most control characters are no part of XML.
-    let picture = Picture::read(&figure("one\u{0}two\u{1b}three\nfour", &[], 1));
+    let picture = Picture::read(&figure("one\u{0}two\u{1b}three\nfour\u{ffff}", &[], 1));
     picture.find("one two three four");
 }
 
