@@ -19,6 +19,11 @@ const BETWEEN_ROWS: f64 = 16.0;
 /// Between the figure's title and what it stands above, in pixels.
 const BELOW_HEADING: f64 = 7.0;
 
+/// How much wider than regular text bold text is.
+const BOLD: f64 = 1.08;
+/// Panels beside each other at most: more would be too narrow for their words.
+const MOST_COLUMNS: usize = 4;
+
 /// Where a panel lies and how it is divided, in pixels.
 struct Cell<'a> {
     panel: &'a Panel,
@@ -29,12 +34,13 @@ struct Cell<'a> {
     chart_height: f64,
 }
 
-/// One picture, 900 pixels wide, of panels in a grid of so many columns (at least 1), row by row.
+/// One picture, 900 pixels wide, of panels in a grid of so many columns (1 to 4; other numbers are taken as the nearest of
+/// these), row by row.
 ///
 /// Panels that have the same legend share one below all of them. The picture is SVG that needs nothing besides itself;
 /// the same panels give the same bytes.
 pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
-    let columns = columns.clamp(1, panels.len().max(1));
+    let columns = columns.clamp(1, panels.len().clamp(1, MOST_COLUMNS));
     let room = WIDTH - 2.0 * MARGIN;
     let wide = (room - (columns - 1) as f64 * GUTTER) / columns as f64;
     let heading = words::lines(title, words::HEADING, room / BOLD);
@@ -102,9 +108,6 @@ pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
     };
     svg::picture((WIDTH as u32, height.ceil() as u32), draw).expect("a string takes all that is drawn")
 }
-
-/// How much wider than regular text bold text is.
-const BOLD: f64 = 1.08;
 
 fn title_height(lines: &[String], height: f64) -> f64 {
     lines.len() as f64 * words::LINE * height

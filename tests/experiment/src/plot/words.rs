@@ -129,9 +129,12 @@ pub(super) fn write_lines(
     Ok(())
 }
 
-/// The text without the control characters that no XML may hold.
+/// The text with spaces for the characters that no XML may hold.
 pub(super) fn drawable(text: &str) -> String {
     text.chars()
-        .map(|letter| if letter.is_control() { ' ' } else { letter })
+        .map(|letter| {
+            let is_forbidden = letter.is_control() || matches!(letter, '\u{fffe}' | '\u{ffff}');
+            if is_forbidden { ' ' } else { letter }
+        })
         .collect()
 }

@@ -1,9 +1,11 @@
 //! The charts as a reader sees them: where dots and bars lie, what the words say.
 
-mod charts;
+mod bars;
+mod dots;
 mod figures;
 mod palettes;
 mod picture;
+mod soundness;
 
 use grasp_experiment::plot::{Axis, Chart, Colour, Panel, Series, figure};
 use picture::Picture;
@@ -45,4 +47,23 @@ fn scattered(count: usize, seed: f64) -> Vec<f64> {
     (1..=count)
         .map(|index| (index as f64 * 0.618_033_988_75 * seed).fract())
         .collect()
+}
+
+const RED: Colour = Colour(200, 0, 0);
+const GREEN: Colour = Colour(0, 200, 0);
+const BLUE: Colour = Colour(0, 0, 200);
+
+/// What rounding to the picture's units may move a dot or an edge by.
+const ROUNDING: f64 = 1.5;
+
+/// The line through two points, as a function.
+fn line((x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> impl Fn(f64) -> f64 {
+    move |x| y0 + (x - x0) * (y1 - y0) / (x1 - x0)
+}
+
+fn assert_near(found: f64, expected: f64) {
+    assert!(
+        (found - expected).abs() <= ROUNDING,
+        "{found} instead of {expected}"
+    );
 }
