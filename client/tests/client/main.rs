@@ -2,6 +2,7 @@
 
 #[cfg(feature = "cli")]
 mod cli;
+#[cfg(feature = "cli")]
 mod experiments;
 mod library;
 #[cfg(feature = "cli")]

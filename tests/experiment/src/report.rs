@@ -150,6 +150,7 @@ fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table) -> Vec<Section> {
                 tables::ratio_counts(data),
                 tables::lost_contacts(data),
                 tables::columns(data),
+                tables::columns_per_holdout(data),
             ],
         },
         Section {

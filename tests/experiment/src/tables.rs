@@ -11,8 +11,8 @@ pub(crate) use bend_ratios::{BEND_BIN_DEGREES, bend_angle_bins, column_means, lo
 pub use bend_ratios::{bend_angles, columns, lost_contacts, ratio_counts};
 pub use comfort::{comfort_spread, contact_counts};
 pub(crate) use comfort::{contacts_of, valid_with_figures};
-pub(crate) use ladder::{holdout_means, mean_of_means};
-pub use ladder::{ladder, per_holdout};
+pub(crate) use ladder::{column_letter, holdout_means, mean_of_means};
+pub use ladder::{columns_per_holdout, ladder, per_holdout};
 pub use lists::{attempt_list, grasp_list};
 pub(crate) use outputs::{mean_step_times, negative_counts, step_shares};
 pub use outputs::{output_types, step_times, step_totals};

@@ -7,7 +7,7 @@ use crate::{
     data::Data,
     plan::{Set, choice_name},
     plot::{Axis, Chart, Panel, Series, palette},
-    tables::{BEND_BIN_DEGREES, bend_angle_bins, column_means, lost},
+    tables::{BEND_BIN_DEGREES, bend_angle_bins, column_letter, column_means, lost},
     thesis,
 };
 
@@ -159,11 +159,7 @@ pub(super) fn choices(data: &Data<'_>) -> Figure {
                     .iter()
                     .enumerate()
                     .map(|(index, set)| {
-                        format!(
-                            "({}) {}",
-                            char::from(b'a' + index as u8),
-                            choice_name(set.bend_ratios)
-                        )
+                        format!("({}) {}", column_letter(index), choice_name(set.bend_ratios))
                     })
                     .collect(),
                 series: vec![

@@ -2,7 +2,7 @@
 
 use grasp_synthesis::{hand::Digit, strategy::Strategy, synthesis::closing_motion::BEND_RATIOS};
 
-use super::ladder::mean_of_means;
+use super::ladder::{column_letter, mean_of_means};
 use crate::{
     data::{Data, attempts, milliseconds},
     plan::{Set, choice_name},
@@ -213,7 +213,7 @@ pub fn columns(data: &Data<'_>) -> Table {
             100.0 * printed.milliseconds / printed_all.milliseconds,
         ];
         let mut row = vec![
-            format!("({})", char::from(b'a' + index as u8)).into(),
+            format!("({})", column_letter(index)).into(),
             choice_name(set.bend_ratios).into(),
             Value::number(attempts),
             Value::number(ms),

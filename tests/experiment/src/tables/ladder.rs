@@ -1,10 +1,9 @@
 //! Attempts and time per valid grasp (Figures 5.5a, 5.12a, 5.14a, 5.16a, 5.21a).
 
-use grasp_synthesis::strategy::Strategy;
-
 use crate::{
     data::{Data, attempts, milliseconds},
     plan::Set,
+    record::SearchFigures,
     stats::{mean, quantile, standard_error_of_group_means},
     table::{Table, Value},
     thesis,
@@ -81,59 +80,103 @@ pub(crate) fn mean_of_means(groups: &[Vec<f64>]) -> Option<f64> {
 
 /// A row for each holdout and for each object, a pair of columns for each set, and the thesis' where it has them.
 pub fn per_holdout(data: &Data<'_>) -> Table {
-    let strategies: Vec<Strategy> = data.ladder().collect();
-    let in_thesis: Vec<_> = strategies
-        .iter()
-        .copied()
-        .filter(|&strategy| thesis::by_holdout(strategy, 0).is_some())
-        .collect();
-    let mut header = vec!["holdout".to_owned()];
-    for strategy in &strategies {
-        header.extend([format!("{strategy:?}: attempts"), format!("{strategy:?}: ms")]);
+    let mut columns = Vec::new();
+    for strategy in data.ladder() {
+        columns.push(Columns::of_set(
+            data,
+            format!("{strategy:?}"),
+            Set::ladder(strategy),
+        ));
     }
-    for strategy in &in_thesis {
-        header.extend([
-            format!("thesis {strategy:?}: attempts"),
-            format!("thesis {strategy:?}: ms"),
-        ]);
+    for strategy in data.ladder() {
+        let printed: Option<Vec<_>> = data
+            .settings
+            .holdouts
+            .iter()
+            .map(|&holdout| thesis::by_holdout(strategy, holdout))
+            .collect();
+        columns.extend(printed.map(|printed| Columns {
+            name: format!("thesis {strategy:?}"),
+            attempts: printed.iter().map(|grasp| grasp.attempts).collect(),
+            milliseconds: printed.iter().map(|grasp| grasp.milliseconds).collect(),
+        }));
     }
-    let mut table = Table::new(
+    by_holdout(
+        data,
         "per-holdout",
         "Attempts and time per valid grasp, by holdout",
-        header,
-    );
-    let holdouts = &data.settings.holdouts;
-    let columns: Vec<Vec<f64>> = strategies
+        &columns,
+    )
+}
+
+/// Figure 5.20 by holdout.
+pub fn columns_per_holdout(data: &Data<'_>) -> Table {
+    let sets = if data.settings.bend_ratio_columns {
+        &Set::BEND_RATIO_COLUMNS[..]
+    } else {
+        &[]
+    };
+    let columns: Vec<_> = sets
         .iter()
-        .flat_map(|&strategy| {
-            let searches = data.searches_by_holdout(Set::ladder(strategy), 1);
-            let means = |of: fn(&[crate::record::SearchFigures]) -> Vec<f64>| {
-                searches
-                    .iter()
-                    .map(|own| mean(&of(own)).unwrap_or(f64::NAN))
-                    .collect()
-            };
-            [means(attempts), means(milliseconds)]
-        })
-        .chain(in_thesis.iter().flat_map(|&strategy| {
-            let printed = |of: fn(thesis::PerGrasp) -> f64| {
-                holdouts
-                    .iter()
-                    .map(|&holdout| thesis::by_holdout(strategy, holdout).map_or(f64::NAN, of))
-                    .collect()
-            };
-            [
-                printed(|grasp| grasp.attempts),
-                printed(|grasp| grasp.milliseconds),
-            ]
-        }))
+        .enumerate()
+        .map(|(index, set)| Columns::of_set(data, format!("({})", column_letter(index)), *set))
         .collect();
+    by_holdout(
+        data,
+        "bend-ratio-choices-per-holdout",
+        "Ways to choose the bend ratios, attempts and time per valid grasp by holdout",
+        &columns,
+    )
+}
+
+/// The letter of a column of Figure 5.20.
+pub(crate) fn column_letter(index: usize) -> char {
+    char::from(b'a' + index as u8)
+}
+
+/// A pair of columns: values for each holdout.
+struct Columns {
+    name: String,
+    attempts: Vec<f64>,
+    milliseconds: Vec<f64>,
+}
+
+impl Columns {
+    fn of_set(data: &Data<'_>, name: String, set: Set) -> Self {
+        let searches = data.searches_by_holdout(set, 1);
+        let means = |of: fn(&[SearchFigures]) -> Vec<f64>| {
+            searches
+                .iter()
+                .map(|own| mean(&of(own)).unwrap_or(f64::NAN))
+                .collect()
+        };
+        Self {
+            name,
+            attempts: means(attempts),
+            milliseconds: means(milliseconds),
+        }
+    }
+}
+
+/// Rows for the holdouts, the objects and all; empty without columns.
+fn by_holdout(data: &Data<'_>, file: &'static str, title: &str, columns: &[Columns]) -> Table {
+    let names = columns
+        .iter()
+        .flat_map(|own| [format!("{}: attempts", own.name), format!("{}: ms", own.name)]);
+    let mut table = Table::new(file, title, std::iter::once("holdout".to_owned()).chain(names));
+    if columns.is_empty() {
+        return table;
+    }
     let built_in = grasp_assets::holdouts::holdouts();
+    let holdouts = &data.settings.holdouts;
     let row_of = |name: &str, rows: &[usize]| {
-        let means = columns.iter().map(|column| {
+        let mean_of = |column: &[f64]| {
             let values: Vec<_> = rows.iter().map(|&row| column[row]).collect();
             Value::number(mean(&values))
-        });
+        };
+        let means = columns
+            .iter()
+            .flat_map(|own| [mean_of(&own.attempts), mean_of(&own.milliseconds)]);
         std::iter::once(name.into()).chain(means).collect()
     };
     for (row, &holdout) in holdouts.iter().enumerate() {
