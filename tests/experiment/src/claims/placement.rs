@@ -97,10 +97,7 @@ fn table_5_3(data: &Data<'_>) -> Option<Claim> {
     let named: Vec<_> = MEASURES[..5]
         .iter()
         .zip(&shares)
-        .map(|(measure, share)| {
-            let name = measure.name.split(',').next().unwrap_or(measure.name);
-            format!("{name} {:.0} %", 100.0 * share)
-        })
+        .map(|(measure, share)| format!("{} {:.0} %", measure.bare_name(), 100.0 * share))
         .collect();
     Some(Claim {
         source: "5.3, Table 5.3",

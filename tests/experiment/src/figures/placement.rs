@@ -56,7 +56,7 @@ pub(super) fn by_output_type(data: &Data<'_>) -> Figure {
                 .collect(),
         });
         Panel {
-            title: MEASURES[measure].name.to_owned(),
+            title: MEASURES[measure].bare_name().to_owned(),
             chart: Chart::Strips {
                 x: axis(measure),
                 series: series.filter(|series| !series.values.is_empty()).collect(),
@@ -86,7 +86,7 @@ pub(super) fn pairs(data: &Data<'_>, strategy: Strategy, file: &'static str, tit
                 .collect(),
         };
         Panel {
-            title: format!("{} against {}", MEASURES[y].name, MEASURES[x].name),
+            title: format!("{} against {}", MEASURES[y].bare_name(), MEASURES[x].bare_name()),
             chart: Chart::Scatter {
                 x: axis(x),
                 y: axis(y),

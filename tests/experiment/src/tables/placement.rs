@@ -29,6 +29,13 @@ pub(crate) struct Measure {
     pub(crate) allowed: MeasureRange,
 }
 
+impl Measure {
+    /// The name without the unit.
+    pub(crate) fn bare_name(&self) -> &'static str {
+        self.name.split(',').next().unwrap_or(self.name)
+    }
+}
+
 const fn in_centimetres(range: MeasureRange) -> MeasureRange {
     MeasureRange {
         min: range.min * 100.0,
