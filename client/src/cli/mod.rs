@@ -11,6 +11,7 @@ mod holdout;
 mod objects;
 mod output;
 mod picture;
+mod progress;
 mod server;
 mod values;
 

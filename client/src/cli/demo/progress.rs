@@ -1,11 +1,8 @@
-//! The progress bar; hidden where standard error is no terminal, and gone when the demo ends, however it ends.
+//! The progress bar of the demo.
 
-use std::time::Duration;
+use indicatif::ProgressBar;
 
-use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
-
-/// How often the bar is drawn anew while a step takes long, so that it is seen to live.
-const TICK: Duration = Duration::from_millis(100);
+use crate::cli::progress::bar;
 
 /// A bar with a message.
 #[derive(Debug)]
@@ -13,13 +10,7 @@ pub(super) struct Progress(ProgressBar);
 
 impl Progress {
     pub(super) fn new(steps: u64) -> Self {
-        let style = ProgressStyle::with_template("{bar:32} {pos:>2}/{len} {elapsed:>4} {msg}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-        let bar = ProgressBar::new(steps)
-            .with_style(style)
-            .with_finish(ProgressFinish::AndClear);
-        bar.enable_steady_tick(TICK);
-        Self(bar)
+        Self(bar(steps, "{pos:>2}/{len}"))
     }
 
     /// The next step begins.

@@ -1,12 +1,11 @@
-//! The progress bar of the run; hidden where standard error is no terminal.
+//! The progress bar of a run.
 
 use std::time::{Duration, Instant};
 
 use grasp_experiment::run;
-use indicatif::{HumanDuration, ProgressBar, ProgressFinish, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar};
 
-/// How often the bar is drawn anew while a search takes long, so that it is seen to live.
-const TICK: Duration = Duration::from_millis(100);
+use crate::cli::progress::bar;
 
 /// How often the message changes at most: grasps can be found by the thousand a second.
 const MESSAGE_EVERY: Duration = Duration::from_millis(50);
@@ -21,7 +20,9 @@ pub(super) struct Progress {
 impl Progress {
     /// Shows how far the run is.
     pub(super) fn show(&mut self, now: &run::Progress) {
-        let bar = self.bar.get_or_insert_with(|| new_bar(now.total));
+        let bar = self
+            .bar
+            .get_or_insert_with(|| bar(now.total, "{human_pos:>6}/{human_len}"));
         let is_due = self
             .last_message
             .is_none_or(|last| last.elapsed() >= MESSAGE_EVERY);
@@ -57,14 +58,4 @@ impl Progress {
             bar.finish_and_clear();
         }
     }
-}
-
-fn new_bar(total: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:32} {human_pos:>6}/{human_len} {elapsed:>4} {msg}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(total)
-        .with_style(style)
-        .with_finish(ProgressFinish::AndClear);
-    bar.enable_steady_tick(TICK);
-    bar
 }

@@ -10,20 +10,21 @@ use crate::{
     table::{Table, Value},
 };
 
+/// The columns of [`origin`].
+const ORIGIN: [&str; 7] = [
+    "strategy",
+    "bend_ratios",
+    "threads",
+    "holdout",
+    "number",
+    "seed",
+    "attempt",
+];
+
 /// All valid grasps, also those of more threads and of Figure 5.20's columns.
 pub fn grasp_list(data: &Data<'_>) -> Table {
-    let mut header = vec![
-        "strategy",
-        "bend_ratios",
-        "threads",
-        "holdout",
-        "number",
-        "seed",
-        "attempt",
-        "attempts",
-        "prunes",
-        "milliseconds",
-    ];
+    let mut header: Vec<_> = ORIGIN.to_vec();
+    header.extend(["attempts", "prunes", "milliseconds"]);
     header.extend(Rejection::ALL.map(|rejection| output_type(Some(rejection))));
     header.extend([
         "touching_digits",
@@ -62,23 +63,18 @@ pub fn grasp_list(data: &Data<'_>) -> Table {
 
 /// All attempts that were looked at closely: the positive and the negative sets on one thread.
 pub fn attempt_list(data: &Data<'_>) -> Table {
-    let mut header: Vec<String> = [
-        "strategy",
-        "bend_ratios",
-        "threads",
-        "holdout",
-        "number",
-        "seed",
-        "attempt",
-        "output_type",
-        "wrist_distance_cm",
-        "palm_distance_cm",
-        "upward_wrist_angle_degrees",
-        "forward_wrist_angle_degrees",
-        "palm_com_palm_angle_degrees",
-    ]
-    .map(str::to_owned)
-    .to_vec();
+    let mut header: Vec<_> = ORIGIN.map(str::to_owned).to_vec();
+    header.extend(
+        [
+            "output_type",
+            "wrist_distance_cm",
+            "palm_distance_cm",
+            "upward_wrist_angle_degrees",
+            "forward_wrist_angle_degrees",
+            "palm_com_palm_angle_degrees",
+        ]
+        .map(str::to_owned),
+    );
     for digit in Digit::ALL {
         let name = format!("{digit:?}").to_lowercase();
         header.extend(
