@@ -29,8 +29,7 @@ use grasp_synthesis::{
 };
 
 use crate::AssetFile;
-use search::Selected;
-use specs::{HoldSpec, Target, hold_specs, selection, targets, write_selection};
+use specs::{HoldSpec, Selected, Target, hold_specs, selection, targets, write_selection};
 
 /// The rig of every giver: the thesis held its objects out with the hand that it also posed.
 const GIVER_RIG: &str = "thesis";

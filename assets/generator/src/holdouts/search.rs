@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
     clock::Clock,
@@ -23,13 +23,12 @@ use grasp_synthesis::{
     strategy::{BendRatioChoice, Strategy},
 };
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::{Deserialize, Serialize};
 
 use super::{
     halton::halton,
     judge::{Figures, SurfacePoint, coverage, overlap, posed_skin, surface_points, uncovered},
     solids::Palm,
-    specs::Target,
+    specs::{Selected, Target},
     stance::stances,
     wish::{coverage_misfit, misfit},
 };
@@ -57,20 +56,6 @@ const SURFACE_POINTS: u32 = 1500;
 
 /// A candidate's penalty for awkwardness 1, in the millimetres of the misfit.
 const AWKWARDNESS: f32 = 8.0;
-
-/// A grasp of the synthesis that was chosen to be a holdout.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Selected {
-    /// The holdout's name.
-    pub(crate) name: String,
-    /// The seed of the search.
-    pub(crate) seed: u64,
-    /// The index of the attempt.
-    pub(crate) attempt: u64,
-    /// How the object is turned in the world; gravity follows from it.
-    pub(crate) world_from_object: Quat,
-}
 
 /// A clock for searches without a deadline.
 pub(crate) struct NoClock;

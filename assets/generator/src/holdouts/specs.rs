@@ -2,9 +2,10 @@
 
 use std::{fs, io, path::PathBuf};
 
+use glam::Quat;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use super::{posing::Intent, search::Selected, wish::Wish};
+use super::{posing::Intent, wish::Wish};
 
 /// Where the author's files are.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/holdouts");
@@ -54,6 +55,20 @@ struct Holds {
 #[serde(deny_unknown_fields)]
 struct GenHolds {
     genhold: Vec<Target>,
+}
+
+/// A grasp of the synthesis that was chosen to be a holdout.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Selected {
+    /// The holdout's name.
+    pub(crate) name: String,
+    /// The seed of the search.
+    pub(crate) seed: u64,
+    /// The index of the attempt.
+    pub(crate) attempt: u64,
+    /// How the object is turned in the world; gravity follows from it.
+    pub(crate) world_from_object: Quat,
 }
 
 /// The record of a search.
