@@ -1,5 +1,6 @@
 //! What chapter 5 says, against a run: does it come out?
 
+mod open;
 mod placement;
 mod posing;
 mod speed;
@@ -51,6 +52,7 @@ pub fn claims(data: &Data<'_>) -> Vec<Claim> {
         posing::claims(data),
         steps::immobility(data),
         speed::claims(data),
+        open::claims(data),
     ];
     all.into_iter().flatten().collect()
 }

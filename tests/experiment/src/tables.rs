@@ -9,8 +9,8 @@ mod placement;
 
 pub(crate) use bend_ratios::{BEND_BIN_DEGREES, bend_angle_bins, column_means, lost};
 pub use bend_ratios::{bend_angles, columns, lost_contacts, ratio_counts};
+pub(crate) use comfort::{comfort_share_by_draw, contacts_of, touching_digits, valid_with_figures};
 pub use comfort::{comfort_spread, contact_counts};
-pub(crate) use comfort::{contacts_of, valid_with_figures};
 pub(crate) use ladder::{column_letter, holdout_means, mean_of_means};
 pub use ladder::{columns_per_holdout, ladder, per_holdout};
 pub use lists::{attempt_list, grasp_list};

@@ -2,12 +2,8 @@
 
 use grasp_synthesis::strategy::Strategy::{A, E, F};
 
-use super::{Claim, Verdict, verdict_of_ratio};
-use crate::{
-    data::{Data, milliseconds},
-    plan::Set,
-    tables::{column_means, mean_of_means},
-};
+use super::{Claim, verdict_of_ratio};
+use crate::{data::Data, plan::Set, tables::column_means};
 
 pub(super) fn claims(data: &Data<'_>) -> Vec<Claim> {
     let means = |strategy| column_means(data, Set::ladder(strategy));
@@ -38,23 +34,5 @@ pub(super) fn claims(data: &Data<'_>) -> Vec<Claim> {
                   alone; what the later steps save in the thesis was never spent",
         });
     }
-    claims.extend(data.ladder().last().and_then(|strategy| {
-        let threads = data.more_threads()?;
-        let of = |threads| {
-            let searches = data.searches_by_holdout(Set::ladder(strategy), threads);
-            mean_of_means(&searches.iter().map(|own| milliseconds(own)).collect::<Vec<_>>())
-        };
-        let ratio = of(1)? / of(threads)?;
-        Some(Claim {
-            source: "6.1, open question",
-            thesis: "how fast is it on a better computer? (not measured)",
-            run: format!(
-                "{:.1} ms on one thread, {ratio:.2} times as fast on {threads} (set {strategy:?})",
-                of(1)?
-            ),
-            verdict: Verdict::Answered,
-            why: "",
-        })
-    }));
     claims
 }

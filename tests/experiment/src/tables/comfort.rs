@@ -95,7 +95,7 @@ pub fn comfort_spread(data: &Data<'_>) -> Table {
                 .collect();
             Value::decimals(rank_correlation(&pairs), 2)
         };
-        let by_draw = share_by_draw(&grasps.iter().map(|(.., grasp)| draws(grasp)).collect::<Vec<_>>());
+        let by_draw = comfort_share_by_draw(data, set);
         table.push(vec![
             set.name().into(),
             (grasps.len() as u64).into(),
@@ -111,6 +111,14 @@ pub fn comfort_spread(data: &Data<'_>) -> Table {
     table
 }
 
+/// The share of E's variance in a positive set that is the draw of the force distribution.
+pub(crate) fn comfort_share_by_draw(data: &Data<'_>, set: Set) -> Option<f64> {
+    let drawn: Vec<_> = valid_with_figures(data, set)
+        .map(|(.., grasp)| draws(grasp))
+        .collect();
+    share_by_draw(&drawn)
+}
+
 /// E as it was found and as it was drawn again.
 fn draws(grasp: &GraspFigures) -> Vec<f64> {
     std::iter::once(&grasp.comfort)
@@ -121,7 +129,7 @@ fn draws(grasp: &GraspFigures) -> Vec<f64> {
 
 /// The share of the variance within groups in all of it: mean variance within, against that plus the variance of what
 /// the groups' means would be without it (analysis of variance for random effects).
-pub(crate) fn share_by_draw(groups: &[Vec<f64>]) -> Option<f64> {
+fn share_by_draw(groups: &[Vec<f64>]) -> Option<f64> {
     let drawn: Vec<_> = groups.iter().filter(|group| group.len() > 1).collect();
     let within = mean(
         &drawn
