@@ -5,6 +5,9 @@
 //! values or a list of everything wrong; `objects` has the object with its search structures; `search` admits the
 //! search, runs it on threads of its own and stops it when the call is dropped; `answer` words what was found.
 //!
+//! Before it serves, `memory` compares what it may take with what it may have, and `objects::directory` reads the folder
+//! of objects. `health_check` is the other side: it asks a server that runs.
+//!
 //! What is not here: the algorithm (crate `grasp-synthesis`), which in turn knows nothing of gRPC or async code.
 //! Only `convention` knows the engines' axes, only `error` knows status codes, and nothing but `search` starts
 //! threads.
@@ -15,6 +18,8 @@ mod call;
 pub mod config;
 mod convention;
 mod error;
+mod health_check;
+mod memory;
 mod net;
 mod objects;
 mod search;
@@ -24,5 +29,10 @@ mod validate;
 
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
-pub use objects::store::StoreLimits;
+pub use health_check::{HealthCheckError, check_health};
+pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory, memory_limits};
+pub use objects::{
+    directory::{DirectoryError, DirectoryProblem},
+    store::StoreLimits,
+};
 pub use serve::{Gauges, ServeError, Server, run};

@@ -1,11 +1,12 @@
-//! The binary: configuration, log, runtime, listener, signals.
+//! The binary: configuration, log, memory, runtime, listener, signals; and the health check of a server that runs.
 
 use std::{io::IsTerminal as _, path::PathBuf, process::ExitCode, time::Duration};
 
 use clap::{CommandFactory as _, Parser};
 use grasp_server::{
-    Config,
+    Config, Server, check_health, check_memory,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
+    memory_limits,
 };
 use tokio::{net::TcpListener, signal::unix::SignalKind};
 use tracing_subscriber::EnvFilter;
@@ -17,6 +18,10 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 ///
 /// Every option can also be set in the environment or in a file; flags win over the environment, and the environment
 /// over the file.
+///
+/// The server does not start, says why, and exits with 1 if a value cannot be used, if an object of the objects
+/// directory is wrong, or if the configuration may take more memory than the process may have (by its control groups,
+/// `RLIMIT_AS` or `RLIMIT_DATA`). SIGTERM and SIGINT end it with 0 after running calls were answered.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {
@@ -26,13 +31,18 @@ struct Flags {
     /// Print the configuration that is in force as TOML and exit.
     #[arg(long)]
     print_config: bool,
+    /// Ask the server that runs with this configuration for its health and exit: with 0 if it serves.
+    ///
+    /// An unspecified address (0.0.0.0, [::]) is asked over the loopback interface. The answer may take 900 ms.
+    #[arg(long, conflicts_with = "print_config")]
+    health_check: bool,
     #[command(flatten)]
     values: RawConfig,
 }
 
 fn main() -> ExitCode {
     match start(Flags::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::FAILURE
@@ -40,7 +50,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn start(flags: Flags) -> Result<(), Box<dyn std::error::Error>> {
+fn start(flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     let file = match &flags.config {
         Some(path) => read_file(path)?,
         None => RawConfig::default(),
@@ -48,25 +58,50 @@ fn start(flags: Flags) -> Result<(), Box<dyn std::error::Error>> {
     let config = flags.values.or(file).validate()?;
     if flags.print_config {
         print!("{}", toml::to_string(&RawConfig::from(&config))?);
-        return Ok(());
+        return Ok(ExitCode::SUCCESS);
+    }
+    if flags.health_check {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()?;
+        runtime.block_on(check_health(config.listen))?;
+        return Ok(ExitCode::SUCCESS);
     }
     start_log(&config)?;
+    let json = config.log_format == LogFormat::Json;
+    match run(&config) {
+        Ok(()) => Ok(ExitCode::SUCCESS),
+        // Whoever reads the log as JSON reads the reason for its end there too.
+        Err(error) if json && tracing::enabled!(tracing::Level::ERROR) => {
+            tracing::error!(%error, "the server ends");
+            Ok(ExitCode::FAILURE)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     for name in unknown_variables(variables(), &known_variables()) {
         tracing::warn!(
             name,
             "an environment variable looks like one of the server's and is none"
         );
     }
+    // Before the objects directory is read, which a server with too little memory might not survive to tell.
+    let limits = memory_limits();
+    check_memory(config, 0, &limits)?;
+    let server = Server::new(config.clone())?;
+    check_memory(config, server.directory_bytes(), &limits)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(config.io_threads.get())
         .enable_all()
         .build()?;
-    let result = runtime.block_on(serve(config));
+    let result = runtime.block_on(serve(config, server));
     runtime.shutdown_timeout(RUNTIME_END);
     result
 }
 
-async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
+async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error::Error>> {
     let listener = TcpListener::bind(config.listen)
         .await
         .map_err(|error| format!("cannot listen on {}: {error}", config.listen))?;
@@ -80,7 +115,7 @@ async fn serve(config: Config) -> Result<(), Box<dyn std::error::Error>> {
         }
     };
     tracing::info!(address = %listener.local_addr()?, workers = config.workers, "serving");
-    grasp_server::run(listener, config, shutdown).await?;
+    server.serve(listener, shutdown).await?;
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! From a listener to a server, and back to silence.
 
-use std::{future::Future, num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{future::Future, num::NonZeroUsize, path::Path, sync::Arc, time::Duration};
 
 use grasp_assets::{
     hands::{self, RIG_NAMES},
@@ -17,7 +17,11 @@ use crate::{
     call::{CallLayer, CallsInFlight},
     config::Config,
     net::{AcceptLimits, accept},
-    objects::store::ObjectStore,
+    objects::{
+        StoredObject,
+        directory::{self, DirectoryError},
+        store::ObjectStore,
+    },
     search::executor::SearchExecutor,
     services::{
         BYTES_BESIDE_MESH, GraspHandler, LARGEST_ANSWER, LARGEST_FIND_REQUEST, ObjectHandler, Shared,
@@ -66,6 +70,9 @@ pub enum ServeError {
     /// The threads that search cannot be started.
     #[error("cannot start the search workers: {0}")]
     Workers(#[from] rayon::ThreadPoolBuildError),
+    /// The objects directory cannot be used.
+    #[error(transparent)]
+    Objects(#[from] DirectoryError),
     /// The descriptors of the contract are broken.
     #[error("cannot offer reflection: {0}")]
     Reflection(#[from] tonic_reflection::server::Error),
@@ -82,6 +89,7 @@ pub struct Server {
     maximum_uploads: NonZeroUsize,
     maximum_connections: NonZeroUsize,
     drain: Duration,
+    directory_bytes: usize,
 }
 
 /// What the server is doing, for tests and monitors.
@@ -117,22 +125,28 @@ pub async fn run(
 }
 
 impl Server {
-    /// Starts the search workers and reads the built-in objects and hands.
+    /// Starts the search workers and reads the built-in objects and hands, and the objects directory.
     ///
     /// # Errors
-    /// [`ServeError::Workers`].
+    /// [`ServeError::Workers`], [`ServeError::Objects`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
         read_hands();
         let triangles = config.maximum_object_triangles.get();
+        let obj_limits = ObjLimits {
+            bytes: config.maximum_object_bytes.get(),
+            vertices: triangles,
+            triangles,
+        };
+        let directory = match &config.objects_directory {
+            Some(path) => tell(path, directory::load(path, obj_limits, config.store)?),
+            None => Vec::new(),
+        };
+        let directory_bytes = directory.iter().map(StoredObject::bytes).sum();
         let shared = Shared {
-            objects: ObjectStore::new(config.store),
+            objects: ObjectStore::new(config.store, directory),
             executor: SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?,
             budgets: config.budgets,
-            obj_limits: ObjLimits {
-                bytes: config.maximum_object_bytes.get(),
-                vertices: triangles,
-                triangles,
-            },
+            obj_limits,
             default_rig: config.default_rig,
         };
         Ok(Self {
@@ -141,7 +155,13 @@ impl Server {
             maximum_uploads: config.maximum_uploads,
             maximum_connections: config.maximum_connections,
             drain: config.drain,
+            directory_bytes,
         })
+    }
+
+    /// Bytes that the objects of the objects directory take, by estimate.
+    pub fn directory_bytes(&self) -> usize {
+        self.directory_bytes
     }
 
     /// What the server is doing.
@@ -225,6 +245,21 @@ impl Server {
         tracing::info!("stopped");
         Ok(())
     }
+}
+
+/// Tells in the log which objects a folder gave, and what is odd about them.
+fn tell(path: &Path, objects: Vec<StoredObject>) -> Vec<StoredObject> {
+    for object in &objects {
+        for warning in &object.warnings {
+            tracing::warn!(
+                object = object.name(),
+                warning,
+                "an object of the objects directory is odd"
+            );
+        }
+    }
+    tracing::info!(directory = %path.display(), objects = objects.len(), "read the objects directory");
+    objects
 }
 
 /// Has the built-in hands read now, which takes milliseconds, instead of by the first call that names them.

@@ -1,6 +1,6 @@
 //! Checks the configuration as it was written.
 
-use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, time::Duration};
+use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use grasp_assets::hands::RIG_NAMES;
 
@@ -66,6 +66,7 @@ impl RawConfig {
                     defaults.store.bytes,
                 ),
             },
+            objects_directory: check.folder("objects_directory", self.objects_directory),
             maximum_connections: check.count(
                 "maximum_connections",
                 self.maximum_connections,
@@ -195,6 +196,16 @@ impl Check<'_> {
             .map_or(default, Duration::from_millis)
     }
 
+    /// A folder, which is read later: here it only has to have a name.
+    fn folder(&mut self, key: &'static str, value: Option<PathBuf>) -> Option<PathBuf> {
+        let path = value?;
+        if path.as_os_str().is_empty() {
+            self.refuse(key, "\"\"", "a folder, or absent");
+            return None;
+        }
+        Some(path)
+    }
+
     fn parsed<T>(
         &mut self,
         key: &'static str,
@@ -226,6 +237,7 @@ mod tests {
         let config = Config {
             log_format: LogFormat::Json,
             drain: Duration::from_millis(77),
+            objects_directory: Some("/objects".into()),
             ..Config::default()
         };
         let text = toml::to_string(&RawConfig::from(&config)).unwrap();
@@ -269,6 +281,7 @@ mod tests {
             maximum_object_triangles: Some(0),
             cache_objects: Some(0),
             cache_bytes: Some(0),
+            objects_directory: Some(PathBuf::new()),
             maximum_connections: Some(0),
             drain_ms: Some(u64::MAX),
             default_rig: Some("robot".into()),
@@ -278,7 +291,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 17, "{bad:?}");
+        assert_eq!(bad.len(), 18, "{bad:?}");
         let told: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

@@ -39,6 +39,8 @@ pub struct Config {
     pub maximum_object_triangles: NonZeroUsize,
     /// How much the created objects may take.
     pub store: StoreLimits,
+    /// A folder of objects that the server starts with; none for the built-in ones alone.
+    pub objects_directory: Option<PathBuf>,
     /// Connections; others wait.
     pub maximum_connections: NonZeroUsize,
     /// How long running calls are waited for at the end.
@@ -74,6 +76,7 @@ impl Default for Config {
                 objects: 1000,
                 bytes: 512 << 20,
             },
+            objects_directory: None,
             maximum_connections: non_zero(1000),
             drain: Duration::from_secs(10),
             default_rig: "thesis".to_owned(),

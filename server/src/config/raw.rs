@@ -1,8 +1,15 @@
 //! The configuration as it is written: flags before environment before file before defaults.
 
-use std::{fs, path::Path, time::Duration};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
-use clap::Args;
+use clap::{
+    Args,
+    builder::{OsStringValueParser, TypedValueParser},
+};
 use serde::{Deserialize, Serialize};
 
 use super::{Config, ConfigError, LogFormat};
@@ -50,6 +57,13 @@ pub struct RawConfig {
     /// Bytes that created objects take at most, by estimate [default: 536870912].
     #[arg(long, env = "GRASP_CACHE_BYTES", value_name = "BYTES")]
     pub cache_bytes: Option<u64>,
+    /// Folder of objects to start with: NAME.toml beside NAME.obj makes objects/NAME [default: none].
+    ///
+    /// The TOML file has the keys of a `CreateObject` request: `mass_kg`, and where needed `unit_metres`,
+    /// `centre_of_mass`, `friction`, `forbidden.groups` and `forbidden.triangles`. Each file is bounded like an upload,
+    /// all together by `cache_objects` and `cache_bytes`, beside what clients create. The objects are never evicted.
+    #[arg(long, env = "GRASP_OBJECTS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
+    pub objects_directory: Option<PathBuf>,
     /// Connections at most [default: 1000].
     #[arg(long, env = "GRASP_MAXIMUM_CONNECTIONS", value_name = "COUNT")]
     pub maximum_connections: Option<u64>,
@@ -65,6 +79,11 @@ pub struct RawConfig {
     /// What is logged: info, debug, or a filter such as `grasp_server=debug,h2=warn` [default: info].
     #[arg(long, env = "GRASP_LOG", value_name = "FILTER")]
     pub log: Option<String>,
+}
+
+/// Takes an empty path too: it is told with everything else that is wrong, as in a file.
+fn any_path() -> impl TypedValueParser<Value = PathBuf> {
+    OsStringValueParser::new().map(PathBuf::from)
 }
 
 /// Reads a configuration file.
@@ -110,6 +129,7 @@ impl RawConfig {
                 .or(fallback.maximum_object_triangles),
             cache_objects: self.cache_objects.or(fallback.cache_objects),
             cache_bytes: self.cache_bytes.or(fallback.cache_bytes),
+            objects_directory: self.objects_directory.or(fallback.objects_directory),
             maximum_connections: self.maximum_connections.or(fallback.maximum_connections),
             drain_ms: self.drain_ms.or(fallback.drain_ms),
             default_rig: self.default_rig.or(fallback.default_rig),
@@ -136,6 +156,7 @@ impl From<&Config> for RawConfig {
             maximum_object_triangles: count(config.maximum_object_triangles.get()),
             cache_objects: count(config.store.objects),
             cache_bytes: count(config.store.bytes),
+            objects_directory: config.objects_directory.clone(),
             maximum_connections: count(config.maximum_connections.get()),
             drain_ms: time(config.drain),
             default_rig: Some(config.default_rig.clone()),

@@ -1,7 +1,9 @@
-//! The objects that can be held out: the built-in ones, and those that clients created, in a cache of bounded size.
+//! The objects that can be held out: the built-in ones, those of a folder that the server started with, and those that
+//! clients created, in a cache of bounded size.
 
 pub(crate) mod build;
 mod centre_of_mass;
+pub(crate) mod directory;
 pub(crate) mod store;
 
 use std::sync::Arc;

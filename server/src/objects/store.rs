@@ -1,4 +1,4 @@
-//! Objects by name. The built-in ones stay; created ones are kept while they fit.
+//! Objects by name. The built-in ones and those of the objects directory stay; created ones are kept while they fit.
 //!
 //! When a new object does not fit, created objects that no call uses are evicted, the least recently used first. A
 //! client that asks for an evicted object is told that it was evicted, and creates it again.
@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use grasp_assets::objects::objects;
+use grasp_assets::objects::{object, objects};
 
 use super::{StoredObject, name_of};
 use crate::error::{Limit, ServiceError};
@@ -33,7 +33,8 @@ pub struct StoreLimits {
 /// All objects.
 #[derive(Debug)]
 pub(crate) struct ObjectStore {
-    built_in: BTreeMap<String, Arc<StoredObject>>,
+    /// Those that the server started with; they stay.
+    pinned: BTreeMap<String, Arc<StoredObject>>,
     created: Mutex<Created>,
     limits: StoreLimits,
 }
@@ -53,19 +54,23 @@ struct Entry {
     last_used: u64,
 }
 
+/// Does a built-in object have this id?
+pub(crate) fn is_built_in(id: &str) -> bool {
+    object(id).is_some()
+}
+
 impl ObjectStore {
-    /// The built-in objects and room for others.
-    pub(crate) fn new(limits: StoreLimits) -> Self {
-        let built_in = objects()
-            .iter()
-            .map(|built_in| {
-                let id = built_in.name.to_owned();
-                let stored = StoredObject::new(id.clone(), true, Arc::clone(&built_in.object), Vec::new());
-                (id, Arc::new(stored))
-            })
-            .collect();
+    /// The built-in objects, those of the objects directory, none of which has the id of another, and room for others.
+    pub(crate) fn new(limits: StoreLimits, directory: Vec<StoredObject>) -> Self {
+        let built_in = objects().iter().map(|built_in| {
+            let id = built_in.name.to_owned();
+            StoredObject::new(id, true, Arc::clone(&built_in.object), Vec::new())
+        });
         Self {
-            built_in,
+            pinned: built_in
+                .chain(directory)
+                .map(|object| (object.id.clone(), Arc::new(object)))
+                .collect(),
             created: Mutex::default(),
             limits,
         }
@@ -73,7 +78,7 @@ impl ObjectStore {
 
     /// True if an object has this id.
     pub(crate) fn contains(&self, id: &str) -> bool {
-        self.built_in.contains_key(id) || self.created().objects.contains_key(id)
+        self.pinned.contains_key(id) || self.created().objects.contains_key(id)
     }
 
     /// The object with this id. While its `object` is held, it is not evicted.
@@ -81,7 +86,7 @@ impl ObjectStore {
     /// # Errors
     /// [`ServiceError::ObjectNotFound`].
     pub(crate) fn get(&self, id: &str) -> Result<Arc<StoredObject>, ServiceError> {
-        if let Some(object) = self.built_in.get(id) {
+        if let Some(object) = self.pinned.get(id) {
             return Ok(Arc::clone(object));
         }
         let mut created = self.created();
@@ -117,7 +122,7 @@ impl ObjectStore {
             ));
         }
         let mut created = self.created();
-        if self.built_in.contains_key(&object.id) || created.objects.contains_key(&object.id) {
+        if self.pinned.contains_key(&object.id) || created.objects.contains_key(&object.id) {
             return Err(ServiceError::ObjectExists { name: object.name() });
         }
         while created.objects.len() >= self.limits.objects || created.bytes + bytes > self.limits.bytes {
@@ -147,7 +152,7 @@ impl ObjectStore {
         let created = self.created();
         // One more of each than fits the page: enough to know whether there is another.
         let mut objects: Vec<_> = self
-            .built_in
+            .pinned
             .range::<str, _>(from)
             .map(|(_, object)| object)
             .take(size + 1)
@@ -200,7 +205,7 @@ mod tests {
 
     fn store(objects: usize, tetrahedra: usize) -> ObjectStore {
         let bytes = tetrahedra * tetrahedron("any", 1.0, &[]).bytes();
-        ObjectStore::new(StoreLimits { objects, bytes })
+        ObjectStore::new(StoreLimits { objects, bytes }, Vec::new())
     }
 
     fn insert(store: &ObjectStore, id: &str) -> Result<(), ServiceError> {
@@ -260,11 +265,31 @@ mod tests {
 
     #[test]
     fn what_can_never_fit_evicts_nothing() {
-        let store = ObjectStore::new(StoreLimits {
+        let limits = StoreLimits {
             objects: 10,
             bytes: 10,
-        });
+        };
+        let store = ObjectStore::new(limits, Vec::new());
         assert!(matches!(insert(&store, "a"), Err(ServiceError::Invalid(_))));
+    }
+
+    #[test]
+    fn objects_of_the_directory_stay_and_take_no_client_s_place() {
+        let limits = StoreLimits {
+            objects: 1,
+            bytes: tetrahedron("any", 1.0, &[]).bytes(),
+        };
+        let store = ObjectStore::new(limits, vec![tetrahedron("shelf", 1.0, &[])]);
+        for id in ["a", "b"] {
+            insert(&store, id).unwrap();
+        }
+        assert!(store.contains("shelf") && store.contains("b") && !store.contains("a"));
+        assert!(matches!(
+            insert(&store, "shelf"),
+            Err(ServiceError::ObjectExists { .. })
+        ));
+        let listed: Vec<String> = store.page(None, 100).0.iter().map(|o| o.id.clone()).collect();
+        assert_eq!(listed, ["b", "remote", "scalpel", "scissors", "shelf"]);
     }
 
     #[test]

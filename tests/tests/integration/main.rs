@@ -6,6 +6,7 @@ mod health;
 mod invalid;
 mod load;
 mod objects;
+mod objects_directory;
 mod real_input;
 mod reflection;
 mod reproducible;

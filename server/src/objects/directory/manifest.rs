@@ -1,0 +1,193 @@
+//! What `NAME.toml` says: what a client says beside the mesh when it creates an object, in the same words.
+
+use grasp_proto::v1;
+use toml::{Table, Value};
+
+use crate::validate::{Field, Violations, quoted};
+
+/// The keys of a manifest.
+const KEYS: [&str; 5] = [
+    "mass_kg",
+    "unit_metres",
+    "centre_of_mass",
+    "friction",
+    "forbidden",
+];
+
+/// The keys of `forbidden`.
+const FORBIDDEN_KEYS: [&str; 2] = ["groups", "triangles"];
+
+/// Mass in kilograms with which checking goes on where none is said; never that of an object.
+const PLACEHOLDER_MASS: f32 = 1.0;
+
+/// A manifest, its values unchecked.
+#[derive(Debug)]
+pub(super) struct Manifest {
+    mass_kg: f32,
+    unit_metres: Option<f32>,
+    centre_of_mass: Option<v1::Vector3>,
+    friction: Option<f32>,
+    forbidden: v1::ForbiddenSurfaces,
+}
+
+impl Manifest {
+    /// The request by which a client would create the object.
+    pub(super) fn into_request(self, id: &str, obj: Vec<u8>) -> v1::CreateObjectRequest {
+        v1::CreateObjectRequest {
+            object_id: id.to_owned(),
+            obj,
+            unit_metres: self.unit_metres,
+            mass_kg: self.mass_kg,
+            centre_of_mass: self.centre_of_mass,
+            friction: self.friction,
+            forbidden: Some(self.forbidden),
+        }
+    }
+}
+
+/// Reads a manifest key by key, so that everything that is wrong with it is told; none if it is no TOML.
+pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option<Manifest> {
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => {
+            violations.add("", format_args!("is no text in UTF-8: {error}"));
+            return None;
+        }
+    };
+    let table: Table = match text.parse() {
+        Ok(table) => table,
+        Err(error) => {
+            let error: toml::de::Error = error;
+            let line = error
+                .span()
+                .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
+            violations.add("", format_args!("is no TOML: line {line}: {}", error.message()));
+            return None;
+        }
+    };
+    refuse_unknown(&table, None, &KEYS, violations);
+    if !table.contains_key("mass_kg") {
+        violations.add(
+            Field::root("mass_kg"),
+            "is missing; the mass in kilograms is needed",
+        );
+    }
+    let mut optional = |key| {
+        let value = table.get(key)?;
+        number(Field::root(key), value, violations)
+    };
+    let mass_kg = optional("mass_kg");
+    let unit_metres = optional("unit_metres");
+    let friction = optional("friction");
+    Some(Manifest {
+        // What is wrong is told already.
+        mass_kg: mass_kg.unwrap_or(PLACEHOLDER_MASS),
+        unit_metres,
+        centre_of_mass: table
+            .get("centre_of_mass")
+            .and_then(|value| vector(Field::root("centre_of_mass"), value, violations)),
+        friction,
+        forbidden: table
+            .get("forbidden")
+            .map(|value| forbidden(Field::root("forbidden"), value, violations))
+            .unwrap_or_default(),
+    })
+}
+
+fn refuse_unknown(table: &Table, parent: Option<Field<'_>>, known: &[&str], violations: &mut Violations) {
+    for key in table.keys().filter(|key| !known.contains(&key.as_str())) {
+        let description = format!("is no key; there are {}", known.join(", "));
+        match parent {
+            Some(parent) => violations.add(parent.child(key), description),
+            None => violations.add(Field::root(key), description),
+        }
+    }
+}
+
+/// A number, whole or not.
+fn number(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<f32> {
+    match value {
+        Value::Float(number) => Some(*number as f32),
+        Value::Integer(number) => Some(*number as f32),
+        _ => refuse(field, value, "a number", violations),
+    }
+}
+
+fn vector(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Vector3> {
+    let Some([x, y, z]) = value.as_array().map(Vec::as_slice) else {
+        return refuse(
+            field,
+            value,
+            "three numbers in metres, as in [0, 0.1, 0]",
+            violations,
+        );
+    };
+    let mut at = |place, value| number(field.at(place), value, violations);
+    let (x, y, z) = (at(0, x), at(1, y), at(2, z));
+    Some(v1::Vector3 { x: x?, y: y?, z: z? })
+}
+
+fn forbidden(field: Field<'_>, value: &Value, violations: &mut Violations) -> v1::ForbiddenSurfaces {
+    let Some(table) = value.as_table() else {
+        return refuse(field, value, "a table with groups, triangles or both", violations)
+            .unwrap_or_default();
+    };
+    refuse_unknown(table, Some(field), &FORBIDDEN_KEYS, violations);
+    v1::ForbiddenSurfaces {
+        groups: list(
+            field.child("groups"),
+            table.get("groups"),
+            "a name in quotes",
+            violations,
+            |value| value.as_str().map(str::to_owned),
+        ),
+        triangles: list(
+            field.child("triangles"),
+            table.get("triangles"),
+            "a triangle's number, counted from 0",
+            violations,
+            |value| value.as_integer().and_then(|number| u32::try_from(number).ok()),
+        ),
+    }
+}
+
+/// The elements of an array; none of them if one is wrong, because what the mesh says of the others would be told of
+/// wrong places.
+fn list<T>(
+    field: Field<'_>,
+    value: Option<&Value>,
+    needed: &str,
+    violations: &mut Violations,
+    element: impl Fn(&Value) -> Option<T>,
+) -> Vec<T> {
+    let Some(value) = value else {
+        return Vec::new();
+    };
+    let Some(values) = value.as_array() else {
+        return refuse(field, value, "a list in brackets", violations).unwrap_or_default();
+    };
+    let elements: Vec<T> = values
+        .iter()
+        .enumerate()
+        .filter_map(|(place, value)| {
+            element(value).or_else(|| refuse(field.at(place), value, needed, violations))
+        })
+        .collect();
+    if elements.len() == values.len() {
+        elements
+    } else {
+        Vec::new()
+    }
+}
+
+/// Tells that a value is of the wrong kind.
+fn refuse<T>(field: Field<'_>, value: &Value, needed: &str, violations: &mut Violations) -> Option<T> {
+    let text = match value {
+        Value::String(text) => quoted(text),
+        Value::Table(_) => "a table".to_owned(),
+        Value::Array(values) => format!("a list of {}", values.len()),
+        other => other.to_string(),
+    };
+    violations.add(field, format_args!("is {text}; it must be {needed}"));
+    None
+}

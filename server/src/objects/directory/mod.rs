@@ -1,0 +1,221 @@
+//! A folder of objects that the server starts with: for every `NAME.obj` a `NAME.toml` beside it.
+//!
+//! They go through the same checks as objects that clients create, and each within the same limits. Anything that is
+//! wrong keeps the server from starting, and everything that is wrong is told at once: a pipeline whose object is
+//! silently missing finds out too late.
+
+mod manifest;
+mod pairs;
+
+use std::{
+    fmt,
+    fs::File,
+    io::Read as _,
+    path::{Path, PathBuf},
+};
+
+use grasp_assets::obj::ObjLimits;
+
+use super::{
+    StoredObject,
+    build::build_object,
+    store::{StoreLimits, is_built_in},
+};
+use crate::{
+    error::ServiceError,
+    services::BYTES_BESIDE_MESH,
+    validate::{Violations, object_fields, quoted},
+};
+use manifest::read_manifest;
+use pairs::{Pair, pairs};
+
+/// Problems that are listed at most; more of them are only counted, because a log line has an end.
+const LISTED_PROBLEMS: usize = 100;
+
+/// One thing that is wrong with a folder of objects.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DirectoryProblem {
+    /// The file's name; empty for the folder itself.
+    pub file: String,
+    /// The key of the manifest, or `obj` for the mesh; empty for the file itself.
+    pub field: String,
+    /// The value, and what would be right.
+    pub description: String,
+}
+
+impl DirectoryProblem {
+    /// Of a file or, with an empty name, the folder.
+    fn of(file: impl Into<String>, description: impl fmt::Display) -> Self {
+        Self {
+            file: file.into(),
+            field: String::new(),
+            description: description.to_string(),
+        }
+    }
+}
+
+impl fmt::Display for DirectoryProblem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for part in [&self.file, &self.field] {
+            if !part.is_empty() {
+                write!(f, "{part}: ")?;
+            }
+        }
+        f.write_str(&self.description)
+    }
+}
+
+/// A folder of objects that cannot be used, with everything that is wrong.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("objects_directory is {}; {}", path.display(), listed(problems))]
+pub struct DirectoryError {
+    /// The folder.
+    pub path: PathBuf,
+    /// What is wrong, file by file.
+    pub problems: Vec<DirectoryProblem>,
+}
+
+fn listed(problems: &[DirectoryProblem]) -> String {
+    let mut lines: Vec<String> = problems
+        .iter()
+        .take(LISTED_PROBLEMS)
+        .map(DirectoryProblem::to_string)
+        .collect();
+    if problems.len() > LISTED_PROBLEMS {
+        lines.push(format!("and {} more problems", problems.len() - LISTED_PROBLEMS));
+    }
+    lines.join("\n")
+}
+
+/// Reads every object of a folder, one after the other, so that no more memory is taken than by one upload at a time
+/// and the objects themselves.
+///
+/// # Errors
+/// Everything that is wrong, in the order of the files' names.
+pub(crate) fn load(
+    path: &Path,
+    limits: ObjLimits,
+    store: StoreLimits,
+) -> Result<Vec<StoredObject>, DirectoryError> {
+    let mut problems = Vec::new();
+    let mut objects = Vec::new();
+    let mut bytes = 0_usize;
+    for pair in pairs(path, store.objects, &mut problems) {
+        match read_pair(path, &pair, limits) {
+            Ok(object) => {
+                bytes = bytes.saturating_add(object.bytes());
+                if bytes > store.bytes {
+                    problems.push(DirectoryProblem::of(
+                        pair.obj,
+                        format_args!(
+                            "takes all objects so far to about {bytes} bytes with their search structures; at most \
+                             cache_bytes, {}, are allowed (the files after it were not read)",
+                            store.bytes
+                        ),
+                    ));
+                    break;
+                }
+                objects.push(object);
+            }
+            Err(found) => problems.extend(found),
+        }
+    }
+    if problems.is_empty() {
+        Ok(objects)
+    } else {
+        Err(DirectoryError {
+            path: path.to_owned(),
+            problems,
+        })
+    }
+}
+
+/// Reads one object.
+fn read_pair(path: &Path, pair: &Pair, limits: ObjLimits) -> Result<StoredObject, Vec<DirectoryProblem>> {
+    let mut problems = Vec::new();
+    let mut read = |name: &str, limit| match read_bounded(&path.join(name), limit) {
+        Ok(bytes) => Some(bytes),
+        Err(description) => {
+            problems.push(DirectoryProblem::of(name, description));
+            None
+        }
+    };
+    let manifest = read(&pair.toml, BYTES_BESIDE_MESH);
+    let obj = read(&pair.obj, limits.bytes);
+    if is_built_in(&pair.id) {
+        problems.push(DirectoryProblem::of(
+            &pair.obj,
+            format_args!(
+                "is named like the built-in object {}; another name is needed",
+                quoted(&pair.id)
+            ),
+        ));
+    }
+    let (Some(manifest), Some(obj)) = (manifest, obj) else {
+        return Err(problems);
+    };
+    let mut violations = Violations::default();
+    let Some(manifest) = read_manifest(&manifest, &mut violations) else {
+        problems.extend(told(pair, violations.into_error()));
+        return Err(problems);
+    };
+    let fields = object_fields(
+        manifest.into_request(&pair.id, obj),
+        limits.bytes,
+        &mut violations,
+    );
+    match build_object(fields, limits, violations) {
+        Ok(object) if problems.is_empty() => Ok(object),
+        Ok(_) => Err(problems),
+        Err(error) => {
+            problems.extend(told(pair, error));
+            Err(problems)
+        }
+    }
+}
+
+/// What is wrong with a request, told of the files that it was made of.
+fn told(pair: &Pair, error: ServiceError) -> Vec<DirectoryProblem> {
+    let ServiceError::Invalid(violations) = error else {
+        return vec![DirectoryProblem::of(&pair.obj, error)];
+    };
+    violations
+        .into_iter()
+        .map(|violation| match violation.field.as_str() {
+            "obj" => DirectoryProblem {
+                file: pair.obj.clone(),
+                field: String::new(),
+                description: violation.description,
+            },
+            "object_id" => DirectoryProblem {
+                file: pair.obj.clone(),
+                field: "the name".to_owned(),
+                description: violation.description,
+            },
+            _ => DirectoryProblem {
+                file: pair.toml.clone(),
+                field: violation.field,
+                description: violation.description,
+            },
+        })
+        .collect()
+}
+
+/// The bytes of a file that has at most `limit` of them.
+fn read_bounded(path: &Path, limit: usize) -> Result<Vec<u8>, String> {
+    let unreadable = |error| format!("cannot be read: {error}");
+    // Asked before it is opened: to open a pipe would wait for its writer.
+    if !path.metadata().map_err(unreadable)?.is_file() {
+        return Err("is no regular file".to_owned());
+    }
+    let mut bytes = Vec::new();
+    let mut file = File::open(path).map_err(unreadable)?.take(limit as u64 + 1);
+    file.read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() > limit {
+        return Err(format!("has more than {limit} bytes, which is what is allowed"));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,218 @@
+use std::fs;
+
+use super::*;
+
+const LIMITS: ObjLimits = ObjLimits {
+    bytes: 1000,
+    vertices: 10,
+    triangles: 10,
+};
+
+const STORE: StoreLimits = StoreLimits {
+    objects: 100,
+    bytes: 1 << 20,
+};
+
+const TETRAHEDRON: &str =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\ng lid\nf 1 3 2\ng wall\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+
+const MASS: &str = "mass_kg = 0.2\n";
+
+/// A folder of its own for a test, removed at its end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str, files: &[(&str, &str)]) -> Self {
+        let path = std::env::temp_dir().join(format!("grasp-objects-{}-{test}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        for (name, text) in files {
+            fs::write(path.join(name), text).unwrap();
+        }
+        Self(path)
+    }
+
+    fn load(&self) -> Result<Vec<StoredObject>, DirectoryError> {
+        load(&self.0, LIMITS, STORE)
+    }
+
+    /// What is wrong with it, line by line.
+    fn problems(&self) -> Vec<String> {
+        let error = self.load().expect_err("the folder is wrong");
+        error.problems.iter().map(ToString::to_string).collect()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder that stays in the temporary directory harms nobody.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn pairs_become_objects_and_other_files_are_left_alone() {
+    let manifest = "mass_kg = 1\nunit_metres = 0.1\ncentre_of_mass = [0, 0.01, 2e-2]\nfriction = 0.5\n\
+                    [forbidden]\ngroups = [\"lid\"]\ntriangles = [3]\n";
+    let folder = Folder::new(
+        "pairs",
+        &[
+            ("mug.obj", TETRAHEDRON),
+            ("mug.toml", manifest),
+            ("block-2.obj", TETRAHEDRON),
+            ("block-2.toml", MASS),
+            ("mug.mtl", "newmtl red"),
+            ("README", "about"),
+            (".mug.toml", "not = read"),
+        ],
+    );
+    let objects = folder.load().unwrap();
+    let ids: Vec<&str> = objects.iter().map(|object| object.id.as_str()).collect();
+    assert_eq!(ids, ["block-2", "mug"]);
+    let block = &objects[0].object;
+    // The centroid of a tetrahedron is the mean of its corners; the friction is the contract's default.
+    assert!((block.centre_of_mass - glam::Vec3::splat(0.25)).length() < 1e-6);
+    assert_eq!((block.mass, block.friction), (0.2, 0.34));
+    let mug = &objects[1].object;
+    assert_eq!((mug.mass, mug.friction), (1.0, 0.5));
+    assert_eq!(mug.centre_of_mass, glam::Vec3::new(0.0, 0.01, 0.02));
+    let forbidden: Vec<bool> = (0..4).map(|t| mug.is_forbidden(t)).collect();
+    assert_eq!(forbidden, [true, false, false, true]);
+    let longest = mug.surface.mesh().positions().iter().map(|p| p.max_element());
+    assert!((longest.fold(0.0, f32::max) - 0.1).abs() < 1e-6);
+    assert!(objects.iter().all(|object| !object.built_in));
+}
+
+#[test]
+fn everything_that_is_wrong_is_told_at_once() {
+    let folder = Folder::new(
+        "wrong",
+        &[
+            ("alone.obj", TETRAHEDRON),
+            ("orphan.toml", MASS),
+            ("remote.obj", TETRAHEDRON),
+            ("remote.toml", MASS),
+            ("Big Mug.obj", TETRAHEDRON),
+            ("Big Mug.toml", MASS),
+            ("heavy.obj", "v 0 0 0\nf 1 2 3\n"),
+            ("heavy.toml", "mass_kg = 2000\nfriction = 0\nunit_metres = -1\n"),
+            ("keys.obj", TETRAHEDRON),
+            (
+                "keys.toml",
+                "masskg = 1\nfriction = \"high\"\ncentre_of_mass = [0, 1]\n[forbidden]\ngroup = [\"lid\"]\n\
+                 triangles = [0, -1, \"two\"]\n",
+            ),
+            ("lids.obj", TETRAHEDRON),
+            (
+                "lids.toml",
+                "mass_kg = 1\nforbidden = { groups = [\"lid\", \"lit\"], triangles = [9] }\n",
+            ),
+            ("long.obj", &" ".repeat(1001)),
+            ("long.toml", MASS),
+            ("LOUD.OBJ", TETRAHEDRON),
+            ("torn.obj", TETRAHEDRON),
+            ("torn.toml", "mass_kg = 1\n= 3\n"),
+        ],
+    );
+    let problems = folder.problems();
+    let expected = [
+        "LOUD.OBJ: ends in capitals; .obj and .toml are read",
+        "alone.obj: has no alone.toml beside it, which must say mass_kg at least",
+        "orphan.toml: has no orphan.obj beside it",
+        "Big Mug.obj: the name: is \"Big Mug\"; it must be 1 to 63 of a-z, 0-9 and -, starting with a letter",
+        "heavy.toml: unit_metres: is -1; it must be 0.000001 to 1000",
+        "heavy.toml: mass_kg: is 2000; it must be more than 0 and at most 1000",
+        "heavy.toml: friction: is 0; it must be more than 0 and at most 5",
+        "heavy.obj: line 2: vertex 2 does not exist; 1 are known, counted from 1 or backward from -1",
+        "keys.toml: masskg: is no key; there are mass_kg, unit_metres, centre_of_mass, friction, forbidden",
+        "keys.toml: mass_kg: is missing; the mass in kilograms is needed",
+        "keys.toml: friction: is \"high\"; it must be a number",
+        "keys.toml: centre_of_mass: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",
+        "keys.toml: forbidden.group: is no key; there are groups, triangles",
+        "keys.toml: forbidden.triangles[1]: is -1; it must be a triangle's number, counted from 0",
+        "keys.toml: forbidden.triangles[2]: is \"two\"; it must be a triangle's number, counted from 0",
+        "lids.toml: forbidden.groups[1]: is \"lit\"; the mesh has \"lid\", \"wall\"",
+        "lids.toml: forbidden.triangles[0]: is 9; the mesh has 4 triangles, counted from 0",
+        "long.obj: has more than 1000 bytes, which is what is allowed",
+        "remote.obj: is named like the built-in object \"remote\"; another name is needed",
+    ];
+    for line in expected {
+        assert!(
+            problems.iter().any(|problem| problem == line),
+            "{line}\nnot in\n{problems:#?}"
+        );
+    }
+    // Its wording is the TOML parser's.
+    assert!(
+        problems
+            .iter()
+            .any(|problem| problem.starts_with("torn.toml: is no TOML: line 2: "))
+    );
+    // Vertex 3 does not exist either.
+    assert_eq!(problems.len(), expected.len() + 2, "{problems:#?}");
+}
+
+#[test]
+fn a_path_that_is_no_readable_folder_is_told() {
+    let folder = Folder::new("file", &[("file", "text")]);
+    for name in ["file", "nothing"] {
+        let path = folder.0.join(name);
+        let error = load(&path, LIMITS, STORE).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.starts_with(&format!("objects_directory is {}; ", path.display())),
+            "{text}"
+        );
+        assert!(
+            text.ends_with("a folder that the server may read is needed"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn a_folder_within_the_folder_is_no_mesh() {
+    let folder = Folder::new("nested", &[("mug.toml", MASS)]);
+    fs::create_dir_all(folder.0.join("mug.obj")).unwrap();
+    assert_eq!(folder.problems(), ["mug.obj: is no regular file"]);
+}
+
+#[test]
+fn all_objects_together_are_bounded() {
+    let folder = Folder::new(
+        "bounded",
+        &[
+            ("a.obj", TETRAHEDRON),
+            ("a.toml", MASS),
+            ("b.obj", TETRAHEDRON),
+            ("b.toml", MASS),
+        ],
+    );
+    let one = folder.load().unwrap()[0].bytes();
+    let load = |objects, bytes| load(&folder.0, LIMITS, StoreLimits { objects, bytes });
+    assert_eq!(load(2, 2 * one).unwrap().len(), 2);
+    let by_count = load(1, 2 * one).unwrap_err().to_string();
+    assert!(
+        by_count.contains("it has 2 objects; at most cache_objects, 1, are allowed"),
+        "{by_count}"
+    );
+    let by_bytes = load(2, 2 * one - 1).unwrap_err().to_string();
+    assert!(
+        by_bytes.contains("b.obj: takes all objects so far to about"),
+        "{by_bytes}"
+    );
+    assert!(by_bytes.contains("cache_bytes"), "{by_bytes}");
+}
+
+#[test]
+fn a_flood_of_problems_is_cut_and_counted() {
+    let folder = Folder::new("flood", &[]);
+    for number in 0..95 {
+        fs::write(folder.0.join(format!("o{number}.toml")), MASS).unwrap();
+    }
+    for number in 0..10 {
+        fs::write(folder.0.join(format!("O{number}.OBJ")), MASS).unwrap();
+    }
+    let error = folder.load().unwrap_err();
+    assert_eq!(error.problems.len(), 105);
+    assert!(error.to_string().ends_with("\nand 5 more problems"), "{error}");
+}

@@ -1,0 +1,107 @@
+//! The server's binary as a process.
+
+use std::{
+    io::{BufRead as _, BufReader, Read as _},
+    path::Path,
+    process::{Child, ChildStderr, Command, Stdio},
+};
+
+/// How a process ended.
+pub(crate) struct Ended {
+    /// Its exit code.
+    pub code: i32,
+    /// What it wrote to standard error.
+    pub text: String,
+}
+
+/// A command of the shell in which `grasp-server` is the binary under test, and of the server's variables there are
+/// only these.
+fn command(line: &str, variables: &[(&str, &str)]) -> Command {
+    let binary = Path::new(env!("CARGO_BIN_EXE_grasp-server"));
+    let folder = binary.parent().expect("a binary lies in a folder");
+    let mut command = Command::new("/bin/sh");
+    command.arg("-c").arg(line).env_clear().env("PATH", folder);
+    command.envs(variables.iter().copied());
+    command.stdin(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+/// Runs a command to its end.
+pub(crate) fn output(line: &str, variables: &[(&str, &str)]) -> Ended {
+    let output = command(line, variables).output().expect("there is a shell");
+    Ended {
+        code: output.status.code().expect("no signal ended it"),
+        text: String::from_utf8(output.stderr).expect("the server writes text"),
+    }
+}
+
+/// A server that runs; killed when it is dropped.
+pub(crate) struct Running {
+    child: Child,
+    log: BufReader<ChildStderr>,
+    address: String,
+}
+
+impl Running {
+    /// Starts the server and waits until it names its address.
+    pub(crate) fn start(variables: &[(&str, &str)]) -> Self {
+        Self::start_command("exec grasp-server", variables)
+    }
+
+    /// Starts the server by a command, which has to become the server, and waits until it names its address.
+    pub(crate) fn start_command(line: &str, variables: &[(&str, &str)]) -> Self {
+        let mut child = command(line, variables).spawn().expect("there is a shell");
+        let log = BufReader::new(child.stderr.take().expect("it is piped"));
+        let mut running = Self {
+            child,
+            log,
+            address: String::new(),
+        };
+        running.address = running.read_address();
+        running
+    }
+
+    /// Reads the log up to the line that names the address.
+    fn read_address(&mut self) -> String {
+        let mut told = String::new();
+        loop {
+            let start = told.len();
+            let read = self.log.read_line(&mut told).expect("the server writes text");
+            assert!(read > 0, "the server ended before it named its address: {told}");
+            if let Some((_, rest)) = told[start..].split_once("address=") {
+                return rest.split_whitespace().next().expect("it follows").to_owned();
+            }
+        }
+    }
+
+    /// Where it listens.
+    pub(crate) fn address(&self) -> &str {
+        &self.address
+    }
+
+    /// Sends SIGTERM and waits for the end, which must be a success; gives the rest of the log.
+    pub(crate) fn terminate(mut self) -> Vec<String> {
+        let killed = Command::new("kill")
+            .arg(self.child.id().to_string())
+            .status()
+            .expect("there is kill");
+        assert!(killed.success());
+        let log = self
+            .log
+            .by_ref()
+            .lines()
+            .map(|line| line.expect("the server writes text"))
+            .collect();
+        let status = self.child.wait().expect("it is a child");
+        assert!(status.success(), "{status}");
+        log
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It has ended already unless the test failed.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

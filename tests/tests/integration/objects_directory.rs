@@ -1,0 +1,130 @@
+//! A folder of objects that the server starts with.
+
+use std::{fs, path::PathBuf};
+
+use grasp_assets::objects::{BuiltInObject, Manifest, object};
+use grasp_proto::v1;
+use grasp_server::{Config, Server};
+use grasp_tests::TestServer;
+use tonic::Code;
+
+use crate::support::{box_request, held_remote};
+
+/// A folder of its own for a test, removed at its end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id()));
+        fs::create_dir_all(&path).expect("the temporary directory can be written to");
+        Self(path)
+    }
+
+    /// Writes an object's two files.
+    fn add(&self, name: &str, obj: &str, manifest: &str) {
+        fs::write(self.0.join(format!("{name}.obj")), obj).expect("a file can be written");
+        fs::write(self.0.join(format!("{name}.toml")), manifest).expect("a file can be written");
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder that stays in the temporary directory harms nobody.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What the built-in object is, in the words of a manifest.
+fn manifest_of(built_in: &BuiltInObject) -> String {
+    let about = Manifest::parse(built_in.manifest).expect("it is part of the program");
+    let [x, y, z] = about.centre_of_mass_m.to_array();
+    format!(
+        "mass_kg = {}\ncentre_of_mass = [{x:?}, {y:?}, {z:?}]\nfriction = {}\n[forbidden]\ngroups = {:?}\n",
+        about.mass_kg, about.friction, about.forbidden_groups
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_built_in_object_read_from_a_folder_is_grasped_alike() {
+    let folder = Folder::new("alike");
+    let remote = object("remote").expect("it is built in");
+    folder.add("my-remote", remote.obj, &manifest_of(remote));
+    let server = TestServer::start_with(|config| config.objects_directory = Some(folder.0.clone())).await;
+    let mut objects = server.objects().await;
+    let mut get = async |name: &str| {
+        let request = v1::GetObjectRequest {
+            name: name.to_owned(),
+        };
+        let answer = objects
+            .get_object(request)
+            .await
+            .expect("it is there")
+            .into_inner();
+        answer.object.expect("an answer has the object")
+    };
+    let (built_in, ours) = (get("objects/remote").await, get("objects/my-remote").await);
+    assert!(built_in.built_in && !ours.built_in);
+    assert_eq!(ours.content_hash, built_in.content_hash);
+
+    let mut grasps = Vec::new();
+    for object in [built_in.name, ours.name] {
+        let request = v1::FindGraspRequest {
+            object,
+            reproducible: true,
+            ..held_remote()
+        };
+        let answer = server.grasps().await.find_grasp(request).await.unwrap();
+        grasps.push(answer.into_inner().grasp.expect("the remote can be grasped"));
+    }
+    assert_eq!(grasps[0], grasps[1]);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_of_the_folder_stay_when_others_are_evicted() {
+    let folder = Folder::new("stay");
+    let shelf = box_request("any");
+    folder.add(
+        "shelf",
+        std::str::from_utf8(&shelf.obj).unwrap(),
+        "mass_kg = 0.1\n",
+    );
+    let server = TestServer::start_with(|config| {
+        config.objects_directory = Some(folder.0.clone());
+        config.store.objects = 1;
+    })
+    .await;
+    let mut client = server.objects().await;
+    for id in ["first", "second"] {
+        client.create_object(box_request(id)).await.unwrap();
+    }
+    let status = client.create_object(box_request("shelf")).await.unwrap_err();
+    assert_eq!(status.code(), Code::AlreadyExists);
+    let listed = client
+        .list_objects(v1::ListObjectsRequest::default())
+        .await
+        .unwrap();
+    let names: Vec<String> = listed.into_inner().objects.into_iter().map(|o| o.name).collect();
+    let expected = ["remote", "scalpel", "scissors", "second", "shelf"];
+    assert_eq!(names, expected.map(|id| format!("objects/{id}")));
+    server.stop().await;
+}
+
+#[test]
+fn a_broken_folder_is_no_server() {
+    let folder = Folder::new("broken");
+    folder.add("mug", "v 0 0 0\n", "mass_kg = -1\n");
+    folder.add("scissors", "v 0 0 0\n", "mass_kg = 1\n");
+    let config = Config {
+        objects_directory: Some(folder.0.clone()),
+        ..Config::default()
+    };
+    let text = Server::new(config).expect_err("the folder is broken").to_string();
+    for part in [
+        "mug.toml: mass_kg: is -1; it must be more than 0",
+        "mug.obj: ",
+        "scissors.obj: is named like the built-in object",
+    ] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+}
