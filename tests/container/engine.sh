@@ -1,0 +1,111 @@
+# Finds a container engine and what it takes to use it here. Sourced by tests/container/run, which sets `work`.
+# Every function fails with the reason in `problem`.
+# shellcheck shell=bash disable=SC2034 # What is found is used by the script that sources this one.
+
+engine=
+compose=
+no_compose=
+build_image=
+problem=
+
+# Installs packages by name if that is possible without asking anybody.
+install() {
+    if [ "$(id -u)" != 0 ] || ! command -v apt-get > /dev/null; then
+        return 1
+    fi
+    echo "installing $*"
+    # What is known of the packages may be missing or too old on a fresh machine.
+    DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "$@" > "$work/apt.log" 2>&1 \
+        || { apt-get update > "$work/apt.log" 2>&1 \
+            && DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "$@" >> "$work/apt.log" 2>&1; }
+}
+
+find_engine() {
+    if command -v docker > /dev/null && timeout 20 docker info > /dev/null 2>&1; then
+        engine=docker
+        if docker compose version > /dev/null 2>&1; then
+            compose="$(command -v docker) compose"
+        elif command -v docker-compose > /dev/null; then
+            compose=$(command -v docker-compose)
+        else
+            no_compose='no docker compose'
+        fi
+        return
+    fi
+    if ! command -v podman > /dev/null; then
+        # The bridge and the name service of either network stack, whichever the distribution has.
+        install podman runc iptables containernetworking-plugins golang-github-containernetworking-plugin-dnsname \
+            || install podman runc iptables netavark aardvark-dns \
+            || { problem='no docker daemon answers, and there is no podman and no way to install it'; return 1; }
+    fi
+    engine=podman
+    if command -v podman-compose > /dev/null || install podman-compose; then
+        compose=$(command -v podman-compose)
+    else
+        no_compose='no podman-compose, and no way to install it'
+    fi
+}
+
+# The image to build in: GRASP_BUILD_IMAGE, or the Dockerfile's own if it can be had, or one that is made here.
+find_build_image() {
+    build_image=${GRASP_BUILD_IMAGE:-}
+    if [ -n "$build_image" ]; then
+        return
+    fi
+    build_image=$(sed -n 's/^ARG BUILD_IMAGE=//p' docker/Dockerfile)
+    if "$engine" image inspect "$build_image" > /dev/null 2>&1 \
+        || timeout 300 "$engine" pull --quiet "$build_image" > "$work/pull.log" 2>&1; then
+        return
+    fi
+    echo "no image registry in reach: $(tail -1 "$work/pull.log")"
+    # Packages that cargo has here are taken along; the lock file says which.
+    build_image=localhost/grasp-build:$(cat Cargo.lock tests/container/make-build-image <(rustc --version --verbose) \
+        | sha256sum | cut -c1-16)
+    if "$engine" image inspect "$build_image" > /dev/null 2>&1; then
+        return
+    fi
+    if [ "$(id -u)" != 0 ]; then
+        problem='no image registry in reach, and only root can make a build image'
+        return 1
+    fi
+    echo 'making a build image of Debian packages and the toolchain at hand'
+    command -v mmdebstrap > /dev/null || install mmdebstrap \
+        || { problem='no image registry in reach, and no mmdebstrap to make a build image with'; return 1; }
+    tests/container/make-build-image "$engine" "$build_image" "$work" > "$work/build-image.log" 2>&1 \
+        || { problem="cannot make a build image: $(tail -1 "$work/build-image.log")"; return 1; }
+}
+
+# Some machines do not let an engine raise the limits that it raises by default, or have a runtime that does not work.
+# podman reads a configuration file by which the first combination that works is set; docker's daemon has its own.
+find_run_options() {
+    local runs=("$engine" run --rm --entrypoint /bin/true "$build_image")
+    if "${runs[@]}" > "$work/run.log" 2>&1; then
+        return
+    fi
+    local first
+    first=$(tail -1 "$work/run.log")
+    if [ "$engine" = podman ]; then
+        command -v runc > /dev/null || install runc || true
+        export CONTAINERS_CONF=$work/containers.conf
+        local limits
+        limits="default_ulimits = [\"nofile=$(limit -n):$(limit -n)\", \"nproc=$(limit -u):$(limit -u)\"]"
+        for engine_options in '' 'runtime = "runc"'; do
+            for container_options in '' "$limits"; do
+                printf '[containers]\n%s\n[engine]\n%s\n' "$container_options" "$engine_options" > "$CONTAINERS_CONF"
+                if "${runs[@]}" > "$work/run.log" 2>&1; then
+                    return
+                fi
+            done
+        done
+    fi
+    problem="$engine cannot run a container here: $first"
+    return 1
+}
+
+# A resource limit that this process may give on: its own hard one, and no more than a container needs.
+limit() {
+    local hard
+    hard=$(ulimit -H "$1")
+    if [ "$hard" = unlimited ] || [ "$hard" -gt 4096 ]; then hard=4096; fi
+    echo "$hard"
+}

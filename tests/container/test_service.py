@@ -1,0 +1,120 @@
+"""The service in a container, asked over its published port."""
+
+import datetime
+import json
+import pathlib
+import re
+import time
+
+from conftest import ENGINE, engine, grasp, inspect, measured, run, skip, wait_for
+
+FIND = ["find", "--holdout", "scissors-hold1", "--seed", "7", "--reproducible", "--budget", "10s", "--json"]
+
+
+def test_the_client_is_answered(start):
+    begin = time.monotonic()
+    service = start()
+    measured("time from the engine's start to an answer", f"{1000 * (time.monotonic() - begin):.0f} ms")
+    address = service.address()
+    assert grasp(address, "health").stdout.strip() == "serving"
+    listed = json.loads(grasp(address, "objects", "list", "--json").stdout)
+    names = [thing["name"] for thing in listed["objects"]]
+    assert names == ["objects/remote", "objects/scalpel", "objects/scissors"]
+    found = grasp(address, *FIND)
+    assert found.returncode == 0, found.stderr
+
+
+def test_a_seed_gives_the_same_grasp_as_outside(start, outside):
+    answers = [grasp(address, *FIND) for address in (start().address(), outside)]
+    assert [answer.returncode for answer in answers] == [0, 0]
+    within, without = (json.loads(answer.stdout)["grasp"] for answer in answers)
+    assert within == without
+
+
+def test_it_runs_without_any_privilege(start):
+    service = start()
+    process = inspect(service.name, "{{.State.Pid}}")
+    status = pathlib.Path("/proc", process, "status")
+    if not status.exists() or "grasp-server" not in status.read_text():
+        skip("privileges of the process: its /proc is not on this machine")
+    fields = dict(line.split(":\t", 1) for line in status.read_text().splitlines() if ":\t" in line)
+    assert "0" not in fields["Uid"].split()
+    assert int(fields["CapEff"], 16) == 0 and int(fields["CapPrm"], 16) == 0 and int(fields["CapBnd"], 16) == 0
+    assert fields["NoNewPrivs"].strip() == "1"
+    measured("resident memory at rest", fields["VmRSS"].strip())
+
+
+def test_the_health_check_works_from_inside(start):
+    service = start()
+    check = run(ENGINE, "exec", service.name, "/grasp-server", "--health-check")
+    assert (check.returncode, check.stdout + check.stderr) == (0, "")
+    # Where nobody listens.
+    check = run(ENGINE, "exec", "--env", "GRASP_LISTEN=0.0.0.0:9", service.name, "/grasp-server", "--health-check")
+    assert check.returncode == 1
+    assert "cannot connect to 127.0.0.1:9" in check.stdout + check.stderr
+
+
+def test_the_engine_finds_it_healthy(start):
+    service = start()
+    if ENGINE == "podman":
+        # podman leaves the timing to systemd, which need not be there.
+        engine("healthcheck", "run", service.name)
+    wait_for("health", lambda: "healthy" == inspect(service.name, "{{.State.Health.Status}}"))
+
+
+def test_the_environment_configures_it(start):
+    service = start(environment={"GRASP_MAXIMUM_OBJECT_TRIANGLES": "4", "GRASP_LISTEN": "0.0.0.0:50051"})
+    mesh = "assets/objects/remote.obj"
+    refused = grasp(service.address(), "objects", "create", "--obj", mesh, "--mass", "0.1", "mesh")
+    assert refused.returncode == 4
+    assert "more than 4 triangles" in refused.stderr
+
+
+def test_a_folder_of_objects_is_served(start, objects, tmp_path):
+    service = start(mounts={objects: "/objects"})
+    about = json.loads(grasp(service.address(), "objects", "get", "my-remote", "--json").stdout)
+    built_in = json.loads(grasp(service.address(), "objects", "get", "remote", "--json").stdout)
+    assert about["content_hash"] == built_in["content_hash"] and not about["built_in"]
+    found = []
+    for name in ("objects/my-remote", "objects/remote"):
+        request = tmp_path / "request.json"
+        request.write_text(json.dumps({"object": name, "seed": "3", "reproducible": True, "budget": "10s"}))
+        answer = grasp(service.address(), "find", "--request", request, "--json")
+        assert answer.returncode == 0, answer.stderr
+        found.append(json.loads(answer.stdout)["grasp"])
+    assert found[0] == found[1]
+
+
+def test_every_line_of_the_log_is_json_and_it_is_ready_soon(start):
+    service = start()
+    grasp(service.address(), *FIND)
+    grasp(service.address(), "objects", "get", "nothing")
+    started = inspect(service.name, "{{json .State.StartedAt}}")
+    engine("stop", service.name)
+    lines = [json.loads(line) for line in service.log().splitlines()]
+    messages = [line["message"] for line in lines]
+    assert "serving" in messages and "stopped" in messages
+    assert sum("FindGrasp" in json.dumps(line) for line in lines) == 1
+    # The engine tells nanoseconds, Python reads microseconds.
+    moments = [re.sub(r"(\.\d{6})\d*", r"\1", text.strip('"')) for text in (started, lines[0]["timestamp"])]
+    begin, ready = (datetime.datetime.fromisoformat(moment.replace("Z", "+00:00")) for moment in moments)
+    measured("from the start of the container to readiness", f"{1000 * (ready - begin).total_seconds():.0f} ms")
+
+
+def test_killed_it_can_be_started_again(start):
+    service = start()
+    engine("kill", "--signal", "KILL", service.name)
+    wait_for("the end", lambda: not service.is_running())
+    assert service.exit_code() == 137
+    engine("start", service.name)
+    service.wait_until_it_serves()
+    assert grasp(service.address(), *FIND).returncode == 0
+
+
+def test_sigterm_ends_it_cleanly(start):
+    service = start()
+    begin = time.monotonic()
+    engine("kill", "--signal", "TERM", service.name)
+    engine("wait", service.name)
+    measured("from SIGTERM to the end, idle", f"{1000 * (time.monotonic() - begin):.0f} ms")
+    assert service.exit_code() == 0
