@@ -6,6 +6,7 @@ import pathlib
 import re
 import shutil
 import subprocess
+import tempfile
 import time
 
 import pytest
@@ -26,8 +27,13 @@ HANGS_AFTER = 60
 
 
 def run(*command, **options):
-    """Runs a command to its end; both outputs are kept as text."""
-    return subprocess.run(command, capture_output=True, text=True, timeout=540, **options)
+    """Runs a command to its end; both outputs are kept as text. By files: podman-compose leaves processes behind that
+    would keep a pipe open."""
+    with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+        done = subprocess.run(command, stdout=out, stderr=err, timeout=540, **options)
+        out.seek(0)
+        err.seek(0)
+        return subprocess.CompletedProcess(command, done.returncode, out.read(), err.read())
 
 
 def engine(*arguments):

@@ -5,8 +5,8 @@ import os
 import pytest
 from conftest import ROOT, run, skip
 
-# What the client says of something that is not there.
-NOT_FOUND = 4
+# What the client says of a server that is not there.
+NO_ANSWER = 5
 
 
 @pytest.fixture
@@ -28,4 +28,4 @@ def test_the_test_container_s_verdict_is_the_exit_code(compose):
     assert "found" in passed.stdout + passed.stderr
     compose("down", "--timeout", "5")
     failed = compose("--file", "tests/container/failing.yaml", *up)
-    assert failed.returncode == NOT_FOUND, failed.stdout[-4000:] + failed.stderr[-4000:]
+    assert failed.returncode == NO_ANSWER, failed.stdout[-4000:] + failed.stderr[-4000:]

@@ -67,7 +67,7 @@ def test_the_environment_configures_it(start):
     mesh = "assets/objects/remote.obj"
     refused = grasp(service.address(), "objects", "create", "--obj", mesh, "--mass", "0.1", "mesh")
     assert refused.returncode == 4
-    assert "more than 4 triangles" in refused.stderr
+    assert "more than 4 " in refused.stderr
 
 
 def test_a_folder_of_objects_is_served(start, objects, tmp_path):
@@ -78,7 +78,7 @@ def test_a_folder_of_objects_is_served(start, objects, tmp_path):
     found = []
     for name in ("objects/my-remote", "objects/remote"):
         request = tmp_path / "request.json"
-        request.write_text(json.dumps({"object": name, "seed": "3", "reproducible": True, "budget": "10s"}))
+        request.write_text(json.dumps({"object": name, "seed": "3", "reproducible": True, "budget_seconds": 10}))
         answer = grasp(service.address(), "find", "--request", request, "--json")
         assert answer.returncode == 0, answer.stderr
         found.append(json.loads(answer.stdout)["grasp"])
@@ -96,7 +96,8 @@ def test_every_line_of_the_log_is_json_and_it_is_ready_soon(start):
     assert "serving" in messages and "stopped" in messages
     assert sum("FindGrasp" in json.dumps(line) for line in lines) == 1
     # The engine tells nanoseconds, Python reads microseconds.
-    moments = [re.sub(r"(\.\d{6})\d*", r"\1", text.strip('"')) for text in (started, lines[0]["timestamp"])]
+    serving = lines[messages.index("serving")]["timestamp"]
+    moments = [re.sub(r"(\.\d{6})\d*", r"\1", text.strip('"')) for text in (started, serving)]
     begin, ready = (datetime.datetime.fromisoformat(moment.replace("Z", "+00:00")) for moment in moments)
     measured("from the start of the container to readiness", f"{1000 * (ready - begin).total_seconds():.0f} ms")
 
