@@ -54,6 +54,12 @@ def skip(reason):
     pytest.skip(reason)
 
 
+def limits_memory():
+    """Does the engine set a memory limit, or does it refuse or only warn that it cannot?"""
+    done = run(ENGINE, "run", "--rm", "--memory", "256m", IMAGE, "--print-config")
+    return done.returncode == 0 and "limit" not in done.stderr.lower()
+
+
 def measured(what, value):
     """A figure for a person to read; nothing depends on it."""
     print(f"measured: {what}: {value}")

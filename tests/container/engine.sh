@@ -15,9 +15,9 @@ install() {
     fi
     echo "installing $*"
     # What is known of the packages may be missing or too old on a fresh machine.
-    DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "$@" > "$work/apt.log" 2>&1 \
-        || { apt-get update > "$work/apt.log" 2>&1 \
-            && DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "$@" >> "$work/apt.log" 2>&1; }
+    local get=(env DEBIAN_FRONTEND=noninteractive apt-get)
+    "${get[@]}" install --yes --no-install-recommends "$@" > "$work/apt.log" 2>&1 \
+        || { "${get[@]}" update && "${get[@]}" install --yes --no-install-recommends "$@"; } > "$work/apt.log" 2>&1
 }
 
 find_engine() {

@@ -2,7 +2,7 @@
 
 import json
 
-from conftest import ENGINE, grasp, run, skip
+from conftest import grasp, limits_memory, skip
 
 # Settings for a container of 256 MiB, as docker/README.md has them.
 SMALL = {
@@ -43,7 +43,7 @@ def test_a_folder_that_is_not_mounted_is_told(refused):
 def test_too_little_memory_is_told(refused):
     # By a control group where the engine may set one, else by a resource limit.
     limit, source = ["--memory", "256m"], "memory"
-    if not limits_memory(limit):
+    if not limits_memory():
         limit, source = ["--ulimit", f"data={256 << 20}:{256 << 20}"], "RLIMIT_DATA"
         print("the engine cannot limit memory by a control group here; by RLIMIT_DATA instead")
     log = refused(*limit)
@@ -54,10 +54,9 @@ def test_too_little_memory_is_told(refused):
 
 
 def test_settings_that_fit_the_memory_survive_their_load(start, tmp_path):
-    limit = ["--memory", "256m"]
-    if not limits_memory(limit):
+    if not limits_memory():
         skip("load within a memory limit: the engine cannot set one here")
-    service = start(*limit, environment=SMALL)
+    service = start("--memory", "256m", environment=SMALL)
     mesh = tmp_path / "large.obj"
     write_wavy_sheet(mesh, 315)
     for number in range(4):
@@ -67,12 +66,6 @@ def test_settings_that_fit_the_memory_survive_their_load(start, tmp_path):
     listed = json.loads(grasp(service.address(), "objects", "list", "--json").stdout)["objects"]
     assert sum(thing["name"].startswith("objects/large-") for thing in listed) == 1
     assert service.is_running()
-
-
-def limits_memory(options):
-    """Does the engine set this memory limit, or does it only warn that it cannot?"""
-    done = run(ENGINE, "run", "--rm", *options, "--entrypoint", "/grasp-server", "grasp-server", "--print-config")
-    return done.returncode == 0 and "limit" not in done.stderr.lower()
 
 
 def write_wavy_sheet(path, edge):
