@@ -13,6 +13,7 @@ pub mod grasp;
 pub mod hand;
 pub mod holdout;
 pub mod object;
+pub mod physical;
 pub mod pose;
 pub mod rejection;
 pub mod search;

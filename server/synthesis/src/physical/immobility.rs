@@ -1,0 +1,1 @@
+//! Immobility: forces that hold the object, and closure.
