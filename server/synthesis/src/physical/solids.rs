@@ -1,1 +1,15 @@
 //! Hands as solids: what they leave free of objects and of each other.
+//!
+//! A hand is a union of tapered capsules ([`HandSolids`]). How far it is from an object's surface, and how deep in it,
+//! is asked capsule by capsule ([`clearance()`], [`closest()`]); how far from other parts of itself and from another hand
+//! by [`self_clearance`] and [`giver_clearance`].
+
+mod hand_clearance;
+mod hand_solids;
+mod mesh_clearance;
+mod tapered_capsule;
+
+pub use hand_clearance::{SOFT_CONTACT, giver_clearance, self_clearance};
+pub use hand_solids::{FOREARM_SOLIDS, HandSolids, PALM_SOLIDS};
+pub use mesh_clearance::{Touch, clearance, closest};
+pub use tapered_capsule::TaperedCapsule;

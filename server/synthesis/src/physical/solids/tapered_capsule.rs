@@ -1,0 +1,143 @@
+//! The tapered capsule, or cone-sphere: the convex hull of two balls.
+
+use glam::{DVec3, Vec3};
+
+use crate::pose::Pose;
+
+/// The convex hull of two balls: everything within [`TaperedCapsule::radius_at`] of a point of the axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TaperedCapsule {
+    /// Centre of one ball, in metres.
+    pub start: Vec3,
+    /// Centre of the other.
+    pub end: Vec3,
+    /// Radius of the ball around `start`, in metres.
+    pub start_radius: f32,
+    /// Radius of the ball around `end`, in metres.
+    pub end_radius: f32,
+}
+
+impl TaperedCapsule {
+    /// The hull of a ball of `start_radius` metres around `start` and one of `end_radius` around `end`.
+    pub const fn new(start: Vec3, end: Vec3, start_radius: f32, end_radius: f32) -> Self {
+        Self {
+            start,
+            end,
+            start_radius,
+            end_radius,
+        }
+    }
+
+    /// A point of the axis: 0 is the start, 1 the end.
+    pub fn at(&self, along: f32) -> Vec3 {
+        self.start + (self.end - self.start) * along
+    }
+
+    /// The radius around a point of the axis, in metres: linear from start to end.
+    pub fn radius_at(&self, along: f32) -> f32 {
+        self.start_radius + (self.end_radius - self.start_radius) * along
+    }
+
+    /// Length of the axis in metres.
+    pub fn length(&self) -> f32 {
+        self.start.distance(self.end)
+    }
+
+    /// The same solid seen from another frame.
+    #[must_use]
+    pub fn transformed(&self, a_from_b: Pose) -> Self {
+        Self {
+            start: a_from_b.transform_point(self.start),
+            end: a_from_b.transform_point(self.end),
+            ..*self
+        }
+    }
+
+    /// The ball around it: its centre and radius in metres.
+    pub fn bounding_ball(&self) -> (Vec3, f32) {
+        let reach = self.start_radius.max(self.end_radius);
+        ((self.start + self.end) * 0.5, 0.5 * self.length() + reach)
+    }
+
+    /// Distance from a point to the surface in metres, negative inside. Exact.
+    pub fn signed_distance(&self, point: Vec3) -> f32 {
+        self.nearest(point.as_dvec3()).1 as f32
+    }
+
+    /// Where on the axis (0 to 1) the ball is that comes closest to the point, and how close, in metres.
+    ///
+    /// The solid is the union of the balls around its axis, so that the distance is the least of |p - a(t)| - r(t):
+    /// convex in t, and stationary where the way to the point leaves the axis at the angle at which the cone opens.
+    fn nearest(&self, point: DVec3) -> (f64, f64) {
+        let start = self.start.as_dvec3();
+        let axis = self.end.as_dvec3() - start;
+        let (r0, r1) = (f64::from(self.start_radius), f64::from(self.end_radius));
+        let length = axis.length();
+        let value = |t: f64| (start + axis * t).distance(point) - (r0 + (r1 - r0) * t);
+        let slope = (r1 - r0) / length;
+        // One ball contains the other (or they are one, and the slope is no number).
+        if slope.is_nan() || slope.abs() >= 1.0 {
+            let t = if r1 > r0 { 1.0 } else { 0.0 };
+            return (t, value(t));
+        }
+        let direction = axis / length;
+        let offset = point - start;
+        let along = offset.dot(direction);
+        let across = (offset - direction * along).length();
+        let t = ((along + across * slope / (1.0 - slope * slope).sqrt()) / length).clamp(0.0, 1.0);
+        (t, value(t))
+    }
+
+    /// Distance between the surfaces of two solids in metres; negative, how far one must move to leave the other.
+    ///
+    /// The least of |a(t) - b(u)| - r(t) - q(u), which is convex in t and u: either stationary inside, where the way
+    /// from one axis to the other leaves each at its cone's angle, or at an end of one of them.
+    pub fn distance(&self, other: &Self) -> f32 {
+        let ends = [
+            self.nearest(other.start.as_dvec3()).1 - f64::from(other.start_radius),
+            self.nearest(other.end.as_dvec3()).1 - f64::from(other.end_radius),
+            other.nearest(self.start.as_dvec3()).1 - f64::from(self.start_radius),
+            other.nearest(self.end.as_dvec3()).1 - f64::from(self.end_radius),
+        ];
+        let at_an_end = ends.into_iter().fold(f64::INFINITY, f64::min);
+        self.between(other)
+            .map_or(at_an_end, |inside| inside.min(at_an_end)) as f32
+    }
+
+    /// The stationary value of |a(t) - b(u)| - r(t) - q(u) with t and u inside of the axes, if there is one.
+    fn between(&self, other: &Self) -> Option<f64> {
+        let (a, b) = (self.start.as_dvec3(), other.start.as_dvec3());
+        let (along_a, along_b) = (self.end.as_dvec3() - a, other.end.as_dvec3() - b);
+        let rise_a = f64::from(self.end_radius) - f64::from(self.start_radius);
+        let rise_b = f64::from(other.end_radius) - f64::from(other.start_radius);
+        // The unit vector n from b(u) to a(t) has n · along_a = rise_a and n · along_b = -rise_b. That fixes its part
+        // in the plane of the axes; the rest is across both.
+        let across = along_a.cross(along_b);
+        let (aa, ab, bb) = (along_a.dot(along_a), along_a.dot(along_b), along_b.dot(along_b));
+        let determinant = aa * bb - ab * ab;
+        if determinant < f64::MIN_POSITIVE {
+            return None;
+        }
+        let in_plane = along_a * ((rise_a * bb + rise_b * ab) / determinant)
+            - along_b * ((rise_b * aa + rise_a * ab) / determinant);
+        let rest = 1.0 - in_plane.length_squared();
+        if rest <= 0.0 {
+            return None;
+        }
+        let unit_across = across / determinant.sqrt();
+        let from_b = a - b;
+        let height = from_b.dot(unit_across);
+        let distance = height.abs() / rest.sqrt();
+        // from_b + along_a t - along_b u = distance n; its part in the plane gives t and u.
+        let target = in_plane * distance - from_b;
+        let (ta, tb) = (target.dot(along_a), target.dot(along_b));
+        let t = (ta * bb - tb * ab) / determinant;
+        let u = (ta * ab - tb * aa) / determinant;
+        let inside = (0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&u);
+        inside.then(|| {
+            let reach =
+                f64::from(self.start_radius) + rise_a * t + f64::from(other.start_radius) + rise_b * u;
+            (from_b + along_a * t - along_b * u).length() - reach
+        })
+    }
+}
