@@ -34,4 +34,20 @@ pub struct Grasp {
     pub wrench_angle: f32,
     /// E of Eq. 4.6.
     pub comfort: f32,
+    /// By how much the grasp passes the checks of `PHYSICAL` validity; none under the thesis' own.
+    pub margins: Option<PhysicalMargins>,
+}
+
+/// By how much a grasp passes the checks of `PHYSICAL` validity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhysicalMargins {
+    /// Length of the wrench that the forces leave unbalanced, torque over the object's characteristic length, as a share
+    /// of the weight.
+    pub residual: f32,
+    /// Ferrari-Canny epsilon of the contacts, torque over the characteristic length.
+    pub epsilon: f32,
+    /// How deep the hand sinks into the object at its deepest, in metres; 0 if it does nowhere.
+    pub penetration: f32,
+    /// Smallest distance between the receiving hand or forearm and the giver's, in metres; none without a giver.
+    pub giver_clearance: Option<f32>,
 }

@@ -19,6 +19,17 @@ pub enum Strategy {
     F,
 }
 
+/// Which grasps count as valid. Separate from the strategy: how they are searched for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Validity {
+    /// As the thesis prints it (4.5).
+    #[default]
+    Thesis,
+    /// Hands are solid, and forces are solved for instead of drawn ([`crate::physical`]).
+    Physical,
+}
+
 /// Which bend ratios a finger tries: the columns of Figure 5.20.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -10,6 +10,6 @@ mod mesh_clearance;
 mod tapered_capsule;
 
 pub use hand_clearance::{SOFT_CONTACT, giver_clearance, self_clearance};
-pub use hand_solids::{FOREARM_SOLIDS, HandSolids, PALM_SOLIDS};
+pub use hand_solids::{FOREARM_SOLIDS, HandSolids, PALM_SOLIDS, link_radii, link_solids};
 pub use mesh_clearance::{Touch, clearance, closest};
 pub use tapered_capsule::TaperedCapsule;

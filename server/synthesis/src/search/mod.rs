@@ -11,7 +11,7 @@ use crate::{
     grasp::Grasp,
     hand::rig::Rig,
     holdout::Holdout,
-    strategy::{BendRatioChoice, Strategy},
+    strategy::{BendRatioChoice, Strategy, Validity},
     synthesis::{
         attempt::Scene,
         stopwatch::{NoStopwatch, StepStopwatch},
@@ -29,6 +29,8 @@ pub struct SearchSettings {
     pub seed: u64,
     /// The step of the ladder.
     pub strategy: Strategy,
+    /// Which grasps count as valid.
+    pub validity: Validity,
     /// Which bend ratios a digit tries.
     pub bend_ratios: BendRatioChoice,
     /// Coefficient of static friction.
@@ -96,7 +98,8 @@ pub fn find_grasp(
         settings.strategy,
         settings.bend_ratios,
         settings.friction,
-    );
+    )
+    .with_validity(settings.validity);
     let race = Race::new(&scene, settings, clock, stop);
     let run = |worker: usize| {
         if settings.record_step_times {

@@ -18,9 +18,10 @@ use crate::{
     grasp::{Contact, Grasp},
     hand::{Digit, HandPose, rig::Rig},
     holdout::Holdout,
+    physical::attempt::{PhysicalAttempt, PhysicalEnd, PhysicalScene, Surroundings},
     pose::Pose,
     rejection::Rejection,
-    strategy::{BendRatioChoice, Strategy},
+    strategy::{BendRatioChoice, Strategy, Validity},
 };
 
 /// What all attempts of a search share, prepared once.
@@ -33,6 +34,8 @@ pub struct Scene<'a> {
     placer: WristPlacer<'a>,
     motion: [DigitMotion; 5],
     load: Load,
+    /// Under `PHYSICAL` validity.
+    physical: Option<PhysicalScene>,
 }
 
 impl<'a> Scene<'a> {
@@ -65,6 +68,20 @@ impl<'a> Scene<'a> {
                 centre_of_mass: holdout.object.centre_of_mass,
                 friction,
             },
+            physical: None,
+        }
+    }
+
+    /// The same with grasps that count as valid as `validity` says.
+    #[must_use]
+    pub fn with_validity(self, validity: Validity) -> Self {
+        let friction = self.load.friction;
+        Self {
+            physical: match validity {
+                Validity::Thesis => None,
+                Validity::Physical => Some(PhysicalScene::new(self.holdout, friction)),
+            },
+            ..self
         }
     }
 }
@@ -95,6 +112,7 @@ pub struct Attempt {
     posed: usize,
     contacts: Vec<Contact>,
     immobility: ImmobilityBuffers,
+    physical: PhysicalAttempt,
 }
 
 impl Default for Attempt {
@@ -106,6 +124,7 @@ impl Default for Attempt {
             posed: 0,
             contacts: Vec::new(),
             immobility: ImmobilityBuffers::default(),
+            physical: PhysicalAttempt::default(),
         }
     }
 }
@@ -164,6 +183,9 @@ impl Attempt {
             return AttemptEnd::Interrupted;
         };
         self.wrist = wrist;
+        if let Some(physical) = &scene.physical {
+            return self.hold_physically(scene, physical, stream, stopwatch, interrupted);
+        }
 
         // Step 2, Finger Posing.
         let posed = self.pose_digits(scene, stream, interrupted);
@@ -213,6 +235,41 @@ impl Attempt {
         }
     }
 
+    /// Steps 2 to 5 under `PHYSICAL` validity.
+    fn hold_physically(
+        &mut self,
+        scene: &Scene<'_>,
+        physical: &PhysicalScene,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> AttemptEnd {
+        let around = Surroundings {
+            holdout: scene.holdout,
+            rig: scene.rig,
+            scene: physical,
+            bend_ratios: scene.bend_ratios,
+        };
+        let end = self
+            .physical
+            .hold(&around, &self.wrist, stream, stopwatch, interrupted);
+        for (digit, angles) in self.digits.iter_mut().zip(&self.physical.posed) {
+            *digit = PosedDigit {
+                angles: *angles,
+                ..PosedDigit::default()
+            };
+        }
+        self.posed = self.physical.posed.len();
+        match end {
+            PhysicalEnd::Valid(grasp) => AttemptEnd::Valid(grasp),
+            PhysicalEnd::Rejected(rejection) => AttemptEnd::Rejected {
+                rejection,
+                wrench_angle: None,
+            },
+            PhysicalEnd::Interrupted => AttemptEnd::Interrupted,
+        }
+    }
+
     /// `CALCULATEHOLDPOSEANDCONTACTS`: poses the digits in turn, from strategy D on only while the thumb touches
     /// (Algorithm 12). False if interrupted.
     fn pose_digits(
@@ -252,6 +309,7 @@ impl Attempt {
             forces: self.immobility.forces(),
             wrench_angle,
             comfort: comfort(self.immobility.digit_totals(&self.contacts)),
+            margins: None,
         }
     }
 }

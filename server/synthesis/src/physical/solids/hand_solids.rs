@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::TaperedCapsule;
 use crate::{
     hand::{
-        HandPose,
+        Digit, HandPose,
         joints::{HandJoints, index, thesis_from_openxr_frame},
         rig::Rig,
     },
@@ -54,19 +54,8 @@ impl HandSolids {
         let bone = |from: usize, to: usize| TaperedCapsule::new(at(from), at(to), radius(from), radius(to));
 
         let phalanges = array::from_fn(|digit| {
-            let tip = index::TIP_OF_DIGIT[digit];
-            let last = bone(tip - 1, tip);
-            // The tip lies on the skin: its ball ends there.
-            let direction = (last.end - last.start).normalize_or_zero();
-            let inset = last.end_radius.min(last.length());
-            [
-                bone(tip - 3, tip - 2),
-                bone(tip - 2, tip - 1),
-                TaperedCapsule {
-                    end: last.end - direction * inset,
-                    ..last
-                },
-            ]
+            let joints = joints_of_digit(digit);
+            link_solids(joints.map(at), joints.map(radius))
         });
         let metacarpals: [_; 4] =
             array::from_fn(|i| bone(index::FIRST_OF_DIGIT[i + 1], index::FIRST_OF_DIGIT[i + 1] + 1));
@@ -109,6 +98,28 @@ impl HandSolids {
             .chain(&self.palm)
             .chain(&self.forearm)
     }
+}
+
+/// The `OpenXR` joints at the ends of a digit's three links.
+fn joints_of_digit(digit: usize) -> [usize; 4] {
+    let tip = index::TIP_OF_DIGIT[digit];
+    [tip - 3, tip - 2, tip - 1, tip]
+}
+
+/// Distances from joint to skin at the ends of a digit's three links, in metres.
+pub fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
+    joints_of_digit(digit.index()).map(|joint| rig.joint_radii[joint])
+}
+
+/// The links of a digit, whose joints and tip are at `points`, with distances from there to the skin. The tip lies on
+/// the skin, so the last ball ends there.
+pub fn link_solids(points: [Vec3; 4], radii: [f32; 4]) -> [TaperedCapsule; 3] {
+    let link = |i: usize| TaperedCapsule::new(points[i], points[i + 1], radii[i], radii[i + 1]);
+    let last = link(2);
+    let direction = (last.end - last.start).normalize_or_zero();
+    let inset = last.end_radius.min(last.length());
+    let end = last.end - direction * inset;
+    [link(0), link(1), TaperedCapsule { end, ..last }]
 }
 
 /// The forearm behind a wrist of `radius` metres (half its thickness), toward a unit vector of the wrist frame.

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use crate::pose::Pose;
 
 /// The convex hull of two balls: everything within [`TaperedCapsule::radius_at`] of a point of the axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TaperedCapsule {
     /// Centre of one ball, in metres.
     pub start: Vec3,

@@ -1,0 +1,354 @@
+//! One attempt at a grasp under `PHYSICAL` validity: Algorithm 1 with the hand as solids.
+//!
+//! The checks come by cost: palm and forearm before any digit closes, solids before forces, balance before closure.
+
+use super::{
+    closing::{ClosedDigit, Closing},
+    immobility::{Balance, Buffers, Load, SoftContact, balance, epsilon},
+    solids::{HandSolids, TaperedCapsule, clearance, closest, giver_clearance, link_radii, self_clearance},
+};
+use crate::{
+    geometry::mesh_bvh::MeshBvh,
+    grasp::{Contact, Grasp, PhysicalMargins},
+    hand::{Digit, DigitAngles, HandPose, Phalanx, rig::Rig},
+    holdout::Holdout,
+    rejection::Rejection,
+    strategy::BendRatioChoice,
+    synthesis::{
+        closing_motion::{BEND_RATIOS, allowed_ratios},
+        comfort::comfort,
+        random::AttemptStream,
+        stopwatch::{Step, Stopwatch},
+        wrist_placement::WristFrame,
+    },
+};
+
+/// How deep any part of the hand may sink into the rigid object, in metres: soft flesh gives way by about as much under
+/// a firm grip. More lets hands look sunken.
+pub const DEEPEST: f32 = 0.002;
+
+/// How far the receiving hand and forearm stay from the giver's, in metres. More is safer and finds fewer grasps.
+pub const GIVER_CLEARANCE: f32 = 0.001;
+
+/// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way.
+pub const FORBIDDEN_CLEARANCE: f32 = 0.002;
+
+/// Smallest Ferrari-Canny epsilon of a grasp. In a simulation, grasps above 0.02 did not fall under gravity and half of
+/// them held against pulls in all directions. A higher one gives firmer grasps and finds fewer.
+pub const LEAST_EPSILON: f32 = 0.02;
+
+/// Radius in metres over which a soft fingertip is pressed flat, times two thirds: what a contact's normal force is
+/// multiplied with, and with friction, to give the torsion that it bears (a uniformly pressed disk of 5 mm).
+const TORSION_RADIUS: f32 = 0.0033;
+
+/// Flexion in radians, of all three joints together, with which a hand at rest holds its fingers: about 25° for the
+/// first two and two thirds of it for the last.
+const RESTING_FLEXION: f32 = 1.15;
+
+/// Cosine of the angle up to which a contact's normal may differ from the direction to the bone: a touch, not a scrape.
+const FACING_COS: f32 = 0.5;
+
+/// What all attempts of a search share.
+#[derive(Clone, Debug)]
+pub struct PhysicalScene {
+    giver: Option<HandSolids>,
+    load: Load,
+    friction: f32,
+}
+
+impl PhysicalScene {
+    /// Prepares attempts at a holdout; `friction` is the coefficient between skin and object.
+    pub fn new(holdout: &Holdout, friction: f32) -> Self {
+        let object = &holdout.object;
+        let giver = holdout.presenting_hand.as_ref();
+        Self {
+            giver: giver.map(|hand| HandSolids::of_joints(&hand.joints)),
+            load: Load {
+                mass: object.mass,
+                centre_of_mass: object.centre_of_mass,
+                up: holdout.up,
+                // Of the box: how far from the middle a force can act.
+                characteristic_length: object.bounding_box.half_extents.length(),
+            },
+            friction,
+        }
+    }
+}
+
+/// What an attempt works with.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings<'a> {
+    /// What is held out.
+    pub holdout: &'a Holdout,
+    /// The receiving hand.
+    pub rig: &'a Rig,
+    /// What all attempts share.
+    pub scene: &'a PhysicalScene,
+    /// Which bend ratios a digit may take.
+    pub bend_ratios: BendRatioChoice,
+}
+
+/// How an attempt ended after its wrist was placed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PhysicalEnd {
+    /// With a valid grasp.
+    Valid(Box<Grasp>),
+    /// With a failed check.
+    Rejected(Rejection),
+    /// The stop signal came before it was over.
+    Interrupted,
+}
+
+/// The hand of an attempt, as far as it came, and its buffers.
+#[derive(Clone, Debug, Default)]
+pub struct PhysicalAttempt {
+    /// Joint angles of the digits that were posed, thumb first.
+    pub posed: Vec<DigitAngles>,
+    contacts: Vec<Contact>,
+    soft_contacts: Vec<SoftContact>,
+    buffers: Buffers,
+}
+
+impl PhysicalAttempt {
+    /// Everything after the wrist was placed.
+    pub fn hold(
+        &mut self,
+        around: &Surroundings<'_>,
+        wrist: &WristFrame,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> PhysicalEnd {
+        self.posed.clear();
+        let object = &around.holdout.object;
+
+        // Step 3 for what does not move: palm and forearm.
+        let opened = HandPose {
+            frame_from_wrist: wrist.object_from_wrist,
+            digits: around.rig.stretched(),
+        };
+        let still = HandSolids::of_pose(around.rig, &opened);
+        let collides = around.collides_without_digits(&still);
+        stopwatch.lap(Step::CollisionValidation);
+        if collides {
+            return PhysicalEnd::Rejected(Rejection::PalmCollision);
+        }
+
+        // Step 2, Finger Posing.
+        let mut closed: [Option<ClosedDigit>; 5] = [None; 5];
+        let mut closings = Vec::with_capacity(5);
+        for digit in Digit::ALL {
+            if interrupted() {
+                return PhysicalEnd::Interrupted;
+            }
+            let closing = around.closing(digit, wrist, stream);
+            closings.push(closing);
+            let Some(ended) = closing.close() else {
+                stopwatch.lap(Step::FingerPosing);
+                return PhysicalEnd::Rejected(Rejection::FingerCollision);
+            };
+            if digit == Digit::Thumb && !ended.touches_object() {
+                stopwatch.lap(Step::FingerPosing);
+                return PhysicalEnd::Rejected(Rejection::NoThumbEarlyStop);
+            }
+            closed[digit.index()] = Some(ended);
+        }
+        let touching: Vec<_> = closed.iter().flatten().map(ClosedDigit::touches_object).collect();
+        if !touching[1..].contains(&true) {
+            stopwatch.lap(Step::FingerPosing);
+            return PhysicalEnd::Rejected(Rejection::NoFingers);
+        }
+        let mut digits = [ClosedDigit::default(); 5];
+        for digit in 0..5 {
+            digits[digit] = match closed[digit] {
+                Some(closed) if closed.touches_object() => closed,
+                _ => closings[digit].relax(resting_flexion(&closed, digit)),
+            };
+        }
+        stopwatch.lap(Step::FingerPosing);
+        self.posed.extend(digits.iter().map(|digit| digit.angles));
+        if interrupted() {
+            return PhysicalEnd::Interrupted;
+        }
+
+        // Step 3, Collision Validation.
+        let mut solids = still;
+        for (solids, digit) in solids.phalanges.iter_mut().zip(&digits) {
+            *solids = digit.links;
+        }
+        let checked = around.check_digits(&solids);
+        stopwatch.lap(Step::CollisionValidation);
+        let Some((penetration, giver_distance)) = checked else {
+            return PhysicalEnd::Rejected(Rejection::FingerCollision);
+        };
+
+        // Step 4, Contact Validation.
+        self.collect_contacts(around, &digits);
+        let forbidden = object.forbidden_surface();
+        let is_unwanted = self.contacts.iter().any(|contact| object.is_forbidden(contact.triangle))
+            || forbidden.is_some_and(|surface| comes_within(solids.iter(), surface, FORBIDDEN_CLEARANCE));
+        stopwatch.lap(Step::ContactValidation);
+        if is_unwanted {
+            return PhysicalEnd::Rejected(Rejection::UnwantedContact);
+        }
+
+        // Step 5, Immobility Validation.
+        let held = self.immobilize(around);
+        stopwatch.lap(Step::ImmobilityValidation);
+        let Some((balance, epsilon)) = held else {
+            return PhysicalEnd::Rejected(Rejection::NotImmobilizing);
+        };
+        let margins = PhysicalMargins {
+            residual: balance.residual,
+            epsilon,
+            penetration,
+            giver_clearance: giver_distance,
+        };
+        let pose = HandPose {
+            frame_from_wrist: wrist.object_from_wrist,
+            digits: digits.map(|digit| digit.angles),
+        };
+        let ratios = std::array::from_fn(|digit| {
+            digits[digit].touches_object().then_some(closings[digit].bend_ratio)
+        });
+        PhysicalEnd::Valid(Box::new(self.grasp(around, pose, ratios, &balance, margins)))
+    }
+
+    /// Where the links touch: for every link that does, its deepest point, if the surface faces the bone there.
+    fn collect_contacts(&mut self, around: &Surroundings<'_>, digits: &[ClosedDigit; 5]) {
+        self.contacts.clear();
+        self.soft_contacts.clear();
+        let surface = &around.holdout.object.surface;
+        for (digit, closed) in Digit::ALL.into_iter().zip(digits) {
+            for (phalanx, link) in Phalanx::ALL.into_iter().zip(&closed.links) {
+                if !closed.touches[phalanx.index()] {
+                    continue;
+                }
+                let Some(touch) = closest(link, surface, 0.0) else {
+                    continue;
+                };
+                let outward = (link.at(touch.along) - touch.point).normalize_or_zero();
+                if outward.dot(touch.normal) < FACING_COS {
+                    continue;
+                }
+                self.contacts.push(Contact {
+                    position: touch.point,
+                    normal: touch.normal,
+                    triangle: touch.triangle,
+                    digit,
+                    phalanx,
+                });
+                self.soft_contacts.push(SoftContact {
+                    position: touch.point,
+                    normal: touch.normal,
+                    digit: Some(digit),
+                    friction: around.scene.friction,
+                    torsion_radius: TORSION_RADIUS,
+                });
+            }
+        }
+    }
+
+    /// Forces that balance gravity, and closure.
+    fn immobilize(&mut self, around: &Surroundings<'_>) -> Option<(Balance, f32)> {
+        let load = &around.scene.load;
+        let balance = balance(&self.soft_contacts, load, &mut self.buffers)?;
+        let epsilon = epsilon(&self.soft_contacts, load);
+        (epsilon >= LEAST_EPSILON).then_some((balance, epsilon))
+    }
+
+    fn grasp(
+        &self,
+        around: &Surroundings<'_>,
+        pose: HandPose,
+        bend_ratios: [Option<f32>; 5],
+        balance: &Balance,
+        margins: PhysicalMargins,
+    ) -> Grasp {
+        let mut totals = [0.0; 5];
+        for (contact, force) in self.contacts.iter().zip(&balance.forces) {
+            totals[contact.digit.index()] += force.length();
+        }
+        let sum: glam::Vec3 = balance.forces.iter().sum();
+        Grasp {
+            pose,
+            bend_ratios,
+            contacts: self.contacts.clone(),
+            forces: balance.forces.clone(),
+            wrench_angle: sum.angle_between(around.holdout.up),
+            comfort: comfort(totals),
+            margins: Some(margins),
+        }
+    }
+}
+
+impl<'a> Surroundings<'a> {
+    /// One digit, ready to close at a random yaw and bend ratio.
+    fn closing(&self, digit: Digit, wrist: &WristFrame, stream: &mut AttemptStream) -> Closing<'a> {
+        let rig = self.rig.digit(digit);
+        let yaw = rig.limits.base_yaw;
+        let ratios = allowed_ratios(self.bend_ratios, digit.index());
+        Closing {
+            surface: &self.holdout.object.surface,
+            digit: rig,
+            radii: link_radii(self.rig, digit),
+            object_from_wrist: wrist.object_from_wrist,
+            base_yaw: stream.between(yaw.min, yaw.max),
+            bend_ratio: BEND_RATIOS[ratios[stream.below(ratios.len())]],
+        }
+    }
+
+    /// True if palm or forearm sink into the object or come too near to the giver.
+    fn collides_without_digits(&self, still: &HandSolids) -> bool {
+        let parts = || still.palm.iter().chain(&still.forearm);
+        if comes_within(parts(), &self.holdout.object.surface, -DEEPEST) {
+            return true;
+        }
+        self.scene.giver.as_ref().is_some_and(|giver| {
+            giver.iter().any(|theirs| parts().any(|ours| ours.distance(theirs) < GIVER_CLEARANCE))
+        })
+    }
+
+    /// How deep the hand is in the object and how far from the giver's, if that and the digits' own distances are in
+    /// order.
+    fn check_digits(&self, solids: &HandSolids) -> Option<(f32, Option<f32>)> {
+        if self_clearance(solids) < 0.0 {
+            return None;
+        }
+        let giver_distance = self.scene.giver.as_ref().map(|giver| giver_clearance(solids, giver));
+        if giver_distance.is_some_and(|distance| distance < GIVER_CLEARANCE) {
+            return None;
+        }
+        let surface = &self.holdout.object.surface;
+        let least = solids.iter().fold(0.0, |least: f32, part| clearance(part, surface, least).min(least));
+        (least >= -DEEPEST).then_some((-least, giver_distance))
+    }
+}
+
+/// True if a part comes nearer to a surface than `distance` metres.
+fn comes_within<'a>(
+    parts: impl IntoIterator<Item = &'a TaperedCapsule>,
+    surface: &MeshBvh,
+    distance: f32,
+) -> bool {
+    parts.into_iter().any(|part| clearance(part, surface, distance) < distance)
+}
+
+/// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a
+/// half more; that of a relaxed hand if none does.
+fn resting_flexion(closed: &[Option<ClosedDigit>; 5], digit: usize) -> f32 {
+    let neighbours = [digit.checked_sub(1).filter(|&other| other > 0), Some(digit + 1)];
+    let flexions: Vec<f32> = neighbours
+        .into_iter()
+        .flatten()
+        .filter_map(|other| closed.get(other).copied().flatten())
+        .filter(ClosedDigit::touches_object)
+        .map(|closed| closed.flexion())
+        .collect();
+    if flexions.is_empty() {
+        RESTING_FLEXION
+    } else {
+        let mean = flexions.iter().sum::<f32>() / flexions.len() as f32;
+        mean.clamp(0.5 * RESTING_FLEXION, 1.5 * RESTING_FLEXION)
+    }
+}
