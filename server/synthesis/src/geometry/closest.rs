@@ -6,31 +6,12 @@ use super::{
     aabb::Aabb,
     crossing::{cross, dot, lanes},
     mesh::TriangleMesh,
-    wide_bvh::{Child, ChildRef, Node, TrianglePack, WIDTH, WideBvh},
+    waiting::{Waiting, sorted_falling},
+    wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
 };
 
 /// Relative slack of a squared distance to a box: a few roundings, so that a box is never left out by one.
 const BOX_SLACK: f32 = 1.0 - 8.0 * f32::EPSILON;
-
-/// A child that waits, and the squared distance to its box above it in one number, so that sorting needs no branches:
-/// the bits of floats that are not negative sort like the floats. 0, a place that the root never takes, stands for no
-/// child.
-#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-struct Waiting(u64);
-
-impl Waiting {
-    fn new(squared_distance: f32, child: ChildRef) -> Self {
-        Self(u64::from(squared_distance.to_bits()) << 32 | u64::from(child.to_bits()))
-    }
-
-    fn squared_distance(self) -> f32 {
-        f32::from_bits((self.0 >> 32) as u32)
-    }
-
-    fn child(self) -> Child {
-        ChildRef::from_bits(self.0 as u32).child()
-    }
-}
 
 /// Relative slack of a distance to the mesh's box, for the same reason.
 const AABB_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
@@ -63,7 +44,7 @@ pub(super) fn closest(
         while height > 0 {
             height -= 1;
             let waiting = stack[height];
-            if waiting.squared_distance() > best {
+            if waiting.bound() > best {
                 continue;
             }
             match waiting.child() {
@@ -103,15 +84,6 @@ pub(super) fn closest(
     (distance <= f64::from(max_distance)).then_some((triangle, exact.as_vec3(), distance as f32))
 }
 
-/// Sorts four children, the farthest first, by the shortest sorting network.
-#[inline]
-fn sorted_falling(mut children: [Waiting; WIDTH]) -> [Waiting; WIDTH] {
-    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
-        (children[i], children[j]) = (children[i].max(children[j]), children[i].min(children[j]));
-    }
-    children
-}
-
 /// Squared distances to the boxes of a node's children; 0 inside, ∞ for unused children.
 #[inline]
 fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
@@ -129,7 +101,7 @@ fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
 /// Without branches: the distance to the plane where the point's projection falls inside, else the least of the
 /// distances to the three edges.
 #[inline]
-fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
+pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
     let c: [Vec4; 3] = std::array::from_fn(|axis| point[axis] - pack.corner[axis]);
     let edge3: [Vec4; 3] = std::array::from_fn(|axis| pack.edge2[axis] - pack.edge1[axis]);
     let from_second: [Vec4; 3] = std::array::from_fn(|axis| c[axis] - pack.edge1[axis]);
@@ -171,7 +143,7 @@ fn edge_distance(from_start: &[Vec4; 3], edge: &[Vec4; 3], along: Vec4, squared_
 
 /// The point of a triangle that is closest to `point`, in double precision (C. Ericson: Real-Time Collision
 /// Detection, 2005, 5.1.5: the Voronoi regions of the corners, the edges and the face in turn).
-fn closest_on_triangle(corners: [Vec3; 3], point: DVec3) -> DVec3 {
+pub(super) fn closest_on_triangle(corners: [Vec3; 3], point: DVec3) -> DVec3 {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let (ab, ac) = (b - a, c - a);
     let ap = point - a;

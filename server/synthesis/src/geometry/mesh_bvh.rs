@@ -5,10 +5,11 @@ use glam::Vec3;
 use super::{
     Segment,
     aabb::Aabb,
-    closest,
+    capsule_gap, closest,
     containment::Containment,
     crossing,
     mesh::TriangleMesh,
+    tapered_capsule::TaperedCapsule,
     wide_bvh::{BuildQuality, WideBvh},
 };
 
@@ -32,6 +33,19 @@ pub struct ClosestPoint {
     pub distance: f32,
     /// The triangle it lies on.
     pub triangle: u32,
+}
+
+/// Where the surface of a mesh is closest to a capsule's skin or deepest below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CapsuleGap {
+    /// The point of the mesh.
+    pub position: Vec3,
+    /// The triangle it lies on.
+    pub triangle: u32,
+    /// Where on the capsule's axis the ball is that comes closest: 0 is the start, 1 the end.
+    pub along: f32,
+    /// From the capsule's skin to the point in metres, negative below the skin.
+    pub gap: f32,
 }
 
 /// A mesh and its hierarchy. Queries take metres in the mesh's frame, never allocate for a tree of usual depth, and
@@ -111,6 +125,12 @@ impl MeshBvh {
             distance,
             triangle,
         })
+    }
+
+    /// Where the surface comes closest to a capsule's skin, or goes deepest below it, if that is at most `within` metres
+    /// off the skin. It says nothing of the mesh's volume: a capsule deep in it has a positive gap.
+    pub fn closest_to_capsule(&self, capsule: &TaperedCapsule, within: f32) -> Option<CapsuleGap> {
+        capsule_gap::closest(&self.bvh, &self.mesh, capsule, within)
     }
 
     /// True if the mesh's volume contains the point: if its generalised winding number is more than one half, so that

@@ -1,13 +1,16 @@
 //! Segments, meshes, bounding boxes and the queries that the synthesis needs.
 
 pub mod aabb;
+mod capsule_gap;
 mod closest;
 mod containment;
 mod crossing;
 pub mod mesh;
 pub mod mesh_bvh;
 pub mod oriented_box;
+pub mod tapered_capsule;
 pub mod topology;
+mod waiting;
 mod wide_bvh;
 
 use glam::Vec3;

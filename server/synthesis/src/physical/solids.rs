@@ -7,9 +7,9 @@
 mod hand_clearance;
 mod hand_solids;
 mod mesh_clearance;
-mod tapered_capsule;
 
 pub use hand_clearance::{SOFT_CONTACT, giver_clearance, self_clearance};
 pub use hand_solids::{FOREARM_SOLIDS, HandSolids, PALM_SOLIDS, link_radii, link_solids};
 pub use mesh_clearance::{Touch, clearance, closest};
-pub use tapered_capsule::TaperedCapsule;
+
+pub use crate::geometry::tapered_capsule::TaperedCapsule;

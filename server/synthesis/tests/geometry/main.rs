@@ -1,5 +1,6 @@
 //! Tests of the geometry against brute force in double precision.
 
+mod capsule;
 mod closest_point;
 mod containment;
 mod crossing;

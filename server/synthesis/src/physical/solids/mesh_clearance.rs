@@ -8,7 +8,10 @@
 use glam::Vec3;
 
 use super::TaperedCapsule;
-use crate::geometry::mesh_bvh::MeshBvh;
+use crate::geometry::{
+    Segment,
+    mesh_bvh::{CapsuleGap, MeshBvh},
+};
 
 /// Where a capsule comes closest to a mesh, or goes deepest into it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,65 +28,77 @@ pub struct Touch {
     pub clearance: f32,
 }
 
-/// How exact clearances are, in metres: far below the 2 mm that a hand may sink into an object.
-const TOLERANCE: f32 = 1e-4;
+/// How exact depths are where a capsule's axis is inside of the volume, in metres. Such a capsule is deeper than its
+/// radius, several times what skin gives, so that nothing hangs on the rest; less makes hopeless hands expensive.
+const DEEP_TOLERANCE: f32 = 1e-3;
+
+/// More than the rounding of a gap, in metres.
+const ROUNDING: f32 = 1e-6;
 
 /// The clearance between the surfaces of a capsule and a mesh in metres, negative where they overlap, or `at_least` if
-/// it is certainly more than that.
+/// it is more than that. Exact but for rounding where the axis is outside of the volume, else at most
+/// 1 mm short of the depth.
 pub fn clearance(capsule: &TaperedCapsule, surface: &MeshBvh, at_least: f32) -> f32 {
     closest(capsule, surface, at_least).map_or(at_least, |touch| touch.clearance)
 }
 
-/// Where a capsule and a mesh come closest, if that is at most `within` metres.
+/// Where a capsule and a mesh come closest, if the clearance ([`clearance`]) is at most `within` metres.
 pub fn closest(capsule: &TaperedCapsule, surface: &MeshBvh, within: f32) -> Option<Touch> {
-    let mut best = within;
-    let mut touch = None;
-    narrow(capsule, surface, 0.0, 1.0, &mut best, &mut touch);
-    touch
+    let gap = surface.closest_to_capsule(capsule, within);
+    // The axis crosses the surface only where the gap is a radius.
+    let crossing = ROUNDING - capsule.start_radius.min(capsule.end_radius);
+    let may_cross = gap.is_some_and(|gap| gap.gap <= crossing);
+    let axis = Segment::new(capsule.start, capsule.end);
+    let mut nearest = gap;
+    if may_cross && surface.is_crossed_by(axis) || surface.contains(axis.start) {
+        let mut least = gap.map_or(within, |gap| gap.gap);
+        deepen(capsule, surface, [0.0, 1.0], &mut least, &mut nearest);
+    }
+    nearest.map(|nearest| Touch {
+        point: nearest.position,
+        triangle: nearest.triangle,
+        normal: surface.mesh().normal(nearest.triangle as usize),
+        along: nearest.along,
+        clearance: nearest.gap,
+    })
 }
 
-/// Branch and bound over a part of the axis.
-fn narrow(
+/// Looks for the deepest point of the axis in the volume, by branch and bound over a part of it: the depth changes by
+/// no more than the way along the axis, the radius by its slope.
+fn deepen(
     capsule: &TaperedCapsule,
     surface: &MeshBvh,
-    from: f32,
-    to: f32,
-    best: &mut f32,
-    touch: &mut Option<Touch>,
+    [from, to]: [f32; 2],
+    least: &mut f32,
+    nearest: &mut Option<CapsuleGap>,
 ) {
     let along = 0.5 * (from + to);
-    let half = 0.5 * (to - from);
-    // d changes by no more than the way, r by its slope.
-    let change = half * (capsule.length() + (capsule.end_radius - capsule.start_radius).abs());
-    let point = capsule.at(along);
-    let radius = capsule.radius_at(along);
-    let is_inside = surface.contains(point);
-    let reach = if is_inside {
-        f32::INFINITY
-    } else {
-        *best + radius + change
-    };
-    let Some(closest) = surface.closest_point_within(point, reach) else {
+    let change = 0.5 * (to - from) * (capsule.length() + (capsule.end_radius - capsule.start_radius).abs());
+    let (point, radius) = (capsule.at(along), capsule.radius_at(along));
+    let Some(closest) = surface.closest_point_within(point, f32::INFINITY) else {
         return;
     };
-    let distance = if is_inside {
-        -closest.distance
-    } else {
+    // Inside, the depth may grow with the way; outside, it only begins where the surface is.
+    let depth = if surface.contains(point) {
+        let gap = -closest.distance - radius;
+        if gap <= *least {
+            *least = gap;
+            *nearest = Some(CapsuleGap {
+                position: closest.position,
+                triangle: closest.triangle,
+                along,
+                gap,
+            });
+        }
         closest.distance
+    } else if closest.distance > change {
+        return;
+    } else {
+        -closest.distance
     };
-    let clearance = distance - radius;
-    if clearance <= *best {
-        *best = clearance;
-        *touch = Some(Touch {
-            point: closest.position,
-            triangle: closest.triangle,
-            normal: surface.mesh().normal(closest.triangle as usize),
-            along,
-            clearance,
-        });
-    }
-    if clearance - change < *best && change > TOLERANCE {
-        narrow(capsule, surface, from, along, best, touch);
-        narrow(capsule, surface, along, to, best, touch);
+    let deepest = -radius - depth - change;
+    if deepest < *least - DEEP_TOLERANCE && change > DEEP_TOLERANCE {
+        deepen(capsule, surface, [from, along], least, nearest);
+        deepen(capsule, surface, [along, to], least, nearest);
     }
 }

@@ -68,7 +68,7 @@ impl TaperedCapsule {
     ///
     /// The solid is the union of the balls around its axis, so that the distance is the least of |p - a(t)| - r(t):
     /// convex in t, and stationary where the way to the point leaves the axis at the angle at which the cone opens.
-    fn nearest(&self, point: DVec3) -> (f64, f64) {
+    pub(super) fn nearest(&self, point: DVec3) -> (f64, f64) {
         let start = self.start.as_dvec3();
         let axis = self.end.as_dvec3() - start;
         let (r0, r1) = (f64::from(self.start_radius), f64::from(self.end_radius));
@@ -100,21 +100,29 @@ impl TaperedCapsule {
             other.nearest(self.end.as_dvec3()).1 - f64::from(self.end_radius),
         ];
         let at_an_end = ends.into_iter().fold(f64::INFINITY, f64::min);
-        self.between(other)
-            .map_or(at_an_end, |inside| inside.min(at_an_end)) as f32
+        let axis = (other.end - other.start).as_dvec3();
+        let rise = f64::from(other.end_radius) - f64::from(other.start_radius);
+        self.stationary(other.start.as_dvec3(), axis, f64::from(other.start_radius), rise)
+            .map_or(at_an_end, |(_, between)| between.min(at_an_end)) as f32
     }
 
-    /// The stationary value of |a(t) - b(u)| - r(t) - q(u) with t and u inside of the axes, if there is one.
-    fn between(&self, other: &Self) -> Option<f64> {
-        let (a, b) = (self.start.as_dvec3(), other.start.as_dvec3());
-        let (along_a, along_b) = (self.end.as_dvec3() - a, other.end.as_dvec3() - b);
+    /// The stationary value of |a(t) - b(u)| - r(t) - q(u) with t and u inside of the axes, and t, if there is one. The
+    /// other axis goes from `b` along `along_b`, its radius from `radius_b` up by `rise_b`.
+    pub(super) fn stationary(
+        &self,
+        b: DVec3,
+        along_b: DVec3,
+        radius_b: f64,
+        rise_b: f64,
+    ) -> Option<(f64, f64)> {
+        let a = self.start.as_dvec3();
+        let along_a = self.end.as_dvec3() - a;
         let rise_a = f64::from(self.end_radius) - f64::from(self.start_radius);
-        let rise_b = f64::from(other.end_radius) - f64::from(other.start_radius);
         // The unit vector n from b(u) to a(t) has n · along_a = rise_a and n · along_b = -rise_b. That fixes its part
         // in the plane of the axes; the rest is across both.
         let across = along_a.cross(along_b);
         let (aa, ab, bb) = (along_a.dot(along_a), along_a.dot(along_b), along_b.dot(along_b));
-        let determinant = aa * bb - ab * ab;
+        let determinant = across.length_squared();
         if determinant < f64::MIN_POSITIVE {
             return None;
         }
@@ -124,20 +132,19 @@ impl TaperedCapsule {
         if rest <= 0.0 {
             return None;
         }
-        let unit_across = across / determinant.sqrt();
         let from_b = a - b;
-        let height = from_b.dot(unit_across);
-        let distance = height.abs() / rest.sqrt();
+        let distance = from_b.dot(across).abs() / (determinant * rest).sqrt();
         // from_b + along_a t - along_b u = distance n; its part in the plane gives t and u.
-        let target = in_plane * distance - from_b;
-        let (ta, tb) = (target.dot(along_a), target.dot(along_b));
+        let (ta, tb) = (
+            rise_a * distance - from_b.dot(along_a),
+            -rise_b * distance - from_b.dot(along_b),
+        );
         let t = (ta * bb - tb * ab) / determinant;
         let u = (ta * ab - tb * aa) / determinant;
-        let inside = (0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&u);
-        inside.then(|| {
-            let reach =
-                f64::from(self.start_radius) + rise_a * t + f64::from(other.start_radius) + rise_b * u;
-            (from_b + along_a * t - along_b * u).length() - reach
+        let is_inside = (0.0..=1.0).contains(&t) && (0.0..=1.0).contains(&u);
+        is_inside.then(|| {
+            let reach = f64::from(self.start_radius) + rise_a * t + radius_b + rise_b * u;
+            (t, (from_b + along_a * t - along_b * u).length() - reach)
         })
     }
 }

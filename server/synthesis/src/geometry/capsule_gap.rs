@@ -1,0 +1,322 @@
+//! The gap between a tapered capsule and a surface: branch and bound, four boxes and four triangles at a time.
+//!
+//! With D(t) the distance from the point a(t) of the capsule's axis to a convex set, the gap to the set is the least of
+//! D(t) - r(t) for t from 0 to 1, and D is convex. For boxes, tangents of it give a lower bound; for triangles, the
+//! least is one of a few values that have closed forms.
+
+use glam::{Vec3, Vec4};
+
+use super::{
+    closest::{closest_on_triangle, pack_distances},
+    crossing::{cross, dot, lanes},
+    mesh::TriangleMesh,
+    mesh_bvh::CapsuleGap,
+    tapered_capsule::TaperedCapsule,
+    waiting::{Waiting, sorted_falling},
+    wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
+};
+
+/// Slack of the bounds in metres: more than all roundings for coordinates of a metre, and a hundredth of what matters
+/// to a hand.
+const SLACK: f32 = 1e-6;
+
+/// The least determinant of two directions that is divided by, in m⁴: less than what a micrometre makes with another,
+/// and more than 0. What comes out for such pairs is clamped and measured, never trusted.
+const LEAST_DETERMINANT: f32 = 1e-30;
+
+/// Three coordinates of four points.
+type Four = [Vec4; 3];
+
+/// A capsule as the four-lane formulas need it.
+struct Query {
+    start: Four,
+    end: Four,
+    /// From start to end.
+    axis: Four,
+    /// Its squared length.
+    squared_length: Vec4,
+    start_radius: Vec4,
+    end_radius: Vec4,
+    /// From the start's radius to the end's.
+    rise: Vec4,
+    /// A point that lies `x` along the axis' direction and `y` across it is closest to the ball at
+    /// t = `foot` + (x + y `lean`) / length.
+    foot: Vec4,
+    direction: Four,
+    lean: Vec4,
+    inverse_length: Vec4,
+    /// What makes every gap a number that is not negative.
+    largest_radius: f32,
+}
+
+impl Query {
+    fn new(capsule: &TaperedCapsule) -> Self {
+        let splat = |v: Vec3| [Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z)];
+        let axis = capsule.end - capsule.start;
+        let length = axis.length();
+        let rise = capsule.end_radius - capsule.start_radius;
+        let slope = rise / length;
+        // Where one ball contains the other, it is the only one that counts.
+        let is_one_ball = slope.is_nan() || slope.abs() >= 1.0;
+        let (foot, direction, lean, inverse_length) = if is_one_ball {
+            (if rise > 0.0 { 1.0 } else { 0.0 }, Vec3::ZERO, 0.0, 0.0)
+        } else {
+            (
+                0.0,
+                axis / length,
+                slope / (1.0 - slope * slope).sqrt(),
+                length.recip(),
+            )
+        };
+        Self {
+            start: splat(capsule.start),
+            end: splat(capsule.end),
+            axis: splat(axis),
+            squared_length: Vec4::splat(axis.length_squared()),
+            start_radius: Vec4::splat(capsule.start_radius),
+            end_radius: Vec4::splat(capsule.end_radius),
+            rise: Vec4::splat(rise),
+            foot: Vec4::splat(foot),
+            direction: splat(direction),
+            lean: Vec4::splat(lean),
+            inverse_length: Vec4::splat(inverse_length),
+            largest_radius: capsule.start_radius.max(capsule.end_radius),
+        }
+    }
+
+    fn radius_at(&self, t: Vec4) -> Vec4 {
+        self.start_radius + self.rise * t
+    }
+}
+
+/// Where the surface is closest to the capsule's skin, if that is at most `within` metres off it.
+pub(super) fn closest(
+    bvh: &WideBvh,
+    mesh: &TriangleMesh,
+    capsule: &TaperedCapsule,
+    within: f32,
+) -> Option<CapsuleGap> {
+    let is_finite = capsule.start.is_finite() && capsule.end.is_finite();
+    if !(is_finite && capsule.start_radius.is_finite() && capsule.end_radius.is_finite()) {
+        return None;
+    }
+    let query = Query::new(capsule);
+    let mut best = within + SLACK;
+    let mut winner = None;
+    bvh.with_stack(|stack: &mut [Waiting]| {
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let waiting = stack[height];
+            if waiting.bound() - query.largest_radius > best {
+                continue;
+            }
+            match waiting.child() {
+                Child::Node(index) => {
+                    let node = &bvh.nodes[index];
+                    let bounds = box_gaps(node, &query);
+                    let near = bounds.cmple(Vec4::splat(best)).bitmask();
+                    let keys = (bounds + query.largest_radius).max(Vec4::ZERO).to_array();
+                    let children = sorted_falling(std::array::from_fn(|lane| {
+                        if near >> lane & 1 == 1 {
+                            Waiting::new(keys[lane], node.children[lane])
+                        } else {
+                            Waiting::default()
+                        }
+                    }));
+                    // The closest child is taken up next; what is no child is overwritten.
+                    stack[height..height + WIDTH].copy_from_slice(&children);
+                    height += near.count_ones() as usize;
+                }
+                Child::Pack(index) => {
+                    let pack = &bvh.packs[index];
+                    let gaps = pack_gaps(pack, &query);
+                    let closer = gaps.cmplt(Vec4::splat(best)).bitmask();
+                    for lane in lanes(closer) {
+                        if gaps[lane] < best {
+                            best = gaps[lane];
+                            winner = Some(pack.triangle(lane));
+                        }
+                    }
+                }
+            }
+        }
+    });
+    let triangle = winner?;
+    let along = nearest_on_axis(capsule, mesh.corners(triangle as usize));
+    let on_axis = capsule.start.as_dvec3() + (capsule.end - capsule.start).as_dvec3() * along;
+    let position = closest_on_triangle(mesh.corners(triangle as usize), on_axis);
+    let radius = f64::from(capsule.start_radius) * (1.0 - along) + f64::from(capsule.end_radius) * along;
+    let gap = (position.distance(on_axis) - radius) as f32;
+    (gap <= within).then_some(CapsuleGap {
+        position: position.as_vec3(),
+        triangle,
+        along: along as f32,
+        gap,
+    })
+}
+
+/// Lower bounds of the gaps to the boxes of a node's children; ∞ for unused children.
+#[inline]
+fn box_gaps(node: &Node, query: &Query) -> Vec4 {
+    let [least, most] = &node.bounds;
+    // D(t) - r(t) and its slope.
+    let tangent = |t: Vec4| {
+        let mut squared = Vec4::ZERO;
+        let mut falling = Vec4::ZERO;
+        for axis in 0..3 {
+            let point = query.start[axis] + query.axis[axis] * t;
+            let below = (least[axis] - point).max(Vec4::ZERO);
+            let above = (point - most[axis]).max(Vec4::ZERO);
+            // One of the two is 0, but for unused children, whose distance is ∞.
+            let outside = above.max(below);
+            squared += outside * outside;
+            falling += (above - below) * query.axis[axis];
+        }
+        let distance = squared.max(Vec4::splat(f32::MIN_POSITIVE)).sqrt();
+        (distance - query.radius_at(t), falling / distance - query.rise)
+    };
+    let (value0, slope0) = tangent(Vec4::ZERO);
+    let (value1, slope1) = tangent(Vec4::ONE);
+    // Two tangents meet where the least may be; a third there lifts the bound to where it meets one of them.
+    let between = Vec4::select(
+        slope0.cmplt(Vec4::ZERO) & slope1.cmpgt(Vec4::ZERO),
+        ((value1 - slope1 - value0) / (slope0 - slope1))
+            .max(Vec4::ZERO)
+            .min(Vec4::ONE),
+        Vec4::ZERO,
+    );
+    let (value, slope) = tangent(between);
+    let rises = slope.cmpgt(Vec4::ZERO);
+    let (t, other_value, other_slope, other_t) = (
+        between,
+        Vec4::select(rises, value0, value1),
+        Vec4::select(rises, slope0, slope1),
+        Vec4::select(rises, Vec4::ZERO, Vec4::ONE),
+    );
+    let meet = ((other_value - other_slope * other_t) - (value - slope * t)) / (slope - other_slope);
+    let lowest = value + slope * (meet - t);
+    let bound = Vec4::select(
+        slope0.cmpge(Vec4::ZERO),
+        value0,
+        Vec4::select(slope1.cmple(Vec4::ZERO), value1, lowest),
+    );
+    let used = least[0].cmplt(most[0]) | least[0].cmpeq(most[0]);
+    Vec4::select(used, bound - SLACK, Vec4::INFINITY)
+}
+
+/// Gaps to the triangles of a pack; NaN for unused lanes.
+///
+/// The least is at an end of the axis, at a corner, where the way from axis to edge is square to the edge and leaves the
+/// axis at the cone's angle, or where the axis crosses the triangle. Above the face's inside, the distance is linear.
+/// Every value that is taken into account is one that occurs, so that the least of them is right.
+#[inline]
+fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
+    let from =
+        |point: &Four, corner: &Four| -> Four { std::array::from_fn(|axis| point[axis] - corner[axis]) };
+    let first = from(&query.start, &pack.corner);
+    let second = from(&first, &pack.edge1);
+    let third = from(&first, &pack.edge2);
+    let edge3 = from(&pack.edge2, &pack.edge1);
+
+    let starts = pack_distances(pack, &query.start).sqrt() - query.start_radius;
+    let ends = pack_distances(pack, &query.end).sqrt() - query.end_radius;
+    let corners = corner_gap(query, &first)
+        .min(corner_gap(query, &second))
+        .min(corner_gap(query, &third));
+    let edges = edge_gap(query, &first, &pack.edge1)
+        .min(edge_gap(query, &first, &pack.edge2))
+        .min(edge_gap(query, &second, &edge3));
+    let around = starts.min(ends).min(corners).min(edges);
+
+    let height = dot(&pack.normal, &first);
+    let climb = dot(&pack.normal, &query.axis);
+    let t = -height / climb;
+    let crossing: Four = std::array::from_fn(|axis| first[axis] + query.axis[axis] * t);
+    let around_first = cross(&crossing, &pack.normal);
+    let around_second = cross(&from(&crossing, &pack.edge1), &pack.normal);
+    let least_side = dot(&pack.edge1, &around_first)
+        .min(-dot(&pack.edge2, &around_first))
+        .min(dot(&edge3, &around_second));
+    let crosses = least_side.cmpge(Vec4::ZERO)
+        & (height * (height + climb)).cmple(Vec4::ZERO)
+        & climb.cmpne(Vec4::ZERO);
+    Vec4::select(crosses, around.min(-query.radius_at(t)), around)
+}
+
+/// Gap to a corner, from which the capsule's start is seen at `start`.
+#[inline]
+fn corner_gap(query: &Query, start: &Four) -> Vec4 {
+    let along = -dot(start, &query.direction);
+    let across: Four = std::array::from_fn(|axis| start[axis] + query.direction[axis] * along);
+    let across = dot(&across, &across).sqrt();
+    let t = query.foot + (along + across * query.lean) * query.inverse_length;
+    let t = t.max(Vec4::ZERO).min(Vec4::ONE);
+    let way: Four = std::array::from_fn(|axis| start[axis] + query.axis[axis] * t);
+    dot(&way, &way).sqrt() - query.radius_at(t)
+}
+
+/// Gap to an edge at its stationary point, from whose first corner the capsule's start is seen at `start`.
+#[inline]
+fn edge_gap(query: &Query, start: &Four, edge: &Four) -> Vec4 {
+    let (aa, ab, bb) = (query.squared_length, dot(&query.axis, edge), dot(edge, edge));
+    let normal = cross(&query.axis, edge);
+    let determinant = dot(&normal, &normal).max(Vec4::splat(LEAST_DETERMINANT));
+    // See TaperedCapsule::distance; the edge is a capsule without radius.
+    let rest = (determinant - query.rise * query.rise * bb).max(Vec4::splat(LEAST_DETERMINANT));
+    let height = dot(start, &normal);
+    let distance = (height * height / rest).sqrt();
+    let along_axis = query.rise * distance - dot(start, &query.axis);
+    let along_edge = -dot(start, edge);
+    let t = ((along_axis * bb - along_edge * ab) / determinant)
+        .max(Vec4::ZERO)
+        .min(Vec4::ONE);
+    let u = ((along_axis * ab - along_edge * aa) / determinant)
+        .max(Vec4::ZERO)
+        .min(Vec4::ONE);
+    let way: Four = std::array::from_fn(|axis| start[axis] + query.axis[axis] * t - edge[axis] * u);
+    dot(&way, &way).sqrt() - query.radius_at(t)
+}
+
+/// Where on the axis the gap to a triangle is the least, in double precision.
+fn nearest_on_axis(capsule: &TaperedCapsule, triangle: [Vec3; 3]) -> f64 {
+    let corners = triangle.map(Vec3::as_dvec3);
+    let start = capsule.start.as_dvec3();
+    let axis = capsule.end.as_dvec3() - start;
+    let radius = |t: f64| {
+        f64::from(capsule.start_radius)
+            + (f64::from(capsule.end_radius) - f64::from(capsule.start_radius)) * t
+    };
+    let mut best = (0.0, f64::INFINITY);
+    let mut consider = |t: f64, gap: f64| {
+        if gap < best.1 {
+            best = (t, gap);
+        }
+    };
+    for t in [0.0, 1.0] {
+        let point = start + axis * t;
+        let closest = closest_on_triangle(triangle, point);
+        consider(t, closest.distance(point) - radius(t));
+    }
+    for (corner, next) in [(0, 1), (1, 2), (2, 0)] {
+        let (t, gap) = capsule.nearest(corners[corner]);
+        consider(t, gap);
+        let edge = corners[next] - corners[corner];
+        if let Some((t, gap)) = capsule.stationary(corners[corner], edge, 0.0, 0.0) {
+            consider(t, gap);
+        }
+    }
+    let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let t = (corners[0] - start).dot(normal) / axis.dot(normal);
+    if (0.0..=1.0).contains(&t) {
+        let point = start + axis * t;
+        let is_inside = (0..3).all(|i| {
+            let edge = corners[(i + 1) % 3] - corners[i];
+            edge.cross(point - corners[i]).dot(normal) >= 0.0
+        });
+        if is_inside {
+            consider(t, -radius(t));
+        }
+    }
+    best.0
+}
