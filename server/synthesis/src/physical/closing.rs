@@ -30,10 +30,6 @@ const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
 /// Room that a relaxed digit leaves between itself and the object, in metres: enough to be seen.
 const RELAXED_CLEARANCE: f32 = 0.001;
 
-/// A clearance that is certainly more than this, in metres, need not be known exactly to advance: a short look at the
-/// ball around a link tells enough. Less asks for exact clearances later, but takes shorter steps before.
-const NEAR: f32 = 0.003;
-
 /// Steps of advancement at most. Each covers what is certainly free, so that surfaces that a link glides along need
 /// many; where it still has not arrived, it stops where it is, which is free.
 const MOST_STEPS: usize = 40;
@@ -185,7 +181,7 @@ impl Closing<'_> {
             let links = self.links(&self.angles_at(sweep, way));
             // Beyond what the rest of the way can reach, nothing needs to be known.
             let reachable = target + speed * (most - way) + TOUCH_TOLERANCE;
-            let free = self.certain_clearance(&links[first_moving..], reachable) - target;
+            let free = self.smallest_gap(&links[first_moving..], reachable) - target;
             if free <= TOUCH_TOLERANCE || way >= most {
                 break;
             }
@@ -215,16 +211,12 @@ impl Closing<'_> {
         links.iter().fold(enough, smallest)
     }
 
-    /// What the links' clearance certainly is at least, up to `enough`; exact where it is small. Only for links that are
-    /// outside of the object's volume.
-    fn certain_clearance(&self, links: &[TaperedCapsule], enough: f32) -> f32 {
+    /// The smallest gap between links and surface, up to `enough`. Only for links that are outside of the object's
+    /// volume: of others it says how far the surface is.
+    fn smallest_gap(&self, links: &[TaperedCapsule], enough: f32) -> f32 {
         links.iter().fold(enough, |least, link| {
-            let (centre, radius) = link.bounding_ball();
-            match self.surface.closest_point_within(centre, least + radius) {
-                None => least,
-                Some(closest) if closest.distance - radius > NEAR => least.min(closest.distance - radius),
-                Some(_) => clearance(link, self.surface, least).min(least),
-            }
+            let gap = self.surface.closest_to_capsule(link, least);
+            gap.map_or(least, |gap| gap.gap)
         })
     }
 
