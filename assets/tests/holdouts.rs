@@ -306,6 +306,7 @@ fn synthesized_grasps_are_found_again() {
         let settings = SearchSettings {
             seed,
             strategy,
+            validity: grasp_synthesis::strategy::Validity::Thesis,
             bend_ratios,
             friction,
             reproducible: true,
@@ -339,6 +340,7 @@ fn a_receiver_finds_a_grasp_on_each() {
         let settings = SearchSettings {
             seed: 1,
             strategy: Strategy::F,
+            validity: grasp_synthesis::strategy::Validity::Thesis,
             bend_ratios: BendRatioChoice::OneRandom,
             friction: 0.34,
             reproducible: false,

@@ -49,8 +49,8 @@ pub use object::{ForbiddenSurfaces, Health, NewObject, Object, ObjectPage};
 pub use pose::Pose;
 pub use retry::RetryPolicy;
 pub use search::{
-    BendRatios, Contact, Convention, FindAnswer, FindRequest, Grasp, NearestMiss, Outcome, Rejection,
-    RejectionCount, SearchReport, Step, StepTime, Strategy, Validity,
+    BendRatios, Contact, Convention, FindAnswer, FindRequest, Grasp, NearestMiss, Outcome, PhysicalMargins,
+    Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy, Validity,
 };
 
 /// The README's Rust example compiles.

@@ -34,6 +34,8 @@ pub enum Convention {
 pub enum Validity {
     /// As the thesis prints it (chapters 4 and 5).
     Thesis,
+    /// Hands are solid, and the contacts hold the object by forces within their friction cones and with closure.
+    Physical,
 }
 
 /// How grasps are searched for: the ladder of the thesis' chapter 5, each step on top of the one before.
@@ -181,6 +183,23 @@ pub struct Contact {
     pub client_force: Vec3,
     /// The same force in the object's frame, in newtons.
     pub object_force: Vec3,
+    /// The torsion that the soft fingertip applies here about the surface's inward normal, in newton metres; 0 under
+    /// [`Validity::Thesis`].
+    pub torsion: f32,
+}
+
+/// By how much a grasp passes the checks of [`Validity::Physical`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhysicalMargins {
+    /// The wrench that the forces leave unbalanced, torque over half the diagonal of the object's box, as a share of the
+    /// weight.
+    pub residual: f32,
+    /// Ferrari-Canny epsilon of the contacts as soft fingers, torque over the same length.
+    pub epsilon: f32,
+    /// How deep the hand sinks into the object at its deepest, in metres.
+    pub penetration: f32,
+    /// Smallest distance between the receiving hand or forearm and the giver's, in metres; none without a giver.
+    pub giver_clearance: Option<f32>,
 }
 
 /// A pose of the receiving hand that takes the object.
@@ -204,6 +223,8 @@ pub struct Grasp {
     pub comfort: f32,
     /// Angle in radians between the sum of the contact wrenches and the wrench that opposes gravity (Eq. 4.5).
     pub wrench_angle: f32,
+    /// Under [`Validity::Physical`]: by how much the checks are passed.
+    pub margins: Option<PhysicalMargins>,
 }
 
 /// Why an attempt failed: the names of Table 5.2.

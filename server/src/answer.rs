@@ -14,7 +14,7 @@ use grasp_synthesis::{
     pose::Pose,
     rejection::Rejection,
     search::{NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes},
-    strategy::Strategy,
+    strategy::{Strategy, Validity},
 };
 
 use crate::{convention::Convention, error::ServiceError};
@@ -116,14 +116,22 @@ fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
             .contacts
             .iter()
             .zip(&grasp.forces)
-            .map(|(contact, &force)| wire_contact(contact, force, frame))
+            // The thesis' validity has no torsions.
+            .zip(grasp.torsions.iter().copied().chain(std::iter::repeat(0.0)))
+            .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, frame))
             .collect(),
         comfort: grasp.comfort,
         wrench_angle: grasp.wrench_angle,
+        margins: grasp.margins.map(|margins| v1::PhysicalMargins {
+            residual: margins.residual,
+            epsilon: margins.epsilon,
+            penetration: margins.penetration,
+            giver_clearance: margins.giver_clearance,
+        }),
     }
 }
 
-fn wire_contact(contact: &Contact, force: Vec3, frame: ClientFrame) -> v1::Contact {
+fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, frame: ClientFrame) -> v1::Contact {
     let ClientFrame {
         convention,
         client_from_object,
@@ -140,6 +148,7 @@ fn wire_contact(contact: &Contact, force: Vec3, frame: ClientFrame) -> v1::Conta
         triangle: contact.triangle,
         client_force: direction(client_from_object.transform_vector(force)),
         object_force: direction(force),
+        torsion,
     }
 }
 
@@ -168,7 +177,7 @@ fn report(
         workers: u32::try_from(settings.workers).unwrap_or(u32::MAX),
         nearest_miss: report.nearest_miss.as_ref().map(|miss| nearest_miss(miss, frame)),
         strategy: wire_strategy(settings.strategy).into(),
-        validity: v1::Validity::Thesis.into(),
+        validity: wire_validity(settings.validity).into(),
     }
 }
 
@@ -242,6 +251,13 @@ fn wire_rejection(rejection: Rejection) -> v1::Rejection {
         Rejection::FingerCollision => v1::Rejection::FingerCollision,
         Rejection::UnwantedContact => v1::Rejection::UnwantedContact,
         Rejection::NotImmobilizing => v1::Rejection::NotImmobilizing,
+    }
+}
+
+fn wire_validity(validity: Validity) -> v1::Validity {
+    match validity {
+        Validity::Thesis => v1::Validity::Thesis,
+        Validity::Physical => v1::Validity::Physical,
     }
 }
 

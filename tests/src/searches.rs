@@ -15,7 +15,7 @@ use grasp_synthesis::{
     holdout::Holdout,
     object::THESIS_FRICTION,
     search::{SearchOutcome, SearchSettings, find_grasp},
-    strategy::Strategy,
+    strategy::{Strategy, Validity},
 };
 
 /// The machine's monotonic clock.
@@ -99,6 +99,7 @@ impl Bench {
             seed,
             strategy,
             bend_ratios: strategy.default_bend_ratios(),
+            validity: Validity::Thesis,
             friction: THESIS_FRICTION,
             reproducible: false,
             first_attempt,

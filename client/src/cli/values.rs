@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::ValueEnum;
 use glam::Vec3;
-use grasp_client::{BendRatios, Handedness, Strategy};
+use grasp_client::{BendRatios, Handedness, Strategy, Validity};
 
 /// Reads a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
 pub(super) fn parse_duration(text: &str) -> Result<Duration, String> {
@@ -122,6 +122,24 @@ impl From<StrategyName> for grasp_synthesis::strategy::Strategy {
             StrategyName::D => Self::D,
             StrategyName::E => Self::E,
             StrategyName::F => Self::F,
+        }
+    }
+}
+
+/// Which grasps count as valid.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum ValidityName {
+    /// As the thesis prints it.
+    Thesis,
+    /// Hands are solid, forces are solved for.
+    Physical,
+}
+
+impl From<ValidityName> for Validity {
+    fn from(name: ValidityName) -> Self {
+        match name {
+            ValidityName::Thesis => Self::Thesis,
+            ValidityName::Physical => Self::Physical,
         }
     }
 }

@@ -14,8 +14,8 @@ use super::{
     required,
 };
 use crate::search::{
-    BendRatios, Contact, Convention, FindAnswer, FindRequest, Grasp, NearestMiss, Outcome, Rejection,
-    RejectionCount, SearchReport, Step, StepTime, Strategy, Validity,
+    BendRatios, Contact, Convention, FindAnswer, FindRequest, Grasp, NearestMiss, Outcome, PhysicalMargins,
+    Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy, Validity,
 };
 
 pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspRequest {
@@ -37,7 +37,7 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
             .into(),
         validity: request
             .validity
-            .map_or(v1::Validity::Unspecified, |Validity::Thesis| v1::Validity::Thesis)
+            .map_or(v1::Validity::Unspecified, validity_to_wire)
             .into(),
         seed: request.seed,
         reproducible: request.reproducible,
@@ -82,6 +82,14 @@ fn validity_from_wire(value: i32) -> Option<Validity> {
     match v1::Validity::try_from(value).ok()? {
         v1::Validity::Unspecified => None,
         v1::Validity::Thesis => Some(Validity::Thesis),
+        v1::Validity::Physical => Some(Validity::Physical),
+    }
+}
+
+fn validity_to_wire(validity: Validity) -> v1::Validity {
+    match validity {
+        Validity::Thesis => v1::Validity::Thesis,
+        Validity::Physical => v1::Validity::Physical,
     }
 }
 
@@ -161,6 +169,12 @@ fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
         contacts: each("contacts", grasp.contacts, contact_from_wire)?,
         comfort: grasp.comfort,
         wrench_angle: grasp.wrench_angle,
+        margins: grasp.margins.map(|margins| PhysicalMargins {
+            residual: margins.residual,
+            epsilon: margins.epsilon,
+            penetration: margins.penetration,
+            giver_clearance: margins.giver_clearance,
+        }),
     })
 }
 
@@ -176,6 +190,7 @@ fn contact_from_wire(contact: v1::Contact) -> Result<Contact, Malformed> {
         triangle: contact.triangle,
         client_force: vector("client_force", contact.client_force)?,
         object_force: vector("object_force", contact.object_force)?,
+        torsion: contact.torsion,
     })
 }
 

@@ -32,6 +32,7 @@ fn wire_answer() -> v1::FindGraspResponse {
                 })
                 .collect(),
             contacts: vec![v1::Contact {
+                torsion: 0.002,
                 client_position: Some(wire_vector(3.0)),
                 client_normal: Some(wire_vector(4.0)),
                 object_position: Some(wire_vector(5.0)),
@@ -42,6 +43,12 @@ fn wire_answer() -> v1::FindGraspResponse {
                 client_force: Some(wire_vector(8.0)),
                 object_force: Some(wire_vector(9.0)),
             }],
+            margins: Some(v1::PhysicalMargins {
+                residual: 0.01,
+                epsilon: 0.03,
+                penetration: 0.001,
+                giver_clearance: None,
+            }),
             comfort: 10.0,
             wrench_angle: 11.0,
         }),
@@ -99,6 +106,7 @@ fn an_answer_keeps_every_number_in_its_place() {
         std::array::from_fn::<f32, JOINT_COUNT, _>(|i| i as f32)
     );
     let expected = Contact {
+        torsion: 0.002,
         client_position: Vec3::X * 3.0,
         client_normal: Vec3::X * 4.0,
         object_position: Vec3::X * 5.0,
@@ -111,6 +119,7 @@ fn an_answer_keeps_every_number_in_its_place() {
     };
     assert_eq!(grasp.contacts, [expected]);
     assert_eq!((grasp.comfort, grasp.wrench_angle), (10.0, 11.0));
+    assert_eq!(grasp.margins.map(|margins| margins.epsilon), Some(0.03));
     let report = answer.report;
     assert_eq!((report.attempts, report.pruned_placements), (12, 13));
     assert_eq!(report.rejections[0].rejection, Rejection::PalmCollision);

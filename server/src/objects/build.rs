@@ -176,7 +176,7 @@ mod tests {
             unit_metres: 0.1,
             mass: 0.1,
             centre_of_mass: None,
-            friction: 0.34,
+            friction: None,
             forbidden_groups: Vec::new(),
             forbidden_triangles: forbidden_triangles.to_vec(),
         }

@@ -9,7 +9,7 @@ pub(crate) mod store;
 use std::sync::Arc;
 
 use grasp_proto::v1;
-use grasp_synthesis::object::GraspObject;
+use grasp_synthesis::{object::GraspObject, strategy::Validity};
 use sha2::{Digest as _, Sha256};
 
 use crate::answer::{vector, wire_pose};
@@ -75,7 +75,7 @@ impl StoredObject {
             vertex_count: count(mesh.positions().len()),
             mass_kg: self.object.mass,
             centre_of_mass: Some(vector(self.object.centre_of_mass)),
-            friction: self.object.friction,
+            friction: self.object.friction_under(Validity::Thesis),
             forbidden_triangle_count: count(self.object.forbidden_count()),
             object_from_box: Some(wire_pose(bounding_box.object_from_box)),
             box_half_extents: Some(vector(bounding_box.half_extents)),
@@ -133,7 +133,7 @@ pub(crate) mod tests {
         let positions = vec![Vec3::ZERO, Vec3::X * edge, Vec3::Y * edge, Vec3::Z * edge];
         let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let mesh = TriangleMesh::new(positions, triangles).unwrap();
-        let object = GraspObject::new(mesh, 0.1, Vec3::ZERO, 0.3, forbidden).unwrap();
+        let object = GraspObject::new(mesh, 0.1, Vec3::ZERO, Some(0.3), forbidden).unwrap();
         StoredObject::new(id.to_owned(), false, Arc::new(object), Vec::new())
     }
 

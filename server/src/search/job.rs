@@ -75,8 +75,11 @@ impl FindJob {
         let settings = SearchSettings {
             seed: self.seed,
             strategy: query.strategy,
+            validity: query.validity,
             bend_ratios: query.bend_ratios,
-            friction: query.friction.unwrap_or(holdout.object.friction),
+            friction: query
+                .friction
+                .unwrap_or_else(|| holdout.object.friction_under(query.validity)),
             reproducible: query.reproducible,
             first_attempt: query.first_attempt,
             max_attempts: query.max_attempts,

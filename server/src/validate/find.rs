@@ -7,7 +7,7 @@ use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
     pose::Pose,
-    strategy::{BendRatioChoice, Strategy},
+    strategy::{BendRatioChoice, Strategy, Validity},
 };
 
 use super::{Field, GiverHand, Violations, friction, hand, known, object_id_of, pose};
@@ -42,6 +42,8 @@ pub(crate) struct FindQuery {
     pub max_attempts: u64,
     /// The step of the ladder.
     pub strategy: Strategy,
+    /// Which grasps count as valid.
+    pub validity: Validity,
     /// The bend ratios.
     pub bend_ratios: BendRatioChoice,
     /// The seed that was asked for.
@@ -88,7 +90,7 @@ pub(crate) fn find_query(
         .budget
         .and_then(|budget| positive_duration(Field::root("budget"), budget, v));
     let (first_attempt, max_attempts) = attempts(request.max_attempts, request.only_attempt, v);
-    known::<v1::Validity>(Field::root("validity"), request.validity, v);
+    let validity = validity(known(Field::root("validity"), request.validity, v));
     let strategy = strategy(known(Field::root("strategy"), request.strategy, v));
     let bend_ratios = bend_ratios(
         known(Field::root("bend_ratios"), request.bend_ratios, v),
@@ -117,6 +119,7 @@ pub(crate) fn find_query(
         first_attempt,
         max_attempts,
         strategy,
+        validity,
         bend_ratios,
         seed: request.seed,
         reproducible: request.reproducible,
@@ -166,6 +169,14 @@ fn positive_duration(
             violations.add(field, format_args!("is {}; it must be more than 0", text()));
             None
         }
+    }
+}
+
+/// The server's default is the thesis' notion.
+fn validity(validity: v1::Validity) -> Validity {
+    match validity {
+        v1::Validity::Unspecified | v1::Validity::Thesis => Validity::Thesis,
+        v1::Validity::Physical => Validity::Physical,
     }
 }
 

@@ -2,7 +2,6 @@
 
 use glam::Vec3;
 use grasp_proto::v1;
-use grasp_synthesis::object::THESIS_FRICTION;
 
 use super::{Field, Violations, friction, point, quoted};
 
@@ -31,8 +30,8 @@ pub(crate) struct ObjectFields {
     pub mass: f32,
     /// In metres, in the object's frame; none to compute it.
     pub centre_of_mass: Option<Vec3>,
-    /// Coefficient of static friction.
-    pub friction: f32,
+    /// Coefficient of static friction, if it was given.
+    pub friction: Option<f32>,
     /// Groups, objects and materials of the OBJ text that may not be touched.
     pub forbidden_groups: Vec<String>,
     /// Triangles that may not be touched.
@@ -114,9 +113,9 @@ pub(crate) fn object_fields(
     let centre_of_mass = request
         .centre_of_mass
         .map(|v| point(Field::root("centre_of_mass"), v, 1.0, violations));
-    let friction = request.friction.map_or(THESIS_FRICTION, |value| {
-        friction(Field::root("friction"), value, violations)
-    });
+    let friction = request
+        .friction
+        .map(|value| friction(Field::root("friction"), value, violations));
     let forbidden = request.forbidden.unwrap_or_default();
     ObjectFields {
         id: request.object_id,
@@ -170,7 +169,7 @@ mod tests {
         let mut violations = Violations::default();
         let fields = object_fields(right(), 100, &mut violations);
         assert!(violations.is_empty());
-        assert_eq!((fields.unit_metres, fields.friction), (1.0, THESIS_FRICTION));
+        assert_eq!((fields.unit_metres, fields.friction), (1.0, None));
     }
 
     #[test]

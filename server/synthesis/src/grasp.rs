@@ -30,6 +30,9 @@ pub struct Grasp {
     pub contacts: Vec<Contact>,
     /// The force that the hand applies on the object at each contact, in newtons.
     pub forces: Vec<Vec3>,
+    /// The torsion of a soft finger at each contact, about the surface's inward normal, in newton metres; empty under the
+    /// thesis' validity, which knows none.
+    pub torsions: Vec<f32>,
     /// Angle between the summed contact wrench and the one that opposes gravity (Eq. 4.5), in radians.
     pub wrench_angle: f32,
     /// E of Eq. 4.6.

@@ -2,10 +2,18 @@
 
 use glam::Vec3;
 
-use crate::geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox};
+use crate::{
+    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox},
+    strategy::Validity,
+};
 
 /// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
 pub const THESIS_FRICTION: f32 = 0.34;
+
+/// Coefficient of static friction between dry skin and smooth plastic or metal where nobody knows better: measured ones
+/// lie between 0.4 and 1.0 (S. Derler and L.-C. Gerhardt, "Tribology of Skin", 2012). A higher one lets grasps hold that
+/// would slip.
+pub const SKIN_FRICTION: f32 = 0.6;
 
 /// How many forbidden triangles that do not exist are named one by one. More would help nobody and let a client ask
 /// for an answer as long as its request.
@@ -22,8 +30,8 @@ pub struct GraspObject {
     pub mass: f32,
     /// In metres, in the object's frame.
     pub centre_of_mass: Vec3,
-    /// Coefficient of static friction between skin and the surface.
-    pub friction: f32,
+    /// Coefficient of static friction between skin and the surface; none if nobody said.
+    pub friction: Option<f32>,
     /// One flag a triangle: may it not be touched?
     forbidden: Vec<bool>,
     /// The triangles that may not be touched; none if all may.
@@ -70,14 +78,14 @@ impl GraspObject {
         mesh: TriangleMesh,
         mass: f32,
         centre_of_mass: Vec3,
-        friction: f32,
+        friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
         let mut errors = Vec::new();
         if !(mass.is_finite() && mass > 0.0) {
             errors.push(ObjectError::Mass(mass));
         }
-        if !(friction.is_finite() && friction > 0.0) {
+        if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
             errors.push(ObjectError::Friction(friction));
         }
         if !centre_of_mass.is_finite() {
@@ -123,6 +131,14 @@ impl GraspObject {
             centre_of_mass,
             friction,
             forbidden,
+        })
+    }
+
+    /// The coefficient of friction that grasps are judged by: the object's own, or what the notion of valid assumes.
+    pub fn friction_under(&self, validity: Validity) -> f32 {
+        self.friction.unwrap_or(match validity {
+            Validity::Thesis => THESIS_FRICTION,
+            Validity::Physical => SKIN_FRICTION,
         })
     }
 

@@ -18,6 +18,7 @@ use grasp_synthesis::{
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
     search::{SearchEnd, SearchSettings, find_grasp},
+    strategy::Validity,
     synthesis::{
         attempt::{Attempt, AttemptEnd, Scene},
         random::AttemptStream,
@@ -102,7 +103,8 @@ impl Maker {
             seed,
             strategy: cell.set.strategy,
             bend_ratios: cell.set.bend_ratios,
-            friction: holdout.object.friction,
+            validity: Validity::Thesis,
+            friction: holdout.object.friction_under(Validity::Thesis),
             reproducible: false,
             first_attempt: 0,
             max_attempts: u64::MAX,
@@ -205,7 +207,8 @@ impl Maker {
             strategy,
             bend_ratios,
         } = cell.set;
-        Scene::new(holdout, self.rig, strategy, bend_ratios, holdout.object.friction)
+        let friction = holdout.object.friction_under(Validity::Thesis);
+        Scene::new(holdout, self.rig, strategy, bend_ratios, friction)
     }
 }
 

@@ -7,6 +7,7 @@ mod invalid;
 mod load;
 mod objects;
 mod objects_directory;
+mod physical;
 mod real_input;
 mod reflection;
 mod reproducible;

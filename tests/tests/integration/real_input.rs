@@ -103,7 +103,7 @@ fn local_object(obj: &[u8], mass: f32) -> GraspObject {
         triangles: 1 << 20,
     };
     let read = grasp_assets::obj::read_obj(obj, 1.0, limits).expect("the mesh can be read");
-    GraspObject::new(read.mesh, mass, Vec3::ZERO, THESIS_FRICTION, &[]).expect("the object is sound")
+    GraspObject::new(read.mesh, mass, Vec3::ZERO, None, &[]).expect("the object is sound")
 }
 
 /// Asks with strategy F, then with D where F finds nothing in its time.

@@ -101,6 +101,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
         let settings = SearchSettings {
             seed,
             strategy: Strategy::F,
+            validity: grasp_synthesis::strategy::Validity::Thesis,
             bend_ratios: Strategy::F.default_bend_ratios(),
             friction: FRICTION,
             reproducible: true,

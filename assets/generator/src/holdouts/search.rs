@@ -87,6 +87,7 @@ fn next_grasp(
     let settings = SearchSettings {
         seed,
         strategy: STRATEGY,
+        validity: grasp_synthesis::strategy::Validity::Thesis,
         bend_ratios: BEND_RATIOS,
         friction: FRICTION,
         reproducible: true,

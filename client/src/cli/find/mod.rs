@@ -19,7 +19,9 @@ use super::{
     output::{Output, write_json},
     picture::{Model, Picture, write_file},
     server::ServerOptions,
-    values::{BendRatiosName, HandName, StrategyName, ViewSize, parse_duration, parse_view_size},
+    values::{
+        BendRatiosName, HandName, StrategyName, ValidityName, ViewSize, parse_duration, parse_view_size,
+    },
 };
 
 /// The long help: the shapes of requests and answers as JSON.
@@ -64,6 +66,9 @@ pub(super) struct Arguments {
     /// How to search. Default: the server's.
     #[arg(long, ignore_case = true)]
     strategy: Option<StrategyName>,
+    /// What counts as valid. Default: the server's.
+    #[arg(long)]
+    validity: Option<ValidityName>,
     /// Which bend ratios the fingers try. Default: what the strategy says.
     #[arg(long)]
     bend_ratios: Option<BendRatiosName>,
@@ -187,6 +192,7 @@ impl Arguments {
             }
         };
         request.strategy = self.strategy.map(Into::into).or(request.strategy);
+        request.validity = self.validity.map(Into::into).or(request.validity);
         request.bend_ratios = self.bend_ratios.map(Into::into).or(request.bend_ratios);
         request.budget = self.budget.or(request.budget);
         request.max_attempts = self.max_attempts.or(request.max_attempts);

@@ -185,7 +185,10 @@ impl PhysicalAttempt {
         // Step 4, Contact Validation.
         self.collect_contacts(around, &digits);
         let forbidden = object.forbidden_surface();
-        let is_unwanted = self.contacts.iter().any(|contact| object.is_forbidden(contact.triangle))
+        let is_unwanted = self
+            .contacts
+            .iter()
+            .any(|contact| object.is_forbidden(contact.triangle))
             || forbidden.is_some_and(|surface| comes_within(solids.iter(), surface, FORBIDDEN_CLEARANCE));
         stopwatch.lap(Step::ContactValidation);
         if is_unwanted {
@@ -209,7 +212,9 @@ impl PhysicalAttempt {
             digits: digits.map(|digit| digit.angles),
         };
         let ratios = std::array::from_fn(|digit| {
-            digits[digit].touches_object().then_some(closings[digit].bend_ratio)
+            digits[digit]
+                .touches_object()
+                .then_some(closings[digit].bend_ratio)
         });
         PhysicalEnd::Valid(Box::new(self.grasp(around, pose, ratios, &balance, margins)))
     }
@@ -275,6 +280,7 @@ impl PhysicalAttempt {
             bend_ratios,
             contacts: self.contacts.clone(),
             forces: balance.forces.clone(),
+            torsions: balance.torsions.clone(),
             wrench_angle: sum.angle_between(around.holdout.up),
             comfort: comfort(totals),
             margins: Some(margins),
@@ -305,7 +311,9 @@ impl<'a> Surroundings<'a> {
             return true;
         }
         self.scene.giver.as_ref().is_some_and(|giver| {
-            giver.iter().any(|theirs| parts().any(|ours| ours.distance(theirs) < GIVER_CLEARANCE))
+            giver
+                .iter()
+                .any(|theirs| parts().any(|ours| ours.distance(theirs) < GIVER_CLEARANCE))
         })
     }
 
@@ -315,12 +323,18 @@ impl<'a> Surroundings<'a> {
         if self_clearance(solids) < 0.0 {
             return None;
         }
-        let giver_distance = self.scene.giver.as_ref().map(|giver| giver_clearance(solids, giver));
+        let giver_distance = self
+            .scene
+            .giver
+            .as_ref()
+            .map(|giver| giver_clearance(solids, giver));
         if giver_distance.is_some_and(|distance| distance < GIVER_CLEARANCE) {
             return None;
         }
         let surface = &self.holdout.object.surface;
-        let least = solids.iter().fold(0.0, |least: f32, part| clearance(part, surface, least).min(least));
+        let least = solids
+            .iter()
+            .fold(0.0, |least: f32, part| clearance(part, surface, least).min(least));
         (least >= -DEEPEST).then_some((-least, giver_distance))
     }
 }
@@ -331,7 +345,9 @@ fn comes_within<'a>(
     surface: &MeshBvh,
     distance: f32,
 ) -> bool {
-    parts.into_iter().any(|part| clearance(part, surface, distance) < distance)
+    parts
+        .into_iter()
+        .any(|part| clearance(part, surface, distance) < distance)
 }
 
 /// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a

@@ -111,7 +111,11 @@ impl Closing<'_> {
         for (touches, link) in touches.iter_mut().zip(&links) {
             *touches = *touches || self.link_touches(link);
         }
-        Some(ClosedDigit { angles, links, touches })
+        Some(ClosedDigit {
+            angles,
+            links,
+            touches,
+        })
     }
 
     /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in all, or less if the object is in
@@ -165,10 +169,24 @@ impl Closing<'_> {
     /// The way after which all joints that move are at their limits.
     fn whole_way(&self, sweep: &Sweep) -> f32 {
         let limits = &self.digit.limits;
-        let way = |rate: f32, start: f32, max: f32| if rate > 0.0 { ((max - start) / rate).max(0.0) } else { 0.0 };
+        let way = |rate: f32, start: f32, max: f32| {
+            if rate > 0.0 {
+                ((max - start) / rate).max(0.0)
+            } else {
+                0.0
+            }
+        };
         way(sweep.rates[0], sweep.start.base_pitch, limits.base_pitch.max)
-            .max(way(sweep.rates[1], sweep.start.second_pitch, limits.second_pitch.max))
-            .max(way(sweep.rates[2], sweep.start.third_pitch, limits.third_pitch.max))
+            .max(way(
+                sweep.rates[1],
+                sweep.start.second_pitch,
+                limits.second_pitch.max,
+            ))
+            .max(way(
+                sweep.rates[2],
+                sweep.start.third_pitch,
+                limits.third_pitch.max,
+            ))
     }
 
     /// Sweeps until a moving link's clearance is down to `target`, or `most` radians.
@@ -196,7 +214,13 @@ impl Closing<'_> {
         let thickest = self.radii.iter().copied().fold(0.0, f32::max);
         // The farthest point from a joint, with the digit stretched.
         let reach = [first + second + third, second + third, third].map(|length| length + thickest);
-        sweep.rates.iter().zip(reach).map(|(rate, reach)| rate * reach).sum::<f32>().max(f32::EPSILON)
+        sweep
+            .rates
+            .iter()
+            .zip(reach)
+            .map(|(rate, reach)| rate * reach)
+            .sum::<f32>()
+            .max(f32::EPSILON)
     }
 
     fn links(&self, angles: &DigitAngles) -> [TaperedCapsule; 3] {

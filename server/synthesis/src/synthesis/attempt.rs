@@ -307,6 +307,7 @@ impl Attempt {
             bend_ratios: self.digits.map(|digit| digit.bend_ratio),
             contacts: self.contacts.clone(),
             forces: self.immobility.forces(),
+            torsions: Vec::new(),
             wrench_angle,
             comfort: comfort(self.immobility.digit_totals(&self.contacts)),
             margins: None,

@@ -175,7 +175,7 @@ pub(crate) fn cylinder_mesh(radius: f32, half_height: f32, sides: u32, rings: u3
 
 /// An object of 100 g whose centre of mass is its origin.
 pub(crate) fn object(mesh: TriangleMesh, forbidden: &[u32]) -> GraspObject {
-    GraspObject::new(mesh, 0.1, Vec3::ZERO, THESIS_FRICTION, forbidden).expect("the object is sound")
+    GraspObject::new(mesh, 0.1, Vec3::ZERO, None, forbidden).expect("the object is sound")
 }
 
 /// A bar of 3 × 3 × 16 cm along y.
@@ -241,6 +241,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
     SearchSettings {
         seed: 20_231,
         strategy,
+        validity: grasp_synthesis::strategy::Validity::Thesis,
         bend_ratios: strategy.default_bend_ratios(),
         friction: THESIS_FRICTION,
         reproducible: true,

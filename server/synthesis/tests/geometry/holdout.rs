@@ -104,7 +104,7 @@ fn hands_that_are_none_are_refused() {
 fn objects_name_every_violation_within_bounds() {
     let mesh = || meshes::cuboid(Vec3::splat(0.05), 1);
     let errors =
-        GraspObject::new(mesh(), f32::NAN, Vec3::INFINITY, -1.0, &[3, 12]).expect_err("all is wrong");
+        GraspObject::new(mesh(), f32::NAN, Vec3::INFINITY, Some(-1.0), &[3, 12]).expect_err("all is wrong");
     assert!(matches!(
         errors[..],
         [
@@ -118,7 +118,8 @@ fn objects_name_every_violation_within_bounds() {
         ]
     ));
     let unknown: Vec<u32> = (100..100_000).collect();
-    let errors = GraspObject::new(mesh(), 1.0, Vec3::ZERO, 0.3, &unknown).expect_err("they do not exist");
+    let errors =
+        GraspObject::new(mesh(), 1.0, Vec3::ZERO, Some(0.3), &unknown).expect_err("they do not exist");
     assert_eq!(errors.len(), MAX_NAMED_TRIANGLES + 1);
     assert_eq!(
         errors.last(),
@@ -128,15 +129,21 @@ fn objects_name_every_violation_within_bounds() {
         })
     );
 
-    let object = GraspObject::new(mesh(), 0.2, Vec3::ZERO, 0.3, &[3, 3, 5]).expect("it is sound");
+    let object = GraspObject::new(mesh(), 0.2, Vec3::ZERO, Some(0.3), &[3, 3, 5]).expect("it is sound");
     assert_eq!(object.forbidden_count(), 2);
     assert!(object.is_forbidden(3) && object.is_forbidden(5) && !object.is_forbidden(4));
 }
 
 #[test]
 fn up_must_be_a_direction() {
-    let object = GraspObject::new(meshes::cuboid(Vec3::splat(0.05), 1), 0.2, Vec3::ZERO, 0.3, &[])
-        .expect("it is sound");
+    let object = GraspObject::new(
+        meshes::cuboid(Vec3::splat(0.05), 1),
+        0.2,
+        Vec3::ZERO,
+        Some(0.3),
+        &[],
+    )
+    .expect("it is sound");
     let object = Arc::new(object);
     assert!(Holdout::new(Arc::clone(&object), None, Vec3::Y).is_ok());
     for up in [Vec3::ZERO, Vec3::Y * 2.0, Vec3::NAN] {

@@ -2,6 +2,7 @@
 
 use grasp_synthesis::{
     grasp::{Contact, Grasp},
+    strategy::Validity,
     synthesis::{
         attempt::{Attempt, AttemptEnd},
         closing_motion::hand_motion,
@@ -106,7 +107,7 @@ impl Maker {
         let load = Load {
             gravity: Wrench::of_gravity(holdout.object.mass, holdout.up),
             centre_of_mass: holdout.object.centre_of_mass,
-            friction: holdout.object.friction,
+            friction: holdout.object.friction_under(Validity::Thesis),
         };
         let choice = if cell.set.strategy.takes_first_force_distribution() {
             DistributionChoice::FirstSufficient

@@ -9,7 +9,7 @@ use grasp_synthesis::{
     hand::Handedness,
     rejection::Rejection,
     search::{SearchOutcome, SearchSettings, find_grasp},
-    strategy::{BendRatioChoice, Strategy},
+    strategy::{BendRatioChoice, Strategy, Validity},
 };
 
 use crate::support::{Scratch, complete, small};
@@ -38,7 +38,8 @@ fn search(record: &Record, first_attempt: u64, max_attempts: u64) -> SearchOutco
         seed: record.seed,
         strategy: record.cell.set.strategy,
         bend_ratios: record.cell.set.bend_ratios,
-        friction: holdout.object.friction,
+        validity: Validity::Thesis,
+        friction: holdout.object.friction_under(Validity::Thesis),
         reproducible: true,
         first_attempt,
         max_attempts,

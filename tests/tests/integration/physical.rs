@@ -1,0 +1,131 @@
+//! `PHYSICAL` validity over the wire, judged from the answers alone: by what a contact, a balance and a solid are, with
+//! code that the search does not use.
+
+use glam::{DVec3, Vec3};
+use grasp_assets::{holdouts::holdout, objects::object};
+use grasp_client::{FindAnswer, FindRequest, GraspClient, Outcome, Validity, built_in::request_for};
+use grasp_synthesis::geometry::mesh::TriangleMesh;
+use grasp_tests::TestServer;
+
+/// Holdouts of each object that are answered soon.
+const HOLDOUTS: [&str; 4] = ["remote-genhold3", "scalpel-hold2", "scissors-hold1", "scissors-genhold1"];
+
+/// Skin friction where nothing else is said, as the contract has it.
+const FRICTION: f64 = 0.6;
+
+const GRAVITY: f64 = 9.81;
+
+async fn ask(client: &GraspClient, name: &str, seed: u64) -> FindAnswer {
+    let request = FindRequest {
+        validity: Some(Validity::Physical),
+        seed: Some(seed),
+        budget: Some(std::time::Duration::from_secs(10)),
+        ..request_for(holdout(name).expect("a built-in holdout"))
+    };
+    client.find_grasp(&request).await.expect("a valid request")
+}
+
+/// The distance of a point from a mesh by looking at every triangle.
+fn distance_to_mesh(mesh: &TriangleMesh, point: DVec3) -> f64 {
+    (0..mesh.triangles().len())
+        .map(|triangle| distance_to_triangle(mesh.corners(triangle).map(Vec3::as_dvec3), point))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// By projection onto the plane and, if that falls outside, onto the edges.
+fn distance_to_triangle([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
+    let normal = (b - a).cross(c - a);
+    let inside = [(a, b), (b, c), (c, a)]
+        .iter()
+        .all(|&(from, to)| (to - from).cross(point - from).dot(normal) >= 0.0);
+    if inside {
+        return (point - a).dot(normal).abs() / normal.length();
+    }
+    let to_edge = |from: DVec3, to: DVec3| {
+        let along = ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
+        (from + (to - from) * along).distance(point)
+    };
+    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn forces_hold_the_weight_inside_of_their_cones() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    for name in HOLDOUTS {
+        let answer = ask(&client, name, 1).await;
+        assert_eq!(answer.outcome, Outcome::Found, "{name}: {:?}", answer.report);
+        assert_eq!(answer.report.validity, Some(Validity::Physical));
+        let grasp = answer.grasp.expect("a grasp");
+        let margins = grasp.margins.expect("margins of a physical grasp");
+        assert!(margins.residual <= 0.02 && margins.epsilon >= 0.02, "{name}: {margins:?}");
+
+        let built_in = holdout(name).expect("a built-in holdout");
+        let about = &object(&built_in.object).expect("a built-in object").object;
+        let weight = f64::from(about.mass) * GRAVITY;
+        let up = (built_in.world_from_object.orientation.inverse() * Vec3::Y).as_dvec3();
+        let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
+        for contact in &grasp.contacts {
+            let pushes = contact.object_force.as_dvec3();
+            let normal = contact.object_normal.as_dvec3();
+            let pressing = -pushes.dot(normal);
+            let rubbing = (pushes + normal * pressing).length();
+            assert!(pressing > 0.0 && pushes.length() <= 27.0 + 1e-3, "{name}: {pushes}");
+            assert!(rubbing <= FRICTION * pressing * (1.0 + 1e-3) + 1e-6, "{name}: {rubbing} N at {pressing} N");
+            let lever = contact.object_position.as_dvec3() - about.centre_of_mass.as_dvec3();
+            force += pushes;
+            torque += lever.cross(pushes) - normal * f64::from(contact.torsion);
+            assert!(distance_to_mesh(about.surface.mesh(), contact.object_position.as_dvec3()) < 1e-5, "{name}");
+        }
+        let length = f64::from(about.bounding_box.half_extents.length());
+        let left = ((force - up * weight).length_squared() + (torque / length).length_squared()).sqrt();
+        assert!(left <= 0.02 * weight, "{name}: {:.1} % unbalanced", 100.0 * left / weight);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_bone_comes_nearer_to_the_object_than_flesh_gives_way() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    for name in HOLDOUTS {
+        let answer = ask(&client, name, 2).await;
+        let grasp = answer.grasp.unwrap_or_else(|| panic!("{name}: {:?}", answer.report));
+        let built_in = holdout(name).expect("a built-in holdout");
+        let object_from_world = built_in.world_from_object.inverse();
+        let mesh = object(&built_in.object).expect("a built-in object").object.surface.mesh();
+        // The OpenXR joints of each finger and of the thumb, metacarpal to tip.
+        for chain in [2..=5, 6..=10, 11..=15, 16..=20, 21..=25] {
+            let joints: Vec<_> = chain.map(|index| &grasp.joints[index]).collect();
+            for bone in joints.windows(2) {
+                for step in 0..10 {
+                    let share = step as f32 / 10.0;
+                    let at = bone[0].client_from_joint.position.lerp(bone[1].client_from_joint.position, share);
+                    let radius = bone[0].radius + (bone[1].radius - bone[0].radius) * share;
+                    let distance = distance_to_mesh(mesh, object_from_world.transform_point(at).as_dvec3());
+                    // The last millimetres of a tip are rounder than a cone to it.
+                    let slack = if bone[1].radius < bone[0].radius { 0.0005 } else { 0.0 };
+                    assert!(
+                        distance >= f64::from(radius) - 0.002 - slack || step > 7,
+                        "{name}: {:.1} mm deep",
+                        1e3 * (f64::from(radius) - distance)
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_physical_grasp_can_be_replayed() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let first = ask(&client, "scissors-hold1", 3).await;
+    let request = FindRequest {
+        validity: Some(Validity::Physical),
+        seed: Some(first.report.seed),
+        only_attempt: first.report.attempt,
+        ..request_for(holdout("scissors-hold1").expect("a built-in holdout"))
+    };
+    let again = client.find_grasp(&request).await.expect("a valid request");
+    assert_eq!(again.grasp, first.grasp);
+}
