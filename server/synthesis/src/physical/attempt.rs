@@ -37,9 +37,10 @@ pub const FORBIDDEN_CLEARANCE: f32 = 0.002;
 /// them held against pulls in all directions. A higher one gives firmer grasps and finds fewer.
 pub const LEAST_EPSILON: f32 = 0.02;
 
-/// Radius in metres over which a soft fingertip is pressed flat, times two thirds: what a contact's normal force is
-/// multiplied with, and with friction, to give the torsion that it bears (a uniformly pressed disk of 5 mm).
-const TORSION_RADIUS: f32 = 0.0033;
+/// Metres by which friction is multiplied to give the torsion that a fingertip bears per newton of normal force: two
+/// thirds of the radius of a disk that is pressed evenly, of 5 mm here. A larger one lets two fingers hold what would
+/// twist out of them.
+const TORSION_LEVER: f32 = 0.0033;
 
 /// Flexion in radians, of all three joints together, with which a hand at rest holds its fingers: about 25° for the
 /// first two and two thirds of it for the last.
@@ -248,7 +249,7 @@ impl PhysicalAttempt {
                     normal: touch.normal,
                     digit: Some(digit),
                     friction: around.scene.friction,
-                    torsion_radius: TORSION_RADIUS,
+                    torsion_radius: around.scene.friction * TORSION_LEVER,
                 });
             }
         }
@@ -258,7 +259,7 @@ impl PhysicalAttempt {
     fn immobilize(&mut self, around: &Surroundings<'_>) -> Option<(Balance, f32)> {
         let load = &around.scene.load;
         let balance = balance(&self.soft_contacts, load, &mut self.buffers)?;
-        let epsilon = epsilon(&self.soft_contacts, load);
+        let epsilon = epsilon(&self.soft_contacts, load, LEAST_EPSILON, &mut self.buffers);
         (epsilon >= LEAST_EPSILON).then_some((balance, epsilon))
     }
 

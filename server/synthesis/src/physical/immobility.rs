@@ -1,31 +1,76 @@
 //! Immobility: forces that hold the object, and closure.
-use crate::hand::Digit;
+//!
+//! Wrenches here are vectors of six dimensionless numbers: force, and torque about the centre of mass divided by the
+//! object's characteristic length, so that neither counts more because of its unit (the thesis sets newtons beside
+//! newton metres, Eq. 4.5). Contacts are soft fingers with their exact, curved friction limits ([`contact_model`]);
+//! both questions ask those for the wrench that reaches farthest in a direction, and take only such wrenches. What they
+//! build from them lies inside the true limits, so that every answer is on the safe side.
+//!
+//! - [`balance`]: which forces hold the object against gravity, as comfortably as they can
+//!   ([`least_squares`] after Lawson and Hanson, over cones instead of a matrix);
+//! - [`epsilon`]: how large a disturbance in any direction the contacts can resist (Ferrari and Canny), by an expanding
+//!   polytope in six dimensions ([`polytope`]).
+
+mod balance;
+mod closure;
+mod contact_model;
+mod least_squares;
+mod polytope;
+
 use glam::Vec3;
-/// c
+
+use crate::hand::Digit;
+pub use balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance};
+pub use closure::{EPSILON_TOLERANCE, epsilon};
+
+/// A soft-finger contact: it pushes, rubs along the surface and resists twist about the normal.
+///
+/// With normal force N, tangential force T and torsion M, it holds as long as (T / μN)² + (M / ρN)² ≤ 1: the
+/// elliptical limit surface of Howe and Cutkosky (1996), which lies inside Coulomb's cone of half-angle tan⁻¹ μ and
+/// inside the limit of pure torsion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SoftContact { /// a
- pub position: Vec3, /// a
- pub normal: Vec3, /// a
- pub digit: Option<Digit>, /// a
- pub friction: f32, /// a
- pub torsion_radius: f32 }
-/// c
+pub struct SoftContact {
+    /// On the surface, in the object's frame.
+    pub position: Vec3,
+    /// Outward unit normal of the object.
+    pub normal: Vec3,
+    /// The digit that touches; `None` is the palm.
+    pub digit: Option<Digit>,
+    /// μ: coefficient of static friction, more than 0.
+    pub friction: f32,
+    /// ρ in metres, not negative: the most torsion about the normal per newton of normal force. 0 is a point contact.
+    pub torsion_radius: f32,
+}
+
+/// What the contacts have to hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Load { /// a
- pub mass: f32, /// a
- pub centre_of_mass: Vec3, /// a
- pub up: Vec3, /// a
- pub characteristic_length: f32 }
-/// c
-#[derive(Clone, Debug, PartialEq)]
-pub struct Balance { /// a
- pub forces: Vec<Vec3>, /// a
- pub torsions: Vec<f32>, /// a
- pub residual: f32 }
-/// c
+pub struct Load {
+    /// In kilograms, more than 0.
+    pub mass: f32,
+    /// In metres, in the object's frame.
+    pub centre_of_mass: Vec3,
+    /// Unit vector against gravity, in the object's frame.
+    pub up: Vec3,
+    /// In metres, more than 0: torques are divided by it. The lever that matters for the object, such as half the
+    /// diagonal of its oriented box. A larger one makes twist count less beside force.
+    pub characteristic_length: f32,
+}
+
+/// Forces that balance gravity, one entry a contact.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Balance {
+    /// What the hand applies to the object, in newtons, in the object's frame.
+    pub forces: Vec<Vec3>,
+    /// Torsion in newton metres about the inward normal.
+    pub torsions: Vec<f32>,
+    /// Length of the wrench that is left unbalanced (torque over characteristic length), as a share of the weight.
+    pub residual: f32,
+}
+
+/// What [`balance`] and [`epsilon`] keep from one call to the next, so that they need not allocate.
 #[derive(Clone, Debug, Default)]
-pub struct Buffers;
-/// c
-pub fn balance(contacts: &[SoftContact], _l: &Load, _b: &mut Buffers) -> Option<Balance> { (contacts.len()>=3).then(|| Balance{forces: contacts.iter().map(|c| -c.normal).collect(), torsions: vec![0.0;contacts.len()], residual: 0.0}) }
-/// c
-pub fn epsilon(_c: &[SoftContact], _l: &Load) -> f32 { 1.0 }
+pub struct Buffers {
+    cones: Vec<contact_model::ContactCone>,
+    solver: least_squares::ConicLeastSquares,
+    polytope: polytope::Polytope,
+}

@@ -1,0 +1,292 @@
+//! Force balance: which contact forces hold the object against gravity.
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    Balance, Buffers, Load, SoftContact,
+    contact_model::{ContactCone, ScaledWrench, UnitPush, dot},
+    least_squares::{Column, ConicLeastSquares},
+};
+use crate::synthesis::{force_distribution::COMFORTABLE_SHARES, wrenches::GRAVITY};
+
+/// The most force at a contact in newtons: peak force of a finger (thesis 2.5, after Didomenico and Nussbaum). A smaller
+/// one refuses heavy objects.
+pub const MAX_CONTACT_FORCE: f32 = 27.0;
+
+/// How long the unbalanced wrench may be, as a share of the weight. The thesis' 5 degrees are 9 %, and objects held like
+/// that fall in a simulation; a smaller share refuses more grasps.
+pub const BALANCE_TOLERANCE: f32 = 0.02;
+
+/// How firmly the digits press where balance leaves it open: the sum of their normal forces times friction, over the
+/// weight. 1 is the least with which two opposed digits hold anything; people keep a margin of about half above that
+/// (Westling and Johansson 1984).
+const FIRMNESS: f64 = 1.5;
+
+/// The firmness aimed at puts no digit beyond this share of [`MAX_CONTACT_FORCE`]; nobody lifts with all their strength
+/// more firmly than necessary.
+const FIRM_SHARE_OF_MAX: f64 = 0.5;
+
+/// Weight of uncomfortable shares against unbalanced wrench. The balance pays with the square of it: ten times as much
+/// would spend the whole tolerance on comfort, and a tenth would drown in rounding.
+const SHARE_WEIGHT: f64 = 0.05;
+
+/// Weight of firmness: well below that of the shares, which matter more.
+const FIRMNESS_WEIGHT: f64 = 0.01;
+
+/// Weight of a contact's limit against unbalanced wrench: what is over the limit costs a thousand times as much.
+const LIMIT_WEIGHT: f64 = 30.0;
+
+/// The search for any balance ends at this share of [`BALANCE_TOLERANCE`]: it has been found.
+const FOUND: f64 = 0.5;
+
+/// A push that goes less than this with the residual does not help any more.
+const NEGLIGIBLE_GAIN: f64 = 1e-6;
+
+/// Columns tried for each of the two questions. Most grasps need a dozen.
+const MAX_COLUMNS: usize = 60;
+
+/// Rows in front of all: the wrench.
+const WRENCH_ROWS: usize = 6;
+
+/// Forces inside the friction limits, each at most [`MAX_CONTACT_FORCE`], that balance gravity within
+/// [`BALANCE_TOLERANCE`]: of those the digits' shares are as near to the comfortable ones (Eq. 4.6) as balance allows,
+/// and then their sum near to a firm grip. The palm may press as it likes. `None` if there are none.
+///
+/// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
+pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
+    let Buffers { cones, solver, .. } = buffers;
+    cones.clear();
+    cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
+    let mut problem = Problem::new(contacts, load, cones);
+    // First whether there are any: that settles most grasps, at once.
+    problem.solve(solver);
+    let mut found = problem.balance(solver);
+    if found.residual > BALANCE_TOLERANCE {
+        return None;
+    }
+    if exceeds_limit(&found) {
+        problem.limited = true;
+        problem.solve(solver);
+        found = problem.balance(solver);
+    }
+    problem.keep_limits(&mut found);
+    if found.residual > BALANCE_TOLERANCE {
+        return None;
+    }
+    problem.comfortable = true;
+    problem.solve(solver);
+    let mut preferred = problem.balance(solver);
+    if !problem.limited && exceeds_limit(&preferred) {
+        problem.limited = true;
+        problem.solve(solver);
+        preferred = problem.balance(solver);
+    }
+    problem.keep_limits(&mut preferred);
+    Some(if preferred.residual <= BALANCE_TOLERANCE {
+        preferred
+    } else {
+        found
+    })
+}
+
+/// Non-negative least squares for one grasp. Forces are in units of the weight.
+///
+/// Rows: the wrench; then, if limited, one a contact that sets its force and a slack equal to the limit; then, if
+/// comfortable, one a digit for its share and one for the sum of all.
+struct Problem<'a> {
+    contacts: &'a [SoftContact],
+    cones: &'a [ContactCone],
+    /// In newtons.
+    weight: f64,
+    length: f64,
+    up: DVec3,
+    /// Comfortable shares of the digits that touch, scaled to sum one.
+    shares: [f64; 5],
+    /// Sum of the digits' normal forces to aim at.
+    firm_sum: f64,
+    limited: bool,
+    comfortable: bool,
+}
+
+impl<'a> Problem<'a> {
+    fn new(contacts: &'a [SoftContact], load: &Load, cones: &'a [ContactCone]) -> Self {
+        let weight = f64::from(load.mass * GRAVITY);
+        let mut shares = [0.0; 5];
+        let mut friction = f64::INFINITY;
+        for contact in contacts {
+            if let Some(digit) = contact.digit {
+                shares[digit.index()] = f64::from(COMFORTABLE_SHARES[digit.index()]);
+                friction = friction.min(f64::from(contact.friction));
+            }
+        }
+        let sum: f64 = shares.iter().sum();
+        let largest = shares.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let strongest = FIRM_SHARE_OF_MAX * f64::from(MAX_CONTACT_FORCE) / weight;
+        let firm_sum = if sum > 0.0 {
+            (FIRMNESS / friction).min(strongest * sum / largest)
+        } else {
+            0.0
+        };
+        Self {
+            contacts,
+            cones,
+            weight,
+            length: f64::from(load.characteristic_length),
+            up: load.up.as_dvec3(),
+            shares: shares.map(|share| if sum > 0.0 { share / sum } else { 0.0 }),
+            firm_sum,
+            limited: false,
+            comfortable: false,
+        }
+    }
+
+    /// The largest force at a contact over the weight.
+    fn limit(&self) -> f64 {
+        f64::from(MAX_CONTACT_FORCE) / self.weight
+    }
+
+    fn limit_rows(&self) -> usize {
+        if self.limited { self.contacts.len() } else { 0 }
+    }
+
+    /// Adds pushes until none helps.
+    fn solve(&self, solver: &mut ConicLeastSquares) {
+        let rows = WRENCH_ROWS + self.limit_rows() + if self.comfortable { 6 } else { 0 };
+        let mut entries = vec![0.0; rows];
+        entries[..3].copy_from_slice(&self.up.to_array());
+        entries[WRENCH_ROWS..WRENCH_ROWS + self.limit_rows()].fill(LIMIT_WEIGHT);
+        if self.comfortable {
+            entries[rows - 1] = FIRMNESS_WEIGHT * self.firm_sum;
+        }
+        solver.reset(&entries);
+        for contact in 0..self.limit_rows() {
+            entries.fill(0.0);
+            entries[WRENCH_ROWS + contact] = LIMIT_WEIGHT;
+            solver.add(&entries, Column::Slack);
+        }
+        for _ in 0..MAX_COLUMNS {
+            let residual = solver.residual();
+            let unbalanced: ScaledWrench = std::array::from_fn(|k| residual[k]);
+            if !self.comfortable
+                && dot(&unbalanced, &unbalanced).sqrt() < FOUND * f64::from(BALANCE_TOLERANCE)
+            {
+                return;
+            }
+            let mut best = (NEGLIGIBLE_GAIN, None);
+            for (contact, cone) in self.cones.iter().enumerate() {
+                let push = cone.farthest_push(&unbalanced).1;
+                self.write_entries(contact, &push, &mut entries);
+                let gain = dot(solver.residual(), &entries);
+                if gain > best.0 {
+                    best = (gain, Some((contact, push)));
+                }
+            }
+            let slack = (0..self.limit_rows())
+                .map(|row| (LIMIT_WEIGHT * solver.residual()[WRENCH_ROWS + row], row))
+                .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
+            if slack.0 > best.0 {
+                entries.fill(0.0);
+                entries[WRENCH_ROWS + slack.1] = LIMIT_WEIGHT;
+                if solver.add(&entries, Column::Slack) {
+                    continue;
+                }
+            }
+            let Some((contact, push)) = best.1 else {
+                return;
+            };
+            self.write_entries(contact, &push, &mut entries);
+            if !solver.add(&entries, Column::Push { contact, push }) {
+                return;
+            }
+        }
+    }
+
+    /// The column of a push.
+    fn write_entries(&self, contact: usize, push: &UnitPush, entries: &mut [f64]) {
+        entries[..WRENCH_ROWS].copy_from_slice(&self.cones[contact].wrench(push));
+        let (limits, comfort) = entries[WRENCH_ROWS..].split_at_mut(self.limit_rows());
+        limits.fill(0.0);
+        if let Some(row) = limits.get_mut(contact) {
+            // Forces at a contact add up to at most the sum of their lengths.
+            *row = LIMIT_WEIGHT * push.force.length() / self.limit();
+        }
+        comfort.fill(0.0);
+        if let (true, Some(digit)) = (self.comfortable, self.contacts[contact].digit) {
+            // Of digit d: its normal force less its share of the sum of all digits.
+            for (row, share) in comfort.iter_mut().zip(self.shares) {
+                *row = -SHARE_WEIGHT * share;
+            }
+            comfort[digit.index()] += SHARE_WEIGHT;
+            comfort[5] = FIRMNESS_WEIGHT;
+        }
+    }
+
+    fn balance(&self, solver: &ConicLeastSquares) -> Balance {
+        let mut pushes = vec![UnitPush::default(); self.contacts.len()];
+        for (factor, column) in solver.weighted_columns() {
+            if let Column::Push { contact, push } = column {
+                pushes[*contact].force += push.force * factor;
+                pushes[*contact].torsion += push.torsion * factor;
+            }
+        }
+        Balance {
+            residual: self.residual(&pushes),
+            forces: pushes
+                .iter()
+                .map(|push| (push.force * self.weight).as_vec3())
+                .collect(),
+            torsions: pushes
+                .iter()
+                .map(|push| (push.torsion * self.weight * self.length) as f32)
+                .collect(),
+        }
+    }
+
+    /// What the pushes leave unbalanced, over the weight.
+    fn residual(&self, pushes: &[UnitPush]) -> f32 {
+        let [x, y, z] = self.up.to_array();
+        let mut left = [x, y, z, 0.0, 0.0, 0.0];
+        for (cone, push) in self.cones.iter().zip(pushes) {
+            for (left, part) in left.iter_mut().zip(cone.wrench(push)) {
+                *left -= part;
+            }
+        }
+        dot(&left, &left).sqrt() as f32
+    }
+
+    /// Shortens what is over the limit, as equations with weights leave a little.
+    fn keep_limits(&self, balance: &mut Balance) {
+        if !exceeds_limit(balance) {
+            return;
+        }
+        for (force, torsion) in balance.forces.iter_mut().zip(&mut balance.torsions) {
+            let factor = MAX_CONTACT_FORCE / force.length();
+            if factor < 1.0 {
+                *force = shortened(*force, factor);
+                *torsion *= factor;
+            }
+        }
+        let pushes: Vec<UnitPush> = balance
+            .forces
+            .iter()
+            .zip(&balance.torsions)
+            .map(|(force, &torsion)| UnitPush {
+                force: force.as_dvec3() / self.weight,
+                torsion: f64::from(torsion) / (self.weight * self.length),
+            })
+            .collect();
+        balance.residual = self.residual(&pushes);
+    }
+}
+
+fn exceeds_limit(balance: &Balance) -> bool {
+    balance
+        .forces
+        .iter()
+        .any(|force| force.length() > MAX_CONTACT_FORCE)
+}
+
+/// Rounded down, so that the limit holds in single precision too.
+fn shortened(force: Vec3, factor: f32) -> Vec3 {
+    force * (factor * (1.0 - f32::EPSILON * 2.0))
+}

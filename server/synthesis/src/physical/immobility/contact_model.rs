@@ -1,0 +1,108 @@
+//! The contact model: which wrenches a soft finger can apply.
+
+use glam::DVec3;
+
+use super::{Load, SoftContact};
+
+/// A force and its torque about the centre of mass over the characteristic length.
+pub(super) type ScaledWrench = [f64; 6];
+
+/// Product of two vectors of equally many numbers.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// A contact's friction limits, prepared for questions. Everything is per newton of normal force.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ContactCone {
+    inward: DVec3,
+    /// From the centre of mass to the contact, over the characteristic length.
+    arm: DVec3,
+    friction: f64,
+    /// Torsion radius over characteristic length.
+    torsion: f64,
+}
+
+/// What a contact applies with a normal force of one newton.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct UnitPush {
+    pub(super) force: DVec3,
+    /// About the inward normal, over the characteristic length.
+    pub(super) torsion: f64,
+}
+
+impl ContactCone {
+    pub(super) fn new(contact: &SoftContact, load: &Load) -> Self {
+        let length = f64::from(load.characteristic_length);
+        Self {
+            inward: -contact.normal.as_dvec3().normalize_or_zero(),
+            arm: (contact.position.as_dvec3() - load.centre_of_mass.as_dvec3()) / length,
+            friction: f64::from(contact.friction),
+            torsion: f64::from(contact.torsion_radius) / length,
+        }
+    }
+
+    /// The push whose wrench reaches farthest along `direction`, and how far.
+    ///
+    /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is
+    /// (n + t)·a + s b with a = u + v × arm and b = v·n; over an ellipsoid that is largest at t = μ² aₜ / q, s = σ² b / q
+    /// with q² = μ² |aₜ|² + σ² b², where it is a·n + q.
+    pub(super) fn farthest_push(&self, direction: &ScaledWrench) -> (f64, UnitPush) {
+        let [ux, uy, uz, vx, vy, vz] = *direction;
+        let twist = DVec3::new(vx, vy, vz);
+        let along = DVec3::new(ux, uy, uz) + twist.cross(self.arm);
+        let along_normal = along.dot(self.inward);
+        let across = along - self.inward * along_normal;
+        let about_normal = twist.dot(self.inward);
+        let (friction_squared, torsion_squared) =
+            (self.friction * self.friction, self.torsion * self.torsion);
+        let gain = (friction_squared * across.length_squared()
+            + torsion_squared * about_normal * about_normal)
+            .sqrt();
+        let push = if gain > 0.0 {
+            UnitPush {
+                force: self.inward + across * (friction_squared / gain),
+                torsion: torsion_squared * about_normal / gain,
+            }
+        } else {
+            UnitPush {
+                force: self.inward,
+                torsion: 0.0,
+            }
+        };
+        (along_normal + gain, push)
+    }
+
+    /// The wrench of a push, or of a sum of pushes.
+    pub(super) fn wrench(&self, push: &UnitPush) -> ScaledWrench {
+        let torque = self.arm.cross(push.force) + self.inward * push.torsion;
+        let force = push.force;
+        [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+    }
+
+    /// The push along the normal alone.
+    pub(super) fn normal_push(&self) -> UnitPush {
+        UnitPush {
+            force: self.inward,
+            torsion: 0.0,
+        }
+    }
+}
+
+/// The wrench that reaches farthest along `direction` over all contacts, each with one newton of normal force, and how
+/// far: the support function of the hull of unit wrenches.
+pub(super) fn farthest_wrench(cones: &[ContactCone], direction: &ScaledWrench) -> (f64, ScaledWrench) {
+    let mut best = (f64::NEG_INFINITY, [0.0; 6]);
+    let mut chosen = None;
+    for cone in cones {
+        let (reach, push) = cone.farthest_push(direction);
+        if reach > best.0 {
+            best.0 = reach;
+            chosen = Some((cone, push));
+        }
+    }
+    if let Some((cone, push)) = chosen {
+        best.1 = cone.wrench(&push);
+    }
+    best
+}

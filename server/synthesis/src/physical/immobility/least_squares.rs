@@ -1,0 +1,167 @@
+//! Non-negative least squares after Lawson and Hanson (1974, chapter 23), one column at a time.
+//!
+//! The columns are not a matrix that is there from the start: whoever asks looks at the residual, finds the column of a
+//! cone that goes with it best, and adds it. What is kept is the passive set, the columns with a positive weight; the
+//! weights always solve the least-squares problem over it.
+
+use super::contact_model::{UnitPush, dot};
+
+/// A pivot of the Cholesky factorisation below this share of its diagonal means that a column depends on the others.
+const DEPENDENT_PIVOT: f64 = 1e-11;
+
+/// What a column stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Column {
+    /// A push of a contact.
+    Push {
+        /// Index of the contact.
+        contact: usize,
+        /// Force and torsion per unit of weight.
+        push: UnitPush,
+    },
+    /// What is left below an upper limit.
+    Slack,
+}
+
+/// The smallest |A x − b| over x ≥ 0, for the columns added so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ConicLeastSquares {
+    /// b.
+    target: Vec<f64>,
+    /// A by columns.
+    entries: Vec<f64>,
+    columns: Vec<Column>,
+    /// x.
+    weights: Vec<f64>,
+    /// b − A x.
+    residual: Vec<f64>,
+    /// The Cholesky factor of `AᵀA`, row by row.
+    factor: Vec<f64>,
+    /// The solution without regard to signs.
+    free: Vec<f64>,
+}
+
+impl ConicLeastSquares {
+    /// Starts anew, without columns.
+    pub(super) fn reset(&mut self, target: &[f64]) {
+        self.target.clear();
+        self.target.extend_from_slice(target);
+        self.residual.clear();
+        self.residual.extend_from_slice(target);
+        self.entries.clear();
+        self.columns.clear();
+        self.weights.clear();
+    }
+
+    /// b − A x.
+    pub(super) fn residual(&self) -> &[f64] {
+        &self.residual
+    }
+
+    /// The passive columns and their weights.
+    pub(super) fn weighted_columns(&self) -> impl Iterator<Item = (f64, &Column)> {
+        self.weights.iter().copied().zip(&self.columns)
+    }
+
+    /// Adds a column and solves again. False, and nothing is changed, if it depends on those that are there or would
+    /// get no positive weight.
+    pub(super) fn add(&mut self, entries: &[f64], column: Column) -> bool {
+        debug_assert_eq!(entries.len(), self.target.len(), "a column has other rows");
+        self.entries.extend_from_slice(entries);
+        self.columns.push(column);
+        self.weights.push(0.0);
+        let newest = self.columns.len() - 1;
+        if !self.solve_freely() || self.free[newest] <= 0.0 {
+            self.remove(newest);
+            return false;
+        }
+        // Lawson and Hanson's inner loop: as far toward the free solution as no weight becomes negative; the columns
+        // whose weight vanishes leave the passive set.
+        while self.free.iter().any(|&weight| weight <= 0.0) {
+            let mut step = 1.0_f64;
+            let mut blocking = 0;
+            for (k, (&weight, &free)) in self.weights.iter().zip(&self.free).enumerate() {
+                if free <= 0.0 && weight < step * (weight - free) {
+                    step = weight / (weight - free);
+                    blocking = k;
+                }
+            }
+            for (weight, &free) in self.weights.iter_mut().zip(&self.free) {
+                *weight += step * (free - *weight);
+            }
+            self.weights[blocking] = 0.0;
+            for k in (0..self.weights.len()).rev() {
+                if self.weights[k] <= 0.0 {
+                    self.remove(k);
+                }
+            }
+            if !self.solve_freely() {
+                // Columns of an independent set are independent; only rounding comes here. The weights stand.
+                self.free.clone_from(&self.weights);
+            }
+        }
+        self.weights.clone_from(&self.free);
+        self.update_residual();
+        true
+    }
+
+    fn remove(&mut self, column: usize) {
+        let rows = self.target.len();
+        let last = self.columns.len() - 1;
+        self.columns.swap_remove(column);
+        self.weights.swap_remove(column);
+        self.entries
+            .copy_within(last * rows..(last + 1) * rows, column * rows);
+        self.entries.truncate(last * rows);
+    }
+
+    fn update_residual(&mut self) {
+        self.residual.copy_from_slice(&self.target);
+        for (column, &weight) in self.entries.chunks_exact(self.target.len()).zip(&self.weights) {
+            for (residual, entry) in self.residual.iter_mut().zip(column) {
+                *residual -= weight * entry;
+            }
+        }
+    }
+
+    /// Solves `AᵀA x = Aᵀb` by Cholesky into `free`. False if columns are dependent.
+    fn solve_freely(&mut self) -> bool {
+        let count = self.columns.len();
+        let rows = self.target.len();
+        self.factor.resize(count * count, 0.0);
+        self.free.resize(count, 0.0);
+        for i in 0..count {
+            let column = &self.entries[i * rows..(i + 1) * rows];
+            for j in 0..=i {
+                let product = dot(column, &self.entries[j * rows..(j + 1) * rows]);
+                let (before, of_i) = self.factor.split_at(i * count);
+                let known = dot(
+                    &of_i[..j],
+                    if j == i {
+                        &of_i[..j]
+                    } else {
+                        &before[j * count..j * count + j]
+                    },
+                );
+                let rest = product - known;
+                self.factor[i * count + j] = if j < i {
+                    rest / self.factor[j * count + j]
+                } else if rest > DEPENDENT_PIVOT * product {
+                    rest.sqrt()
+                } else {
+                    return false;
+                };
+            }
+            let known = dot(&self.factor[i * count..i * count + i], &self.free[..i]);
+            self.free[i] = (dot(column, &self.target) - known) / self.factor[i * count + i];
+        }
+        for i in (0..count).rev() {
+            let mut value = self.free[i];
+            for k in i + 1..count {
+                value -= self.factor[k * count + i] * self.free[k];
+            }
+            self.free[i] = value / self.factor[i * count + i];
+        }
+        true
+    }
+}

@@ -1,0 +1,296 @@
+//! A convex polytope in six dimensions that grows by one vertex at a time.
+//!
+//! All facets are simplices of six vertices. A new vertex sees some facets from outside; they go, and each ridge between
+//! a facet that goes and one that stays gets a new facet with the vertex (beneath and beyond). The plane of such a facet
+//! is the combination of the two planes at the ridge that meets the vertex; both factors are positive, so that nothing
+//! cancels and rounding does not grow.
+
+use super::contact_model::{ScaledWrench, dot};
+
+/// Numbers in a wrench.
+const DIMENSIONS: usize = 6;
+
+/// A vertex sees a facet if it is farther than this outside. Wrenches are of the order of one; rounding is far below, and
+/// a facet that was spared wrongly is off by no more than this.
+const OUTSIDE: f64 = 1e-10;
+
+/// A hull that is thinner than this in some direction has no volume.
+const FLAT: f64 = 1e-7;
+
+/// Set in a dying facet's neighbour to say that it is the new facet at that ridge.
+const NEW: u32 = 1 << 31;
+
+#[derive(Clone, Copy, Debug)]
+struct Facet {
+    /// Outward unit normal.
+    normal: ScaledWrench,
+    vertices: [u16; DIMENSIONS],
+    /// Neighbour k shares all vertices but the k-th.
+    neighbours: [u32; DIMENSIONS],
+    /// Signed distance of the newest vertex, if `seen_by` names it.
+    height: f64,
+    seen_by: u32,
+}
+
+/// A polytope with simplicial facets.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Polytope {
+    vertices: u32,
+    facets: Vec<Facet>,
+    /// Signed distance of each facet's plane from the origin, negative if the origin is outside; infinite for facets
+    /// that are gone.
+    offsets: Vec<f64>,
+    gone: Vec<u32>,
+    going: Vec<u32>,
+    created: Vec<u32>,
+}
+
+impl Polytope {
+    /// Starts with a simplex of seven points that `farthest` gives for as many directions. False if all points lie in a
+    /// plane.
+    pub(super) fn start(&mut self, farthest: impl Fn(&ScaledWrench) -> (f64, ScaledWrench)) -> bool {
+        let mut corners = [[0.0; DIMENSIONS]; DIMENSIONS + 1];
+        corners[0] = farthest(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).1;
+        // An orthonormal basis of the directions spanned so far.
+        let mut basis = [[0.0; DIMENSIONS]; DIMENSIONS];
+        for count in 0..DIMENSIONS {
+            let direction = perpendicular(&basis[..count]);
+            let height =
+                |corner: &ScaledWrench| (dot(corner, &direction) - dot(&corners[0], &direction)).abs();
+            let forward = farthest(&direction).1;
+            let backward = farthest(&direction.map(|x| -x)).1;
+            let corner = if height(&forward) >= height(&backward) {
+                forward
+            } else {
+                backward
+            };
+            if height(&corner) < FLAT {
+                return false;
+            }
+            corners[count + 1] = corner;
+            let edge = std::array::from_fn(|k| corner[k] - corners[0][k]);
+            basis[count] = orthonormalised(edge, &basis[..count]);
+        }
+        let Some(coordinates) = barycentric_coordinates(&corners) else {
+            return false;
+        };
+        self.vertices = DIMENSIONS as u32 + 1;
+        self.facets.clear();
+        self.offsets.clear();
+        self.gone.clear();
+        for (k, &(gradient, constant)) in coordinates.iter().enumerate() {
+            // 0 on the facet opposite to corner k, 1 in that corner.
+            let length = dot(&gradient, &gradient).sqrt();
+            let others = std::array::from_fn(|i| if i < k { i } else { i + 1 });
+            self.facets.push(Facet {
+                normal: gradient.map(|x| -x / length),
+                vertices: others.map(|i| i as u16),
+                neighbours: others.map(|i| i as u32),
+                height: 0.0,
+                seen_by: 0,
+            });
+            self.offsets.push(constant / length);
+        }
+        true
+    }
+
+    /// The facet whose plane is nearest to the origin, or farthest beyond it if the origin is outside.
+    pub(super) fn nearest_facet(&self) -> u32 {
+        let mut nearest = (f64::INFINITY, 0);
+        for (index, &offset) in self.offsets.iter().enumerate() {
+            if offset < nearest.0 {
+                nearest = (offset, index as u32);
+            }
+        }
+        nearest.1
+    }
+
+    /// Outward unit normal of a facet and its signed distance from the origin.
+    pub(super) fn plane(&self, facet: u32) -> (ScaledWrench, f64) {
+        (self.facets[facet as usize].normal, self.offsets[facet as usize])
+    }
+
+    /// How many facets there are.
+    pub(super) fn facet_count(&self) -> usize {
+        self.facets.len() - self.gone.len()
+    }
+
+    /// Grows by a vertex that is outside `facet`. False, and nothing is changed, if it is not.
+    pub(super) fn expand(&mut self, facet: u32, vertex: ScaledWrench) -> bool {
+        let height = dot(&self.facets[facet as usize].normal, &vertex) - self.offsets[facet as usize];
+        if height <= OUTSIDE {
+            return false;
+        }
+        let name = self.vertices;
+        self.vertices += 1;
+        self.created.clear();
+        self.going.clear();
+        self.going.push(facet);
+        self.facets[facet as usize].height = height;
+        self.facets[facet as usize].seen_by = name;
+        let mut visited = 0;
+        while visited < self.going.len() {
+            let from = self.going[visited];
+            visited += 1;
+            for ridge in 0..DIMENSIONS {
+                let to = self.facets[from as usize].neighbours[ridge];
+                let neighbour = &mut self.facets[to as usize];
+                if neighbour.seen_by != name {
+                    neighbour.seen_by = name;
+                    neighbour.height = dot(&neighbour.normal, &vertex) - self.offsets[to as usize];
+                    if neighbour.height > OUTSIDE {
+                        self.going.push(to);
+                    }
+                }
+                if self.facets[to as usize].height <= OUTSIDE {
+                    self.create(from, ridge, to, name);
+                }
+            }
+        }
+        for k in 0..self.created.len() {
+            self.link(self.created[k]);
+        }
+        for &index in &self.going {
+            self.offsets[index as usize] = f64::INFINITY;
+        }
+        self.gone.append(&mut self.going);
+        true
+    }
+
+    /// The new facet at the ridge of `going`, opposite to its vertex `ridge`, beyond which `staying` stays.
+    fn create(&mut self, going: u32, ridge: usize, staying: u32, name: u32) {
+        let (from, to) = (&self.facets[going as usize], &self.facets[staying as usize]);
+        let (a, b) = ((-to.height).max(0.0), from.height);
+        let sum: ScaledWrench = std::array::from_fn(|k| a * from.normal[k] + b * to.normal[k]);
+        let scale = dot(&sum, &sum).sqrt().recip();
+        let offset = (a * self.offsets[going as usize] + b * self.offsets[staying as usize]) * scale;
+        let mut facet = Facet {
+            normal: sum.map(|x| x * scale),
+            vertices: from.vertices,
+            // The others are found when all new facets are there.
+            neighbours: [going; DIMENSIONS],
+            height: 0.0,
+            seen_by: name,
+        };
+        facet.vertices[ridge] = name as u16;
+        facet.neighbours[ridge] = staying;
+        let index = if let Some(index) = self.gone.pop() {
+            self.facets[index as usize] = facet;
+            self.offsets[index as usize] = offset;
+            index
+        } else {
+            self.facets.push(facet);
+            self.offsets.push(offset);
+            self.facets.len() as u32 - 1
+        };
+        self.created.push(index);
+        self.facets[going as usize].neighbours[ridge] = NEW | index;
+        for neighbour in &mut self.facets[staying as usize].neighbours {
+            if *neighbour == going {
+                *neighbour = index;
+            }
+        }
+    }
+
+    /// Finds a new facet's neighbours among the new ones: around the four vertices that they share with the newest one,
+    /// through facets that go, to where that fan ends.
+    fn link(&mut self, index: u32) {
+        let newest = (self.vertices - 1) as u16;
+        let facet = self.facets[index as usize];
+        let at_newest = position(&facet.vertices, newest);
+        for other in (0..DIMENSIONS).filter(|&k| k != at_newest) {
+            // All other neighbours still name the facet that the new one replaces.
+            let mut from = facet.neighbours[other];
+            let mut pivot = self.facets[from as usize].vertices[at_newest];
+            let mut across = other;
+            loop {
+                let to = self.facets[from as usize].neighbours[across];
+                if to & NEW != 0 {
+                    self.facets[index as usize].neighbours[other] = to & !NEW;
+                    break;
+                }
+                // Enter `to`, where the vertex not shared becomes the one to keep, and leave it opposite to the pivot.
+                let entered = &self.facets[to as usize];
+                let back = position(&entered.neighbours, from);
+                across = position(&entered.vertices, pivot);
+                pivot = entered.vertices[back];
+                from = to;
+            }
+        }
+    }
+}
+
+fn position<T: Copy + PartialEq>(values: &[T; DIMENSIONS], value: T) -> usize {
+    values.iter().position(|v| *v == value).unwrap_or(0)
+}
+
+/// What is left of a vector without its parts along an orthonormal basis, at length one.
+fn orthonormalised(vector: ScaledWrench, basis: &[ScaledWrench]) -> ScaledWrench {
+    let mut rest = vector;
+    // Twice, because once loses digits when little is left.
+    for _ in 0..2 {
+        for axis in basis {
+            let along = dot(&rest, axis);
+            for (x, a) in rest.iter_mut().zip(axis) {
+                *x -= along * a;
+            }
+        }
+    }
+    let length = dot(&rest, &rest).sqrt();
+    rest.map(|x| x / length)
+}
+
+/// A direction perpendicular to an orthonormal basis that does not span everything: from the axis that it covers least.
+fn perpendicular(basis: &[ScaledWrench]) -> ScaledWrench {
+    let covered = |k: usize| basis.iter().map(|axis| axis[k] * axis[k]).sum::<f64>();
+    let mut least = 0;
+    for k in 1..DIMENSIONS {
+        if covered(k) < covered(least) {
+            least = k;
+        }
+    }
+    let mut axis = [0.0; DIMENSIONS];
+    axis[least] = 1.0;
+    orthonormalised(axis, basis)
+}
+
+/// Gradient and constant of each barycentric coordinate: the columns of the inverse of the matrix whose rows are the
+/// corners with a 1 behind them, by Gauss and Jordan with row pivots. `None` if it is singular.
+fn barycentric_coordinates(
+    corners: &[ScaledWrench; DIMENSIONS + 1],
+) -> Option<[(ScaledWrench, f64); DIMENSIONS + 1]> {
+    const N: usize = DIMENSIONS + 1;
+    let mut left = [[1.0; N]; N];
+    let mut right = [[0.0; N]; N];
+    for (k, corner) in corners.iter().enumerate() {
+        left[k][..DIMENSIONS].copy_from_slice(corner);
+        right[k][k] = 1.0;
+    }
+    for column in 0..N {
+        let mut pivot = column;
+        for row in column + 1..N {
+            if left[row][column].abs() > left[pivot][column].abs() {
+                pivot = row;
+            }
+        }
+        left.swap(column, pivot);
+        right.swap(column, pivot);
+        let scale = left[column][column].recip();
+        if !scale.is_finite() {
+            return None;
+        }
+        left[column] = left[column].map(|x| x * scale);
+        right[column] = right[column].map(|x| x * scale);
+        let (left_pivot, right_pivot) = (left[column], right[column]);
+        for row in (0..N).filter(|&row| row != column) {
+            let factor = left[row][column];
+            for k in 0..N {
+                left[row][k] -= factor * left_pivot[k];
+                right[row][k] -= factor * right_pivot[k];
+            }
+        }
+    }
+    Some(std::array::from_fn(|k| {
+        (std::array::from_fn(|i| right[i][k]), right[DIMENSIONS][k])
+    }))
+}

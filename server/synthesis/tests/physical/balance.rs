@@ -1,0 +1,292 @@
+//! Force balance against closed forms, and its limits over many random grasps.
+
+use glam::Vec3;
+use grasp_synthesis::{
+    hand::Digit,
+    physical::immobility::{
+        BALANCE_TOLERANCE, Balance, Buffers, Load, MAX_CONTACT_FORCE, SoftContact, balance,
+    },
+    synthesis::comfort::comfort,
+};
+
+use crate::support::{Random, contacts_at, load, moved, scaled};
+
+fn solve(contacts: &[SoftContact], load: &Load) -> Option<Balance> {
+    balance(contacts, load, &mut Buffers::default())
+}
+
+/// What is left unbalanced over the weight, in single steps from the reply alone.
+fn residual(contacts: &[SoftContact], load: &Load, balance: &Balance) -> f32 {
+    let weight = load.mass * 9.81;
+    let mut force = load.up * -weight;
+    let mut torque = Vec3::ZERO;
+    for ((contact, &push), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
+        force += push;
+        torque += (contact.position - load.centre_of_mass).cross(push) - contact.normal * torsion;
+    }
+    (force.length_squared() + (torque / load.characteristic_length).length_squared()).sqrt() / weight
+}
+
+fn assert_sound(contacts: &[SoftContact], load: &Load, balance: &Balance, what: &str) {
+    let left = residual(contacts, load, balance);
+    assert!(
+        left <= BALANCE_TOLERANCE * 1.001,
+        "{what}: {left} is left unbalanced"
+    );
+    assert!(
+        (left - balance.residual).abs() < 1e-4,
+        "{what}: {left}, not {}",
+        balance.residual
+    );
+    for ((contact, &force), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
+        assert!(
+            force.length() <= MAX_CONTACT_FORCE,
+            "{what}: {} N",
+            force.length()
+        );
+        let normal = -force.dot(contact.normal);
+        let across = (force + contact.normal * normal).length();
+        assert!(normal >= -1e-5, "{what}: a contact pulls with {normal} N");
+        let slipping = across / contact.friction;
+        let twisting = if torsion == 0.0 {
+            0.0
+        } else {
+            torsion / contact.torsion_radius
+        };
+        let used = (slipping * slipping + twisting * twisting).sqrt();
+        assert!(
+            used <= normal * 1.0001 + 1e-4,
+            "{what}: {used} of {normal} N used"
+        );
+    }
+}
+
+/// Two opposed contacts carry a weight if and only if each can push with half of it along the edge of its cone.
+#[test]
+fn pinch_holds_what_friction_carries() {
+    let places = [(Vec3::X * 0.03, Vec3::X), (Vec3::NEG_X * 0.03, Vec3::NEG_X)];
+    for friction in [0.34_f32, 0.5, 1.0] {
+        let contacts = contacts_at(&places, friction, 0.004);
+        // Half the weight across, half the weight over friction along the normal.
+        let greatest = 2.0 * MAX_CONTACT_FORCE / (1.0 + 1.0 / (friction * friction)).sqrt() / 9.81;
+        for share in [0.01, 0.2, 0.5, 0.9, 0.99] {
+            let load = load(share * greatest, Vec3::Y, 0.04);
+            let found =
+                solve(&contacts, &load).unwrap_or_else(|| panic!("friction {friction}, share {share}"));
+            assert_sound(&contacts, &load, &found, "pinch");
+            for force in &found.forces {
+                let half = load.mass * 9.81 / 2.0;
+                assert!(
+                    force.x.abs() >= half / friction * (1.0 - 0.05),
+                    "friction {friction}: {force}"
+                );
+                assert!(
+                    (force.y - half).abs() <= half * 0.05,
+                    "friction {friction}: {force}"
+                );
+            }
+        }
+        for share in [1.05, 2.0, 20.0] {
+            assert_eq!(
+                solve(&contacts, &load(share * greatest, Vec3::Y, 0.04)),
+                None,
+                "share {share}"
+            );
+        }
+    }
+}
+
+/// A pinch beside the centre of mass needs torsion of mass times lever, which the pads must be wide enough for.
+#[test]
+fn pinch_beside_the_centre_of_mass_needs_torsion() {
+    let places = [
+        (Vec3::new(0.03, 0.0, 0.01), Vec3::X),
+        (Vec3::new(-0.03, 0.0, 0.01), Vec3::NEG_X),
+    ];
+    let load = load(0.2, Vec3::Y, 0.05);
+    assert_eq!(solve(&contacts_at(&places, 0.6, 0.0), &load), None);
+    let contacts = contacts_at(&places, 0.6, 0.006);
+    let found = solve(&contacts, &load).expect("wide pads hold it");
+    assert_sound(&contacts, &load, &found, "beside");
+    // About +x: the torsions about the inward normals -x and +x.
+    let about_x = found.torsions[1] - found.torsions[0];
+    let needed = -0.01 * 0.2 * 9.81;
+    assert!((about_x + needed).abs() < 0.1 * needed.abs() || (about_x - needed).abs() < 0.1 * needed.abs());
+}
+
+/// From below, anything holds up to the limit of 27 N a contact.
+#[test]
+fn tray_holds_up_to_the_limit() {
+    let places = [(Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y)];
+    let contacts = contacts_at(&places, 0.5, 0.004);
+    let found = solve(&contacts, &load(2.7, Vec3::Y, 0.04)).expect("26.5 N are possible");
+    assert!((found.forces[0].y - 2.7 * 9.81).abs() < 0.6);
+    assert_eq!(solve(&contacts, &load(2.85, Vec3::Y, 0.04)), None);
+    assert_eq!(solve(&contacts, &load(0.1, Vec3::X, 0.04)), None);
+    assert_eq!(solve(&contacts, &load(0.1, Vec3::NEG_Y, 0.04)), None);
+    assert_eq!(solve(&[], &load(0.1, Vec3::Y, 0.04)), None);
+}
+
+/// Where balance leaves shares open, they are the comfortable ones: thumb 1/2, index and middle 1/4 each of two that
+/// stand opposite to it... which opposition forbids for thumb against two: there the thumb carries half.
+#[test]
+fn shares_are_comfortable_where_they_can_be() {
+    // Five contacts below a tray, all at the same place: any distribution balances.
+    let below = (Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y);
+    let contacts = contacts_at(&[below; 5], 0.5, 0.004);
+    let load = load(0.5, Vec3::Y, 0.04);
+    let found = solve(&contacts, &load).expect("a tray holds");
+    let total: f32 = found.forces.iter().map(|force| force.length()).sum();
+    for (force, share) in found.forces.iter().zip([0.25, 0.25, 0.25, 0.125, 0.125]) {
+        assert!(
+            (force.length() / total - share).abs() < 0.02,
+            "{force} of {total}"
+        );
+    }
+    // A thumb against two fingers carries what both do, and they the same.
+    let against = [
+        (Vec3::X * 0.03, Vec3::X),
+        (Vec3::new(-0.03, 0.0, 0.02), Vec3::NEG_X),
+        (Vec3::new(-0.03, 0.0, -0.02), Vec3::NEG_X),
+    ];
+    let contacts = contacts_at(&against, 0.6, 0.004);
+    let found = solve(&contacts, &load).expect("three digits hold it");
+    assert_sound(&contacts, &load, &found, "three");
+    let total: f32 = found.forces.iter().map(|force| force.length()).sum();
+    for (force, share) in found.forces.iter().zip([0.5, 0.25, 0.25]) {
+        assert!(
+            (force.length() / total - share).abs() < 0.03,
+            "{force} of {total}"
+        );
+    }
+}
+
+/// Forces over many random grasps keep every limit, and the residual is that of what is answered.
+#[test]
+fn random_grasps_keep_every_limit() {
+    let mut random = Random::new(3);
+    let mut buffers = Buffers::default();
+    let (mut held, mut limited) = (0, 0);
+    for case in 0..4000 {
+        let contacts = random.contacts(1 + case % 10);
+        let load = load(random.between(0.02, 4.0), random.direction(), 0.04);
+        let Some(found) = balance(&contacts, &load, &mut buffers) else {
+            continue;
+        };
+        held += 1;
+        limited += u32::from(
+            found
+                .forces
+                .iter()
+                .any(|force| force.length() > 0.99 * MAX_CONTACT_FORCE),
+        );
+        assert_sound(&contacts, &load, &found, &format!("case {case}"));
+    }
+    assert!(held > 800, "only {held} grasps hold");
+    assert!(limited > 20, "only {limited} grasps come to a limit");
+}
+
+/// Forces of a known balance exist, so they are found: contacts push at random inside their limits, and gravity is what
+/// they add up to.
+#[test]
+fn finds_a_balance_where_one_was_made() {
+    let mut random = Random::new(4);
+    for case in 0..2000 {
+        let contacts = random.contacts(2 + case % 7);
+        let mut force = Vec3::ZERO;
+        let mut torque = Vec3::ZERO;
+        for contact in &contacts {
+            let size = random.between(0.0, 5.0);
+            let across = random.direction().reject_from_normalized(contact.normal);
+            let push = (across * contact.friction * random.between(0.0, 0.95) - contact.normal) * size;
+            force += push;
+            torque += contact.position.cross(push);
+        }
+        let weight = force.length();
+        if weight < 0.5 {
+            continue;
+        }
+        // Of the lines of action with this force, only one with no torque along it goes through a centre of mass.
+        let up = force / weight;
+        let lever = 0.04;
+        if torque.dot(up).abs() / lever > 0.005 * weight {
+            continue;
+        }
+        let load = Load {
+            mass: weight / 9.81,
+            centre_of_mass: force.cross(torque) / (weight * weight),
+            up,
+            characteristic_length: lever,
+        };
+        let found = solve(&contacts, &load);
+        assert!(
+            found.is_some(),
+            "case {case}: {} contacts, {weight} N",
+            contacts.len()
+        );
+    }
+}
+
+/// Rotation, order and units do not matter to whether forces exist, nor to how comfortable they are.
+#[test]
+fn is_invariant() {
+    let mut random = Random::new(5);
+    let (mut held, mut differing) = (0, 0);
+    for case in 0..600 {
+        let contacts = random.contacts(3 + case % 5);
+        let load = load(random.between(0.05, 0.6), random.direction(), 0.04);
+        let found = solve(&contacts, &load);
+        let (turned, turned_load) = moved(&contacts, &load, random.rotation(), random.direction());
+        let (larger, larger_load) = scaled(&contacts, &load, 3.0);
+        let mut permuted = contacts.clone();
+        permuted.reverse();
+        let others = [
+            solve(&turned, &turned_load),
+            solve(&larger, &larger_load),
+            solve(&permuted, &load),
+        ];
+        for (other, of) in others.iter().zip([&turned, &larger, &permuted]) {
+            match (&found, other) {
+                (Some(a), Some(b)) => {
+                    let (a, b) = (discomfort(&contacts, a), discomfort(of, b));
+                    assert!((a - b).abs() < 0.02, "case {case}: {a} and {b}");
+                }
+                (None, None) => {}
+                _ => differing += 1,
+            }
+        }
+        held += u32::from(found.is_some());
+    }
+    assert!(held > 100, "only {held} grasps hold");
+    // At the very edge of the tolerance, rounding decides.
+    assert!(differing <= 3, "{differing} differ");
+}
+
+fn discomfort(contacts: &[SoftContact], balance: &Balance) -> f32 {
+    let mut totals = [0.0; 5];
+    for (contact, force) in contacts.iter().zip(&balance.forces) {
+        if let Some(digit) = contact.digit {
+            totals[digit.index()] += force.length();
+        }
+    }
+    comfort(totals)
+}
+
+/// The palm presses as it likes: it has no share.
+#[test]
+fn palm_may_carry_what_digits_cannot() {
+    let mut contacts = contacts_at(
+        &[
+            (Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y),
+            (Vec3::new(0.0, 0.02, 0.0), Vec3::Y),
+        ],
+        0.5,
+        0.004,
+    );
+    contacts[0].digit = None;
+    contacts[1].digit = Some(Digit::Index);
+    let load = load(1.0, Vec3::Y, 0.04);
+    let found = solve(&contacts, &load).expect("it lies on the palm");
+    assert_sound(&contacts, &load, &found, "palm");
+    assert!(found.forces[0].y > 9.6);
+}

@@ -1,0 +1,5 @@
+//! Tests of physical validity.
+
+mod balance;
+mod closure;
+mod support;
