@@ -8,7 +8,12 @@ use grasp_synthesis::geometry::mesh::TriangleMesh;
 use grasp_tests::TestServer;
 
 /// Holdouts of each object that are answered soon.
-const HOLDOUTS: [&str; 4] = ["remote-genhold3", "scalpel-hold2", "scissors-hold1", "scissors-genhold1"];
+const HOLDOUTS: [&str; 4] = [
+    "remote-genhold3",
+    "scalpel-hold2",
+    "scissors-hold1",
+    "scissors-genhold1",
+];
 
 /// Skin friction where nothing else is said, as the contract has it.
 const FRICTION: f64 = 0.6;
@@ -58,7 +63,10 @@ async fn forces_hold_the_weight_inside_of_their_cones() {
         assert_eq!(answer.report.validity, Some(Validity::Physical));
         let grasp = answer.grasp.expect("a grasp");
         let margins = grasp.margins.expect("margins of a physical grasp");
-        assert!(margins.residual <= 0.02 && margins.epsilon >= 0.02, "{name}: {margins:?}");
+        assert!(
+            margins.residual <= 0.02 && margins.epsilon >= 0.02,
+            "{name}: {margins:?}"
+        );
 
         let built_in = holdout(name).expect("a built-in holdout");
         let about = &object(&built_in.object).expect("a built-in object").object;
@@ -70,16 +78,29 @@ async fn forces_hold_the_weight_inside_of_their_cones() {
             let normal = contact.object_normal.as_dvec3();
             let pressing = -pushes.dot(normal);
             let rubbing = (pushes + normal * pressing).length();
-            assert!(pressing > 0.0 && pushes.length() <= 27.0 + 1e-3, "{name}: {pushes}");
-            assert!(rubbing <= FRICTION * pressing * (1.0 + 1e-3) + 1e-6, "{name}: {rubbing} N at {pressing} N");
+            assert!(
+                pressing > 0.0 && pushes.length() <= 27.0 + 1e-3,
+                "{name}: {pushes}"
+            );
+            assert!(
+                rubbing <= FRICTION * pressing * (1.0 + 1e-3) + 1e-6,
+                "{name}: {rubbing} N at {pressing} N"
+            );
             let lever = contact.object_position.as_dvec3() - about.centre_of_mass.as_dvec3();
             force += pushes;
             torque += lever.cross(pushes) - normal * f64::from(contact.torsion);
-            assert!(distance_to_mesh(about.surface.mesh(), contact.object_position.as_dvec3()) < 1e-5, "{name}");
+            assert!(
+                distance_to_mesh(about.surface.mesh(), contact.object_position.as_dvec3()) < 1e-5,
+                "{name}"
+            );
         }
         let length = f64::from(about.bounding_box.half_extents.length());
         let left = ((force - up * weight).length_squared() + (torque / length).length_squared()).sqrt();
-        assert!(left <= 0.02 * weight, "{name}: {:.1} % unbalanced", 100.0 * left / weight);
+        assert!(
+            left <= 0.02 * weight,
+            "{name}: {:.1} % unbalanced",
+            100.0 * left / weight
+        );
     }
 }
 
@@ -89,21 +110,34 @@ async fn no_bone_comes_nearer_to_the_object_than_flesh_gives_way() {
     let client = server.client().await;
     for name in HOLDOUTS {
         let answer = ask(&client, name, 2).await;
-        let grasp = answer.grasp.unwrap_or_else(|| panic!("{name}: {:?}", answer.report));
+        let grasp = answer
+            .grasp
+            .unwrap_or_else(|| panic!("{name}: {:?}", answer.report));
         let built_in = holdout(name).expect("a built-in holdout");
         let object_from_world = built_in.world_from_object.inverse();
-        let mesh = object(&built_in.object).expect("a built-in object").object.surface.mesh();
+        let mesh = object(&built_in.object)
+            .expect("a built-in object")
+            .object
+            .surface
+            .mesh();
         // The OpenXR joints of each finger and of the thumb, metacarpal to tip.
         for chain in [2..=5, 6..=10, 11..=15, 16..=20, 21..=25] {
             let joints: Vec<_> = chain.map(|index| &grasp.joints[index]).collect();
             for bone in joints.windows(2) {
                 for step in 0..10 {
                     let share = step as f32 / 10.0;
-                    let at = bone[0].client_from_joint.position.lerp(bone[1].client_from_joint.position, share);
+                    let at = bone[0]
+                        .client_from_joint
+                        .position
+                        .lerp(bone[1].client_from_joint.position, share);
                     let radius = bone[0].radius + (bone[1].radius - bone[0].radius) * share;
                     let distance = distance_to_mesh(mesh, object_from_world.transform_point(at).as_dvec3());
                     // The last millimetres of a tip are rounder than a cone to it.
-                    let slack = if bone[1].radius < bone[0].radius { 0.0005 } else { 0.0 };
+                    let slack = if bone[1].radius < bone[0].radius {
+                        0.0005
+                    } else {
+                        0.0
+                    };
                     assert!(
                         distance >= f64::from(radius) - 0.002 - slack || step > 7,
                         "{name}: {:.1} mm deep",

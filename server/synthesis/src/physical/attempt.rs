@@ -10,7 +10,10 @@ use super::{
 use crate::{
     geometry::mesh_bvh::MeshBvh,
     grasp::{Contact, Grasp, PhysicalMargins},
-    hand::{Digit, DigitAngles, HandPose, Phalanx, rig::Rig},
+    hand::{
+        Digit, DigitAngles, HandPose, Phalanx,
+        rig::{AngleRange, Rig},
+    },
     holdout::Holdout,
     rejection::Rejection,
     strategy::BendRatioChoice,
@@ -33,9 +36,14 @@ pub const GIVER_CLEARANCE: f32 = 0.001;
 /// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way.
 pub const FORBIDDEN_CLEARANCE: f32 = 0.002;
 
-/// Smallest Ferrari-Canny epsilon of a grasp. In a simulation, grasps above 0.02 did not fall under gravity and half of
-/// them held against pulls in all directions. A higher one gives firmer grasps and finds fewer.
-pub const LEAST_EPSILON: f32 = 0.02;
+/// Smallest Ferrari-Canny epsilon of a grasp on an object that fingers get round. In a simulation, grasps above 0.02 did
+/// not fall under gravity and half of them held against pulls in all directions. A higher one gives firmer grasps and
+/// finds fewer.
+const LEAST_EPSILON: f32 = 0.02;
+
+/// Of the epsilon that a thin object allows at best, the share that a grasp must have: a rod can only be kept from rolling
+/// by friction at its radius, however it is held.
+const LEAST_SHARE_OF_BEST: f32 = 0.25;
 
 /// Metres by which friction is multiplied to give the torsion that a fingertip bears per newton of normal force: two
 /// thirds of the radius of a disk that is pressed evenly, of 5 mm here. A larger one lets two fingers hold what would
@@ -55,6 +63,7 @@ pub struct PhysicalScene {
     giver: Option<HandSolids>,
     load: Load,
     friction: f32,
+    least_epsilon: f32,
 }
 
 impl PhysicalScene {
@@ -62,16 +71,22 @@ impl PhysicalScene {
     pub fn new(holdout: &Holdout, friction: f32) -> Self {
         let object = &holdout.object;
         let giver = holdout.presenting_hand.as_ref();
+        // Of the box: how far from the middle a force can act.
+        let half_extents = object.bounding_box.half_extents;
+        let characteristic_length = half_extents.length();
+        // The mean of the two smaller ones: how far from its long axis the surface is.
+        let thickness = 0.5 * (half_extents.element_sum() - half_extents.max_element());
+        let best = friction * thickness / characteristic_length;
         Self {
             giver: giver.map(|hand| HandSolids::of_joints(&hand.joints)),
             load: Load {
                 mass: object.mass,
                 centre_of_mass: object.centre_of_mass,
                 up: holdout.up,
-                // Of the box: how far from the middle a force can act.
-                characteristic_length: object.bounding_box.half_extents.length(),
+                characteristic_length,
             },
             friction,
+            least_epsilon: LEAST_EPSILON.min(LEAST_SHARE_OF_BEST * best),
         }
     }
 }
@@ -98,6 +113,46 @@ pub enum PhysicalEnd {
     Rejected(Rejection),
     /// The stop signal came before it was over.
     Interrupted,
+}
+
+/// What an attempt draws of the hand: how the thumb stands, how far the fingers are spread, and how the digits bend. The
+/// fingers share a spread and a bend ratio, as those of a person do; drawn one by one, half of the hands have fingers
+/// that cross.
+#[derive(Clone, Copy, Debug)]
+struct HandShape {
+    /// Where in its range the thumb's yaw is.
+    thumb_yaw: f32,
+    /// 0: fingers beside each other or as close as they go, 1: as far apart as they go.
+    spread: f32,
+    /// Of the thumb and of the fingers, as indices into [`BEND_RATIOS`].
+    bend_ratios: [usize; 2],
+}
+
+impl HandShape {
+    fn draw(choice: BendRatioChoice, stream: &mut AttemptStream) -> Self {
+        let mut draw_ratio = |digit: Digit| {
+            let allowed = allowed_ratios(choice, digit.index());
+            allowed[stream.below(allowed.len())]
+        };
+        let bend_ratios = [draw_ratio(Digit::Thumb), draw_ratio(Digit::Index)];
+        Self {
+            thumb_yaw: stream.unit(),
+            spread: stream.unit(),
+            bend_ratios,
+        }
+    }
+
+    /// Where in its range a digit's yaw is: spread fingers fan out from between middle and ring finger.
+    fn yaw_share(&self, digit: Digit) -> f32 {
+        let fan = match digit {
+            Digit::Thumb => return self.thumb_yaw,
+            Digit::Index => -0.5,
+            Digit::Middle => -1.0 / 6.0,
+            Digit::Ring => 1.0 / 6.0,
+            Digit::Little => 0.5,
+        };
+        0.5 + fan * self.spread
+    }
 }
 
 /// The hand of an attempt, as far as it came, and its buffers.
@@ -138,11 +193,12 @@ impl PhysicalAttempt {
         // Step 2, Finger Posing.
         let mut closed: [Option<ClosedDigit>; 5] = [None; 5];
         let mut closings = Vec::with_capacity(5);
+        let shape = HandShape::draw(around.bend_ratios, stream);
         for digit in Digit::ALL {
             if interrupted() {
                 return PhysicalEnd::Interrupted;
             }
-            let closing = around.closing(digit, wrist, stream);
+            let closing = around.closing(digit, wrist, &shape);
             closings.push(closing);
             let Some(ended) = closing.close() else {
                 stopwatch.lap(Step::FingerPosing);
@@ -259,8 +315,13 @@ impl PhysicalAttempt {
     fn immobilize(&mut self, around: &Surroundings<'_>) -> Option<(Balance, f32)> {
         let load = &around.scene.load;
         let balance = balance(&self.soft_contacts, load, &mut self.buffers)?;
-        let epsilon = epsilon(&self.soft_contacts, load, LEAST_EPSILON, &mut self.buffers);
-        (epsilon >= LEAST_EPSILON).then_some((balance, epsilon))
+        let epsilon = epsilon(
+            &self.soft_contacts,
+            load,
+            around.scene.least_epsilon,
+            &mut self.buffers,
+        );
+        (epsilon >= around.scene.least_epsilon).then_some((balance, epsilon))
     }
 
     fn grasp(
@@ -290,18 +351,17 @@ impl PhysicalAttempt {
 }
 
 impl<'a> Surroundings<'a> {
-    /// One digit, ready to close at a random yaw and bend ratio.
-    fn closing(&self, digit: Digit, wrist: &WristFrame, stream: &mut AttemptStream) -> Closing<'a> {
+    /// One digit, ready to close.
+    fn closing(&self, digit: Digit, wrist: &WristFrame, shape: &HandShape) -> Closing<'a> {
         let rig = self.rig.digit(digit);
-        let yaw = rig.limits.base_yaw;
-        let ratios = allowed_ratios(self.bend_ratios, digit.index());
+        let AngleRange { min, max } = rig.limits.base_yaw;
         Closing {
             surface: &self.holdout.object.surface,
             digit: rig,
             radii: link_radii(self.rig, digit),
             object_from_wrist: wrist.object_from_wrist,
-            base_yaw: stream.between(yaw.min, yaw.max),
-            bend_ratio: BEND_RATIOS[ratios[stream.below(ratios.len())]],
+            base_yaw: min + (max - min) * shape.yaw_share(digit),
+            bend_ratio: BEND_RATIOS[shape.bend_ratios[usize::from(digit != Digit::Thumb)]],
         }
     }
 
