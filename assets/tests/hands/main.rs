@@ -8,6 +8,7 @@ mod opposition;
 mod recorded;
 mod skin;
 mod skin_fit;
+mod solids;
 
 use grasp_assets::hands::{Hand, RIG_NAMES, hand};
 use grasp_synthesis::hand::{DigitAngles, Handedness, rig::Rig};

@@ -53,10 +53,19 @@ impl TaperedCapsule {
         }
     }
 
-    /// The ball around it: its centre and radius in metres.
+    /// The smallest ball around it: its centre and radius in metres.
     pub fn bounding_ball(&self) -> (Vec3, f32) {
-        let reach = self.start_radius.max(self.end_radius);
-        ((self.start + self.end) * 0.5, 0.5 * self.length() + reach)
+        let length = self.length();
+        let (start, end) = (self.start_radius, self.end_radius);
+        if length <= (end - start).abs() {
+            return if end > start {
+                (self.end, end)
+            } else {
+                (self.start, start)
+            };
+        }
+        let radius = 0.5 * (length + start + end);
+        (self.at((radius - start) / length), radius)
     }
 
     /// Distance from a point to the surface in metres, negative inside. Exact.

@@ -2,14 +2,16 @@
 //!
 //! A hand is a union of tapered capsules ([`HandSolids`]). How far it is from an object's surface, and how deep in it,
 //! is asked capsule by capsule ([`clearance()`], [`closest()`]); how far from other parts of itself and from another hand
-//! by [`self_clearance`] and [`giver_clearance`].
+//! by [`self_clearance`], [`giver_clearance`] and [`least_distance`].
 
+mod flesh;
 mod hand_clearance;
 mod hand_solids;
 mod mesh_clearance;
 
-pub use hand_clearance::{SOFT_CONTACT, giver_clearance, self_clearance};
-pub use hand_solids::{FOREARM_SOLIDS, HandSolids, PALM_SOLIDS, link_radii, link_solids};
+pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
+pub use hand_clearance::{SOFT_CONTACT, giver_clearance, least_distance, self_clearance};
+pub use hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
 pub use mesh_clearance::{Touch, clearance, closest};
 
 pub use crate::geometry::tapered_capsule::TaperedCapsule;

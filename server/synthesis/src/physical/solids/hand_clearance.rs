@@ -1,26 +1,33 @@
 //! How far a hand is from itself and from another.
 
+use glam::Vec3;
+
 use super::{HandSolids, TaperedCapsule};
 
-/// How far the skins of two digits may press into each other before they count as one going through the other, in
-/// metres: neighbouring fingers touch in life, and flesh gives way by about this much on either side.
+/// How far the skins of two parts of a hand may press into each other before one counts as going through the other, in
+/// metres: neighbouring fingers touch in life, and the flesh of both gives way by a millimetre under little force. More
+/// lets fingers visibly share room, less refuses hands that are closed like every other.
 pub const SOFT_CONTACT: f32 = 0.002;
 
-/// The smallest distance between two digits of a hand in metres, less what soft flesh allows ([`SOFT_CONTACT`]):
-/// negative if one goes through the other.
+/// The smallest distance between parts of a hand that can meet in metres, less what soft flesh allows
+/// ([`SOFT_CONTACT`]): negative if one goes through the other.
+///
+/// Those are the links of different digits, and the two outer links of a digit with the palm, for fingers also with the
+/// ball of the thumb. The inner links and the thumb's ball overlap the palm in every pose.
 pub fn self_clearance(hand: &HandSolids) -> f32 {
     let mut least = f32::INFINITY;
-    for first in 0..5 {
-        for second in first + 1..5 {
-            for (i, a) in hand.phalanges[first].iter().enumerate() {
-                for (j, b) in hand.phalanges[second].iter().enumerate() {
-                    // Neighbours are one flesh where they begin.
-                    if i == 0 && j == 0 {
-                        continue;
-                    }
-                    least = least.min(a.distance(b));
-                }
-            }
+    let digits = hand.phalanges.map(|links| links.map(Bounded::new));
+    for (i, digit) in digits.iter().enumerate() {
+        for other in &digits[i + 1..] {
+            least = between(digit, other, least);
+        }
+    }
+    let palm = hand.palm.map(Bounded::new);
+    let thenar = hand.thenar.map(Bounded::new);
+    for (i, digit) in digits.iter().enumerate() {
+        least = between(&digit[1..], &palm, least);
+        if i > 0 {
+            least = between(&digit[1..], &thenar, least);
         }
     }
     least + SOFT_CONTACT
@@ -28,19 +35,73 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
 
 /// The smallest distance between two hands with their forearms in metres; negative if they overlap.
 pub fn giver_clearance(receiver: &HandSolids, giver: &HandSolids) -> f32 {
-    let mut least = f32::INFINITY;
-    for a in receiver.iter() {
-        for b in giver.iter() {
-            if apart(a, b) < least {
-                least = least.min(a.distance(b));
+    least_distance(receiver.iter(), giver, f32::INFINITY)
+}
+
+/// The smallest distance between solids and a hand with its forearm in metres, or `enough` if it is more than that.
+pub fn least_distance<'a>(
+    solids: impl IntoIterator<Item = &'a TaperedCapsule>,
+    hand: &HandSolids,
+    enough: f32,
+) -> f32 {
+    let mut theirs = [Bounded::default(); HandSolids::COUNT];
+    for (bounded, solid) in theirs.iter_mut().zip(hand.iter()) {
+        *bounded = Bounded::new(*solid);
+    }
+    solids.into_iter().fold(enough, |least, ours| {
+        between(&[Bounded::new(*ours)], &theirs, least)
+    })
+}
+
+/// A solid with the ball around it.
+#[derive(Clone, Copy)]
+struct Bounded {
+    solid: TaperedCapsule,
+    centre: Vec3,
+    radius: f32,
+}
+
+impl Default for Bounded {
+    fn default() -> Self {
+        Self::new(TaperedCapsule::default())
+    }
+}
+
+impl Bounded {
+    fn new(solid: TaperedCapsule) -> Self {
+        let (centre, radius) = solid.bounding_ball();
+        Self {
+            solid,
+            centre,
+            radius,
+        }
+    }
+
+    /// True if the other is certainly farther away than `distance`: by the balls around both, then by one ball and the
+    /// longer solid, as the ball around a forearm is wide.
+    fn is_beyond(&self, other: &Self, distance: f32) -> bool {
+        let reach = distance + self.radius + other.radius;
+        if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {
+            return true;
+        }
+        let (long, round) = if self.radius > other.radius {
+            (self, other)
+        } else {
+            (other, self)
+        };
+        long.solid.signed_distance(round.centre) > distance + round.radius
+    }
+}
+
+/// The smallest distance between two groups of solids, or `least` if it is more than that.
+fn between(ours: &[Bounded], theirs: &[Bounded], least: f32) -> f32 {
+    let mut least = least;
+    for our in ours {
+        for their in theirs {
+            if !our.is_beyond(their, least) {
+                least = least.min(our.solid.distance(&their.solid));
             }
         }
     }
     least
-}
-
-/// A lower bound of the distance between two solids.
-fn apart(a: &TaperedCapsule, b: &TaperedCapsule) -> f32 {
-    let ((centre_a, radius_a), (centre_b, radius_b)) = (a.bounding_ball(), b.bounding_ball());
-    centre_a.distance(centre_b) - radius_a - radius_b
 }

@@ -4,7 +4,10 @@ use std::array;
 
 use glam::Vec3;
 
-use super::TaperedCapsule;
+use super::{
+    TaperedCapsule,
+    flesh::{PALM_SOLIDS, Skeleton, THENAR_SOLIDS},
+};
 use crate::{
     hand::{
         Digit, HandPose,
@@ -14,34 +17,42 @@ use crate::{
     pose::Pose,
 };
 
-/// Solids that the palm is made of.
-pub const PALM_SOLIDS: usize = 8;
-
 /// Solids that the forearm is made of: side by side, since it is twice as wide as thick at the wrist.
 pub const FOREARM_SOLIDS: usize = 2;
 
 /// How much of the forearm counts, in metres behind the wrist: to the elbow's end of an adult's forearm.
 const FOREARM_LENGTH: f32 = 0.25;
 
-/// How much thicker the forearm is at its far end than at the wrist: mean circumferences of forearm and wrist in
-/// ANSUR II are 0.31 m and 0.18 m.
-const FOREARM_TAPER: f32 = 1.7;
+/// Half the thickness of the forearm at wrist and far end, as a multiple of the wrist's tracked radius, which is half its
+/// thickness at the crease. The far one makes a circumference of 0.30 m beside one of 0.17 m at an adult's wrist, as the
+/// means of ANSUR II for forearm and wrist are.
+const FOREARM_RADII: [f32; 2] = [0.95, 2.3];
 
-/// Breadth of a wrist per thickness.
-const WRIST_BREADTH: f32 = 1.45;
+/// How far its two solids lie from its middle at wrist and far end, in the same unit: a wrist is 1.65 times as broad as
+/// thick, a forearm 1.4 times.
+const FOREARM_SIDES: [f32; 2] = [0.65, 0.85];
+
+/// How much thicker the first phalanx of a finger is at the knuckle than at its far joint. The radius of a knuckle
+/// includes the palm's flesh, which does not bend with the finger.
+const KNUCKLE_TAPER: f32 = 1.03;
 
 /// A posed hand and its forearm as solids, in the frame of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandSolids {
     /// The three links of each digit, thumb first. The thumb's first one is its metacarpal.
     pub phalanges: [[TaperedCapsule; 3]; 5],
-    /// The metacarpals of index, middle, ring and little finger, then what fills the palm between them and the thumb.
+    /// The palm, as far as it moves with the wrist.
     pub palm: [TaperedCapsule; PALM_SOLIDS],
+    /// The ball of the thumb and the web to the index finger: they move with the thumb's metacarpal.
+    pub thenar: [TaperedCapsule; THENAR_SOLIDS],
     /// The forearm, from the wrist backward.
     pub forearm: [TaperedCapsule; FOREARM_SOLIDS],
 }
 
 impl HandSolids {
+    /// How many solids there are.
+    pub(super) const COUNT: usize = 15 + PALM_SOLIDS + THENAR_SOLIDS + FOREARM_SOLIDS;
+
     /// The solids of a posed rig.
     pub fn of_pose(rig: &Rig, pose: &HandPose) -> Self {
         Self::of_joints(&HandJoints::of_pose(rig, pose))
@@ -51,51 +62,29 @@ impl HandSolids {
     pub fn of_joints(joints: &HandJoints) -> Self {
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
-        let bone = |from: usize, to: usize| TaperedCapsule::new(at(from), at(to), radius(from), radius(to));
-
         let phalanges = array::from_fn(|digit| {
             let joints = joints_of_digit(digit);
-            link_solids(joints.map(at), joints.map(radius))
+            link_solids(joints.map(at), slimmed(digit, joints.map(radius)))
         });
-        let metacarpals: [_; 4] =
-            array::from_fn(|i| bone(index::FIRST_OF_DIGIT[i + 1], index::FIRST_OF_DIGIT[i + 1] + 1));
-        let between = |i: usize, j: usize| {
-            let (a, b): (TaperedCapsule, TaperedCapsule) = (metacarpals[i], metacarpals[j]);
-            TaperedCapsule::new(
-                (a.start + b.start) * 0.5,
-                (a.end + b.end) * 0.5,
-                0.5 * (a.start_radius + b.start_radius),
-                0.5 * (a.end_radius + b.end_radius),
-            )
-        };
-        let palm = [
-            metacarpals[0],
-            metacarpals[1],
-            metacarpals[2],
-            metacarpals[3],
-            between(0, 1),
-            between(1, 2),
-            between(2, 3),
-            // The web between the thumb and the index finger.
-            bone(index::FIRST_OF_DIGIT[0] + 1, index::FIRST_OF_DIGIT[1]),
-        ];
+        let skeleton = Skeleton::new(joints);
         Self {
             phalanges,
-            palm,
+            palm: skeleton.palm(),
+            thenar: skeleton.thenar(),
             forearm: forearm(
                 thesis_from_openxr_frame(joints.joints[index::WRIST].pose),
                 radius(index::WRIST),
-                Vec3::NEG_Y,
             ),
         }
     }
 
-    /// All solids: phalanges by digit, palm, forearm.
+    /// All solids: phalanges by digit, palm, ball of the thumb, forearm.
     pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> {
         self.phalanges
             .as_flattened()
             .iter()
             .chain(&self.palm)
+            .chain(&self.thenar)
             .chain(&self.forearm)
     }
 }
@@ -106,9 +95,21 @@ fn joints_of_digit(digit: usize) -> [usize; 4] {
     [tip - 3, tip - 2, tip - 1, tip]
 }
 
-/// Distances from joint to skin at the ends of a digit's three links, in metres.
+/// Distances from bone to skin at the ends of a digit's three links, in metres.
 pub fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
-    joints_of_digit(digit.index()).map(|joint| rig.joint_radii[joint])
+    let radii = joints_of_digit(digit.index()).map(|joint| rig.joint_radii[joint]);
+    slimmed(digit.index(), radii)
+}
+
+/// The radii of a digit's links from those of its joints: without the palm's flesh at a finger's knuckle.
+fn slimmed(digit: usize, [first, second, third, tip]: [f32; 4]) -> [f32; 4] {
+    let is_finger = digit != Digit::Thumb.index();
+    let first = if is_finger {
+        first.min(second * KNUCKLE_TAPER)
+    } else {
+        first
+    };
+    [first, second, third, tip]
 }
 
 /// The links of a digit, whose joints and tip are at `points`, with distances from there to the skin. The tip lies on
@@ -122,16 +123,16 @@ pub fn link_solids(points: [Vec3; 4], radii: [f32; 4]) -> [TaperedCapsule; 3] {
     [link(0), link(1), TaperedCapsule { end, ..last }]
 }
 
-/// The forearm behind a wrist of `radius` metres (half its thickness), toward a unit vector of the wrist frame.
-fn forearm(frame_from_wrist: Pose, radius: f32, toward: Vec3) -> [TaperedCapsule; FOREARM_SOLIDS] {
-    let far = toward * FOREARM_LENGTH;
-    let across = Vec3::X * (radius * (WRIST_BREADTH - 1.0));
+/// The forearm straight behind a wrist of `radius` metres.
+fn forearm(frame_from_wrist: Pose, radius: f32) -> [TaperedCapsule; FOREARM_SOLIDS] {
+    let [near, far] = FOREARM_SIDES.map(|side| side * radius);
+    let [near_radius, far_radius] = FOREARM_RADII.map(|share| share * radius);
     [-1.0, 1.0].map(|side| {
         TaperedCapsule::new(
-            frame_from_wrist.transform_point(across * side),
-            frame_from_wrist.transform_point(far + across * side),
-            radius,
-            radius * FOREARM_TAPER,
+            frame_from_wrist.transform_point(Vec3::new(side * near, 0.0, 0.0)),
+            frame_from_wrist.transform_point(Vec3::new(side * far, -FOREARM_LENGTH, 0.0)),
+            near_radius,
+            far_radius,
         )
     })
 }

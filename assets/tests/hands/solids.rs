@@ -1,0 +1,201 @@
+//! Hands as solids against the skins of the built-in hands.
+
+use glam::{Quat, Vec3};
+use grasp_assets::hands::Hand;
+use grasp_synthesis::{
+    hand::{
+        DigitAngles, HandPose, Handedness,
+        joints::{HandJoints, index},
+    },
+    physical::solids::{
+        HandSolids, SOFT_CONTACT, TaperedCapsule, giver_clearance, least_distance, self_clearance,
+    },
+    pose::Pose,
+};
+
+use crate::{Numbers, all, built_in};
+
+/// How far from the wrist's crease the skin of the forearm begins to end in a rounded stump, in metres.
+const STUMP: f32 = -0.012;
+
+fn posed(hand: &Hand, digits: [DigitAngles; 5]) -> HandPose {
+    HandPose {
+        frame_from_wrist: Pose::IDENTITY,
+        digits,
+    }
+}
+
+/// A hand as one holds it to take something: fingers bent more from index to little finger, thumb abducted.
+fn relaxed() -> [DigitAngles; 5] {
+    [0.0_f32, 15.0, 20.0, 25.0, 30.0].map(|bend| {
+        if bend == 0.0 {
+            DigitAngles::coupled(35_f32.to_radians(), 0.0, 20_f32.to_radians())
+        } else {
+            DigitAngles::coupled(0.0, bend.to_radians(), bend.to_radians())
+        }
+    })
+}
+
+fn signed_distance(solids: &HandSolids, point: Vec3) -> f32 {
+    let distances = solids.iter().map(|solid| solid.signed_distance(point));
+    distances.fold(f32::INFINITY, f32::min)
+}
+
+/// The 95th percentile of the distances between skin and solids in metres, of vertices that `is_of` a part.
+fn misfit(hand: &Hand, digits: [DigitAngles; 5], is_of: impl Fn(usize, Vec3) -> bool) -> f32 {
+    let pose = posed(hand, digits);
+    let solids = HandSolids::of_pose(&hand.rig, &pose);
+    let skin = hand.skin.posed(&HandJoints::of_pose(&hand.rig, &pose));
+    let mut distances: Vec<f32> = skin
+        .iter()
+        .enumerate()
+        .filter(|&(vertex, &point)| point.y > STUMP && is_of(vertex, point))
+        .map(|(_, &point)| signed_distance(&solids, point).abs())
+        .collect();
+    assert!(distances.len() > 300, "only {} vertices", distances.len());
+    distances.sort_by(f32::total_cmp);
+    distances[distances.len() * 95 / 100]
+}
+
+/// The share of a vertex's weights that the palm has.
+fn palm_share(hand: &Hand, vertex: usize) -> f32 {
+    let rows = hand.skin.joint_indices[vertex]
+        .iter()
+        .zip(hand.skin.weights[vertex]);
+    rows.filter(|&(&joint, _)| joint < 3 || index::FIRST_OF_DIGIT.contains(&usize::from(joint)))
+        .map(|(_, weight)| weight)
+        .sum()
+}
+
+#[test]
+fn solids_end_at_the_skin() {
+    for hand in all() {
+        // Millimetres of an adult's hand in metres of this one.
+        let mm = 1e-3 * hand.rig.reach / 0.19;
+        for digits in [hand.rig.stretched(), relaxed()] {
+            let whole = misfit(hand, digits, |_, _| true);
+            assert!(whole < 1.9 * mm, "{}: {} mm", hand.rig.name, whole / mm);
+            let palm = misfit(hand, digits, |vertex, point| {
+                point.z > 0.002 && palm_share(hand, vertex) > 0.5
+            });
+            assert!(palm < 2.3 * mm, "{}: {} mm at the palm", hand.rig.name, palm / mm);
+        }
+    }
+}
+
+#[test]
+fn solids_of_tracked_joints_are_those_of_the_pose() {
+    let hand = built_in("adult", Handedness::Left);
+    let pose = HandPose {
+        frame_from_wrist: Pose::new(Vec3::new(0.1, 0.2, -0.3), Quat::from_rotation_x(1.0)),
+        digits: relaxed(),
+    };
+    let of_pose = HandSolids::of_pose(&hand.rig, &pose);
+    let elsewhere = Pose::new(Vec3::new(-0.4, 0.0, 0.2), Quat::from_rotation_y(2.0));
+    let joints = HandJoints::of_pose(&hand.rig, &pose).transformed(elsewhere);
+    let of_joints = HandSolids::of_joints(&joints);
+    for (expected, found) in of_pose.iter().zip(of_joints.iter()) {
+        let expected = expected.transformed(elsewhere);
+        assert!(
+            expected.start.distance(found.start) < 1e-6,
+            "{expected:?} {found:?}"
+        );
+        assert!(expected.end.distance(found.end) < 1e-6, "{expected:?} {found:?}");
+        let radii = [
+            expected.start_radius - found.start_radius,
+            expected.end_radius - found.end_radius,
+        ];
+        assert!(radii.iter().all(|off| off.abs() < 1e-6), "{expected:?} {found:?}");
+    }
+}
+
+#[test]
+fn a_left_hand_is_the_mirror_image_of_the_right() {
+    let flip = |point: Vec3| point * Vec3::new(-1.0, 1.0, 1.0);
+    for rig in ["thesis", "adult"] {
+        let [left, right] = [Handedness::Left, Handedness::Right].map(|side| {
+            HandSolids::of_pose(&built_in(rig, side).rig, &posed(built_in(rig, side), relaxed()))
+        });
+        let mut mirrored: Vec<TaperedCapsule> = right.iter().copied().collect();
+        for solid in &mut mirrored {
+            (solid.start, solid.end) = (flip(solid.start), flip(solid.end));
+        }
+        // The forearm's two solids change sides.
+        let forearm = mirrored.len() - 2;
+        mirrored.swap(forearm, forearm + 1);
+        for (expected, found) in mirrored.iter().zip(left.iter()) {
+            assert!(
+                expected.start.distance(found.start) < 1e-5,
+                "{expected:?} {found:?}"
+            );
+            assert!(expected.end.distance(found.end) < 1e-5, "{expected:?} {found:?}");
+        }
+    }
+}
+
+#[test]
+fn hands_at_ease_are_clear_of_themselves() {
+    for hand in all() {
+        for digits in [hand.rig.stretched(), relaxed()] {
+            let solids = HandSolids::of_pose(&hand.rig, &posed(hand, digits));
+            let clearance = self_clearance(&solids);
+            assert!(clearance > 0.0, "{}: {clearance}", hand.rig.name);
+        }
+    }
+}
+
+#[test]
+fn fingers_through_fingers_and_palm_are_found() {
+    let hand = built_in("adult", Handedness::Right);
+    let clearance_of = |digits| self_clearance(&HandSolids::of_pose(&hand.rig, &posed(hand, digits)));
+    let mut crossed = hand.rig.stretched();
+    crossed[1].base_yaw = 20_f32.to_radians();
+    crossed[2].base_yaw = -20_f32.to_radians();
+    assert!(clearance_of(crossed) < -0.005);
+    let mut thumb_through = hand.rig.stretched();
+    // Beyond its limits: across the palm at the height of the metacarpals.
+    thumb_through[0] = DigitAngles::coupled(0.0, 60_f32.to_radians(), 40_f32.to_radians());
+    assert!(clearance_of(thumb_through) < -0.005);
+    // As far in as the deepest pair says, less the soft flesh.
+    let solids = HandSolids::of_pose(&hand.rig, &posed(hand, crossed));
+    let deepest = solids.phalanges[1]
+        .iter()
+        .flat_map(|a| solids.phalanges[2].iter().map(|b| a.distance(b)))
+        .fold(f32::INFINITY, f32::min);
+    assert!((clearance_of(crossed) - deepest - SOFT_CONTACT).abs() < 1e-6);
+}
+
+#[test]
+fn distances_between_hands_are_those_of_all_pairs() {
+    let (receiver, giver) = (
+        built_in("adult", Handedness::Right),
+        built_in("thesis", Handedness::Left),
+    );
+    let mut numbers = Numbers(9);
+    for i in 0..300 {
+        let ours = HandSolids::of_pose(&receiver.rig, &posed(receiver, numbers.angles(&receiver.rig)));
+        let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();
+        let axis = Vec3::from_array(std::array::from_fn(|_| between(-1.0, 1.0))).normalize_or(Vec3::X);
+        let place = Vec3::from_array(std::array::from_fn(|_| between(-0.25, 0.25)));
+        let turn = Quat::from_axis_angle(axis, between(0.0, 3.0));
+        let pose = HandPose {
+            frame_from_wrist: Pose::new(place, turn),
+            digits: numbers.angles(&giver.rig),
+        };
+        let theirs = HandSolids::of_pose(&giver.rig, &pose);
+        let brute = ours
+            .iter()
+            .flat_map(|a| theirs.iter().map(|b| a.distance(b)))
+            .fold(f32::INFINITY, f32::min);
+        for (found, expected) in [
+            (giver_clearance(&ours, &theirs), brute),
+            (giver_clearance(&theirs, &ours), brute),
+            (least_distance(ours.iter(), &theirs, 0.001), brute.min(0.001)),
+        ] {
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "{i}: {found} instead of {expected}"
+            );
+        }
+    }
+}

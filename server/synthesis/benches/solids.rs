@@ -1,0 +1,105 @@
+//! Time per query of hands as solids, in batches of fixed random queries: divide by the batch, or read the throughput.
+//!
+//! "Touching" capsules are as close to the surface as those of a closed finger, "near" ones within 3 cm, "deep" ones
+//! start in the volume.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use glam::Vec3;
+use grasp_synthesis::{
+    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
+    physical::solids::clearance,
+};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Queries in a batch: more than branch predictors learn by heart.
+const BATCH: usize = 4096;
+
+/// A bar of 5 × 18 × 2.4 cm, like a remote control, with quads of 3 mm.
+fn bar() -> TriangleMesh {
+    let half = Vec3::new(0.025, 0.09, 0.012);
+    let mut positions = Vec::new();
+    let mut triangles = Vec::new();
+    for axis in 0..3 {
+        let (u, v) = (Vec3::AXES[(axis + 1) % 3], Vec3::AXES[(axis + 2) % 3]);
+        let columns = (half.dot(u) / 0.0015).round() as u32;
+        let rows = (half.dot(v) / 0.0015).round() as u32;
+        for side in [-1.0, 1.0] {
+            let first = positions.len() as u32;
+            for j in 0..=rows {
+                for i in 0..=columns {
+                    let share = |k: u32, n: u32| 2.0 * k as f32 / n as f32 - 1.0;
+                    positions
+                        .push((Vec3::AXES[axis] * side + u * share(i, columns) + v * share(j, rows)) * half);
+                }
+            }
+            for j in 0..rows {
+                for i in 0..columns {
+                    let a = first + j * (columns + 1) + i;
+                    let (b, c, d) = (a + 1, a + columns + 2, a + columns + 1);
+                    triangles.extend(if side > 0.0 {
+                        [[a, b, c], [a, c, d]]
+                    } else {
+                        [[a, c, b], [a, d, c]]
+                    });
+                }
+            }
+        }
+    }
+    TriangleMesh::new(positions, triangles).expect("the mesh is sound")
+}
+
+fn random_capsules(surface: &MeshBvh, gaps: [f32; 2], deep: bool) -> Vec<TaperedCapsule> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+    let aabb = surface.aabb();
+    let mut capsules = Vec::new();
+    while capsules.len() < BATCH {
+        let mut cube = || Vec3::from_array(std::array::from_fn(|_| random.random::<f32>() * 2.0 - 1.0));
+        let start = aabb.centre() + cube() * (0.5 * aabb.extents() + 0.05);
+        let direction = cube().normalize_or(Vec3::X);
+        let radius = 0.007 + 0.003 * random.random::<f32>();
+        let length = 0.015 + 0.03 * random.random::<f32>();
+        let capsule = TaperedCapsule::new(start, start + direction * length, radius, radius * 0.85);
+        let fits = if deep {
+            surface.contains(start)
+        } else {
+            (gaps[0]..gaps[1]).contains(&clearance(&capsule, surface, 1.0))
+        };
+        if fits {
+            capsules.push(capsule);
+        }
+    }
+    capsules
+}
+
+fn clearances(criterion: &mut Criterion) {
+    let surface = MeshBvh::build(bar());
+    let mut group = criterion.benchmark_group("clearance");
+    group.throughput(Throughput::Elements(BATCH as u64));
+    for (name, gaps, deep, at_least) in [
+        ("touching", [-0.002, 0.002], false, 1.0),
+        ("touching, asked for 2 mm", [-0.002, 0.002], false, 0.002),
+        ("near", [0.002, 0.03], false, 1.0),
+        ("near, asked for 2 mm", [0.002, 0.03], false, 0.002),
+        ("deep", [0.0, 0.0], true, 1.0),
+    ] {
+        let capsules = random_capsules(&surface, gaps, deep);
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                for capsule in &capsules {
+                    black_box(clearance(black_box(capsule), &surface, at_least));
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10).warm_up_time(std::time::Duration::from_millis(300)).measurement_time(std::time::Duration::from_secs(1));
+    targets = clearances
+}
+criterion_main!(benches);
