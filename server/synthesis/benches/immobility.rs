@@ -31,10 +31,10 @@ fn grasps(count: usize) -> Vec<(Vec<SoftContact>, Load)> {
         let contacts = (0..count)
             .map(|k| {
                 let side = if k % 3 == 0 { Vec3::X } else { Vec3::NEG_X };
-                let on_sphere = (side + around() * 0.7).normalize();
+                let on_sphere = (side + around() * 0.7).normalize_or(Vec3::X);
                 SoftContact {
                     position: on_sphere * half,
-                    normal: (on_sphere / half).normalize(),
+                    normal: (on_sphere / half).normalize_or(Vec3::X),
                     digit: Digit::ALL.get(k).copied(),
                     friction: 0.6,
                     torsion_radius: 0.004,

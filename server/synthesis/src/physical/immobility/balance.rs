@@ -40,7 +40,7 @@ const LIMIT_WEIGHT: f64 = 30.0;
 const FOUND: f64 = 0.5;
 
 /// A push that goes less than this with the residual does not help any more.
-const NEGLIGIBLE_GAIN: f64 = 1e-6;
+const NEGLIGIBLE_GAIN: f64 = 3e-6;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
@@ -60,10 +60,10 @@ pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> 
     let mut problem = Problem::new(contacts, load, cones);
     // First whether there are any: that settles most grasps, at once.
     problem.solve(solver);
-    let mut found = problem.balance(solver);
-    if found.residual > BALANCE_TOLERANCE {
+    if unbalanced_length(solver) > f64::from(BALANCE_TOLERANCE) {
         return None;
     }
+    let mut found = problem.balance(solver);
     if exceeds_limit(&found) {
         problem.limited = true;
         problem.solve(solver);
@@ -159,6 +159,7 @@ impl<'a> Problem<'a> {
             entries[rows - 1] = FIRMNESS_WEIGHT * self.firm_sum;
         }
         solver.reset(&entries);
+        let strength = self.limit() * self.contacts.len() as f64;
         for contact in 0..self.limit_rows() {
             entries.fill(0.0);
             entries[WRENCH_ROWS + contact] = LIMIT_WEIGHT;
@@ -167,9 +168,8 @@ impl<'a> Problem<'a> {
         for _ in 0..MAX_COLUMNS {
             let residual = solver.residual();
             let unbalanced: ScaledWrench = std::array::from_fn(|k| residual[k]);
-            if !self.comfortable
-                && dot(&unbalanced, &unbalanced).sqrt() < FOUND * f64::from(BALANCE_TOLERANCE)
-            {
+            let length = dot(&unbalanced, &unbalanced).sqrt();
+            if !self.comfortable && length < FOUND * f64::from(BALANCE_TOLERANCE) {
                 return;
             }
             let mut best = (NEGLIGIBLE_GAIN, None);
@@ -180,6 +180,11 @@ impl<'a> Problem<'a> {
                 if gain > best.0 {
                     best = (gain, Some((contact, push)));
                 }
+            }
+            // What is left is perpendicular to what is balanced; so no pushes, together at most `strength`, can shorten it
+            // by more than their gain along it.
+            if !self.comfortable && length - strength * best.0 / length > f64::from(BALANCE_TOLERANCE) {
+                return;
             }
             let slack = (0..self.limit_rows())
                 .map(|row| (LIMIT_WEIGHT * solver.residual()[WRENCH_ROWS + row], row))
@@ -277,6 +282,12 @@ impl<'a> Problem<'a> {
             .collect();
         balance.residual = self.residual(&pushes);
     }
+}
+
+/// Length of the wrench that is left.
+fn unbalanced_length(solver: &ConicLeastSquares) -> f64 {
+    let wrench = &solver.residual()[..WRENCH_ROWS];
+    dot(wrench, wrench).sqrt()
 }
 
 fn exceeds_limit(balance: &Balance) -> bool {

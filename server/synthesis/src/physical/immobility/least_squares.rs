@@ -35,8 +35,12 @@ pub(super) struct ConicLeastSquares {
     weights: Vec<f64>,
     /// b − A x.
     residual: Vec<f64>,
-    /// The Cholesky factor of `AᵀA`, row by row.
+    /// The Cholesky factor L of `AᵀA`, the rows of its lower triangle.
     factor: Vec<f64>,
+    /// How many rows of it belong to the columns that are there now.
+    factored: usize,
+    /// The solution of L y = Aᵀb.
+    forward: Vec<f64>,
     /// The solution without regard to signs.
     free: Vec<f64>,
 }
@@ -51,6 +55,7 @@ impl ConicLeastSquares {
         self.entries.clear();
         self.columns.clear();
         self.weights.clear();
+        self.factored = 0;
     }
 
     /// b − A x.
@@ -108,6 +113,7 @@ impl ConicLeastSquares {
     fn remove(&mut self, column: usize) {
         let rows = self.target.len();
         let last = self.columns.len() - 1;
+        self.factored = self.factored.min(column);
         self.columns.swap_remove(column);
         self.weights.swap_remove(column);
         self.entries
@@ -124,44 +130,44 @@ impl ConicLeastSquares {
         }
     }
 
-    /// Solves `AᵀA x = Aᵀb` by Cholesky into `free`. False if columns are dependent.
+    /// Solves `AᵀA x = Aᵀb` by Cholesky into `free`, from the first row on that has changed. False if columns are
+    /// dependent.
     fn solve_freely(&mut self) -> bool {
         let count = self.columns.len();
         let rows = self.target.len();
-        self.factor.resize(count * count, 0.0);
-        self.free.resize(count, 0.0);
-        for i in 0..count {
+        self.factor.resize(first_of_row(count), 0.0);
+        self.forward.resize(count, 0.0);
+        for i in self.factored..count {
             let column = &self.entries[i * rows..(i + 1) * rows];
-            for j in 0..=i {
+            let (before, of_i) = self.factor.split_at_mut(first_of_row(i));
+            for j in 0..i {
+                let of_j = &before[first_of_row(j)..=first_of_row(j) + j];
                 let product = dot(column, &self.entries[j * rows..(j + 1) * rows]);
-                let (before, of_i) = self.factor.split_at(i * count);
-                let known = dot(
-                    &of_i[..j],
-                    if j == i {
-                        &of_i[..j]
-                    } else {
-                        &before[j * count..j * count + j]
-                    },
-                );
-                let rest = product - known;
-                self.factor[i * count + j] = if j < i {
-                    rest / self.factor[j * count + j]
-                } else if rest > DEPENDENT_PIVOT * product {
-                    rest.sqrt()
-                } else {
-                    return false;
-                };
+                of_i[j] = (product - dot(&of_i[..j], &of_j[..j])) / of_j[j];
             }
-            let known = dot(&self.factor[i * count..i * count + i], &self.free[..i]);
-            self.free[i] = (dot(column, &self.target) - known) / self.factor[i * count + i];
+            let product = dot(column, column);
+            let rest = product - dot(&of_i[..i], &of_i[..i]);
+            if rest <= DEPENDENT_PIVOT * product {
+                return false;
+            }
+            of_i[i] = rest.sqrt();
+            self.forward[i] = (dot(column, &self.target) - dot(&of_i[..i], &self.forward[..i])) / of_i[i];
+            self.factored = i + 1;
         }
+        self.free.clone_from(&self.forward);
         for i in (0..count).rev() {
-            let mut value = self.free[i];
-            for k in i + 1..count {
-                value -= self.factor[k * count + i] * self.free[k];
+            let row = &self.factor[first_of_row(i)..=first_of_row(i) + i];
+            let value = self.free[i] / row[i];
+            self.free[i] = value;
+            for (above, entry) in self.free[..i].iter_mut().zip(row) {
+                *above -= value * entry;
             }
-            self.free[i] = value / self.factor[i * count + i];
         }
         true
     }
+}
+
+/// Where row i of a lower triangle starts.
+fn first_of_row(i: usize) -> usize {
+    i * (i + 1) / 2
 }

@@ -42,7 +42,8 @@ pub(super) struct Polytope {
     offsets: Vec<f64>,
     gone: Vec<u32>,
     going: Vec<u32>,
-    created: Vec<u32>,
+    /// New facets, each with the one it replaces at its ridge.
+    created: Vec<(u32, u32)>,
 }
 
 impl Polytope {
@@ -148,7 +149,8 @@ impl Polytope {
             }
         }
         for k in 0..self.created.len() {
-            self.link(self.created[k]);
+            let (index, replaced) = self.created[k];
+            self.link(index, replaced);
         }
         for &index in &self.going {
             self.offsets[index as usize] = f64::INFINITY;
@@ -183,7 +185,7 @@ impl Polytope {
             self.offsets.push(offset);
             self.facets.len() as u32 - 1
         };
-        self.created.push(index);
+        self.created.push((index, going));
         self.facets[going as usize].neighbours[ridge] = NEW | index;
         for neighbour in &mut self.facets[staying as usize].neighbours {
             if *neighbour == going {
@@ -194,19 +196,25 @@ impl Polytope {
 
     /// Finds a new facet's neighbours among the new ones: around the four vertices that they share with the newest one,
     /// through facets that go, to where that fan ends.
-    fn link(&mut self, index: u32) {
+    fn link(&mut self, index: u32, replaced: u32) {
         let newest = (self.vertices - 1) as u16;
-        let facet = self.facets[index as usize];
-        let at_newest = position(&facet.vertices, newest);
+        let at_newest = position(&self.facets[index as usize].vertices, newest);
         for other in (0..DIMENSIONS).filter(|&k| k != at_newest) {
-            // All other neighbours still name the facet that the new one replaces.
-            let mut from = facet.neighbours[other];
+            if self.facets[index as usize].neighbours[other] != replaced {
+                // Found from the other end.
+                continue;
+            }
+            let mut from = replaced;
             let mut pivot = self.facets[from as usize].vertices[at_newest];
             let mut across = other;
             loop {
                 let to = self.facets[from as usize].neighbours[across];
                 if to & NEW != 0 {
-                    self.facets[index as usize].neighbours[other] = to & !NEW;
+                    // The vertices of that new facet are in the places that they have in the one it replaces.
+                    let found = to & !NEW;
+                    let back = position(&self.facets[from as usize].vertices, pivot);
+                    self.facets[index as usize].neighbours[other] = found;
+                    self.facets[found as usize].neighbours[back] = index;
                     break;
                 }
                 // Enter `to`, where the vertex not shared becomes the one to keep, and leave it opposite to the pivot.
@@ -220,8 +228,13 @@ impl Polytope {
     }
 }
 
+/// Where a value is among six, which do not differ by chance but by construction: all are looked at, without branches.
 fn position<T: Copy + PartialEq>(values: &[T; DIMENSIONS], value: T) -> usize {
-    values.iter().position(|v| *v == value).unwrap_or(0)
+    let mut found = 0;
+    for (k, &v) in values.iter().enumerate() {
+        found |= if v == value { k } else { 0 };
+    }
+    found
 }
 
 /// What is left of a vector without its parts along an orthonormal basis, at length one.
