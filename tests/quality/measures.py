@@ -18,9 +18,10 @@ from solids import clearance
 GRAVITY = 9.81
 # What the targets allow.
 OFF_MESH, OFF_SKIN, FORBIDDEN = 0.0005, 0.002, 0.002
-# Fingers press soft flesh against each other when they lie side by side: so much on both sides together is touch, more
-# is one finger in another.
-FLESH = 0.002
+# Parts of a hand press soft flesh against each other: so much on both sides together is touch, more is one in the other.
+# Neighbours side by side share skin at their roots, and are wider there than capsules tell: in recorded hands they
+# overlap by 0 to 5 mm (those of two sources, with an adult's radii scaled), while crossed ones overlap by 10 and more.
+FLESH, NEIGHBOURS_FLESH = 0.002, 0.005
 # An angle of a joint beyond its limit by more than this is broken: rounding is far below.
 LIMIT_TOLERANCE = 0.5
 # A joint that is farther than this from where the rig's bones put it belongs to another hand.
@@ -253,22 +254,25 @@ def self_clearance(hand):
             trimmed.starts[row], trimmed.start_radii[row] = middle[row], radius[row]
     trimmed = type(capsules)(trimmed.starts, trimmed.ends, trimmed.start_radii, trimmed.end_radii)
     gaps = clearance(trimmed, trimmed)
-    worst, pair = np.inf, ""
+    least, worst, pair = np.inf, np.inf, ""
     metacarpals = range(15, 19)
     for a in range(15):
         for b in range(a + 1, 19):
             (first, link), (second, other) = tags[a], tags[b]
             if second < 0:
-                considered = b in metacarpals and link == 2 or (first > 0 and link == 1 and b in metacarpals)
+                considered = b in metacarpals and (link == 2 or (first > 0 and link == 1))
             else:
                 # The thumb's metacarpal is in the palm, next to the index finger's root.
-                rooted = first == 0 and (link == 0 and other == 0)
+                rooted = first == 0 and link == 0 and other == 0
                 considered = first != second and not rooted
-            if considered and gaps[a, b] < worst:
-                worst = gaps[a, b]
+            if not considered:
+                continue
+            excess = gaps[a, b] + (NEIGHBOURS_FLESH if first > 0 and second == first + 1 else FLESH)
+            if excess < least:
+                least, worst = excess, gaps[a, b]
                 name = "palm" if second < 0 else f"{DIGITS[second]} {PHALANGES[other]}"
                 pair = f"{DIGITS[first]} {PHALANGES[link]} - {name}"
-    return {"self_clearance": float(worst), "self_collision": bool(worst < -FLESH), "closest_pair": pair}
+    return {"self_clearance": float(worst), "self_collision": bool(least < 0), "closest_pair": pair}
 
 
 def forbidden_distance(scene, hand):
