@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import hand as hands
 from hand import ROOT, Hand
-from mesh import Mesh
+from mesh import Mesh, thinned
 
 BUILT_IN = ["remote", "scalpel", "scissors"]
 # Real objects of the recorded data: file and a usual mass in kilograms.
@@ -105,8 +105,11 @@ class Placer:
 
     def __init__(self, mesh):
         self.mesh = mesh
-        points, owners = mesh.samples()
-        self.tree, self.points, self.normals = cKDTree(points), points, mesh.normals[owners]
+        self.all_points, owners = mesh.samples()
+        # Every third millimetre is enough to place by.
+        coarse = thinned(self.all_points, 0.003)
+        self.points, self.normals = self.all_points[coarse], mesh.normals[owners[coarse]]
+        self.tree = cKDTree(self.points)
         self.middle, self.half = (mesh.low + mesh.high) / 2, (mesh.high - mesh.low) / 2
 
     def _gaps(self, points):
@@ -137,11 +140,11 @@ class Placer:
         for _ in range(6):
             placed = self._attempt(hand, random)
             capsules, _ = placed.solids()
-            if max(0.0, -capsules.distances(self.points).min()) <= GIVER_DEPTH:
+            if max(0.0, -capsules.distances(self.all_points).min()) <= GIVER_DEPTH:
                 break
         return placed
 
-    def _attempt(self, hand, random, starts=800, refined=6):
+    def _attempt(self, hand, random, starts=400, refined=6):
         balls = self._balls(hand)
         grip = (2 * hand.positions[5] + hand.positions[10] + hand.positions[15]) / 4
         targets = self.middle + random.uniform(-0.5, 0.5, (starts, 3)) * self.half

@@ -20,6 +20,8 @@ from service import Service, built_in_request
 
 # A grasp should be there within this; whether there is any at all, a long search tells.
 BUDGET_SECONDS, EXHAUSTIVE_SECONDS = 0.05, 5.0
+# What each notion of valid assumes where no friction is given (leather on metal; skin on plastic).
+THESIS_FRICTION, PHYSICAL_FRICTION = 0.34, 0.6
 
 
 def arguments():
@@ -82,7 +84,8 @@ def cases(name, service, options, givers):
             mesh=mesh,
             mass=told["mass_kg"],
             centre_of_mass=np.array(told["centre_of_mass"]),
-            friction=request.get("friction") or told["friction"],
+            friction=told["friction"],
+            reach=float(np.linalg.norm(told["box_half_extents"])),
             forbidden=holdouts.forbidden_triangles(name, mesh),
             rotation=Rotation.from_quat(pose["orientation"]),
             translation=np.array(pose["position"]),
@@ -90,6 +93,16 @@ def cases(name, service, options, givers):
             giver=holdouts.giver_of_request(request),
             asked_handedness=(request.get("receiving_hand") or {}).get("handedness") or "right",
         )
+
+
+def friction_in_force(request, told, validity):
+    """The coefficient that the answer was made with: the request's, the object's, or that of the notion of valid.
+
+    An object to which none was given tells the thesis' one.
+    """
+    if request.get("friction"):
+        return request["friction"]
+    return PHYSICAL_FRICTION if validity == "physical" and abs(told - THESIS_FRICTION) < 1e-6 else told
 
 
 def ask(service, request, **picture):
@@ -125,6 +138,7 @@ def main():
                 row["in_time"] = in_time
                 row["search_ms"] = 1000 * answer["report"]["search_time_seconds"]
                 row["validity"] = answer["report"]["validity"]
+                scene.friction = friction_in_force(request, scene.friction, row["validity"])
                 if answer["grasp"]:
                     row.update(measures.judge(scene, answer["grasp"]))
                     replies.write(json.dumps({"request": request, "answer": answer}) + "\n")

@@ -10,9 +10,8 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
-import hand as hands
-from hand import CHAINS, DIGITS, PHALANGES, Hand
-from mesh import SPACING, Mesh
+from hand import DIGITS, PHALANGES, Hand
+from mesh import Mesh
 from solids import clearance
 
 GRAVITY = 9.81
@@ -33,7 +32,7 @@ NORMAL_REACH, NORMAL_ANGLE = 0.0005, 15.0
 # Most that a digit presses with, in newtons (thesis 2.5).
 STRONGEST = 27.0
 # A contact resists twisting about its normal by up to friction times force times this: two thirds of the radius of a
-# pad's patch of some 6 mm under a few newtons, pressed evenly.
+# pad's patch of some 6 mm under a few newtons, pressed evenly. Slip and twist share the friction (an ellipse).
 TORSION_RADIUS = 0.004
 # Comfortable shares of the force, thumb first (thesis 4.6).
 SHARES = np.array([0.25, 0.25, 0.25, 0.125, 0.125])
@@ -47,6 +46,8 @@ class Scene:
     mass: float
     centre_of_mass: np.ndarray
     friction: float
+    # What torques are divided by to compare them with forces: half the diagonal of the object's box.
+    reach: float
     forbidden: np.ndarray
     rotation: Rotation
     translation: np.ndarray
@@ -85,6 +86,7 @@ def judge(scene, grasp):
     return {
         **penetration(scene.mesh, local),
         **forces(scene, contacts, inverse.apply(scene.up)),
+        **epsilon(scene, contacts),
         **fingers(local, contacts),
         **contact_places(scene.mesh, local, contacts),
         **giver_clearance(scene.mesh, local, giver),
@@ -92,6 +94,7 @@ def judge(scene, grasp):
         **forbidden_distance(scene, local),
         "wrong_chirality": hand.chirality() != hand.handedness or hand.handedness != scene.asked_handedness,
         **comfort(contacts, grasp["comfort"]),
+        **told_margins(grasp),
         "contacts": len(contacts),
         "digits_touching": len({contact["digit"] for contact in contacts} & set(DIGITS)),
     }
@@ -152,19 +155,66 @@ def forces(scene, contacts, up):
     size = np.linalg.norm(force, axis=1)
     # Where the force is not zero, it presses, and slips by no more than rounding allows.
     inside = sideways <= scene.friction * pressed + 1e-3 * size + 1e-6
-    reach = np.linalg.norm(scene.mesh.vertices - scene.centre_of_mass, axis=1).max()
     missing = force.sum(axis=0) - weight * up
     torque = np.cross(arm, force).sum(axis=0)
-    # Pads resist some twisting about the normal; take what helps, within what their friction allows.
-    limit = scene.friction * np.maximum(pressed, 0.0) * TORSION_RADIUS
-    helped = lsq_linear(normal.T / reach, -torque / reach, bounds=(-limit - 1e-12, limit + 1e-12)).x
-    torque = torque + normal.T @ helped
-    imbalance = np.hypot(np.linalg.norm(missing), np.linalg.norm(torque) / reach) / weight
+    limit = scene.friction * TORSION_RADIUS * np.maximum(pressed, 0.0)
+    if any(contact["torsion"] for contact in contacts):
+        torsion = np.array([contact["torsion"] for contact in contacts], float)
+        allowed = limit * np.sqrt(np.maximum(1 - (sideways / (scene.friction * np.maximum(pressed, 1e-9))) ** 2, 0.0))
+        inside &= np.abs(torsion) <= allowed + 1e-2 * limit + 1e-7
+        torque = torque - normal.T @ torsion
+    else:
+        # The reply tells no torsions: take those that help most, within what friction allows.
+        bounds = (-limit - 1e-12, limit + 1e-12)
+        torque = torque + normal.T @ lsq_linear(normal.T / scene.reach, -torque / scene.reach, bounds=bounds).x
+    imbalance = np.hypot(np.linalg.norm(missing), np.linalg.norm(torque) / scene.reach) / weight
     return {
         "force_outside_cone": bool((~inside).any()),
         "imbalance": float(imbalance),
         "largest_force": float(size.max()),
     }
+
+
+def epsilon(scene, contacts):
+    """Ferrari and Canny's quality of the contacts as soft fingers, from above: the smallest of many directions' supports.
+
+    In each direction of wrench space the hull of all wrenches of one newton's pressing reaches as far as the best
+    contact does; where it reaches least is how far it holds against the worst disturbance. Random directions are
+    improved by smaller and smaller random steps.
+    """
+    if not contacts:
+        return {"epsilon": 0.0}
+    inward = -np.array([contact["normal"] for contact in contacts])
+    arm = (np.array([contact["position"] for contact in contacts]) - scene.centre_of_mass) / scene.reach
+    twist = TORSION_RADIUS / scene.reach
+
+    def support(directions):
+        push, turn = directions[..., :3], directions[..., 3:]
+        along = push[..., None, :] + np.cross(turn[..., None, :], arm)
+        pressing = np.einsum("...ci,ci->...c", along, inward)
+        sideways = np.einsum("...ci,...ci->...c", along, along) - pressing**2
+        about = np.einsum("...i,ci->...c", turn, inward)
+        reach = np.sqrt(np.maximum(sideways, 0.0) + (twist * about) ** 2)
+        return (pressing + scene.friction * reach).max(axis=-1)
+
+    random = np.random.default_rng(0)
+    directions = random.normal(size=(4000, 6))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    best = directions[np.argsort(support(directions))[:24]]
+    values = support(best)
+    step = 0.3
+    while step > 1e-3:
+        tried = best[:, None] + step * random.normal(size=(len(best), 48, 6))
+        tried /= np.linalg.norm(tried, axis=2, keepdims=True)
+        reached = support(tried)
+        choice = reached.argmin(axis=1)
+        rows = np.arange(len(best))
+        better = reached[rows, choice] < values
+        best[better] = tried[rows, choice][better]
+        values = np.minimum(values, reached[rows, choice])
+        if better.mean() < 0.3:
+            step *= 0.9
+    return {"epsilon": float(max(0.0, values.min()))}
 
 
 def fingers(hand, contacts):
@@ -218,8 +268,7 @@ def contact_places(mesh, hand, contacts):
 def giver_clearance(mesh, hand, giver):
     """Smallest distances to the giver's hand and forearm, and of the receiver's forearm, held as is best, to all."""
     capsules, _ = hand.solids()
-    # Only what is near can matter; the far parts of a mesh are left out of the forearm's test.
-    points = surface_samples(mesh)[0][::2]
+    points = surface_samples(mesh)[0]
     result = {"giver_hand": np.inf, "giver_forearm": np.inf}
     others = None
     if giver is not None:
@@ -277,8 +326,7 @@ def self_clearance(hand):
 
 def forbidden_distance(scene, hand):
     """Distance of the forbidden surface to the nearest part of the hand."""
-    points, owners = surface_samples(scene.mesh)
-    chosen = points[np.isin(owners, scene.forbidden)]
+    chosen = scene.mesh.samples(scene.forbidden)[0]
     if len(chosen) == 0:
         return {"forbidden_distance": np.inf}
     return {"forbidden_distance": float(hand.solids()[0].distances(chosen).min())}
@@ -297,4 +345,8 @@ def comfort(contacts, told):
     return {"comfort": value, "comfort_error": abs(value - told)}
 
 
-__all__ = ["Scene", "judge", "hand_of_reply", "CHAINS", "SPACING", "hands"]
+def told_margins(grasp):
+    """What the reply itself says about the grasp, where it does."""
+    margins = grasp.get("margins") or {}
+    return {f"told_{name}": value for name, value in margins.items()}
+

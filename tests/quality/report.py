@@ -49,6 +49,8 @@ def targets(rows):
     imbalance = column("imbalance")
     detail = f"; median {100 * np.median(imbalance):.1f} %"
     none_of("gravity not balanced within 2 %", imbalance > 0.02, detail)
+    figure = f"median {np.median(column('epsilon')):.4f}, {100 * (column('epsilon') > 0.02).mean():.0f} % above 0.02"
+    lines.append(Target("closure: soft-finger epsilon", "reported", figure, None))
     strongest = column("largest_force")
     none_of("a force above 27 N", strongest > measures.STRONGEST + 0.01, f"; largest {strongest.max():.1f} N")
     idle, all_fingers = int(column("stretched_idle").sum()), 4 * n
@@ -68,12 +70,30 @@ def targets(rows):
     none_of("joint limits broken", column("limits_broken") > 0, f"; worst {column('beyond_limits').max():.1f}°")
     none_of("fingers through fingers or palm", column("self_collision") > 0)
     none_of("forbidden surface within 2 mm", column("forbidden_distance") < measures.FORBIDDEN)
+    lines += overstated(found)
     figure = f"median {np.nanmedian(column('comfort')):.4f}, reply off by {np.median(column('comfort_error')):.4f}"
     lines.append(Target("comfort E", "reported", figure, None))
     figure = f"{column('digits_touching').mean():.1f} digits, {column('contacts').mean():.1f} contacts"
     lines.append(Target("touching, mean", "reported", figure, None))
     flawless = sum(acceptable(row) for row in found)
     lines.append(Target("without any of these faults", "reported", f"{100 * flawless / n:.0f} % of grasps", None))
+    return lines
+
+
+def overstated(found):
+    """Whether the margins that the replies tell are better than what is measured."""
+    lines = []
+    for told, measured, sign, slack in [
+        ("told_epsilon", "epsilon", 1, 0.002),
+        ("told_penetration", "penetration", -1, 0.0005),
+        ("told_giver_clearance", "giver_hand", 1, 0.0005),
+    ]:
+        both = [(row[told], row[measured]) for row in found if row.get(told) is not None]
+        if both:
+            better = [sign * (a - b) for a, b in both]
+            count = sum(value > slack for value in better)
+            figure = f"{count} of {len(both)}; by {1000 * max(better):.1f} thousandths at most"
+            lines.append(Target(f"{told[5:]} in the reply is too good", "0", figure, count == 0))
     return lines
 
 

@@ -174,6 +174,7 @@ def good():
         mass=MASS,
         centre_of_mass=rotation.inv().apply(middle - translation),
         friction=FRICTION,
+        reach=0.03,
         forbidden=np.arange(12, 24),
         rotation=rotation,
         translation=translation,
@@ -405,6 +406,51 @@ class TestFaults:
         scene, grasp, direction = good()
         scene.centre_of_mass = scene.centre_of_mass + scene.rotation.inv().apply(0.01 * direction)
         assert faults(scene, grasp) == {"balance"}
+
+    def test_torsion_that_the_reply_tells(self):
+        # A centre of mass off the line between the pads, along the other two axes: a twist about that line.
+        scene, grasp, direction = good()
+        outward = np.cross(scene.up, direction)
+        scene.centre_of_mass = scene.centre_of_mass + scene.rotation.inv().apply(0.002 * outward)
+        for contact in grasp["contacts"]:
+            contact["client_force"] = np.add(contact["client_force"], contact["client_force"])
+            contact["client_force"] -= MASS * measures.GRAVITY / 2 * scene.up
+        # Without a word, the pads may bear it; said to bear none, they do not.
+        assert faults(scene, grasp) == set()
+        needed = MASS * measures.GRAVITY * 0.002 / 2
+        inward = [-np.array(contact["client_normal"]) for contact in grasp["contacts"]]
+        told = copy.deepcopy(grasp)
+        for contact, axis in zip(told["contacts"], inward):
+            contact["torsion"] = needed * np.sign(axis @ direction)
+        flipped = copy.deepcopy(told)
+        for contact in flipped["contacts"]:
+            contact["torsion"] *= -1
+        assert sorted("balance" in faults(scene, g) for g in (told, flipped)) == [False, True]
+        # More than friction bears.
+        for contact in told["contacts"]:
+            contact["torsion"] = 1.01 * FRICTION * 2 * MASS * measures.GRAVITY / FRICTION * measures.TORSION_RADIUS
+        assert "cone" in faults(scene, told)
+
+    def test_epsilon(self):
+        # Two pads twist least easily about their line: friction times two thirds of the patch over the reach.
+        scene, grasp, _ = good()
+        assert judged(scene, grasp)["epsilon"] == pytest.approx(
+            FRICTION * measures.TORSION_RADIUS / scene.reach, rel=0.02
+        )
+        grasp["contacts"].pop()
+        assert judged(scene, grasp)["epsilon"] == 0.0
+
+    def test_epsilon_of_a_cube_held_on_all_sides(self):
+        # Far enough out, torques are easy, and the hull of the forces decides: pushes along six axes without friction
+        # make an octahedron, whose faces are 1 / sqrt 3 away.
+        scene, _, _ = good()
+        scene.centre_of_mass, scene.friction, scene.reach = np.zeros(3), 1e-9, 1.0
+        contacts = []
+        for axis in np.concatenate([np.eye(3), -np.eye(3)]):
+            for around in np.concatenate([np.eye(3), -np.eye(3)]):
+                if abs(axis @ around) < 0.5:
+                    contacts.append({"normal": axis, "position": axis + 9 * around})
+        assert measures.epsilon(scene, contacts)["epsilon"] == pytest.approx(3**-0.5, rel=0.02)
 
     def test_stretched_fingers(self):
         scene, grasp, _ = good()
