@@ -293,7 +293,7 @@ class TestFaults:
         scene, grasp, _ = good()
         hand = measures.hand_of_reply(grasp)
         tip = hand.positions[hands.CHAINS[4][3]]
-        scene.mesh = Mesh(scene.to_object(box([0.03] * 3, tip)), BOX_FACES)
+        scene.mesh, scene.forbidden = Mesh(scene.to_object(box([0.03] * 3, tip)), BOX_FACES), np.arange(0)
         assert judged(scene, grasp)["skin_in_object"] > 0.02
 
     def test_flipped_and_tilted_normal(self):
