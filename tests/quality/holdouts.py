@@ -1,0 +1,217 @@
+"""Objects, and the holdouts that are asked for: the built-in ones, and random ones with recorded givers."""
+
+import json
+import os
+import pathlib
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+import hand as hands
+from hand import ROOT, Hand
+from mesh import Mesh, thinned
+
+BUILT_IN = ["remote", "scalpel", "scissors"]
+# Real objects of the recorded data: file and a usual mass in kilograms.
+REAL = {
+    "osim_banana": 0.12,
+    "osim_hammer": 0.45,
+    "osim_knife": 0.1,
+    "osim_mug": 0.3,
+    "osim_phone": 0.17,
+    "osim_scissors": 0.06,
+    "osim_toothbrush": 0.02,
+    "osim_wineglass": 0.15,
+    "xr_google-daydream": 0.04,
+    "xr_logitech-mx-ink": 0.03,
+    "xr_oculus-go": 0.1,
+}
+# Recorded poses in which a hand can hold something.
+HOLDING = {"Cup", "Grip", "Grip 1", "Grip 2", "Grip 3", "Grip 4", "Grip 5", "Grip Shaft", "Hold", "OK", "Pinch Flat"}
+HOLDING |= {"Pinch Large", "Pinch Middle", "Pinch Tight", "Pinch Up", "PingPong", "Rounded", "relax"}
+# How deep a giver's skin may be in the object, in metres; deeper ones are placed anew.
+GIVER_DEPTH = 0.004
+
+
+def data_folder():
+    """The folder with real objects and recorded poses, or None."""
+    folder = pathlib.Path(os.environ.get("GRASP_TEST_DATA", ROOT.parent / "shared/data"))
+    return folder if (folder / "poses").is_dir() else None
+
+
+def mesh_file(name):
+    """The file of an object's mesh."""
+    if name in BUILT_IN:
+        return ROOT / "assets/objects" / f"{name}.obj"
+    return data_folder() / "objects" / f"{name}.obj"
+
+
+def forbidden_triangles(name, mesh):
+    """Indices of the triangles that may not be touched."""
+    if name not in BUILT_IN:
+        return np.empty(0, np.int64)
+    groups = json.loads((ROOT / "assets/objects" / f"{name}.json").read_text())["forbidden_groups"]
+    return np.flatnonzero(np.isin(mesh.groups, groups))
+
+
+def built_in_holdouts(name):
+    """The built-in holdouts of an object."""
+    return sorted(path.stem for path in (ROOT / "assets/holdouts").glob(f"{name}-*.json"))
+
+
+def recorded_hands():
+    """Recorded hands that hold, in their wrist's frame; without the data, those of the built-in holdouts."""
+    folder, result = data_folder(), []
+    if folder is None:
+        for path in sorted((ROOT / "assets/holdouts").glob("*.json")):
+            entry = json.loads(path.read_text())
+            result.append(
+                hands.posed(
+                    entry["giver_rig"], entry["giver_handedness"], [0, 0, 0], [0, 0, 0, 1], entry["giver_digits"]
+                )
+            )
+        return result
+    for file in ["godot_xr_tools_poses.json", "handy-work_poses.json"]:
+        for pose in json.loads((folder / "poses" / file).read_text())["poses"]:
+            if pose["name"] not in HOLDING:
+                continue
+            joints = pose["joints"]
+            places = [joints[name]["position"] for name in hands.NAMES[1:]]
+            turns = [joints[name]["orientation_xyzw"] for name in hands.NAMES[1:]]
+            # The files have no radii: an adult's, scaled by the length of the middle finger.
+            rig = hands.description("adult", pose["handedness"])
+            finger = np.linalg.norm(np.diff(np.array(places)[11:15], axis=0), axis=1).sum()
+            scale = finger / sum(rig["digits"]["middle"]["lengths_m"])
+            radii = [scale * rig["joint_radii_m"][name] for name in hands.NAMES[1:]]
+            result.append(
+                Hand.of_joints(
+                    pose["handedness"],
+                    [
+                        {"client_from_joint": {"position": p, "orientation": q}, "radius": r}
+                        for p, q, r in zip(places, turns, radii)
+                    ],
+                )
+            )
+    return result
+
+
+class Placer:
+    """Puts hands on an object so that they hold it near one end, as a giver would.
+
+    The hand is balls along its bones. Random placements with the grip near the object are improved by a pattern
+    search; the cost wants thumb, two fingers and the palm near the surface, and no ball in it.
+    """
+
+    def __init__(self, mesh):
+        self.mesh = mesh
+        self.all_points, owners = mesh.samples()
+        # Every third millimetre is enough to place by.
+        coarse = thinned(self.all_points, 0.003)
+        self.points, self.normals = self.all_points[coarse], mesh.normals[owners[coarse]]
+        self.tree = cKDTree(self.points)
+        self.middle, self.half = (mesh.low + mesh.high) / 2, (mesh.high - mesh.low) / 2
+
+    def _gaps(self, points):
+        """Signed distances by the nearest sample and its normal: quick, and good enough to place a giver."""
+        distance, nearest = self.tree.query(points)
+        outward = np.einsum("...i,...i->...", points - self.points[nearest], self.normals[nearest])
+        return np.where(outward < 0, -distance, distance)
+
+    @staticmethod
+    def _balls(hand):
+        capsules, tags = hand.solids()
+        fractions = np.array([0.0, 0.5, 1.0])
+        centres = capsules.starts[:, None] + fractions[None, :, None] * (capsules.ends - capsules.starts)[:, None]
+        radii = capsules.start_radii[:, None] + fractions * (capsules.end_radii - capsules.start_radii)[:, None]
+        return centres.reshape(-1, 3), radii.ravel(), np.repeat(tags[:, 0], 3)
+
+    def _costs(self, balls, quaternions, translations):
+        centres, radii, digits = balls
+        turned = Rotation.from_quat(quaternions).as_matrix() @ centres.T
+        gaps = self._gaps(turned.transpose(0, 2, 1) + translations[:, None]) - radii
+        of_digit = np.stack([np.clip(gaps[:, digits == d].min(axis=1), 0, 0.05) for d in range(-1, 5)], axis=1)
+        best = np.sort(of_digit[:, 2:], axis=1)
+        reach = of_digit[:, 1] + best[:, 0] + 0.5 * best[:, 1] + 0.1 * of_digit[:, 0]
+        return reach + 100 * (np.minimum(gaps, 0) ** 2).sum(axis=1)
+
+    def place(self, hand, random):
+        """The hand on the object, in the object's frame."""
+        for _ in range(6):
+            placed = self._attempt(hand, random)
+            capsules, _ = placed.solids()
+            if max(0.0, -capsules.distances(self.all_points).min()) <= GIVER_DEPTH:
+                break
+        return placed
+
+    def _attempt(self, hand, random, starts=400, refined=6):
+        balls = self._balls(hand)
+        grip = (2 * hand.positions[5] + hand.positions[10] + hand.positions[15]) / 4
+        targets = self.middle + random.uniform(-0.5, 0.5, (starts, 3)) * self.half
+        axis, end = int(np.argmax(self.half)), random.choice([-1, 1])
+        targets[:, axis] = self.middle[axis] + end * random.uniform(0.3, 0.8, starts) * self.half[axis]
+        turns = Rotation.random(starts, rng=random)
+        quaternions, translations = turns.as_quat(), targets - turns.apply(grip)
+        costs = self._costs(balls, quaternions, translations)
+        best = np.argsort(costs)[:refined]
+        quaternions, translations, costs = quaternions[best], translations[best], costs[best]
+        pivot = balls[0].mean(axis=0)
+        shift, turn = 0.01, 0.3
+        directions = np.concatenate([np.eye(3), -np.eye(3)])
+        while shift > 0.0003:
+            rotations = Rotation.from_quat(quaternions)
+            pivots = rotations.apply(pivot) + translations
+            moved = [(quaternions, translations + shift * d) for d in directions]
+            for d in directions:
+                turned = Rotation.from_rotvec(turn * d) * rotations
+                moved.append((turned.as_quat(), pivots - turned.apply(pivot)))
+            tried = np.stack([self._costs(balls, q, t) for q, t in moved])
+            choice, rows = tried.argmin(axis=0), np.arange(len(costs))
+            better = tried[choice, rows] < costs
+            if not better.any():
+                shift, turn = shift / 2, turn / 2
+                continue
+            for row in rows[better]:
+                quaternions[row] = moved[choice[row]][0][row]
+                translations[row] = moved[choice[row]][1][row]
+                costs[row] = tried[choice[row], row]
+            if better.sum() == 1 and costs[better][0] > costs.min():
+                shift, turn = shift * 0.8, turn * 0.8
+        winner = int(np.argmin(costs))
+        return hand.moved(Rotation.from_quat(quaternions[winner]), translations[winner])
+
+
+def random_request(name, placer, givers, random):
+    """A request with a recorded giver, the whole turned at random: gravity comes from anywhere."""
+    giver = placer.place(givers[random.integers(len(givers))], random)
+    turn = Rotation.random(rng=random)
+    # A metre above the ground: the frame's origin is not the object's.
+    shift = np.array([0.0, 1.2, 0.3])
+    giver = giver.moved(turn, shift)
+    joints = [
+        {"client_from_joint": {"position": p.tolist(), "orientation": q.tolist()}, "radius": float(r)}
+        for p, q, r in zip(giver.positions[1:], giver.rotations[1:].as_quat(), giver.radii[1:])
+    ]
+    return {
+        "object": name,
+        "client_from_object": {"position": shift.tolist(), "orientation": turn.as_quat().tolist()},
+        "presenting_hand": {
+            "joints": {"handedness": giver.handedness, "joint_set": "webxr_25", "joints": joints}
+        },
+    }
+
+
+def giver_of_request(request):
+    """The giver's hand of a request in the client's frame, or None."""
+    form = request.get("presenting_hand")
+    if not form:
+        return None
+    if joints := form.get("joints"):
+        return Hand.of_joints(joints["handedness"], joints["joints"])
+    angles, pose = form["angles"], form["angles"]["client_from_wrist"]
+    return hands.posed(angles["rig"], angles["handedness"], pose["position"], pose["orientation"], angles["digits"])
+
+
+def load_mesh(name):
+    """The mesh of an object in metres."""
+    return Mesh.read_obj(mesh_file(name))

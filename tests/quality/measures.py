@@ -1,0 +1,352 @@
+"""What is good or bad about one grasp, from the reply alone.
+
+Everything is measured in the client's frame, from joint poses with radii, contacts and forces; the mesh is put there by
+the request's pose of the object. Lengths in metres, angles in degrees, forces in newtons.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+from scipy.spatial.transform import Rotation
+
+from hand import DIGITS, PHALANGES, Hand
+from mesh import Mesh
+from solids import clearance
+
+GRAVITY = 9.81
+# What the targets allow.
+OFF_MESH, OFF_SKIN, FORBIDDEN = 0.0005, 0.002, 0.002
+# Parts of a hand press soft flesh against each other: so much on both sides together is touch, more is one in the other.
+# Neighbours side by side share skin at their roots, and are wider there than capsules tell: in recorded hands they
+# overlap by 0 to 5 mm (those of two sources, with an adult's radii scaled), while crossed ones overlap by 10 and more.
+FLESH, NEIGHBOURS_FLESH = 0.002, 0.005
+# An angle of a joint beyond its limit by more than this is broken: rounding is far below.
+LIMIT_TOLERANCE = 0.5
+# A joint that is farther than this from where the rig's bones put it belongs to another hand.
+BONE_TOLERANCE = 0.001
+# Both knuckles of a finger bent by less than this: stretched.
+STRETCHED = 10.0
+# A contact's normal may be that of any triangle so near, within so many degrees.
+NORMAL_REACH, NORMAL_ANGLE = 0.0005, 15.0
+# Most that a digit presses with, in newtons (thesis 2.5).
+STRONGEST = 27.0
+# A contact resists twisting about its normal by up to friction times force times this: two thirds of the radius of a
+# pad's patch of some 6 mm under a few newtons, pressed evenly. Slip and twist share the friction (an ellipse).
+TORSION_RADIUS = 0.004
+# Comfortable shares of the force, thumb first (thesis 4.6).
+SHARES = np.array([0.25, 0.25, 0.25, 0.125, 0.125])
+
+
+@dataclass
+class Scene:
+    """What the request says, in the client's frame."""
+
+    mesh: Mesh
+    mass: float
+    centre_of_mass: np.ndarray
+    friction: float
+    # What torques are divided by to compare them with forces: half the diagonal of the object's box.
+    reach: float
+    forbidden: np.ndarray
+    rotation: Rotation
+    translation: np.ndarray
+    up: np.ndarray
+    giver: Hand | None
+    asked_handedness: str = "right"
+
+    def to_object(self, points):
+        """Points of the client's frame in the object's."""
+        return self.rotation.inv().apply(np.asarray(points, float).reshape(-1, 3) - self.translation)
+
+
+def hand_of_reply(grasp):
+    """The receiving hand of a reply in the client's frame."""
+    return Hand.of_joints(grasp["handedness"], grasp["joints"], grasp["rig"])
+
+
+def judge(scene, grasp):
+    """All measures of a grasp by name."""
+    hand = hand_of_reply(grasp)
+    # The mesh stays where it is and the hand goes into its frame: distances are the same.
+    inverse = scene.rotation.inv()
+    local = hand.moved(inverse, -inverse.apply(scene.translation))
+    giver = scene.giver and scene.giver.moved(inverse, -inverse.apply(scene.translation))
+    contacts = [
+        {
+            "position": scene.to_object(contact["client_position"])[0],
+            "normal": inverse.apply(contact["client_normal"]),
+            "force": inverse.apply(contact["client_force"]),
+            "digit": contact.get("digit"),
+            "phalanx": contact.get("phalanx"),
+            "torsion": contact.get("torsion"),
+        }
+        for contact in grasp["contacts"]
+    ]
+    return {
+        **penetration(scene.mesh, local),
+        **forces(scene, contacts, inverse.apply(scene.up)),
+        **epsilon(scene, contacts),
+        **fingers(local, contacts),
+        **contact_places(scene.mesh, local, contacts),
+        **giver_clearance(scene.mesh, local, giver),
+        **self_clearance(local),
+        **forbidden_distance(scene, local),
+        "wrong_chirality": hand.chirality() != hand.handedness or hand.handedness != scene.asked_handedness,
+        **comfort(contacts, grasp["comfort"]),
+        **told_margins(grasp),
+        "contacts": len(contacts),
+        "digits_touching": len({contact["digit"] for contact in contacts} & set(DIGITS)),
+    }
+
+
+def penetration(mesh, hand):
+    """The deeper of skin in the object and of the object's surface in flesh."""
+    capsules, tags = hand.solids()
+    skin, owners = capsules.skin(0.002)
+    near = ((skin > mesh.low) & (skin < mesh.high)).all(axis=1)
+    skin, owners = skin[near], owners[near]
+    skin_depth = 0.0
+    if len(skin):
+        # What lies inside of another capsule is no skin.
+        others = capsules.distances(skin)
+        others[np.arange(len(skin)), owners] = np.inf
+        skin_depth = mesh.depth(skin[others.min(axis=1) > -1e-6])
+    points = surface_near(mesh, hand)
+    flesh_depth, part = 0.0, ""
+    if len(points):
+        distances = capsules.distances(points).min(axis=0)
+        worst = int(np.argmin(distances))
+        flesh_depth = max(0.0, -float(distances[worst]))
+        digit, phalanx = tags[worst]
+        part = "palm" if digit < 0 else f"{DIGITS[digit]} {PHALANGES[phalanx]}"
+    return {
+        "penetration": max(skin_depth, flesh_depth),
+        "skin_in_object": skin_depth,
+        "object_in_flesh": flesh_depth,
+        "deepest_part": part if flesh_depth > 0 else "",
+    }
+
+
+def surface_samples(mesh):
+    """The mesh's sample points, made once."""
+    if not hasattr(mesh, "sampled"):
+        mesh.sampled = mesh.samples()
+    return mesh.sampled
+
+
+def surface_near(mesh, hand, margin=0.03):
+    """Sample points of the surface that the hand may reach."""
+    points = surface_samples(mesh)[0]
+    low, high = hand.positions.min(axis=0) - margin, hand.positions.max(axis=0) + margin
+    return points[((points > low) & (points < high)).all(axis=1)]
+
+
+def forces(scene, contacts, up):
+    """Forces inside their cones, and what is left of the weight: force, and torque over the object's reach."""
+    weight = scene.mass * GRAVITY
+    if not contacts:
+        return {"force_outside_cone": True, "imbalance": 1.0, "largest_force": 0.0}
+    force = np.array([contact["force"] for contact in contacts])
+    normal = np.array([contact["normal"] for contact in contacts])
+    arm = np.array([contact["position"] for contact in contacts]) - scene.centre_of_mass
+    pressed = -np.einsum("ci,ci->c", force, normal)
+    sideways = np.linalg.norm(force + pressed[:, None] * normal, axis=1)
+    size = np.linalg.norm(force, axis=1)
+    # Where the force is not zero, it presses, and slips by no more than rounding allows.
+    inside = sideways <= scene.friction * pressed + 1e-3 * size + 1e-6
+    missing = force.sum(axis=0) - weight * up
+    torque = np.cross(arm, force).sum(axis=0)
+    limit = scene.friction * TORSION_RADIUS * np.maximum(pressed, 0.0)
+    if any(contact["torsion"] for contact in contacts):
+        torsion = np.array([contact["torsion"] for contact in contacts], float)
+        allowed = limit * np.sqrt(np.maximum(1 - (sideways / (scene.friction * np.maximum(pressed, 1e-9))) ** 2, 0.0))
+        inside &= np.abs(torsion) <= allowed + 1e-2 * limit + 1e-7
+        torque = torque - normal.T @ torsion
+    else:
+        # The reply tells no torsions: take those that help most, within what friction allows.
+        bounds = (-limit - 1e-12, limit + 1e-12)
+        torque = torque + normal.T @ lsq_linear(normal.T / scene.reach, -torque / scene.reach, bounds=bounds).x
+    imbalance = np.hypot(np.linalg.norm(missing), np.linalg.norm(torque) / scene.reach) / weight
+    return {
+        "force_outside_cone": bool((~inside).any()),
+        "imbalance": float(imbalance),
+        "largest_force": float(size.max()),
+    }
+
+
+def epsilon(scene, contacts):
+    """Ferrari and Canny's quality of the contacts as soft fingers, from above: the smallest of many directions' supports.
+
+    In each direction of wrench space the hull of all wrenches of one newton's pressing reaches as far as the best
+    contact does; where it reaches least is how far it holds against the worst disturbance. Random directions are
+    improved by smaller and smaller random steps.
+    """
+    if not contacts:
+        return {"epsilon": 0.0}
+    inward = -np.array([contact["normal"] for contact in contacts])
+    arm = (np.array([contact["position"] for contact in contacts]) - scene.centre_of_mass) / scene.reach
+    twist = TORSION_RADIUS / scene.reach
+
+    def support(directions):
+        push, turn = directions[..., :3], directions[..., 3:]
+        along = push[..., None, :] + np.cross(turn[..., None, :], arm)
+        pressing = np.einsum("...ci,ci->...c", along, inward)
+        sideways = np.einsum("...ci,...ci->...c", along, along) - pressing**2
+        about = np.einsum("...i,ci->...c", turn, inward)
+        reach = np.sqrt(np.maximum(sideways, 0.0) + (twist * about) ** 2)
+        return (pressing + scene.friction * reach).max(axis=-1)
+
+    random = np.random.default_rng(0)
+    directions = random.normal(size=(4000, 6))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    best = directions[np.argsort(support(directions))[:24]]
+    values = support(best)
+    step = 0.3
+    while step > 1e-3:
+        tried = best[:, None] + step * random.normal(size=(len(best), 48, 6))
+        tried /= np.linalg.norm(tried, axis=2, keepdims=True)
+        reached = support(tried)
+        choice = reached.argmin(axis=1)
+        rows = np.arange(len(best))
+        better = reached[rows, choice] < values
+        best[better] = tried[rows, choice][better]
+        values = np.minimum(values, reached[rows, choice])
+        if better.mean() < 0.3:
+            step *= 0.9
+    return {"epsilon": float(max(0.0, values.min()))}
+
+
+def fingers(hand, contacts):
+    """Joint limits, and fingers that are stretched."""
+    angles, _, displaced = hand.angles()
+    beyond = hand.beyond_limits()
+    stretched = (np.abs(angles[1:, 1]) < STRETCHED) & (np.abs(angles[1:, 2]) < STRETCHED)
+    touching = np.array([any(c["digit"] == name for c in contacts) for name in DIGITS[1:]])
+    return {
+        "beyond_limits": float(beyond),
+        "limits_broken": bool(beyond > LIMIT_TOLERANCE or displaced > BONE_TOLERANCE),
+        "displaced_joint": float(displaced),
+        "stretched": int(stretched.sum()),
+        "stretched_idle": int((stretched & ~touching).sum()),
+    }
+
+
+def contact_places(mesh, hand, contacts):
+    """How far contacts are from mesh and skin, and whether their normals make sense."""
+    if not contacts:
+        return {"off_mesh": 0.0, "off_skin": 0.0, "faces_away": 0, "normal_wrong": 0}
+    capsules, tags = hand.solids()
+    points = np.array([contact["position"] for contact in contacts])
+    off_mesh = mesh.closest(points)[0]
+    off_skin, away, wrong = [], 0, 0
+    for point, contact in zip(points, contacts):
+        digit = DIGITS.index(contact["digit"]) if contact["digit"] in DIGITS else -1
+        own = tags[:, 0] == digit
+        if digit >= 0 and contact["phalanx"] in PHALANGES:
+            own &= tags[:, 1] == PHALANGES.index(contact["phalanx"])
+        part = capsules.of(np.flatnonzero(own))
+        distances = part.distances(point)[0]
+        nearest = int(np.argmin(distances))
+        off_skin.append(abs(distances[nearest]))
+        axis = part.ends[nearest] - part.starts[nearest]
+        along = np.clip(np.dot(point - part.starts[nearest], axis) / np.dot(axis, axis), 0.0, 1.0)
+        away += np.dot(contact["normal"], part.starts[nearest] + along * axis - point) <= 0
+        # One of the triangles at the place has this normal; which way is out, the winding number tells.
+        near = np.flatnonzero(np.linalg.norm(mesh.centres - point, axis=1) < mesh.radii + NORMAL_REACH)
+        near = [t for t in near if Mesh(mesh.triangles[t], [[0, 1, 2]]).closest([point])[0][0] < NORMAL_REACH]
+        agree = np.abs(mesh.normals[near] @ contact["normal"]) > np.cos(np.radians(NORMAL_ANGLE))
+        wrong += not agree.any()
+    return {
+        "off_mesh": float(off_mesh.max()),
+        "off_skin": float(max(off_skin)),
+        "faces_away": int(away),
+        "normal_wrong": int(wrong),
+    }
+
+
+def giver_clearance(mesh, hand, giver):
+    """Smallest distances to the giver's hand and forearm, and of the receiver's forearm, held as is best, to all."""
+    capsules, _ = hand.solids()
+    points = surface_samples(mesh)[0]
+    result = {"giver_hand": np.inf, "giver_forearm": np.inf}
+    others = None
+    if giver is not None:
+        others, _ = giver.solids()
+        result["giver_hand"] = float(clearance(capsules, others).min())
+        # Where a giver's forearm is the request does not say: straight behind the wrist.
+        result["giver_forearm"] = float(clearance(capsules, giver.forearm()).min())
+    best = -np.inf
+    for forearm in hand.forearms():
+        gap = forearm.distances(points).min() if len(points) else np.inf
+        if gap > best and others is not None:
+            gap = min(gap, clearance(forearm, others).min(), clearance(forearm, giver.forearm()).min())
+        best = max(best, gap)
+        if best > 0.001:
+            break
+    result["own_forearm"] = float(best)
+    result["giver_touched"] = bool(min(result["giver_hand"], result["giver_forearm"], best) < 0)
+    return result
+
+
+def self_clearance(hand):
+    """The smallest distance of parts that are not joined: digits among each other, and digits to the palm.
+
+    Neighbours' proximal phalanges share the web at the knuckles, so of those only the outer halves count, and against
+    the palm only what lies beyond the middle joint (of the thumb: the last phalanx).
+    """
+    capsules, tags = hand.solids()
+    trimmed, _ = hand.solids()
+    for row, (digit, phalanx) in enumerate(tags):
+        if digit > 0 and phalanx == 0:
+            middle, radius = trimmed.at(np.full(len(tags), 0.5))
+            trimmed.starts[row], trimmed.start_radii[row] = middle[row], radius[row]
+    trimmed = type(capsules)(trimmed.starts, trimmed.ends, trimmed.start_radii, trimmed.end_radii)
+    gaps = clearance(trimmed, trimmed)
+    least, worst, pair = np.inf, np.inf, ""
+    metacarpals = range(15, 19)
+    for a in range(15):
+        for b in range(a + 1, 19):
+            (first, link), (second, other) = tags[a], tags[b]
+            if second < 0:
+                considered = b in metacarpals and (link == 2 or (first > 0 and link == 1))
+            else:
+                # The thumb's metacarpal is in the palm, next to the index finger's root.
+                rooted = first == 0 and link == 0 and other == 0
+                considered = first != second and not rooted
+            if not considered:
+                continue
+            excess = gaps[a, b] + (NEIGHBOURS_FLESH if first > 0 and second == first + 1 else FLESH)
+            if excess < least:
+                least, worst = excess, gaps[a, b]
+                name = "palm" if second < 0 else f"{DIGITS[second]} {PHALANGES[other]}"
+                pair = f"{DIGITS[first]} {PHALANGES[link]} - {name}"
+    return {"self_clearance": float(worst), "self_collision": bool(least < 0), "closest_pair": pair}
+
+
+def forbidden_distance(scene, hand):
+    """Distance of the forbidden surface to the nearest part of the hand."""
+    chosen = scene.mesh.samples(scene.forbidden)[0]
+    if len(chosen) == 0:
+        return {"forbidden_distance": np.inf}
+    return {"forbidden_distance": float(hand.solids()[0].distances(chosen).min())}
+
+
+def comfort(contacts, told):
+    """E of Eq. 4.6 from the forces, and how far the reply's figure is from it."""
+    totals = np.zeros(5)
+    for contact in contacts:
+        if contact["digit"] in DIGITS:
+            totals[DIGITS.index(contact["digit"])] += np.linalg.norm(contact["force"])
+    if totals.sum() <= 0:
+        return {"comfort": np.nan, "comfort_error": np.inf}
+    wanted = np.where(totals > 0, SHARES, 0)
+    value = float(((wanted / wanted.sum() - totals / totals.sum()) ** 2).sum())
+    return {"comfort": value, "comfort_error": abs(value - told)}
+
+
+def told_margins(grasp):
+    """What the reply itself says about the grasp, where it does."""
+    margins = grasp.get("margins") or {}
+    return {f"told_{name}": value for name, value in margins.items()}
+

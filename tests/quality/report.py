@@ -1,0 +1,237 @@
+"""Targets and figures: a table for the terminal, CSV, and a Markdown report with plots and a contact sheet."""
+
+import csv
+from dataclasses import dataclass
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+import measures
+
+
+@dataclass
+class Target:
+    """One line of the table; `met` is None for what is only reported."""
+
+    measure: str
+    wanted: str
+    figure: str
+    met: bool | None
+
+
+def targets(rows):
+    """The targets, with what the rows give."""
+    found = [row for row in rows if row["found"]]
+    n = len(found)
+    lines = []
+
+    def column(name):
+        return np.array([float(row[name]) for row in found])
+
+    def none_of(measure, wrong, detail=""):
+        count = int(wrong.sum())
+        lines.append(Target(measure, "0", f"{count} of {n} ({100 * count / n:.0f} %){detail}", count == 0))
+
+    in_time = sum(row["in_time"] for row in rows)
+    share = 100 * in_time / n if n else 0.0
+    figure = f"{share:.1f} % ({in_time} of {n}; {len(rows) - n} more have none)"
+    lines.append(Target("answered within 50 ms, where there is any", "≥ 99.5 %", figure, share >= 99.5))
+    if n == 0:
+        return lines
+    depth = 1000 * column("penetration")
+    lines.append(Target("penetration, median", "≤ 1 mm", f"{np.median(depth):.1f} mm", bool(np.median(depth) <= 1)))
+    within = f"{depth.max():.1f} mm ({100 * (depth <= 3).mean():.0f} % within 3 mm)"
+    lines.append(Target("penetration, worst", "≤ 3 mm", within, bool(depth.max() <= 3)))
+    none_of("forces outside their cones", column("force_outside_cone") > 0)
+    imbalance = column("imbalance")
+    detail = f"; median {100 * np.median(imbalance):.1f} %"
+    none_of("gravity not balanced within 2 %", imbalance > 0.02, detail)
+    figure = f"median {np.median(column('epsilon')):.4f}, {100 * (column('epsilon') > 0.02).mean():.0f} % above 0.02"
+    lines.append(Target("closure: soft-finger epsilon", "reported", figure, None))
+    strongest = column("largest_force")
+    none_of("a force above 27 N", strongest > measures.STRONGEST + 0.01, f"; largest {strongest.max():.1f} N")
+    idle, all_fingers = int(column("stretched_idle").sum()), 4 * n
+    share = 100 * idle / all_fingers
+    figure = f"{share:.1f} % of fingers (in {100 * (column('stretched_idle') > 0).mean():.0f} % of grasps)"
+    lines.append(Target("idle fingers left stretched", "≤ 5 %", figure, share <= 5))
+    none_of("wrong chirality", column("wrong_chirality") > 0)
+    none_of("a normal faces away from its phalanx", column("faces_away") > 0)
+    none_of("a normal is not the mesh's", column("normal_wrong") > 0)
+    off = 1000 * column("off_mesh")
+    none_of("a contact off the mesh (> 0.5 mm)", off > 1000 * measures.OFF_MESH, f"; worst {off.max():.2f} mm")
+    off = 1000 * column("off_skin")
+    none_of("a contact off the skin (> 2 mm)", off > 1000 * measures.OFF_SKIN, f"; worst {off.max():.1f} mm")
+    none_of("giver's hand touched", column("giver_hand") < 0, f"; closest {1000 * column('giver_hand').min():.1f} mm")
+    none_of("giver's forearm touched", column("giver_forearm") < 0)
+    none_of("own forearm touches object or giver", column("own_forearm") < 0)
+    none_of("joint limits broken", column("limits_broken") > 0, f"; worst {column('beyond_limits').max():.1f}°")
+    none_of("fingers through fingers or palm", column("self_collision") > 0)
+    none_of("forbidden surface within 2 mm", column("forbidden_distance") < measures.FORBIDDEN)
+    lines += overstated(found)
+    figure = f"median {np.nanmedian(column('comfort')):.4f}, reply off by {np.median(column('comfort_error')):.4f}"
+    lines.append(Target("comfort E", "reported", figure, None))
+    figure = f"{column('digits_touching').mean():.1f} digits, {column('contacts').mean():.1f} contacts"
+    lines.append(Target("touching, mean", "reported", figure, None))
+    flawless = sum(acceptable(row) for row in found)
+    lines.append(Target("without any of these faults", "reported", f"{100 * flawless / n:.0f} % of grasps", None))
+    return lines
+
+
+def overstated(found):
+    """Whether the margins that the replies tell are better than what is measured."""
+    lines = []
+    for told, measured, sign, slack in [
+        ("told_epsilon", "epsilon", 1, 0.002),
+        ("told_penetration", "penetration", -1, 0.0005),
+        ("told_giver_clearance", "giver_hand", 1, 0.0005),
+    ]:
+        both = [(row[told], row[measured]) for row in found if row.get(told) is not None]
+        if both:
+            better = [sign * (a - b) for a, b in both]
+            count = sum(value > slack for value in better)
+            figure = f"{count} of {len(both)}; by {1000 * max(better):.1f} thousandths at most"
+            lines.append(Target(f"{told[5:]} in the reply is too good", "0", figure, count == 0))
+    return lines
+
+
+def acceptable(row):
+    """Whether a grasp breaks none of the bounds that hold for each grasp."""
+    return bool(
+        row["penetration"] <= 0.003
+        and not row["force_outside_cone"]
+        and row["imbalance"] <= 0.02
+        and row["largest_force"] <= measures.STRONGEST + 0.01
+        and row["stretched_idle"] == 0
+        and not row["wrong_chirality"]
+        and row["faces_away"] == row["normal_wrong"] == 0
+        and row["off_mesh"] <= measures.OFF_MESH
+        and row["off_skin"] <= measures.OFF_SKIN
+        and not row["giver_touched"]
+        and not row["limits_broken"]
+        and not row["self_collision"]
+        and row["forbidden_distance"] >= measures.FORBIDDEN
+    )
+
+
+def table(lines):
+    """The table for a terminal."""
+    rows = [("", "target", "figure", "met")]
+    rows += [(t.measure, t.wanted, t.figure, {True: "yes", False: "NO", None: ""}[t.met]) for t in lines]
+    widths = [max(len(row[i]) for row in rows) for i in range(4)]
+    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
+
+
+def markdown(lines):
+    """The same as Markdown."""
+    rows = ["| | target | figure | met |", "|---|---|---|---|"]
+    for t in lines:
+        rows.append(f"| {t.measure} | {t.wanted} | {t.figure} | {({True: 'yes', False: 'no', None: ''})[t.met]} |")
+    return "\n".join(rows)
+
+
+def write(folder, rows, lines, options):
+    """Everything that is left of a run."""
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    with open(folder / "grasps.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, columns)
+        writer.writeheader()
+        writer.writerows(rows)
+    found = [row for row in rows if row["found"]]
+    text = ["# Quality of grasps", ""]
+    told = ", ".join(f"{key} {value}" for key, value in options.items() if key not in ("out", "strict") and value)
+    text += [f"{len(rows)} holdouts, {len(found)} grasps judged; {told}. Every grasp: [grasps.csv](grasps.csv).", ""]
+    text += [markdown(lines), ""]
+    if found:
+        text += ["## By object", "", by_object(rows), ""]
+        plots(folder, found)
+        text += ["![Distributions](distributions.svg)", ""]
+        if sheet(folder, found):
+            text += ["## Contact sheet", "", "Green: no fault; red: what is wrong.", "", "![Grasps](sheet.png)", ""]
+    (folder / "README.md").write_text("\n".join(text), encoding="utf-8")
+
+
+def by_object(rows):
+    """Main figures of each object."""
+    lines = ["| object | grasps | within 50 ms | penetration median / worst, mm | balanced | giver clear | no fault |"]
+    lines.append("|---|--:|--:|--:|--:|--:|--:|")
+    for name in dict.fromkeys(row["object"] for row in rows):
+        here = [row for row in rows if row["object"] == name]
+        found = [row for row in here if row["found"]]
+        if not found:
+            lines.append(f"| {name} | 0 of {len(here)} | | | | | |")
+            continue
+        depth = [1000 * row["penetration"] for row in found]
+
+        def share(test, found=found):
+            return f"{100 * sum(map(test, found)) / len(found):.0f} %"
+
+        cells = [name, f"{len(found)} of {len(here)}", share(lambda row: row["in_time"])]
+        cells.append(f"{np.median(depth):.1f} / {max(depth):.1f}")
+        cells.append(share(lambda row: row["imbalance"] <= 0.02 and not row["force_outside_cone"]))
+        cells += [share(lambda row: not row["giver_touched"]), share(acceptable)]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def plots(folder, found):
+    """Distributions of the measures that are lengths or ratios, with the bound of each."""
+    chosen = [
+        ("penetration", 1000, "penetration, mm", 3),
+        ("imbalance", 100, "weight not balanced, %", 2),
+        ("off_skin", 1000, "worst contact off the skin, mm", 2),
+        ("giver_hand", 1000, "clearance to the giver's hand, mm", 0),
+        ("self_clearance", 1000, "clearance among digits, mm", -1000 * measures.FLESH),
+        ("comfort", 1, "comfort E", None),
+    ]
+    figure, axes = plt.subplots(2, 3, figsize=(11, 5.5), layout="constrained")
+    for axis, (name, scale, label, bound) in zip(axes.flat, chosen):
+        values = scale * np.array([row[name] for row in found], float)
+        values = values[np.isfinite(values)]
+        if len(values):
+            axis.hist(np.clip(values, *np.percentile(values, [1, 99])), bins=30, color="#4878a8")
+        if bound is not None:
+            axis.axvline(bound, color="#c03030")
+        axis.set_xlabel(label)
+        axis.set_ylabel("grasps")
+    figure.savefig(folder / "distributions.svg")
+    plt.close(figure)
+
+
+def faults(row):
+    """What is wrong with a grasp, in few words."""
+    named = [
+        (row["penetration"] > 0.003, f"{1000 * row['penetration']:.0f} mm deep"),
+        (row["force_outside_cone"], "cone"),
+        (row["imbalance"] > 0.02, f"{100 * row['imbalance']:.0f} % unbalanced"),
+        (row["stretched_idle"] > 0, f"{row['stretched_idle']} stretched"),
+        (row["wrong_chirality"], "chirality"),
+        (row["faces_away"] + row["normal_wrong"] > 0, "normal"),
+        (row["off_mesh"] > measures.OFF_MESH or row["off_skin"] > measures.OFF_SKIN, "contact off"),
+        (row["giver_touched"], "giver or forearm"),
+        (row["limits_broken"], "limits"),
+        (row["self_collision"], "self"),
+        (row["forbidden_distance"] < measures.FORBIDDEN, "forbidden"),
+    ]
+    return [name for wrong, name in named if wrong]
+
+
+def sheet(folder, found, across=4):
+    """All pictures of a run on one sheet; false if there are none."""
+    drawn = [row for row in found if row.get("picture") and (folder / "pictures" / row["picture"]).exists()]
+    if not drawn:
+        return False
+    down = -(-len(drawn) // across)
+    figure, axes = plt.subplots(down, across, figsize=(4.8 * across, 2.4 * down), layout="constrained", squeeze=False)
+    for axis in axes.flat:
+        axis.axis("off")
+    for axis, row in zip(axes.flat, drawn):
+        axis.imshow(plt.imread(folder / "pictures" / row["picture"]))
+        wrong = faults(row)
+        title = f"{row['object']} {row['holdout']}\n{', '.join(wrong) or 'no fault'}"
+        axis.set_title(title, fontsize=7, color="#b02020" if wrong else "#207020")
+    figure.savefig(folder / "sheet.png", dpi=100)
+    plt.close(figure)
+    return True

@@ -1,0 +1,85 @@
+"""The release server on a free port, and requests to it through the client's binary."""
+
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import threading
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+# Exit code of `grasp find` when the budget ended first.
+EXHAUSTED = 3
+
+
+class Service:
+    """A running server; use it in a with statement."""
+
+    def __init__(self, workers=None):
+        command = [ROOT / "target/release/grasp-server", "--listen", "127.0.0.1:0", "--log", "grasp_server=info"]
+        if workers:
+            command += ["--workers", str(workers)]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "NO_COLOR": "1"},
+        )
+        for line in self.process.stderr:
+            if match := re.search(r"127\.0\.0\.1:\d+", line):
+                self.url = f"http://{match.group(0)}"
+                break
+        else:
+            raise RuntimeError(f"the server ended with {self.process.wait()} before it named its address")
+        # The log must be drained, or a full pipe would hold the server up.
+        threading.Thread(target=lambda: self.process.stderr.read(), daemon=True).start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait(timeout=20)
+
+    def _client(self, *arguments, stdin=None, accept=(0,)):
+        done = subprocess.run(
+            [ROOT / "target/release/grasp", "--json", *map(str, arguments), "--server", self.url],
+            input=stdin,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        if done.returncode not in accept:
+            raise RuntimeError(f"grasp {arguments[0]} ended with {done.returncode}: {done.stderr.strip()}")
+        return json.loads(done.stdout)
+
+    def create(self, identifier, path, mass):
+        """Makes an object from a file; returns what the server tells about it."""
+        return self._client("objects", "create", identifier, "--obj", path, "--mass", mass)
+
+    def object(self, name):
+        """What the server tells about an object."""
+        return self._client("objects", "get", name)
+
+    def find(self, request, picture=None, mesh=None):
+        """The answer to a request in the form of `grasp find --request`."""
+        extra = ["--png", picture, "--view-size", "480x400"] if picture else []
+        if picture and mesh:
+            extra += ["--mesh", mesh]
+        return self._client(
+            "find", "--request", "-", *extra, stdin=json.dumps(request), accept=(0, EXHAUSTED)
+        )
+
+
+def built_in_request(holdout):
+    """The request of a built-in holdout."""
+    done = subprocess.run(
+        [ROOT / "target/release/grasp", "find", "--holdout", holdout, "--print-request"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=20,
+    )
+    return json.loads(done.stdout)

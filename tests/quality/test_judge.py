@@ -1,0 +1,483 @@
+"""The judge is judged: closed forms, and a made-up grasp that is good until a single fault is put into it."""
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import hand as hands
+import measures
+import report
+from hand import Hand
+from mesh import Mesh
+from solids import Capsules, clearance
+
+BOX_FACES = [
+    [0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7], [0, 1, 5], [0, 5, 4],
+    [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7],
+]  # fmt: skip
+
+
+def box(half, centre=(0, 0, 0), axes=None):
+    """Vertices of a box; its axes are the rows of `axes`."""
+    x, y, z = half
+    corners = np.array([[i * x, j * y, k * z] for k in (-1, 1) for i, j in [(-1, -1), (1, -1), (1, 1), (-1, 1)]])
+    return corners @ (np.eye(3) if axes is None else axes) + centre
+
+
+def box_mesh(half):
+    return Mesh(box(half), BOX_FACES)
+
+
+class TestCapsules:
+    def test_distance_to_a_straight_one(self):
+        capsule = Capsules([[0, 0, 0]], [[0, 0.1, 0]], [0.01], [0.01])
+        points = [[0.03, 0.05, 0], [0, 0.13, 0], [0.03, 0.14, 0], [0.004, 0.05, 0], [0, -0.02, 0]]
+        expected = [0.02, 0.02, 0.04, -0.006, 0.01]
+        np.testing.assert_allclose(capsule.distances(points)[:, 0], expected, atol=1e-12)
+
+    def test_distance_to_a_tapered_one_is_that_to_its_balls(self):
+        random = np.random.default_rng(1)
+        for _ in range(30):
+            a, b = random.uniform(-0.05, 0.05, (2, 3))
+            r, q = random.uniform(0.005, 0.02, 2)
+            points = random.uniform(-0.1, 0.1, (50, 3))
+            steps = np.linspace(0, 1, 20001)
+            centres, radii = a + steps[:, None] * (b - a), r + steps * (q - r)
+            brute = [(np.linalg.norm(centres - p, axis=1) - radii).min() for p in points]
+            found = Capsules([a], [b], [r], [q]).distances(points)[:, 0]
+            np.testing.assert_allclose(found, brute, atol=1e-8)
+
+    def test_skin_lies_on_the_skin(self):
+        capsules = Capsules([[0, 0, 0], [0.1, 0, 0]], [[0, 0.05, 0.01], [0.1, 0, 0.03]], [0.01, 0.006], [0.006, 0.012])
+        points, owners = capsules.skin(0.002)
+        own = capsules.distances(points)[np.arange(len(points)), owners]
+        assert np.abs(own).max() < 2e-4
+        # Both poles are there.
+        for row, pole in [(0, capsules.at(np.zeros(2))), (1, capsules.at(np.ones(2)))]:
+            assert np.linalg.norm(points - pole[0][row], axis=1).min() < pole[1][row] + 1e-9
+
+    def test_clearance_of_parallel_crossing_and_aligned_ones(self):
+        first = Capsules([[0, 0, 0]], [[0, 0.1, 0]], [0.01], [0.01])
+        others = Capsules(
+            [[0.05, 0.02, 0], [-0.1, 0.05, 0.03], [0, 0.15, 0], [-0.1, 0.05, 0.005]],
+            [[0.05, 0.2, 0], [0.1, 0.05, 0.03], [0, 0.2, 0], [0.1, 0.05, 0.005]],
+            [0.005, 0.01, 0.01, 0.01],
+            [0.005, 0.01, 0.01, 0.01],
+        )
+        np.testing.assert_allclose(clearance(first, others)[0], [0.035, 0.01, 0.03, -0.015], atol=1e-9)
+        np.testing.assert_allclose(clearance(others, first)[:, 0], [0.035, 0.01, 0.03, -0.015], atol=1e-9)
+
+
+class TestMesh:
+    def test_closed_cube(self):
+        mesh = box_mesh([0.5, 0.5, 0.5])
+        winding = mesh.winding([[0, 0, 0], [0.4, -0.3, 0.2], [0.6, 0, 0], [3, 3, 3]])
+        np.testing.assert_allclose(winding, [1, 1, 0, 0], atol=1e-12)
+        np.testing.assert_allclose(
+            mesh.signed_distance([[0, 0, 0.1], [0.4, 0, 0], [0.8, 0.9, 0]]), [-0.4, -0.1, 0.5], atol=1e-12
+        )
+
+    def test_open_box_and_one_inside_out(self):
+        # Without its top, the middle of a cube sees five of six equal solid angles.
+        lid = [2, 3]
+        faces = [face for i, face in enumerate(BOX_FACES) if i not in lid]
+        mesh = Mesh(box([0.5, 0.5, 0.5]), faces)
+        np.testing.assert_allclose(mesh.winding([[0, 0, 0]]), [5 / 6], atol=1e-12)
+        assert mesh.signed_distance([[0, 0, 0]])[0] == pytest.approx(-0.5)
+        assert mesh.signed_distance([[0, 0, 2]])[0] > 0
+        turned = Mesh(box([0.5, 0.5, 0.5]), [face[::-1] for face in BOX_FACES])
+        assert turned.signed_distance([[0, 0, 0.3]])[0] == pytest.approx(-0.2)
+
+    def test_two_overlapping_parts_count_as_inside(self):
+        both = Mesh(
+            np.concatenate([box([0.5] * 3), box([0.5] * 3, (0.4, 0, 0))]),
+            BOX_FACES + [[i + 8 for i in face] for face in BOX_FACES],
+        )
+        np.testing.assert_allclose(both.winding([[0.2, 0, 0], [-0.3, 0, 0]]), [2, 1], atol=1e-12)
+
+    def test_samples_leave_no_hole(self):
+        mesh = box_mesh([0.01, 0.02, 0.005])
+        points, _ = mesh.samples()
+        assert mesh.closest(points)[0].max() < 1e-12
+        random = np.random.default_rng(2)
+        corners = mesh.triangles[random.integers(12, size=200)]
+        weights = random.dirichlet([1, 1, 1], 200)
+        on_surface = np.einsum("nk,nki->ni", weights, corners)
+        gaps = np.linalg.norm(on_surface[:, None] - points[None], axis=2).min(axis=1)
+        assert gaps.max() < 0.0015
+
+    def test_obj_with_polygons_negative_indices_and_groups(self, tmp_path):
+        file = tmp_path / "box.obj"
+        file.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng one\nf 1/1/1 2/2/2 3//3 4\ng two\nf -4 -3 -2\n")
+        mesh = Mesh.read_obj(file, 0.001)
+        assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 2]]
+        assert mesh.groups.tolist() == ["one", "one", "two"]
+        assert mesh.high.tolist() == [0.001, 0.001, 0.0]
+
+
+# A pinch of the adult hand, in degrees: yaw and three pitches of each digit.
+PINCH = [[40, 8, 8, 25], [0, 50, 42, 22], [0, 45, 45, 30], [0, 45, 50, 30], [0, 45, 50, 30]]
+MASS, FRICTION = 0.1, 0.5
+
+
+def pinching_hand(angles, handedness="right"):
+    digits = [
+        dict(zip(["base_yaw", "base_pitch", "second_pitch", "third_pitch"], np.radians(digit))) for digit in angles
+    ]
+    return hands.posed("adult", handedness, [0.1, 1.2, -0.3], [0.1, -0.3, 0.2, 0.93], digits)
+
+
+def touching_balls(hand):
+    """Where the last phalanges of thumb and index are closest, and the direction from the one to the other."""
+    capsules, tags = hand.solids()
+    pair = [int(np.flatnonzero((tags == (digit, 2)).all(axis=1))[0]) for digit in (0, 1)]
+    thumb, index = capsules.of([pair[0]]), capsules.of([pair[1]])
+    steps = np.linspace(0, 1, 401)
+    ends = [c.at(steps[:, None])[0][:, 0] for c in (thumb, index)]
+    radii = [c.at(steps[:, None])[1][:, 0] for c in (thumb, index)]
+    gaps = np.linalg.norm(ends[0][:, None] - ends[1][None], axis=2) - radii[0][:, None] - radii[1][None]
+    i, j = np.unravel_index(gaps.argmin(), gaps.shape)
+    direction = (ends[1][j] - ends[0][i]) / np.linalg.norm(ends[1][j] - ends[0][i])
+    return ends[0][i] + radii[0][i] * direction, ends[1][j] - radii[1][j] * direction, direction
+
+
+def joints_of(hand):
+    return [
+        {"client_from_joint": {"position": p.tolist(), "orientation": q.tolist()}, "radius": float(r)}
+        for p, q, r in zip(hand.positions, hand.rotations.as_quat(), hand.radii)
+    ]
+
+
+def good():
+    """A block between thumb and index, held with forces that carry it; a forbidden block hangs off its outer end."""
+    hand = pinching_hand(PINCH)
+    thumb, index, direction = touching_balls(hand)
+    middle = (thumb + index) / 2
+    outward = middle - hand.positions[hands.WRIST]
+    outward -= outward @ direction * direction
+    outward /= np.linalg.norm(outward)
+    # Supported by friction alone: gravity across the line between the contacts.
+    axes = np.stack([direction, outward, np.cross(direction, outward)])
+    up = axes[2]
+    thickness = np.linalg.norm(index - thumb) / 2
+    vertices = np.concatenate(
+        [box([thickness, 0.009, 0.009], middle, axes), box([0.004, 0.004, 0.004], middle + 0.04 * outward, axes)]
+    )
+    faces = BOX_FACES + [[i + 8 for i in face] for face in BOX_FACES]
+    pressing = MASS * measures.GRAVITY / FRICTION
+    rotation, translation = Rotation.from_quat([0.3, 0.1, -0.5, 0.8]), np.array([0.4, 0.2, -1.0])
+    mesh = Mesh(rotation.inv().apply(vertices - translation), faces)
+    scene = measures.Scene(
+        mesh=mesh,
+        mass=MASS,
+        centre_of_mass=rotation.inv().apply(middle - translation),
+        friction=FRICTION,
+        reach=0.03,
+        forbidden=np.arange(12, 24),
+        rotation=rotation,
+        translation=translation,
+        up=up,
+        giver=pinching_hand(PINCH).moved(Rotation.identity(), 0.5 * outward),
+    )
+    contacts = [
+        {
+            "client_position": point.tolist(),
+            "client_normal": (-sign * direction).tolist(),
+            "client_force": (sign * pressing * direction + MASS * measures.GRAVITY / 2 * up).tolist(),
+            "digit": digit,
+            "phalanx": "third",
+        }
+        for point, sign, digit in [(thumb, 1, "thumb"), (index, -1, "index")]
+    ]
+    grasp = {"rig": "adult", "handedness": "right", "joints": joints_of(hand), "contacts": contacts, "comfort": 0.0}
+    return scene, grasp, direction
+
+
+def judged(scene, grasp):
+    return measures.judge(scene, grasp)
+
+
+def faults(scene, grasp):
+    """Names of the measures that are not as they should be."""
+    row = judged(scene, grasp)
+    wrong = {
+        "penetration": row["penetration"] > 0.001,
+        "cone": row["force_outside_cone"],
+        "balance": row["imbalance"] > 0.02,
+        "strength": row["largest_force"] > measures.STRONGEST,
+        "stretched": row["stretched_idle"] > 0,
+        "chirality": row["wrong_chirality"],
+        "faces_away": row["faces_away"] > 0,
+        "normal": row["normal_wrong"] > 0,
+        "off_mesh": row["off_mesh"] > measures.OFF_MESH,
+        "off_skin": row["off_skin"] > measures.OFF_SKIN,
+        "giver": row["giver_touched"],
+        "limits": row["limits_broken"],
+        "self": row["self_collision"],
+        "forbidden": row["forbidden_distance"] < measures.FORBIDDEN,
+        "comfort": row["comfort_error"] > 1e-6,
+    }
+    return {name for name, bad in wrong.items() if bad}
+
+
+def with_hand(grasp, hand):
+    changed = copy.deepcopy(grasp)
+    changed["joints"] = joints_of(hand)
+    return changed
+
+
+def bent(grasp, changes):
+    """The same grasp with other angles, in degrees, of some joints."""
+    angles = np.array(PINCH, float)
+    for place, value in changes.items():
+        angles[place] = value
+    return with_hand(grasp, pinching_hand(angles))
+
+
+class TestGoodGrasp:
+    def test_has_no_fault(self):
+        scene, grasp, _ = good()
+        assert faults(scene, grasp) == set()
+        row = judged(scene, grasp)
+        assert row["penetration"] < 1e-4
+        assert row["imbalance"] < 1e-6
+        assert row["off_skin"] < 1e-4
+        assert report.acceptable({**row, "found": True})
+
+    def test_measures_do_not_depend_on_the_frame(self):
+        scene, grasp, _ = good()
+        before = judged(scene, grasp)
+        turn, shift = Rotation.from_quat([0.5, -0.2, 0.4, 0.7]), np.array([3.0, -1.0, 2.0])
+        moved = copy.deepcopy(grasp)
+        moved["joints"] = joints_of(measures.hand_of_reply(grasp).moved(turn, shift))
+        for contact in moved["contacts"]:
+            contact["client_position"] = turn.apply(contact["client_position"]) + shift
+            contact["client_normal"] = turn.apply(contact["client_normal"])
+            contact["client_force"] = turn.apply(contact["client_force"])
+        scene.rotation, scene.translation = turn * scene.rotation, turn.apply(scene.translation) + shift
+        scene.up, scene.giver = turn.apply(scene.up), scene.giver.moved(turn, shift)
+        after = judged(scene, moved)
+        for name, value in before.items():
+            if isinstance(value, float):
+                assert after[name] == pytest.approx(value, abs=1e-5), name
+
+
+class TestFaults:
+    @pytest.mark.parametrize("millimetres", [5, -5])
+    def test_sunk_hand(self, millimetres):
+        scene, grasp, direction = good()
+        sunk = measures.hand_of_reply(grasp).moved(Rotation.identity(), millimetres / 1000 * direction)
+        assert {"penetration", "off_skin"} <= faults(scene, with_hand(grasp, sunk))
+        depth = judged(scene, with_hand(grasp, sunk))["penetration"]
+        assert depth == pytest.approx(0.005, abs=3e-4)
+
+    def test_blade_through_a_finger(self):
+        # A thin sheet across the index finger: no skin is in its volume, but it is deep in the flesh.
+        scene, grasp, direction = good()
+        hand = measures.hand_of_reply(grasp)
+        centre, radius = hand.positions[hands.CHAINS[1][1]], hand.radii[hands.CHAINS[1][1]]
+        axis = hand.positions[hands.CHAINS[1][2]] - centre
+        axis /= np.linalg.norm(axis)
+        side = np.cross(axis, direction) / np.linalg.norm(np.cross(axis, direction))
+        sheet = box([0.0001, 0.03, 0.03], centre + 0.01 * axis, np.stack([axis, side, np.cross(axis, side)]))
+        scene.mesh = Mesh(scene.to_object(sheet), BOX_FACES)
+        row = measures.penetration(scene.mesh, hand.moved(
+            scene.rotation.inv(), -scene.rotation.inv().apply(scene.translation)))  # fmt: skip
+        assert row["object_in_flesh"] > 0.9 * (radius - 0.001)
+        assert row["skin_in_object"] < 0.001
+        assert row["penetration"] == row["object_in_flesh"]
+
+    def test_finger_inside_of_a_large_block(self):
+        scene, grasp, _ = good()
+        hand = measures.hand_of_reply(grasp)
+        tip = hand.positions[hands.CHAINS[4][3]]
+        scene.mesh, scene.forbidden = Mesh(scene.to_object(box([0.03] * 3, tip)), BOX_FACES), np.arange(0)
+        assert judged(scene, grasp)["skin_in_object"] > 0.02
+
+    def test_flipped_and_tilted_normal(self):
+        scene, grasp, _ = good()
+        grasp["contacts"][1]["client_normal"] = [-x for x in grasp["contacts"][1]["client_normal"]]
+        assert "faces_away" in faults(scene, grasp)
+        scene, grasp, direction = good()
+        tilted = Rotation.from_rotvec(np.radians(40) * scene.up).apply(grasp["contacts"][0]["client_normal"])
+        grasp["contacts"][0]["client_normal"] = tilted
+        assert "normal" in faults(scene, grasp)
+        assert "faces_away" not in faults(scene, grasp)
+
+    def test_mirrored_hand(self):
+        scene, grasp, _ = good()
+        hand = measures.hand_of_reply(grasp)
+        quaternions = hand.rotations.as_quat() * [1, -1, -1, 1]
+        mirrored = Hand("right", hand.positions * [-1, 1, 1], quaternions, hand.radii, hand.rig)
+        assert "chirality" in faults(scene, with_hand(grasp, mirrored))
+        # Called what it is, it is still not the hand that was asked for; but its limits are those of a left hand.
+        grasp["handedness"] = "left"
+        found = faults(scene, with_hand(grasp, mirrored))
+        assert "chirality" in found and "limits" not in found
+        scene.asked_handedness = "left"
+        assert "chirality" not in faults(scene, with_hand(grasp, mirrored))
+
+    def test_moved_contacts(self):
+        scene, grasp, direction = good()
+        grasp["contacts"][0]["client_position"] = grasp["contacts"][0]["client_position"] + 0.001 * direction
+        assert "off_mesh" in faults(scene, grasp) and "off_skin" not in faults(scene, grasp)
+        scene, grasp, direction = good()
+        capsules, _ = measures.hand_of_reply(grasp).solids()
+        sideways = np.cross(capsules.directions[5], direction)
+        moved = grasp["contacts"][1]["client_position"] + 0.0085 * sideways / np.linalg.norm(sideways)
+        grasp["contacts"][1]["client_position"] = moved
+        assert "off_skin" in faults(scene, grasp) and "off_mesh" not in faults(scene, grasp)
+
+    def test_contact_of_another_digit(self):
+        scene, grasp, _ = good()
+        grasp["contacts"][1]["digit"] = "little"
+        assert "off_skin" in faults(scene, grasp)
+
+    @pytest.mark.parametrize(
+        "changes", [{(4, 2): 110}, {(4, 1): -10}, {(3, 0): 24}, {(0, 3): 85}, {(2, 3): 95}], ids=str
+    )
+    def test_joint_beyond_its_limit(self, changes):
+        scene, grasp, _ = good()
+        row = judged(scene, bent(grasp, changes))
+        assert row["limits_broken"]
+        limit = {110: 10, -10: 10, 24: 4, 85: 5, 95: 5}[next(iter(changes.values()))]
+        assert row["beyond_limits"] == pytest.approx(limit, abs=1e-3)
+
+    def test_twisted_and_stretched_bones(self):
+        scene, grasp, _ = good()
+        hand = measures.hand_of_reply(grasp)
+        turned = hand.rotations.as_matrix()
+        joint = hands.CHAINS[4][2]
+        turned[joint] = turned[joint] @ Rotation.from_euler("y", 20, degrees=True).as_matrix()
+        twisted = Hand("right", hand.positions, Rotation.from_matrix(turned).as_quat(), hand.radii, "adult")
+        assert "limits" in faults(scene, with_hand(grasp, twisted))
+        longer = hand.positions.copy()
+        longer[hands.CHAINS[4][3]] += 0.01 * (longer[hands.CHAINS[4][3]] - longer[hands.WRIST])
+        pulled = Hand("right", longer, hand.rotations.as_quat(), hand.radii, "adult")
+        assert "limits" in faults(scene, with_hand(grasp, pulled))
+
+    def test_finger_through_another(self):
+        scene, grasp, _ = good()
+        assert "self" not in faults(scene, bent(grasp, {(4, 0): 10}))
+        # The little finger goes through the ring finger, and the index finger through the thumb.
+        assert "self" in faults(scene, bent(grasp, {(3, 0): 15, (4, 0): -20}))
+        assert "self" in faults(scene, bent(grasp, {(1, 1): 75}))
+
+    def test_fingertip_in_the_palm(self):
+        scene, grasp, _ = good()
+        assert "self" in faults(scene, bent(grasp, {(4, 1): 90, (4, 2): 110, (4, 3): 60}))
+
+    def test_giver_in_the_hand(self):
+        scene, grasp, _ = good()
+        scene.giver = measures.hand_of_reply(grasp).moved(Rotation.identity(), np.array([0.01, 0, 0]))
+        assert "giver" in faults(scene, grasp)
+        row = judged(scene, grasp)
+        assert row["giver_hand"] < -0.005
+
+    def test_forearm_that_has_nowhere_to_go(self):
+        scene, grasp, _ = good()
+        wrist = measures.hand_of_reply(grasp).positions[hands.WRIST]
+        giver = scene.giver
+        # A giver's fist right behind the wrist, as wide as all directions of the forearm.
+        scene.giver = Hand("right", np.tile(wrist, (26, 1)) + np.linspace(-1e-3, 1e-3, 26)[:, None],
+                           giver.rotations.as_quat(), giver.radii, "adult")  # fmt: skip
+        assert judged(scene, grasp)["own_forearm"] < 0
+
+    def test_forces(self):
+        scene, grasp, direction = good()
+        grasp["contacts"][0]["client_force"] = np.multiply(grasp["contacts"][0]["client_force"], 1.05)
+        assert "balance" in faults(scene, grasp)
+        # Pressing harder on both sides changes nothing until it is too strong; pressing less lets it slip.
+        for factor, expected in [(3, set()), (14, {"strength"}), (0.4, {"cone"})]:
+            scene, grasp, direction = good()
+            more = (factor - 1) * MASS * measures.GRAVITY / FRICTION * direction
+            for contact, sign in zip(grasp["contacts"], (1, -1)):
+                contact["client_force"] = np.add(contact["client_force"], sign * more)
+            assert faults(scene, grasp) == expected
+        # Pulling is no contact.
+        scene, grasp, direction = good()
+        for contact in grasp["contacts"]:
+            contact["client_force"] = np.multiply(contact["client_force"], -1)
+        assert {"cone", "balance"} <= faults(scene, grasp)
+
+    def test_centre_of_mass_beside_the_contacts(self):
+        scene, grasp, direction = good()
+        scene.centre_of_mass = scene.centre_of_mass + scene.rotation.inv().apply(0.01 * direction)
+        assert faults(scene, grasp) == {"balance"}
+
+    def test_torsion_that_the_reply_tells(self):
+        # A centre of mass off the line between the pads, along the other two axes: a twist about that line.
+        scene, grasp, direction = good()
+        outward = np.cross(scene.up, direction)
+        scene.centre_of_mass = scene.centre_of_mass + scene.rotation.inv().apply(0.002 * outward)
+        for contact in grasp["contacts"]:
+            contact["client_force"] = np.add(contact["client_force"], contact["client_force"])
+            contact["client_force"] -= MASS * measures.GRAVITY / 2 * scene.up
+        # Without a word, the pads may bear it; said to bear none, they do not.
+        assert faults(scene, grasp) == set()
+        needed = MASS * measures.GRAVITY * 0.002 / 2
+        inward = [-np.array(contact["client_normal"]) for contact in grasp["contacts"]]
+        told = copy.deepcopy(grasp)
+        for contact, axis in zip(told["contacts"], inward):
+            contact["torsion"] = needed * np.sign(axis @ direction)
+        flipped = copy.deepcopy(told)
+        for contact in flipped["contacts"]:
+            contact["torsion"] *= -1
+        assert sorted("balance" in faults(scene, g) for g in (told, flipped)) == [False, True]
+        # More than friction bears.
+        for contact in told["contacts"]:
+            contact["torsion"] = 1.01 * FRICTION * 2 * MASS * measures.GRAVITY / FRICTION * measures.TORSION_RADIUS
+        assert "cone" in faults(scene, told)
+
+    def test_epsilon(self):
+        # Two pads twist least easily about their line: friction times two thirds of the patch over the reach.
+        scene, grasp, _ = good()
+        assert judged(scene, grasp)["epsilon"] == pytest.approx(
+            FRICTION * measures.TORSION_RADIUS / scene.reach, rel=0.02
+        )
+        grasp["contacts"].pop()
+        assert judged(scene, grasp)["epsilon"] == 0.0
+
+    def test_epsilon_of_a_cube_held_on_all_sides(self):
+        # Far enough out, torques are easy, and the hull of the forces decides: pushes along six axes without friction
+        # make an octahedron, whose faces are 1 / sqrt 3 away.
+        scene, _, _ = good()
+        scene.centre_of_mass, scene.friction, scene.reach = np.zeros(3), 1e-9, 1.0
+        contacts = []
+        for axis in np.concatenate([np.eye(3), -np.eye(3)]):
+            for around in np.concatenate([np.eye(3), -np.eye(3)]):
+                if abs(axis @ around) < 0.5:
+                    contacts.append({"normal": axis, "position": axis + 9 * around})
+        assert measures.epsilon(scene, contacts)["epsilon"] == pytest.approx(3**-0.5, rel=0.02)
+
+    def test_stretched_fingers(self):
+        scene, grasp, _ = good()
+        straight = {(3, 1): 5, (3, 2): 5, (3, 3): 5, (4, 1): 5, (4, 2): 5, (4, 3): 5}
+        assert judged(scene, bent(grasp, straight))["stretched_idle"] == 2
+        assert judged(scene, bent(grasp, {(3, 1): 5, (3, 2): 20}))["stretched_idle"] == 0
+
+    def test_forbidden_surface(self):
+        scene, grasp, _ = good()
+        scene.forbidden = np.arange(12)
+        assert faults(scene, grasp) == {"forbidden"}
+
+    def test_comfort(self):
+        scene, grasp, direction = good()
+        grasp["comfort"] = 0.1
+        assert faults(scene, grasp) == {"comfort"}
+        grasp["contacts"][0]["client_force"] = np.multiply(grasp["contacts"][0]["client_force"], 3)
+        assert judged(scene, grasp)["comfort"] == pytest.approx(2 * 0.25**2)
+
+
+def test_targets_count_what_is_wrong():
+    scene, grasp, _ = good()
+    row = {"found": True, "in_time": True, **judged(scene, grasp)}
+    lines = {line.measure: line for line in report.targets([row])}
+    assert all(line.met for line in lines.values() if line.met is not None)
+    bad = {**row, "penetration": 0.004, "giver_hand": -0.001}
+    lines = {line.measure: line for line in report.targets([row, bad, {"found": False, "in_time": False}])}
+    assert not lines["penetration, worst"].met and not lines["giver's hand touched"].met
+    assert lines["giver's hand touched"].figure.startswith("1 of 2")
+    assert lines["wrong chirality"].met
