@@ -1,5 +1,6 @@
 //! Tests of physical validity.
 
 mod balance;
+mod closing;
 mod closure;
 mod support;
