@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Asks a real server for grasps and judges each reply with means that share no code with the search.
 
-The exit code is 0 when replies could be judged, whatever they are worth; with --strict it is 1 when a target is not met.
+The exit code is 0 when replies could be judged, whatever they are worth; with --strict it is 1 when a target is not
+met.
 """
 
 import argparse

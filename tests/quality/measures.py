@@ -17,7 +17,7 @@ from solids import clearance
 GRAVITY = 9.81
 # What the targets allow.
 OFF_MESH, OFF_SKIN, FORBIDDEN = 0.0005, 0.002, 0.002
-# Parts of a hand press soft flesh against each other: so much on both sides together is touch, more is one in the other.
+# Parts of a hand press soft flesh against each other: so much on both sides together is touch, more is one in another.
 # Neighbours side by side share skin at their roots, and are wider there than capsules tell: in recorded hands they
 # overlap by 0 to 5 mm (those of two sources, with an adult's radii scaled), while crossed ones overlap by 10 and more.
 FLESH, NEIGHBOURS_FLESH = 0.002, 0.005
@@ -176,7 +176,7 @@ def forces(scene, contacts, up):
 
 
 def epsilon(scene, contacts):
-    """Ferrari and Canny's quality of the contacts as soft fingers, from above: the smallest of many directions' supports.
+    """Ferrari and Canny's quality of the contacts as soft fingers, from above: the least of many directions' supports.
 
     In each direction of wrench space the hull of all wrenches of one newton's pressing reaches as far as the best
     contact does; where it reaches least is how far it holds against the worst disturbance. Random directions are
