@@ -159,7 +159,7 @@ impl<'a> Problem<'a> {
             entries[rows - 1] = FIRMNESS_WEIGHT * self.firm_sum;
         }
         solver.reset(&entries);
-        let strength = self.limit() * self.contacts.len() as f64;
+        let strength = (self.limit() + 1.0) * self.contacts.len() as f64;
         for contact in 0..self.limit_rows() {
             entries.fill(0.0);
             entries[WRENCH_ROWS + contact] = LIMIT_WEIGHT;
@@ -181,14 +181,15 @@ impl<'a> Problem<'a> {
                     best = (gain, Some((contact, push)));
                 }
             }
-            // What is left is perpendicular to what is balanced; so no pushes, together at most `strength`, can shorten it
-            // by more than their gain along it.
-            if !self.comfortable && length - strength * best.0 / length > f64::from(BALANCE_TOLERANCE) {
-                return;
-            }
             let slack = (0..self.limit_rows())
                 .map(|row| (LIMIT_WEIGHT * solver.residual()[WRENCH_ROWS + row], row))
                 .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
+            // What is left is perpendicular to what is balanced, so that pushes and slacks, together at most `strength`,
+            // can shorten it by no more than they gain along it.
+            let gained = strength * best.0.max(slack.0);
+            if !self.comfortable && length - gained / length > f64::from(BALANCE_TOLERANCE) {
+                return;
+            }
             if slack.0 > best.0 {
                 entries.fill(0.0);
                 entries[WRENCH_ROWS + slack.1] = LIMIT_WEIGHT;

@@ -18,6 +18,9 @@ const GILBERT_STEPS: usize = 12;
 /// grasps that hold equally badly in very many directions.
 const MAX_FACETS: usize = 6_000;
 
+/// Contacts that resist less than this in some direction have no closure: below, single precision decides.
+const NO_CLOSURE: f64 = 1e-6;
+
 /// Ferrari and Canny's epsilon (1992) of soft-finger contacts: the radius of the largest ball about the origin inside the
 /// convex hull of the unit wrenches of all contacts. That is the L1 convention: the normal forces sum to one newton. The
 /// number is the longest disturbance, as a share of the summed normal forces, that the contacts resist from wherever it
@@ -32,7 +35,7 @@ pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &m
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let required = f64::from(required);
     let resisted = least_resisted(cones);
-    if resisted <= 0.0 {
+    if resisted <= NO_CLOSURE {
         return 0.0;
     }
     if resisted < required {
@@ -63,7 +66,7 @@ fn least_resisted(cones: &[ContactCone]) -> f64 {
         let direction = point.map(|x| -x / length);
         let (reach, wrench) = farthest_wrench(cones, &direction);
         upper = upper.min(reach);
-        if upper <= 0.0 {
+        if upper <= NO_CLOSURE {
             return 0.0;
         }
         // The nearest point to the origin on the segment to the new wrench.
@@ -88,7 +91,7 @@ fn inscribed_ball(cones: &[ContactCone], upper: f64, required: f64, polytope: &m
         let (normal, lower) = polytope.plane(facet);
         let (reach, wrench) = farthest_wrench(cones, &normal);
         upper = upper.min(reach);
-        if upper <= 0.0 {
+        if upper <= NO_CLOSURE {
             return 0.0;
         }
         if upper < required {
@@ -96,7 +99,8 @@ fn inscribed_ball(cones: &[ContactCone], upper: f64, required: f64, polytope: &m
         }
         let near = lower >= (1.0 - f64::from(EPSILON_TOLERANCE)) * upper;
         if near || polytope.facet_count() > MAX_FACETS || !polytope.expand(facet, wrench) {
-            return lower.max(0.0);
+            // Rounding must not lift the bound above what is certain.
+            return lower.clamp(0.0, upper);
         }
     }
 }
