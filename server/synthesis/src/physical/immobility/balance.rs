@@ -54,19 +54,24 @@ const WRENCH_ROWS: usize = 6;
 ///
 /// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
 pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
-    let Buffers { cones, solver, .. } = buffers;
+    let Buffers {
+        cones,
+        solver,
+        column,
+        ..
+    } = buffers;
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
     // First whether there are any: that settles most grasps, at once.
-    problem.solve(solver);
+    problem.solve(solver, column);
     if unbalanced_length(solver) > f64::from(BALANCE_TOLERANCE) {
         return None;
     }
     let mut found = problem.balance(solver);
     if exceeds_limit(&found) {
         problem.limited = true;
-        problem.solve(solver);
+        problem.solve(solver, column);
         found = problem.balance(solver);
     }
     problem.keep_limits(&mut found);
@@ -74,11 +79,11 @@ pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> 
         return None;
     }
     problem.comfortable = true;
-    problem.solve(solver);
+    problem.solve(solver, column);
     let mut preferred = problem.balance(solver);
     if !problem.limited && exceeds_limit(&preferred) {
         problem.limited = true;
-        problem.solve(solver);
+        problem.solve(solver, column);
         preferred = problem.balance(solver);
     }
     problem.keep_limits(&mut preferred);
@@ -149,21 +154,22 @@ impl<'a> Problem<'a> {
         if self.limited { self.contacts.len() } else { 0 }
     }
 
-    /// Adds pushes until none helps.
-    fn solve(&self, solver: &mut ConicLeastSquares) {
+    /// Adds pushes until none helps. `entries` is a buffer.
+    fn solve(&self, solver: &mut ConicLeastSquares, entries: &mut Vec<f64>) {
         let rows = WRENCH_ROWS + self.limit_rows() + if self.comfortable { 6 } else { 0 };
-        let mut entries = vec![0.0; rows];
+        entries.clear();
+        entries.resize(rows, 0.0);
         entries[..3].copy_from_slice(&self.up.to_array());
         entries[WRENCH_ROWS..WRENCH_ROWS + self.limit_rows()].fill(LIMIT_WEIGHT);
         if self.comfortable {
             entries[rows - 1] = FIRMNESS_WEIGHT * self.firm_sum;
         }
-        solver.reset(&entries);
+        solver.reset(entries);
         let strength = (self.limit() + 1.0) * self.contacts.len() as f64;
         for contact in 0..self.limit_rows() {
             entries.fill(0.0);
             entries[WRENCH_ROWS + contact] = LIMIT_WEIGHT;
-            solver.add(&entries, Column::Slack);
+            solver.add(entries, Column::Slack);
         }
         for _ in 0..MAX_COLUMNS {
             let residual = solver.residual();
@@ -175,8 +181,8 @@ impl<'a> Problem<'a> {
             let mut best = (NEGLIGIBLE_GAIN, None);
             for (contact, cone) in self.cones.iter().enumerate() {
                 let push = cone.farthest_push(&unbalanced).1;
-                self.write_entries(contact, &push, &mut entries);
-                let gain = dot(solver.residual(), &entries);
+                self.write_entries(contact, &push, entries);
+                let gain = dot(solver.residual(), entries);
                 if gain > best.0 {
                     best = (gain, Some((contact, push)));
                 }
@@ -193,15 +199,15 @@ impl<'a> Problem<'a> {
             if slack.0 > best.0 {
                 entries.fill(0.0);
                 entries[WRENCH_ROWS + slack.1] = LIMIT_WEIGHT;
-                if solver.add(&entries, Column::Slack) {
+                if solver.add(entries, Column::Slack) {
                     continue;
                 }
             }
             let Some((contact, push)) = best.1 else {
                 return;
             };
-            self.write_entries(contact, &push, &mut entries);
-            if !solver.add(&entries, Column::Push { contact, push }) {
+            self.write_entries(contact, &push, entries);
+            if !solver.add(entries, Column::Push { contact, push }) {
                 return;
             }
         }

@@ -36,6 +36,8 @@ struct Facet {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polytope {
     vertices: u32,
+    /// How many facets were made, those that are gone again included.
+    made: usize,
     facets: Vec<Facet>,
     /// Signed distance of each facet's plane from the origin, negative if the origin is outside; infinite for facets
     /// that are gone.
@@ -76,6 +78,7 @@ impl Polytope {
             return false;
         };
         self.vertices = DIMENSIONS as u32 + 1;
+        self.made = DIMENSIONS + 1;
         self.facets.clear();
         self.offsets.clear();
         self.gone.clear();
@@ -111,9 +114,9 @@ impl Polytope {
         (self.facets[facet as usize].normal, self.offsets[facet as usize])
     }
 
-    /// How many facets there are.
-    pub(super) fn facet_count(&self) -> usize {
-        self.facets.len() - self.gone.len()
+    /// How many facets were made since the start: what the polytope has cost.
+    pub(super) fn facets_made(&self) -> usize {
+        self.made
     }
 
     /// Grows by a vertex that is outside `facet`. False if it is not, or if rounding has broken the surface; the polytope
@@ -149,6 +152,7 @@ impl Polytope {
                 }
             }
         }
+        self.made += self.created.len();
         for k in 0..self.created.len() {
             let (index, replaced) = self.created[k];
             if self.link(index, replaced).is_none() {
