@@ -26,12 +26,19 @@ const FIRMNESS: f64 = 1.5;
 /// more firmly than necessary.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
+/// Share of friction and torsion that the forces use if they can: nobody holds a thing just so that it does not slip.
+/// A smaller share gives safer forces to fewer grasps; the others use all of it.
+const SAFE_FRICTION: f64 = 0.8;
+
+/// All of it, but for what rounding to single precision may add.
+const ALL_FRICTION: f64 = 1.0 - 2e-6;
+
 /// Weight of uncomfortable shares against unbalanced wrench. The balance pays with the square of it: ten times as much
 /// would spend the whole tolerance on comfort, and a tenth would drown in rounding.
-const SHARE_WEIGHT: f64 = 0.05;
+const SHARE_WEIGHT: f64 = 0.03;
 
 /// Weight of firmness: well below that of the shares, which matter more.
-const FIRMNESS_WEIGHT: f64 = 0.01;
+const FIRMNESS_WEIGHT: f64 = 0.006;
 
 /// Weight of a contact's limit against unbalanced wrench: what is over the limit costs a thousand times as much.
 const LIMIT_WEIGHT: f64 = 30.0;
@@ -40,7 +47,7 @@ const LIMIT_WEIGHT: f64 = 30.0;
 const FOUND: f64 = 0.5;
 
 /// A push that goes less than this with the residual does not help any more.
-const NEGLIGIBLE_GAIN: f64 = 3e-6;
+const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
@@ -49,8 +56,9 @@ const MAX_COLUMNS: usize = 60;
 const WRENCH_ROWS: usize = 6;
 
 /// Forces inside the friction limits, each at most [`MAX_CONTACT_FORCE`], that balance gravity within
-/// [`BALANCE_TOLERANCE`]: of those the digits' shares are as near to the comfortable ones (Eq. 4.6) as balance allows,
-/// and then their sum near to a firm grip. The palm may press as it likes. `None` if there are none.
+/// [`BALANCE_TOLERANCE`]. Of those, ones that keep off the friction limits if there are any; their digits' shares as near
+/// to the comfortable ones (Eq. 4.6) as balance allows, and their sum near to a firm grip. The palm may press as it
+/// likes. `None` if there are none.
 ///
 /// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
 pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
@@ -79,19 +87,21 @@ pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> 
         return None;
     }
     problem.comfortable = true;
-    problem.solve(solver, column);
-    let mut preferred = problem.balance(solver);
-    if !problem.limited && exceeds_limit(&preferred) {
-        problem.limited = true;
+    for share in [SAFE_FRICTION, ALL_FRICTION] {
+        problem.friction_share = share;
         problem.solve(solver, column);
-        preferred = problem.balance(solver);
+        let mut preferred = problem.balance(solver);
+        if !problem.limited && exceeds_limit(&preferred) {
+            problem.limited = true;
+            problem.solve(solver, column);
+            preferred = problem.balance(solver);
+        }
+        problem.keep_limits(&mut preferred);
+        if preferred.residual <= BALANCE_TOLERANCE {
+            return Some(preferred);
+        }
     }
-    problem.keep_limits(&mut preferred);
-    Some(if preferred.residual <= BALANCE_TOLERANCE {
-        preferred
-    } else {
-        found
-    })
+    Some(found)
 }
 
 /// Non-negative least squares for one grasp. Forces are in units of the weight.
@@ -109,6 +119,8 @@ struct Problem<'a> {
     shares: [f64; 5],
     /// Sum of the digits' normal forces to aim at.
     firm_sum: f64,
+    /// Of friction and torsion, how much may be used.
+    friction_share: f64,
     limited: bool,
     comfortable: bool,
 }
@@ -140,6 +152,7 @@ impl<'a> Problem<'a> {
             up: load.up.as_dvec3(),
             shares: shares.map(|share| if sum > 0.0 { share / sum } else { 0.0 }),
             firm_sum,
+            friction_share: ALL_FRICTION,
             limited: false,
             comfortable: false,
         }
@@ -180,7 +193,7 @@ impl<'a> Problem<'a> {
             }
             let mut best = (NEGLIGIBLE_GAIN, None);
             for (contact, cone) in self.cones.iter().enumerate() {
-                let push = cone.farthest_push(&unbalanced).1;
+                let push = cone.with_share(self.friction_share).farthest_push(&unbalanced).1;
                 self.write_entries(contact, &push, entries);
                 let gain = dot(solver.residual(), entries);
                 if gain > best.0 {
