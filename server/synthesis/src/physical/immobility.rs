@@ -2,14 +2,14 @@
 //!
 //! Wrenches here are vectors of six dimensionless numbers: force, and torque about the centre of mass divided by the
 //! object's characteristic length, so that neither counts more because of its unit (the thesis sets newtons beside
-//! newton metres, Eq. 4.5). Contacts are soft fingers with their exact, curved friction limits ([`contact_model`]);
+//! newton metres, Eq. 4.5). Contacts are soft fingers with their exact, curved friction limits;
 //! both questions ask those for the wrench that reaches farthest in a direction, and take only such wrenches. What they
 //! build from them lies inside the true limits, so that every answer is on the safe side.
 //!
 //! - [`balance`]: which forces hold the object against gravity, as comfortably as they can
-//!   ([`least_squares`] after Lawson and Hanson, over cones instead of a matrix);
+//!   (non-negative least squares after Lawson and Hanson, over cones instead of a matrix);
 //! - [`epsilon`]: how large a disturbance in any direction the contacts can resist (Ferrari and Canny), by an expanding
-//!   polytope in six dimensions ([`polytope`]).
+//!   polytope in six dimensions.
 
 mod balance;
 mod closure;
@@ -71,6 +71,7 @@ pub struct Balance {
 #[derive(Clone, Debug, Default)]
 pub struct Buffers {
     cones: Vec<contact_model::ContactCone>,
+    column: Vec<f64>,
     solver: least_squares::ConicLeastSquares,
     polytope: polytope::Polytope,
 }

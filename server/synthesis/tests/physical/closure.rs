@@ -125,6 +125,53 @@ fn agrees_with_all_facets_of_frictionless_contacts() {
     assert!(closed > 30, "only {closed} cases have closure");
 }
 
+/// Contacts on a coarse grid of a box, where very many wrenches lie in common planes: the same, and nothing breaks.
+#[test]
+fn agrees_with_all_facets_of_a_box_on_a_grid() {
+    let mut random = Random::new(12);
+    let mut closed = 0;
+    for case in 0..300 {
+        let contacts: Vec<SoftContact> = (0..7 + case % 7)
+            .map(|k| {
+                let normal = Vec3::AXES[k % 3] * if k / 3 % 2 == 0 { 1.0 } else { -1.0 };
+                let step = |random: &mut Random| random.index(3) as f32 * 0.03 - 0.03;
+                let beside = Vec3::new(step(&mut random), step(&mut random), step(&mut random));
+                SoftContact {
+                    position: beside.reject_from_normalized(normal) + normal * 0.03,
+                    normal,
+                    digit: None,
+                    friction: 1e-9,
+                    torsion_radius: 0.0,
+                }
+            })
+            .collect();
+        let load = load(0.3, Vec3::Y, 0.03);
+        let truth = nearest_facet(&pyramid_wrenches(&contacts, &load, 0));
+        assert_near(whole(&contacts, &load), truth, &format!("case {case}"));
+        closed += u32::from(truth > 0.0);
+    }
+    assert!(closed > 10, "only {closed} cases have closure");
+}
+
+/// The same contact twice is that contact.
+#[test]
+fn repeated_contacts_change_nothing() {
+    let mut random = Random::new(13);
+    let mut closed = 0;
+    for case in 0..100 {
+        let contacts = random.contacts(3 + case % 4);
+        let load = load(0.3, Vec3::Y, 0.04);
+        let once = whole(&contacts, &load);
+        let twice = whole(&[contacts.as_slice(), &contacts].concat(), &load);
+        assert!(
+            (once - twice).abs() <= 1.01 * EPSILON_TOLERANCE * once.max(twice) + 1e-6,
+            "case {case}"
+        );
+        closed += u32::from(once > 0.0);
+    }
+    assert!(closed > 10, "only {closed} cases have closure");
+}
+
 /// The smallest distance of a facet of the hull from the origin, 0 if the origin is outside.
 fn nearest_facet(points: &[[f64; 6]]) -> f64 {
     let mut nearest = f64::INFINITY;
@@ -133,7 +180,9 @@ fn nearest_facet(points: &[[f64; 6]]) -> f64 {
             .filter(|k| set >> k & 1 == 1)
             .map(|k| points[k])
             .collect();
-        let normal = normal_of_plane(&of_plane);
+        let Some(normal) = normal_of_plane(&of_plane) else {
+            continue;
+        };
         let height = |point: &[f64; 6]| point.iter().zip(normal).map(|(a, b)| a * b).sum::<f64>();
         let offset = height(&of_plane[0]);
         let above = points.iter().any(|point| height(point) > offset + 1e-9);
@@ -144,7 +193,12 @@ fn nearest_facet(points: &[[f64; 6]]) -> f64 {
             _ => {}
         }
     }
-    nearest.max(0.0)
+    // A flat hull has no facets.
+    if nearest.is_finite() {
+        nearest.max(0.0)
+    } else {
+        0.0
+    }
 }
 
 /// All sets of six below `count`, as bits, in rising order: Gosper's way from each to the next.
@@ -158,8 +212,8 @@ fn sets_of_six(count: usize) -> impl Iterator<Item = u32> {
 }
 
 /// Unit normal of the plane through six points: what is perpendicular to their five edges, by elimination with full
-/// pivots.
-fn normal_of_plane(points: &[[f64; 6]]) -> [f64; 6] {
+/// pivots. `None` if they span no plane.
+fn normal_of_plane(points: &[[f64; 6]]) -> Option<[f64; 6]> {
     let mut rows: [[f64; 6]; 5] =
         std::array::from_fn(|k| std::array::from_fn(|i| points[k + 1][i] - points[0][i]));
     let mut order = [0, 1, 2, 3, 4, 5];
@@ -175,6 +229,9 @@ fn normal_of_plane(points: &[[f64; 6]]) -> [f64; 6] {
         rows.swap(step, pivot_row);
         order.swap(step, pivot_column);
         let pivot = rows[step];
+        if pivot[order[step]].abs() < 1e-9 {
+            return None;
+        }
         for row in &mut rows[step + 1..] {
             let factor = row[order[step]] / pivot[order[step]];
             for (x, p) in row.iter_mut().zip(pivot) {
@@ -190,7 +247,7 @@ fn normal_of_plane(points: &[[f64; 6]]) -> [f64; 6] {
             .sum();
         normal[order[step]] = -known / rows[step][order[step]];
     }
-    unit(normal)
+    Some(unit(normal))
 }
 
 /// From below: a pyramid of a few pushes inside the curved limits of each contact has all its facets tried. From above:

@@ -158,7 +158,8 @@ pub(crate) fn sampled_reach(contacts: &[SoftContact], load: &Load, direction: &[
     best
 }
 
-/// Unit wrenches of pushes along some edges of each friction cone, and of pure torsion either way.
+/// Unit wrenches of pushes along some edges of each friction cone, and of pure torsion either way, or of
+/// the push along the normal for a point contact.
 pub(crate) fn pyramid_wrenches(contacts: &[SoftContact], load: &Load, edges: u32) -> Vec<[f64; 6]> {
     let mut wrenches = Vec::new();
     for contact in contacts {
@@ -175,8 +176,12 @@ pub(crate) fn pyramid_wrenches(contacts: &[SoftContact], load: &Load, edges: u32
             let (sin, cos) = (f64::from(edge) * std::f64::consts::TAU / f64::from(edges)).sin_cos();
             add(right * cos + forward * sin, 0.0);
         }
-        add(DVec3::ZERO, 1.0);
-        add(DVec3::ZERO, -1.0);
+        if contact.torsion_radius > 0.0 {
+            add(DVec3::ZERO, 1.0);
+            add(DVec3::ZERO, -1.0);
+        } else {
+            add(DVec3::ZERO, 0.0);
+        }
     }
     wrenches
 }

@@ -26,12 +26,19 @@ const FIRMNESS: f64 = 1.5;
 /// more firmly than necessary.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
+/// Share of friction and torsion that the forces use if they can: nobody holds a thing just so that it does not slip.
+/// A smaller share gives safer forces to fewer grasps; the others use all of it.
+const SAFE_FRICTION: f64 = 0.8;
+
+/// All of it, but for what rounding to single precision may add.
+const ALL_FRICTION: f64 = 1.0 - 2e-6;
+
 /// Weight of uncomfortable shares against unbalanced wrench. The balance pays with the square of it: ten times as much
 /// would spend the whole tolerance on comfort, and a tenth would drown in rounding.
-const SHARE_WEIGHT: f64 = 0.05;
+const SHARE_WEIGHT: f64 = 0.03;
 
 /// Weight of firmness: well below that of the shares, which matter more.
-const FIRMNESS_WEIGHT: f64 = 0.01;
+const FIRMNESS_WEIGHT: f64 = 0.006;
 
 /// Weight of a contact's limit against unbalanced wrench: what is over the limit costs a thousand times as much.
 const LIMIT_WEIGHT: f64 = 30.0;
@@ -40,7 +47,7 @@ const LIMIT_WEIGHT: f64 = 30.0;
 const FOUND: f64 = 0.5;
 
 /// A push that goes less than this with the residual does not help any more.
-const NEGLIGIBLE_GAIN: f64 = 3e-6;
+const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
@@ -49,24 +56,30 @@ const MAX_COLUMNS: usize = 60;
 const WRENCH_ROWS: usize = 6;
 
 /// Forces inside the friction limits, each at most [`MAX_CONTACT_FORCE`], that balance gravity within
-/// [`BALANCE_TOLERANCE`]: of those the digits' shares are as near to the comfortable ones (Eq. 4.6) as balance allows,
-/// and then their sum near to a firm grip. The palm may press as it likes. `None` if there are none.
+/// [`BALANCE_TOLERANCE`]. Of those, ones that keep off the friction limits if there are any; their digits' shares as near
+/// to the comfortable ones (Eq. 4.6) as balance allows, and their sum near to a firm grip. The palm may press as it
+/// likes. `None` if there are none.
 ///
 /// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
 pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
-    let Buffers { cones, solver, .. } = buffers;
+    let Buffers {
+        cones,
+        solver,
+        column,
+        ..
+    } = buffers;
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
     // First whether there are any: that settles most grasps, at once.
-    problem.solve(solver);
+    problem.solve(solver, column);
     if unbalanced_length(solver) > f64::from(BALANCE_TOLERANCE) {
         return None;
     }
     let mut found = problem.balance(solver);
     if exceeds_limit(&found) {
         problem.limited = true;
-        problem.solve(solver);
+        problem.solve(solver, column);
         found = problem.balance(solver);
     }
     problem.keep_limits(&mut found);
@@ -74,19 +87,21 @@ pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> 
         return None;
     }
     problem.comfortable = true;
-    problem.solve(solver);
-    let mut preferred = problem.balance(solver);
-    if !problem.limited && exceeds_limit(&preferred) {
-        problem.limited = true;
-        problem.solve(solver);
-        preferred = problem.balance(solver);
+    for share in [SAFE_FRICTION, ALL_FRICTION] {
+        problem.friction_share = share;
+        problem.solve(solver, column);
+        let mut preferred = problem.balance(solver);
+        if !problem.limited && exceeds_limit(&preferred) {
+            problem.limited = true;
+            problem.solve(solver, column);
+            preferred = problem.balance(solver);
+        }
+        problem.keep_limits(&mut preferred);
+        if preferred.residual <= BALANCE_TOLERANCE {
+            return Some(preferred);
+        }
     }
-    problem.keep_limits(&mut preferred);
-    Some(if preferred.residual <= BALANCE_TOLERANCE {
-        preferred
-    } else {
-        found
-    })
+    Some(found)
 }
 
 /// Non-negative least squares for one grasp. Forces are in units of the weight.
@@ -104,6 +119,8 @@ struct Problem<'a> {
     shares: [f64; 5],
     /// Sum of the digits' normal forces to aim at.
     firm_sum: f64,
+    /// Of friction and torsion, how much may be used.
+    friction_share: f64,
     limited: bool,
     comfortable: bool,
 }
@@ -135,6 +152,7 @@ impl<'a> Problem<'a> {
             up: load.up.as_dvec3(),
             shares: shares.map(|share| if sum > 0.0 { share / sum } else { 0.0 }),
             firm_sum,
+            friction_share: ALL_FRICTION,
             limited: false,
             comfortable: false,
         }
@@ -149,21 +167,22 @@ impl<'a> Problem<'a> {
         if self.limited { self.contacts.len() } else { 0 }
     }
 
-    /// Adds pushes until none helps.
-    fn solve(&self, solver: &mut ConicLeastSquares) {
+    /// Adds pushes until none helps. `entries` is a buffer.
+    fn solve(&self, solver: &mut ConicLeastSquares, entries: &mut Vec<f64>) {
         let rows = WRENCH_ROWS + self.limit_rows() + if self.comfortable { 6 } else { 0 };
-        let mut entries = vec![0.0; rows];
+        entries.clear();
+        entries.resize(rows, 0.0);
         entries[..3].copy_from_slice(&self.up.to_array());
         entries[WRENCH_ROWS..WRENCH_ROWS + self.limit_rows()].fill(LIMIT_WEIGHT);
         if self.comfortable {
             entries[rows - 1] = FIRMNESS_WEIGHT * self.firm_sum;
         }
-        solver.reset(&entries);
-        let strength = self.limit() * self.contacts.len() as f64;
+        solver.reset(entries);
+        let strength = (self.limit() + 1.0) * self.contacts.len() as f64;
         for contact in 0..self.limit_rows() {
             entries.fill(0.0);
             entries[WRENCH_ROWS + contact] = LIMIT_WEIGHT;
-            solver.add(&entries, Column::Slack);
+            solver.add(entries, Column::Slack);
         }
         for _ in 0..MAX_COLUMNS {
             let residual = solver.residual();
@@ -174,33 +193,34 @@ impl<'a> Problem<'a> {
             }
             let mut best = (NEGLIGIBLE_GAIN, None);
             for (contact, cone) in self.cones.iter().enumerate() {
-                let push = cone.farthest_push(&unbalanced).1;
-                self.write_entries(contact, &push, &mut entries);
-                let gain = dot(solver.residual(), &entries);
+                let push = cone.with_share(self.friction_share).farthest_push(&unbalanced).1;
+                self.write_entries(contact, &push, entries);
+                let gain = dot(solver.residual(), entries);
                 if gain > best.0 {
                     best = (gain, Some((contact, push)));
                 }
             }
-            // What is left is perpendicular to what is balanced; so no pushes, together at most `strength`, can shorten it
-            // by more than their gain along it.
-            if !self.comfortable && length - strength * best.0 / length > f64::from(BALANCE_TOLERANCE) {
-                return;
-            }
             let slack = (0..self.limit_rows())
                 .map(|row| (LIMIT_WEIGHT * solver.residual()[WRENCH_ROWS + row], row))
                 .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
+            // What is left is perpendicular to what is balanced, so that pushes and slacks, together at most `strength`,
+            // can shorten it by no more than they gain along it.
+            let gained = strength * best.0.max(slack.0);
+            if !self.comfortable && length - gained / length > f64::from(BALANCE_TOLERANCE) {
+                return;
+            }
             if slack.0 > best.0 {
                 entries.fill(0.0);
                 entries[WRENCH_ROWS + slack.1] = LIMIT_WEIGHT;
-                if solver.add(&entries, Column::Slack) {
+                if solver.add(entries, Column::Slack) {
                     continue;
                 }
             }
             let Some((contact, push)) = best.1 else {
                 return;
             };
-            self.write_entries(contact, &push, &mut entries);
-            if !solver.add(&entries, Column::Push { contact, push }) {
+            self.write_entries(contact, &push, entries);
+            if !solver.add(entries, Column::Push { contact, push }) {
                 return;
             }
         }

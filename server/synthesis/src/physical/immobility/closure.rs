@@ -14,16 +14,19 @@ pub const EPSILON_TOLERANCE: f32 = 0.05;
 /// of those, but cost every grasp that has closure.
 const GILBERT_STEPS: usize = 12;
 
-/// When the polytope has this many facets, its bound is taken as it is. More would only bring epsilon nearer for
-/// grasps that hold equally badly in very many directions.
-const MAX_FACETS: usize = 6_000;
+/// When so many facets have been made, some 1 ms of work, the bound is taken as it is. Grasps need about 1,000; more
+/// would only bring epsilon nearer for those that hold equally badly in very many directions.
+const MAX_FACETS_MADE: usize = 10_000;
+
+/// Contacts that resist less than this in some direction have no closure: below, single precision decides.
+const NO_CLOSURE: f64 = 1e-6;
 
 /// Ferrari and Canny's epsilon (1992) of soft-finger contacts: the radius of the largest ball about the origin inside the
 /// convex hull of the unit wrenches of all contacts. That is the L1 convention: the normal forces sum to one newton. The
 /// number is the longest disturbance, as a share of the summed normal forces, that the contacts resist from wherever it
 /// comes; torque is over the characteristic length, and the number without unit. 0 if there is no closure.
 ///
-/// The value is a lower bound at most [`EPSILON_TOLERANCE`] below the true one. If it cannot reach `required`, the search
+/// The value is a lower bound, at most [`EPSILON_TOLERANCE`] below the true one unless that took more than about 1 ms. If it cannot reach `required`, the search
 /// ends as soon as that is certain, and the value is only some number below `required`; with `required` 0, it is always
 /// followed to its end.
 pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &mut Buffers) -> f32 {
@@ -32,7 +35,7 @@ pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &m
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let required = f64::from(required);
     let resisted = least_resisted(cones);
-    if resisted <= 0.0 {
+    if resisted <= NO_CLOSURE {
         return 0.0;
     }
     if resisted < required {
@@ -51,10 +54,7 @@ fn least_resisted(cones: &[ContactCone]) -> f64 {
             *sum += part / cones.len() as f64;
         }
     }
-    let mut upper = f64::INFINITY;
-    if cones.is_empty() {
-        return 0.0;
-    }
+    let mut upper = if cones.is_empty() { 0.0 } else { f64::INFINITY };
     for _ in 0..GILBERT_STEPS {
         let length = dot(&point, &point).sqrt();
         if length < 1e-9 {
@@ -63,7 +63,7 @@ fn least_resisted(cones: &[ContactCone]) -> f64 {
         let direction = point.map(|x| -x / length);
         let (reach, wrench) = farthest_wrench(cones, &direction);
         upper = upper.min(reach);
-        if upper <= 0.0 {
+        if upper <= NO_CLOSURE {
             return 0.0;
         }
         // The nearest point to the origin on the segment to the new wrench.
@@ -88,15 +88,16 @@ fn inscribed_ball(cones: &[ContactCone], upper: f64, required: f64, polytope: &m
         let (normal, lower) = polytope.plane(facet);
         let (reach, wrench) = farthest_wrench(cones, &normal);
         upper = upper.min(reach);
-        if upper <= 0.0 {
+        if upper <= NO_CLOSURE {
             return 0.0;
         }
         if upper < required {
             return upper;
         }
         let near = lower >= (1.0 - f64::from(EPSILON_TOLERANCE)) * upper;
-        if near || polytope.facet_count() > MAX_FACETS || !polytope.expand(facet, wrench) {
-            return lower.max(0.0);
+        if near || polytope.facets_made() > MAX_FACETS_MADE || !polytope.expand(facet, wrench) {
+            // Rounding must not lift the bound above what is certain.
+            return lower.clamp(0.0, upper);
         }
     }
 }

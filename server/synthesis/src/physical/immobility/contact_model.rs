@@ -42,6 +42,15 @@ impl ContactCone {
         }
     }
 
+    /// The same contact with a share of its friction and torsion.
+    pub(super) fn with_share(&self, share: f64) -> Self {
+        Self {
+            friction: self.friction * share,
+            torsion: self.torsion * share,
+            ..*self
+        }
+    }
+
     /// The push whose wrench reaches farthest along `direction`, and how far.
     ///
     /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is

@@ -36,6 +36,8 @@ struct Facet {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polytope {
     vertices: u32,
+    /// How many facets were made, those that are gone again included.
+    made: usize,
     facets: Vec<Facet>,
     /// Signed distance of each facet's plane from the origin, negative if the origin is outside; infinite for facets
     /// that are gone.
@@ -76,6 +78,7 @@ impl Polytope {
             return false;
         };
         self.vertices = DIMENSIONS as u32 + 1;
+        self.made = DIMENSIONS + 1;
         self.facets.clear();
         self.offsets.clear();
         self.gone.clear();
@@ -111,12 +114,13 @@ impl Polytope {
         (self.facets[facet as usize].normal, self.offsets[facet as usize])
     }
 
-    /// How many facets there are.
-    pub(super) fn facet_count(&self) -> usize {
-        self.facets.len() - self.gone.len()
+    /// How many facets were made since the start: what the polytope has cost.
+    pub(super) fn facets_made(&self) -> usize {
+        self.made
     }
 
-    /// Grows by a vertex that is outside `facet`. False, and nothing is changed, if it is not.
+    /// Grows by a vertex that is outside `facet`. False if it is not, or if rounding has broken the surface; the polytope
+    /// is not to be used any more then.
     pub(super) fn expand(&mut self, facet: u32, vertex: ScaledWrench) -> bool {
         let height = dot(&self.facets[facet as usize].normal, &vertex) - self.offsets[facet as usize];
         if height <= OUTSIDE {
@@ -148,9 +152,12 @@ impl Polytope {
                 }
             }
         }
+        self.made += self.created.len();
         for k in 0..self.created.len() {
             let (index, replaced) = self.created[k];
-            self.link(index, replaced);
+            if self.link(index, replaced).is_none() {
+                return false;
+            }
         }
         for &index in &self.going {
             self.offsets[index as usize] = f64::INFINITY;
@@ -195,10 +202,11 @@ impl Polytope {
     }
 
     /// Finds a new facet's neighbours among the new ones: around the four vertices that they share with the newest one,
-    /// through facets that go, to where that fan ends.
-    fn link(&mut self, index: u32, replaced: u32) {
+    /// through facets that go, to where that fan ends. `None` if it does not end, which takes rounding to break the
+    /// surface.
+    fn link(&mut self, index: u32, replaced: u32) -> Option<()> {
         let newest = (self.vertices - 1) as u16;
-        let at_newest = position(&self.facets[index as usize].vertices, newest);
+        let at_newest = position(&self.facets[index as usize].vertices, newest)?;
         for other in (0..DIMENSIONS).filter(|&k| k != at_newest) {
             if self.facets[index as usize].neighbours[other] != replaced {
                 // Found from the other end.
@@ -207,34 +215,35 @@ impl Polytope {
             let mut from = replaced;
             let mut pivot = self.facets[from as usize].vertices[at_newest];
             let mut across = other;
+            let mut steps = 0;
             loop {
                 let to = self.facets[from as usize].neighbours[across];
                 if to & NEW != 0 {
                     // The vertices of that new facet are in the places that they have in the one it replaces.
                     let found = to & !NEW;
-                    let back = position(&self.facets[from as usize].vertices, pivot);
+                    let back = position(&self.facets[from as usize].vertices, pivot)?;
                     self.facets[index as usize].neighbours[other] = found;
                     self.facets[found as usize].neighbours[back] = index;
                     break;
                 }
                 // Enter `to`, where the vertex not shared becomes the one to keep, and leave it opposite to the pivot.
                 let entered = &self.facets[to as usize];
-                let back = position(&entered.neighbours, from);
-                across = position(&entered.vertices, pivot);
+                let back = position(&entered.neighbours, from)?;
+                across = position(&entered.vertices, pivot)?;
                 pivot = entered.vertices[back];
                 from = to;
+                steps += 1;
+                if steps > self.going.len() {
+                    return None;
+                }
             }
         }
+        Some(())
     }
 }
 
-/// Where a value is among six, which do not differ by chance but by construction: all are looked at, without branches.
-fn position<T: Copy + PartialEq>(values: &[T; DIMENSIONS], value: T) -> usize {
-    let mut found = 0;
-    for (k, &v) in values.iter().enumerate() {
-        found |= if v == value { k } else { 0 };
-    }
-    found
+fn position<T: Copy + PartialEq>(values: &[T; DIMENSIONS], value: T) -> Option<usize> {
+    values.iter().position(|&v| v == value)
 }
 
 /// What is left of a vector without its parts along an orthonormal basis, at length one.
