@@ -18,7 +18,7 @@ use crate::{Numbers, all, built_in};
 /// How far from the wrist's crease the skin of the forearm begins to end in a rounded stump, in metres.
 const STUMP: f32 = -0.012;
 
-fn posed(hand: &Hand, digits: [DigitAngles; 5]) -> HandPose {
+fn posed(digits: [DigitAngles; 5]) -> HandPose {
     HandPose {
         frame_from_wrist: Pose::IDENTITY,
         digits,
@@ -43,7 +43,7 @@ fn signed_distance(solids: &HandSolids, point: Vec3) -> f32 {
 
 /// The 95th percentile of the distances between skin and solids in metres, of vertices that `is_of` a part.
 fn misfit(hand: &Hand, digits: [DigitAngles; 5], is_of: impl Fn(usize, Vec3) -> bool) -> f32 {
-    let pose = posed(hand, digits);
+    let pose = posed(digits);
     let solids = HandSolids::of_pose(&hand.rig, &pose);
     let skin = hand.skin.posed(&HandJoints::of_pose(&hand.rig, &pose));
     let mut distances: Vec<f32> = skin
@@ -113,9 +113,8 @@ fn solids_of_tracked_joints_are_those_of_the_pose() {
 fn a_left_hand_is_the_mirror_image_of_the_right() {
     let flip = |point: Vec3| point * Vec3::new(-1.0, 1.0, 1.0);
     for rig in ["thesis", "adult"] {
-        let [left, right] = [Handedness::Left, Handedness::Right].map(|side| {
-            HandSolids::of_pose(&built_in(rig, side).rig, &posed(built_in(rig, side), relaxed()))
-        });
+        let [left, right] = [Handedness::Left, Handedness::Right]
+            .map(|side| HandSolids::of_pose(&built_in(rig, side).rig, &posed(relaxed())));
         let mut mirrored: Vec<TaperedCapsule> = right.iter().copied().collect();
         for solid in &mut mirrored {
             (solid.start, solid.end) = (flip(solid.start), flip(solid.end));
@@ -137,7 +136,7 @@ fn a_left_hand_is_the_mirror_image_of_the_right() {
 fn hands_at_ease_are_clear_of_themselves() {
     for hand in all() {
         for digits in [hand.rig.stretched(), relaxed()] {
-            let solids = HandSolids::of_pose(&hand.rig, &posed(hand, digits));
+            let solids = HandSolids::of_pose(&hand.rig, &posed(digits));
             let clearance = self_clearance(&solids);
             assert!(clearance > 0.0, "{}: {clearance}", hand.rig.name);
         }
@@ -147,7 +146,7 @@ fn hands_at_ease_are_clear_of_themselves() {
 #[test]
 fn fingers_through_fingers_and_palm_are_found() {
     let hand = built_in("adult", Handedness::Right);
-    let clearance_of = |digits| self_clearance(&HandSolids::of_pose(&hand.rig, &posed(hand, digits)));
+    let clearance_of = |digits| self_clearance(&HandSolids::of_pose(&hand.rig, &posed(digits)));
     let mut crossed = hand.rig.stretched();
     crossed[1].base_yaw = 20_f32.to_radians();
     crossed[2].base_yaw = -20_f32.to_radians();
@@ -157,7 +156,7 @@ fn fingers_through_fingers_and_palm_are_found() {
     thumb_through[0] = DigitAngles::coupled(0.0, 60_f32.to_radians(), 40_f32.to_radians());
     assert!(clearance_of(thumb_through) < -0.005);
     // As far in as the deepest pair says, less the soft flesh.
-    let solids = HandSolids::of_pose(&hand.rig, &posed(hand, crossed));
+    let solids = HandSolids::of_pose(&hand.rig, &posed(crossed));
     let deepest = solids.phalanges[1]
         .iter()
         .flat_map(|a| solids.phalanges[2].iter().map(|b| a.distance(b)))
@@ -173,7 +172,7 @@ fn distances_between_hands_are_those_of_all_pairs() {
     );
     let mut numbers = Numbers(9);
     for i in 0..300 {
-        let ours = HandSolids::of_pose(&receiver.rig, &posed(receiver, numbers.angles(&receiver.rig)));
+        let ours = HandSolids::of_pose(&receiver.rig, &posed(numbers.angles(&receiver.rig)));
         let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();
         let axis = Vec3::from_array(std::array::from_fn(|_| between(-1.0, 1.0))).normalize_or(Vec3::X);
         let place = Vec3::from_array(std::array::from_fn(|_| between(-0.25, 0.25)));

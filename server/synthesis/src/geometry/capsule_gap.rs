@@ -20,6 +20,10 @@ use super::{
 /// to a hand.
 const SLACK: f32 = 1e-6;
 
+/// How much closer a triangle must be to be preferred to one that was found, in metres. Along flat faces, many triangles
+/// are equally close, and with 0 all of them would be visited. Nothing that is done with hands needs more.
+const ACCURACY: f32 = 1e-5;
+
 /// The least determinant of two directions that is divided by, in m⁴: less than what a micrometre makes with another,
 /// and more than 0. What comes out for such pairs is clamped and measured, never trusted.
 const LEAST_DETERMINANT: f32 = 1e-30;
@@ -89,33 +93,34 @@ impl Query {
     }
 }
 
-/// Where the surface is closest to the capsule's skin, if that is at most `within` metres off it.
-pub(super) fn closest(
-    bvh: &WideBvh,
-    mesh: &TriangleMesh,
-    capsule: &TaperedCapsule,
-    within: f32,
-) -> Option<CapsuleGap> {
-    let is_finite = capsule.start.is_finite() && capsule.end.is_finite();
-    if !(is_finite && capsule.start_radius.is_finite() && capsule.end_radius.is_finite()) {
-        return None;
-    }
-    let query = Query::new(capsule);
-    let mut best = within + SLACK;
-    let mut winner = None;
+/// True if any of the surface is less than `distance` metres off the capsule's skin.
+pub(super) fn is_within(bvh: &WideBvh, capsule: &TaperedCapsule, distance: f32) -> bool {
+    let mut is_within = false;
+    descend(bvh, &Query::new(capsule), distance, |_, _| {
+        is_within = true;
+        f32::NEG_INFINITY
+    });
+    is_within
+}
+
+/// Visits triangles with gaps below a limit, the likely closest first. `found` takes a gap and its triangle and returns
+/// the limit from then on.
+#[inline]
+fn descend(bvh: &WideBvh, query: &Query, limit: f32, mut found: impl FnMut(f32, u32) -> f32) {
+    let mut limit = limit;
     bvh.with_stack(|stack: &mut [Waiting]| {
         let mut height = 1;
         while height > 0 {
             height -= 1;
             let waiting = stack[height];
-            if waiting.bound() - query.largest_radius > best {
+            if waiting.bound() - query.largest_radius > limit {
                 continue;
             }
             match waiting.child() {
                 Child::Node(index) => {
                     let node = &bvh.nodes[index];
-                    let bounds = box_gaps(node, &query);
-                    let near = bounds.cmple(Vec4::splat(best)).bitmask();
+                    let bounds = box_gaps(node, query);
+                    let near = bounds.cmple(Vec4::splat(limit)).bitmask();
                     let keys = (bounds + query.largest_radius).max(Vec4::ZERO).to_array();
                     let children = sorted_falling(std::array::from_fn(|lane| {
                         if near >> lane & 1 == 1 {
@@ -130,17 +135,30 @@ pub(super) fn closest(
                 }
                 Child::Pack(index) => {
                     let pack = &bvh.packs[index];
-                    let gaps = pack_gaps(pack, &query);
-                    let closer = gaps.cmplt(Vec4::splat(best)).bitmask();
+                    let gaps = pack_gaps(pack, query);
+                    let closer = gaps.cmplt(Vec4::splat(limit)).bitmask();
                     for lane in lanes(closer) {
-                        if gaps[lane] < best {
-                            best = gaps[lane];
-                            winner = Some(pack.triangle(lane));
+                        if gaps[lane] < limit {
+                            limit = found(gaps[lane], pack.triangle(lane));
                         }
                     }
                 }
             }
         }
+    });
+}
+
+/// Where the surface is closest to the capsule's skin within [`ACCURACY`], if that is at most `within` metres off it.
+pub(super) fn closest(
+    bvh: &WideBvh,
+    mesh: &TriangleMesh,
+    capsule: &TaperedCapsule,
+    within: f32,
+) -> Option<CapsuleGap> {
+    let mut winner = None;
+    descend(bvh, &Query::new(capsule), within + SLACK, |gap, triangle| {
+        winner = Some(triangle);
+        gap - ACCURACY
     });
     let triangle = winner?;
     let along = nearest_on_axis(capsule, mesh.corners(triangle as usize));
@@ -156,7 +174,8 @@ pub(super) fn closest(
     })
 }
 
-/// Lower bounds of the gaps to the boxes of a node's children; ∞ for unused children.
+/// Lower bounds of the gaps to the boxes of a node's children; NaN, which is below no limit, for unused
+/// children.
 #[inline]
 fn box_gaps(node: &Node, query: &Query) -> Vec4 {
     let [least, most] = &node.bounds;
@@ -168,7 +187,7 @@ fn box_gaps(node: &Node, query: &Query) -> Vec4 {
             let point = query.start[axis] + query.axis[axis] * t;
             let below = (least[axis] - point).max(Vec4::ZERO);
             let above = (point - most[axis]).max(Vec4::ZERO);
-            // One of the two is 0, but for unused children, whose distance is ∞.
+            // One of the two is 0, but for unused children.
             let outside = above.max(below);
             squared += outside * outside;
             falling += (above - below) * query.axis[axis];
@@ -202,7 +221,7 @@ fn box_gaps(node: &Node, query: &Query) -> Vec4 {
         Vec4::select(slope1.cmple(Vec4::ZERO), value1, lowest),
     );
     let used = least[0].cmplt(most[0]) | least[0].cmpeq(most[0]);
-    Vec4::select(used, bound - SLACK, Vec4::INFINITY)
+    Vec4::select(used, bound - SLACK, Vec4::NAN)
 }
 
 /// Gaps to the triangles of a pack; NaN for unused lanes.

@@ -128,9 +128,16 @@ impl MeshBvh {
     }
 
     /// Where the surface comes closest to a capsule's skin, or goes deepest below it, if that is at most `within` metres
-    /// off the skin. It says nothing of the mesh's volume: a capsule deep in it has a positive gap.
+    /// off the skin, to a hundredth of a millimetre. It says nothing of the mesh's volume: a capsule deep in it has a
+    /// positive gap.
     pub fn closest_to_capsule(&self, capsule: &TaperedCapsule, within: f32) -> Option<CapsuleGap> {
         capsule_gap::closest(&self.bvh, &self.mesh, capsule, within)
+    }
+
+    /// True if any of the surface is less than `distance` metres off a capsule's skin; below 0, deeper than that below
+    /// it.
+    pub fn comes_within(&self, capsule: &TaperedCapsule, distance: f32) -> bool {
+        capsule_gap::is_within(&self.bvh, capsule, distance)
     }
 
     /// True if the mesh's volume contains the point: if its generalised winding number is more than one half, so that

@@ -4,6 +4,10 @@ use glam::{DVec3, Vec3};
 
 use crate::pose::Pose;
 
+/// Squared sine of the angle below which two axes count as parallel: over 10 cm, they part by a micrometre. There is always
+/// an end of parallel axes among their nearest points.
+const PARALLEL: f64 = 1e-10;
+
 /// The convex hull of two balls: everything within [`TaperedCapsule::radius_at`] of a point of the axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TaperedCapsule {
@@ -102,17 +106,20 @@ impl TaperedCapsule {
     /// The least of |a(t) - b(u)| - r(t) - q(u), which is convex in t and u: either stationary inside, where the way
     /// from one axis to the other leaves each at its cone's angle, or at an end of one of them.
     pub fn distance(&self, other: &Self) -> f32 {
+        let axis = (other.end - other.start).as_dvec3();
+        let rise = f64::from(other.end_radius) - f64::from(other.start_radius);
+        let start_radius = f64::from(other.start_radius);
+        if let Some((_, between)) = self.stationary(other.start.as_dvec3(), axis, start_radius, rise) {
+            // Of a convex function, the least.
+            return between as f32;
+        }
         let ends = [
             self.nearest(other.start.as_dvec3()).1 - f64::from(other.start_radius),
             self.nearest(other.end.as_dvec3()).1 - f64::from(other.end_radius),
             other.nearest(self.start.as_dvec3()).1 - f64::from(self.start_radius),
             other.nearest(self.end.as_dvec3()).1 - f64::from(self.end_radius),
         ];
-        let at_an_end = ends.into_iter().fold(f64::INFINITY, f64::min);
-        let axis = (other.end - other.start).as_dvec3();
-        let rise = f64::from(other.end_radius) - f64::from(other.start_radius);
-        self.stationary(other.start.as_dvec3(), axis, f64::from(other.start_radius), rise)
-            .map_or(at_an_end, |(_, between)| between.min(at_an_end)) as f32
+        ends.into_iter().fold(f64::INFINITY, f64::min) as f32
     }
 
     /// The stationary value of |a(t) - b(u)| - r(t) - q(u) with t and u inside of the axes, and t, if there is one. The
@@ -132,7 +139,7 @@ impl TaperedCapsule {
         let across = along_a.cross(along_b);
         let (aa, ab, bb) = (along_a.dot(along_a), along_a.dot(along_b), along_b.dot(along_b));
         let determinant = across.length_squared();
-        if determinant < f64::MIN_POSITIVE {
+        if determinant <= PARALLEL * aa * bb {
             return None;
         }
         let in_plane = along_a * ((rise_a * bb + rise_b * ab) / determinant)

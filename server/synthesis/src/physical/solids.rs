@@ -1,7 +1,7 @@
 //! Hands as solids: what they leave free of objects and of each other.
 //!
 //! A hand is a union of tapered capsules ([`HandSolids`]). How far it is from an object's surface, and how deep in it,
-//! is asked capsule by capsule ([`clearance()`], [`closest()`]); how far from other parts of itself and from another hand
+//! is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far from other parts of itself and from another hand
 //! by [`self_clearance`], [`giver_clearance`] and [`least_distance`].
 
 mod flesh;
@@ -12,6 +12,6 @@ mod mesh_clearance;
 pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
 pub use hand_clearance::{SOFT_CONTACT, giver_clearance, least_distance, self_clearance};
 pub use hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
-pub use mesh_clearance::{Touch, clearance, closest};
+pub use mesh_clearance::{Touch, clearance, closest, comes_within};
 
 pub use crate::geometry::tapered_capsule::TaperedCapsule;

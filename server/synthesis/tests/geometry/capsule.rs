@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
     geometry::{mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
-    physical::solids::{clearance, closest},
+    physical::solids::{clearance, closest, comes_within},
     pose::Pose,
 };
 
@@ -14,6 +14,9 @@ const SAMPLES: u16 = 1000;
 
 /// Rounding, in metres.
 const ROUNDING: f32 = 2e-6;
+
+/// What gaps to meshes are exact to, in metres, and rounding.
+const ACCURACY: f32 = 1e-5 + ROUNDING;
 
 fn shares() -> impl Iterator<Item = f32> {
     (0..=SAMPLES).map(|i| f32::from(i) / f32::from(SAMPLES))
@@ -128,6 +131,14 @@ fn compare(name: &str, surface: &MeshBvh, count: usize) {
                 closest.distance - capsule.radius_at(t)
             })
             .fold(f32::INFINITY, f32::min);
+        if (expected - within).abs() > brute_slack(&capsule) {
+            let comes_within = surface.comes_within(&capsule, within);
+            assert_eq!(
+                comes_within,
+                expected < within,
+                "{name} {i}: {expected}, {within}"
+            );
+        }
         let Some(gap) = surface.closest_to_capsule(&capsule, within) else {
             assert!(
                 expected > within - ROUNDING,
@@ -137,7 +148,7 @@ fn compare(name: &str, surface: &MeshBvh, count: usize) {
         };
         assert!(gap.gap <= within, "{name} {i}: {gap:?} is not within {within}");
         assert!(
-            gap.gap <= expected + ROUNDING && gap.gap >= expected - brute_slack(&capsule),
+            gap.gap <= expected + ACCURACY && gap.gap >= expected - brute_slack(&capsule),
             "{name} {i}: {gap:?}, brute force says {expected} for {capsule:?}"
         );
         let way = capsule.at(gap.along).distance(gap.position) - capsule.radius_at(gap.along);
@@ -189,7 +200,7 @@ fn clearances_from_solids_are_those_of_the_nearest_or_deepest_balls() {
                 expected = expected.min(signed - capsule.radius_at(t));
             }
             deep += usize::from(is_inside);
-            let tolerance = brute_slack(&capsule) + if is_inside { 1e-3 } else { 0.0 };
+            let tolerance = brute_slack(&capsule) + if is_inside { 1e-3 } else { ACCURACY };
             let found = clearance(&capsule, &surface, 0.1);
             assert!(
                 (found - expected.min(0.1)).abs() <= tolerance,
@@ -197,6 +208,10 @@ fn clearances_from_solids_are_those_of_the_nearest_or_deepest_balls() {
             );
             if let Some(touch) = closest(&capsule, &surface, 0.1) {
                 assert_eq!(touch.clearance, found, "{name} {i}");
+            }
+            if (expected + 0.002).abs() > brute_slack(&capsule) {
+                let sinks = comes_within(&capsule, &surface, -0.002);
+                assert_eq!(sinks, expected < -0.002, "{name} {i}: {expected} for {capsule:?}");
             }
         }
         assert!(
@@ -277,6 +292,20 @@ fn clearances_do_not_depend_on_the_frame() {
             .closest_to_capsule(&capsule.transformed(frame), 1.0)
             .expect("it is near")
             .gap;
-        assert!((here - there).abs() <= ROUNDING, "{i}: {here} and {there}");
+        assert!((here - there).abs() <= ACCURACY, "{i}: {here} and {there}");
+    }
+}
+
+#[test]
+fn nothing_is_near_capsules_that_are_nowhere() {
+    let surface = MeshBvh::build(meshes::cuboid(Vec3::splat(0.02), 3));
+    for broken in [f32::NAN, f32::INFINITY] {
+        for capsule in [
+            TaperedCapsule::new(Vec3::splat(broken), Vec3::ZERO, 0.01, 0.01),
+            TaperedCapsule::new(Vec3::X, Vec3::Y * broken, 0.01, 0.01),
+        ] {
+            assert_eq!(surface.closest_to_capsule(&capsule, f32::INFINITY), None);
+            assert!(!surface.comes_within(&capsule, 0.01));
+        }
     }
 }

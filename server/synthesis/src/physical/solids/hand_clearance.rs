@@ -9,13 +9,13 @@ use super::{HandSolids, TaperedCapsule};
 /// lets fingers visibly share room, less refuses hands that are closed like every other.
 pub const SOFT_CONTACT: f32 = 0.002;
 
-/// The smallest distance between parts of a hand that can meet in metres, less what soft flesh allows
-/// ([`SOFT_CONTACT`]): negative if one goes through the other.
+/// The smallest distance between parts of a hand that can meet in metres, with what soft flesh allows
+/// ([`SOFT_CONTACT`]) added: negative if one goes through the other, [`SOFT_CONTACT`] if none touches another.
 ///
 /// Those are the links of different digits, and the two outer links of a digit with the palm, for fingers also with the
 /// ball of the thumb. The inner links and the thumb's ball overlap the palm in every pose.
 pub fn self_clearance(hand: &HandSolids) -> f32 {
-    let mut least = f32::INFINITY;
+    let mut least = 0.0;
     let digits = hand.phalanges.map(|links| links.map(Bounded::new));
     for (i, digit) in digits.iter().enumerate() {
         for other in &digits[i + 1..] {
@@ -35,7 +35,20 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
 
 /// The smallest distance between two hands with their forearms in metres; negative if they overlap.
 pub fn giver_clearance(receiver: &HandSolids, giver: &HandSolids) -> f32 {
-    least_distance(receiver.iter(), giver, f32::INFINITY)
+    // The distance of any pair bounds the smallest; that of the pair with the nearest middles is a good one.
+    let mut nearest = f32::INFINITY;
+    let mut pair = (&receiver.palm[0], &giver.palm[0]);
+    for ours in receiver.iter() {
+        for theirs in giver.iter() {
+            let apart = (ours.start + ours.end).distance_squared(theirs.start + theirs.end);
+            if apart < nearest {
+                nearest = apart;
+                pair = (ours, theirs);
+            }
+        }
+    }
+    let enough = pair.0.distance(pair.1);
+    least_distance(receiver.iter(), giver, enough)
 }
 
 /// The smallest distance between solids and a hand with its forearm in metres, or `enough` if it is more than that.
@@ -78,7 +91,7 @@ impl Bounded {
     }
 
     /// True if the other is certainly farther away than `distance`: by the balls around both, then by one ball and the
-    /// longer solid, as the ball around a forearm is wide.
+    /// longer solid's axis, as the ball around a forearm is wide.
     fn is_beyond(&self, other: &Self, distance: f32) -> bool {
         let reach = distance + self.radius + other.radius;
         if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {
@@ -89,7 +102,12 @@ impl Bounded {
         } else {
             (other, self)
         };
-        long.solid.signed_distance(round.centre) > distance + round.radius
+        let thickest = long.solid.start_radius.max(long.solid.end_radius);
+        let axis = long.solid.end - long.solid.start;
+        let offset = round.centre - long.solid.start;
+        let along = (offset.dot(axis) / axis.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let reach = distance + thickest + round.radius;
+        reach < 0.0 || offset.distance_squared(axis * along) > reach * reach
     }
 }
 
