@@ -13,7 +13,7 @@ use grasp_client::{
 };
 use grasp_synthesis::{
     hand::{Handedness, joints},
-    object::{GraspObject, THESIS_FRICTION},
+    object::GraspObject,
 };
 use grasp_tests::{
     TestServer,

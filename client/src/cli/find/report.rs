@@ -37,7 +37,7 @@ pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_se
 fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
     let wrist = grasp.client_from_wrist;
     let (p, q) = (wrist.position, wrist.orientation);
-    vec![
+    let mut lines = vec![
         (
             "hand",
             format!("{}, rig {}", name_of(&grasp.handedness), grasp.rig),
@@ -51,7 +51,22 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
         ),
         ("comfort E", format!("{:.4}", grasp.comfort)),
         ("wrench angle", format!("{:.2}°", grasp.wrench_angle.to_degrees())),
-    ]
+    ];
+    if let Some(margins) = &grasp.margins {
+        let giver = margins.giver_clearance.map_or_else(String::new, |clearance| {
+            format!(", {:.1} mm clear of the giver", 1e3 * clearance)
+        });
+        lines.push((
+            "margins",
+            format!(
+                "epsilon {:.3}, {:.1} % of the weight unbalanced, {:.1} mm deep{giver}",
+                margins.epsilon,
+                100.0 * margins.residual,
+                1e3 * margins.penetration
+            ),
+        ));
+    }
+    lines
 }
 
 fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
