@@ -1,8 +1,8 @@
 //! Hands as solids: what they leave free of objects and of each other.
 //!
 //! A hand is a union of tapered capsules ([`HandSolids`]). How far it is from an object's surface, and how deep in it,
-//! is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far from other parts of itself and from another hand
-//! by [`self_clearance`], [`giver_clearance`] and [`least_distance`].
+//! is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far from other parts of itself
+//! and from another hand by [`self_clearance`], [`giver_clearance`] and [`least_distance`].
 
 mod flesh;
 mod hand_clearance;

@@ -1,8 +1,9 @@
 //! The flesh of the palm as solids, where it lies on the bones.
 //!
 //! The figures are a least-squares fit of the solids' union to the skin of the built-in rig `adult`, in three poses: its
-//! stretched hand, a relaxed one and one whose thumb opposes the fingers. Of the palm's skin, 95 % lies within 2 mm of
-//! the fitted solids in each of them. For other hands they grow with the hand.
+//! stretched hand, a relaxed one and one whose thumb opposes the fingers. Of the back, 95 % lies within 1.3 mm of the
+//! fitted solids, of the palmar side within 1.8 mm, and 2.2 mm when thumb and fingers bend. For other hands they grow
+//! with the hand.
 
 use glam::{Mat3, Vec3};
 

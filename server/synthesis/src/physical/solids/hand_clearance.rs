@@ -36,18 +36,21 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
 /// The smallest distance between two hands with their forearms in metres; negative if they overlap.
 pub fn giver_clearance(receiver: &HandSolids, giver: &HandSolids) -> f32 {
     // The distance of any pair bounds the smallest; that of the pair with the nearest middles is a good one.
+    let theirs: [TaperedCapsule; HandSolids::COUNT] = giver.to_array();
+    let middles = theirs.map(|solid| solid.start + solid.end);
     let mut nearest = f32::INFINITY;
-    let mut pair = (&receiver.palm[0], &giver.palm[0]);
-    for ours in receiver.iter() {
-        for theirs in giver.iter() {
-            let apart = (ours.start + ours.end).distance_squared(theirs.start + theirs.end);
+    let mut pair = (receiver.palm[0], theirs[0]);
+    for ours in receiver.to_array() {
+        let middle = ours.start + ours.end;
+        for (their_middle, theirs) in middles.iter().zip(&theirs) {
+            let apart = middle.distance_squared(*their_middle);
             if apart < nearest {
                 nearest = apart;
-                pair = (ours, theirs);
+                pair = (ours, *theirs);
             }
         }
     }
-    let enough = pair.0.distance(pair.1);
+    let enough = pair.0.distance(&pair.1);
     least_distance(receiver.iter(), giver, enough)
 }
 
@@ -57,13 +60,31 @@ pub fn least_distance<'a>(
     hand: &HandSolids,
     enough: f32,
 ) -> f32 {
-    let mut theirs = [Bounded::default(); HandSolids::COUNT];
-    for (bounded, solid) in theirs.iter_mut().zip(hand.iter()) {
-        *bounded = Bounded::new(*solid);
+    let theirs = hand.to_array().map(Bounded::new);
+    // The balls, coordinate by coordinate, so that a whole hand of them is compared at once.
+    let balls: [[f32; HandSolids::COUNT]; 4] = [
+        theirs.map(|their| their.centre.x),
+        theirs.map(|their| their.centre.y),
+        theirs.map(|their| their.centre.z),
+        theirs.map(|their| their.radius),
+    ];
+    let mut least = enough;
+    for ours in solids {
+        let our = Bounded::new(*ours);
+        let is_near: [bool; HandSolids::COUNT] = std::array::from_fn(|i| {
+            let (x, y, z) = (
+                balls[0][i] - our.centre.x,
+                balls[1][i] - our.centre.y,
+                balls[2][i] - our.centre.z,
+            );
+            let reach = (least + our.radius + balls[3][i]).max(0.0);
+            x * x + y * y + z * z <= reach * reach
+        });
+        for (their, _) in theirs.iter().zip(is_near).filter(|(_, near)| *near) {
+            least = between(&[our], &[*their], least);
+        }
     }
-    solids.into_iter().fold(enough, |least, ours| {
-        between(&[Bounded::new(*ours)], &theirs, least)
-    })
+    least
 }
 
 /// A solid with the ball around it.
@@ -72,12 +93,6 @@ struct Bounded {
     solid: TaperedCapsule,
     centre: Vec3,
     radius: f32,
-}
-
-impl Default for Bounded {
-    fn default() -> Self {
-        Self::new(TaperedCapsule::default())
-    }
 }
 
 impl Bounded {

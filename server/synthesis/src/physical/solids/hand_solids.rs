@@ -78,6 +78,15 @@ impl HandSolids {
         }
     }
 
+    /// All solids in the order of [`HandSolids::iter`], side by side.
+    pub(super) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
+        let mut all = [self.palm[0]; Self::COUNT];
+        for (place, solid) in all.iter_mut().zip(self.iter()) {
+            *place = *solid;
+        }
+        all
+    }
+
     /// All solids: phalanges by digit, palm, ball of the thumb, forearm.
     pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> {
         self.phalanges
