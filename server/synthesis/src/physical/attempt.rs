@@ -5,10 +5,12 @@
 use super::{
     closing::{ClosedDigit, Closing},
     immobility::{Balance, Buffers, Load, SoftContact, balance, epsilon},
-    solids::{HandSolids, TaperedCapsule, clearance, closest, giver_clearance, link_radii, self_clearance},
+    solids::{
+        HandSolids, clearance, closest, comes_within, giver_clearance, least_distance, link_radii,
+        self_clearance,
+    },
 };
 use crate::{
-    geometry::mesh_bvh::MeshBvh,
     grasp::{Contact, Grasp, PhysicalMargins},
     hand::{
         Digit, DigitAngles, HandPose, Phalanx,
@@ -229,10 +231,11 @@ impl PhysicalAttempt {
         }
 
         // Step 3, Collision Validation.
-        let mut solids = still;
-        for (solids, digit) in solids.phalanges.iter_mut().zip(&digits) {
-            *solids = digit.links;
-        }
+        let pose = HandPose {
+            frame_from_wrist: wrist.object_from_wrist,
+            digits: digits.map(|digit| digit.angles),
+        };
+        let solids = HandSolids::of_pose(around.rig, &pose);
         let checked = around.check_digits(&solids);
         stopwatch.lap(Step::CollisionValidation);
         let Some((penetration, giver_distance)) = checked else {
@@ -246,7 +249,12 @@ impl PhysicalAttempt {
             .contacts
             .iter()
             .any(|contact| object.is_forbidden(contact.triangle))
-            || forbidden.is_some_and(|surface| comes_within(solids.iter(), surface, FORBIDDEN_CLEARANCE));
+            || forbidden.is_some_and(|surface| {
+                // A patch of a surface, which has no volume to be in.
+                solids
+                    .iter()
+                    .any(|part| surface.comes_within(part, FORBIDDEN_CLEARANCE))
+            });
         stopwatch.lap(Step::ContactValidation);
         if is_unwanted {
             return PhysicalEnd::Rejected(Rejection::UnwantedContact);
@@ -263,10 +271,6 @@ impl PhysicalAttempt {
             epsilon,
             penetration,
             giver_clearance: giver_distance,
-        };
-        let pose = HandPose {
-            frame_from_wrist: wrist.object_from_wrist,
-            digits: digits.map(|digit| digit.angles),
         };
         let ratios = std::array::from_fn(|digit| {
             digits[digit]
@@ -368,14 +372,10 @@ impl<'a> Surroundings<'a> {
     /// True if palm or forearm sink into the object or come too near to the giver.
     fn collides_without_digits(&self, still: &HandSolids) -> bool {
         let parts = || still.palm.iter().chain(&still.forearm);
-        if comes_within(parts(), &self.holdout.object.surface, -DEEPEST) {
-            return true;
-        }
-        self.scene.giver.as_ref().is_some_and(|giver| {
-            giver
-                .iter()
-                .any(|theirs| parts().any(|ours| ours.distance(theirs) < GIVER_CLEARANCE))
-        })
+        let surface = &self.holdout.object.surface;
+        let giver = self.scene.giver.as_ref();
+        parts().any(|part| comes_within(part, surface, -DEEPEST))
+            || giver.is_some_and(|giver| least_distance(parts(), giver, GIVER_CLEARANCE) < GIVER_CLEARANCE)
     }
 
     /// How deep the hand is in the object and how far from the giver's, if that and the digits' own distances are in
@@ -398,17 +398,6 @@ impl<'a> Surroundings<'a> {
             .fold(0.0, |least: f32, part| clearance(part, surface, least).min(least));
         (least >= -DEEPEST).then_some((-least, giver_distance))
     }
-}
-
-/// True if a part comes nearer to a surface than `distance` metres.
-fn comes_within<'a>(
-    parts: impl IntoIterator<Item = &'a TaperedCapsule>,
-    surface: &MeshBvh,
-    distance: f32,
-) -> bool {
-    parts
-        .into_iter()
-        .any(|part| clearance(part, surface, distance) < distance)
 }
 
 /// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a
