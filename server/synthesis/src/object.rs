@@ -34,8 +34,6 @@ pub struct GraspObject {
     pub friction: Option<f32>,
     /// One flag a triangle: may it not be touched?
     forbidden: Vec<bool>,
-    /// The triangles that may not be touched; none if all may.
-    forbidden_surface: Option<MeshBvh>,
 }
 
 /// Why an object was refused.
@@ -115,16 +113,7 @@ impl GraspObject {
         if !errors.is_empty() {
             return Err(errors);
         }
-        let untouchable: Vec<_> = mesh
-            .triangles()
-            .iter()
-            .zip(&forbidden)
-            .filter_map(|(triangle, forbidden)| forbidden.then_some(*triangle))
-            .collect();
-        // All of it is valid as a part of a mesh that is; only nothing at all is not a mesh.
-        let forbidden_surface = TriangleMesh::new(mesh.positions().to_vec(), untouchable).ok();
         Ok(Self {
-            forbidden_surface: forbidden_surface.map(MeshBvh::build),
             bounding_box: OrientedBox::around(&mesh),
             surface: MeshBvh::build(mesh),
             mass,
@@ -145,11 +134,6 @@ impl GraspObject {
     /// True if the triangle may not be touched (Algorithm 7); O(1).
     pub fn is_forbidden(&self, triangle: u32) -> bool {
         self.forbidden[triangle as usize]
-    }
-
-    /// The triangles that may not be touched, as a surface of their own; none if all may be touched.
-    pub fn forbidden_surface(&self) -> Option<&MeshBvh> {
-        self.forbidden_surface.as_ref()
     }
 
     /// How many triangles may not be touched.

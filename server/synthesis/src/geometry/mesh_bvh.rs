@@ -137,7 +137,17 @@ impl MeshBvh {
     /// True if any of the surface is less than `distance` metres off a capsule's skin; below 0, deeper than that below
     /// it.
     pub fn comes_within(&self, capsule: &TaperedCapsule, distance: f32) -> bool {
-        capsule_gap::is_within(&self.bvh, capsule, distance)
+        self.comes_within_of(capsule, distance, |_| true)
+    }
+
+    /// The same for those triangles of the surface that `counts` says.
+    pub fn comes_within_of(
+        &self,
+        capsule: &TaperedCapsule,
+        distance: f32,
+        counts: impl Fn(u32) -> bool,
+    ) -> bool {
+        capsule_gap::is_within(&self.bvh, capsule, distance, counts)
     }
 
     /// True if the mesh's volume contains the point: if its generalised winding number is more than one half, so that

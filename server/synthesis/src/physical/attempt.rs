@@ -244,17 +244,14 @@ impl PhysicalAttempt {
 
         // Step 4, Contact Validation.
         self.collect_contacts(around, &digits);
-        let forbidden = object.forbidden_surface();
-        let is_unwanted = self
-            .contacts
-            .iter()
-            .any(|contact| object.is_forbidden(contact.triangle))
-            || forbidden.is_some_and(|surface| {
-                // A patch of a surface, which has no volume to be in.
-                solids
-                    .iter()
-                    .any(|part| surface.comes_within(part, FORBIDDEN_CLEARANCE))
-            });
+        let nears_forbidden = |part| {
+            object
+                .surface
+                .comes_within_of(part, FORBIDDEN_CLEARANCE, |triangle| {
+                    object.is_forbidden(triangle)
+                })
+        };
+        let is_unwanted = solids.iter().any(nears_forbidden);
         stopwatch.lap(Step::ContactValidation);
         if is_unwanted {
             return PhysicalEnd::Rejected(Rejection::UnwantedContact);

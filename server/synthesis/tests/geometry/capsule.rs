@@ -133,6 +133,10 @@ fn compare(name: &str, surface: &MeshBvh, count: usize) {
             .fold(f32::INFINITY, f32::min);
         if (expected - within).abs() > brute_slack(&capsule) {
             let comes_within = surface.comes_within(&capsule, within);
+            // A part of the surface and the rest of it are all of it, and nothing is none of it.
+            let of = |odd: u32| surface.comes_within_of(&capsule, within, |triangle| triangle % 2 == odd);
+            assert_eq!(of(0) || of(1), comes_within, "{name} {i}");
+            assert!(!surface.comes_within_of(&capsule, within, |_| false));
             assert_eq!(
                 comes_within,
                 expected < within,
