@@ -164,3 +164,27 @@ async fn a_physical_grasp_can_be_replayed() {
     let again = client.find_grasp(&request).await.expect("a valid request");
     assert_eq!(again.grasp, first.grasp);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn any_number_of_workers_gives_the_same_grasp() {
+    let mut grasps = Vec::new();
+    for workers in [1, 3] {
+        let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
+        let request = FindRequest {
+            validity: Some(Validity::Physical),
+            seed: Some(4),
+            reproducible: true,
+            budget: Some(std::time::Duration::from_secs(10)),
+            ..request_for(holdout("scissors-hold1").expect("a built-in holdout"))
+        };
+        let answer = server
+            .client()
+            .await
+            .find_grasp(&request)
+            .await
+            .expect("a valid request");
+        grasps.push((answer.grasp.expect("a grasp"), answer.report.attempt));
+        server.stop().await;
+    }
+    assert_eq!(grasps[0], grasps[1]);
+}
