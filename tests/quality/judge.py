@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Asks a real server for grasps and judges each reply with means that share no code with the search.
 
-The exit code is 0 when replies could be judged, whatever they are worth; with --strict it is 1 when a target is not
-met.
+The exit code is 0 when replies could be judged, whatever they are worth; with --least-sound it is 1 when too many have
+faults, with --strict when a target is not met.
 """
 
 import argparse
@@ -39,6 +39,13 @@ def arguments():
     parser.add_argument("--workers", type=int, help="threads of the server (default: the server's)")
     parser.add_argument("--pictures", type=int, default=24, help="pictures on the contact sheet (default: 24)")
     parser.add_argument("--out", type=pathlib.Path, default=holdouts.ROOT / "target/quality/report")
+    parser.add_argument(
+        "--least-sound",
+        type=float,
+        default=0,
+        metavar="PERCENT",
+        help="exit with 1 when fewer of the grasps are without any fault (default: 0)",
+    )
     parser.add_argument("--strict", action="store_true", help="exit with 1 when a target is not met")
     return parser.parse_args()
 
@@ -156,6 +163,9 @@ def main():
     print(f"\n{len(rows)} holdouts in {time.monotonic() - began:.0f} s; the report is {options.out}/README.md")
     if not any(row["found"] for row in rows):
         raise SystemExit("no grasp was found: nothing could be judged")
+    sound = 100 * report.sound_share(rows)
+    if sound < options.least_sound:
+        raise SystemExit(f"only {sound:.0f} % of the grasps are without fault, of at least {options.least_sound:.0f} %")
     if options.strict and not all(target.met for target in targets if target.met is not None):
         raise SystemExit(1)
 

@@ -75,9 +75,15 @@ def targets(rows):
     lines.append(Target("comfort E", "reported", figure, None))
     figure = f"{column('digits_touching').mean():.1f} digits, {column('contacts').mean():.1f} contacts"
     lines.append(Target("touching, mean", "reported", figure, None))
-    flawless = sum(acceptable(row) for row in found)
-    lines.append(Target("without any of these faults", "reported", f"{100 * flawless / n:.0f} % of grasps", None))
+    figure = f"{100 * sound_share(rows):.0f} % of grasps"
+    lines.append(Target("without any of these faults", "reported", figure, None))
     return lines
+
+
+def sound_share(rows):
+    """Of the grasps that were found, the share without any fault."""
+    found = [row for row in rows if row["found"]]
+    return sum(acceptable(row) for row in found) / len(found)
 
 
 def overstated(found):

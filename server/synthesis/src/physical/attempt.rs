@@ -193,16 +193,14 @@ impl PhysicalAttempt {
         }
 
         // Step 2, Finger Posing.
-        let mut closed: [Option<ClosedDigit>; 5] = [None; 5];
-        let mut closings = Vec::with_capacity(5);
         let shape = HandShape::draw(around.bend_ratios, stream);
+        let closings = Digit::ALL.map(|digit| around.closing(digit, wrist, &shape));
+        let mut closed = [ClosedDigit::default(); 5];
         for digit in Digit::ALL {
             if interrupted() {
                 return PhysicalEnd::Interrupted;
             }
-            let closing = around.closing(digit, wrist, &shape);
-            closings.push(closing);
-            let Some(ended) = closing.close() else {
+            let Some(ended) = closings[digit.index()].close() else {
                 stopwatch.lap(Step::FingerPosing);
                 return PhysicalEnd::Rejected(Rejection::FingerCollision);
             };
@@ -210,20 +208,19 @@ impl PhysicalAttempt {
                 stopwatch.lap(Step::FingerPosing);
                 return PhysicalEnd::Rejected(Rejection::NoThumbEarlyStop);
             }
-            closed[digit.index()] = Some(ended);
+            closed[digit.index()] = ended;
         }
-        let touching: Vec<_> = closed.iter().flatten().map(ClosedDigit::touches_object).collect();
-        if !touching[1..].contains(&true) {
+        if !closed[1..].iter().any(ClosedDigit::touches_object) {
             stopwatch.lap(Step::FingerPosing);
             return PhysicalEnd::Rejected(Rejection::NoFingers);
         }
-        let mut digits = [ClosedDigit::default(); 5];
-        for digit in 0..5 {
-            digits[digit] = match closed[digit] {
-                Some(closed) if closed.touches_object() => closed,
-                _ => closings[digit].relax(resting_flexion(&closed, digit)),
-            };
-        }
+        let digits: [ClosedDigit; 5] = std::array::from_fn(|digit| {
+            if closed[digit].touches_object() {
+                closed[digit]
+            } else {
+                closings[digit].relax(resting_flexion(&closed, digit))
+            }
+        });
         stopwatch.lap(Step::FingerPosing);
         self.posed.extend(digits.iter().map(|digit| digit.angles));
         if interrupted() {
@@ -402,19 +399,23 @@ impl<'a> Surroundings<'a> {
 
 /// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a
 /// half more; that of a relaxed hand if none does.
-fn resting_flexion(closed: &[Option<ClosedDigit>; 5], digit: usize) -> f32 {
+fn resting_flexion(closed: &[ClosedDigit; 5], digit: usize) -> f32 {
     let neighbours = [digit.checked_sub(1).filter(|&other| other > 0), Some(digit + 1)];
-    let flexions: Vec<f32> = neighbours
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for neighbour in neighbours
         .into_iter()
         .flatten()
-        .filter_map(|other| closed.get(other).copied().flatten())
-        .filter(ClosedDigit::touches_object)
-        .map(|closed| closed.flexion())
-        .collect();
-    if flexions.is_empty() {
+        .filter_map(|other| closed.get(other))
+    {
+        if neighbour.touches_object() {
+            sum += neighbour.flexion();
+            count += 1.0;
+        }
+    }
+    if count == 0.0 {
         RESTING_FLEXION
     } else {
-        let mean = flexions.iter().sum::<f32>() / flexions.len() as f32;
-        mean.clamp(0.5 * RESTING_FLEXION, 1.5 * RESTING_FLEXION)
+        (sum / count).clamp(0.5 * RESTING_FLEXION, 1.5 * RESTING_FLEXION)
     }
 }
