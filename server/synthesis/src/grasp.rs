@@ -2,9 +2,14 @@
 
 use glam::Vec3;
 
-use crate::hand::{Digit, HandPose, Phalanx};
+use crate::{
+    hand::{HandPart, HandPose},
+    key_frames::KeyFrame,
+    score::Score,
+    taxonomy::Classification,
+};
 
-/// A point where a digit touches the object.
+/// A point where the hand touches the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// On the surface, in metres.
@@ -13,10 +18,8 @@ pub struct Contact {
     pub normal: Vec3,
     /// The triangle that is touched.
     pub triangle: u32,
-    /// The digit that touches.
-    pub digit: Digit,
-    /// The link of the digit that touches.
-    pub phalanx: Phalanx,
+    /// What touches there.
+    pub part: HandPart,
 }
 
 /// A valid grasp.
@@ -26,7 +29,7 @@ pub struct Grasp {
     pub pose: HandPose,
     /// The bend ratio that each digit was closed with, thumb first; none where the digit found no contact.
     pub bend_ratios: [Option<f32>; 5],
-    /// Where it touches, thumb first.
+    /// Where it touches, thumb first, the palm last.
     pub contacts: Vec<Contact>,
     /// The force that the hand applies on the object at each contact, in newtons.
     pub forces: Vec<Vec3>,
@@ -39,6 +42,12 @@ pub struct Grasp {
     pub comfort: f32,
     /// By how much the grasp passes the checks of `PHYSICAL` validity; none under the thesis' own.
     pub margins: Option<PhysicalMargins>,
+    /// What it is in the taxonomy.
+    pub classification: Classification,
+    /// How good it is; none under the thesis' validity.
+    pub score: Option<Score>,
+    /// The way to it, once it was planned ([`crate::key_frames`]); none if there is no straight one.
+    pub key_frames: Option<[KeyFrame; 3]>,
 }
 
 /// By how much a grasp passes the checks of `PHYSICAL` validity.

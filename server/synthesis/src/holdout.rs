@@ -19,8 +19,8 @@ use crate::{
 pub struct PresentingHand {
     /// Its joints.
     pub joints: HandJoints,
-    /// Its posed skin and search structure.
-    pub surface: MeshBvh,
+    /// Its posed skin and search structure; none where grasps are judged by solids alone, as under `PHYSICAL` validity.
+    pub surface: Option<MeshBvh>,
     /// The middle of its palm's skin.
     pub palm: Vec3,
 }
@@ -103,8 +103,18 @@ impl PresentingHand {
         Ok(Self {
             palm: joints.palm_skin(),
             joints,
-            surface: MeshBvh::build_quick(mesh),
+            surface: Some(MeshBvh::build_quick(mesh)),
         })
+    }
+
+    /// A hand without skin, for `PHYSICAL` validity: its solids follow its joints, which are given in the object's frame
+    /// and are finite. A thousandth of the work.
+    pub fn of_joints(joints: HandJoints) -> Self {
+        Self {
+            palm: joints.palm_skin(),
+            joints,
+            surface: None,
+        }
     }
 
     /// The same for joints in another frame.

@@ -7,15 +7,21 @@
 //! frame b to frame a. Hand frames follow the thesis (4.4): +y along the fingers, +z out of the palm, pitch about x,
 //! yaw about z; [`hand::joints`] is the one place where they become `OpenXR` joint frames.
 
+pub mod atlas;
 pub mod clock;
+pub mod constraints;
 pub mod geometry;
 pub mod grasp;
+pub mod guided;
 pub mod hand;
 pub mod holdout;
+pub mod key_frames;
 pub mod object;
 pub mod physical;
 pub mod pose;
 pub mod rejection;
+pub mod score;
 pub mod search;
 pub mod strategy;
 pub mod synthesis;
+pub mod taxonomy;

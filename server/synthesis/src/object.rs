@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::{
     geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox},
+    guided::surface_pairs::SurfacePairs,
     strategy::Validity,
 };
 
@@ -32,6 +33,8 @@ pub struct GraspObject {
     pub centre_of_mass: Vec3,
     /// Coefficient of static friction between skin and the surface; none if nobody said.
     pub friction: Option<f32>,
+    /// Where opposed digits and the palm may press.
+    pub surface_pairs: SurfacePairs,
     /// One flag a triangle: may it not be touched?
     forbidden: Vec<bool>,
 }
@@ -113,9 +116,12 @@ impl GraspObject {
         if !errors.is_empty() {
             return Err(errors);
         }
+        let bounding_box = OrientedBox::around(&mesh);
+        let surface = MeshBvh::build(mesh);
         Ok(Self {
-            bounding_box: OrientedBox::around(&mesh),
-            surface: MeshBvh::build(mesh),
+            bounding_box,
+            surface_pairs: SurfacePairs::of(&surface, |triangle| forbidden[triangle as usize]),
+            surface,
             mass,
             centre_of_mass,
             friction,

@@ -1,4 +1,4 @@
-//! Why attempts fail (thesis Table 5.2).
+//! Why attempts fail (thesis Table 5.2, and a request's own constraints).
 
 use serde::{Deserialize, Serialize};
 
@@ -22,11 +22,27 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
+    /// A grasp that is otherwise valid, or a wrist that is yet to get one, is not what the request's constraints ask for.
+    UnmetConstraint,
 }
 
 impl Rejection {
-    /// All kinds in the order of Table 5.2, which is also the order in which an attempt meets them.
-    pub const ALL: [Self; 8] = [
+    /// All kinds: those of Table 5.2 in its order, which is also the order in which an attempt meets them, then the one
+    /// that the thesis does not have.
+    pub const ALL: [Self; 9] = [
+        Self::NoContacts,
+        Self::NoThumb,
+        Self::NoThumbEarlyStop,
+        Self::NoFingers,
+        Self::PalmCollision,
+        Self::FingerCollision,
+        Self::UnwantedContact,
+        Self::NotImmobilizing,
+        Self::UnmetConstraint,
+    ];
+
+    /// The kinds of Table 5.2, all that a search without constraints can meet: the first of [`Rejection::ALL`].
+    pub const OF_THESIS: [Self; 8] = [
         Self::NoContacts,
         Self::NoThumb,
         Self::NoThumbEarlyStop,
@@ -40,5 +56,19 @@ impl Rejection {
     /// Its place in [`Rejection::ALL`].
     pub const fn index(self) -> usize {
         self as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_has_its_own_place_those_of_the_thesis_first() {
+        for (place, kind) in Rejection::ALL.into_iter().enumerate() {
+            assert_eq!(kind.index(), place);
+        }
+        assert!(Rejection::ALL.starts_with(&Rejection::OF_THESIS));
+        assert!(!Rejection::OF_THESIS.contains(&Rejection::UnmetConstraint));
     }
 }

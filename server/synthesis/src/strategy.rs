@@ -1,8 +1,8 @@
-//! The ladder of search strategies of the thesis' chapter 5.
+//! The ladder of search strategies of the thesis' chapter 5, and what goes beyond it.
 
 use serde::{Deserialize, Serialize};
 
-/// Each strategy adds a step to the one before.
+/// How grasps are searched for. Of the ladder, each strategy adds a step to the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Strategy {
     /// Naive synthesis (5.2).
@@ -17,6 +17,9 @@ pub enum Strategy {
     E,
     /// First sufficient force distribution (5.6, Algorithm 14).
     F,
+    /// Hands are placed where opposed surfaces suggest it ([`crate::guided`]), and grips that are known are tried first
+    /// ([`crate::atlas`]). What counts as valid is the same.
+    Guided,
 }
 
 /// Which grasps count as valid. Separate from the strategy: how they are searched for.
@@ -28,6 +31,17 @@ pub enum Validity {
     Thesis,
     /// Hands are solid, and forces are solved for instead of drawn ([`crate::physical`]).
     Physical,
+}
+
+/// Which of the valid grasps is the answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Choice {
+    /// The first that is found.
+    #[default]
+    FirstValid,
+    /// The best of all that are found until the deadline.
+    BestWithinBudget,
 }
 
 /// Which bend ratios a finger tries: the columns of Figure 5.20.
@@ -49,8 +63,8 @@ pub enum BendRatioChoice {
 }
 
 impl Strategy {
-    /// All strategies in order.
-    pub const ALL: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F];
+    /// The ladder of chapter 5 in order.
+    pub const LADDER: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F];
 
     /// Are placements pruned by the measures relative to the object?
     pub fn prunes_by_object(self) -> bool {

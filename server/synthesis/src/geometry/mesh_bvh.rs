@@ -8,6 +8,7 @@ use super::{
     capsule_gap, closest,
     containment::Containment,
     crossing,
+    distance_field::DistanceField,
     mesh::TriangleMesh,
     tapered_capsule::TaperedCapsule,
     wide_bvh::{BuildQuality, WideBvh},
@@ -56,6 +57,8 @@ pub struct MeshBvh {
     bvh: WideBvh,
     aabb: Aabb,
     containment: Containment,
+    /// Of meshes that are queried many times.
+    field: Option<DistanceField>,
 }
 
 impl MeshBvh {
@@ -72,8 +75,17 @@ impl MeshBvh {
 
     fn with_quality(mesh: TriangleMesh, quality: BuildQuality) -> Self {
         let aabb = mesh.aabb();
+        let bvh = WideBvh::build(&mesh, quality);
+        let distance = |point: Vec3, within: f32| {
+            closest::closest(&bvh, &mesh, point, within).map_or(within, |(_, _, distance)| distance)
+        };
+        let field = match quality {
+            BuildQuality::Thorough => Some(DistanceField::new(&aabb, distance)),
+            BuildQuality::Quick => None,
+        };
         Self {
-            bvh: WideBvh::build(&mesh, quality),
+            field,
+            bvh,
             containment: Containment::of(&mesh, &aabb),
             aabb,
             mesh,
@@ -131,7 +143,24 @@ impl MeshBvh {
     /// off the skin, to a hundredth of a millimetre. It says nothing of the mesh's volume: a capsule deep in it has a
     /// positive gap.
     pub fn closest_to_capsule(&self, capsule: &TaperedCapsule, within: f32) -> Option<CapsuleGap> {
+        if self.least_gap(capsule) > within {
+            return None;
+        }
         capsule_gap::closest(&self.bvh, &self.mesh, capsule, within)
+    }
+
+    /// Bytes that what is known of the distances around the mesh takes.
+    pub fn field_bytes(&self) -> usize {
+        self.field.as_ref().map_or(0, DistanceField::bytes)
+    }
+
+    /// A gap that the surface surely keeps from a capsule's skin, in metres, known without a look at the triangles: some
+    /// millimetres less than the true one. Below 0, none is sure.
+    #[inline]
+    pub fn least_gap(&self, capsule: &TaperedCapsule) -> f32 {
+        self.field
+            .as_ref()
+            .map_or(f32::NEG_INFINITY, |field| field.least_gap(capsule))
     }
 
     /// True if any of the surface is less than `distance` metres off a capsule's skin; below 0, deeper than that below
@@ -147,7 +176,7 @@ impl MeshBvh {
         distance: f32,
         counts: impl Fn(u32) -> bool,
     ) -> bool {
-        capsule_gap::is_within(&self.bvh, capsule, distance, counts)
+        self.least_gap(capsule) < distance && capsule_gap::is_within(&self.bvh, capsule, distance, counts)
     }
 
     /// True if the mesh's volume contains the point: if its generalised winding number is more than one half, so that

@@ -5,6 +5,7 @@ mod capsule_gap;
 mod closest;
 mod containment;
 mod crossing;
+mod distance_field;
 pub mod mesh;
 pub mod mesh_bvh;
 pub mod oriented_box;

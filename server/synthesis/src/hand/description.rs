@@ -9,7 +9,7 @@ use super::{
     DigitAngles, Handedness,
     joints::{JOINT_COUNT, JOINT_NAMES},
     kinematics::digit_frames,
-    rig::{AngleRange, DigitLimits, DigitRig, Rig},
+    rig::{AngleRange, DigitLimits, DigitRig, Rig, RigGuide},
 };
 use crate::{geometry::Segment, pose::Pose};
 
@@ -232,6 +232,7 @@ impl RigDescription {
             joint_radii: std::array::from_fn::<_, JOINT_COUNT, _>(|i| {
                 self.joint_radii_m.get(JOINT_NAMES[i]).copied().unwrap_or(0.0)
             }),
+            guide: RigGuide::default(),
         })
     }
 

@@ -79,6 +79,34 @@ impl Phalanx {
     }
 }
 
+/// A part of the hand that can touch something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HandPart {
+    /// A link of a digit.
+    Phalanx(Digit, Phalanx),
+    /// The palm, with the ball of the thumb.
+    Palm,
+}
+
+impl HandPart {
+    /// The digit; none for the palm.
+    pub const fn digit(self) -> Option<Digit> {
+        match self {
+            Self::Phalanx(digit, _) => Some(digit),
+            Self::Palm => None,
+        }
+    }
+
+    /// The link of the digit; none for the palm.
+    pub const fn phalanx(self) -> Option<Phalanx> {
+        match self {
+            Self::Phalanx(_, phalanx) => Some(phalanx),
+            Self::Palm => None,
+        }
+    }
+}
+
 /// The joint angles of one digit, in radians: the thesis' q = (θ1, ψ1, θ2), with θ3 beside them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DigitAngles {

@@ -1,9 +1,11 @@
 //! A hand's bones, limits and widths.
 
+use std::sync::{Arc, OnceLock};
+
 use glam::Vec3;
 
 use super::{Digit, DigitAngles, Handedness, Phalanx};
-use crate::{geometry::Segment, pose::Pose};
+use crate::{geometry::Segment, guided::opposition::Oppositions, pose::Pose};
 
 /// A closed range of angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,9 +83,27 @@ pub struct Rig {
     /// themselves, as in trackers' data; their radius is that of the fingertip's rounding, so that a capsule around
     /// the last phalanx must end one radius before the tip.
     pub joint_radii: [f32; 26],
+    /// What GUIDED search knows of the hand, once it was asked for.
+    pub guide: RigGuide,
+}
+
+/// What GUIDED search derives of a rig, when it is first asked for. Copies of a rig share it.
+#[derive(Clone, Debug, Default)]
+pub struct RigGuide(Arc<OnceLock<Oppositions>>);
+
+impl PartialEq for RigGuide {
+    /// It is derived, so that rigs do not differ by it.
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl Rig {
+    /// How thumb and fingers can oppose each other. Some 150 ms of work when it is first asked for.
+    pub fn oppositions(&self) -> &Oppositions {
+        self.guide.0.get_or_init(|| Oppositions::of(self))
+    }
+
     /// The digit's chain.
     pub fn digit(&self, digit: Digit) -> &DigitRig {
         &self.digits[digit.index()]
@@ -123,6 +143,7 @@ impl Rig {
                 .palm_segments
                 .map(|s| Segment::new(flip(s.start), flip(s.end))),
             joint_radii: self.joint_radii,
+            guide: RigGuide::default(),
         }
     }
 }

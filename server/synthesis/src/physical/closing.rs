@@ -6,14 +6,15 @@
 //! "Timewarp Rigid Body Simulation", 2000, for rotations). A link that touches stays, and so do the joints that carry
 //! it; the joints beyond go on, as a finger's deep flexor bends the last joint when the others are held.
 
-use super::solids::{TaperedCapsule, clearance, link_solids};
+use std::f32::consts::PI;
+
+use super::{
+    flexing::{Flexing, Sweep},
+    solids::{TaperedCapsule, clearance, link_solids},
+};
 use crate::{
     geometry::mesh_bvh::MeshBvh,
-    hand::{
-        DigitAngles,
-        kinematics::digit_frames,
-        rig::{AngleRange, DigitRig},
-    },
+    hand::{DigitAngles, kinematics::digit_frames},
     pose::Pose,
 };
 
@@ -22,7 +23,10 @@ use crate::{
 pub const TOUCH_DEPTH: f32 = 0.0005;
 
 /// How near to that depth is near enough, in metres: nobody sees a tenth of a millimetre. Less takes more steps.
-const TOUCH_TOLERANCE: f32 = 0.0001;
+pub(super) const TOUCH_TOLERANCE: f32 = 0.0001;
+
+/// The clearance below which a part of the hand touches, in metres.
+pub(super) const TOUCHING: f32 = -TOUCH_DEPTH + 2.0 * TOUCH_TOLERANCE;
 
 /// A link that starts deeper than this in a surface is inside from the start, in metres.
 const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
@@ -30,9 +34,16 @@ const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
 /// Room that a relaxed digit leaves between itself and the object, in metres: enough to be seen.
 const RELAXED_CLEARANCE: f32 = 0.001;
 
+/// From a gap of this many metres on, one that is sure is as good as the true one. A smaller one takes more steps of a
+/// few nanoseconds each, a larger one more looks at the mesh.
+pub(super) const SURE_GAP: f32 = 0.004;
+
+/// The farthest that the mesh is looked at, in metres: what is nearer is found sooner.
+pub(super) const NEAR: f32 = 0.015;
+
 /// Steps of advancement at most. Each covers what is certainly free, so that surfaces that a link glides along need
 /// many; where it still has not arrived, it stops where it is, which is free.
-const MOST_STEPS: usize = 40;
+pub(super) const MOST_STEPS: usize = 40;
 
 /// A digit after it was closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,35 +68,23 @@ impl ClosedDigit {
     }
 }
 
-/// Which of the three joints still close, and where they start.
-#[derive(Clone, Copy, Debug)]
-struct Sweep {
-    start: DigitAngles,
-    /// Radians of each joint for a radian of the sweep.
-    rates: [f32; 3],
-}
-
 /// What closes: one digit at a wrist, toward an object.
 #[derive(Clone, Copy, Debug)]
 pub struct Closing<'a> {
     /// The object's surface.
     pub surface: &'a MeshBvh,
-    /// The digit.
-    pub digit: &'a DigitRig,
+    /// The digit and how it bends.
+    pub flexing: Flexing<'a>,
     /// Radii of the digit's joints and tip, in metres.
     pub radii: [f32; 4],
     /// The wrist in the object's frame.
     pub object_from_wrist: Pose,
-    /// ψ1 in radians.
-    pub base_yaw: f32,
-    /// Degrees of the second joint for a degree of the first.
-    pub bend_ratio: f32,
 }
 
 impl Closing<'_> {
     /// Closes until every joint is held or at its limit. None if a link is inside a surface from the start.
     pub fn close(&self) -> Option<ClosedDigit> {
-        let opened = self.opened();
+        let opened = self.flexing.opened();
         if self.smallest_clearance(&self.links(&opened), INSIDE_DEPTH) < -INSIDE_DEPTH {
             return None;
         }
@@ -96,7 +95,13 @@ impl Closing<'_> {
         while free < 3 {
             let sweep = Sweep {
                 start: angles,
-                rates: std::array::from_fn(|joint| if joint < free { 0.0 } else { self.rate(joint) }),
+                rates: std::array::from_fn(|joint| {
+                    if joint < free {
+                        0.0
+                    } else {
+                        self.flexing.rate(joint)
+                    }
+                }),
             };
             angles = self.advance(&sweep, -TOUCH_DEPTH, f32::INFINITY);
             let links = self.links(&angles);
@@ -121,9 +126,8 @@ impl Closing<'_> {
     /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in all, or less if the object is in
     /// the way.
     pub fn relax(&self, flexion: f32) -> ClosedDigit {
-        let start = self.opened();
-        let rates: [f32; 3] = std::array::from_fn(|joint| self.rate(joint));
-        let sweep = Sweep { start, rates };
+        let sweep = self.flexing.sweep();
+        let Sweep { start, rates } = sweep;
         let opened = start.base_pitch + start.second_pitch + start.third_pitch;
         let most = (flexion - opened).max(0.0) / rates.iter().sum::<f32>();
         let angles = self.advance(&sweep, RELAXED_CLEARANCE, most);
@@ -134,97 +138,89 @@ impl Closing<'_> {
         }
     }
 
-    /// The opened pose: every joint at the lower end of its range, but not bent backward.
-    fn opened(&self) -> DigitAngles {
-        let limits = &self.digit.limits;
-        let straight = |range: AngleRange| range.min.max(0.0_f32.min(range.max));
-        DigitAngles {
-            base_yaw: self.base_yaw,
-            base_pitch: limits.base_pitch.min,
-            second_pitch: straight(limits.second_pitch),
-            third_pitch: straight(limits.third_pitch),
-        }
-    }
-
-    /// Radians of a joint for a radian of the sweep.
-    fn rate(&self, joint: usize) -> f32 {
-        match joint {
-            0 => 1.0,
-            1 => self.bend_ratio,
-            _ => self.bend_ratio * DigitAngles::THIRD_PITCH_SHARE,
-        }
-    }
-
-    /// The angles after a sweep, none beyond its limit.
-    fn angles_at(&self, sweep: &Sweep, way: f32) -> DigitAngles {
-        let limits = &self.digit.limits;
-        DigitAngles {
-            base_yaw: self.base_yaw,
-            base_pitch: (sweep.start.base_pitch + sweep.rates[0] * way).min(limits.base_pitch.max),
-            second_pitch: (sweep.start.second_pitch + sweep.rates[1] * way).min(limits.second_pitch.max),
-            third_pitch: (sweep.start.third_pitch + sweep.rates[2] * way).min(limits.third_pitch.max),
-        }
-    }
-
-    /// The way after which all joints that move are at their limits.
-    fn whole_way(&self, sweep: &Sweep) -> f32 {
-        let limits = &self.digit.limits;
-        let way = |rate: f32, start: f32, max: f32| {
-            if rate > 0.0 {
-                ((max - start) / rate).max(0.0)
-            } else {
-                0.0
-            }
-        };
-        way(sweep.rates[0], sweep.start.base_pitch, limits.base_pitch.max)
-            .max(way(
-                sweep.rates[1],
-                sweep.start.second_pitch,
-                limits.second_pitch.max,
-            ))
-            .max(way(
-                sweep.rates[2],
-                sweep.start.third_pitch,
-                limits.third_pitch.max,
-            ))
-    }
-
-    /// Sweeps until a moving link's clearance is down to `target`, or `most` radians.
+    /// Sweeps until a moving link's clearance is down to `target`, or `most` radians. Only for links that are outside of
+    /// the object's volume: of others it asks how far the surface is.
     fn advance(&self, sweep: &Sweep, target: f32, most: f32) -> DigitAngles {
-        let most = most.min(self.whole_way(sweep));
-        let speed = self.fastest(sweep);
-        let first_moving = sweep.rates.iter().position(|rate| *rate > 0.0).unwrap_or(3);
+        let most = most.min(self.flexing.whole_way(sweep));
         let mut way = 0.0;
+        // Up to where each link is free; it is not looked at again before.
+        let mut free_until = [0.0; 3];
         for _ in 0..MOST_STEPS {
-            let links = self.links(&self.angles_at(sweep, way));
-            // Beyond what the rest of the way can reach, nothing needs to be known.
-            let reachable = target + speed * (most - way) + TOUCH_TOLERANCE;
-            let free = self.smallest_gap(&links[first_moving..], reachable) - target;
-            if free <= TOUCH_TOLERANCE || way >= most {
+            if way >= most {
                 break;
             }
-            way = (way + free / speed).min(most);
+            let angles = self.flexing.angles_at(sweep, way);
+            let links = self.links(&angles);
+            let speeds = self.speeds(sweep, &angles, &links);
+            // The outermost links move fastest and stop most sweeps.
+            for link in (0..3).rev() {
+                let speed = speeds[link];
+                if speed <= 0.0 {
+                    free_until[link] = f32::INFINITY;
+                }
+                if free_until[link] > way {
+                    continue;
+                }
+                // Beyond what the rest of the way can reach, nothing needs to be known.
+                let reachable = target + 2.0 * TOUCH_TOLERANCE + speed * (most - way);
+                let free = self.gap(&links[link], reachable) - target;
+                if free <= TOUCH_TOLERANCE {
+                    return angles;
+                }
+                free_until[link] = way + free / speed;
+            }
+            way = free_until.into_iter().fold(most, f32::min);
         }
-        self.angles_at(sweep, way)
+        self.flexing.angles_at(sweep, way)
     }
 
-    /// Metres that the fastest point of the links can move for a radian of the sweep.
-    fn fastest(&self, sweep: &Sweep) -> f32 {
-        let [first, second, third] = self.digit.lengths;
-        let thickest = self.radii.iter().copied().fold(0.0, f32::max);
-        // The farthest point from a joint, with the digit stretched.
-        let reach = [first + second + third, second + third, third].map(|length| length + thickest);
-        sweep
-            .rates
-            .iter()
-            .zip(reach)
-            .map(|(rate, reach)| rate * reach)
-            .sum::<f32>()
-            .max(f32::EPSILON)
+    /// A gap that the surface keeps from a link, in metres: the smallest if that is small and less than `reachable`.
+    fn gap(&self, link: &TaperedCapsule, reachable: f32) -> f32 {
+        let sure = self.surface.least_gap(link);
+        if sure > SURE_GAP {
+            return sure;
+        }
+        let within = reachable.min(NEAR);
+        let gap = self.surface.closest_to_capsule(link, within);
+        gap.map_or(within, |gap| gap.gap)
+    }
+
+    /// Metres by which the gap of each link can shrink for a radian of the rest of a sweep.
+    ///
+    /// A link is made of balls, which turn within themselves, so that their middles' speeds count; the fastest is at an
+    /// end. A joint at its limit turns no more. As the digit bends, everything comes nearer to the joints that carry it.
+    fn speeds(&self, sweep: &Sweep, angles: &DigitAngles, links: &[TaperedCapsule; 3]) -> [f32; 3] {
+        let limits = &self.flexing.digit.limits;
+        let rate = |joint: usize, angle: f32, max: f32| if angle < max { sweep.rates[joint] } else { 0.0 };
+        let rates = [
+            rate(0, angles.base_pitch, limits.base_pitch.max),
+            rate(1, angles.second_pitch, limits.second_pitch.max),
+            rate(2, angles.third_pitch, limits.third_pitch.max),
+        ];
+        // Bent backward, or by more than half a turn, a digit may yet stretch.
+        let comes_nearer = angles.second_pitch.min(angles.third_pitch) >= 0.0
+            && limits.second_pitch.max + limits.third_pitch.max <= PI;
+        std::array::from_fn(|link| {
+            (0..=link)
+                .map(|joint| {
+                    let reach = if comes_nearer {
+                        let joint = links[joint].start;
+                        let TaperedCapsule { start, end, .. } = links[link];
+                        joint
+                            .distance_squared(start)
+                            .max(joint.distance_squared(end))
+                            .sqrt()
+                    } else {
+                        self.flexing.digit.lengths[joint..=link].iter().sum()
+                    };
+                    rates[joint] * reach
+                })
+                .sum()
+        })
     }
 
     fn links(&self, angles: &DigitAngles) -> [TaperedCapsule; 3] {
-        let frames = digit_frames(self.digit, self.object_from_wrist, *angles);
+        let frames = digit_frames(self.flexing.digit, self.object_from_wrist, *angles);
         let [first, second, third] = frames.links.map(|link| link.position);
         link_solids([first, second, third, frames.tip], self.radii)
     }
@@ -235,17 +231,7 @@ impl Closing<'_> {
         links.iter().fold(enough, smallest)
     }
 
-    /// The smallest gap between links and surface, up to `enough`. Only for links that are outside of the object's
-    /// volume: of others it says how far the surface is.
-    fn smallest_gap(&self, links: &[TaperedCapsule], enough: f32) -> f32 {
-        links.iter().fold(enough, |least, link| {
-            let gap = self.surface.closest_to_capsule(link, least);
-            gap.map_or(least, |gap| gap.gap)
-        })
-    }
-
     fn link_touches(&self, link: &TaperedCapsule) -> bool {
-        let near = -TOUCH_DEPTH + 2.0 * TOUCH_TOLERANCE;
-        clearance(link, self.surface, near) < near
+        clearance(link, self.surface, TOUCHING) < TOUCHING
     }
 }

@@ -2,9 +2,15 @@
 //!
 //! Where the thesis tests a few segments, the hand is solid here ([`solids`]), and digits close until their flesh touches
 //! ([`closing`]); where it draws force distributions until one is lucky, forces are solved for ([`immobility`]). Placing
-//! the wrist is common to both; [`attempt`] is the rest of Algorithm 1.
+//! the wrist is common to both; a hand closed on an object is a [`grip`], and one that holds what is presented a grasp
+//! ([`attempt`]).
 
 pub mod attempt;
 pub mod closing;
+pub(crate) mod contacts;
+pub mod flexing;
+pub mod grip;
 pub mod immobility;
+pub mod scene;
+pub mod shape;
 pub mod solids;

@@ -2,16 +2,18 @@
 //!
 //! A hand is a union of tapered capsules ([`HandSolids`]). How far it is from an object's surface, and how deep in it,
 //! is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far from other parts of itself
-//! and from another hand by [`self_clearance`], [`giver_clearance`] and [`least_distance`].
+//! by [`self_clearance`], and how far from another hand, of that hand when it is a [`PreparedHand`].
 
 mod flesh;
 mod hand_clearance;
 mod hand_solids;
 mod mesh_clearance;
+mod prepared_hand;
 
 pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
-pub use hand_clearance::{SOFT_CONTACT, giver_clearance, least_distance, self_clearance};
+pub use hand_clearance::{SOFT_CONTACT, self_clearance};
 pub use hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
 pub use mesh_clearance::{Touch, clearance, closest, comes_within};
+pub use prepared_hand::PreparedHand;
 
 pub use crate::geometry::tapered_capsule::TaperedCapsule;

@@ -1,24 +1,31 @@
 //! The race: workers pull attempt indices until a valid grasp is found, the deadline passes or they are told to stop.
 
+mod candidates;
 mod race;
 mod report;
 mod tally;
 
-use std::{sync::atomic::AtomicBool, time::Duration};
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Duration,
+};
 
 use crate::{
+    atlas::Atlas,
     clock::Clock,
+    constraints::Constraints,
     grasp::Grasp,
     hand::rig::Rig,
     holdout::Holdout,
-    strategy::{BendRatioChoice, Strategy, Validity},
+    strategy::{BendRatioChoice, Choice, Strategy, Validity},
     synthesis::{
         attempt::Scene,
         stopwatch::{NoStopwatch, StepStopwatch},
     },
 };
+use candidates::KnownGrips;
 use race::Race;
-pub use report::{NearestMiss, SearchReport};
+pub use report::{GraspSource, NearestMiss, SearchReport};
 
 pub use crate::synthesis::stopwatch::StepTimes;
 
@@ -35,7 +42,14 @@ pub struct SearchSettings {
     pub bend_ratios: BendRatioChoice,
     /// Coefficient of static friction.
     pub friction: f32,
-    /// Answer with the valid attempt of the lowest index instead of the first to finish.
+    /// What is demanded of the grasps beside being valid, in the object's frame.
+    pub constraints: Constraints,
+    /// Which of the valid grasps is wanted.
+    pub choice: Choice,
+    /// Grips that are known, to be tried first under `GUIDED` and `PHYSICAL`; made for this object and rig.
+    pub atlas: Option<Arc<Atlas>>,
+    /// Answer with the valid grip of the atlas that is first in its order, or else with the valid attempt of the lowest
+    /// index, instead of with the first to finish.
     pub reproducible: bool,
     /// The attempt indices to run: from here …
     pub first_attempt: u64,
@@ -69,8 +83,43 @@ pub struct SearchOutcome {
     pub end: SearchEnd,
     /// The grasp, if one was found.
     pub grasp: Option<Grasp>,
+    /// How good it is, where the best is wanted; more is better.
+    pub value: f32,
     /// What the search did.
     pub report: SearchReport,
+}
+
+/// True if a search with these settings may be answered from an atlas.
+pub fn uses_atlas(strategy: Strategy, validity: Validity) -> bool {
+    strategy == Strategy::Guided && validity == Validity::Physical
+}
+
+/// Looks for a valid grip in the atlas of `settings`, for no longer than `within` and without any other thread. None if
+/// none was found by then: [`find_grasp`] looks further. For first answers only, not for the best.
+pub fn find_known_grasp(
+    holdout: &Holdout,
+    rig: &Rig,
+    settings: &SearchSettings,
+    clock: &dyn Clock,
+    within: Duration,
+) -> Option<SearchOutcome> {
+    if settings.choice != Choice::FirstValid || settings.reproducible {
+        return None;
+    }
+    let scene = Scene::new(
+        holdout,
+        rig,
+        settings.strategy,
+        settings.bend_ratios,
+        settings.friction,
+    )
+    .with_validity(settings.validity)
+    .with_constraints(settings.constraints);
+    let known = KnownGrips::of(&scene, settings)?;
+    let stop = AtomicBool::new(false);
+    let race = Race::new(&scene, settings, Some(&known), clock, &stop);
+    race.look_ahead(Some(clock.now() + within))
+        .then(|| race.outcome())
 }
 
 /// Races `settings.workers` tasks of `pool` for a valid grasp. Returns when all of them have stopped.
@@ -99,8 +148,14 @@ pub fn find_grasp(
         settings.bend_ratios,
         settings.friction,
     )
-    .with_validity(settings.validity);
-    let race = Race::new(&scene, settings, clock, stop);
+    .with_validity(settings.validity)
+    .with_constraints(settings.constraints);
+    let known = KnownGrips::of(&scene, settings);
+    let race = Race::new(&scene, settings, known.as_ref(), clock, stop);
+    // Mostly one of the first known grips is the answer, and waking a worker takes longer than looking at some dozens.
+    if race.looks_ahead() {
+        return race.outcome();
+    }
     let run = |worker: usize| {
         if settings.record_step_times {
             race.run_worker(worker, StepStopwatch::new(clock));

@@ -41,11 +41,26 @@ pub struct SearchReport {
     /// Placements that the measures pruned.
     pub pruned_placements: u64,
     /// Rejections by kind, in the order of [`Rejection::ALL`].
-    pub rejections: [u64; 8],
+    pub rejections: [u64; Rejection::ALL.len()],
     /// Times by step, if they were asked for.
     pub step_times: Option<StepTimes>,
     /// The index of the attempt that gave the grasp.
     pub attempt: Option<u64>,
     /// The attempt that came closest, if none was valid.
     pub nearest_miss: Option<NearestMiss>,
+    /// Where the grasp came from.
+    pub source: Option<GraspSource>,
+    /// Valid grasps that were found.
+    pub candidates: u64,
+    /// Known grips that there were to try.
+    pub known_grips: usize,
+}
+
+/// Where a grasp came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GraspSource {
+    /// A fresh attempt of this index.
+    Attempt(u64),
+    /// The atlas' grip of this index.
+    Atlas(u16),
 }

@@ -15,13 +15,21 @@ use super::{
     wrist_placement::{WristFrame, WristPlacer},
 };
 use crate::{
+    constraints::Constraints,
     grasp::{Contact, Grasp},
+    guided::proposal::{Place, propose},
     hand::{Digit, HandPose, rig::Rig},
     holdout::Holdout,
-    physical::attempt::{PhysicalAttempt, PhysicalEnd, PhysicalScene, Surroundings},
+    physical::{
+        attempt::{PhysicalAttempt, Surroundings},
+        grip::{NoGrip, settled_wrist},
+        scene::{ObjectScene, Presented},
+        shape::{HandShape, Proposal},
+    },
     pose::Pose,
     rejection::Rejection,
     strategy::{BendRatioChoice, Strategy, Validity},
+    taxonomy::classify,
 };
 
 /// What all attempts of a search share, prepared once.
@@ -35,7 +43,8 @@ pub struct Scene<'a> {
     motion: [DigitMotion; 5],
     load: Load,
     /// Under `PHYSICAL` validity.
-    physical: Option<PhysicalScene>,
+    physical: Option<(ObjectScene<'a>, Presented)>,
+    constraints: Constraints,
 }
 
 impl<'a> Scene<'a> {
@@ -69,7 +78,56 @@ impl<'a> Scene<'a> {
                 friction,
             },
             physical: None,
+            constraints: Constraints::default(),
         }
+    }
+
+    /// The same with demands on the grasps, in the object's frame.
+    #[must_use]
+    pub fn with_constraints(self, constraints: Constraints) -> Self {
+        Self { constraints, ..self }
+    }
+
+    /// Under `PHYSICAL` validity: the object, and how it is held out.
+    pub fn physical(&self) -> Option<(&ObjectScene<'a>, &Presented)> {
+        self.physical
+            .as_ref()
+            .map(|(object, presented)| (object, presented))
+    }
+
+    /// The receiving hand.
+    pub fn rig(&self) -> &'a Rig {
+        self.rig
+    }
+
+    /// A hand as GUIDED search proposes it, with the palm laid on where it is to be; none if the object has nothing for
+    /// it.
+    fn guided_proposal(&self, stream: &mut AttemptStream) -> Option<Proposal> {
+        let object = &self.holdout.object;
+        let place = Place {
+            object,
+            giver: self
+                .physical
+                .as_ref()
+                .and_then(|(_, presented)| presented.giver.as_ref()),
+            rig: self.rig,
+        };
+        let proposal = propose(&place, stream)?;
+        if self.physical.is_some() {
+            // Palm and forearm are looked at on the way there.
+            return Some(proposal);
+        }
+        let scene = ObjectScene::new(object, self.load.friction);
+        Some(Proposal {
+            object_from_wrist: settled_wrist(&scene, self.rig, &proposal)?,
+            advance: 0.0,
+            ..proposal
+        })
+    }
+
+    /// What is demanded of the grasps.
+    pub fn constraints(&self) -> &Constraints {
+        &self.constraints
     }
 
     /// The same with grasps that count as valid as `validity` says.
@@ -79,7 +137,10 @@ impl<'a> Scene<'a> {
         Self {
             physical: match validity {
                 Validity::Thesis => None,
-                Validity::Physical => Some(PhysicalScene::new(self.holdout, friction)),
+                Validity::Physical => Some((
+                    ObjectScene::new(&self.holdout.object, friction),
+                    Presented::of(self.holdout),
+                )),
             },
             ..self
         }
@@ -175,16 +236,41 @@ impl Attempt {
         };
 
         // Step 1, Wrist Placement.
-        let placed = scene
-            .placer
-            .place(stream, interrupted, &mut self.pruned_placements);
-        stopwatch.lap(Step::WristPlacement);
-        let Some(wrist) = placed else {
-            return AttemptEnd::Interrupted;
+        let proposal = if scene.strategy == Strategy::Guided {
+            let proposal = scene.guided_proposal(stream);
+            stopwatch.lap(Step::WristPlacement);
+            let Some(proposal) = proposal else {
+                return reject(Rejection::NoContacts);
+            };
+            self.wrist = WristFrame::new(proposal.object_from_wrist);
+            Some(proposal)
+        } else {
+            let placed = scene
+                .placer
+                .place(stream, interrupted, &mut self.pruned_placements);
+            stopwatch.lap(Step::WristPlacement);
+            let Some(wrist) = placed else {
+                return AttemptEnd::Interrupted;
+            };
+            self.wrist = wrist;
+            None
         };
-        self.wrist = wrist;
-        if let Some(physical) = &scene.physical {
-            return self.hold_physically(scene, physical, stream, stopwatch, interrupted);
+        if !scene.constraints.admits_wrist(self.wrist.object_from_wrist) {
+            return reject(Rejection::UnmetConstraint);
+        }
+        if let Some((object, presented)) = &scene.physical {
+            let proposal = proposal.unwrap_or_else(|| Proposal {
+                object_from_wrist: self.wrist.object_from_wrist,
+                shape: HandShape::draw(scene.bend_ratios, stream),
+                advance: 0.0,
+            });
+            let around = Surroundings {
+                object: *object,
+                presented,
+                rig: scene.rig,
+                constraints: &scene.constraints,
+            };
+            return self.hold_physically(&around, &proposal, stopwatch, interrupted);
         }
 
         // Step 2, Finger Posing.
@@ -225,7 +311,12 @@ impl Attempt {
         stopwatch.lap(Step::ImmobilityValidation);
         match immobility {
             Immobility::Immobilizing(wrench_angle) => {
-                AttemptEnd::Valid(Box::new(self.grasp(scene, wrench_angle)))
+                let grasp = self.grasp(scene, wrench_angle);
+                if scene.constraints.admits(&grasp) {
+                    AttemptEnd::Valid(Box::new(grasp))
+                } else {
+                    reject(Rejection::UnmetConstraint)
+                }
             }
             Immobility::NotImmobilizing(wrench_angle) => AttemptEnd::Rejected {
                 rejection: Rejection::NotImmobilizing,
@@ -238,35 +329,27 @@ impl Attempt {
     /// Steps 2 to 5 under `PHYSICAL` validity.
     fn hold_physically(
         &mut self,
-        scene: &Scene<'_>,
-        physical: &PhysicalScene,
-        stream: &mut AttemptStream,
+        around: &Surroundings<'_>,
+        proposal: &Proposal,
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
     ) -> AttemptEnd {
-        let around = Surroundings {
-            holdout: scene.holdout,
-            rig: scene.rig,
-            scene: physical,
-            bend_ratios: scene.bend_ratios,
-        };
-        let end = self
-            .physical
-            .hold(&around, &self.wrist, stream, stopwatch, interrupted);
-        for (digit, angles) in self.digits.iter_mut().zip(&self.physical.posed) {
+        let end = self.physical.hold(around, proposal, stopwatch, interrupted);
+        let posed = &self.physical.gripper.posed;
+        for (digit, angles) in self.digits.iter_mut().zip(posed) {
             *digit = PosedDigit {
                 angles: *angles,
                 ..PosedDigit::default()
             };
         }
-        self.posed = self.physical.posed.len();
+        self.posed = posed.len();
         match end {
-            PhysicalEnd::Valid(grasp) => AttemptEnd::Valid(grasp),
-            PhysicalEnd::Rejected(rejection) => AttemptEnd::Rejected {
+            Ok(grasp) => AttemptEnd::Valid(grasp),
+            Err(NoGrip::Rejected(rejection)) => AttemptEnd::Rejected {
                 rejection,
                 wrench_angle: None,
             },
-            PhysicalEnd::Interrupted => AttemptEnd::Interrupted,
+            Err(NoGrip::Interrupted) => AttemptEnd::Interrupted,
         }
     }
 
@@ -302,8 +385,9 @@ impl Attempt {
 
     /// The grasp of an attempt that passed all checks.
     fn grasp(&self, scene: &Scene<'_>, wrench_angle: f32) -> Grasp {
+        let pose = self.pose(scene);
         Grasp {
-            pose: self.pose(scene),
+            pose,
             bend_ratios: self.digits.map(|digit| digit.bend_ratio),
             contacts: self.contacts.clone(),
             forces: self.immobility.forces(),
@@ -311,6 +395,9 @@ impl Attempt {
             wrench_angle,
             comfort: comfort(self.immobility.digit_totals(&self.contacts)),
             margins: None,
+            classification: classify(scene.rig, &pose, &self.contacts),
+            score: None,
+            key_frames: None,
         }
     }
 }

@@ -22,7 +22,10 @@ pub fn collision(
     digits: &[PosedDigit; 5],
 ) -> Option<Rejection> {
     let object = &holdout.object.surface;
-    let giver = holdout.presenting_hand.as_ref().map(|hand| &hand.surface);
+    let giver = holdout.presenting_hand.as_ref().map(|hand| {
+        let surface = hand.surface.as_ref();
+        surface.expect("under THESIS validity the giver's hand has a skin")
+    });
     let palm = rig.palm_segments.map(|segment| {
         Segment::new(
             wrist.transform_point(segment.start),

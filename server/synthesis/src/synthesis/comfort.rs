@@ -1,6 +1,9 @@
 //! The evaluation measure "comfort" (thesis 4.6, Eq. 4.6).
 
+use glam::Vec3;
+
 use super::force_distribution::COMFORTABLE_SHARES;
+use crate::grasp::Contact;
 
 /// E of Eq. 4.6: how far the digits' forces are from the comfortable distribution; 0 is the most comfortable.
 ///
@@ -15,4 +18,15 @@ pub fn comfort(digit_totals: [f32; 5]) -> f32 {
     (0..5)
         .map(|i| (touching[i] * COMFORTABLE_SHARES[i] / z - digit_totals[i] / total).powi(2))
         .sum()
+}
+
+/// The force magnitudes of each digit, thumb first, summed over its contacts; `forces` has one entry a contact.
+pub fn digit_totals(contacts: &[Contact], forces: &[Vec3]) -> [f32; 5] {
+    let mut totals = [0.0; 5];
+    for (contact, force) in contacts.iter().zip(forces) {
+        if let Some(digit) = contact.part.digit() {
+            totals[digit.index()] += force.length();
+        }
+    }
+    totals
 }

@@ -3,7 +3,7 @@
 use super::finger_posing::PosedDigit;
 use crate::{
     grasp::Contact,
-    hand::{Digit, Phalanx},
+    hand::{Digit, HandPart, Phalanx},
     object::GraspObject,
 };
 
@@ -16,8 +16,7 @@ pub fn collect_contacts(object: &GraspObject, digits: &[PosedDigit; 5], contacts
                 position: hit.position,
                 normal: object.surface.mesh().normal(hit.triangle as usize),
                 triangle: hit.triangle,
-                digit,
-                phalanx,
+                part: HandPart::Phalanx(digit, phalanx),
             }));
         }
     }

@@ -25,8 +25,9 @@ impl ForceDistribution {
         let noisy = COMFORTABLE_SHARES.map(|share| share * stream.between(SHARE_NOISE[0], SHARE_NOISE[1]));
         self.magnitudes.clear();
         self.magnitudes.extend(contacts.iter().map(|contact| {
-            let digit = contact.digit.index();
-            let size = noisy[digit] / contact_counts[digit] as f32;
+            let size = contact.part.digit().map_or(0.0, |digit| {
+                noisy[digit.index()] / contact_counts[digit.index()] as f32
+            });
             stream.four_shares().map(|share| size * share)
         }));
     }
@@ -46,7 +47,9 @@ impl ForceDistribution {
     pub fn digit_totals(&self, contacts: &[Contact]) -> [f32; 5] {
         let mut totals = [0.0; 5];
         for (contact, magnitudes) in contacts.iter().zip(&self.magnitudes) {
-            totals[contact.digit.index()] += magnitudes.iter().sum::<f32>();
+            if let Some(digit) = contact.part.digit() {
+                totals[digit.index()] += magnitudes.iter().sum::<f32>();
+            }
         }
         totals
     }
@@ -54,5 +57,10 @@ impl ForceDistribution {
 
 /// How many contacts each digit has, thumb first.
 pub fn contact_counts(contacts: &[Contact]) -> [u32; 5] {
-    Digit::ALL.map(|digit| contacts.iter().filter(|contact| contact.digit == digit).count() as u32)
+    Digit::ALL.map(|digit| {
+        let of_digit = contacts
+            .iter()
+            .filter(|contact| contact.part.digit() == Some(digit));
+        of_digit.count() as u32
+    })
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use grasp_synthesis::{
     grasp::Contact,
-    hand::{Digit, Phalanx},
+    hand::{Digit, HandPart, Phalanx},
     object::THESIS_FRICTION,
     synthesis::{
         comfort::comfort,
@@ -19,8 +19,7 @@ fn contact(digit: Digit, phalanx: Phalanx, position: Vec3, normal: Vec3) -> Cont
         position,
         normal,
         triangle: 0,
-        digit,
-        phalanx,
+        part: HandPart::Phalanx(digit, phalanx),
     }
 }
 
@@ -133,16 +132,16 @@ fn distributions_split_noisy_shares_over_contacts() {
     let contacts = [
         thumb,
         Contact {
-            phalanx: Phalanx::First,
+            part: HandPart::Phalanx(Digit::Index, Phalanx::First),
             ..index
         },
         Contact {
-            phalanx: Phalanx::Second,
+            part: HandPart::Phalanx(Digit::Index, Phalanx::Second),
             ..index
         },
         index,
         Contact {
-            digit: Digit::Little,
+            part: HandPart::Phalanx(Digit::Little, Phalanx::Third),
             ..index
         },
     ];

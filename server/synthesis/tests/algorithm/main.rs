@@ -1,5 +1,6 @@
 //! Tests of the synthesis algorithm and of the search, on simple bodies and a simple hand.
 
+mod constraints;
 mod forces;
 mod placement;
 mod posing;

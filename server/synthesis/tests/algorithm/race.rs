@@ -5,6 +5,7 @@ use std::sync::{OnceLock, atomic::AtomicBool};
 use glam::Vec3;
 use grasp_synthesis::{
     grasp::Grasp,
+    hand::HandPart,
     holdout::Holdout,
     rejection::Rejection,
     search::{SearchEnd, SearchOutcome, SearchSettings, find_grasp},
@@ -38,8 +39,9 @@ fn hash(outcome: &SearchOutcome) -> u64 {
     let report = &outcome.report;
     add(report.attempts);
     add(report.pruned_placements);
-    for count in report.rejections {
-        add(count);
+    // The kinds of the thesis' Table 5.2, which were there when the golden hash was made.
+    for rejection in Rejection::OF_THESIS {
+        add(report.rejections[rejection.index()]);
     }
     add(report.attempt.unwrap_or(u64::MAX));
     if let Some(grasp) = &outcome.grasp {
@@ -48,7 +50,10 @@ fn hash(outcome: &SearchOutcome) -> u64 {
         }
         for contact in &grasp.contacts {
             add(u64::from(contact.triangle));
-            add((contact.digit.index() * 3 + contact.phalanx.index()) as u64);
+            add(match contact.part {
+                HandPart::Phalanx(digit, phalanx) => (digit.index() * 3 + phalanx.index()) as u64,
+                HandPart::Palm => 15,
+            });
         }
     }
     hash

@@ -205,7 +205,8 @@ fn attempts_ahead_of_the_winner_do_not_count() {
         (outcome.end, outcome.report.attempt),
         (SearchEnd::Found, Some(valid))
     );
-    assert_eq!((outcome.report.attempts, outcome.report.rejections), (1, [0; 8]));
+    assert_eq!(outcome.report.attempts, 1);
+    assert!(outcome.report.rejections.iter().all(|&count| count == 0));
 }
 
 /// A flag that is set in the middle of an attempt ends it at the next look; the attempt does not count.

@@ -11,17 +11,18 @@ use std::{
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
     clock::Clock,
+    constraints::Constraints,
     geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh},
     hand::{
         HandPose, Handedness,
         joints::HandJoints,
-        rig::{AngleRange, DigitLimits, DigitRig, Rig},
+        rig::{AngleRange, DigitLimits, DigitRig, Rig, RigGuide},
     },
     holdout::{Holdout, PresentingHand},
     object::{GraspObject, THESIS_FRICTION},
     pose::Pose,
     search::SearchSettings,
-    strategy::Strategy,
+    strategy::{Choice, Strategy},
 };
 
 /// A clock that stands still until it is told to move.
@@ -106,6 +107,7 @@ pub(crate) fn rig() -> Rig {
         finger_metacarpals: [0.014, 0.003, -0.009, -0.02].map(|x| Vec3::new(x, 0.02, 0.0)),
         palm_segments,
         joint_radii: [0.009; 26],
+        guide: RigGuide::default(),
     }
 }
 
@@ -229,7 +231,7 @@ pub(crate) fn held(object: GraspObject) -> Holdout {
         object: Arc::new(object),
         presenting_hand: Some(PresentingHand {
             joints,
-            surface: MeshBvh::build(lump),
+            surface: Some(MeshBvh::build(lump)),
             palm: Vec3::new(0.0, -0.06, -0.03),
         }),
         up: Vec3::new(0.28, 0.96, 0.0),
@@ -250,6 +252,9 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
         deadline: None,
         workers: 1,
         record_step_times: false,
+        constraints: Constraints::default(),
+        choice: Choice::FirstValid,
+        atlas: None,
     }
 }
 

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use grasp_synthesis::{
     geometry::mesh::TriangleMesh,
     grasp::Grasp,
-    hand::{Digit, HandPose, kinematics::hand_frames, rig::Rig},
+    hand::{Digit, HandPart, HandPose, kinematics::hand_frames, rig::Rig},
     holdout::Holdout,
     object::GraspObject,
     pose::Pose,
@@ -81,13 +81,21 @@ fn assert_valid(holdout: &Holdout, rig: &Rig, grasp: &Grasp, settings: &SearchSe
     }
 
     // Contacts: thumb and finger, one a link, on the touch segments and on their triangles, none forbidden.
-    let touches = |digit| grasp.contacts.iter().any(|contact| contact.digit == digit);
+    let touches = |digit| {
+        grasp
+            .contacts
+            .iter()
+            .any(|contact| contact.part.digit() == Some(digit))
+    };
     assert!(touches(Digit::Thumb) && Digit::ALL[1..].iter().any(|&digit| touches(digit)));
     let frames = hand_frames(rig, &grasp.pose);
     for (index, contact) in grasp.contacts.iter().enumerate() {
-        let link = contact.phalanx.index();
-        let digit = rig.digit(contact.digit);
-        let local = frames.digits[contact.digit.index()].links[link]
+        let HandPart::Phalanx(touching, phalanx) = contact.part else {
+            panic!("the thesis knows no contacts of the palm");
+        };
+        let link = phalanx.index();
+        let digit = rig.digit(touching);
+        let local = frames.digits[touching.index()].links[link]
             .inverse()
             .transform_point(contact.position);
         assert!(local.x.abs() < 1e-5 && (local.z - digit.diameters[link] / 2.0).abs() < 1e-5);
@@ -99,7 +107,7 @@ fn assert_valid(holdout: &Holdout, rig: &Rig, grasp: &Grasp, settings: &SearchSe
         assert!(
             grasp.contacts[..index]
                 .iter()
-                .all(|other| (other.digit, other.phalanx) < (contact.digit, contact.phalanx))
+                .all(|other| other.part < contact.part)
         );
     }
     for digit in Digit::ALL {
@@ -125,7 +133,10 @@ fn assert_valid(holdout: &Holdout, rig: &Rig, grasp: &Grasp, settings: &SearchSe
             [joints[2], joints[3]],
         ]
     });
-    let giver = holdout.presenting_hand.as_ref().map(|hand| hand.surface.mesh());
+    let giver = holdout
+        .presenting_hand
+        .as_ref()
+        .and_then(|hand| Some(hand.surface.as_ref()?.mesh()));
     for [from, to] in palm.chain(bones) {
         for mesh in std::iter::once(mesh).chain(giver) {
             assert!(!crosses(mesh, from, to) && !winds_around(mesh, from));
@@ -203,7 +214,7 @@ fn rejections(holdout: &Holdout, settings: &SearchSettings, attempts: u64) -> [u
     sum
 }
 
-fn count(rejections: &[u64; 8], kind: Rejection) -> u64 {
+fn count(rejections: &[u64], kind: Rejection) -> u64 {
     rejections[kind.index()]
 }
 
@@ -374,7 +385,7 @@ fn collision_at(object: GraspObject, giver_at: Option<Vec3>, wrist: Vec3) -> Opt
         let lump = box_mesh(Vec3::splat(0.02), 2);
         let positions = lump.positions().iter().map(|&p| p + at).collect();
         let lump = TriangleMesh::new(positions, lump.triangles().to_vec()).expect("a box is a mesh");
-        giver.surface = grasp_synthesis::geometry::mesh_bvh::MeshBvh::build(lump);
+        giver.surface = Some(grasp_synthesis::geometry::mesh_bvh::MeshBvh::build(lump));
     }
     let wrist = WristFrame::new(Pose::from_position(wrist));
     collision(&holdout, &rig, &wrist, &stretched_hand(&rig, &wrist))

@@ -313,3 +313,26 @@ fn nothing_is_near_capsules_that_are_nowhere() {
         }
     }
 }
+
+#[test]
+fn sure_gaps_are_never_more_than_the_true_ones() {
+    let mut random = Random::new(17);
+    let mut positive = 0;
+    for (name, mesh) in meshes::all() {
+        let prepared = MeshBvh::build(mesh.clone());
+        // Without a field of distances: every answer comes from the triangles.
+        let exact = MeshBvh::build_quick(mesh.clone());
+        for i in 0..400 {
+            let near = random.near(&mesh, 0.1);
+            let capsule = capsule(&mut random, near);
+            let sure = prepared.least_gap(&capsule);
+            let gap = exact.closest_to_capsule(&capsule, 1.0).map_or(1.0, |gap| gap.gap);
+            assert!(
+                sure <= gap + ACCURACY,
+                "{name} {i}: {sure} is sure, {gap} true for {capsule:?}"
+            );
+            positive += u32::from(sure > 0.0);
+        }
+    }
+    assert!(positive > 500, "{positive} sure gaps");
+}

@@ -10,6 +10,7 @@ use grasp_synthesis::{
     },
     physical::{
         closing::{Closing, TOUCH_DEPTH},
+        flexing::Flexing,
         solids::{clearance, link_solids},
     },
     pose::Pose,
@@ -66,11 +67,13 @@ fn cuboid(low: Vec3, high: Vec3) -> MeshBvh {
 fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Closing<'a> {
     Closing {
         surface,
-        digit,
+        flexing: Flexing {
+            digit,
+            base_yaw: 0.0,
+            bend_ratio,
+        },
         radii: RADII,
         object_from_wrist: Pose::IDENTITY,
-        base_yaw: 0.0,
-        bend_ratio,
     }
 }
 

@@ -3,4 +3,5 @@
 mod balance;
 mod closing;
 mod closure;
+mod prepared_hand;
 mod support;

@@ -46,8 +46,12 @@ const LIMIT_WEIGHT: f64 = 30.0;
 /// The search for any balance ends at this share of [`BALANCE_TOLERANCE`]: it has been found.
 const FOUND: f64 = 0.5;
 
-/// A push that goes less than this with the residual does not help any more.
+/// A push that goes less than this with the residual does not help to balance any more.
 const NEGLIGIBLE_GAIN: f64 = 1e-6;
+
+/// A push that goes less than this with the residual makes the forces no more comfortable: shares that differ by some
+/// percent are equally so. A smaller one takes up to three times as long.
+const NEGLIGIBLE_COMFORT: f64 = 1e-4;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
@@ -61,7 +65,12 @@ const WRENCH_ROWS: usize = 6;
 /// likes. `None` if there are none.
 ///
 /// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
-pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
+pub fn balance(
+    contacts: &[SoftContact],
+    load: &Load,
+    expected: Expected,
+    buffers: &mut Buffers,
+) -> Option<Balance> {
     let Buffers {
         cones,
         solver,
@@ -71,6 +80,11 @@ pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> 
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
+    if expected == Expected::Balance
+        && let Some(found) = problem.comfortable_balance(SAFE_FRICTION, solver, column)
+    {
+        return Some(found);
+    }
     // First whether there are any: that settles most grasps, at once.
     problem.solve(solver, column);
     if unbalanced_length(solver) > f64::from(BALANCE_TOLERANCE) {
@@ -86,22 +100,19 @@ pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> 
     if found.residual > BALANCE_TOLERANCE {
         return None;
     }
-    problem.comfortable = true;
-    for share in [SAFE_FRICTION, ALL_FRICTION] {
-        problem.friction_share = share;
-        problem.solve(solver, column);
-        let mut preferred = problem.balance(solver);
-        if !problem.limited && exceeds_limit(&preferred) {
-            problem.limited = true;
-            problem.solve(solver, column);
-            preferred = problem.balance(solver);
-        }
-        problem.keep_limits(&mut preferred);
-        if preferred.residual <= BALANCE_TOLERANCE {
-            return Some(preferred);
-        }
-    }
-    Some(found)
+    [SAFE_FRICTION, ALL_FRICTION]
+        .into_iter()
+        .find_map(|share| problem.comfortable_balance(share, solver, column))
+        .or(Some(found))
+}
+
+/// What is asked first: it changes how soon the answer is there, and not the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Expected {
+    /// Most contacts that come cannot hold the load: first whether there are any forces at all.
+    Nothing,
+    /// The contacts have closure, so that they hold nearly everything: first the comfortable forces.
+    Balance,
 }
 
 /// Non-negative least squares for one grasp. Forces are in units of the weight.
@@ -158,6 +169,30 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// The comfortable balance within a share of friction and torsion, if there is one.
+    fn comfortable_balance(
+        &mut self,
+        friction_share: f64,
+        solver: &mut ConicLeastSquares,
+        column: &mut Vec<f64>,
+    ) -> Option<Balance> {
+        let was_limited = self.limited;
+        self.comfortable = true;
+        self.friction_share = friction_share;
+        self.solve(solver, column);
+        let mut found = self.balance(solver);
+        if !self.limited && exceeds_limit(&found) {
+            self.limited = true;
+            self.solve(solver, column);
+            found = self.balance(solver);
+        }
+        self.keep_limits(&mut found);
+        self.comfortable = false;
+        self.friction_share = ALL_FRICTION;
+        self.limited = was_limited;
+        (found.residual <= BALANCE_TOLERANCE).then_some(found)
+    }
+
     /// The largest force at a contact over the weight.
     fn limit(&self) -> f64 {
         f64::from(MAX_CONTACT_FORCE) / self.weight
@@ -191,11 +226,25 @@ impl<'a> Problem<'a> {
             if !self.comfortable && length < FOUND * f64::from(BALANCE_TOLERANCE) {
                 return;
             }
-            let mut best = (NEGLIGIBLE_GAIN, None);
+            let mut best = (
+                if self.comfortable {
+                    NEGLIGIBLE_COMFORT
+                } else {
+                    NEGLIGIBLE_GAIN
+                },
+                None,
+            );
+            let of_comfort = self.comfort_gains(solver.residual());
             for (contact, cone) in self.cones.iter().enumerate() {
-                let push = cone.with_share(self.friction_share).farthest_push(&unbalanced).1;
-                self.write_entries(contact, &push, entries);
-                let gain = dot(solver.residual(), entries);
+                let (reach, push) = cone.with_share(self.friction_share).farthest_push(&unbalanced);
+                // The residual times the push's column, without writing that.
+                let mut gain = reach;
+                if self.limited {
+                    gain += solver.residual()[WRENCH_ROWS + contact] * self.limit_entry(&push);
+                }
+                if let Some(digit) = self.contacts[contact].digit {
+                    gain += of_comfort[digit.index()];
+                }
                 if gain > best.0 {
                     best = (gain, Some((contact, push)));
                 }
@@ -226,14 +275,29 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// What a push takes of its contact's limit.
+    fn limit_entry(&self, push: &UnitPush) -> f64 {
+        // Forces at a contact add up to at most the sum of their lengths.
+        LIMIT_WEIGHT * push.force.length() / self.limit()
+    }
+
+    /// What a push of each digit gains in the rows of comfort.
+    fn comfort_gains(&self, residual: &[f64]) -> [f64; 5] {
+        if !self.comfortable {
+            return [0.0; 5];
+        }
+        let rows = &residual[residual.len() - 6..];
+        let common = FIRMNESS_WEIGHT * rows[5] - SHARE_WEIGHT * dot(&rows[..5], &self.shares);
+        std::array::from_fn(|digit| common + SHARE_WEIGHT * rows[digit])
+    }
+
     /// The column of a push.
     fn write_entries(&self, contact: usize, push: &UnitPush, entries: &mut [f64]) {
         entries[..WRENCH_ROWS].copy_from_slice(&self.cones[contact].wrench(push));
         let (limits, comfort) = entries[WRENCH_ROWS..].split_at_mut(self.limit_rows());
         limits.fill(0.0);
         if let Some(row) = limits.get_mut(contact) {
-            // Forces at a contact add up to at most the sum of their lengths.
-            *row = LIMIT_WEIGHT * push.force.length() / self.limit();
+            *row = self.limit_entry(push);
         }
         comfort.fill(0.0);
         if let (true, Some(digit)) = (self.comfortable, self.contacts[contact].digit) {

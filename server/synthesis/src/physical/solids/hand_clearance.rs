@@ -1,4 +1,4 @@
-//! How far a hand is from itself and from another.
+//! How far a hand is from itself, and when two solids are certainly far apart.
 
 use glam::Vec3;
 
@@ -33,70 +33,16 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
     least + SOFT_CONTACT
 }
 
-/// The smallest distance between two hands with their forearms in metres; negative if they overlap.
-pub fn giver_clearance(receiver: &HandSolids, giver: &HandSolids) -> f32 {
-    // The distance of any pair bounds the smallest; that of the pair with the nearest middles is a good one.
-    let theirs: [TaperedCapsule; HandSolids::COUNT] = giver.to_array();
-    let middles = theirs.map(|solid| solid.start + solid.end);
-    let mut nearest = f32::INFINITY;
-    let mut pair = (receiver.palm[0], theirs[0]);
-    for ours in receiver.to_array() {
-        let middle = ours.start + ours.end;
-        for (their_middle, theirs) in middles.iter().zip(&theirs) {
-            let apart = middle.distance_squared(*their_middle);
-            if apart < nearest {
-                nearest = apart;
-                pair = (ours, *theirs);
-            }
-        }
-    }
-    let enough = pair.0.distance(&pair.1);
-    least_distance(receiver.iter(), giver, enough)
-}
-
-/// The smallest distance between solids and a hand with its forearm in metres, or `enough` if it is more than that.
-pub fn least_distance<'a>(
-    solids: impl IntoIterator<Item = &'a TaperedCapsule>,
-    hand: &HandSolids,
-    enough: f32,
-) -> f32 {
-    let theirs = hand.to_array().map(Bounded::new);
-    // The balls, coordinate by coordinate, so that a whole hand of them is compared at once.
-    let balls: [[f32; HandSolids::COUNT]; 4] = [
-        theirs.map(|their| their.centre.x),
-        theirs.map(|their| their.centre.y),
-        theirs.map(|their| their.centre.z),
-        theirs.map(|their| their.radius),
-    ];
-    let mut least = enough;
-    for ours in solids {
-        let our = Bounded::new(*ours);
-        let is_near: [bool; HandSolids::COUNT] = std::array::from_fn(|i| {
-            let (x, y, z) = (
-                balls[0][i] - our.centre.x,
-                balls[1][i] - our.centre.y,
-                balls[2][i] - our.centre.z,
-            );
-            let reach = (least + our.radius + balls[3][i]).max(0.0);
-            x * x + y * y + z * z <= reach * reach
-        });
-        for (their, _) in theirs.iter().zip(is_near).filter(|(_, near)| *near) {
-            least = between(&[our], &[*their], least);
-        }
-    }
-    least
-}
-
 /// A solid with the ball around it.
-#[derive(Clone, Copy)]
-struct Bounded {
-    solid: TaperedCapsule,
-    centre: Vec3,
-    radius: f32,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounded {
+    pub(super) solid: TaperedCapsule,
+    pub(super) centre: Vec3,
+    pub(super) radius: f32,
 }
 
 impl Bounded {
-    fn new(solid: TaperedCapsule) -> Self {
+    pub(super) fn new(solid: TaperedCapsule) -> Self {
         let (centre, radius) = solid.bounding_ball();
         Self {
             solid,
@@ -107,7 +53,7 @@ impl Bounded {
 
     /// True if the other is certainly farther away than `distance`: by the balls around both, then by one ball and the
     /// longer solid's axis, as the ball around a forearm is wide.
-    fn is_beyond(&self, other: &Self, distance: f32) -> bool {
+    pub(super) fn is_beyond(&self, other: &Self, distance: f32) -> bool {
         let reach = distance + self.radius + other.radius;
         if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {
             return true;

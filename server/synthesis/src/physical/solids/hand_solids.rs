@@ -78,6 +78,22 @@ impl HandSolids {
         }
     }
 
+    /// The same hand elsewhere.
+    #[must_use]
+    pub fn moved(&self, way: Vec3) -> Self {
+        let moved = |solid: TaperedCapsule| TaperedCapsule {
+            start: solid.start + way,
+            end: solid.end + way,
+            ..solid
+        };
+        Self {
+            phalanges: self.phalanges.map(|links| links.map(moved)),
+            palm: self.palm.map(moved),
+            thenar: self.thenar.map(moved),
+            forearm: self.forearm.map(moved),
+        }
+    }
+
     /// All solids in the order of [`HandSolids::iter`], side by side.
     pub(super) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
         let mut all = [self.palm[0]; Self::COUNT];
@@ -88,7 +104,7 @@ impl HandSolids {
     }
 
     /// All solids: phalanges by digit, palm, ball of the thumb, forearm.
-    pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> {
+    pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
         self.phalanges
             .as_flattened()
             .iter()

@@ -1,0 +1,144 @@
+//! Time per grip: to hold one of the atlas out of a giver's hand, to find the first that holds, to close a proposed hand,
+//! and to find an entry of an atlas. In batches of fixed queries: divide by the batch, or read the throughput.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use grasp_assets::{hands, holdouts, objects};
+use grasp_synthesis::{
+    atlas::{Atlas, entry::Entry, growth::Growth},
+    guided::proposal::{Place, propose},
+    hand::{Handedness, rig::Rig},
+    object::GraspObject,
+    physical::{
+        grip::Gripper,
+        scene::{ObjectScene, Presented},
+    },
+    strategy::Validity,
+    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+};
+
+/// The built-in objects: a light one that is thin everywhere, and a box.
+const OBJECTS: [&str; 2] = ["scissors", "remote"];
+
+/// Entries of the atlases that are searched.
+const ENTRIES: usize = 400;
+
+/// Entries for which an atlas is grown again and again.
+const GROWN: usize = 20;
+
+/// Proposals in a batch.
+const PROPOSALS: u64 = 1000;
+
+fn rig() -> &'static Rig {
+    &hands::hand("adult", Handedness::Right)
+        .expect("the hand is built in")
+        .rig
+}
+
+fn object(name: &str) -> &'static GraspObject {
+    &objects::object(name).expect("the object is built in").object
+}
+
+fn scene(object: &GraspObject) -> ObjectScene<'_> {
+    ObjectScene::new(object, object.friction_under(Validity::Physical))
+}
+
+fn grown(object: &GraspObject, entries: usize) -> Atlas {
+    let mut growth = Growth::new(object, rig());
+    let mut gripper = Gripper::default();
+    while growth.len() < entries && !growth.is_complete() {
+        growth.round(&mut gripper);
+    }
+    growth.atlas()
+}
+
+fn presented(name: &str) -> Vec<Presented> {
+    let of_object = holdouts::holdouts()
+        .iter()
+        .filter(|holdout| holdout.object == name);
+    of_object
+        .map(|holdout| Presented::of(&holdout.to_holdout().expect("the holdout is sound")))
+        .collect()
+}
+
+fn holds(criterion: &mut Criterion) {
+    let mut gripper = Gripper::default();
+    for name in OBJECTS {
+        let (scene, atlas, presented) = (scene(object(name)), grown(object(name), ENTRIES), presented(name));
+        let mut holds = |entry: &Entry, presented: &Presented| {
+            entry
+                .hold(&scene, rig(), presented, false, &mut gripper)
+                .is_some()
+        };
+        let pairs = presented
+            .iter()
+            .flat_map(|way| atlas.entries().iter().map(move |entry| (entry, way)));
+        let (accepted, rejected): (Vec<_>, Vec<_>) = pairs.partition(|(entry, way)| holds(entry, way));
+
+        let mut group = criterion.benchmark_group(format!("hold/{name}"));
+        for (verdict, pairs) in [("accepted", accepted), ("rejected", rejected)] {
+            group.throughput(Throughput::Elements(pairs.len() as u64));
+            group.bench_function(verdict, |bencher| {
+                bencher.iter(|| {
+                    for (entry, way) in &pairs {
+                        black_box(holds(black_box(entry), way));
+                    }
+                });
+            });
+        }
+        group.throughput(Throughput::Elements(presented.len() as u64));
+        group.bench_function("first valid", |bencher| {
+            bencher.iter(|| {
+                for way in &presented {
+                    let mut order = atlas.by_score(way.up).iter();
+                    black_box(order.find(|&&index| holds(&atlas.entries()[usize::from(index)], way)));
+                }
+            });
+        });
+        group.finish();
+    }
+}
+
+fn proposals(criterion: &mut Criterion) {
+    let mut gripper = Gripper::default();
+    let mut group = criterion.benchmark_group("proposal");
+    group.throughput(Throughput::Elements(PROPOSALS));
+    for name in OBJECTS {
+        let scene = scene(object(name));
+        let place = Place {
+            object: scene.object,
+            giver: None,
+            rig: rig(),
+        };
+        let proposals: Vec<_> = (0..PROPOSALS)
+            .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index)))
+            .collect();
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                for proposal in &proposals {
+                    let proposal = black_box(proposal);
+                    let grip = gripper.grip(&scene, rig(), proposal, None, &mut NoStopwatch, &|| false);
+                    black_box(grip.is_ok());
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+fn growth(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("growth");
+    group.throughput(Throughput::Elements(GROWN as u64));
+    for name in OBJECTS {
+        group.bench_function(name, |bencher| bencher.iter(|| grown(object(name), GROWN)));
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10).warm_up_time(std::time::Duration::from_millis(300)).measurement_time(std::time::Duration::from_secs(1));
+    targets = holds, proposals, growth
+}
+criterion_main!(benches);

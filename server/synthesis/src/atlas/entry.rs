@@ -1,0 +1,174 @@
+//! A grip of the atlas, and what is left to check when an object is held out.
+
+use glam::Vec3;
+
+use super::gravity::{DIRECTIONS, direction};
+use crate::{
+    grasp::{Contact, Grasp},
+    hand::rig::Rig,
+    physical::{
+        attempt::grasp,
+        contacts::soften,
+        grip::{GIVER_CLEARANCE, Grip, Gripper, clear_of_giver},
+        immobility::{Expected, balance},
+        scene::{ObjectScene, Presented},
+        solids::{HandSolids, PreparedHand, TaperedCapsule},
+    },
+    score::{Score, Values, force_values, grip_values, score},
+};
+
+/// Balls inside a hand that settle most meetings with a giver's: seven in palm and forearm, which meet most often, and
+/// the middle of each link. More leave fewer to the distance of the hands, which takes as long as hundreds of them, and
+/// take 16 bytes each.
+const CORES: usize = 22;
+
+/// The score of a grip that cannot hold the object in a direction.
+pub const SLIPS: u8 = 0;
+
+/// A grip with what was found out about it once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// The hand on the object.
+    pub grip: Grip,
+    /// Where it touches.
+    pub contacts: Vec<Contact>,
+    /// Ferrari-Canny epsilon under the atlas' friction.
+    pub epsilon: f32,
+    /// The score's terms that depend on hand and object alone.
+    pub grip_values: Values,
+    /// For each of [`DIRECTIONS`] against gravity: the score of grip and comfort in 1 … 255, or [`SLIPS`].
+    pub scores: [u8; DIRECTIONS],
+    /// Balls inside the hand: middle and radius in metres.
+    cores: [(Vec3, f32); CORES],
+}
+
+impl Entry {
+    /// An entry from what a gripper has just closed.
+    pub fn new(
+        scene: &ObjectScene<'_>,
+        rig: &Rig,
+        grip: Grip,
+        solids: &HandSolids,
+        epsilon: f32,
+        gripper: &mut Gripper,
+    ) -> Self {
+        let contacts = gripper.contacts.clone();
+        let grip_values = grip_values(scene, rig, &grip.pose, &contacts, epsilon, solids);
+        let of_grip = Score { values: grip_values }.of_grip();
+        let scores = std::array::from_fn(|index| {
+            let load = scene.load(direction(index));
+            balance(
+                &gripper.soft_contacts,
+                &load,
+                Expected::Balance,
+                &mut gripper.buffers,
+            )
+            .map_or(SLIPS, |balance| {
+                let values = force_values(scene, &contacts, &balance.forces, &balance.torsions);
+                quantised(of_grip + Score { values }.total())
+            })
+        });
+        Self::from_parts(grip, contacts, epsilon, grip_values, scores, solids)
+    }
+
+    /// An entry of which everything is known.
+    pub(super) fn from_parts(
+        grip: Grip,
+        contacts: Vec<Contact>,
+        epsilon: f32,
+        grip_values: Values,
+        scores: [u8; DIRECTIONS],
+        solids: &HandSolids,
+    ) -> Self {
+        Self {
+            grip,
+            contacts,
+            epsilon,
+            grip_values,
+            scores,
+            cores: cores(solids),
+        }
+    }
+
+    /// The grasp that this grip is for what is presented, with its score; none if it comes too near to the giver or the
+    /// object slips. `friction_differs` if the scene's friction is not the one that the atlas was made under.
+    pub fn hold(
+        &self,
+        scene: &ObjectScene<'_>,
+        rig: &Rig,
+        presented: &Presented,
+        friction_differs: bool,
+        gripper: &mut Gripper,
+    ) -> Option<Grasp> {
+        let giver = presented.giver.as_ref();
+        if giver.is_some_and(|giver| self.surely_meets(giver)) {
+            return None;
+        }
+        let giver_clearance = match giver {
+            None => None,
+            Some(giver) => {
+                let solids = HandSolids::of_pose(rig, &self.grip.pose);
+                clear_of_giver(&solids, Some(giver))?
+            }
+        };
+        soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
+        let load = scene.load(presented.up);
+        let balance = balance(
+            &gripper.soft_contacts,
+            &load,
+            Expected::Balance,
+            &mut gripper.buffers,
+        )?;
+        let epsilon = if friction_differs {
+            gripper.closure(scene)?
+        } else {
+            self.epsilon
+        };
+        let mut grasp = grasp(
+            rig,
+            &self.grip,
+            &self.contacts,
+            epsilon,
+            &balance,
+            presented,
+            giver_clearance,
+        );
+        grasp.score = Some(score(self.grip_values, &grasp, scene, rig, presented));
+        Some(grasp)
+    }
+
+    /// Bytes that the entry takes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + size_of_val(self.contacts.as_slice())
+    }
+
+    /// True if a ball inside the hand comes too near to the giver's: then so does the hand.
+    fn surely_meets(&self, giver: &PreparedHand) -> bool {
+        self.cores
+            .iter()
+            .any(|&(middle, radius)| giver.surely_nears(middle, radius, GIVER_CLEARANCE))
+    }
+}
+
+/// A score as a number from 1 to 255.
+fn quantised(score: f32) -> u8 {
+    (1.0 + score.clamp(0.0, 1.0) * 254.0).round() as u8
+}
+
+fn cores(solids: &HandSolids) -> [(Vec3, f32); CORES] {
+    let ball = |solid: &TaperedCapsule, along: f32| (solid.at(along), solid.radius_at(along));
+    let palm_and_forearm = [
+        ball(&solids.palm[1], 0.5),
+        ball(&solids.palm[2], 0.9),
+        ball(&solids.forearm[0], 0.3),
+        ball(&solids.forearm[1], 0.8),
+        ball(&solids.thenar[1], 0.5),
+        ball(&solids.forearm[0], 0.8),
+        ball(&solids.forearm[1], 0.3),
+    ];
+    let links = solids.phalanges.as_flattened();
+    std::array::from_fn(|core| {
+        let link = || ball(&links[core - palm_and_forearm.len()], 0.5);
+        palm_and_forearm.get(core).copied().unwrap_or_else(link)
+    })
+}

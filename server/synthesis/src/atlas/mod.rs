@@ -1,0 +1,93 @@
+//! The atlas: what is known of how a hand can hold an object, before anybody holds it out.
+//!
+//! A grip that passes every check on object and hand alone fits every holdout whose giver and gravity let it. So grips are
+//! collected once per object and rig ([`growth`]), spread over all sides of the object; for a request they are tried in
+//! the order of their score under its gravity ([`gravity`]), and what is left to check is the giver's hand and the forces
+//! ([`entry`]). The thesis rejects precomputed grasps because a giver may spoil all of them (thesis 1): hence the atlas
+//! never answers alone, a fresh search runs beside it.
+
+pub mod codec;
+pub mod entry;
+pub mod gravity;
+pub mod growth;
+pub mod key;
+
+use glam::Vec3;
+use sha2::{Digest as _, Sha256};
+
+use entry::Entry;
+use gravity::GravityOrder;
+
+/// What is known of how a hand holds an object.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Atlas {
+    entries: Vec<Entry>,
+    order: GravityOrder,
+    complete: bool,
+    stamp: u64,
+}
+
+impl Atlas {
+    /// An atlas of entries; `complete` if it is not going to grow.
+    pub fn new(entries: Vec<Entry>, complete: bool) -> Self {
+        Self {
+            order: GravityOrder::of(&entries),
+            stamp: stamp(&entries),
+            entries,
+            complete,
+        }
+    }
+
+    /// The grips, in the order in which they were found.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// True if it is not going to grow.
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// A number that names these grips: the same for the same grips in the same order.
+    pub fn stamp(&self) -> u64 {
+        self.stamp
+    }
+
+    /// The grips in the order of their score when `up` (a unit vector in the object's frame) is against gravity, as
+    /// indices of [`Atlas::entries`]; those that the object would slip out of come last.
+    pub fn by_score(&self, up: Vec3) -> &[u16] {
+        self.order.under(up)
+    }
+
+    /// Bytes that it takes in memory.
+    pub fn bytes(&self) -> usize {
+        self.entries.iter().map(Entry::bytes).sum::<usize>() + self.order.bytes()
+    }
+}
+
+/// The first bytes of a hash over where the hands are and what they are worth.
+fn stamp(entries: &[Entry]) -> u64 {
+    let mut hash = Sha256::new();
+    for entry in entries {
+        let pose = &entry.grip.pose;
+        let wrist = pose.frame_from_wrist;
+        let angles = pose.digits.iter().flat_map(|digit| {
+            [
+                digit.base_yaw,
+                digit.base_pitch,
+                digit.second_pitch,
+                digit.third_pitch,
+            ]
+        });
+        let numbers = wrist.position.to_array().into_iter();
+        for number in numbers.chain(wrist.orientation.to_array()).chain(angles) {
+            hash.update(number.to_le_bytes());
+        }
+        hash.update(entry.scores);
+    }
+    let digest = hash.finalize();
+    digest
+        .iter()
+        .take(8)
+        .fold(0, |stamp, &byte| stamp << 8 | u64::from(byte))
+}

@@ -1,0 +1,10 @@
+//! `GUIDED` search: hands are placed where grips are, instead of anywhere.
+//!
+//! A proposal starts from how hands hold: between thumb and finger pads, or in the palm. The hand's side
+//! ([`opposition`]) draws a shape and asks where its pads oppose each other and how far apart; the object's side
+//! ([`surface_pairs`]) knows where it is as thick as that; [`proposal`] puts the two together. What comes of a proposal is
+//! decided by the same checks as ever.
+
+pub mod opposition;
+pub mod proposal;
+pub mod surface_pairs;

@@ -1,0 +1,310 @@
+//! A grip: a hand closed on an object, whoever holds it out and wherever gravity pulls. Steps 2 to 4 of Algorithm 1 with
+//! the hand as solids, and closure.
+//!
+//! The checks come by cost: palm and forearm before any digit closes, solids before contacts, closure last.
+
+use glam::Vec3;
+
+use super::{
+    closing::{ClosedDigit, Closing, MOST_STEPS, NEAR, SURE_GAP, TOUCH_DEPTH, TOUCH_TOLERANCE},
+    contacts::{are_opposed, collect_contacts, soften},
+    immobility::{Buffers, SoftContact, epsilon},
+    scene::{ObjectScene, Presented},
+    shape::{HandShape, Proposal, resting_flexion},
+    solids::{HandSolids, PreparedHand, clearance, comes_within, link_radii, self_clearance},
+};
+use crate::{
+    grasp::Contact,
+    hand::{Digit, DigitAngles, HandPose, rig::Rig},
+    pose::Pose,
+    rejection::Rejection,
+    synthesis::stopwatch::{Step, Stopwatch},
+};
+
+/// How deep any part of the hand may sink into the rigid object, in metres: soft flesh gives way by about as much under
+/// a firm grip. More lets hands look sunken.
+pub const DEEPEST: f32 = 0.002;
+
+/// How far the receiving hand and forearm stay from the giver's, in metres. More is safer and finds fewer grasps.
+pub const GIVER_CLEARANCE: f32 = 0.001;
+
+/// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way.
+pub const FORBIDDEN_CLEARANCE: f32 = 0.002;
+
+/// Why a hand was not closed to a grip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoGrip {
+    /// A check failed.
+    Rejected(Rejection),
+    /// The stop signal came before it was over.
+    Interrupted,
+}
+
+/// A hand closed on an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grip {
+    /// The hand in the object's frame.
+    pub pose: HandPose,
+    /// The bend ratio that each digit was closed with, thumb first; none where the digit does not touch.
+    pub bend_ratios: [Option<f32>; 5],
+    /// How deep it sinks into the object at its deepest, in metres; 0 if it does nowhere.
+    pub penetration: f32,
+}
+
+/// Closes hands, and keeps its buffers from one to the next.
+#[derive(Clone, Debug, Default)]
+pub struct Gripper {
+    /// Joint angles of the digits that were posed, thumb first.
+    pub posed: Vec<DigitAngles>,
+    /// Where the hand touches.
+    pub contacts: Vec<Contact>,
+    pub(crate) soft_contacts: Vec<SoftContact>,
+    pub(crate) buffers: Buffers,
+}
+
+impl Gripper {
+    /// Closes a proposed hand. What it touches is in `contacts` afterwards. With `presented`, a hand that
+    /// comes too near to the giver's is refused on the way.
+    ///
+    /// # Errors
+    /// The first check that fails, or the stop signal.
+    pub fn grip(
+        &mut self,
+        scene: &ObjectScene<'_>,
+        rig: &Rig,
+        proposal: &Proposal,
+        presented: Option<&Presented>,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<(Grip, HandSolids), NoGrip> {
+        self.posed.clear();
+        let giver = presented.and_then(|presented| presented.giver.as_ref());
+
+        // Step 3 for what does not move: palm and forearm.
+        let Proposal { shape, advance, .. } = proposal;
+        let opened = HandPose {
+            frame_from_wrist: proposal.object_from_wrist,
+            digits: Digit::ALL.map(|digit| shape.flexing(rig, digit).opened()),
+        };
+        let mut still = HandSolids::of_pose(rig, &opened);
+        let mut object_from_wrist = proposal.object_from_wrist;
+        if *advance > 0.0 {
+            let Some(way) = free_way(
+                scene,
+                &still,
+                object_from_wrist.transform_vector(Vec3::Z),
+                *advance,
+            ) else {
+                stopwatch.lap(Step::CollisionValidation);
+                return Err(NoGrip::Rejected(Rejection::PalmCollision));
+            };
+            object_from_wrist.position += way;
+            still = still.moved(way);
+        }
+        let collides = collides_without_digits(scene, giver, &still);
+        stopwatch.lap(Step::CollisionValidation);
+        if collides {
+            return Err(NoGrip::Rejected(Rejection::PalmCollision));
+        }
+
+        // Step 2, Finger Posing.
+        let closings = Digit::ALL.map(|digit| closing(scene, rig, digit, object_from_wrist, shape));
+        let closed = close(&closings, shape, interrupted);
+        stopwatch.lap(Step::FingerPosing);
+        let digits = closed?;
+        self.posed.extend(digits.iter().map(|digit| digit.angles));
+        if interrupted() {
+            return Err(NoGrip::Interrupted);
+        }
+
+        // Step 3, Collision Validation.
+        let pose = HandPose {
+            frame_from_wrist: object_from_wrist,
+            digits: digits.map(|digit| digit.angles),
+        };
+        let solids = HandSolids::of_pose(rig, &pose);
+        let penetration = penetration(scene, giver, &solids);
+        stopwatch.lap(Step::CollisionValidation);
+        let penetration = penetration.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+
+        // Step 4, Contact Validation.
+        collect_contacts(scene.object, &digits, &solids, &mut self.contacts);
+        let refused = if nears_forbidden_surface(scene, &solids) {
+            Some(Rejection::UnwantedContact)
+        } else if !are_opposed(&self.contacts) {
+            Some(Rejection::NotImmobilizing)
+        } else {
+            None
+        };
+        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+        stopwatch.lap(Step::ContactValidation);
+        if let Some(rejection) = refused {
+            return Err(NoGrip::Rejected(rejection));
+        }
+        let bend_ratios = std::array::from_fn(|digit| {
+            digits[digit]
+                .touches_object()
+                .then_some(closings[digit].flexing.bend_ratio)
+        });
+        let grip = Grip {
+            pose,
+            bend_ratios,
+            penetration,
+        };
+        Ok((grip, solids))
+    }
+
+    /// The closure of the contacts, if it is enough.
+    pub fn closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
+        // Closure is the same wherever gravity pulls.
+        let load = scene.load(Vec3::Y);
+        let epsilon = epsilon(&self.soft_contacts, &load, scene.least_epsilon, &mut self.buffers);
+        (epsilon >= scene.least_epsilon).then_some(epsilon)
+    }
+}
+
+/// The distance of a hand from the giver's, if it is enough: `Some(None)` without a giver.
+pub fn clear_of_giver(solids: &HandSolids, giver: Option<&PreparedHand>) -> Option<Option<f32>> {
+    match giver {
+        None => Some(None),
+        Some(giver) => giver.clearance(solids, GIVER_CLEARANCE).map(Some),
+    }
+}
+
+/// Where the wrist of a proposed hand is when its palm is laid on, if that is how it is to be; none if the palm does not
+/// touch anything on its way.
+pub fn settled_wrist(scene: &ObjectScene<'_>, rig: &Rig, proposal: &Proposal) -> Option<Pose> {
+    let wrist = proposal.object_from_wrist;
+    if proposal.advance <= 0.0 {
+        return Some(wrist);
+    }
+    let opened = HandPose {
+        frame_from_wrist: wrist,
+        digits: Digit::ALL.map(|digit| proposal.shape.flexing(rig, digit).opened()),
+    };
+    let still = HandSolids::of_pose(rig, &opened);
+    let way = free_way(scene, &still, wrist.transform_vector(Vec3::Z), proposal.advance)?;
+    Some(Pose::new(wrist.position + way, wrist.orientation))
+}
+
+/// The way along `direction` after which palm or thenar touch, if they are free at first and touch within `most` metres.
+fn free_way(scene: &ObjectScene<'_>, still: &HandSolids, direction: Vec3, most: f32) -> Option<Vec3> {
+    let surface = &scene.object.surface;
+    let mut way = 0.0;
+    for _ in 0..MOST_STEPS {
+        let moved = still.moved(direction * way);
+        let parts = moved.palm.iter().chain(&moved.thenar);
+        let reachable = most - way + TOUCH_DEPTH;
+        let sure = parts
+            .clone()
+            .fold(reachable, |least, part| least.min(surface.least_gap(part)));
+        let gap = if sure > SURE_GAP {
+            sure
+        } else {
+            parts.fold(reachable.min(NEAR), |least, part| {
+                surface
+                    .closest_to_capsule(part, least)
+                    .map_or(least, |gap| gap.gap)
+            })
+        };
+        if way + gap >= most {
+            return None;
+        }
+        let free = gap + TOUCH_DEPTH;
+        if free < TOUCH_TOLERANCE {
+            return (free > -TOUCH_TOLERANCE).then_some(direction * way);
+        }
+        way += free;
+    }
+    Some(direction * way)
+}
+
+/// One digit, ready to close.
+fn closing<'a>(
+    scene: &ObjectScene<'a>,
+    rig: &'a Rig,
+    digit: Digit,
+    object_from_wrist: Pose,
+    shape: &HandShape,
+) -> Closing<'a> {
+    Closing {
+        surface: &scene.object.surface,
+        flexing: shape.flexing(rig, digit),
+        radii: link_radii(rig, digit),
+        object_from_wrist,
+    }
+}
+
+/// Closes the digits, thumb first, and relaxes those that touch nothing or are not to close.
+fn close(
+    closings: &[Closing<'_>; 5],
+    shape: &HandShape,
+    interrupted: &impl Fn() -> bool,
+) -> Result<[ClosedDigit; 5], NoGrip> {
+    let mut closed = [ClosedDigit::default(); 5];
+    for digit in Digit::ALL
+        .into_iter()
+        .filter(|digit| shape.closing[digit.index()])
+    {
+        if interrupted() {
+            return Err(NoGrip::Interrupted);
+        }
+        let ended = closings[digit.index()]
+            .close()
+            .ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        if digit == Digit::Thumb && !ended.touches_object() {
+            return Err(NoGrip::Rejected(Rejection::NoThumbEarlyStop));
+        }
+        closed[digit.index()] = ended;
+    }
+    if !closed[1..].iter().any(ClosedDigit::touches_object) {
+        return Err(NoGrip::Rejected(Rejection::NoFingers));
+    }
+    Ok(std::array::from_fn(|digit| {
+        if closed[digit].touches_object() {
+            closed[digit]
+        } else {
+            closings[digit].relax(resting_flexion(&closed, digit))
+        }
+    }))
+}
+
+/// True if palm or forearm sink into the object or come too near to the giver.
+fn collides_without_digits(
+    scene: &ObjectScene<'_>,
+    giver: Option<&PreparedHand>,
+    still: &HandSolids,
+) -> bool {
+    let parts = || still.palm.iter().chain(&still.forearm);
+    let surface = &scene.object.surface;
+    parts().any(|part| comes_within(part, surface, -DEEPEST))
+        || giver.is_some_and(|giver| giver.is_neared_by(parts(), GIVER_CLEARANCE))
+}
+
+/// How deep the hand is in the object, if that, its distance from the giver's, and its parts' distances from each other
+/// are in order.
+fn penetration(scene: &ObjectScene<'_>, giver: Option<&PreparedHand>, solids: &HandSolids) -> Option<f32> {
+    if self_clearance(solids) < 0.0 {
+        return None;
+    }
+    if giver.is_some_and(|giver| giver.is_neared_by(solids.iter(), GIVER_CLEARANCE)) {
+        return None;
+    }
+    let surface = &scene.object.surface;
+    let least = solids
+        .iter()
+        .fold(0.0, |least: f32, part| clearance(part, surface, least).min(least));
+    (least >= -DEEPEST).then_some(-least)
+}
+
+fn nears_forbidden_surface(scene: &ObjectScene<'_>, solids: &HandSolids) -> bool {
+    let object = scene.object;
+    object.forbidden_count() > 0
+        && solids.iter().any(|part| {
+            object
+                .surface
+                .comes_within_of(part, FORBIDDEN_CLEARANCE, |triangle| {
+                    object.is_forbidden(triangle)
+                })
+        })
+}

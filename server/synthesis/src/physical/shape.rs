@@ -1,0 +1,109 @@
+//! How a hand is held while it closes, and how idle fingers rest.
+
+use super::{closing::ClosedDigit, flexing::Flexing};
+use crate::{
+    hand::{
+        Digit,
+        rig::{AngleRange, Rig},
+    },
+    pose::Pose,
+    strategy::BendRatioChoice,
+    synthesis::{
+        closing_motion::{BEND_RATIOS, allowed_ratios},
+        random::AttemptStream,
+    },
+};
+
+/// Flexion in radians, of all three joints together, with which a hand at rest holds its fingers: about 25° for the
+/// first two and two thirds of it for the last.
+const RESTING_FLEXION: f32 = 1.15;
+
+/// What an attempt draws of the hand: how the thumb stands, how far the fingers are spread, how the digits bend, and
+/// which of them close on the object. The fingers share a spread and a bend ratio, as those of a person do; drawn one by
+/// one, half of the hands have fingers that cross.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandShape {
+    /// Where in its range the thumb's yaw is, from 0 to 1.
+    pub thumb_yaw: f32,
+    /// 0: fingers beside each other or as close as they go, 1: as far apart as they go.
+    pub spread: f32,
+    /// Degrees of the second joint for a degree of the first, of the thumb and of the fingers.
+    pub bend_ratios: [f32; 2],
+    /// Which digits close, thumb first; the others rest.
+    pub closing: [bool; 5],
+}
+
+impl HandShape {
+    /// A shape as the strategies of chapter 5 draw it: every digit closes.
+    pub fn draw(choice: BendRatioChoice, stream: &mut AttemptStream) -> Self {
+        let mut draw_ratio = |digit: Digit| {
+            let allowed = allowed_ratios(choice, digit.index());
+            BEND_RATIOS[allowed[stream.below(allowed.len())]]
+        };
+        let bend_ratios = [draw_ratio(Digit::Thumb), draw_ratio(Digit::Index)];
+        Self {
+            thumb_yaw: stream.unit(),
+            spread: stream.unit(),
+            bend_ratios,
+            closing: [true; 5],
+        }
+    }
+
+    /// Where in its range a digit's yaw is: spread fingers fan out from between middle and ring finger.
+    fn yaw_share(&self, digit: Digit) -> f32 {
+        let fan = match digit {
+            Digit::Thumb => return self.thumb_yaw,
+            Digit::Index => -0.5,
+            Digit::Middle => -1.0 / 6.0,
+            Digit::Ring => 1.0 / 6.0,
+            Digit::Little => 0.5,
+        };
+        0.5 + fan * self.spread
+    }
+
+    /// How a digit of a hand of this shape bends.
+    pub fn flexing<'a>(&self, rig: &'a Rig, digit: Digit) -> Flexing<'a> {
+        let digit_rig = rig.digit(digit);
+        let AngleRange { min, max } = digit_rig.limits.base_yaw;
+        Flexing {
+            digit: digit_rig,
+            base_yaw: min + (max - min) * self.yaw_share(digit),
+            bend_ratio: self.bend_ratios[usize::from(digit != Digit::Thumb)],
+        }
+    }
+}
+
+/// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a
+/// half more; that of a relaxed hand if none does.
+pub(super) fn resting_flexion(closed: &[ClosedDigit; 5], digit: usize) -> f32 {
+    let neighbours = [digit.checked_sub(1).filter(|&other| other > 0), Some(digit + 1)];
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for neighbour in neighbours
+        .into_iter()
+        .flatten()
+        .filter_map(|other| closed.get(other))
+    {
+        if neighbour.touches_object() {
+            sum += neighbour.flexion();
+            count += 1.0;
+        }
+    }
+    if count == 0.0 {
+        RESTING_FLEXION
+    } else {
+        (sum / count).clamp(0.5 * RESTING_FLEXION, 1.5 * RESTING_FLEXION)
+    }
+}
+
+/// A hand to be closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proposal {
+    /// The wrist frame in the object's.
+    pub object_from_wrist: Pose,
+    /// How the hand is held.
+    pub shape: HandShape,
+    /// How far the hand goes along its +z, in metres, until the palm touches; 0 if it stays where it is. A palm that does
+    /// not touch by then is no grip.
+    pub advance: f32,
+}

@@ -1,0 +1,311 @@
+//! The score: which of several valid grasps a person would rather see.
+//!
+//! Comfort E of the thesis (4.6) plus what makes a hand look human. Each term is a number from 0 to 1, 1 being best, and
+//! the score their weighted mean. The weights are the project's choice: they put what an onlooker notices first, fingers
+//! and the place of the hand, before what only forces tell.
+
+use glam::Vec3;
+
+use crate::{
+    grasp::{Contact, Grasp},
+    hand::{Digit, HandPart, HandPose, kinematics::hand_frames, rig::Rig},
+    object::GraspObject,
+    physical::{
+        contacts::TORSION_LEVER,
+        scene::{ObjectScene, Presented},
+        solids::HandSolids,
+    },
+    synthesis::{
+        comfort::{comfort, digit_totals},
+        wrenches::GRAVITY,
+    },
+};
+
+/// E at which comfort counts a third: of grasps valid by the thesis, half are below 0.04.
+const UNCOMFORTABLE: f32 = 0.04;
+
+/// Difference of two neighbouring fingers' flexion in radians, all joints together, at which they look unrelated: about
+/// a third of a finger's range. Fingers move together (M. Santello, M. Flanders, J. Soechting, "Postural hand synergies
+/// for tool use", 1998: two components explain 80 % of hand postures).
+const UNRELATED_FLEXION: f32 = 1.2;
+
+/// Newtons of weight that a person holds with each finger beside the thumb before taking one more: two fingers lift a
+/// pen, and five a bottle (after the masses by grasp type of Feix, Bullock and Dollar, "Analysis of human grasping
+/// behavior: object characteristics and grasp type", 2014).
+const WEIGHT_PER_FINGER: f32 = 1.5;
+
+/// Closure at which a hold looks safe, in multiples of what validity asks for.
+const SAFE_CLOSURE: f32 = 3.0;
+
+/// Distance from the giver's hand in metres from which nobody worries: half a hand's breadth.
+const EASY_CLEARANCE: f32 = 0.04;
+
+/// Distance from forbidden surfaces in metres from which nobody worries: two fingers' thickness.
+const STERILE_CLEARANCE: f32 = 0.03;
+
+/// How many terms there are.
+pub const TERMS: usize = 9;
+
+/// A number for each term, in the order of [`Term::ALL`].
+pub type Values = [f32; TERMS];
+
+/// Share of friction that is left unused in a hold that looks safe: in a simulation by others, ten of eleven grasps with
+/// that much at every contact that matters held, and six of thirteen of the others.
+const SAFE_RESERVE: f32 = 0.2;
+
+/// Share of the pressing from which a contact matters to the reserve.
+const MATTERING_SHARE: f32 = 0.05;
+
+/// What is judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Term {
+    /// E of Eq. 4.6 is small.
+    Comfort,
+    /// The forces that balance gravity keep off the friction limits.
+    FrictionReserve,
+    /// Neighbouring fingers bend alike.
+    SharedFlexion,
+    /// As many digits touch as the weight asks for.
+    EnoughDigits,
+    /// The object lies on pads, not on the sides of digits.
+    Pads,
+    /// Ferrari-Canny epsilon is well above what validity asks for.
+    Closure,
+    /// The palm comes from the side away from the giver's (palm-CoM-palm angle, thesis 5.3).
+    AwayFromGiver,
+    /// The hand keeps off the giver's.
+    GiverClearance,
+    /// The hand keeps off forbidden surfaces.
+    SterileDistance,
+}
+
+impl Term {
+    /// All terms.
+    pub const ALL: [Self; TERMS] = [
+        Self::Comfort,
+        Self::FrictionReserve,
+        Self::SharedFlexion,
+        Self::EnoughDigits,
+        Self::Pads,
+        Self::Closure,
+        Self::AwayFromGiver,
+        Self::GiverClearance,
+        Self::SterileDistance,
+    ];
+
+    /// The name in answers.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Comfort => "comfort",
+            Self::FrictionReserve => "friction_reserve",
+            Self::SharedFlexion => "shared_flexion",
+            Self::EnoughDigits => "enough_digits",
+            Self::Pads => "pads",
+            Self::Closure => "closure",
+            Self::AwayFromGiver => "away_from_giver",
+            Self::GiverClearance => "giver_clearance",
+            Self::SterileDistance => "sterile_distance",
+        }
+    }
+
+    /// How much it counts.
+    pub const fn weight(self) -> f32 {
+        match self {
+            Self::Comfort | Self::EnoughDigits | Self::Closure => 1.0,
+            Self::SharedFlexion | Self::Pads | Self::FrictionReserve => 1.5,
+            Self::AwayFromGiver => 0.75,
+            Self::GiverClearance | Self::SterileDistance => 0.5,
+        }
+    }
+
+    /// True if it depends on the hand and the object alone, not on gravity or the giver.
+    pub const fn is_of_grip(self) -> bool {
+        matches!(
+            self,
+            Self::SharedFlexion | Self::EnoughDigits | Self::Pads | Self::Closure | Self::SterileDistance
+        )
+    }
+}
+
+/// A grasp's score by its terms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// From 0 to 1, 1 being best; in the order of [`Term::ALL`].
+    pub values: Values,
+}
+
+impl Score {
+    /// The terms' weighted mean.
+    pub fn total(&self) -> f32 {
+        weighted_mean(&self.values, |_| true)
+    }
+
+    /// The weighted mean of the terms that depend on hand and object alone, as a share of the whole.
+    pub fn of_grip(&self) -> f32 {
+        weighted_mean(&self.values, Term::is_of_grip)
+    }
+}
+
+/// Sum of weighted terms that count, over the weight of all.
+fn weighted_mean(values: &Values, counts: impl Fn(Term) -> bool) -> f32 {
+    let whole: f32 = Term::ALL.iter().map(|term| term.weight()).sum();
+    let sum: f32 = Term::ALL
+        .iter()
+        .zip(values)
+        .filter(|(term, _)| counts(**term))
+        .map(|(term, value)| term.weight() * value)
+        .sum();
+    sum / whole
+}
+
+/// The term of comfort E, its value from 0 to 1.
+pub fn comfort_value(comfort: f32) -> f32 {
+    (-comfort / UNCOMFORTABLE).exp()
+}
+
+/// The values of the terms that depend on hand and object alone; the others are 0.
+pub fn grip_values(
+    scene: &ObjectScene<'_>,
+    rig: &Rig,
+    pose: &HandPose,
+    contacts: &[Contact],
+    epsilon: f32,
+    solids: &HandSolids,
+) -> Values {
+    let mut values = [0.0; TERMS];
+    values[Term::SharedFlexion as usize] = shared_flexion(pose);
+    values[Term::EnoughDigits as usize] = enough_digits(scene.object, contacts);
+    values[Term::Pads as usize] = pads(rig, pose, contacts);
+    values[Term::Closure as usize] = (epsilon / (SAFE_CLOSURE * scene.least_epsilon)).min(1.0);
+    values[Term::SterileDistance as usize] = sterile_distance(scene.object, solids);
+    values
+}
+
+/// The values of the terms that depend on the forces that balance gravity; the others are 0.
+pub fn force_values(
+    scene: &ObjectScene<'_>,
+    contacts: &[Contact],
+    forces: &[Vec3],
+    torsions: &[f32],
+) -> Values {
+    let mut values = [0.0; TERMS];
+    values[Term::Comfort as usize] = comfort_value(comfort(digit_totals(contacts, forces)));
+    let reserve = friction_reserve(scene.friction, contacts, forces, torsions);
+    values[Term::FrictionReserve as usize] = (reserve / SAFE_RESERVE).clamp(0.0, 1.0);
+    values
+}
+
+/// The smallest share of friction, torsion included, that a contact leaves unused, of those that bear something.
+fn friction_reserve(friction: f32, contacts: &[Contact], forces: &[Vec3], torsions: &[f32]) -> f32 {
+    let pressing = |contact: &Contact, force: &Vec3| -force.dot(contact.normal);
+    let all: f32 = contacts
+        .iter()
+        .zip(forces)
+        .map(|(contact, force)| pressing(contact, force))
+        .sum();
+    let mut least = 1.0_f32;
+    for ((contact, force), torsion) in contacts.iter().zip(forces).zip(torsions) {
+        let normal = pressing(contact, force);
+        if normal > MATTERING_SHARE * all {
+            let rubbing = (*force + contact.normal * normal).length() / (friction * normal);
+            let twisting = torsion / (friction * TORSION_LEVER * normal);
+            least = least.min(1.0 - rubbing.hypot(twisting));
+        }
+    }
+    least
+}
+
+/// Adds what depends on how the object is held out to a grip's values.
+pub fn score(
+    grip_values: Values,
+    grasp: &Grasp,
+    scene: &ObjectScene<'_>,
+    rig: &Rig,
+    presented: &Presented,
+) -> Score {
+    let mut values = grip_values;
+    let of_forces = force_values(scene, &grasp.contacts, &grasp.forces, &grasp.torsions);
+    for (value, of_forces) in values.iter_mut().zip(of_forces) {
+        *value += of_forces;
+    }
+    let clearance = grasp.margins.and_then(|margins| margins.giver_clearance);
+    values[Term::GiverClearance as usize] =
+        clearance.map_or(1.0, |distance| (distance / EASY_CLEARANCE).min(1.0));
+    values[Term::AwayFromGiver as usize] = away_from_giver(scene.object, rig, &grasp.pose, presented);
+    Score { values }
+}
+
+fn shared_flexion(pose: &HandPose) -> f32 {
+    let flexion = |digit: Digit| {
+        let angles = pose.digits[digit.index()];
+        angles.base_pitch + angles.second_pitch + angles.third_pitch
+    };
+    let worst = Digit::ALL[1..]
+        .windows(2)
+        .map(|pair| (flexion(pair[0]) - flexion(pair[1])).abs())
+        .fold(0.0, f32::max);
+    (1.0 - worst / UNRELATED_FLEXION).max(0.0)
+}
+
+fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
+    let mut touching = [false; 5];
+    let mut palm = false;
+    for contact in contacts {
+        match contact.part {
+            HandPart::Phalanx(digit, _) => touching[digit.index()] = true,
+            HandPart::Palm => palm = true,
+        }
+    }
+    // The palm carries as much as two fingers.
+    let fingers =
+        touching[1..].iter().filter(|touches| **touches).count() as f32 + if palm { 2.0 } else { 0.0 };
+    let wanted = 1.0 + object.mass * GRAVITY / WEIGHT_PER_FINGER;
+    (fingers / wanted.min(4.0)).min(1.0)
+}
+
+/// How far the phalanges' contacts lie toward their palmar sides, on average; a contact on the back counts as none.
+fn pads(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> f32 {
+    let frames = hand_frames(rig, pose);
+    let mut sum = 0.0;
+    let mut count = 0.0;
+    for contact in contacts {
+        if let HandPart::Phalanx(digit, phalanx) = contact.part {
+            let frame = frames.digits[digit.index()].links[phalanx.index()];
+            sum += (-contact.normal.dot(frame.transform_vector(Vec3::Z))).max(0.0);
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
+}
+
+fn sterile_distance(object: &GraspObject, solids: &HandSolids) -> f32 {
+    if object.forbidden_count() == 0 {
+        return 1.0;
+    }
+    // By halves: nobody sees the difference of a few millimetres.
+    let is_near = |distance: f32| {
+        solids.iter().any(|part| {
+            object
+                .surface
+                .comes_within_of(part, distance, |triangle| object.is_forbidden(triangle))
+        })
+    };
+    if !is_near(STERILE_CLEARANCE) {
+        1.0
+    } else if !is_near(0.5 * STERILE_CLEARANCE) {
+        0.6
+    } else {
+        0.2
+    }
+}
+
+/// 1 if the palms lie on opposite sides of the centre of mass, seen from above, 0 if on the same side.
+fn away_from_giver(object: &GraspObject, rig: &Rig, pose: &HandPose, presented: &Presented) -> f32 {
+    let Some(giver) = presented.giver_palm else {
+        return 1.0;
+    };
+    let flat = |v: Vec3| v.reject_from_normalized(presented.up).normalize_or_zero();
+    let ours = flat(pose.frame_from_wrist.transform_point(rig.palm) - object.centre_of_mass);
+    let theirs = flat(giver - object.centre_of_mass);
+    0.5 - 0.5 * ours.dot(theirs)
+}

@@ -1,0 +1,110 @@
+//! The grips of an atlas as candidates of a race.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::SearchSettings;
+use crate::{
+    atlas::Atlas,
+    grasp::Grasp,
+    hand::rig::Rig,
+    physical::{
+        grip::Gripper,
+        scene::{ObjectScene, Presented},
+    },
+    score::{Score, comfort_value},
+    strategy::Validity,
+    synthesis::attempt::Scene,
+};
+
+/// The grips of an atlas in the order in which they are tried.
+#[derive(Debug)]
+pub(super) struct KnownGrips<'a> {
+    atlas: &'a Atlas,
+    order: &'a [u16],
+    scene: &'a Scene<'a>,
+    object: &'a ObjectScene<'a>,
+    presented: &'a Presented,
+    rig: &'a Rig,
+    /// Is the search's friction another than the one that the atlas was made under?
+    friction_differs: bool,
+    /// The next place in the order that nobody has taken.
+    next: AtomicUsize,
+}
+
+/// What became of a known grip.
+pub(super) enum Tried {
+    /// There are no more.
+    NoneLeft,
+    /// It does not do.
+    Refused,
+    /// It is a valid grasp.
+    Valid {
+        /// The grip's index in the atlas.
+        entry: u16,
+        /// The grasp.
+        grasp: Box<Grasp>,
+        /// How good it is: more is better.
+        value: f32,
+    },
+}
+
+impl<'a> KnownGrips<'a> {
+    /// The grips that a search may use, if any.
+    pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
+        let atlas = settings.atlas.as_deref()?;
+        let (object, presented) = scene.physical()?;
+        if !super::uses_atlas(settings.strategy, settings.validity) {
+            return None;
+        }
+        Some(Self {
+            atlas,
+            order: atlas.by_score(presented.up),
+            scene,
+            object,
+            presented,
+            rig: scene.rig(),
+            friction_differs: settings.friction != object.object.friction_under(Validity::Physical),
+            next: AtomicUsize::new(0),
+        })
+    }
+
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Tries the next one.
+    pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
+        let place = self.next.fetch_add(1, Ordering::Relaxed);
+        let Some(&entry) = self.order.get(place) else {
+            return Tried::NoneLeft;
+        };
+        let grip = &self.atlas.entries()[usize::from(entry)];
+        let constraints = self.scene.constraints();
+        if !constraints.admits_wrist(grip.grip.pose.frame_from_wrist)
+            || !constraints.admits_contacts(&grip.contacts)
+        {
+            return Tried::Refused;
+        }
+        match grip.hold(
+            self.object,
+            self.rig,
+            self.presented,
+            self.friction_differs,
+            gripper,
+        ) {
+            Some(grasp) if constraints.admits(&grasp) => Tried::Valid {
+                entry,
+                value: value(&grasp),
+                grasp: Box::new(grasp),
+            },
+            _ => Tried::Refused,
+        }
+    }
+}
+
+/// How good a grasp is: its score, or its comfort where it has none.
+pub(super) fn value(grasp: &Grasp) -> f32 {
+    let score = grasp.score.as_ref();
+    score.map_or_else(|| comfort_value(grasp.comfort), Score::total)
+}

@@ -1,0 +1,79 @@
+//! A prepared hand against the distances of all pairs of solids.
+
+use glam::Vec3;
+use grasp_synthesis::physical::solids::{HandSolids, PreparedHand, TaperedCapsule};
+
+use crate::support::Random;
+
+/// A hand that no person has, but with solids as long and as thick as a person's, around `middle`.
+fn hand(random: &mut Random, middle: Vec3) -> HandSolids {
+    let mut solid = |length: f32, thick: f32| {
+        let start = middle + random.direction() * random.between(0.0, 0.1);
+        let way = random.direction() * random.between(0.0, length);
+        let radii = [0.3 * thick, thick].map(|least| random.between(least, thick));
+        TaperedCapsule::new(start, start + way, radii[0], radii[1])
+    };
+    HandSolids {
+        phalanges: [[(); 3]; 5].map(|links| links.map(|()| solid(0.05, 0.01))),
+        palm: [(); 10].map(|()| solid(0.07, 0.017)),
+        thenar: [(); 4].map(|()| solid(0.05, 0.017)),
+        forearm: [(); 2].map(|()| solid(0.3, 0.06)),
+    }
+}
+
+fn least_of_all_pairs<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, theirs: &HandSolids) -> f32 {
+    ours.map(|our| {
+        let distances = theirs.iter().map(|their| our.distance(their));
+        distances.fold(f32::INFINITY, f32::min)
+    })
+    .fold(f32::INFINITY, f32::min)
+}
+
+#[test]
+fn distances_and_verdicts_are_those_of_all_pairs() {
+    let mut random = Random::new(31);
+    let (mut near, mut far, mut sure) = (0, 0, 0);
+    for case in 0..3000 {
+        let giver = hand(&mut random, Vec3::ZERO);
+        let middle = random.direction() * random.between(0.0, 0.7);
+        let receiver = hand(&mut random, middle);
+        let prepared = PreparedHand::new(&giver);
+        let required = random.between(-0.002, 0.01);
+
+        let least = least_of_all_pairs(receiver.iter(), &giver);
+        let clearance = prepared.clearance(&receiver, required);
+        // At the very limit, rounding decides.
+        let is_edge = (least - required).abs() < 1e-5;
+        match clearance {
+            Some(found) => assert!((found - least).abs() < 1e-6, "case {case}: {found}, not {least}"),
+            None => assert!(least < required || is_edge, "case {case}: {least} is enough"),
+        }
+        assert!(
+            clearance.is_some() == (least >= required) || is_edge,
+            "case {case}"
+        );
+
+        let palm = || receiver.palm.iter();
+        let least = least_of_all_pairs(palm(), &giver);
+        if (least - required).abs() >= 1e-5 {
+            assert_eq!(
+                prepared.is_neared_by(palm(), required),
+                least < required,
+                "case {case}"
+            );
+            if least < required { near += 1 } else { far += 1 }
+        }
+
+        let (middle, radius) = (receiver.palm[0].start, receiver.palm[0].start_radius);
+        if prepared.surely_nears(middle, radius, required) {
+            let distances = giver.iter().map(|solid| solid.signed_distance(middle) - radius);
+            let least = distances.fold(f32::INFINITY, f32::min);
+            assert!(least < required, "case {case}: the ball is {least} m off");
+            sure += 1;
+        }
+    }
+    assert!(
+        near > 500 && far > 500 && sure > 300,
+        "{near} near, {far} far, {sure} sure"
+    );
+}
