@@ -17,7 +17,8 @@
 //! ```
 //!
 //! - [`GraspClient`] connects and calls, with deadlines and retries; it is cheap to clone.
-//! - [`FindRequest`] and [`FindAnswer`] are the question and the answer; [`PresentingHand`] is the giver's hand.
+//! - [`FindRequest`] and [`FindAnswer`] are the question and the answer; [`PresentingHand`] is the giver's hand,
+//!   [`Constraints`] say which grasps will do.
 //! - [`ClientError`] tells failures apart and carries the standard details that the server attached.
 //!
 //! Poses are in one frame of the client's choice; a field named `a_from_b` takes points of frame b to frame a. Metres,
@@ -30,27 +31,36 @@
 #[cfg(feature = "cli")]
 pub mod built_in;
 mod client;
+mod constraints;
 mod error;
+mod grasp_type;
 mod hand;
 mod json;
+mod key_frame;
 mod object;
 mod pose;
 mod retry;
+mod score;
 mod search;
 mod wire;
 
 pub use client::{GraspClient, GraspClientBuilder};
+pub use constraints::{ApproachCone, Constraints, Reach};
 pub use error::{BoxError, CallError, ClientError, ErrorDetails, FieldViolation, Resource, code_name};
+pub use grasp_type::GraspType;
 pub use hand::{
     Digit, DigitAngles, HandAngles, HandJoints, Handedness, JOINT_COUNT, JointPose, JointSet, Phalanx,
     PresentingHand, ReceivingHand,
 };
-pub use object::{ForbiddenSurfaces, Health, NewObject, Object, ObjectPage};
+pub use key_frame::{KeyFrame, KeyFrameKind};
+pub use object::{AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage};
 pub use pose::Pose;
 pub use retry::RetryPolicy;
+pub use score::{Score, ScoreTerm};
 pub use search::{
-    BendRatios, Contact, Convention, FindAnswer, FindRequest, Grasp, NearestMiss, Outcome, PhysicalMargins,
-    Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy, Validity,
+    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
+    NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy,
+    Validity,
 };
 
 /// The README's Rust example compiles.

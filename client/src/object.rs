@@ -1,9 +1,11 @@
 //! Objects that can be held out.
 
+use std::time::Duration;
+
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::pose::Pose;
+use crate::{json, pose::Pose};
 
 /// An object as the server knows it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,6 +34,23 @@ pub struct Object {
     pub content_hash: String,
     /// What is odd about the mesh but does not stop it from being used.
     pub warnings: Vec<String>,
+    /// The grasps that the server found for the object before; none if it keeps none.
+    #[serde(default)]
+    pub atlas: Option<AtlasState>,
+}
+
+/// The grasps that a server found for an object before.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AtlasState {
+    /// How many there are.
+    pub entries: u32,
+    /// True if no more are being looked for.
+    pub complete: bool,
+    /// Names this state, hexadecimal; the same for the same entries.
+    pub stamp: String,
+    /// How long it took to find them.
+    #[serde(rename = "build_time_seconds", with = "json::seconds")]
+    pub build_time: Duration,
 }
 
 /// What may not be touched.

@@ -6,9 +6,13 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    constraints::Constraints,
+    grasp_type::GraspType,
     hand::{Digit, DigitAngles, Handedness, JOINT_COUNT, JointPose, Phalanx, PresentingHand, ReceivingHand},
     json,
+    key_frame::KeyFrame,
     pose::Pose,
+    score::Score,
 };
 
 /// The axes, units and joint order that a client's engine uses. Numbers pass through this library unchanged; the
@@ -53,6 +57,8 @@ pub enum Strategy {
     E,
     /// First sufficient force distribution (5.6).
     F,
+    /// Beyond the thesis: samples where grasps are and orders the checks as it likes.
+    Guided,
 }
 
 /// Which bend ratios a finger tries: the columns of Figure 5.20.
@@ -71,6 +77,26 @@ pub enum BendRatios {
     OnlyOne,
     /// (f) Only 1.42.
     OnlyHigh,
+}
+
+/// Which of the valid grasps is the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Choice {
+    /// The first that is found.
+    FirstValid,
+    /// The one of the highest score among all that are found until the budget ends.
+    BestWithinBudget,
+}
+
+/// May the grasps that the server found for the object before, its atlas, be tried before others?
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AtlasUse {
+    /// Yes, if there is an atlas.
+    Allowed,
+    /// No: the answer depends on the request alone.
+    None,
 }
 
 /// A holdout and how to search for a grasp on it.
@@ -126,6 +152,15 @@ pub struct FindRequest {
     /// Static friction coefficient for this request; none: the object's.
     #[serde(default)]
     pub friction: Option<f32>,
+    /// What is demanded of the grasp beyond that it is valid.
+    #[serde(default)]
+    pub constraints: Constraints,
+    /// Which of the valid grasps is wanted; none: the first.
+    #[serde(default)]
+    pub choice: Option<Choice>,
+    /// May the object's atlas be used? None: yes.
+    #[serde(default)]
+    pub atlas: Option<AtlasUse>,
 }
 
 impl FindRequest {
@@ -148,6 +183,9 @@ impl FindRequest {
             record_step_times: false,
             convention: Convention::default(),
             friction: None,
+            constraints: Constraints::default(),
+            choice: None,
+            atlas: None,
         }
     }
 }
@@ -173,10 +211,10 @@ pub struct Contact {
     pub object_position: Vec3,
     /// The same normal in the object's frame.
     pub object_normal: Vec3,
-    /// The digit that touches.
-    pub digit: Digit,
-    /// The link of the digit that touches.
-    pub phalanx: Phalanx,
+    /// The digit that touches; none for the palm.
+    pub digit: Option<Digit>,
+    /// The link of the digit that touches; none for the palm.
+    pub phalanx: Option<Phalanx>,
     /// Index of the triangle in the object's mesh.
     pub triangle: u32,
     /// The force that the hand applies on the object here, in newtons, in the client's frame.
@@ -225,9 +263,20 @@ pub struct Grasp {
     pub wrench_angle: f32,
     /// Under [`Validity::Physical`]: by how much the checks are passed.
     pub margins: Option<PhysicalMargins>,
+    /// What it is in the GRASP taxonomy; none if it is like none of its types, or like one that is not known here.
+    #[serde(rename = "type")]
+    pub grasp_type: Option<GraspType>,
+    /// How sure the type is, from 0 to 1.
+    pub type_confidence: f32,
+    /// How good the grasp is; none if the server did not rate it.
+    #[serde(default)]
+    pub score: Option<Score>,
+    /// The way to the grasp, in order; empty if the server did not plan one.
+    #[serde(default)]
+    pub key_frames: Vec<KeyFrame>,
 }
 
-/// Why an attempt failed: the names of Table 5.2.
+/// Why an attempt failed: the names of Table 5.2, and what the request demands beyond them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rejection {
@@ -247,6 +296,8 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
+    /// The wrist, the contacts or the grasp are not what the request's constraints ask for.
+    UnmetConstraint,
     /// A kind that this version of the library does not know.
     Unrecognised,
 }
@@ -301,6 +352,16 @@ pub struct NearestMiss {
     pub client_from_wrist: Pose,
 }
 
+/// Where a grasp comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GraspSource {
+    /// The request's own search.
+    Search,
+    /// The object's atlas.
+    Atlas,
+}
+
 /// What a search did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchReport {
@@ -331,6 +392,18 @@ pub struct SearchReport {
     pub strategy: Option<Strategy>,
     /// The notion of valid that was used; none if this version of the library does not know it.
     pub validity: Option<Validity>,
+    /// Valid grasps that were ranked; 0 if the first was taken.
+    #[serde(default)]
+    pub candidates: u64,
+    /// Where the grasp comes from; none without one, or if this version of the library does not know it.
+    #[serde(default)]
+    pub source: Option<GraspSource>,
+    /// Entries of the object's atlas that were there to be tried.
+    #[serde(default)]
+    pub atlas_entries: u32,
+    /// Which state of the atlas was used, hexadecimal; none if none was.
+    #[serde(default)]
+    pub atlas_stamp: Option<String>,
 }
 
 /// The answer to a holdout.

@@ -11,13 +11,16 @@ use grasp_synthesis::{
         joints::{HandJoints, JOINT_COUNT, openxr_from_thesis_frame},
         rig::Rig,
     },
+    key_frames::{KeyFrame, Stage},
     pose::Pose,
     rejection::Rejection,
-    search::{NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes},
+    score::{Score, Term},
+    search::{GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes},
     strategy::{Strategy, Validity},
+    taxonomy::GraspType,
 };
 
-use crate::{convention::Convention, error::ServiceError};
+use crate::{atlases::stamp, convention::Convention, error::ServiceError};
 
 /// Where and how a client wants its answer.
 #[derive(Clone, Copy, Debug)]
@@ -78,40 +81,56 @@ pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
     }
 }
 
+/// A hand as grasps and key frames have it.
+struct WireHand {
+    client_from_wrist: v1::Pose,
+    digits: Vec<v1::DigitAngles>,
+    joints: Vec<v1::JointPose>,
+}
+
+impl WireHand {
+    fn new(pose: &HandPose, rig: &Rig, frame: ClientFrame) -> Self {
+        let ClientFrame {
+            convention,
+            client_from_object,
+        } = frame;
+        let client_from_wrist = client_from_object * openxr_from_thesis_frame(pose.frame_from_wrist);
+        let joints = HandJoints::of_pose(rig, pose).transformed(client_from_object);
+        Self {
+            client_from_wrist: wire_pose(convention.joint_from_openxr(client_from_wrist)),
+            digits: pose
+                .digits
+                .iter()
+                .map(|angles| v1::DigitAngles {
+                    base_yaw: angles.base_yaw,
+                    base_pitch: angles.base_pitch,
+                    second_pitch: angles.second_pitch,
+                    third_pitch: Some(angles.third_pitch),
+                })
+                .collect(),
+            joints: (0..JOINT_COUNT)
+                .map(|place| {
+                    let joint = joints.joints[convention.joint_at(place)];
+                    v1::JointPose {
+                        client_from_joint: Some(wire_pose(convention.joint_from_openxr(joint.pose))),
+                        radius: convention.length_from_openxr(joint.radius),
+                    }
+                })
+                .collect(),
+        }
+    }
+}
+
 fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
-    let ClientFrame {
-        convention,
-        client_from_object,
-    } = frame;
+    let hand = WireHand::new(&grasp.pose, rig, frame);
     let object_from_wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
-    let joints = HandJoints::of_pose(rig, &grasp.pose).transformed(client_from_object);
     v1::Grasp {
         rig: rig.name.clone(),
         handedness: wire_handedness(rig.handedness).into(),
-        client_from_wrist: Some(wire_pose(
-            convention.joint_from_openxr(client_from_object * object_from_wrist),
-        )),
-        object_from_wrist: Some(wire_pose(convention.joint_from_openxr(object_from_wrist))),
-        digits: grasp
-            .pose
-            .digits
-            .iter()
-            .map(|angles| v1::DigitAngles {
-                base_yaw: angles.base_yaw,
-                base_pitch: angles.base_pitch,
-                second_pitch: angles.second_pitch,
-                third_pitch: Some(angles.third_pitch),
-            })
-            .collect(),
-        joints: (0..JOINT_COUNT)
-            .map(|place| {
-                let joint = joints.joints[convention.joint_at(place)];
-                v1::JointPose {
-                    client_from_joint: Some(wire_pose(convention.joint_from_openxr(joint.pose))),
-                    radius: convention.length_from_openxr(joint.radius),
-                }
-            })
-            .collect(),
+        client_from_wrist: Some(hand.client_from_wrist),
+        object_from_wrist: Some(wire_pose(frame.convention.joint_from_openxr(object_from_wrist))),
+        digits: hand.digits,
+        joints: hand.joints,
         contacts: grasp
             .contacts
             .iter()
@@ -128,6 +147,49 @@ fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
             penetration: margins.penetration,
             giver_clearance: margins.giver_clearance,
         }),
+        r#type: grasp
+            .classification
+            .grasp_type
+            .map_or(v1::GraspType::Unspecified, wire_grasp_type)
+            .into(),
+        type_confidence: grasp.classification.confidence,
+        score: grasp.score.as_ref().map(wire_score),
+        key_frames: grasp
+            .key_frames
+            .iter()
+            .flatten()
+            .map(|key_frame| wire_key_frame(key_frame, rig, frame))
+            .collect(),
+    }
+}
+
+fn wire_score(score: &Score) -> v1::Score {
+    v1::Score {
+        total: score.total(),
+        terms: Term::ALL
+            .into_iter()
+            .zip(score.values)
+            .map(|(term, value)| v1::ScoreTerm {
+                name: term.name().to_owned(),
+                value,
+                weight: term.weight(),
+            })
+            .collect(),
+    }
+}
+
+fn wire_key_frame(key_frame: &KeyFrame, rig: &Rig, frame: ClientFrame) -> v1::KeyFrame {
+    let hand = WireHand::new(&key_frame.pose, rig, frame);
+    v1::KeyFrame {
+        kind: match key_frame.stage {
+            Stage::Approach => v1::KeyFrameKind::Approach,
+            Stage::PreGrasp => v1::KeyFrameKind::PreGrasp,
+            Stage::Close => v1::KeyFrameKind::Close,
+        }
+        .into(),
+        client_from_wrist: Some(hand.client_from_wrist),
+        digits: hand.digits,
+        joints: hand.joints,
     }
 }
 
@@ -143,8 +205,16 @@ fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, frame: ClientFrame
         client_normal: direction(client_from_object.transform_vector(contact.normal)),
         object_position: point(contact.position),
         object_normal: direction(contact.normal),
-        digit: wire_digit(contact.digit).into(),
-        phalanx: wire_phalanx(contact.phalanx).into(),
+        digit: contact
+            .part
+            .digit()
+            .map_or(v1::Digit::Unspecified, wire_digit)
+            .into(),
+        phalanx: contact
+            .part
+            .phalanx()
+            .map_or(v1::Phalanx::Unspecified, wire_phalanx)
+            .into(),
         triangle: contact.triangle,
         client_force: direction(client_from_object.transform_vector(force)),
         object_force: direction(force),
@@ -162,11 +232,12 @@ fn report(
         attempts: report.attempts,
         pruned_placements: report.pruned_placements,
         rejections: Rejection::ALL
-            .iter()
-            .filter(|rejection| report.rejections[rejection.index()] > 0)
-            .map(|&rejection| v1::RejectionCount {
+            .into_iter()
+            .zip(report.rejections)
+            .filter(|&(_, count)| count > 0)
+            .map(|(rejection, count)| v1::RejectionCount {
                 rejection: wire_rejection(rejection).into(),
-                count: report.rejections[rejection.index()],
+                count,
             })
             .collect(),
         step_times: report.step_times.as_ref().map(step_times).unwrap_or_default(),
@@ -178,6 +249,20 @@ fn report(
         nearest_miss: report.nearest_miss.as_ref().map(|miss| nearest_miss(miss, frame)),
         strategy: wire_strategy(settings.strategy).into(),
         validity: wire_validity(settings.validity).into(),
+        candidates: report.candidates,
+        source: match report.source {
+            Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
+            Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
+            None => v1::GraspSource::Unspecified,
+        }
+        .into(),
+        atlas_entries: u32::try_from(report.known_grips).unwrap_or(u32::MAX),
+        atlas_stamp: settings
+            .atlas
+            .as_ref()
+            .filter(|_| report.known_grips > 0)
+            .map(|atlas| stamp(atlas))
+            .unwrap_or_default(),
     }
 }
 
@@ -223,6 +308,44 @@ fn wire_handedness(handedness: Handedness) -> v1::Handedness {
     }
 }
 
+fn wire_grasp_type(grasp_type: GraspType) -> v1::GraspType {
+    match grasp_type {
+        GraspType::LargeDiameter => v1::GraspType::LargeDiameter,
+        GraspType::SmallDiameter => v1::GraspType::SmallDiameter,
+        GraspType::MediumWrap => v1::GraspType::MediumWrap,
+        GraspType::AdductedThumb => v1::GraspType::AdductedThumb,
+        GraspType::LightTool => v1::GraspType::LightTool,
+        GraspType::Prismatic4Finger => v1::GraspType::Prismatic4Finger,
+        GraspType::Prismatic3Finger => v1::GraspType::Prismatic3Finger,
+        GraspType::Prismatic2Finger => v1::GraspType::Prismatic2Finger,
+        GraspType::PalmarPinch => v1::GraspType::PalmarPinch,
+        GraspType::PowerDisk => v1::GraspType::PowerDisk,
+        GraspType::PowerSphere => v1::GraspType::PowerSphere,
+        GraspType::PrecisionDisk => v1::GraspType::PrecisionDisk,
+        GraspType::PrecisionSphere => v1::GraspType::PrecisionSphere,
+        GraspType::Tripod => v1::GraspType::Tripod,
+        GraspType::FixedHook => v1::GraspType::FixedHook,
+        GraspType::Lateral => v1::GraspType::Lateral,
+        GraspType::IndexFingerExtension => v1::GraspType::IndexFingerExtension,
+        GraspType::ExtensionType => v1::GraspType::ExtensionType,
+        GraspType::DistalType => v1::GraspType::DistalType,
+        GraspType::WritingTripod => v1::GraspType::WritingTripod,
+        GraspType::TripodVariation => v1::GraspType::TripodVariation,
+        GraspType::ParallelExtension => v1::GraspType::ParallelExtension,
+        GraspType::AdductionGrip => v1::GraspType::AdductionGrip,
+        GraspType::TipPinch => v1::GraspType::TipPinch,
+        GraspType::LateralTripod => v1::GraspType::LateralTripod,
+        GraspType::Sphere4Finger => v1::GraspType::Sphere4Finger,
+        GraspType::Quadpod => v1::GraspType::Quadpod,
+        GraspType::Sphere3Finger => v1::GraspType::Sphere3Finger,
+        GraspType::Stick => v1::GraspType::Stick,
+        GraspType::Palmar => v1::GraspType::Palmar,
+        GraspType::Ring => v1::GraspType::Ring,
+        GraspType::Ventral => v1::GraspType::Ventral,
+        GraspType::InferiorPincer => v1::GraspType::InferiorPincer,
+    }
+}
+
 fn wire_digit(digit: Digit) -> v1::Digit {
     match digit {
         Digit::Thumb => v1::Digit::Thumb,
@@ -251,6 +374,7 @@ fn wire_rejection(rejection: Rejection) -> v1::Rejection {
         Rejection::FingerCollision => v1::Rejection::FingerCollision,
         Rejection::UnwantedContact => v1::Rejection::UnwantedContact,
         Rejection::NotImmobilizing => v1::Rejection::NotImmobilizing,
+        Rejection::UnmetConstraint => v1::Rejection::UnmetConstraint,
     }
 }
 
@@ -269,5 +393,6 @@ fn wire_strategy(strategy: Strategy) -> v1::Strategy {
         Strategy::D => v1::Strategy::D,
         Strategy::E => v1::Strategy::E,
         Strategy::F => v1::Strategy::F,
+        Strategy::Guided => v1::Strategy::Guided,
     }
 }

@@ -1,6 +1,12 @@
 //! From a listener to a server, and back to silence.
 
-use std::{future::Future, num::NonZeroUsize, path::Path, sync::Arc, time::Duration};
+use std::{
+    future::Future,
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use grasp_assets::{
     hands::{self, RIG_NAMES},
@@ -14,6 +20,7 @@ use tonic::{server::NamedService, transport};
 use tonic_health::{ServingStatus, server::HealthReporter};
 
 use crate::{
+    atlases::{Atlases, files::AtlasFiles},
     call::{CallLayer, CallsInFlight},
     config::Config,
     net::{AcceptLimits, accept},
@@ -73,6 +80,17 @@ pub enum ServeError {
     /// The objects directory cannot be used.
     #[error(transparent)]
     Objects(#[from] DirectoryError),
+    /// The folder of atlases cannot be used.
+    #[error("atlas_directory is {}; it must be a folder or a name for a new one: {source}", path.display())]
+    AtlasDirectory {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The threads that build atlases cannot be started.
+    #[error("cannot start the builders of atlases: {0}")]
+    Builders(std::io::Error),
     /// The descriptors of the contract are broken.
     #[error("cannot offer reflection: {0}")]
     Reflection(#[from] tonic_reflection::server::Error),
@@ -105,6 +123,11 @@ impl Gauges {
         self.shared.executor.jobs()
     }
 
+    /// Threads that build atlases.
+    pub fn builders(&self) -> usize {
+        self.shared.atlases.builders()
+    }
+
     /// Calls without an answer.
     pub fn calls(&self) -> usize {
         self.calls.count()
@@ -128,7 +151,7 @@ impl Server {
     /// Starts the search workers and reads the built-in objects and hands, and the objects directory.
     ///
     /// # Errors
-    /// [`ServeError::Workers`], [`ServeError::Objects`].
+    /// [`ServeError::Workers`], [`ServeError::Objects`], [`ServeError::AtlasDirectory`], [`ServeError::Builders`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
         read_hands();
         let triangles = config.maximum_object_triangles.get();
@@ -142,9 +165,26 @@ impl Server {
             None => Vec::new(),
         };
         let directory_bytes = directory.iter().map(StoredObject::bytes).sum();
+        let objects = Arc::new(ObjectStore::new(config.store, directory));
+        let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
+        let files = match config.atlas_directory {
+            Some(path) => Some(
+                AtlasFiles::open(path.clone())
+                    .map_err(|source| ServeError::AtlasDirectory { path, source })?,
+            ),
+            None => None,
+        };
         let shared = Shared {
-            objects: ObjectStore::new(config.store, directory),
-            executor: SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?,
+            atlases: Atlases::start(
+                config.builder_threads,
+                Arc::clone(&objects),
+                executor.clone(),
+                files,
+                config.default_rig.clone(),
+            )
+            .map_err(ServeError::Builders)?,
+            objects,
+            executor,
             budgets: config.budgets,
             obj_limits,
             default_rig: config.default_rig,
@@ -222,11 +262,13 @@ impl Server {
             .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());
 
         // Ends what is left, whichever way this function ends.
+        let _builders_end = self.shared.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
         let shutting_down = async {
             shutdown.await;
             tracing::info!(calls = self.calls.count(), "draining");
+            drop(self.shared.atlases.stopper());
             set_health(&health, ServingStatus::NotServing).await;
             stop.cancel();
             let drained = tokio::time::timeout(self.drain, self.calls.none()).await;

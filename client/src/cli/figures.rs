@@ -2,7 +2,7 @@
 
 use std::cmp::Reverse;
 
-use grasp_client::{Rejection, SearchReport};
+use grasp_client::{Grasp, Rejection, SearchReport};
 use serde::Serialize;
 
 /// The name of an enumeration's value as JSON writes it, with blanks.
@@ -11,6 +11,13 @@ pub(super) fn name_of<T: Serialize>(value: &T) -> String {
         Ok(serde_json::Value::String(name)) => name.replace('_', " "),
         other => format!("{other:?}"),
     }
+}
+
+/// What a grasp is in the taxonomy, in words.
+pub(super) fn grasp_type_name(grasp: &Grasp) -> String {
+    grasp
+        .grasp_type
+        .map_or_else(|| "unclassifiable".to_owned(), |grasp_type| name_of(&grasp_type))
 }
 
 /// A time with a unit that fits: microseconds, milliseconds or seconds, with three digits that count.
@@ -47,6 +54,7 @@ pub(super) fn rejections_at_a_glance(report: &SearchReport) -> String {
             Rejection::FingerCollision => "finger",
             Rejection::UnwantedContact => "unwanted",
             Rejection::NotImmobilizing => "not immobile",
+            Rejection::UnmetConstraint => "constraint",
             Rejection::Unrecognised => "other",
         }
         .to_owned()
@@ -115,6 +123,10 @@ mod tests {
             nearest_miss: None,
             strategy: None,
             validity: None,
+            candidates: 0,
+            source: None,
+            atlas_entries: 0,
+            atlas_stamp: None,
         };
         let at_a_glance = rejections_at_a_glance(&report);
         assert_eq!(at_a_glance, "palm 65%, not immobile 25%, no contacts 10%");

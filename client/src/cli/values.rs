@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::ValueEnum;
 use glam::Vec3;
-use grasp_client::{BendRatios, Handedness, Strategy, Validity};
+use grasp_client::{BendRatios, Choice, Digit, Handedness, Strategy, Validity};
 
 /// Reads a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
 pub(super) fn parse_duration(text: &str) -> Result<Duration, String> {
@@ -37,6 +37,25 @@ pub(super) fn parse_vector(text: &str) -> Result<Vec3, String> {
         .map_err(|_| expected())?;
     let [x, y, z] = numbers.try_into().map_err(|_| expected())?;
     Ok(Vec3::new(x, y, z))
+}
+
+/// Directions within an angle of one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cone {
+    /// The one in the middle, of any length.
+    pub(super) direction: Vec3,
+    /// How far the others are from it at most.
+    pub(super) half_angle_degrees: f32,
+}
+
+/// Reads a cone such as `0,0,-1,45`: a vector and degrees.
+pub(super) fn parse_cone(text: &str) -> Result<Cone, String> {
+    let expected = || format!("{text:?} is no cone; write a direction and degrees like 0,0,-1,45");
+    let (direction, degrees) = text.rsplit_once(',').ok_or_else(expected)?;
+    Ok(Cone {
+        direction: parse_vector(direction).map_err(|_| expected())?,
+        half_angle_degrees: degrees.trim().parse().map_err(|_| expected())?,
+    })
 }
 
 /// Pixels of each of a picture's two views.
@@ -82,7 +101,7 @@ pub(super) fn parse_triangles(text: &str) -> Result<TriangleRange, String> {
     Ok(TriangleRange(first..=last))
 }
 
-/// The ladder of the thesis' chapter 5.
+/// The ladder of the thesis' chapter 5, and what goes beyond it.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 #[value(rename_all = "UPPER")]
 pub(super) enum StrategyName {
@@ -98,6 +117,8 @@ pub(super) enum StrategyName {
     E,
     /// First sufficient force distribution.
     F,
+    /// Hands are placed where opposed surfaces suggest it; with physical validity, known grips are tried first.
+    Guided,
 }
 
 impl From<StrategyName> for Strategy {
@@ -109,6 +130,7 @@ impl From<StrategyName> for Strategy {
             StrategyName::D => Self::D,
             StrategyName::E => Self::E,
             StrategyName::F => Self::F,
+            StrategyName::Guided => Self::Guided,
         }
     }
 }
@@ -122,6 +144,25 @@ impl From<StrategyName> for grasp_synthesis::strategy::Strategy {
             StrategyName::D => Self::D,
             StrategyName::E => Self::E,
             StrategyName::F => Self::F,
+            StrategyName::Guided => Self::Guided,
+        }
+    }
+}
+
+/// Which of the valid grasps is the answer.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum ChoiceName {
+    /// The first that is found.
+    First,
+    /// The best of all that are found until the budget ends.
+    Best,
+}
+
+impl From<ChoiceName> for Choice {
+    fn from(name: ChoiceName) -> Self {
+        match name {
+            ChoiceName::First => Self::FirstValid,
+            ChoiceName::Best => Self::BestWithinBudget,
         }
     }
 }
@@ -192,6 +233,33 @@ impl From<HandName> for Handedness {
     }
 }
 
+/// A digit of the hand.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum DigitName {
+    /// The thumb.
+    Thumb,
+    /// The index finger.
+    Index,
+    /// The middle finger.
+    Middle,
+    /// The ring finger.
+    Ring,
+    /// The little finger.
+    Little,
+}
+
+impl From<DigitName> for Digit {
+    fn from(name: DigitName) -> Self {
+        match name {
+            DigitName::Thumb => Self::Thumb,
+            DigitName::Index => Self::Index,
+            DigitName::Middle => Self::Middle,
+            DigitName::Ring => Self::Ring,
+            DigitName::Little => Self::Little,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -224,6 +292,18 @@ mod tests {
         assert_eq!(parse_vector("0, 0.5,-2"), Ok(Vec3::new(0.0, 0.5, -2.0)));
         for wrong in ["", "1,2", "1,2,3,4", "a,b,c", "1;2;3"] {
             assert!(parse_vector(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn cones_have_a_direction_and_degrees() {
+        let cone = Cone {
+            direction: Vec3::new(-1.0, 0.5, 0.0),
+            half_angle_degrees: 45.0,
+        };
+        assert_eq!(parse_cone("-1, 0.5,0, 45"), Ok(cone));
+        for wrong in ["", "45", "0,0,1", "0,0,1,", "0,0,1,2,3", "x,0,1,45", "0,0,1,wide"] {
+            assert!(parse_cone(wrong).is_err(), "{wrong:?}");
         }
     }
 

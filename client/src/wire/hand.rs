@@ -26,23 +26,37 @@ pub(super) fn handedness_from_wire(field: &str, value: i32) -> Result<Handedness
     }
 }
 
-pub(super) fn digit_from_wire(field: &str, value: i32) -> Result<Digit, Malformed> {
-    match v1::Digit::try_from(value) {
-        Ok(v1::Digit::Thumb) => Ok(Digit::Thumb),
-        Ok(v1::Digit::Index) => Ok(Digit::Index),
-        Ok(v1::Digit::Middle) => Ok(Digit::Middle),
-        Ok(v1::Digit::Ring) => Ok(Digit::Ring),
-        Ok(v1::Digit::Little) => Ok(Digit::Little),
-        Ok(v1::Digit::Unspecified) | Err(_) => Err(Malformed::unknown_value(field, value)),
+pub(super) fn digit_to_wire(digit: Digit) -> v1::Digit {
+    match digit {
+        Digit::Thumb => v1::Digit::Thumb,
+        Digit::Index => v1::Digit::Index,
+        Digit::Middle => v1::Digit::Middle,
+        Digit::Ring => v1::Digit::Ring,
+        Digit::Little => v1::Digit::Little,
     }
 }
 
-pub(super) fn phalanx_from_wire(field: &str, value: i32) -> Result<Phalanx, Malformed> {
+/// None for the palm.
+pub(super) fn digit_from_wire(field: &str, value: i32) -> Result<Option<Digit>, Malformed> {
+    match v1::Digit::try_from(value) {
+        Ok(v1::Digit::Thumb) => Ok(Some(Digit::Thumb)),
+        Ok(v1::Digit::Index) => Ok(Some(Digit::Index)),
+        Ok(v1::Digit::Middle) => Ok(Some(Digit::Middle)),
+        Ok(v1::Digit::Ring) => Ok(Some(Digit::Ring)),
+        Ok(v1::Digit::Little) => Ok(Some(Digit::Little)),
+        Ok(v1::Digit::Unspecified) => Ok(None),
+        Err(_) => Err(Malformed::unknown_value(field, value)),
+    }
+}
+
+/// None for the palm.
+pub(super) fn phalanx_from_wire(field: &str, value: i32) -> Result<Option<Phalanx>, Malformed> {
     match v1::Phalanx::try_from(value) {
-        Ok(v1::Phalanx::First) => Ok(Phalanx::First),
-        Ok(v1::Phalanx::Second) => Ok(Phalanx::Second),
-        Ok(v1::Phalanx::Third) => Ok(Phalanx::Third),
-        Ok(v1::Phalanx::Unspecified) | Err(_) => Err(Malformed::unknown_value(field, value)),
+        Ok(v1::Phalanx::First) => Ok(Some(Phalanx::First)),
+        Ok(v1::Phalanx::Second) => Ok(Some(Phalanx::Second)),
+        Ok(v1::Phalanx::Third) => Ok(Some(Phalanx::Third)),
+        Ok(v1::Phalanx::Unspecified) => Ok(None),
+        Err(_) => Err(Malformed::unknown_value(field, value)),
     }
 }
 
@@ -175,13 +189,15 @@ mod tests {
         for value in [0, 3, -1] {
             assert!(handedness_from_wire("handedness", value).is_err(), "{value}");
         }
-        for value in [0, 6] {
+        for value in [-1, 6] {
             assert!(digit_from_wire("digit", value).is_err(), "{value}");
         }
-        for value in [0, 4] {
+        for value in [-1, 4] {
             assert!(phalanx_from_wire("phalanx", value).is_err(), "{value}");
         }
-        assert_eq!(digit_from_wire("digit", 5), Ok(Digit::Little));
-        assert_eq!(phalanx_from_wire("phalanx", 1), Ok(Phalanx::First));
+        assert_eq!(digit_from_wire("digit", 5), Ok(Some(Digit::Little)));
+        assert_eq!(phalanx_from_wire("phalanx", 1), Ok(Some(Phalanx::First)));
+        assert_eq!(digit_from_wire("digit", 0), Ok(None));
+        assert_eq!(phalanx_from_wire("phalanx", 0), Ok(None));
     }
 }

@@ -3,6 +3,7 @@
 //! Functions named `*_to_wire` cannot fail: the server judges requests. Functions named `*_from_wire` refuse answers
 //! that break the contract, with the path of the offending field.
 
+mod constraints;
 mod geometry;
 mod hand;
 mod object;

@@ -5,10 +5,10 @@ use tonic_health::pb::{HealthCheckResponse, health_check_response::ServingStatus
 
 use super::{
     Malformed, each,
-    geometry::{pose_from_wire, vector_from_wire, vector_to_wire},
+    geometry::{duration_from_wire, pose_from_wire, vector_from_wire, vector_to_wire},
     required,
 };
-use crate::object::{Health, NewObject, Object, ObjectPage};
+use crate::object::{AtlasState, Health, NewObject, Object, ObjectPage};
 
 pub(crate) fn new_object_to_wire(object: &NewObject) -> v1::CreateObjectRequest {
     v1::CreateObjectRequest {
@@ -42,6 +42,21 @@ fn object_fields_from_wire(object: v1::Object) -> Result<Object, Malformed> {
         box_half_extents: vector_from_wire(required("box_half_extents", object.box_half_extents)?),
         content_hash: object.content_hash,
         warnings: object.warnings,
+        atlas: object
+            .atlas
+            .map(atlas_from_wire)
+            .transpose()
+            .map_err(|malformed| malformed.within("atlas"))?,
+    })
+}
+
+fn atlas_from_wire(atlas: v1::AtlasState) -> Result<AtlasState, Malformed> {
+    let build_time = required("build_time", atlas.build_time)?;
+    Ok(AtlasState {
+        entries: atlas.entries,
+        complete: atlas.complete,
+        stamp: atlas.stamp,
+        build_time: duration_from_wire("build_time", build_time)?,
     })
 }
 
@@ -66,6 +81,8 @@ pub(crate) fn health_from_wire(response: HealthCheckResponse) -> Health {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use glam::Vec3;
 
     use super::*;
@@ -96,6 +113,32 @@ mod tests {
         assert_eq!(object.centre_of_mass, Vec3::new(0.0, 0.01, 0.0));
         assert_eq!(object.box_half_extents, Vec3::new(0.02, 0.01, 0.09));
         assert_eq!(object.warnings, ["12 open edges"]);
+        assert_eq!(object.atlas, None);
+    }
+
+    #[test]
+    fn the_state_of_an_atlas_keeps_what_it_says_and_tells_its_time() {
+        let mut wire = wire_object("objects/remote");
+        wire.atlas = Some(v1::AtlasState {
+            entries: 40,
+            complete: true,
+            stamp: "a7".to_owned(),
+            build_time: Some(prost_types::Duration {
+                seconds: 2,
+                nanos: 500_000_000,
+            }),
+        });
+        let atlas = object_from_wire(Some(wire.clone())).unwrap().atlas.unwrap();
+        let expected = AtlasState {
+            entries: 40,
+            complete: true,
+            stamp: "a7".to_owned(),
+            build_time: Duration::from_millis(2500),
+        };
+        assert_eq!(atlas, expected);
+        wire.atlas.as_mut().unwrap().build_time = None;
+        let error = object_from_wire(Some(wire)).unwrap_err();
+        assert_eq!(error.path, "object.atlas.build_time");
     }
 
     #[test]

@@ -3,7 +3,9 @@
 use grasp_proto::v1;
 
 use super::{
-    Malformed, each, exactly,
+    Malformed,
+    constraints::constraints_to_wire,
+    each, exactly,
     geometry::{
         duration_from_wire, duration_to_wire, pose_from_wire, pose_to_wire, vector_from_wire, vector_to_wire,
     },
@@ -13,9 +15,15 @@ use super::{
     },
     required,
 };
-use crate::search::{
-    BendRatios, Contact, Convention, FindAnswer, FindRequest, Grasp, NearestMiss, Outcome, PhysicalMargins,
-    Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy, Validity,
+use crate::{
+    grasp_type::GraspType,
+    key_frame::{KeyFrame, KeyFrameKind},
+    score::{Score, ScoreTerm},
+    search::{
+        AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
+        NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
+        Strategy, Validity,
+    },
 };
 
 pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspRequest {
@@ -51,6 +59,19 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         }
         .into(),
         friction: request.friction,
+        constraints: constraints_to_wire(&request.constraints),
+        choice: match request.choice {
+            None => v1::Choice::Unspecified,
+            Some(Choice::FirstValid) => v1::Choice::FirstValid,
+            Some(Choice::BestWithinBudget) => v1::Choice::BestWithinBudget,
+        }
+        .into(),
+        atlas: match request.atlas {
+            None => v1::AtlasUse::Unspecified,
+            Some(AtlasUse::Allowed) => v1::AtlasUse::Allowed,
+            Some(AtlasUse::None) => v1::AtlasUse::None,
+        }
+        .into(),
     }
 }
 
@@ -62,6 +83,7 @@ fn strategy_to_wire(strategy: Strategy) -> v1::Strategy {
         Strategy::D => v1::Strategy::D,
         Strategy::E => v1::Strategy::E,
         Strategy::F => v1::Strategy::F,
+        Strategy::Guided => v1::Strategy::Guided,
     }
 }
 
@@ -75,6 +97,7 @@ fn strategy_from_wire(value: i32) -> Option<Strategy> {
         v1::Strategy::D => Some(Strategy::D),
         v1::Strategy::E => Some(Strategy::E),
         v1::Strategy::F => Some(Strategy::F),
+        v1::Strategy::Guided => Some(Strategy::Guided),
     }
 }
 
@@ -104,6 +127,15 @@ fn bend_ratios_to_wire(ratios: BendRatios) -> v1::BendRatios {
     }
 }
 
+/// A newer server may have grasps from elsewhere.
+fn source_from_wire(value: i32) -> Option<GraspSource> {
+    match v1::GraspSource::try_from(value).ok()? {
+        v1::GraspSource::Unspecified => None,
+        v1::GraspSource::Search => Some(GraspSource::Search),
+        v1::GraspSource::Atlas => Some(GraspSource::Atlas),
+    }
+}
+
 fn rejection_from_wire(value: i32) -> Rejection {
     match v1::Rejection::try_from(value) {
         Ok(v1::Rejection::NoContacts) => Rejection::NoContacts,
@@ -114,6 +146,7 @@ fn rejection_from_wire(value: i32) -> Rejection {
         Ok(v1::Rejection::FingerCollision) => Rejection::FingerCollision,
         Ok(v1::Rejection::UnwantedContact) => Rejection::UnwantedContact,
         Ok(v1::Rejection::NotImmobilizing) => Rejection::NotImmobilizing,
+        Ok(v1::Rejection::UnmetConstraint) => Rejection::UnmetConstraint,
         Ok(v1::Rejection::Unspecified) | Err(_) => Rejection::Unrecognised,
     }
 }
@@ -175,7 +208,47 @@ fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
             penetration: margins.penetration,
             giver_clearance: margins.giver_clearance,
         }),
+        grasp_type: grasp_type_from_wire(grasp.r#type),
+        type_confidence: grasp.type_confidence,
+        score: grasp.score.map(score_from_wire),
+        key_frames: each("key_frames", grasp.key_frames, key_frame_from_wire)?,
     })
+}
+
+fn score_from_wire(score: v1::Score) -> Score {
+    Score {
+        total: score.total,
+        terms: score
+            .terms
+            .into_iter()
+            .map(|term| ScoreTerm {
+                name: term.name,
+                value: term.value,
+                weight: term.weight,
+            })
+            .collect(),
+    }
+}
+
+fn key_frame_from_wire(frame: v1::KeyFrame) -> Result<KeyFrame, Malformed> {
+    Ok(KeyFrame {
+        kind: match v1::KeyFrameKind::try_from(frame.kind) {
+            Ok(v1::KeyFrameKind::Approach) => KeyFrameKind::Approach,
+            Ok(v1::KeyFrameKind::PreGrasp) => KeyFrameKind::PreGrasp,
+            Ok(v1::KeyFrameKind::Close) => KeyFrameKind::Close,
+            Ok(v1::KeyFrameKind::Unspecified) | Err(_) => KeyFrameKind::Unrecognised,
+        },
+        client_from_wrist: pose_from_wire(frame.client_from_wrist),
+        digits: exactly("digits", frame.digits)?.map(digit_angles_from_wire),
+        joints: exactly("joints", frame.joints)?.map(joint_from_wire),
+    })
+}
+
+/// The type of a grasp; a newer server may use one that is not known here.
+fn grasp_type_from_wire(value: i32) -> Option<GraspType> {
+    GraspType::ALL
+        .into_iter()
+        .find(|&grasp_type| grasp_type as i32 == value)
 }
 
 fn contact_from_wire(contact: v1::Contact) -> Result<Contact, Malformed> {
@@ -228,6 +301,10 @@ fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed>
         }),
         strategy: strategy_from_wire(report.strategy),
         validity: validity_from_wire(report.validity),
+        candidates: report.candidates,
+        source: source_from_wire(report.source),
+        atlas_entries: report.atlas_entries,
+        atlas_stamp: Some(report.atlas_stamp).filter(|stamp| !stamp.is_empty()),
     })
 }
 

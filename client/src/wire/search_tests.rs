@@ -3,7 +3,10 @@ use std::time::Duration;
 use glam::Vec3;
 
 use super::*;
-use crate::hand::{Digit, Handedness, JOINT_COUNT, Phalanx};
+use crate::{
+    constraints::Constraints,
+    hand::{Digit, Handedness, JOINT_COUNT, Phalanx},
+};
 
 fn wire_vector(x: f32) -> v1::Vector3 {
     v1::Vector3 { x, y: 0.0, z: 0.0 }
@@ -51,6 +54,19 @@ fn wire_answer() -> v1::FindGraspResponse {
             }),
             comfort: 10.0,
             wrench_angle: 11.0,
+            r#type: v1::GraspType::Quadpod.into(),
+            type_confidence: 0.75,
+            score: Some(v1::Score {
+                total: 0.21,
+                terms: vec![v1::ScoreTerm {
+                    name: "comfort".to_owned(),
+                    value: 0.22,
+                    weight: 0.23,
+                }],
+            }),
+            key_frames: [v1::KeyFrameKind::Approach, v1::KeyFrameKind::Close]
+                .map(wire_key_frame)
+                .to_vec(),
         }),
         report: Some(v1::SearchReport {
             attempts: 12,
@@ -86,7 +102,23 @@ fn wire_answer() -> v1::FindGraspResponse {
             nearest_miss: None,
             strategy: v1::Strategy::F.into(),
             validity: v1::Validity::Thesis.into(),
+            candidates: 24,
+            source: v1::GraspSource::Atlas.into(),
+            atlas_entries: 25,
+            atlas_stamp: "26".to_owned(),
         }),
+    }
+}
+
+fn wire_key_frame(kind: v1::KeyFrameKind) -> v1::KeyFrame {
+    v1::KeyFrame {
+        kind: kind.into(),
+        client_from_wrist: Some(v1::Pose {
+            position: Some(wire_vector(27.0)),
+            orientation: None,
+        }),
+        digits: vec![v1::DigitAngles::default(); 5],
+        joints: vec![v1::JointPose::default(); JOINT_COUNT],
     }
 }
 
@@ -111,16 +143,32 @@ fn an_answer_keeps_every_number_in_its_place() {
         client_normal: Vec3::X * 4.0,
         object_position: Vec3::X * 5.0,
         object_normal: Vec3::X * 6.0,
-        digit: Digit::Ring,
-        phalanx: Phalanx::Third,
+        digit: Some(Digit::Ring),
+        phalanx: Some(Phalanx::Third),
         triangle: 7,
         client_force: Vec3::X * 8.0,
         object_force: Vec3::X * 9.0,
     };
     assert_eq!(grasp.contacts, [expected]);
     assert_eq!((grasp.comfort, grasp.wrench_angle), (10.0, 11.0));
+    assert_eq!(
+        (grasp.grasp_type, grasp.type_confidence),
+        (Some(GraspType::Quadpod), 0.75)
+    );
     assert_eq!(grasp.margins.map(|margins| margins.epsilon), Some(0.03));
+    let score = grasp.score.unwrap();
+    let term = &score.terms[0];
+    assert_eq!(
+        (score.total, term.name.as_str(), term.value, term.weight),
+        (0.21, "comfort", 0.22, 0.23)
+    );
+    let kinds: Vec<_> = grasp.key_frames.iter().map(|frame| frame.kind).collect();
+    assert_eq!(kinds, [KeyFrameKind::Approach, KeyFrameKind::Close]);
+    assert_eq!(grasp.key_frames[1].client_from_wrist.position.x, 27.0);
     let report = answer.report;
+    assert_eq!((report.candidates, report.atlas_entries), (24, 25));
+    assert_eq!(report.source, Some(GraspSource::Atlas));
+    assert_eq!(report.atlas_stamp.as_deref(), Some("26"));
     assert_eq!((report.attempts, report.pruned_placements), (12, 13));
     assert_eq!(report.rejections[0].rejection, Rejection::PalmCollision);
     assert_eq!(report.rejections[0].count, 14);
@@ -142,12 +190,46 @@ fn what_a_newer_server_reports_is_kept_apart_instead_of_refused() {
     let report = wire.report.as_mut().unwrap();
     report.strategy = 77;
     report.validity = 77;
+    report.source = 77;
     report.step_times[0].step = 77;
-    let report = find_answer_from_wire(wire).unwrap().report;
+    let grasp = wire.grasp.as_mut().unwrap();
+    grasp.key_frames[0].kind = 77;
+    grasp.r#type = 77;
+    let answer = find_answer_from_wire(wire).unwrap();
+    let grasp = answer.grasp.unwrap();
+    assert_eq!(grasp.key_frames[0].kind, KeyFrameKind::Unrecognised);
+    assert_eq!(grasp.grasp_type, None);
+    let report = answer.report;
+    assert_eq!(report.source, None);
     assert_eq!(report.rejections[1].rejection, Rejection::Unrecognised);
     assert_eq!(report.rejections[1].count, 15);
     assert_eq!((report.strategy, report.validity), (None, None));
     assert_eq!(report.step_times[0].step, Step::Unrecognised);
+}
+
+#[test]
+fn every_rejection_of_the_contract_is_known_by_its_name() {
+    let known = (1..).map_while(|value| v1::Rejection::try_from(value).ok());
+    let mut count = 0;
+    for wire in known {
+        let name = serde_json::to_value(rejection_from_wire(wire.into())).unwrap();
+        let expected = wire.as_str_name().trim_start_matches("REJECTION_").to_lowercase();
+        assert_eq!(name, expected);
+        count += 1;
+    }
+    assert_eq!(count, 9);
+}
+
+#[test]
+fn types_keep_their_names() {
+    for (number, grasp_type) in (1..).zip(GraspType::ALL) {
+        let wire = v1::GraspType::try_from(number).unwrap();
+        let name = serde_json::to_value(grasp_type).unwrap();
+        let name = name.as_str().unwrap().to_uppercase();
+        assert_eq!(format!("GRASP_TYPE_{name}"), wire.as_str_name());
+        assert_eq!(grasp_type_from_wire(wire.into()), Some(grasp_type));
+    }
+    assert_eq!(grasp_type_from_wire(v1::GraspType::Unspecified.into()), None);
 }
 
 #[test]
@@ -183,6 +265,10 @@ fn a_malformed_answer_is_refused_with_the_path_of_the_field() {
     assert_eq!(path_of(wire), "grasp.contacts[0].client_force");
 
     let mut wire = wire_answer();
+    wire.grasp.as_mut().unwrap().key_frames[1].digits.pop();
+    assert_eq!(path_of(wire), "grasp.key_frames[1].digits");
+
+    let mut wire = wire_answer();
     wire.report.as_mut().unwrap().step_times[0].time = None;
     assert_eq!(path_of(wire), "report.step_times[0].time");
 }
@@ -194,6 +280,9 @@ fn a_request_that_says_nothing_leaves_all_to_the_server() {
     assert_eq!(wire.strategy(), v1::Strategy::Unspecified);
     assert_eq!(wire.bend_ratios(), v1::BendRatios::Unspecified);
     assert_eq!(wire.validity(), v1::Validity::Unspecified);
+    assert_eq!(wire.choice(), v1::Choice::Unspecified);
+    assert_eq!(wire.atlas(), v1::AtlasUse::Unspecified);
+    assert_eq!(wire.constraints, None);
     assert_eq!(wire.convention(), v1::Convention::Openxr);
     assert_eq!((wire.budget, wire.seed, wire.up), (None, None, None));
 }
@@ -213,6 +302,12 @@ fn a_request_keeps_what_it_says() {
         record_step_times: true,
         convention: Convention::Unreal,
         friction: Some(0.5),
+        constraints: Constraints {
+            max_comfort_e: Some(0.25),
+            ..Constraints::default()
+        },
+        choice: Some(Choice::BestWithinBudget),
+        atlas: Some(AtlasUse::None),
         ..FindRequest::new("objects/remote")
     };
     let wire = find_request_to_wire(&request);
@@ -229,4 +324,7 @@ fn a_request_keeps_what_it_says() {
     assert!(wire.reproducible && wire.record_step_times);
     assert_eq!(wire.convention(), v1::Convention::Unreal);
     assert_eq!(wire.friction, Some(0.5));
+    assert_eq!(wire.choice(), v1::Choice::BestWithinBudget);
+    assert_eq!(wire.atlas(), v1::AtlasUse::None);
+    assert_eq!(wire.constraints.unwrap().max_comfort_e, Some(0.25));
 }

@@ -229,7 +229,7 @@ async fn no_grasp_within_the_budget_exits_with_3() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn usage_errors_exit_with_2_before_any_server_is_asked() {
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 10] = [
         (&[], "Usage"),
         (&["find"], "--holdout"),
         (
@@ -243,7 +243,19 @@ async fn usage_errors_exit_with_2_before_any_server_is_asked() {
         (&["find", "--holdout", "remote-hold1", "--budget", "5"], "500ms"),
         (
             &["find", "--holdout", "remote-hold1", "--strategy", "G"],
-            "[possible values: A, B, C, D, E, F]",
+            "[possible values: A, B, C, D, E, F, GUIDED]",
+        ),
+        (
+            &["find", "--holdout", "remote-hold1", "--reach", "1"],
+            "--shoulder",
+        ),
+        (
+            &["find", "--holdout", "remote-hold1", "--approach", "0,0,1"],
+            "0,0,-1,45",
+        ),
+        (
+            &["find", "--holdout", "remote-hold1", "--must-touch", "thumb,toe"],
+            "[possible values: thumb, index, middle, ring, little]",
         ),
         (&["health", "--server", "nowhere"], "is not a URL"),
     ];
@@ -285,6 +297,48 @@ async fn a_request_may_be_printed_and_read_again() {
         text(&printed.stdout),
     );
     assert_eq!(text(&again.stdout), text(&printed.stdout));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_the_grasp_must_be_like_is_laid_over_the_file() {
+    let file = r#"{"object": "objects/remote",
+        "choice": "first_valid", "constraints": {"must_touch": ["ring"], "must_not_touch": ["middle"], "max_comfort_e": 0.5}}"#;
+    let arguments = [
+        "find",
+        "--request",
+        "-",
+        "--print-request",
+        "--shoulder",
+        "-0.5,1.25,0",
+        "--reach",
+        "0.75",
+        "--approach",
+        "-1,0,0,180",
+        "--must-touch",
+        "thumb,index",
+        "--max-comfort-e",
+        "0.25",
+        "--choice",
+        "best",
+    ];
+    let printed = run_with_input(&arguments, file);
+    assert_eq!(code(&printed), 0, "{}", text(&printed.stderr));
+    let request = json(&printed.stdout);
+    assert_eq!(request["choice"], "best_within_budget");
+    let constraints = &request["constraints"];
+    let approach = &constraints["approach"];
+    assert_eq!(approach["client_direction"], serde_json::json!([-1.0, 0.0, 0.0]));
+    assert_eq!(
+        approach["half_angle"].as_f64().map(|angle| angle as f32),
+        Some(std::f32::consts::PI)
+    );
+    assert_eq!(
+        constraints["receiver_reach"],
+        serde_json::json!({"client_shoulder": [-0.5, 1.25, 0.0], "reach": 0.75})
+    );
+    assert_eq!(constraints["must_touch"], serde_json::json!(["thumb", "index"]));
+    assert_eq!(constraints["must_not_touch"], serde_json::json!(["middle"]));
+    assert_eq!(constraints["max_comfort_e"], 0.25);
 }
 
 #[tokio::test(flavor = "multi_thread")]

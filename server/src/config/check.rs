@@ -67,6 +67,13 @@ impl RawConfig {
                 ),
             },
             objects_directory: check.folder("objects_directory", self.objects_directory),
+            builder_threads: check.within(
+                "builder_threads",
+                self.builder_threads,
+                0..=64,
+                defaults.builder_threads,
+            ),
+            atlas_directory: check.folder("atlas_directory", self.atlas_directory),
             maximum_connections: check.count(
                 "maximum_connections",
                 self.maximum_connections,
@@ -238,6 +245,8 @@ mod tests {
             log_format: LogFormat::Json,
             drain: Duration::from_millis(77),
             objects_directory: Some("/objects".into()),
+            atlas_directory: Some("/atlases".into()),
+            builder_threads: 0,
             ..Config::default()
         };
         let text = toml::to_string(&RawConfig::from(&config)).unwrap();
@@ -282,6 +291,8 @@ mod tests {
             cache_objects: Some(0),
             cache_bytes: Some(0),
             objects_directory: Some(PathBuf::new()),
+            builder_threads: Some(65),
+            atlas_directory: Some(PathBuf::new()),
             maximum_connections: Some(0),
             drain_ms: Some(u64::MAX),
             default_rig: Some("robot".into()),
@@ -291,7 +302,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 18, "{bad:?}");
+        assert_eq!(bad.len(), 20, "{bad:?}");
         let told: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

@@ -41,11 +41,15 @@ pub struct Config {
     pub store: StoreLimits,
     /// A folder of objects that the server starts with; none for the built-in ones alone.
     pub objects_directory: Option<PathBuf>,
+    /// Threads that find out in the background how hands can hold the objects; 0: none does, and no atlases are kept.
+    pub builder_threads: usize,
+    /// A folder to keep atlases in; none to keep them in memory alone.
+    pub atlas_directory: Option<PathBuf>,
     /// Connections; others wait.
     pub maximum_connections: NonZeroUsize,
     /// How long running calls are waited for at the end.
     pub drain: Duration,
-    /// The receiving hand's rig unless a request names one.
+    /// The receiving hand's rig unless a request names one; under `THESIS` validity, that is always the thesis' own.
     pub default_rig: String,
     /// How the log is written.
     pub log_format: LogFormat,
@@ -77,9 +81,11 @@ impl Default for Config {
                 bytes: 512 << 20,
             },
             objects_directory: None,
+            builder_threads: 1,
+            atlas_directory: None,
             maximum_connections: non_zero(1000),
             drain: Duration::from_secs(10),
-            default_rig: "thesis".to_owned(),
+            default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,
             log: "info".to_owned(),
         }

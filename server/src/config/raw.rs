@@ -64,13 +64,24 @@ pub struct RawConfig {
     /// all together by `cache_objects` and `cache_bytes`, beside what clients create. The objects are never evicted.
     #[arg(long, env = "GRASP_OBJECTS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub objects_directory: Option<PathBuf>,
+    /// Threads of low priority that find out how hands can hold the objects, before anybody asks [default: 1].
+    ///
+    /// What they find, the objects' atlases, makes answers quick. It takes what created objects leave of `cache_bytes`.
+    /// With 0, there are no atlases.
+    #[arg(long, env = "GRASP_BUILDER_THREADS", value_name = "COUNT")]
+    pub builder_threads: Option<u64>,
+    /// Folder to keep atlases in from one start to the next [default: none].
+    ///
+    /// It is made if need be. Its files take up to 1 GiB; those that were not used for longest go first.
+    #[arg(long, env = "GRASP_ATLAS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
+    pub atlas_directory: Option<PathBuf>,
     /// Connections at most [default: 1000].
     #[arg(long, env = "GRASP_MAXIMUM_CONNECTIONS", value_name = "COUNT")]
     pub maximum_connections: Option<u64>,
     /// How long running calls are waited for at the end [default: 10000].
     #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
     pub drain_ms: Option<u64>,
-    /// Rig of a receiving hand that names none [default: thesis].
+    /// Rig of a receiving hand that names none, under PHYSICAL validity [default: adult].
     #[arg(long, env = "GRASP_DEFAULT_RIG", value_name = "NAME")]
     pub default_rig: Option<String>,
     /// How the log is written: text or json [default: text].
@@ -130,6 +141,8 @@ impl RawConfig {
             cache_objects: self.cache_objects.or(fallback.cache_objects),
             cache_bytes: self.cache_bytes.or(fallback.cache_bytes),
             objects_directory: self.objects_directory.or(fallback.objects_directory),
+            builder_threads: self.builder_threads.or(fallback.builder_threads),
+            atlas_directory: self.atlas_directory.or(fallback.atlas_directory),
             maximum_connections: self.maximum_connections.or(fallback.maximum_connections),
             drain_ms: self.drain_ms.or(fallback.drain_ms),
             default_rig: self.default_rig.or(fallback.default_rig),
@@ -157,6 +170,8 @@ impl From<&Config> for RawConfig {
             cache_objects: count(config.store.objects),
             cache_bytes: count(config.store.bytes),
             objects_directory: config.objects_directory.clone(),
+            builder_threads: count(config.builder_threads),
+            atlas_directory: config.atlas_directory.clone(),
             maximum_connections: count(config.maximum_connections.get()),
             drain_ms: time(config.drain),
             default_rig: Some(config.default_rig.clone()),

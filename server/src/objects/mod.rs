@@ -12,14 +12,17 @@ use grasp_proto::v1;
 use grasp_synthesis::{object::GraspObject, strategy::Validity};
 use sha2::{Digest as _, Sha256};
 
-use crate::answer::{vector, wire_pose};
+use crate::{
+    answer::{vector, wire_pose},
+    atlases::shelf::Shelf,
+};
 
 /// Bytes that a triangle takes in the search structures beside its three indices: the nodes and the prepared
 /// triangle of the hierarchy, and the forbidden flag. An estimate, on the large side: it bounds the cache.
 const SEARCH_BYTES_PER_TRIANGLE: usize = 192;
 
 /// An object as the server keeps it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct StoredObject {
     /// The last part of its name.
     pub id: String,
@@ -31,6 +34,8 @@ pub(crate) struct StoredObject {
     pub content_hash: String,
     /// What is odd about its mesh.
     pub warnings: Vec<String>,
+    /// What is known of how hands hold it.
+    pub shelf: Shelf,
 }
 
 impl StoredObject {
@@ -42,6 +47,7 @@ impl StoredObject {
             content_hash: content_hash(&object),
             object,
             warnings,
+            shelf: Shelf::default(),
         }
     }
 
@@ -55,17 +61,19 @@ impl StoredObject {
         Arc::strong_count(&self.object) > 1
     }
 
-    /// About how many bytes it takes.
+    /// About how many bytes it takes, without its atlases.
     pub(crate) fn bytes(&self) -> usize {
         let mesh = self.object.surface.mesh();
         size_of_val(mesh.positions())
             + size_of_val(mesh.triangles())
             + mesh.triangles().len() * SEARCH_BYTES_PER_TRIANGLE
+            + self.object.surface.field_bytes()
+            + self.object.surface_pairs.bytes()
             + self.warnings.iter().map(String::len).sum::<usize>()
     }
 
-    /// The object as the contract tells it.
-    pub(crate) fn to_wire(&self) -> v1::Object {
+    /// The object as the contract tells it, with the state of its atlas.
+    pub(crate) fn to_wire(&self, atlas: Option<v1::AtlasState>) -> v1::Object {
         let mesh = self.object.surface.mesh();
         let bounding_box = &self.object.bounding_box;
         v1::Object {
@@ -81,6 +89,7 @@ impl StoredObject {
             box_half_extents: Some(vector(bounding_box.half_extents)),
             content_hash: self.content_hash.clone(),
             warnings: self.warnings.clone(),
+            atlas,
         }
     }
 }

@@ -76,6 +76,16 @@ impl ObjectStore {
         }
     }
 
+    /// The objects that the server started with.
+    pub(crate) fn pinned(&self) -> impl Iterator<Item = &Arc<StoredObject>> {
+        self.pinned.values()
+    }
+
+    /// Bytes that created objects leave of what they may take.
+    pub(crate) fn room(&self) -> usize {
+        self.limits.bytes.saturating_sub(self.created().bytes)
+    }
+
     /// True if an object has this id.
     pub(crate) fn contains(&self, id: &str) -> bool {
         self.pinned.contains_key(id) || self.created().objects.contains_key(id)

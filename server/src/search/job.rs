@@ -7,10 +7,13 @@ use std::{
 
 use grasp_proto::v1;
 use grasp_synthesis::{
+    atlas::Atlas,
     clock::Clock,
     holdout::{Holdout, PresentingHand},
+    key_frames::plan_way,
     object::GraspObject,
-    search::SearchSettings,
+    search::{SearchOutcome, SearchSettings, find_known_grasp},
+    strategy::{Choice, Validity},
 };
 use rayon::ThreadPool;
 
@@ -36,9 +39,27 @@ pub(crate) struct FindJob {
     pub budget: Duration,
     /// Workers that race.
     pub workers: usize,
+    /// Grips that are known for the object and the hand.
+    pub atlas: Option<Arc<Atlas>>,
 }
 
+/// A job that has everything computed that its search works on.
+#[derive(Debug)]
+pub(crate) struct PreparedJob {
+    query: FindQuery,
+    holdout: Holdout,
+    settings: SearchSettings,
+    clock: SinceArrival,
+    start: Instant,
+    budget: Duration,
+}
+
+/// How long a call's own thread may look for a known grip: a message takes about as long to be decoded and answered.
+/// Longer answers more calls without a change of threads, and keeps others waiting.
+const LOOK_UP_TIME: Duration = Duration::from_micros(200);
+
 /// Time since a call's arrival.
+#[derive(Debug)]
 struct SinceArrival(Instant);
 
 impl Clock for SinceArrival {
@@ -48,20 +69,24 @@ impl Clock for SinceArrival {
 }
 
 impl FindJob {
-    /// Poses the giver's hand, searches and words the answer.
+    /// True if preparing and a look-up are quick enough for a call's own thread.
+    pub(crate) fn may_be_known(&self) -> bool {
+        self.atlas.is_some() && self.query.choice == Choice::FirstValid && !self.query.reproducible
+    }
+
+    /// Poses the giver's hand.
     ///
     /// # Errors
-    /// The giver's joints fold its skin, or the search was told to stop.
-    pub(crate) fn run(
-        self,
-        pool: &ThreadPool,
-        stop: &AtomicBool,
-    ) -> Result<v1::FindGraspResponse, ServiceError> {
+    /// The giver's joints fold its skin.
+    pub(crate) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
         let query = self.query;
         let object_from_client = query.client_from_object.inverse();
         let presenting_hand = match &query.presenting_hand {
             None => None,
+            Some(giver) if query.validity == Validity::Physical => Some(PresentingHand::of_joints(
+                giver.joints.transformed(object_from_client),
+            )),
             Some(giver) => Some(
                 PresentingHand::in_frame(giver.skin, &giver.joints, object_from_client)
                     .map_err(|error| ServiceError::invalid(giver.field, error.to_string()))?,
@@ -80,6 +105,9 @@ impl FindJob {
             friction: query
                 .friction
                 .unwrap_or_else(|| holdout.object.friction_under(query.validity)),
+            constraints: query.constraints.transformed(object_from_client),
+            choice: query.choice,
+            atlas: self.atlas,
             reproducible: query.reproducible,
             first_attempt: query.first_attempt,
             max_attempts: query.max_attempts,
@@ -87,17 +115,57 @@ impl FindJob {
             workers: self.workers,
             record_step_times: query.record_step_times,
         };
-        let rig = &query.receiving_hand.rig;
-        let outcome = race(pool, &holdout, rig, &settings, &SinceArrival(self.arrived), stop);
+        Ok(PreparedJob {
+            query,
+            holdout,
+            settings,
+            clock: SinceArrival(self.arrived),
+            start,
+            budget: self.budget,
+        })
+    }
+}
+
+impl PreparedJob {
+    /// The answer by a known grip, if one is found at once.
+    ///
+    /// # Errors
+    /// None that a known grip can have; those of [`PreparedJob::run`].
+    pub(crate) fn look_up(&self) -> Option<Result<v1::FindGraspResponse, ServiceError>> {
+        let rig = &self.query.receiving_hand.rig;
+        let outcome = find_known_grasp(&self.holdout, rig, &self.settings, &self.clock, LOOK_UP_TIME)?;
+        Some(self.answer(outcome))
+    }
+
+    /// Searches and words the answer.
+    ///
+    /// # Errors
+    /// The search was told to stop.
+    pub(crate) fn run(
+        &self,
+        pool: &ThreadPool,
+        stop: &AtomicBool,
+    ) -> Result<v1::FindGraspResponse, ServiceError> {
+        let rig = &self.query.receiving_hand.rig;
+        let outcome = race(pool, &self.holdout, rig, &self.settings, &self.clock, stop);
+        self.answer(outcome)
+    }
+
+    fn answer(&self, mut outcome: SearchOutcome) -> Result<v1::FindGraspResponse, ServiceError> {
+        let rig = &self.query.receiving_hand.rig;
+        let search_time = self.start.elapsed();
+        if let Some(grasp) = &mut outcome.grasp {
+            plan_way(&self.holdout, rig, self.settings.friction, grasp);
+        }
         let frame = ClientFrame {
-            convention: query.convention,
-            client_from_object: query.client_from_object,
+            convention: self.query.convention,
+            client_from_object: self.query.client_from_object,
         };
         let circumstances = Circumstances {
-            search_time: start.elapsed(),
+            search_time,
             budget: self.budget,
         };
-        find_response(&outcome, rig, frame, &settings, circumstances)
+        find_response(&outcome, rig, frame, &self.settings, circumstances)
     }
 }
 
@@ -289,8 +357,12 @@ mod tests {
                 seed: 3,
                 arrived,
                 workers: 1,
+                atlas: None,
             };
-            match job.run(&pool, &AtomicBool::new(false)) {
+            match job
+                .prepare()
+                .and_then(|job| job.run(&pool, &AtomicBool::new(false)))
+            {
                 Ok(answer) => {
                     let report = answer.report.expect("every answer has a report");
                     prop_assert!(report.attempts <= 2);

@@ -4,13 +4,18 @@
 //! spent. So it runs slice by slice: after each, its next one queues behind the slices of the other searches. The
 //! slices cover consecutive attempts, so that slicing changes nothing about which attempt wins a reproducible search.
 
-use std::{sync::atomic::AtomicBool, time::Duration};
+use std::{
+    sync::atomic::{AtomicBool, Ordering},
+    time::Duration,
+};
 
 use grasp_synthesis::{
     clock::Clock,
+    grasp::Grasp,
     hand::rig::Rig,
     holdout::Holdout,
     search::{NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes, find_grasp},
+    strategy::Choice,
 };
 use rayon::ThreadPool;
 
@@ -38,20 +43,39 @@ pub(super) fn race(
     let mut slice = settings.clone();
     let mut left = settings.max_attempts;
     let mut per_worker = FIRST_ATTEMPTS_PER_WORKER;
+    let mut best: Option<(Grasp, f32)> = None;
     loop {
         slice.max_attempts = left.min(per_worker.saturating_mul(workers));
         let start = clock.now();
         let outcome = find_grasp(pool, holdout, rig, &slice, clock, stop);
-        merge(&mut total, outcome.report);
+        // Known grips are all tried in the first slice.
+        slice.atlas = None;
         left -= slice.max_attempts;
-        if outcome.end != SearchEnd::AttemptsExhausted || left == 0 {
-            if outcome.grasp.is_some() {
+        let is_better =
+            outcome.grasp.is_some() && best.as_ref().is_none_or(|(_, value)| outcome.value > *value);
+        merge(&mut total, outcome.report, is_better);
+        if is_better {
+            best = outcome.grasp.map(|grasp| (grasp, outcome.value));
+        }
+        // The first valid grasp ends the search; the best is looked for as long as there is time.
+        let is_enough = best.is_some() && settings.choice == Choice::FirstValid;
+        let is_over = matches!(outcome.end, SearchEnd::DeadlinePassed | SearchEnd::Stopped)
+            || clock_has_passed(settings, clock)
+            || stop.load(Ordering::Relaxed);
+        if is_enough || is_over || left == 0 {
+            if best.is_some() {
                 // A miss is of interest only when nothing was hit.
                 total.nearest_miss = None;
             }
+            let end = match (&best, outcome.end) {
+                (_, SearchEnd::Stopped) => SearchEnd::Stopped,
+                (Some(_), _) => SearchEnd::Found,
+                (None, end) => end,
+            };
             return SearchOutcome {
-                end: outcome.end,
-                grasp: outcome.grasp,
+                end,
+                value: best.as_ref().map_or(0.0, |(_, value)| *value),
+                grasp: best.map(|(grasp, _)| grasp),
                 report: total,
             };
         }
@@ -69,8 +93,12 @@ fn next_size(size: u64, elapsed: Duration) -> u64 {
         .clamp(1, (2 * size).min(MOST_ATTEMPTS_PER_WORKER))
 }
 
-/// Adds what a slice did.
-fn merge(total: &mut SearchReport, slice: SearchReport) {
+fn clock_has_passed(settings: &SearchSettings, clock: &dyn Clock) -> bool {
+    settings.deadline.is_some_and(|deadline| clock.now() >= deadline)
+}
+
+/// Adds what a slice did; its grasp `is_better` than those before.
+fn merge(total: &mut SearchReport, slice: SearchReport, is_better: bool) {
     total.attempts += slice.attempts;
     total.pruned_placements += slice.pruned_placements;
     for (sum, count) in total.rejections.iter_mut().zip(slice.rejections) {
@@ -84,7 +112,12 @@ fn merge(total: &mut SearchReport, slice: SearchReport) {
         sum.contact_validation += times.contact_validation;
         sum.immobility_validation += times.immobility_validation;
     }
-    total.attempt = total.attempt.or(slice.attempt);
+    if is_better {
+        total.attempt = slice.attempt;
+        total.source = slice.source;
+    }
+    total.candidates += slice.candidates;
+    total.known_grips = total.known_grips.max(slice.known_grips);
     total.nearest_miss = match (total.nearest_miss.take(), slice.nearest_miss) {
         (Some(a), Some(b)) => Some(if closeness(&b) > closeness(&a) { b } else { a }),
         (a, b) => a.or(b),
@@ -134,27 +167,34 @@ mod tests {
         let slice = |nearest_miss| SearchReport {
             attempts: 5,
             pruned_placements: 7,
-            rejections: [1, 0, 0, 0, 0, 0, 0, 4],
+            rejections: [1, 0, 0, 0, 0, 0, 0, 4, 0],
             step_times: Some(StepTimes {
                 finger_posing: Duration::from_micros(3),
                 ..StepTimes::default()
             }),
             attempt: None,
             nearest_miss,
+            ..SearchReport::default()
         };
         let mut total = SearchReport::default();
         merge(
             &mut total,
             slice(Some(miss(Rejection::NotImmobilizing, Some(0.4), 3))),
+            false,
         );
-        merge(&mut total, slice(Some(miss(Rejection::PalmCollision, None, 8))));
+        merge(
+            &mut total,
+            slice(Some(miss(Rejection::PalmCollision, None, 8))),
+            false,
+        );
         merge(
             &mut total,
             slice(Some(miss(Rejection::NotImmobilizing, Some(0.2), 12))),
+            false,
         );
-        merge(&mut total, slice(None));
+        merge(&mut total, slice(None), false);
         assert_eq!((total.attempts, total.pruned_placements), (20, 28));
-        assert_eq!(total.rejections, [4, 0, 0, 0, 0, 0, 0, 16]);
+        assert_eq!(total.rejections, [4, 0, 0, 0, 0, 0, 0, 16, 0]);
         assert_eq!(total.step_times.unwrap().finger_posing, Duration::from_micros(12));
         assert_eq!(total.nearest_miss.unwrap().attempt, 12);
     }

@@ -7,6 +7,7 @@ use std::{
 };
 
 use grasp_proto::v1::{self, grasp_service_server::GraspService};
+use grasp_synthesis::search::uses_atlas;
 use tonic::{Request, Response, Status};
 
 use super::Shared;
@@ -38,12 +39,19 @@ impl GraspHandler {
         let shared = &self.shared;
         let query = find_query(request, &shared.default_rig, |id| shared.objects.contains(id))?;
         call.tell_object(&query.object_id);
-        let object = Arc::clone(&shared.objects.get(&query.object_id)?.object);
+        let stored = shared.objects.get(&query.object_id)?;
+        let object = Arc::clone(&stored.object);
         let budget = effective_budget(query.budget, shared.budgets, call.arrived, call.deadline);
         if budget.is_zero() {
             return Err(ServiceError::DeadlineExceeded);
         }
         let admission = shared.executor.admit()?;
+        let may_use_atlas = query.may_use_atlas && uses_atlas(query.strategy, query.validity);
+        let atlas = may_use_atlas
+            .then(|| shared.atlases.get(&stored, query.receiving_hand))
+            .flatten()
+            // One that still grows would answer otherwise a moment later.
+            .filter(|atlas| !query.reproducible || atlas.is_complete());
         let job = FindJob {
             seed: query.seed.unwrap_or_else(drawn_seed),
             query,
@@ -51,11 +59,24 @@ impl GraspHandler {
             arrived: call.arrived,
             budget,
             workers: shared.executor.workers(),
+            atlas,
         };
-        let answer = shared
-            .executor
-            .run(admission, move |pool, stop| job.run(pool, stop))
-            .await??;
+        let answer = if job.may_be_known() {
+            let job = job.prepare()?;
+            if let Some(answer) = job.look_up() {
+                answer?
+            } else {
+                let run = shared
+                    .executor
+                    .run(admission, move |pool, stop| job.run(pool, stop));
+                run.await??
+            }
+        } else {
+            let run = shared
+                .executor
+                .run(admission, move |pool, stop| job.prepare()?.run(pool, stop));
+            run.await??
+        };
         call.tell_search(summary(&answer));
         Ok(answer)
     }

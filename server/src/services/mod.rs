@@ -3,18 +3,24 @@
 mod grasp;
 mod objects;
 
+use std::sync::Arc;
+
 use grasp_assets::obj::ObjLimits;
 
 pub(crate) use grasp::GraspHandler;
 pub(crate) use objects::ObjectHandler;
 
-use crate::{budget::BudgetLimits, objects::store::ObjectStore, search::executor::SearchExecutor};
+use crate::{
+    atlases::Atlases, budget::BudgetLimits, objects::store::ObjectStore, search::executor::SearchExecutor,
+};
 
 /// What the handlers share.
 #[derive(Debug)]
 pub(crate) struct Shared {
     /// The objects.
-    pub objects: ObjectStore,
+    pub objects: Arc<ObjectStore>,
+    /// What is known of how hands hold them.
+    pub atlases: Atlases,
     /// The search pool.
     pub executor: SearchExecutor,
     /// How long searches may take.

@@ -9,7 +9,7 @@ use super::Shared;
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
-    objects::{build::build_object, name_of},
+    objects::{StoredObject, build::build_object, name_of},
     search::executor::run_blocking,
     validate::{Field, Violations, object_fields, object_id_of, page_query, page_token},
 };
@@ -50,8 +50,9 @@ impl ObjectHandler {
         })
         .await??;
         let object = self.shared.objects.insert(object)?;
+        self.shared.atlases.registered(&object);
         Ok(v1::CreateObjectResponse {
-            object: Some(object.to_wire()),
+            object: Some(self.told(&object)),
         })
     }
 
@@ -62,7 +63,7 @@ impl ObjectHandler {
         };
         call.tell_object(&id);
         Ok(v1::GetObjectResponse {
-            object: Some(self.shared.objects.get(&id)?.to_wire()),
+            object: Some(self.told(&*self.shared.objects.get(&id)?)),
         })
     }
 
@@ -72,8 +73,12 @@ impl ObjectHandler {
         let last = objects.last().filter(|_| more);
         Ok(v1::ListObjectsResponse {
             next_page_token: last.map(|last| page_token(&last.id)).unwrap_or_default(),
-            objects: objects.iter().map(|object| object.to_wire()).collect(),
+            objects: objects.iter().map(|object| self.told(object)).collect(),
         })
+    }
+
+    fn told(&self, object: &StoredObject) -> v1::Object {
+        object.to_wire(self.shared.atlases.state(object))
     }
 }
 

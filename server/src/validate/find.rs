@@ -6,18 +6,28 @@ use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
+    constraints::Constraints,
     pose::Pose,
-    strategy::{BendRatioChoice, Strategy, Validity},
+    strategy::{BendRatioChoice, Choice, Strategy, Validity},
 };
 
-use super::{Field, GiverHand, Violations, friction, hand, known, object_id_of, pose};
+use super::{
+    Field, GiverHand, Violations, constraints::constraints, friction, hand, known, object_id_of, pose,
+};
 use crate::{convention::Convention, error::ServiceError};
+
+/// The receiving hand of chapter 5, which the thesis' placement measures are made for.
+const THESIS_RIG: &str = "thesis";
 
 /// Attempts beyond this index are not run; at a million a second it takes 146,000 years to get here.
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
 
 /// Seconds that a `google.protobuf.Duration` may have: 10,000 years.
 const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
+
+/// How long the best grasp is searched for if the request does not say: a character that turns to it within a frame of
+/// 60 Hz leaves a third of the 16 ms for it. Longer finds better grasps, later.
+const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
 /// A request that may be searched.
 #[derive(Debug)]
@@ -54,6 +64,12 @@ pub(crate) struct FindQuery {
     pub record_step_times: bool,
     /// Friction for this request.
     pub friction: Option<f32>,
+    /// What is demanded of the grasp, in the client's frame and `OpenXR` axes.
+    pub constraints: Constraints,
+    /// Which of the valid grasps is wanted.
+    pub choice: Choice,
+    /// May the atlas be used?
+    pub may_use_atlas: bool,
 }
 
 /// Checks a request. `object_exists` tells whether an id is known; an unknown one beside other violations is listed
@@ -79,6 +95,11 @@ pub(crate) fn find_query(
     let presenting_hand = request
         .presenting_hand
         .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, v));
+    let validity = validity(known(Field::root("validity"), request.validity, v));
+    let default_rig = match validity {
+        Validity::Thesis => THESIS_RIG,
+        Validity::Physical => default_rig,
+    };
     let receiving_hand = hand::receiving_hand(
         Field::root("receiving_hand"),
         request.receiving_hand,
@@ -86,12 +107,13 @@ pub(crate) fn find_query(
         v,
     );
     let up = hand::up(Field::root("up"), request.up, convention, v);
-    let budget = request
-        .budget
-        .and_then(|budget| positive_duration(Field::root("budget"), budget, v));
+    let choice = choice(known(Field::root("choice"), request.choice, v));
+    let budget = match request.budget {
+        Some(budget) => positive_duration(Field::root("budget"), budget, v),
+        None => (choice == Choice::BestWithinBudget).then_some(BEST_CHOICE_BUDGET),
+    };
     let (first_attempt, max_attempts) = attempts(request.max_attempts, request.only_attempt, v);
-    let validity = validity(known(Field::root("validity"), request.validity, v));
-    let strategy = strategy(known(Field::root("strategy"), request.strategy, v));
+    let strategy = strategy(known(Field::root("strategy"), request.strategy, v), validity);
     let bend_ratios = bend_ratios(
         known(Field::root("bend_ratios"), request.bend_ratios, v),
         strategy,
@@ -99,6 +121,14 @@ pub(crate) fn find_query(
     let friction = request
         .friction
         .map(|value| friction(Field::root("friction"), value, v));
+    let constraints = constraints(Field::root("constraints"), request.constraints, convention, v);
+    let atlas_use: v1::AtlasUse = known(Field::root("atlas"), request.atlas, v);
+    if request.reproducible && choice == Choice::BestWithinBudget {
+        v.add(
+            Field::root("reproducible"),
+            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer hangs on how much fits into the budget; choose one of both",
+        );
+    }
     if let (false, Some(id)) = (violations.is_empty(), &object_id)
         && !object_exists(id)
     {
@@ -125,6 +155,10 @@ pub(crate) fn find_query(
         reproducible: request.reproducible,
         record_step_times: request.record_step_times,
         friction,
+        constraints,
+        choice,
+        // A replayed attempt is to be that attempt.
+        may_use_atlas: atlas_use != v1::AtlasUse::None && request.only_attempt.is_none(),
     })
 }
 
@@ -172,23 +206,35 @@ fn positive_duration(
     }
 }
 
-/// The server's default is the thesis' notion.
+/// The server's default is what a user should get.
 fn validity(validity: v1::Validity) -> Validity {
     match validity {
-        v1::Validity::Unspecified | v1::Validity::Thesis => Validity::Thesis,
-        v1::Validity::Physical => Validity::Physical,
+        v1::Validity::Thesis => Validity::Thesis,
+        v1::Validity::Unspecified | v1::Validity::Physical => Validity::Physical,
     }
 }
 
-/// The server's default is the fastest strategy.
-fn strategy(strategy: v1::Strategy) -> Strategy {
+fn choice(choice: v1::Choice) -> Choice {
+    match choice {
+        v1::Choice::Unspecified | v1::Choice::FirstValid => Choice::FirstValid,
+        v1::Choice::BestWithinBudget => Choice::BestWithinBudget,
+    }
+}
+
+/// The server's default is the fastest strategy; with the thesis' validity, the fastest of its ladder.
+fn strategy(strategy: v1::Strategy, validity: Validity) -> Strategy {
     match strategy {
         v1::Strategy::A => Strategy::A,
         v1::Strategy::B => Strategy::B,
         v1::Strategy::C => Strategy::C,
         v1::Strategy::D => Strategy::D,
         v1::Strategy::E => Strategy::E,
-        v1::Strategy::F | v1::Strategy::Unspecified => Strategy::F,
+        v1::Strategy::F => Strategy::F,
+        v1::Strategy::Guided => Strategy::Guided,
+        v1::Strategy::Unspecified => match validity {
+            Validity::Thesis => Strategy::F,
+            Validity::Physical => Strategy::Guided,
+        },
     }
 }
 

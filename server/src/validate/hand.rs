@@ -13,7 +13,7 @@ use grasp_synthesis::{
     pose::Pose,
 };
 
-use super::{Field, Violations, known, pose, quoted, raw};
+use super::{Field, Violations, direction, known, pose, quoted};
 use crate::convention::Convention;
 
 /// How far a joint angle may be outside its limits, in radians: room for the rounding of a client that clamps in
@@ -334,22 +334,10 @@ pub(super) fn up(
     convention: Convention,
     violations: &mut Violations,
 ) -> Vec3 {
-    let Some(up) = up else {
-        return convention.up_in_openxr();
-    };
-    let up = raw(up);
-    // Scaled first: the square of a huge or tiny vector is no number.
-    let unit = (up / up.abs().max_element()).try_normalize();
-    match unit {
-        Some(unit) if up.is_finite() => convention.direction_to_openxr(unit),
-        _ => {
-            violations.add(
-                field,
-                format_args!("is {up}; it must be finite and point somewhere"),
-            );
-            convention.up_in_openxr()
-        }
-    }
+    up.and_then(|up| direction(field, up, violations)).map_or_else(
+        || convention.up_in_openxr(),
+        |up| convention.direction_to_openxr(up),
+    )
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! can go on even if it was wrong; [`Violations::finish`] decides. Nothing here allocates for a request that is
 //! right.
 
+mod constraints;
 mod find;
 mod hand;
 mod object;
@@ -176,6 +177,22 @@ fn point(field: Field<'_>, v: v1::Vector3, metres_per_unit: f32, violations: &mu
         return Vec3::ZERO;
     }
     point
+}
+
+/// A direction of any length but 0, in the client's axes, as a unit vector; none if it has none.
+fn direction(field: Field<'_>, v: v1::Vector3, violations: &mut Violations) -> Option<Vec3> {
+    let direction = raw(v);
+    // Scaled first: the square of a huge or tiny vector is no number.
+    let unit = (direction / direction.abs().max_element())
+        .try_normalize()
+        .filter(|_| direction.is_finite());
+    if unit.is_none() {
+        violations.add(
+            field,
+            format_args!("is {direction}; it must be finite and point somewhere"),
+        );
+    }
+    unit
 }
 
 /// A unit quaternion, renormalised.

@@ -124,7 +124,7 @@ fn too_little_memory_is_told_with_what_to_lower() {
     assert_eq!(result.code, 1);
     for part in [
         "too little memory: the limit is 1024 MiB (RLIMIT_AS)",
-        "2048 MiB for created objects (cache_bytes is 2147483648)",
+        "2048 MiB for created objects and atlases (cache_bytes is 2147483648)",
     ] {
         assert!(result.text.contains(part), "{part} in {}", result.text);
     }

@@ -13,7 +13,7 @@ use std::{
 use clap::Args;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
 use grasp_client::{
-    FindAnswer, FindRequest, GraspClient, Handedness, Outcome, ReceivingHand, built_in::request_for,
+    FindAnswer, FindRequest, GraspClient, Handedness, Outcome, ReceivingHand, Validity, built_in::request_for,
 };
 
 use super::{
@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     /// same grasps.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// How to search.
+    /// How to search: A to F as in chapter 5, with the thesis' hand and notion of valid.
     #[arg(long, ignore_case = true, default_value = "F")]
     strategy: StrategyName,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
@@ -81,6 +81,14 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 impl Arguments {
+    /// The thesis' own for its ladder.
+    fn validity(&self) -> Option<Validity> {
+        match self.strategy {
+            StrategyName::Guided => None,
+            _ => Some(Validity::Thesis),
+        }
+    }
+
     fn chosen(&self) -> Result<Vec<&'static BuiltInHoldout>, Failure> {
         if self.holdout.is_empty() {
             return Ok(holdouts().iter().collect());
@@ -101,11 +109,12 @@ async fn ask_all(
         progress.step(&format!("asking for {}", holdout.name));
         let request = FindRequest {
             receiving_hand: ReceivingHand {
-                rig: Some("thesis".to_owned()),
+                rig: None,
                 handedness: Some(Handedness::Right),
             },
             budget: Some(arguments.budget),
             strategy: Some(arguments.strategy.into()),
+            validity: arguments.validity(),
             seed: Some(arguments.seed),
             reproducible: true,
             ..request_for(holdout)

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{Asked, draw::Drawn};
 use crate::cli::{
     failure::Failure,
-    figures::{human_time, rejections_at_a_glance},
+    figures::{grasp_type_name, human_time, rejections_at_a_glance},
     output::{Output, table},
 };
 
@@ -73,6 +73,7 @@ fn describe(results: &Results<'_>) -> String {
         "outcome",
         ">attempts",
         "rejections",
+        "type",
         ">comfort E",
         ">server",
         ">round trip",
@@ -90,6 +91,7 @@ fn describe(results: &Results<'_>) -> String {
             .to_owned(),
             report.attempts.to_string(),
             rejections_at_a_glance(report),
+            grasp.map_or_else(|| "-".to_owned(), grasp_type_name),
             grasp.map_or_else(|| "-".to_owned(), |grasp| format!("{:.4}", grasp.comfort)),
             human_time(report.search_time.as_secs_f64()),
             human_time(row.round_trip_seconds),

@@ -1,5 +1,6 @@
 //! `grasp find`
 
+mod constraints;
 mod report;
 
 use std::{
@@ -12,6 +13,8 @@ use clap::{ArgGroup, Args};
 use grasp_client::{FindAnswer, FindRequest, Outcome, built_in::request_for};
 use serde::Serialize;
 
+use constraints::ConstraintOptions;
+
 use super::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
@@ -20,7 +23,8 @@ use super::{
     picture::{Model, Picture, write_file},
     server::ServerOptions,
     values::{
-        BendRatiosName, HandName, StrategyName, ValidityName, ViewSize, parse_duration, parse_view_size,
+        BendRatiosName, ChoiceName, HandName, StrategyName, ValidityName, ViewSize, parse_duration,
+        parse_view_size,
     },
 };
 
@@ -40,7 +44,12 @@ API's FindGraspRequest; only "object" is required:
     "receiving_hand": {"rig": "thesis", "handedness": "right"},
     "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
     "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
-    "record_step_times": false, "convention": "openxr", "friction": null
+    "record_step_times": false, "convention": "openxr", "friction": null,
+    "choice": "first_valid", "atlas": "allowed",
+    "constraints": {
+      "receiver_reach": {"client_shoulder": [0.2, 1.4, 1], "reach": 0.7},
+      "approach": {"client_direction": [0, 0, -1], "half_angle": 0.8},
+      "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1}
   }
 
 Instead of angles, the presenting hand may be the joints of a headset: {"joints": {"handedness": "left",
@@ -72,6 +81,9 @@ pub(super) struct Arguments {
     /// Which bend ratios the fingers try. Default: what the strategy says.
     #[arg(long)]
     bend_ratios: Option<BendRatiosName>,
+    /// Which of the valid grasps is wanted. Default: the first.
+    #[arg(long)]
+    choice: Option<ChoiceName>,
     /// How long to search. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
@@ -117,6 +129,8 @@ pub(super) struct Arguments {
     /// Metres per unit of the mesh: 0.001 for millimetres.
     #[arg(long, value_name = "METRES", default_value_t = 1.0, requires = "mesh")]
     mesh_unit_metres: f32,
+    #[command(flatten)]
+    constraints: ConstraintOptions,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -194,6 +208,7 @@ impl Arguments {
         request.strategy = self.strategy.map(Into::into).or(request.strategy);
         request.validity = self.validity.map(Into::into).or(request.validity);
         request.bend_ratios = self.bend_ratios.map(Into::into).or(request.bend_ratios);
+        request.choice = self.choice.map(Into::into).or(request.choice);
         request.budget = self.budget.or(request.budget);
         request.max_attempts = self.max_attempts.or(request.max_attempts);
         request.seed = self.seed.or(request.seed);
@@ -201,6 +216,7 @@ impl Arguments {
         request.reproducible |= self.reproducible;
         request.record_step_times |= self.step_times;
         request.friction = self.friction.or(request.friction);
+        self.constraints.lay_over(&mut request.constraints);
         let receiver = &mut request.receiving_hand;
         receiver.handedness = self.receiving_hand.map(Into::into).or(receiver.handedness);
         receiver.rig = self.receiving_rig.clone().or(receiver.rig.take());

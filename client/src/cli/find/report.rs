@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use grasp_client::{FindAnswer, FindRequest, Grasp, Outcome, SearchReport};
 
 use crate::cli::{
-    figures::{all_rejections, human_time, name_of},
+    figures::{all_rejections, grasp_type_name, human_time, name_of},
     output::{pairs, table},
 };
 
@@ -49,6 +49,7 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
                 p.x, p.y, p.z, q.x, q.y, q.z, q.w
             ),
         ),
+        ("grasp type", grasp_type(grasp)),
         ("comfort E", format!("{:.4}", grasp.comfort)),
         ("wrench angle", format!("{:.2}°", grasp.wrench_angle.to_degrees())),
     ];
@@ -66,7 +67,29 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
             ),
         ));
     }
+    if let Some(score) = &grasp.score {
+        let terms: Vec<_> = score
+            .terms
+            .iter()
+            .map(|term| format!("{} {:.2}", term.name.replace('_', " "), term.value))
+            .collect();
+        lines.push(("score", format!("{:.2}: {}", score.total, terms.join(", "))));
+    }
+    if !grasp.key_frames.is_empty() {
+        let names: Vec<_> = grasp
+            .key_frames
+            .iter()
+            .map(|frame| name_of(&frame.kind))
+            .collect();
+        lines.push(("key frames", names.join(", ")));
+    }
     lines
+}
+
+/// The grasp's type and how sure it is.
+fn grasp_type(grasp: &Grasp) -> String {
+    let name = grasp_type_name(grasp);
+    format!("{name}, {:.0} % sure", 100.0 * grasp.type_confidence)
 }
 
 fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
@@ -127,8 +150,12 @@ fn contact_table(grasp: &Grasp) -> String {
     for contact in &grasp.contacts {
         let p = contact.client_position;
         table.add_row([
-            name_of(&contact.digit),
-            name_of(&contact.phalanx),
+            contact
+                .digit
+                .map_or_else(|| "palm".to_owned(), |digit| name_of(&digit)),
+            contact
+                .phalanx
+                .map_or_else(String::new, |phalanx| name_of(&phalanx)),
             format!("{:.4}", p.x),
             format!("{:.4}", p.y),
             format!("{:.4}", p.z),

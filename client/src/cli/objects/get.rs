@@ -7,7 +7,8 @@ use crate::cli::{Ending, failure::Failure, output::Output, server::ServerOptions
 const ABOUT: &str = r"Show all about one object but its mesh.
 
 With --json: name, built_in, triangle_count, vertex_count, mass_kg, centre_of_mass, friction, forbidden_triangle_count,
-object_from_box, box_half_extents, content_hash, warnings; metres, kilograms, quaternions x y z w.";
+object_from_box, box_half_extents, content_hash, warnings, atlas (null, or entries, complete, stamp,
+build_time_seconds); metres, kilograms, quaternions x y z w.";
 
 /// Show all about one object but its mesh.
 #[derive(Args, Debug)]

@@ -36,6 +36,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             "box",
             ">forbidden",
             "built in",
+            ">atlas",
             "warnings",
         ]);
         for object in &answer.objects {
@@ -47,6 +48,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
                 super::size(object.box_half_extents),
                 object.forbidden_triangle_count.to_string(),
                 if object.built_in { "yes" } else { "no" }.to_owned(),
+                super::atlas(object.atlas.as_ref()),
                 object.warnings.len().to_string(),
             ]);
         }

@@ -6,7 +6,7 @@ mod list;
 
 use clap::Subcommand;
 use glam::Vec3;
-use grasp_client::Object;
+use grasp_client::{AtlasState, Object};
 
 use super::{
     Ending,
@@ -47,6 +47,15 @@ fn size(half_extents: Vec3) -> String {
     format!("{long:.0} × {middle:.0} × {short:.0} mm")
 }
 
+/// The state of an atlas: how many grips, and whether there will be more.
+fn atlas(atlas: Option<&AtlasState>) -> String {
+    match atlas {
+        None => "none".to_owned(),
+        Some(atlas) if atlas.complete => format!("{} grips", atlas.entries),
+        Some(atlas) => format!("{} grips so far", atlas.entries),
+    }
+}
+
 /// All about an object for people.
 fn describe(object: &Object) -> String {
     let com = object.centre_of_mass * 1000.0;
@@ -71,6 +80,7 @@ fn describe(object: &Object) -> String {
             "forbidden",
             format!("{} triangles", object.forbidden_triangle_count),
         ),
+        ("atlas", atlas(object.atlas.as_ref())),
         ("content hash", object.content_hash.clone()),
     ];
     lines.extend(object.warnings.iter().map(|warning| ("warning", warning.clone())));
@@ -79,12 +89,27 @@ fn describe(object: &Object) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]
     fn names_may_leave_out_their_collection() {
         assert_eq!(full_name("remote"), "objects/remote");
         assert_eq!(full_name("objects/remote"), "objects/remote");
+    }
+
+    #[test]
+    fn an_atlas_tells_whether_it_grows() {
+        let state = |complete| AtlasState {
+            entries: 120,
+            complete,
+            stamp: "a7".to_owned(),
+            build_time: Duration::ZERO,
+        };
+        assert_eq!(atlas(None), "none");
+        assert_eq!(atlas(Some(&state(false))), "120 grips so far");
+        assert_eq!(atlas(Some(&state(true))), "120 grips");
     }
 
     #[test]

@@ -95,14 +95,14 @@ fn mark(contact: &Contact) -> ContactMark {
         position: contact.client_position,
         normal: contact.client_normal,
         force: contact.client_force,
-        digit: Some(match contact.digit {
+        digit: contact.digit.map(|digit| match digit {
             Digit::Thumb => hand::Digit::Thumb,
             Digit::Index => hand::Digit::Index,
             Digit::Middle => hand::Digit::Middle,
             Digit::Ring => hand::Digit::Ring,
             Digit::Little => hand::Digit::Little,
         }),
-        phalanx: Some(match contact.phalanx {
+        phalanx: contact.phalanx.map(|phalanx| match phalanx {
             Phalanx::First => hand::Phalanx::First,
             Phalanx::Second => hand::Phalanx::Second,
             Phalanx::Third => hand::Phalanx::Third,

@@ -1,0 +1,236 @@
+//! Checks `Constraints`.
+
+use std::f32::consts::PI;
+
+use grasp_proto::v1;
+use grasp_synthesis::{
+    constraints::{ApproachCone, Constraints, DigitSet, Reach},
+    hand::Digit,
+};
+
+use super::{FARTHEST, Field, Violations, direction, known, point};
+use crate::convention::Convention;
+
+/// What a request demands of its grasp, in the client's frame and `OpenXR` axes. What is wrong demands nothing.
+pub(super) fn constraints(
+    field: Field<'_>,
+    sent: Option<v1::Constraints>,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Constraints {
+    let Some(sent) = sent else {
+        return Constraints::default();
+    };
+    let reach = sent
+        .receiver_reach
+        .and_then(|sent| reach(field.child("receiver_reach"), sent, convention, violations));
+    let approach = sent
+        .approach
+        .and_then(|sent| approach(field.child("approach"), sent, convention, violations));
+    let must_touch = digits(
+        field.child("must_touch"),
+        &sent.must_touch,
+        DigitSet::default(),
+        violations,
+    );
+    let must_not_touch = digits(
+        field.child("must_not_touch"),
+        &sent.must_not_touch,
+        must_touch,
+        violations,
+    );
+    let worst_comfort = sent
+        .max_comfort_e
+        .and_then(|worst| comfort(field.child("max_comfort_e"), worst, violations));
+    Constraints {
+        reach,
+        approach,
+        must_touch,
+        must_not_touch,
+        worst_comfort,
+        ..Constraints::default()
+    }
+}
+
+fn reach(
+    field: Field<'_>,
+    sent: v1::Reach,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<Reach> {
+    let before = violations.len();
+    let shoulder_field = field.child("client_shoulder");
+    let shoulder = sent
+        .client_shoulder
+        .map(|shoulder| point(shoulder_field, shoulder, convention.metres_per_unit(), violations));
+    if shoulder.is_none() {
+        violations.add(shoulder_field, "is required");
+    }
+    let farthest = FARTHEST / convention.metres_per_unit();
+    if !(sent.reach > 0.0 && sent.reach <= farthest) {
+        violations.add(
+            field.child("reach"),
+            format_args!(
+                "is {}; it must be more than 0 and at most {farthest} (1 km)",
+                sent.reach
+            ),
+        );
+    }
+    let shoulder = shoulder.filter(|_| violations.len() == before)?;
+    Some(Reach {
+        shoulder: convention.point_to_openxr(shoulder),
+        distance: convention.length_to_openxr(sent.reach),
+    })
+}
+
+fn approach(
+    field: Field<'_>,
+    sent: v1::ApproachCone,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<ApproachCone> {
+    let axis_field = field.child("client_direction");
+    let axis = if let Some(axis) = sent.client_direction {
+        direction(axis_field, axis, violations)
+    } else {
+        violations.add(axis_field, "is required");
+        None
+    };
+    let half_angle = sent.half_angle;
+    let has_width = half_angle > 0.0 && half_angle <= PI;
+    if !has_width {
+        violations.add(
+            field.child("half_angle"),
+            format_args!("is {half_angle} rad; it must be more than 0 and at most {PI}"),
+        );
+    }
+    axis.filter(|_| has_width).map(|axis| ApproachCone {
+        axis: convention.direction_to_openxr(axis),
+        half_angle,
+    })
+}
+
+/// The digits of a list, none of which may be in `opposite`.
+fn digits(field: Field<'_>, sent: &[i32], opposite: DigitSet, violations: &mut Violations) -> DigitSet {
+    let check = |(place, &value): (usize, &i32)| {
+        let field = field.at(place);
+        let digit = digit(field, value, violations)?;
+        if opposite.contains(digit) {
+            violations.add(
+                field,
+                format_args!("is {digit:?}, which is in must_touch, too; it cannot be in both"),
+            );
+            return None;
+        }
+        Some(digit)
+    };
+    sent.iter().enumerate().filter_map(check).collect()
+}
+
+fn digit(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Digit> {
+    if v1::Digit::try_from(value) == Ok(v1::Digit::Unspecified) {
+        violations.add(field, "is DIGIT_UNSPECIFIED; it must name a digit");
+        return None;
+    }
+    match known(field, value, violations) {
+        v1::Digit::Unspecified => None,
+        v1::Digit::Thumb => Some(Digit::Thumb),
+        v1::Digit::Index => Some(Digit::Index),
+        v1::Digit::Middle => Some(Digit::Middle),
+        v1::Digit::Ring => Some(Digit::Ring),
+        v1::Digit::Little => Some(Digit::Little),
+    }
+}
+
+fn comfort(field: Field<'_>, worst: f32, violations: &mut Violations) -> Option<f32> {
+    if worst >= 0.0 && worst.is_finite() {
+        return Some(worst);
+    }
+    violations.add(
+        field,
+        format_args!("is {worst}; it must be finite and at least 0"),
+    );
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Mat3, Vec3};
+
+    use super::*;
+
+    fn vector(v: Vec3) -> v1::Vector3 {
+        let [x, y, z] = v.to_array();
+        v1::Vector3 { x, y, z }
+    }
+
+    fn checked(sent: v1::Constraints, convention: Convention) -> Constraints {
+        let mut violations = Violations::default();
+        let constraints = constraints(
+            Field::root("constraints"),
+            Some(sent),
+            convention,
+            &mut violations,
+        );
+        assert!(violations.is_empty(), "{violations:?}");
+        constraints
+    }
+
+    #[test]
+    fn places_lengths_and_directions_are_converted() {
+        // Columns: where OpenXR's axes go; and units in a metre.
+        let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
+        let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
+        for (convention, axes, units) in [
+            (Convention::OpenXr, Mat3::IDENTITY, 1.0),
+            (Convention::Godot, Mat3::IDENTITY, 1.0),
+            (Convention::Unity, unity, 1.0),
+            (Convention::Unreal, unreal, 100.0),
+        ] {
+            let shoulder = Vec3::new(0.2, 1.4, -0.5);
+            let axis = Vec3::new(2.0, -1.0, 2.0) / 3.0;
+            let sent = v1::Constraints {
+                receiver_reach: Some(v1::Reach {
+                    client_shoulder: Some(vector(axes * shoulder * units)),
+                    reach: 0.7 * units,
+                }),
+                approach: Some(v1::ApproachCone {
+                    client_direction: Some(vector(axes * axis * 5.0)),
+                    half_angle: 0.4,
+                }),
+                ..Default::default()
+            };
+            let constraints = checked(sent, convention);
+            let reach = constraints.reach.expect("a reach was sent");
+            assert!(reach.shoulder.distance(shoulder) < 1e-6, "{convention:?}");
+            assert!((reach.distance - 0.7).abs() < 1e-6, "{convention:?}");
+            let approach = constraints.approach.expect("an approach was sent");
+            assert!(approach.axis.distance(axis) < 1e-6, "{convention:?}");
+            assert_eq!(approach.half_angle, 0.4);
+        }
+    }
+
+    #[test]
+    fn digits_and_comfort_are_kept() {
+        use v1::Digit::{Index, Little, Middle, Ring, Thumb};
+        let sent = v1::Constraints {
+            must_touch: vec![Thumb.into(), Middle.into(), Thumb.into()],
+            must_not_touch: vec![Index.into(), Ring.into(), Little.into()],
+            max_comfort_e: Some(0.0),
+            ..Default::default()
+        };
+        let constraints = checked(sent, Convention::OpenXr);
+        let expected = Constraints {
+            must_touch: [Digit::Thumb, Digit::Middle].into_iter().collect(),
+            must_not_touch: [Digit::Index, Digit::Ring, Digit::Little].into_iter().collect(),
+            worst_comfort: Some(0.0),
+            ..Constraints::default()
+        };
+        assert_eq!(constraints, expected);
+    }
+
+    #[test]
+    fn a_message_that_demands_nothing_is_none() {
+        assert!(checked(v1::Constraints::default(), Convention::Unreal).is_empty());
+    }
+}
