@@ -3,6 +3,7 @@
 //!
 //! The files beside this crate are made by `grasp-assets-generator`; see `PROVENANCE.md`.
 
+pub mod atlases;
 pub mod hands;
 pub mod holdouts;
 pub mod obj;

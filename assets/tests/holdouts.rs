@@ -11,6 +11,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     clock::Clock,
+    constraints::Constraints,
     geometry::{Segment, mesh_bvh::MeshBvh},
     hand::{
         DigitAngles, HandPose, Handedness,
@@ -19,7 +20,7 @@ use grasp_synthesis::{
     },
     holdout::Holdout,
     search::{SearchOutcome, SearchSettings, find_grasp},
-    strategy::{BendRatioChoice, Strategy},
+    strategy::{BendRatioChoice, Choice, Strategy},
 };
 
 /// Names and types as the captions of the thesis' Figures 5.2 to 5.4 give them.
@@ -245,7 +246,8 @@ fn some_givers_cover_about_half_of_the_object() {
         let held = built_in
             .to_holdout()
             .expect("built-in holdouts can be made ready");
-        let giver = &held.presenting_hand.as_ref().expect("a giver holds it").surface;
+        let giver = held.presenting_hand.as_ref().expect("a giver holds it");
+        let giver = giver.surface.as_ref().expect("it has a skin");
         let mesh = surface(built_in).mesh();
         let (mut all, mut covered) = (0.0, 0.0);
         for triangle in 0..mesh.triangles().len() {
@@ -315,6 +317,9 @@ fn synthesized_grasps_are_found_again() {
             deadline: None,
             workers: 1,
             record_step_times: false,
+            constraints: Constraints::default(),
+            choice: Choice::FirstValid,
+            atlas: None,
         };
         let grasp = search(&free, &settings)
             .grasp
@@ -349,6 +354,9 @@ fn a_receiver_finds_a_grasp_on_each() {
             deadline: None,
             workers: 2,
             record_step_times: false,
+            constraints: Constraints::default(),
+            choice: Choice::FirstValid,
+            atlas: None,
         };
         let outcome = search(&held, &settings);
         assert!(outcome.grasp.is_some(), "{}: {:?}", built_in.name, outcome.report);

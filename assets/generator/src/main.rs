@@ -1,5 +1,6 @@
-//! Makes the built-in objects, hands and holdouts. A rerun gives identical bytes.
+//! Makes the built-in objects, hands, holdouts and atlases. A rerun gives identical bytes.
 
+mod atlases;
 mod hands;
 mod holdouts;
 mod objects;
@@ -63,7 +64,10 @@ enum Section {
     Hands,
     /// The 15 holdouts; made with the objects and hands that are embedded in this program.
     Holdouts,
-    /// Everything, in the order above.
+    /// Atlases of the objects for both hands of the rig adult; minutes of work. With --check, they are read and some of
+    /// their grips found again.
+    Atlases,
+    /// Objects, hands and holdouts; with --check, the atlases too.
     All,
 }
 
@@ -74,6 +78,7 @@ impl Section {
             Self::Objects => objects::generate(),
             Self::Hands => hands::generate(),
             Self::Holdouts => holdouts::generate(),
+            Self::Atlases => atlases::generate(),
             Self::All => [Self::Objects, Self::Hands, Self::Holdouts]
                 .into_iter()
                 .flat_map(Self::generate)
@@ -94,10 +99,10 @@ fn main() -> ExitCode {
     if let Some(folder) = &arguments.pictures {
         return exit_code("the pictures", holdouts::pictures(folder, &arguments.only));
     }
-    let files = arguments.section.generate();
     if arguments.check {
-        return check(&arguments.out, &files);
+        return check(&arguments.out, arguments.section);
     }
+    let files = arguments.section.generate();
     for (path, bytes) in &files {
         if let Err(error) = write(&arguments.out.join(path), bytes) {
             eprintln!("{path}: cannot be written: {error}");
@@ -127,12 +132,19 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::write(path, bytes)
 }
 
-/// Names every file below `folder` that is missing or not what was made now.
-fn check(folder: &Path, files: &[AssetFile]) -> ExitCode {
+/// Names every file of a section below `folder` that is missing or not what is made now.
+fn check(folder: &Path, section: Section) -> ExitCode {
     let mut code = ExitCode::SUCCESS;
+    if matches!(section, Section::Atlases | Section::All) && !atlases::check(folder) {
+        code = ExitCode::FAILURE;
+    }
+    let files = match section {
+        Section::Atlases => Vec::new(),
+        section => section.generate(),
+    };
     for (path, bytes) in files {
-        match fs::read(folder.join(path)) {
-            Ok(found) if found == *bytes => {}
+        match fs::read(folder.join(&path)) {
+            Ok(found) if found == bytes => {}
             Ok(_) => {
                 println!("{path}: differs");
                 code = ExitCode::FAILURE;

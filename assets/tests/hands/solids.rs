@@ -7,9 +7,7 @@ use grasp_synthesis::{
         DigitAngles, HandPose, Handedness,
         joints::{HandJoints, index},
     },
-    physical::solids::{
-        HandSolids, SOFT_CONTACT, TaperedCapsule, giver_clearance, least_distance, self_clearance,
-    },
+    physical::solids::{HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, self_clearance},
     pose::Pose,
 };
 
@@ -186,10 +184,20 @@ fn distances_between_hands_are_those_of_all_pairs() {
             .iter()
             .flat_map(|a| theirs.iter().map(|b| a.distance(b)))
             .fold(f32::INFINITY, f32::min);
+        let clearance = |ours: &HandSolids, theirs: &HandSolids| {
+            PreparedHand::new(theirs)
+                .clearance(ours, f32::NEG_INFINITY)
+                .expect("nothing is required")
+        };
         for (found, expected) in [
-            (giver_clearance(&ours, &theirs), brute),
-            (giver_clearance(&theirs, &ours), brute),
-            (least_distance(ours.iter(), &theirs, 0.001), brute.min(0.001)),
+            (clearance(&ours, &theirs), brute),
+            (clearance(&theirs, &ours), brute),
+            (
+                PreparedHand::new(&theirs)
+                    .least_distance(ours.iter(), 0.001, f32::NEG_INFINITY)
+                    .expect("nothing is required"),
+                brute.min(0.001),
+            ),
         ] {
             assert!(
                 (found - expected).abs() < 1e-6,

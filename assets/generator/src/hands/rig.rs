@@ -6,7 +6,7 @@ use grasp_synthesis::{
     hand::{
         Handedness,
         joints::{JOINT_COUNT, index},
-        rig::{AngleRange, DigitLimits, DigitRig, Rig},
+        rig::{AngleRange, DigitLimits, DigitRig, Rig, RigGuide},
     },
     pose::Pose,
 };
@@ -135,5 +135,6 @@ pub(super) fn right_rig(kind: RigKind) -> Rig {
         finger_metacarpals,
         palm_segments: [Segment::new(Vec3::ZERO, Vec3::ZERO); 10],
         joint_radii,
+        guide: RigGuide::default(),
     }
 }

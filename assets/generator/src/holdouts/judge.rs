@@ -69,7 +69,7 @@ pub(crate) fn posed_skin(hand: &Hand, pose: &HandPose) -> Option<MeshBvh> {
     let joints = HandJoints::of_pose(&hand.rig, pose);
     PresentingHand::new(&hand.skin, joints)
         .ok()
-        .map(|presenting| presenting.surface)
+        .and_then(|presenting| presenting.surface)
 }
 
 /// How deep skin and object overlap, in metres: the deepest skin vertex in the object, and the deepest surface point

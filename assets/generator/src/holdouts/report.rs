@@ -7,10 +7,11 @@ use grasp_assets::{
     holdouts::BuiltInHoldout,
 };
 use grasp_synthesis::{
+    constraints::Constraints,
     hand::{Digit, HandPose, Handedness, Phalanx},
     holdout::Holdout,
     search::{SearchSettings, find_grasp},
-    strategy::Strategy,
+    strategy::{Choice, Strategy},
 };
 
 use super::{
@@ -48,11 +49,11 @@ pub(crate) fn report(holdouts: &[BuiltInHoldout]) {
 fn line(holdout: &BuiltInHoldout, giver: &Hand, held: &Holdout) -> String {
     let surface = &held.object.surface;
     let points = surface_points(surface.mesh(), SURFACE_POINTS);
-    let skin = &held
+    let skin = held
         .presenting_hand
         .as_ref()
-        .expect("a giver holds every holdout")
-        .surface;
+        .and_then(|hand| hand.surface.as_ref())
+        .expect("a giver with a skin holds every holdout");
     let pose = HandPose {
         frame_from_wrist: holdout.world_from_object.inverse() * holdout.world_from_giver_wrist,
         digits: holdout.giver_digits,
@@ -110,6 +111,9 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
             deadline: None,
             workers: pool.current_num_threads(),
             record_step_times: false,
+            constraints: Constraints::default(),
+            choice: Choice::FirstValid,
+            atlas: None,
         };
         let outcome = find_grasp(
             &pool,

@@ -14,13 +14,14 @@ use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
     clock::Clock,
+    constraints::Constraints,
     geometry::mesh_bvh::MeshBvh,
     grasp::Grasp,
     hand::rig::Rig,
     holdout::Holdout,
     object::{GraspObject, THESIS_FRICTION},
     search::{SearchSettings, find_grasp},
-    strategy::{BendRatioChoice, Strategy},
+    strategy::{BendRatioChoice, Choice, Strategy},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -96,6 +97,9 @@ fn next_grasp(
         deadline: None,
         workers: 1,
         record_step_times: false,
+        constraints: Constraints::default(),
+        choice: Choice::FirstValid,
+        atlas: None,
     };
     let outcome = find_grasp(pool, holdout, rig, &settings, &NoClock, &AtomicBool::new(false));
     outcome.report.attempt.zip(outcome.grasp)

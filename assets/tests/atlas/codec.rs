@@ -1,0 +1,172 @@
+//! Atlases as bytes: what was written is read, and nothing else is.
+
+use std::sync::LazyLock;
+
+use grasp_synthesis::{
+    atlas::{
+        codec::{AtlasError, decode, encode},
+        growth::{Grown, Growth},
+    },
+    hand::Handedness,
+    object::GraspObject,
+    strategy::Validity,
+};
+use proptest::prelude::*;
+use sha2::{Digest as _, Sha256};
+
+use crate::support::{adult, grown, object};
+
+/// Bytes of a checksum, at the end.
+const CHECKSUM: usize = 32;
+
+/// The start of an atlas of the scissors for the right hand, and its bytes.
+static SCISSORS: LazyLock<(Grown, Vec<u8>)> = LazyLock::new(|| {
+    let (object, rig) = (object("scissors"), adult(Handedness::Right));
+    let grown = grown(Growth::new(object, rig), 24);
+    let bytes = encode(&grown, object, rig);
+    (grown, bytes)
+});
+
+fn decode_scissors(bytes: &[u8]) -> Result<Grown, AtlasError> {
+    decode(bytes, object("scissors"), adult(Handedness::Right))
+}
+
+#[test]
+fn what_is_read_is_what_was_written() {
+    for name in ["remote", "scalpel", "scissors"] {
+        for handedness in [Handedness::Left, Handedness::Right] {
+            let (object, rig) = (object(name), adult(handedness));
+            let written = grown(Growth::new(object, rig), 12);
+            let entries = written.atlas.entries().len();
+            assert!(entries > 5, "{name}: {entries}");
+            let bytes = encode(&written, object, rig);
+            let read = decode(&bytes, object, rig).expect("it is whole");
+            assert_eq!(read, written);
+            assert_eq!(encode(&read, object, rig), bytes);
+            // 4,096 grips must fit into 1.2 MB.
+            assert!(
+                bytes.len() <= 290 * entries + 128,
+                "{name}: {entries} in {}",
+                bytes.len()
+            );
+        }
+    }
+}
+
+#[test]
+fn what_grows_after_an_interruption_is_what_grows_without_one() {
+    let (object, rig) = (object("remote"), adult(Handedness::Right));
+    let whole = grown(Growth::new(object, rig), 12);
+    let half = encode(&grown(Growth::new(object, rig), 5), object, rig);
+    let half = decode(&half, object, rig).expect("it is whole");
+    assert!(half.atlas.entries().len() < whole.atlas.entries().len());
+    assert_ne!(half.atlas.stamp(), whole.atlas.stamp());
+    assert_eq!(grown(Growth::resume(object, rig, &half), 7), whole);
+}
+
+#[test]
+fn another_object_or_hand_makes_an_atlas_stale() {
+    let object = object("scissors");
+    let mesh = object.surface.mesh();
+    let friction = object.friction_under(Validity::Physical);
+    let forbidden: Vec<u32> = (0..mesh.triangles().len() as u32)
+        .filter(|&triangle| object.is_forbidden(triangle))
+        .collect();
+    let more: Vec<u32> = forbidden.iter().copied().chain([0]).collect();
+    assert!(!object.is_forbidden(0));
+    let with = |mass: f32, centre, friction: f32, forbidden: &[u32]| {
+        GraspObject::new(mesh.clone(), mass, centre, Some(friction), forbidden).expect("it is right")
+    };
+    let (mass, centre) = (object.mass, object.centre_of_mass);
+    let bytes = &SCISSORS.1;
+    let read = |object: &GraspObject| decode(bytes, object, adult(Handedness::Right)).map(|_| ());
+    assert_eq!(read(&with(mass, centre, friction, &forbidden)), Ok(()));
+    for other in [
+        with(mass * 1.01, centre, friction, &forbidden),
+        with(mass, centre + 0.001, friction, &forbidden),
+        with(mass, centre, friction * 1.01, &forbidden),
+        with(mass, centre, friction, &more),
+    ] {
+        assert_eq!(read(&other), Err(AtlasError::Stale));
+    }
+    assert_eq!(
+        decode(bytes, object, adult(Handedness::Left)).map(|_| ()),
+        Err(AtlasError::Stale)
+    );
+}
+
+#[test]
+fn bytes_that_are_no_atlas_or_of_another_format_are_told_apart() {
+    assert_eq!(decode_scissors(b"").unwrap_err(), AtlasError::NotAnAtlas);
+    assert_eq!(
+        decode_scissors(b"v 0 0 0\nv 1 0 0\n").unwrap_err(),
+        AtlasError::NotAnAtlas
+    );
+    let mut bytes = SCISSORS.1.clone();
+    bytes[8] = 99;
+    assert_eq!(
+        decode_scissors(&bytes).unwrap_err(),
+        AtlasError::OtherFormat { found: 99 }
+    );
+}
+
+/// The bytes with a checksum that fits them.
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    bytes.truncate(bytes.len() - CHECKSUM);
+    let checksum = Sha256::digest(&bytes);
+    bytes.extend_from_slice(&checksum);
+    bytes
+}
+
+#[test]
+fn a_count_beyond_the_bytes_is_refused() {
+    let count = 8 + 2 + 32 + 1;
+    for claimed in [u32::MAX, 4096, SCISSORS.0.atlas.entries().len() as u32 + 1] {
+        let mut bytes = SCISSORS.1.clone();
+        bytes[count..count + 4].copy_from_slice(&claimed.to_le_bytes());
+        assert!(matches!(
+            decode_scissors(&sealed(bytes)),
+            Err(AtlasError::Malformed(_))
+        ));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_flipped_bit_anywhere_is_refused(place in any::<prop::sample::Index>(), bit in 0..8) {
+        let mut bytes = SCISSORS.1.clone();
+        let place = place.index(bytes.len());
+        bytes[place] ^= 1_u8 << bit;
+        prop_assert!(decode_scissors(&bytes).is_err());
+    }
+
+    #[test]
+    fn a_cut_anywhere_is_refused(end in any::<prop::sample::Index>()) {
+        let bytes = &SCISSORS.1;
+        prop_assert!(decode_scissors(&bytes[..end.index(bytes.len())]).is_err());
+    }
+
+    // Whoever can write a checksum gets an error or an atlas whose indices and numbers can be used, but no panic.
+    #[test]
+    fn nonsense_with_a_right_checksum_is_refused_or_harmless(
+        place in any::<prop::sample::Index>(),
+        nonsense in prop::collection::vec(any::<u8>(), 1..40),
+    ) {
+        let mut bytes = SCISSORS.1.clone();
+        let first = 8 + 2 + 32;
+        let place = first + place.index(bytes.len() - CHECKSUM - first);
+        let end = (place + nonsense.len()).min(bytes.len() - CHECKSUM);
+        bytes[place..end].copy_from_slice(&nonsense[..end - place]);
+        if let Ok(read) = decode_scissors(&sealed(bytes)) {
+            let triangles = object("scissors").surface.mesh().triangles().len();
+            for entry in read.atlas.entries() {
+                prop_assert!(entry.grip.pose.frame_from_wrist.is_finite());
+                for contact in &entry.contacts {
+                    prop_assert!((contact.triangle as usize) < triangles && contact.position.is_finite());
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! Atlases of the built-in objects and hands: grown, written, read.
+
+mod codec;
+mod support;

@@ -1,0 +1,123 @@
+//! Hands that were made to be of a type, and hands that nobody would hold anything with.
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    grasp::Contact,
+    hand::{Digit, HandPart, Phalanx},
+    pose::Pose,
+    taxonomy::{GraspType, LEAST_CONFIDENCE},
+};
+use proptest::prelude::*;
+
+use super::{
+    cases::{THUMB_BELOW_TIPS, alike, cases, pads, rod, v},
+    support::{MIDDLE, Shape, held},
+};
+use Digit::{Index, Little, Middle, Ring, Thumb};
+use Phalanx::Third;
+
+#[test]
+fn a_person_would_name_them_so() {
+    let mut named = Vec::new();
+    for (expected, held) in cases() {
+        let found = held.classify();
+        assert_eq!(found.grasp_type, Some(expected), "{found:?}");
+        assert!(found.confidence >= LEAST_CONFIDENCE, "{expected:?}: {found:?}");
+        named.push(expected);
+    }
+    named.sort();
+    assert_eq!(named, GraspType::ALL);
+}
+
+#[test]
+fn neither_the_side_nor_the_size_nor_the_place_of_a_hand_matters() {
+    let turned = Pose::new(
+        Vec3::new(0.3, -1.2, 0.7),
+        Quat::from_axis_angle(Vec3::new(0.48, 0.6, 0.64), 2.2),
+    );
+    for (expected, held) in cases() {
+        for (how, other) in [
+            ("mirrored", held.mirrored()),
+            ("larger", held.scaled(1.4)),
+            ("smaller", held.scaled(0.6)),
+            ("moved", held.moved(turned)),
+            ("all", held.scaled(1.2).mirrored().moved(turned)),
+        ] {
+            let found = other.classify();
+            assert_eq!(found.grasp_type, Some(expected), "{how}: {found:?}");
+            let change = found.confidence - held.classify().confidence;
+            assert!(change.abs() < 1e-2, "{expected:?} {how}: {change}");
+        }
+    }
+}
+
+#[test]
+fn what_nobody_would_hold_so_has_no_type() {
+    let pinch = [0.0, 55.0, 45.0, 20.0];
+    let thumb = (Thumb, Third, MIDDLE);
+    let with = |fingers: &[Digit]| {
+        let fingers = fingers.iter().map(|&digit| (digit, Third, MIDDLE));
+        let touching: Vec<_> = std::iter::once(thumb).chain(fingers).collect();
+        held(
+            alike(THUMB_BELOW_TIPS, pinch),
+            rod(100.0, 57.0, 5.0),
+            &touching,
+            None,
+        )
+    };
+    // The same hand has a type with the fingers that belong together.
+    assert_eq!(
+        with(&[Index, Middle]).classify().grasp_type,
+        Some(GraspType::Prismatic2Finger)
+    );
+    for fingers in [&[][..], &[Ring], &[Little], &[Ring, Little], &[Index, Little]] {
+        let found = with(fingers).classify();
+        assert_eq!(found.grasp_type, None, "{fingers:?}: {found:?}");
+    }
+    // A skipped finger costs confidence.
+    for (skipping, whole) in [
+        (&[Index, Ring][..], &[Index, Middle][..]),
+        (&[Index, Ring, Little], &[Index, Middle, Ring]),
+    ] {
+        let [skipping, whole] = [skipping, whole].map(|fingers| with(fingers).classify().confidence);
+        assert!(skipping < 0.5 * whole, "{skipping}, {whole}");
+    }
+
+    let mut no_thumb = with(&[Index, Middle]);
+    no_thumb.contacts.remove(0);
+    assert_eq!(no_thumb.classify().grasp_type, None);
+
+    // Thumb and fingers on the same side of a plate push the same way.
+    let plate = Shape::Plate(v(0.0, 40.0, 0.0), Vec3::Y, 2.0);
+    let same_side = held(alike(THUMB_BELOW_TIPS, pinch), plate, &pads(4), None);
+    assert_eq!(same_side.classify().grasp_type, None);
+
+    let nothing = held(alike(THUMB_BELOW_TIPS, pinch), plate, &[], None).classify();
+    assert_eq!((nothing.grasp_type, nothing.confidence), (None, 0.0));
+}
+
+proptest! {
+    /// Whatever touches wherever.
+    #[test]
+    fn a_confidence_is_a_share_and_belongs_to_a_type_or_not(
+        angles in prop::array::uniform5(prop::array::uniform4(-90.0..120.0_f32)),
+        touches in prop::collection::vec((0..16_usize, prop::array::uniform6(-0.2..0.2_f32)), 0..20),
+    ) {
+        let mut held = held(angles, rod(0.0, 0.0, 1.0), &[], None);
+        held.contacts = touches
+            .into_iter()
+            .map(|(part, [x, y, z, nx, ny, nz])| Contact {
+                position: Vec3::new(x, y, z),
+                normal: Vec3::new(nx, ny, nz).normalize_or(Vec3::Z),
+                triangle: 0,
+                part: match part {
+                    15 => HandPart::Palm,
+                    link => HandPart::Phalanx(Digit::ALL[link / 3], Phalanx::ALL[link % 3]),
+                },
+            })
+            .collect();
+        let found = held.classify();
+        prop_assert!((0.0..=1.0).contains(&found.confidence), "{found:?}");
+        prop_assert_eq!(found.grasp_type.is_some(), found.confidence >= LEAST_CONFIDENCE);
+    }
+}
