@@ -65,24 +65,31 @@ def hand_of_reply(grasp):
     return Hand.of_joints(grasp["handedness"], grasp["joints"], grasp["rig"])
 
 
-def judge(scene, grasp):
-    """All measures of a grasp by name."""
-    hand = hand_of_reply(grasp)
-    # The mesh stays where it is and the hand goes into its frame: distances are the same.
+def in_object_frame(scene, grasp):
+    """The receiving hand and the contacts of a reply in the object's frame, where the mesh is as its file has it."""
     inverse = scene.rotation.inv()
-    local = hand.moved(inverse, -inverse.apply(scene.translation))
-    giver = scene.giver and scene.giver.moved(inverse, -inverse.apply(scene.translation))
+    hand = hand_of_reply(grasp).moved(inverse, -inverse.apply(scene.translation))
     contacts = [
         {
             "position": scene.to_object(contact["client_position"])[0],
             "normal": inverse.apply(contact["client_normal"]),
             "force": inverse.apply(contact["client_force"]),
+            # The palm's contacts have neither digit nor phalanx.
             "digit": contact.get("digit"),
             "phalanx": contact.get("phalanx"),
             "torsion": contact.get("torsion"),
         }
         for contact in grasp["contacts"]
     ]
+    return hand, contacts
+
+
+def judge(scene, grasp):
+    """All measures of a grasp by name."""
+    hand = hand_of_reply(grasp)
+    inverse = scene.rotation.inv()
+    local, contacts = in_object_frame(scene, grasp)
+    giver = scene.giver and scene.giver.moved(inverse, -inverse.apply(scene.translation))
     return {
         **penetration(scene.mesh, local),
         **forces(scene, contacts, inverse.apply(scene.up)),
@@ -95,8 +102,10 @@ def judge(scene, grasp):
         "wrong_chirality": hand.chirality() != hand.handedness or hand.handedness != scene.asked_handedness,
         **comfort(contacts, grasp["comfort"]),
         **told_margins(grasp),
+        **told_type(grasp),
         "contacts": len(contacts),
         "digits_touching": len({contact["digit"] for contact in contacts} & set(DIGITS)),
+        "palm_touching": any(contact["digit"] not in DIGITS for contact in contacts),
     }
 
 
@@ -350,3 +359,11 @@ def told_margins(grasp):
     margins = grasp.get("margins") or {}
     return {f"told_{name}": value for name, value in margins.items()}
 
+
+def told_type(grasp):
+    """The type of the taxonomy that the reply names, "" for none, and its confidence; nothing if it tells no types."""
+    if "type" not in grasp:
+        return {}
+    name = (grasp["type"] or "").lower().removeprefix("grasp_type_")
+    confidence = grasp.get("type_confidence", grasp.get("typeConfidence"))
+    return {"type": "" if name == "unspecified" else name, "type_confidence": float(confidence or 0.0)}

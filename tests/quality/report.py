@@ -10,6 +10,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import measures
+import relations
+
+# A type counts when its confidence is at least this; wanted are so many per cent of grasps with one, and so many types.
+CONFIDENT, CLASSIFIED, TYPES = 0.5, 95, 15
 
 
 @dataclass
@@ -38,9 +42,13 @@ def targets(rows):
     in_time = sum(row["in_time"] for row in rows)
     share = 100 * in_time / n if n else 0.0
     figure = f"{share:.1f} % ({in_time} of {n}; {len(rows) - n} more have none)"
-    lines.append(Target("answered within 50 ms, where there is any", "≥ 99.5 %", figure, share >= 99.5))
+    lines.append(Target("answered within 50 ms (search), where there is any", "≥ 99.5 %", figure, share >= 99.5))
     if n == 0:
         return lines
+    in_time = sum(row["round_trip_in_time"] for row in rows)
+    trips = column("round_trip_ms")
+    figure = f"{100 * in_time / n:.1f} % ({in_time} of {n}); median {np.median(trips):.1f} ms"
+    lines.append(Target("the same by round trip", "≥ 99.5 %", figure, in_time >= 0.995 * n))
     depth = 1000 * column("penetration")
     lines.append(Target("penetration, median", "≤ 1 mm", f"{np.median(depth):.1f} mm", bool(np.median(depth) <= 1)))
     within = f"{depth.max():.1f} mm ({100 * (depth <= 3).mean():.0f} % within 3 mm)"
@@ -70,6 +78,7 @@ def targets(rows):
     none_of("joint limits broken", column("limits_broken") > 0, f"; worst {column('beyond_limits').max():.1f}°")
     none_of("fingers through fingers or palm", column("self_collision") > 0)
     none_of("forbidden surface within 2 mm", column("forbidden_distance") < measures.FORBIDDEN)
+    lines += held(found) + classified(found)
     lines += overstated(found)
     figure = f"median {np.nanmedian(column('comfort')):.4f}, reply off by {np.median(column('comfort_error')):.4f}"
     lines.append(Target("comfort E", "reported", figure, None))
@@ -84,6 +93,35 @@ def sound_share(rows):
     """Of the grasps that were found, the share without any fault."""
     found = [row for row in rows if row["found"]]
     return sum(acceptable(row) for row in found) / len(found)
+
+
+def held(found):
+    """How many grasps keep hold of the object in the physics engine; nothing without a simulation."""
+    if "survives_gravity" not in found[0]:
+        return []
+    lines = []
+    for name, measure, least in [
+        ("survives_gravity", "survives gravity in simulation", 95),
+        ("survives_all", "survives all six pushes, too", 75),
+    ]:
+        count = sum(row[name] for row in found)
+        share = 100 * count / len(found)
+        lines.append(Target(measure, f"≥ {least} %", f"{share:.0f} % ({count} of {len(found)})", share >= least))
+    return lines
+
+
+def classified(found):
+    """How many grasps have a type of the taxonomy, and how many types there are; nothing if replies tell none."""
+    told = [row for row in found if "type" in row]
+    if not told:
+        return []
+    named = [row["type"] for row in told if row["type"] and row["type_confidence"] >= CONFIDENT]
+    share, types = 100 * len(named) / len(told), len(set(named))
+    figure = f"{share:.0f} % ({len(named)} of {len(told)})"
+    return [
+        Target("classified, confidence at least 0.5", f"≥ {CLASSIFIED} %", figure, share >= CLASSIFIED),
+        Target("types seen", f"≥ {TYPES}", str(types), types >= TYPES),
+    ]
 
 
 def overstated(found):
@@ -152,22 +190,34 @@ def write(folder, rows, lines, options):
     text += [markdown(lines), ""]
     if found:
         text += ["## By object", "", by_object(rows), ""]
+        if "survives_gravity" in found[0]:
+            text += ["## Survival by epsilon", "", relations.survival_by_epsilon(found), ""]
+        text += ["## Comfort E against the verdict", "", relations.comfort_and_verdict(found, acceptable, faults), ""]
+        relations.scatter(folder / "comfort.svg", found, acceptable)
+        text += ["![E against epsilon, by verdict](comfort.svg)", ""]
+        if any("type" in row for row in found):
+            text += ["## Types", "", relations.types(found), ""]
         plots(folder, found)
         text += ["![Distributions](distributions.svg)", ""]
         if sheet(folder, found):
-            text += ["## Contact sheet", "", "Green: no fault; red: what is wrong.", "", "![Grasps](sheet.png)", ""]
+            text += ["## Contact sheet", ""]
+            text += ["Green: no fault, and gravity survived; red: what is wrong. At the right, hand and object alone.", ""]
+            text += ["![Grasps](sheet.png)", ""]
     (folder / "README.md").write_text("\n".join(text), encoding="utf-8")
 
 
 def by_object(rows):
     """Main figures of each object."""
-    lines = ["| object | grasps | within 50 ms | penetration median / worst, mm | balanced | giver clear | no fault |"]
-    lines.append("|---|--:|--:|--:|--:|--:|--:|")
+    simulated = any("survives_gravity" in row for row in rows)
+    heads = ["object", "grasps", "within 50 ms", "penetration median / worst, mm", "balanced", "giver clear", "no fault"]
+    if simulated:
+        heads += ["survives gravity", "single pushes", "all six"]
+    lines = [f"| {' | '.join(heads)} |", "|---|" + "--:|" * (len(heads) - 1)]
     for name in dict.fromkeys(row["object"] for row in rows):
         here = [row for row in rows if row["object"] == name]
         found = [row for row in here if row["found"]]
         if not found:
-            lines.append(f"| {name} | 0 of {len(here)} | | | | | |")
+            lines.append(f"| {name} | 0 of {len(here)} |" + " |" * (len(heads) - 2))
             continue
         depth = [1000 * row["penetration"] for row in found]
 
@@ -178,6 +228,10 @@ def by_object(rows):
         cells.append(f"{np.median(depth):.1f} / {max(depth):.1f}")
         cells.append(share(lambda row: row["imbalance"] <= 0.02 and not row["force_outside_cone"]))
         cells += [share(lambda row: not row["giver_touched"]), share(acceptable)]
+        if simulated:
+            cells.append(share(lambda row: row["survives_gravity"]))
+            cells.append(f"{100 * np.mean([row['survives_pushes'] for row in found]) / 6:.0f} %")
+            cells.append(share(lambda row: row["survives_all"]))
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -224,20 +278,34 @@ def faults(row):
     return [name for wrong, name in named if wrong]
 
 
-def sheet(folder, found, across=4):
-    """All pictures of a run on one sheet; false if there are none."""
+def fate(row):
+    """What became of a grasp in the physics engine, in few words; nothing without a simulation."""
+    if "survives_gravity" not in row:
+        return []
+    if not row["survives_gravity"]:
+        return [f"{row['fate gravity']} under gravity"]
+    return [f"holds {row['survives_pushes']} of 6 pushes"]
+
+
+def sheet(folder, found, across=3):
+    """All pictures of a run on one sheet, from three sides each: two with the giver by the client, one without by the
+    judge; false if there are none."""
     drawn = [row for row in found if row.get("picture") and (folder / "pictures" / row["picture"]).exists()]
     if not drawn:
         return False
     down = -(-len(drawn) // across)
-    figure, axes = plt.subplots(down, across, figsize=(4.8 * across, 2.4 * down), layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(down, across, figsize=(6.9 * across, 2.5 * down), layout="constrained", squeeze=False)
     for axis in axes.flat:
         axis.axis("off")
     for axis, row in zip(axes.flat, drawn):
-        axis.imshow(plt.imread(folder / "pictures" / row["picture"]))
+        file = folder / "pictures" / row["picture"]
+        views = [plt.imread(path)[..., :3] for path in (file, file.with_name(f"{file.stem}-alone.png"))]
+        height = min(len(view) for view in views)
+        axis.imshow(np.concatenate([view[:height] for view in views], axis=1))
         wrong = faults(row)
-        title = f"{row['object']} {row['holdout']}\n{', '.join(wrong) or 'no fault'}"
-        axis.set_title(title, fontsize=7, color="#b02020" if wrong else "#207020")
+        dropped = not row.get("survives_gravity", True)
+        title = f"{row['object']} {row['holdout']}\n{', '.join((wrong or ['no fault']) + fate(row))}"
+        axis.set_title(title, fontsize=7, color="#b02020" if wrong or dropped else "#207020")
     figure.savefig(folder / "sheet.png", dpi=100)
     plt.close(figure)
     return True

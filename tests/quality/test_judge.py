@@ -388,11 +388,11 @@ class TestFaults:
 
 def test_targets_count_what_is_wrong():
     scene, grasp, _ = good()
-    row = {"found": True, "in_time": True, **judged(scene, grasp)}
+    row = {"found": True, "in_time": True, "round_trip_in_time": True, "round_trip_ms": 3.0, **judged(scene, grasp)}
     lines = {line.measure: line for line in report.targets([row])}
     assert all(line.met for line in lines.values() if line.met is not None)
     bad = {**row, "penetration": 0.004, "giver_hand": -0.001}
-    lines = {line.measure: line for line in report.targets([row, bad, {"found": False, "in_time": False}])}
+    lines = {line.measure: line for line in report.targets([row, bad, {"found": False, "in_time": False, "round_trip_in_time": False}])}
     assert not lines["penetration, worst"].met and not lines["giver's hand touched"].met
     assert lines["giver's hand touched"].figure.startswith("1 of 2")
     assert lines["wrong chirality"].met

@@ -1,0 +1,116 @@
+"""Judging many grasps at once: measures and simulation of each in a process of its own, with a progress bar."""
+
+import multiprocessing
+import pathlib
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+
+import matplotlib.image
+
+import convex
+import draw
+import holdouts
+import measures
+import physics
+
+
+@dataclass
+class Case:
+    """A reply that is to be judged. The scene's mesh is left out: it is the same for many, and read once a process."""
+
+    object: str
+    scene: measures.Scene
+    grasp: dict
+    # Where to leave a picture of hand and object alone.
+    drawing: pathlib.Path | None = None
+
+
+_meshes = {}
+
+
+def mesh_of(name):
+    """The mesh of an object, read once."""
+    if name not in _meshes:
+        _meshes[name] = holdouts.load_mesh(name)
+    return _meshes[name]
+
+
+def judged(case, simulated):
+    """All measures of a case by name."""
+    case.scene.mesh = mesh_of(case.object)
+    row = measures.judge(case.scene, case.grasp)
+    if simulated:
+        row.update(survival(case.scene, case.grasp))
+    if case.drawing:
+        matplotlib.image.imsave(case.drawing, draw.picture(case.scene, case.grasp))
+    return row
+
+
+def survival(scene, grasp):
+    """How the runs in the physics engine end; pushes are along the axes of the client's frame, in which gravity is."""
+    hand, contacts = measures.in_object_frame(scene, grasp)
+    thing = physics.Object(convex.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction)
+    to_object = scene.rotation.inv()
+    outcomes = physics.simulate(
+        thing, hand, contacts, to_object.apply(scene.up), to_object.apply([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    )
+    result = {
+        "survives_gravity": outcomes["gravity"].held,
+        "survives_pushes": sum(o.held for name, o in outcomes.items() if name != "gravity"),
+        "survives_all": all(o.held for o in outcomes.values()),
+    }
+    for name, outcome in outcomes.items():
+        result[f"fate {name}"] = outcome.fate.value
+        result[f"moved_mm {name}"] = round(1000 * outcome.distance, 2)
+        result[f"turned_degrees {name}"] = round(outcome.angle, 2)
+    return result
+
+
+def decomposed(name):
+    """Sees to it that the convex pieces of an object are there."""
+    convex.pieces(mesh_of(name))
+
+
+def judge_all(cases, jobs, simulated):
+    """The measures of each case, in the order of the cases."""
+    rows = [None] * len(cases)
+    # Forked processes would inherit threads of numba and of the decomposition in an unknown state.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(max_workers=min(jobs, max(1, len(cases))), mp_context=context) as pool:
+        if simulated:
+            # Each mesh once, before many processes want the same.
+            waiting = [pool.submit(decomposed, name) for name in dict.fromkeys(case.object for case in cases)]
+            for done in Progress("objects decomposed").over(as_completed(waiting), len(waiting)):
+                done.result()
+        waiting = {pool.submit(judged, case, simulated): i for i, case in enumerate(cases)}
+        for done in Progress("grasps judged").over(as_completed(waiting), len(cases)):
+            rows[waiting[done]] = done.result()
+    return rows
+
+
+class Progress:
+    """A bar with a count and the time, on one line of a terminal; elsewhere a line for each tenth."""
+
+    WIDTH = 30
+
+    def __init__(self, what):
+        self.what, self.began, self.shown = what, time.monotonic(), 0
+
+    def over(self, things, total=None):
+        """The things, one after the other, with the bar telling how many are done."""
+        total = total or len(things)
+        for done, thing in enumerate(things, 1):
+            yield thing
+            self._show(done, total)
+
+    def _show(self, done, total):
+        terminal = sys.stdout.isatty()
+        if not terminal and done * 10 // total == self.shown:
+            return
+        self.shown = done * 10 // total
+        bar = ("#" * (self.WIDTH * done // total)).ljust(self.WIDTH, ".")
+        line = f"[{bar}] {done} of {total} {self.what} ({time.monotonic() - self.began:.0f} s)"
+        last = not terminal or done == total
+        print(f"\r{line}" if terminal else line, end="\n" if last else "", flush=True)
