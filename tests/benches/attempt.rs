@@ -13,6 +13,7 @@ use grasp_synthesis::{
         random::AttemptStream,
         stopwatch::NoStopwatch,
     },
+    taxonomy::classify,
 };
 use grasp_tests::searches::Bench;
 
@@ -24,7 +25,7 @@ fn attempt(criterion: &mut Criterion) {
     let bench = Bench::new(1);
     let mut group = criterion.benchmark_group("attempt");
     group.throughput(Throughput::Elements(1));
-    for strategy in Strategy::ALL {
+    for strategy in Strategy::LADDER {
         let ratios = strategy.default_bend_ratios();
         let scenes: Vec<Scene<'_>> = bench
             .holdouts
@@ -65,5 +66,20 @@ fn find(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, attempt, find);
+/// The grasp type of a grasp on each holdout in turn.
+fn classification(criterion: &mut Criterion) {
+    let bench = Bench::new(1);
+    let grasps: Vec<_> = (0..bench.holdouts.len())
+        .filter_map(|holdout| bench.search(holdout, Strategy::F, SEED, 0, u64::MAX).grasp)
+        .collect();
+    let mut next = grasps.iter().cycle();
+    criterion.bench_function("classification", |bencher| {
+        bencher.iter(|| {
+            next.next()
+                .map(|grasp| classify(bench.rig, &grasp.pose, &grasp.contacts))
+        });
+    });
+}
+
+criterion_group!(benches, attempt, find, classification);
 criterion_main!(benches);

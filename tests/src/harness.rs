@@ -22,7 +22,7 @@ pub struct TestServer {
 }
 
 impl TestServer {
-    /// Starts a server with the default configuration and two workers.
+    /// Starts a server with the default configuration, but two workers and no atlases.
     pub async fn start() -> Self {
         Self::start_with(|_| {}).await
     }
@@ -31,6 +31,7 @@ impl TestServer {
     pub async fn start_with(adapt: impl FnOnce(&mut Config)) -> Self {
         let mut config = Config {
             workers: WORKERS.try_into().expect("there are workers"),
+            builder_threads: 0,
             ..Config::default()
         };
         adapt(&mut config);

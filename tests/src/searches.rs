@@ -11,11 +11,12 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     clock::Clock,
+    constraints::Constraints,
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
     object::THESIS_FRICTION,
     search::{SearchOutcome, SearchSettings, find_grasp},
-    strategy::{Strategy, Validity},
+    strategy::{Choice, Strategy, Validity},
 };
 
 /// The machine's monotonic clock.
@@ -107,6 +108,9 @@ impl Bench {
             deadline: None,
             workers: self.workers,
             record_step_times: false,
+            constraints: Constraints::default(),
+            choice: Choice::FirstValid,
+            atlas: None,
         };
         let clock = MonotonicClock::default();
         find_grasp(

@@ -9,6 +9,7 @@ mod steps;
 use crate::{
     data::Data,
     table::{Table, Value},
+    types::SetTypes,
 };
 
 /// Does a run bear out what the thesis says?
@@ -45,14 +46,14 @@ pub struct Claim {
 }
 
 /// All claims that the run has records for, in the thesis' order.
-pub fn claims(data: &Data<'_>) -> Vec<Claim> {
+pub fn claims(data: &Data<'_>, types: &[SetTypes]) -> Vec<Claim> {
     let all = [
         steps::naive(data),
         placement::claims(data),
         posing::claims(data),
         steps::immobility(data),
         speed::claims(data),
-        open::claims(data),
+        open::claims(data, types),
     ];
     all.into_iter().flatten().collect()
 }

@@ -16,3 +16,4 @@ pub mod stats;
 pub mod table;
 pub mod tables;
 pub mod thesis;
+pub mod types;

@@ -15,10 +15,12 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     clock::Clock,
+    constraints::Constraints,
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
+    rejection::Rejection,
     search::{SearchEnd, SearchSettings, find_grasp},
-    strategy::Validity,
+    strategy::{Choice, Validity},
     synthesis::{
         attempt::{Attempt, AttemptEnd, Scene},
         random::AttemptStream,
@@ -105,6 +107,9 @@ impl Maker {
             bend_ratios: cell.set.bend_ratios,
             validity: Validity::Thesis,
             friction: holdout.object.friction_under(Validity::Thesis),
+            constraints: Constraints::default(),
+            choice: Choice::FirstValid,
+            atlas: None,
             reproducible: false,
             first_attempt: 0,
             max_attempts: u64::MAX,
@@ -137,7 +142,7 @@ impl Maker {
             search: Some(SearchFigures {
                 attempts: outcome.report.attempts,
                 pruned_placements: outcome.report.pruned_placements,
-                rejections: outcome.report.rejections,
+                rejections: Rejection::OF_THESIS.map(|kind| outcome.report.rejections[kind.index()]),
                 nanoseconds: nanoseconds(took),
             }),
             details,

@@ -137,7 +137,7 @@ impl Default for Settings {
             seed: 1,
             valid: 25,
             invalid: 100,
-            strategies: Strategy::ALL.to_vec(),
+            strategies: Strategy::LADDER.to_vec(),
             holdouts: (0..holdouts().len()).collect(),
             bend_ratio_columns: true,
             threads: vec![1, 2],

@@ -35,7 +35,7 @@ pub struct SearchFigures {
     pub attempts: u64,
     /// Placements that the measures pruned.
     pub pruned_placements: u64,
-    /// Failed attempts by kind, in the order of [`Rejection::ALL`].
+    /// Failed attempts by kind, in the order of [`Rejection::OF_THESIS`]: the experiments set no constraints.
     pub rejections: [u64; 8],
     /// Wall-clock time in nanoseconds.
     pub nanoseconds: u64,
@@ -125,7 +125,7 @@ impl Record {
     }
 }
 
-/// The name of an output type as Table 5.2 has it.
+/// The name of an output type as Table 5.2 has it, or would.
 pub fn output_type(rejection: Option<Rejection>) -> &'static str {
     match rejection {
         Some(Rejection::NoContacts) => "NoContacts",
@@ -136,6 +136,7 @@ pub fn output_type(rejection: Option<Rejection>) -> &'static str {
         Some(Rejection::FingerCollision) => "FingerCollision",
         Some(Rejection::UnwantedContact) => "UnwantedContact",
         Some(Rejection::NotImmobilizing) => "NotImmobilizing",
+        Some(Rejection::UnmetConstraint) => "UnmetConstraint",
         None => "Valid",
     }
 }

@@ -76,8 +76,8 @@ fn picture(maker: &Maker, record: &Record) -> Option<Image> {
         position: world_from_object.transform_point(contact.position),
         normal: world_from_object.transform_vector(contact.normal),
         force: world_from_object.transform_vector(*force),
-        digit: Some(contact.digit),
-        phalanx: Some(contact.phalanx),
+        digit: contact.part.digit(),
+        phalanx: contact.part.phalanx(),
     };
     let scene = HandoverScene {
         forbidden: &forbidden,

@@ -6,6 +6,7 @@ mod ladder;
 mod lists;
 mod outputs;
 mod placement;
+mod types;
 
 pub(crate) use bend_ratios::{BEND_BIN_DEGREES, bend_angle_bins, column_means, lost};
 pub use bend_ratios::{bend_angles, columns, lost_contacts, ratio_counts};
@@ -21,3 +22,4 @@ pub(crate) use placement::{
     yaw_distance,
 };
 pub use placement::{measure_ranges, palm_angle_bins, yaw_spread};
+pub use types::{grasp_types, unclassifiable};

@@ -36,7 +36,7 @@ async fn an_exhausted_number_of_attempts_is_an_answer_with_a_report() {
     assert_eq!(sum_of_rejections(&report), 300);
     assert_eq!(
         (report.strategy(), report.validity()),
-        (v1::Strategy::F, v1::Validity::Thesis)
+        (v1::Strategy::Guided, v1::Validity::Physical)
     );
     assert_eq!(report.budget, Some(seconds(10)));
     assert_eq!(report.step_times.len(), 5);
@@ -134,11 +134,19 @@ async fn a_found_grasp_is_complete() {
     let grasp = answer.grasp.unwrap();
     assert_eq!(
         (grasp.rig.as_str(), grasp.handedness()),
-        ("thesis", v1::Handedness::Right)
+        ("adult", v1::Handedness::Right)
     );
     assert_eq!((grasp.digits.len(), grasp.joints.len()), (5, 26));
     // Without a pose of the object, both frames are one; the wrist is the second joint.
-    assert_eq!(grasp.client_from_wrist, grasp.object_from_wrist);
+    let [in_client, in_object] = [grasp.client_from_wrist, grasp.object_from_wrist].map(|pose| {
+        let pose = pose.expect("every grasp has a wrist");
+        let q = pose.orientation.expect("every pose has an orientation");
+        (pose.position, [q.x, q.y, q.z, q.w])
+    });
+    assert_eq!(in_client.0, in_object.0);
+    // A product of rotations is normalised again.
+    let parts = in_client.1.iter().zip(in_object.1);
+    assert!(parts.into_iter().all(|(a, b)| (a - b).abs() < 1e-6));
     assert_eq!(grasp.joints[1].client_from_joint, grasp.client_from_wrist);
     assert!(grasp.joints.iter().all(|joint| joint.radius > 0.0));
     assert!(grasp.contacts.len() >= 2);

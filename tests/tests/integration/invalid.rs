@@ -3,9 +3,8 @@
 use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_tests::TestServer;
 use tonic::Code;
-use tonic_types::StatusExt as _;
 
-use crate::support::{blamed_fields, floating_remote, held_remote};
+use crate::support::{assert_blamed, blamed_fields, floating_remote, held_remote};
 
 type Mutation = fn(&mut v1::FindGraspRequest);
 
@@ -79,27 +78,6 @@ fn with_joints(change: impl FnOnce(&mut v1::HandJoints)) -> v1::FindGraspRequest
     }
 }
 
-async fn assert_blamed(server: &TestServer, request: v1::FindGraspRequest, fields: &[&str]) {
-    let text = format!("{request:?}");
-    let status = server
-        .grasps()
-        .await
-        .find_grasp(request)
-        .await
-        .expect_err("an invalid request is refused");
-    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
-    assert_eq!(blamed_fields(&status), fields, "{text}");
-    let details = status.get_error_details();
-    for violation in &details.bad_request().unwrap().field_violations {
-        let first = violation.description.chars().next().unwrap();
-        assert!(
-            !first.is_uppercase() && !violation.description.ends_with('.'),
-            "{}",
-            violation.description
-        );
-    }
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn every_field_of_a_search_is_checked() {
     let server = TestServer::start().await;
@@ -142,6 +120,17 @@ async fn every_field_of_a_search_is_checked() {
         (|r| r.max_attempts = Some(0), "max_attempts"),
         (|r| r.only_attempt = Some(u64::MAX), "only_attempt"),
         (|r| r.strategy = 99, "strategy"),
+        // Not searched with yet.
+        (|r| r.choice = 3, "choice"),
+        // Not searched for yet.
+        (
+            |r| {
+                r.choice = v1::Choice::BestWithinBudget.into();
+                r.reproducible = true;
+            },
+            "reproducible",
+        ),
+        (|r| r.atlas = -1, "atlas"),
         (|r| r.bend_ratios = -1, "bend_ratios"),
         (|r| r.validity = 99, "validity"),
         (|r| r.convention = 99, "convention"),
@@ -264,12 +253,26 @@ async fn all_violations_are_told_at_once() {
     request.up = Some(vector(0.0));
     request.budget = Some(duration(-1, 0));
     request.friction = Some(-1.0);
+    request.constraints = Some(v1::Constraints {
+        receiver_reach: Some(v1::Reach::default()),
+        approach: Some(v1::ApproachCone::default()),
+        must_touch: vec![1, 9],
+        must_not_touch: vec![1],
+        max_comfort_e: Some(-1.0),
+    });
     let fields = [
         "client_from_object.orientation",
         "presenting_hand.angles.digits[2].base_pitch",
         "up",
         "budget",
         "friction",
+        "constraints.receiver_reach.client_shoulder",
+        "constraints.receiver_reach.reach",
+        "constraints.approach.client_direction",
+        "constraints.approach.half_angle",
+        "constraints.must_touch[1]",
+        "constraints.must_not_touch[0]",
+        "constraints.max_comfort_e",
         // An unknown object among other violations is one of them.
         "object",
     ];

@@ -1,9 +1,12 @@
 //! The server over real gRPC. One binary, so that it is linked once.
 
+mod atlases;
 mod budget;
+mod constraints;
 mod conventions;
 mod health;
 mod invalid;
+mod key_frames;
 mod load;
 mod objects;
 mod objects_directory;

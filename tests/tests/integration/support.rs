@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::pose::Pose;
 use grasp_tests::TestServer;
-use tonic::Status;
+use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
 
 /// Longest that anything in a test is waited for: never reached unless something hangs.
@@ -135,6 +135,28 @@ pub(crate) fn blamed_fields(status: &Status) -> Vec<String> {
         .bad_request()
         .map(|bad| bad.field_violations.iter().map(|v| v.field.clone()).collect())
         .unwrap_or_default()
+}
+
+/// Sends a request that is refused for these fields, in order, each with a description in the house's style.
+pub(crate) async fn assert_blamed(server: &TestServer, request: v1::FindGraspRequest, fields: &[&str]) {
+    let text = format!("{request:?}");
+    let status = server
+        .grasps()
+        .await
+        .find_grasp(request)
+        .await
+        .expect_err("an invalid request is refused");
+    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
+    assert_eq!(blamed_fields(&status), fields, "{text}");
+    let details = status.get_error_details();
+    for violation in &details.bad_request().unwrap().field_violations {
+        let first = violation.description.chars().next().unwrap();
+        assert!(
+            !first.is_uppercase() && !violation.description.ends_with('.'),
+            "{}",
+            violation.description
+        );
+    }
 }
 
 /// The reason in a status' `ErrorInfo`.

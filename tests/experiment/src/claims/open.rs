@@ -6,14 +6,18 @@ use crate::{
     plan::Set,
     stats::rank_correlation,
     tables::{comfort_share_by_draw, mean_of_means, touching_digits, valid_with_figures},
+    types::SetTypes,
 };
 
-pub(super) fn claims(data: &Data<'_>) -> Vec<Claim> {
+pub(super) fn claims(data: &Data<'_>, types: &[SetTypes]) -> Vec<Claim> {
     let Some(strategy) = data.ladder().last() else {
         return Vec::new();
     };
     let set = Set::ladder(strategy);
-    threads(data, set).into_iter().chain(comfort(data, set)).collect()
+    [threads(data, set), comfort(data, set), unclassifiable(types)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// "We would have liked to know our algorithm's execution time on a computer that can run VR applications."
@@ -52,6 +56,38 @@ fn comfort(data: &Data<'_>, set: Set) -> Option<Claim> {
             100.0 * by_draw,
             set.name(),
             rank_correlation(&pairs)?
+        ),
+        verdict: Verdict::Answered,
+        why: "",
+    })
+}
+
+/// "... we want to know whether the improvements to our algorithm changed the percentage of false valid grasps."
+fn unclassifiable(types: &[SetTypes]) -> Option<Claim> {
+    let (first, last) = (types.first()?, types.last()?);
+    let (before, after) = (first.share(None)?, last.share(None)?);
+    // Of a difference of two means.
+    let margin = first.margin()?.hypot(last.margin()?);
+    let (from, to) = (first.strategy, last.strategy);
+    let shares = format!(
+        "{:.1} % in set {from:?}, {:.1} % in set {to:?}",
+        100.0 * before,
+        100.0 * after
+    );
+    let change = 100.0 * (after - before);
+    let verdict = if change.abs() <= 100.0 * margin {
+        "no more than chance would"
+    } else if change > 0.0 {
+        "yes, there are more"
+    } else {
+        "yes, there are fewer"
+    };
+    (from != to).then(|| Claim {
+        source: "6.1, open question",
+        thesis: "did the improvements change the share of false valid grasps? (not measured)",
+        run: format!(
+            "{verdict}: of no type of the taxonomy are {shares}, a change by {change:+.1} ± {:.1} points",
+            100.0 * margin
         ),
         verdict: Verdict::Answered,
         why: "",

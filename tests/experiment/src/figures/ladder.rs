@@ -32,7 +32,7 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
                 colour: palette::THESIS,
                 values: data
                     .ladder()
-                    .map(|strategy| printed(thesis::ladder(strategy)))
+                    .map(|strategy| thesis::ladder(strategy).map_or(f64::NAN, printed))
                     .collect(),
             },
             Series {

@@ -17,7 +17,7 @@ pub(super) fn output_types(data: &Data<'_>) -> Figure {
         .ladder()
         .map(|strategy| negative_counts(data, Set::ladder(strategy)))
         .collect();
-    let series = Rejection::ALL.map(|rejection| Series {
+    let series = Rejection::OF_THESIS.map(|rejection| Series {
         name: output_type(Some(rejection)).to_owned(),
         colour: palette::REJECTIONS[rejection.index()],
         values: counts

@@ -49,11 +49,11 @@ pub fn ladder(data: &Data<'_>) -> Table {
             (all.len() as u64).into(),
             Value::number(mean_of_means(&attempts)),
             Value::number(error(&attempts)),
-            Value::number(thesis.attempts),
+            Value::number(thesis.map(|thesis| thesis.attempts)),
             Value::number(mean_ms),
             Value::number(error(&times)),
             Value::number(quantile(&times.concat(), 0.5)),
-            Value::number(thesis.milliseconds),
+            Value::number(thesis.map(|thesis| thesis.milliseconds)),
             Value::number(total_ms * 1e3 / total_attempts as f64),
             Value::number(total_prunes as f64 / total_attempts as f64),
         ];

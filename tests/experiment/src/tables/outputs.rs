@@ -13,7 +13,7 @@ use crate::{
 /// the searches for the positive set made, holdout by holdout, each of which counts the same.
 pub fn output_types(data: &Data<'_>) -> Table {
     let mut header = vec!["set".to_owned(), "attempts".to_owned()];
-    for rejection in Rejection::ALL {
+    for rejection in Rejection::OF_THESIS {
         let name = output_type(Some(rejection));
         header.extend([name.to_owned(), format!("{name}, %"), format!("{name}, % of all")]);
     }
@@ -38,11 +38,10 @@ pub fn output_types(data: &Data<'_>) -> Table {
 
 /// Failed attempts of the negative set by kind.
 pub(crate) fn negative_counts(data: &Data<'_>, set: Set) -> [u64; 8] {
-    let mut counts = [0; 8];
-    for rejection in data.invalid(set).filter_map(|record| record.rejection) {
-        counts[rejection.index()] += 1;
-    }
-    counts
+    Rejection::OF_THESIS.map(|kind| {
+        let of_kind = data.invalid(set).filter(|record| record.rejection == Some(kind));
+        of_kind.count() as u64
+    })
 }
 
 /// Shares of all failed attempts by kind, the mean of the holdouts.
@@ -73,7 +72,7 @@ pub fn step_times(data: &Data<'_>) -> Table {
     let mut table = Table::new("step-times", "Time per attempt by step and output type", header);
     for strategy in data.ladder() {
         let set = Set::ladder(strategy);
-        for kind in Rejection::ALL.map(Some).into_iter().chain([None]) {
+        for kind in Rejection::OF_THESIS.map(Some).into_iter().chain([None]) {
             let (count, means) = mean_step_times(data, set, kind);
             if count == 0 {
                 continue;

@@ -5,10 +5,10 @@ use std::{collections::BTreeMap, fs, path::Path};
 use grasp_experiment::{
     claims::Verdict,
     make::Maker,
-    plan::Settings,
+    plan::{Set, Settings},
     report::{self, Report, command_line},
 };
-use grasp_synthesis::strategy::Strategy;
+use grasp_synthesis::{strategy::Strategy, taxonomy::GraspType};
 
 use crate::support::{Scratch, complete, index_of, small};
 
@@ -177,4 +177,50 @@ fn the_command_is_written_as_it_must_be_typed() {
         "grasp experiment --strategy F --holdout scalpel-hold2 --holdout scissors-hold1 --valid 3 --invalid 20 --seed 7 \
          --threads 1 --no-bend-ratio-columns"
     );
+}
+
+#[test]
+fn types_are_those_of_the_grasps_made_again() {
+    let settings = small();
+    let scratch = Scratch::new();
+    let folder = complete(scratch.path(), &settings);
+    let maker = Maker::new(&settings).expect("built-in holdouts are sound");
+    let report = scratch.path().join("report");
+    report::write(&settings, &folder, &maker, &report).expect("a report");
+    let shares = csv_rows(&report.join("csv/grasp-types.csv"));
+    for strategy in settings.strategies {
+        let own: Vec<_> = folder
+            .records()
+            .iter()
+            .filter(|record| {
+                let cell = record.cell;
+                record.rejection.is_none() && cell.threads == 1 && cell.set == Set::ladder(strategy)
+            })
+            .map(|record| maker.grasp_of(record).expect("the grasp comes out again"))
+            .map(|grasp| {
+                grasp
+                    .classification
+                    .grasp_type
+                    .map_or("unclassifiable", GraspType::name)
+            })
+            .collect();
+        assert_eq!(own.len(), 6);
+        let column = format!("{strategy:?}, %");
+        let mut sum = 0.0;
+        for row in &shares {
+            // Each holdout has as many grasps.
+            let of_type = own.iter().filter(|name| **name == row["type"]).count();
+            let share = number(row, &column);
+            assert!((share - 100.0 * of_type as f64 / 6.0).abs() < 1e-3, "{row:?}");
+            sum += share;
+        }
+        assert!((sum - 100.0).abs() < 1e-2, "{sum}");
+        let rows = csv_rows(&report.join("csv/unclassifiable.csv"));
+        let row = rows
+            .iter()
+            .find(|row| row["set"] == format!("{strategy:?}"))
+            .expect("the set");
+        let none = own.iter().filter(|name| **name == "unclassifiable").count();
+        assert!((number(row, "unclassifiable, %") - 100.0 * none as f64 / 6.0).abs() < 1e-3);
+    }
 }

@@ -1,0 +1,94 @@
+//! The grasp types of a run's valid grasps: what the thesis calls false valid are those without one (5.2, 6.1).
+//!
+//! They are not recorded but looked at when a report is made, on grasps that are made again from their seeds: a run that
+//! was made before types were told has them too, and all are told by the same rules.
+
+use grasp_synthesis::{strategy::Strategy, taxonomy::GraspType};
+
+use crate::{
+    data::Data,
+    make::Maker,
+    plan::Set,
+    stats::{mean, standard_error_of_group_means},
+};
+
+/// Standard errors to either side of a mean that hold it with 95 %.
+const STANDARD_ERRORS: f64 = 1.96;
+
+/// The types of a positive grasp set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SetTypes {
+    /// The step of the ladder.
+    pub strategy: Strategy,
+    /// Of each grasp, holdout by holdout in the order of the settings; none for an unclassifiable one.
+    pub by_holdout: Vec<Vec<Option<GraspType>>>,
+}
+
+impl SetTypes {
+    /// Number of grasps.
+    pub fn count(&self) -> usize {
+        self.by_holdout.iter().map(Vec::len).sum()
+    }
+
+    /// Share of the grasps that are of a type, or of none, from 0 to 1: each holdout counts the same.
+    pub fn share(&self, of: Option<GraspType>) -> Option<f64> {
+        mean_of_groups(&self.is(of))
+    }
+
+    /// Half of the 95 % interval of the share of unclassifiable grasps.
+    pub fn margin(&self) -> Option<f64> {
+        standard_error_of_group_means(&self.is(None)).map(|error| STANDARD_ERRORS * error)
+    }
+
+    /// 1 for each grasp of a type, or of none, else 0.
+    fn is(&self, of: Option<GraspType>) -> Vec<Vec<f64>> {
+        let is_it = |found: &Option<GraspType>| f64::from(u8::from(*found == of));
+        let groups = self.by_holdout.iter().filter(|types| !types.is_empty());
+        groups.map(|types| types.iter().map(is_it).collect()).collect()
+    }
+}
+
+fn mean_of_groups(groups: &[Vec<f64>]) -> Option<f64> {
+    let means: Vec<_> = groups.iter().filter_map(|group| mean(group)).collect();
+    mean(&means)
+}
+
+/// The types of the positive sets of the ladder, on one thread.
+pub fn set_types(data: &Data<'_>, maker: &Maker) -> Vec<SetTypes> {
+    let of_set = |strategy| {
+        let of_holdout = |&holdout: &usize| {
+            let own = data
+                .valid(Set::ladder(strategy))
+                .filter(|record| record.cell.holdout == holdout);
+            own.filter_map(|record| maker.grasp_of(record))
+                .map(|grasp| grasp.classification.grasp_type)
+                .collect()
+        };
+        SetTypes {
+            strategy,
+            by_holdout: data.settings.holdouts.iter().map(of_holdout).collect(),
+        }
+    };
+    data.ladder().map(of_set).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_holdout_counts_the_same() {
+        let ring = Some(GraspType::Ring);
+        let types = SetTypes {
+            strategy: Strategy::A,
+            by_holdout: vec![vec![None, None, None, ring], vec![ring, ring], vec![]],
+        };
+        assert_eq!(types.count(), 6);
+        assert_eq!(types.share(None), Some(0.375));
+        assert_eq!(types.share(ring), Some(0.625));
+        assert_eq!(types.share(Some(GraspType::Stick)), Some(0.0));
+        // Variances 1/4 of four and 0 of two grasps, over two holdouts.
+        let margin = types.margin().expect("two holdouts have grasps");
+        assert!((margin - 1.96 * 0.25 / 2.0).abs() < 1e-9, "{margin}");
+    }
+}

@@ -1,0 +1,167 @@
+//! Atlases: they grow in the background, are told, used, kept on disk, and end with the server.
+
+use std::{fs, path::PathBuf};
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+
+use crate::support::{bounded, box_request, seconds, until};
+
+/// Grips that an atlas has when it is published first, at least, if its object is easy to hold.
+const FIRST: u32 = 100;
+
+/// A folder of its own for a test, removed at its end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id())))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder that stays in the temporary directory harms nobody.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A server that builds atlases, kept in a folder.
+async fn start(folder: &Folder) -> TestServer {
+    TestServer::start_with(|config| {
+        config.builder_threads = 1;
+        config.atlas_directory = Some(folder.0.clone());
+    })
+    .await
+}
+
+/// The state of an object's atlas as soon as it has `least` grips.
+async fn state(server: &TestServer, name: &str, least: u32) -> v1::AtlasState {
+    let mut client = server.objects().await;
+    bounded("the growth of an atlas", async {
+        loop {
+            let request = v1::GetObjectRequest {
+                name: name.to_owned(),
+            };
+            let answer = client.get_object(request).await.expect("it is there");
+            let object = answer.into_inner().object.expect("an answer has the object");
+            let state = object.atlas.expect("there are atlases");
+            if state.entries >= least {
+                return state;
+            }
+            assert_eq!(state.stamp.is_empty(), state.entries == 0);
+            tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+        }
+    })
+    .await
+}
+
+async fn create_box(server: &TestServer) {
+    let created = server.objects().await.create_object(box_request("block")).await;
+    let object = created.expect("it can be created").into_inner().object.unwrap();
+    let state = object.atlas.expect("there are atlases");
+    assert!(!state.complete);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_atlas_grows_answers_and_outlives_its_server() {
+    let folder = Folder::new("atlases");
+    let server = start(&folder).await;
+    create_box(&server).await;
+    let first = state(&server, "objects/block", FIRST).await;
+    let second = state(&server, "objects/block", first.entries + 1).await;
+    assert_ne!(first.stamp, second.stamp);
+
+    let request = v1::FindGraspRequest {
+        object: "objects/block".to_owned(),
+        budget: Some(seconds(10)),
+        receiving_hand: Some(v1::ReceivingHand {
+            rig: "adult".to_owned(),
+            handedness: v1::Handedness::Right.into(),
+        }),
+        ..Default::default()
+    };
+    let answer = server.grasps().await.find_grasp(request.clone()).await;
+    let report = answer.unwrap().into_inner().report.unwrap();
+    assert!(report.atlas_entries >= second.entries);
+    assert_eq!(report.source(), v1::GraspSource::Atlas);
+    assert_eq!(report.atlas_stamp.len(), 16);
+    let request = v1::FindGraspRequest {
+        atlas: v1::AtlasUse::None.into(),
+        ..request
+    };
+    let answer = server.grasps().await.find_grasp(request).await;
+    let report = answer.unwrap().into_inner().report.unwrap();
+    assert_eq!((report.atlas_entries, report.atlas_stamp.as_str()), (0, ""));
+    assert_eq!(report.source(), v1::GraspSource::Search);
+    server.stop().await;
+
+    // What the next server knows first is what the last one knew, not what can be found anew.
+    let server = start(&folder).await;
+    create_box(&server).await;
+    let read = state(&server, "objects/block", 1).await;
+    assert!(read.entries >= second.entries, "{read:?} after {second:?}");
+    server.stop().await;
+
+    // Damaged files are built again, and replaced before that is told.
+    let damaged = damage(&folder);
+    let server = start(&folder).await;
+    create_box(&server).await;
+    state(&server, "objects/block", 1).await;
+    server.stop().await;
+    let is_replaced = |(path, bytes): &(PathBuf, Vec<u8>)| fs::read(path).expect("it is there") != *bytes;
+    assert!(damaged.iter().any(is_replaced));
+}
+
+/// Flips a bit of every atlas of a folder, and gives what is there now.
+fn damage(folder: &Folder) -> Vec<(PathBuf, Vec<u8>)> {
+    let files = fs::read_dir(&folder.0).expect("there is a folder");
+    let damage = |path: PathBuf| {
+        let mut bytes = fs::read(&path).expect("it is there");
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        fs::write(&path, &bytes).expect("it can be written");
+        (path, bytes)
+    };
+    files
+        .map(|file| damage(file.expect("it can be listed").path()))
+        .collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn builders_end_with_their_server() {
+    let server = TestServer::start_with(|config| config.builder_threads = 2).await;
+    let gauges = server.gauges().clone();
+    assert_eq!(gauges.builders(), 2);
+    bounded("the end", server.stop()).await;
+    until("the end of the builders", || gauges.builders() == 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_without_builders_tells_of_no_atlas() {
+    let server = TestServer::start().await;
+    let mut client = server.objects().await;
+    let listed = client.list_objects(v1::ListObjectsRequest::default());
+    let objects = listed.await.unwrap().into_inner().objects;
+    assert!(objects.iter().all(|object| object.atlas.is_none()));
+    server.stop().await;
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_told() {
+    let folder = Folder::new("no-folder");
+    fs::write(&folder.0, "a file").expect("the temporary directory can be written to");
+    let config = grasp_server::Config {
+        builder_threads: 1,
+        atlas_directory: Some(folder.0.join("below")),
+        ..Default::default()
+    };
+    let text = grasp_server::Server::new(config)
+        .expect_err("it is below a file")
+        .to_string();
+    assert!(
+        text.starts_with("atlas_directory is ") && text.contains("below"),
+        "{text}"
+    );
+    fs::remove_file(&folder.0).expect("it is there");
+}

@@ -1,0 +1,174 @@
+//! What a request may demand of its grasp, and that it is not ignored.
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+
+use crate::support::{assert_blamed, floating_remote};
+
+type Change = fn(&mut v1::Constraints);
+
+fn vector(x: f32) -> v1::Vector3 {
+    v1::Vector3 { x, y: 0.0, z: 0.0 }
+}
+
+/// Demands that are right, to be made wrong one by one.
+fn demands() -> v1::Constraints {
+    v1::Constraints {
+        receiver_reach: Some(v1::Reach {
+            client_shoulder: Some(vector(1.0)),
+            reach: 0.7,
+        }),
+        approach: Some(v1::ApproachCone {
+            client_direction: Some(vector(2.0)),
+            half_angle: 0.5,
+        }),
+        must_touch: vec![v1::Digit::Thumb.into()],
+        must_not_touch: vec![v1::Digit::Little.into()],
+        max_comfort_e: Some(0.1),
+    }
+}
+
+fn with_demands(change: impl FnOnce(&mut v1::Constraints)) -> v1::FindGraspRequest {
+    let mut constraints = demands();
+    change(&mut constraints);
+    v1::FindGraspRequest {
+        constraints: Some(constraints),
+        ..floating_remote()
+    }
+}
+
+fn reach(constraints: &mut v1::Constraints) -> &mut v1::Reach {
+    constraints.receiver_reach.as_mut().unwrap()
+}
+
+fn approach(constraints: &mut v1::Constraints) -> &mut v1::ApproachCone {
+    constraints.approach.as_mut().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_demand_is_checked() {
+    let server = TestServer::start().await;
+    let table: &[(&str, Change)] = &[
+        ("receiver_reach.client_shoulder", |c| {
+            reach(c).client_shoulder = None;
+        }),
+        ("receiver_reach.client_shoulder", |c| {
+            reach(c).client_shoulder = Some(vector(f32::NAN));
+        }),
+        ("receiver_reach.client_shoulder", |c| {
+            reach(c).client_shoulder = Some(vector(1e6));
+        }),
+        ("receiver_reach.reach", |c| reach(c).reach = 0.0),
+        ("receiver_reach.reach", |c| reach(c).reach = -0.7),
+        ("receiver_reach.reach", |c| reach(c).reach = f32::NAN),
+        ("receiver_reach.reach", |c| reach(c).reach = f32::INFINITY),
+        ("approach.client_direction", |c| {
+            approach(c).client_direction = None;
+        }),
+        ("approach.client_direction", |c| {
+            approach(c).client_direction = Some(vector(0.0));
+        }),
+        ("approach.client_direction", |c| {
+            approach(c).client_direction = Some(vector(f32::INFINITY));
+        }),
+        ("approach.half_angle", |c| approach(c).half_angle = 0.0),
+        ("approach.half_angle", |c| approach(c).half_angle = 3.2),
+        ("approach.half_angle", |c| approach(c).half_angle = f32::NAN),
+        ("must_touch[1]", |c| c.must_touch.push(0)),
+        ("must_touch[1]", |c| c.must_touch.push(6)),
+        ("must_not_touch[1]", |c| c.must_not_touch.push(-1)),
+        ("must_not_touch[1]", |c| {
+            c.must_not_touch.push(v1::Digit::Thumb.into());
+        }),
+        ("max_comfort_e", |c| c.max_comfort_e = Some(-0.1)),
+        ("max_comfort_e", |c| c.max_comfort_e = Some(f32::NAN)),
+        ("max_comfort_e", |c| c.max_comfort_e = Some(f32::INFINITY)),
+    ];
+    for (field, change) in table {
+        assert_blamed(&server, with_demands(change), &[&format!("constraints.{field}")]).await;
+    }
+    server.stop().await;
+}
+
+type Check = fn(&v1::Grasp) -> bool;
+
+fn touching(grasp: &v1::Grasp) -> Vec<v1::Digit> {
+    grasp.contacts.iter().map(v1::Contact::digit).collect()
+}
+
+fn wrist(grasp: &v1::Grasp) -> glam::Vec3 {
+    let pose = grasp.client_from_wrist.as_ref().unwrap();
+    let p = pose.position.as_ref().unwrap();
+    glam::Vec3::new(p.x, p.y, p.z)
+}
+
+/// Each demand alone, with what every grasp must then be.
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_demanded_is_met() {
+    let server = TestServer::start().await;
+    let mut client = server.grasps().await;
+    let table: [(Change, Check); 5] = [
+        (
+            |c| {
+                c.receiver_reach = Some(v1::Reach {
+                    client_shoulder: Some(v1::Vector3 {
+                        x: 0.4,
+                        y: 0.0,
+                        z: 0.0,
+                    }),
+                    reach: 0.38,
+                });
+            },
+            |grasp| wrist(grasp).distance(glam::Vec3::new(0.4, 0.0, 0.0)) <= 0.38 + 1e-5,
+        ),
+        (
+            |c| c.must_touch = vec![v1::Digit::Little.into()],
+            |grasp| touching(grasp).contains(&v1::Digit::Little),
+        ),
+        (
+            |c| c.must_not_touch = vec![v1::Digit::Little.into()],
+            |grasp| !touching(grasp).contains(&v1::Digit::Little),
+        ),
+        (|c| c.max_comfort_e = Some(0.01), |grasp| grasp.comfort <= 0.01),
+        (
+            |c| {
+                c.approach = Some(v1::ApproachCone {
+                    client_direction: Some(v1::Vector3 {
+                        x: 0.0,
+                        y: -1.0,
+                        z: 0.0,
+                    }),
+                    half_angle: 0.8,
+                });
+            },
+            |grasp| {
+                // Halfway between the forearm and the way that the palm faces, in OpenXR axes.
+                let o = grasp.client_from_wrist.as_ref().unwrap().orientation.unwrap();
+                let turn = glam::Quat::from_xyzw(o.x, o.y, o.z, o.w);
+                let way = turn * (glam::Vec3::NEG_Z + glam::Vec3::NEG_Y);
+                way.angle_between(glam::Vec3::NEG_Y) <= 0.8 + 1e-3
+            },
+        ),
+    ];
+    for (row, (demand, is_met)) in table.into_iter().enumerate() {
+        for seed in 0..3 {
+            let request = v1::FindGraspRequest {
+                seed: Some(seed),
+                budget: Some(prost_types::Duration {
+                    seconds: 10,
+                    nanos: 0,
+                }),
+                ..with_demands(|constraints| {
+                    *constraints = v1::Constraints::default();
+                    demand(constraints);
+                })
+            };
+            let answer = client.find_grasp(request).await.unwrap().into_inner();
+            let grasp = answer
+                .grasp
+                .unwrap_or_else(|| panic!("row {row}: {:?}", answer.report));
+            assert!(is_met(&grasp), "row {row}, seed {seed}: {grasp:?}");
+        }
+    }
+    server.stop().await;
+}

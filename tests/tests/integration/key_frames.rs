@@ -1,0 +1,115 @@
+//! The score and the way to a grasp over the wire.
+
+use std::time::Duration;
+
+use grasp_assets::holdouts::holdout;
+use grasp_client::{Convention, FindRequest, Grasp, KeyFrameKind, Validity, built_in::request_for};
+use grasp_tests::TestServer;
+
+/// Holdouts of which a grasp is found soon.
+const HOLDOUTS: [&str; 3] = ["remote-genhold3", "scissors-hold1", "scissors-genhold1"];
+
+async fn ask(server: &TestServer, name: &str, validity: Validity, convention: Convention) -> Grasp {
+    let mut request = FindRequest {
+        validity: Some(validity),
+        seed: Some(5),
+        budget: Some(Duration::from_secs(10)),
+        convention,
+        ..request_for(holdout(name).expect("a built-in holdout"))
+    };
+    if convention != Convention::OpenXr {
+        // The giver's pose is written in the built-in holdouts' own convention.
+        request.presenting_hand = None;
+    }
+    let client = server.client().await;
+    let answer = client.find_grasp(&request).await.expect("a valid request");
+    answer
+        .grasp
+        .unwrap_or_else(|| panic!("{name}: no grasp: {:?}", answer.report))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_score_is_the_weighted_mean_of_its_terms() {
+    let server = TestServer::start().await;
+    for name in HOLDOUTS {
+        let grasp = ask(&server, name, Validity::Physical, Convention::OpenXr).await;
+        let score = grasp.score.expect("a physical grasp is rated");
+        let names: Vec<_> = score.terms.iter().map(|term| term.name.as_str()).collect();
+        let expected = [
+            "comfort",
+            "friction_reserve",
+            "shared_flexion",
+            "enough_digits",
+            "pads",
+            "closure",
+            "away_from_giver",
+            "giver_clearance",
+            "sterile_distance",
+        ];
+        assert_eq!(names, expected);
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for term in &score.terms {
+            assert!((0.0..=1.0).contains(&term.value), "{name}: {term:?}");
+            assert!(term.weight > 0.0, "{name}: {term:?}");
+            sum += term.value * term.weight;
+            weights += term.weight;
+        }
+        assert!((score.total - sum / weights).abs() < 1e-5, "{name}: {score:?}");
+        // Comfort is rated by E alone, closeness by the clearance that is told.
+        let value = |wanted: &str| {
+            let term = score.terms.iter().find(|term| term.name == wanted);
+            term.expect("named above").value
+        };
+        assert!(
+            (value("comfort") - (-grasp.comfort / 0.04).exp()).abs() < 1e-4,
+            "{name}"
+        );
+        let clearance = grasp.margins.and_then(|margins| margins.giver_clearance);
+        let expected = (clearance.expect("there is a giver") / 0.04).min(1.0);
+        assert!((value("giver_clearance") - expected).abs() < 1e-4, "{name}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_way_ends_in_the_grasp() {
+    let server = TestServer::start().await;
+    for name in HOLDOUTS {
+        for (convention, per_metre) in [(Convention::OpenXr, 1.0), (Convention::Unreal, 100.0)] {
+            let grasp = ask(&server, name, Validity::Physical, convention).await;
+            let kinds: Vec<_> = grasp.key_frames.iter().map(|frame| frame.kind).collect();
+            let expected = [
+                KeyFrameKind::Approach,
+                KeyFrameKind::PreGrasp,
+                KeyFrameKind::Close,
+            ];
+            assert_eq!(kinds, expected, "{name}");
+            let [approach, pre_grasp, close] = &grasp.key_frames[..] else {
+                unreachable!("three kinds");
+            };
+            assert_eq!(close.client_from_wrist, grasp.client_from_wrist, "{name}");
+            assert_eq!(close.digits, grasp.digits, "{name}");
+            assert_eq!(close.joints, grasp.joints, "{name}");
+            let [from, to] = [approach, pre_grasp].map(|frame| frame.client_from_wrist.position);
+            let way = from.distance(to) / per_metre;
+            assert!((way - 0.12).abs() < 1e-4, "{name}: {way} m");
+            // Joints are where the wrist is: the second of OpenXR's, the first of Unreal's hand.
+            for frame in &grasp.key_frames {
+                let wrist = frame.client_from_wrist.position;
+                let nearest = frame
+                    .joints
+                    .iter()
+                    .map(|joint| joint.client_from_joint.position.distance(wrist));
+                let nearest = nearest.fold(f32::INFINITY, f32::min);
+                assert!(nearest < 1e-5 * per_metre, "{name}: {nearest}");
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_thesis_neither_rates_nor_approaches() {
+    let server = TestServer::start().await;
+    let grasp = ask(&server, "remote-genhold3", Validity::Thesis, Convention::OpenXr).await;
+    assert_eq!(grasp.score, None);
+    assert!(grasp.key_frames.is_empty());
+}
