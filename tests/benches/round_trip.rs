@@ -1,7 +1,7 @@
 //! What gRPC adds: a replayed attempt asked over loopback, against the same replay by a plain call, and a listing.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use grasp_client::{FindRequest, Outcome, built_in::request_for};
+use grasp_client::{FindRequest, Outcome, Validity, built_in::request_for};
 use grasp_synthesis::strategy::Strategy;
 use grasp_tests::{TestServer, searches::Bench};
 
@@ -20,6 +20,7 @@ fn round_trip(criterion: &mut Criterion) {
         .expect("it is receivable");
     let request = FindRequest {
         seed: Some(1),
+        validity: Some(Validity::Thesis),
         only_attempt: Some(attempt),
         ..request_for(bench.holdouts[holdout].0)
     };
