@@ -47,8 +47,8 @@ const BESIDE: [f32; 2] = [0.006, 0.12];
 /// Edge in metres of the cells that palms are sorted into, and …
 const CELL: f32 = 0.03;
 
-/// … how many grips a cell may hold for each of six ways that a palm can face.
-const MOST_IN_CELL: usize = 6;
+/// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes.
+const MOST_IN_CELL: usize = 2;
 
 /// What has grown so far, and all that it takes to go on.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,7 +78,7 @@ pub struct Growth<'a> {
     rig: &'a Rig,
     entries: Vec<Entry>,
     shapes: Vec<HandShape>,
-    cells: HashMap<(IVec3, u8), usize>,
+    cells: HashMap<(IVec3, [u8; 2]), usize>,
     proposed: u64,
 }
 
@@ -210,12 +210,18 @@ impl<'a> Growth<'a> {
             .is_some_and(|&count| count >= MOST_IN_CELL)
     }
 
-    /// Where a palm is and which way it faces.
-    fn cell(&self, wrist: Pose) -> (IVec3, u8) {
+    /// Where a palm is, which way it faces and which way its fingers go.
+    fn cell(&self, wrist: Pose) -> (IVec3, [u8; 2]) {
         let palm = wrist.transform_point(self.rig.palm);
-        let facing = wrist.transform_vector(Vec3::Z);
-        let axis = facing.abs().max_position();
-        let side = u8::from(facing[axis] < 0.0);
-        ((palm / CELL).floor().as_ivec3(), 2 * axis as u8 + side)
+        let mut fingers = wrist.transform_vector(Vec3::Y);
+        let facing = nearest_axis(wrist.transform_vector(Vec3::Z));
+        fingers[usize::from(facing / 2)] = 0.0;
+        ((palm / CELL).floor().as_ivec3(), [facing, nearest_axis(fingers)])
     }
+}
+
+/// The axis that a direction is nearest to, from 0 to 5: x, -x, y, -y, z, -z.
+fn nearest_axis(direction: Vec3) -> u8 {
+    let axis = direction.abs().max_position();
+    2 * axis as u8 + u8::from(direction[axis] < 0.0)
 }

@@ -37,6 +37,8 @@ const OUTER_SHARE: f32 = 0.65;
 pub struct Opposition {
     /// How the hand is held.
     pub shape: HandShape,
+    /// How far thumb and fingers are closed: shares of their ways.
+    pub closed: [f32; 2],
     /// The thumb's pad on the skin, in metres.
     pub thumb: Vec3,
     /// The middle of the fingers' pads on the skin, in metres.
@@ -51,6 +53,14 @@ const FINGER_SETS: [([bool; 5], f32); 4] = [
     ([true, true, true, true, false], 0.2),
     ([true, true, true, true, true], 0.45),
 ];
+
+/// Share of hands that tuck their idle fingers away: people do when they pinch something small, and fingers that are
+/// tucked away are out of a giver's way.
+const TUCKED_SHARE: f32 = 0.4;
+
+/// How much less a hand is closed, when it comes to a place that it fits, than it is going to be there: a share of the
+/// digits' ways. More meets with more of the object and the giver's hand on the way, less finds thicker parts too thick.
+const PRESHAPE_ROOM: f32 = 0.22;
 
 /// A hand's shape, before anything is closed.
 pub fn draw_shape(stream: &mut AttemptStream) -> HandShape {
@@ -71,6 +81,8 @@ pub fn draw_shape(stream: &mut AttemptStream) -> HandShape {
             stream.between(BEND_RATIO[0], BEND_RATIO[1]),
         ],
         closing,
+        preshape: [0.0; 2],
+        tucks: stream.unit() < TUCKED_SHARE,
     }
 }
 
@@ -104,15 +116,13 @@ impl Oppositions {
         };
         let solids = HandSolids::of_pose(rig, &stretched);
         let inside = |solid: &TaperedCapsule, along: f32| (solid.at(along), solid.radius_at(along));
+        // Those that meet something most often come first.
+        let of_forearm = [0.2, 0.6, 1.0].map(|along| solids.forearm.map(|solid| inside(&solid, along)));
+        let of_palm = [0.6, 0.95, 0.2].map(|along| solids.palm.map(|solid| inside(&solid, along)));
+        let cores = of_palm.as_flattened().iter().chain(of_forearm.as_flattened());
         Self {
             known,
-            cores: vec![
-                inside(&solids.palm[1], 0.6),
-                inside(&solids.palm[0], 0.9),
-                inside(&solids.palm[3], 0.9),
-                inside(&solids.forearm[0], 0.2),
-                inside(&solids.forearm[1], 0.6),
-            ],
+            cores: cores.copied().collect(),
         }
     }
 
@@ -130,6 +140,29 @@ impl Oppositions {
 }
 
 impl Opposition {
+    /// Balls inside the links of the digits where they are when the pads meet what is between them, fingers that do not
+    /// close left out: middles and radii in metres, in the wrist's frame. The first of the links are within the palm's
+    /// reach and left out too.
+    pub fn link_balls(&self, rig: &Rig) -> [(Vec3, f32); 15] {
+        let pose = HandPose {
+            frame_from_wrist: Pose::IDENTITY,
+            digits: Digit::ALL.map(|digit| {
+                let closed = self.closed[usize::from(digit != Digit::Thumb)];
+                self.shape.flexing(rig, digit).closed_by(closed)
+            }),
+        };
+        let links = HandSolids::of_pose(rig, &pose).phalanges;
+        std::array::from_fn(|i| {
+            let (digit, (link, along)) = (i / 3, [(1, 0.5), (2, 0.2), (2, 1.0)][i % 3]);
+            // A finger that rests may be anywhere: its neighbour's ball stands for it.
+            let digit = (0..=digit)
+                .rfind(|&digit| self.shape.closing[digit])
+                .unwrap_or_default();
+            let solid = links[digit][link];
+            (solid.at(along), solid.radius_at(along))
+        })
+    }
+
     /// Distance between the pads in metres.
     pub fn width(&self) -> f32 {
         self.fingers.distance(self.thumb)
@@ -154,7 +187,11 @@ fn opposition(rig: &Rig, shape: &HandShape, finger_link: usize, closed: [f32; 2]
     let across = (fingers - thumb).normalize_or_zero();
     (across.dot(thumb_facing) >= LEAST_COS && -across.dot(fingers_facing) >= LEAST_COS).then_some(
         Opposition {
-            shape: *shape,
+            shape: HandShape {
+                preshape: closed.map(|closed| (closed - PRESHAPE_ROOM).max(0.0)),
+                ..*shape
+            },
+            closed,
             thumb,
             fingers,
         },

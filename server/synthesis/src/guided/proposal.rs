@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Share of proposals that lay the palm on the object instead of bringing pads to opposed points.
-const PALM_SHARE: f32 = 0.3;
+const PALM_SHARE: f32 = 0.15;
 
 /// Pads may be this much nearer to each other or farther apart than the object is thick, in metres: digits that
 /// close less or more still meet it near the same places.
@@ -31,13 +31,20 @@ const PALM_TILT: f32 = 0.35;
 const MOST_PLACES: usize = 8;
 
 /// … turns of a hand at a place.
-const MOST_TURNS: usize = 6;
+const MOST_TURNS: usize = 10;
 
 /// What a fingertip needs between a point that it presses and the giver's hand, in metres: half its thickness.
 const FINGER_ROOM: f32 = 0.006;
 
 /// The same for the palm.
 const PALM_ROOM: f32 = 0.012;
+
+/// How deep in the object digits may be where they are expected to end, in metres: they stop before. Where the object is
+/// thin, as thick as a finger ([`THIN`]), a digit is deep in it wherever it touches. Less refuses hands that would do.
+const PAD_DEPTHS: [f32; 2] = [0.0075, 0.005];
+
+/// The thickness below which an object is thin, in metres.
+const THIN: f32 = 0.015;
 
 /// Where on the palm it is laid on, from its middle, in metres: across, and along to the fingers.
 const PALM_SPOT: [[f32; 2]; 2] = [[-0.02, 0.02], [-0.02, 0.03]];
@@ -85,12 +92,16 @@ impl Place<'_> {
         let target = (pair.end - pair.start).normalize_or(Vec3::X);
         let arc = Quat::from_rotation_arc(across.normalize_or(Vec3::X), target);
         let middle = (pair.start + pair.end) * 0.5;
+        let links = opposition.link_balls(self.rig);
+        let pad_depth = PAD_DEPTHS[usize::from(pair.thickness > THIN)];
         (0..MOST_TURNS).find_map(|_| {
             let turn = Quat::from_axis_angle(target, stream.between(0.0, TAU));
             let orientation = (turn * arc).normalize();
             let position = middle - orientation * ((opposition.thumb + opposition.fingers) * 0.5);
             let object_from_wrist = Pose::new(position, orientation);
-            self.has_room(object_from_wrist).then_some(Proposal {
+            let has_room =
+                self.has_room(object_from_wrist) && self.have_room(object_from_wrist, &links, pad_depth);
+            has_room.then_some(Proposal {
                 object_from_wrist,
                 shape: opposition.shape,
                 advance: 0.0,
@@ -140,14 +151,20 @@ impl Place<'_> {
     /// True if balls inside palm and forearm are off the object and the giver's hand: a hundred times sooner known than
     /// the whole hand's clearance, which decides in the end.
     fn has_room(&self, object_from_wrist: Pose) -> bool {
-        self.rig.oppositions().cores().iter().all(|&(middle, radius)| {
+        self.have_room(object_from_wrist, self.rig.oppositions().cores(), DEEPEST)
+    }
+
+    /// True if balls, in the wrist's frame, are off the giver's hand and at most `depth` metres in the object.
+    fn have_room(&self, object_from_wrist: Pose, balls: &[(Vec3, f32)], depth: f32) -> bool {
+        balls.iter().all(|&(middle, radius)| {
             let middle = object_from_wrist.transform_point(middle);
             self.is_free_of_giver(middle, radius)
-                && self
-                    .object
-                    .surface
-                    .closest_point_within(middle, radius - DEEPEST)
-                    .is_none()
+                && (radius <= depth
+                    || self
+                        .object
+                        .surface
+                        .closest_point_within(middle, radius - depth)
+                        .is_none())
         })
     }
 }

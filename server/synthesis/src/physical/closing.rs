@@ -10,6 +10,7 @@ use std::f32::consts::PI;
 
 use super::{
     flexing::{Flexing, Sweep},
+    obstacle::Obstacle,
     solids::{TaperedCapsule, clearance, link_solids},
 };
 use crate::{
@@ -33,6 +34,9 @@ const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
 
 /// Room that a relaxed digit leaves between itself and the object, in metres: enough to be seen.
 const RELAXED_CLEARANCE: f32 = 0.001;
+
+/// Shares of its way to closed from which a digit that cannot be opened is relaxed.
+const CURLED: [f32; 3] = [0.35, 0.7, 1.0];
 
 /// From a gap of this many metres on, one that is sure is as good as the true one. A smaller one takes more steps of a
 /// few nanoseconds each, a larger one more looks at the mesh.
@@ -79,16 +83,20 @@ pub struct Closing<'a> {
     pub radii: [f32; 4],
     /// The wrist in the object's frame.
     pub object_from_wrist: Pose,
+    /// The share of its way from opened to closed that the digit is shaped by before it closes, from 0 to 1; where it
+    /// would start inside of something then, by half of it or opened.
+    pub preshape: f32,
+    /// What else of the hand is in the digit's way.
+    pub obstacles: &'a [Obstacle],
 }
 
 impl Closing<'_> {
     /// Closes until every joint is held or at its limit. None if a link is inside a surface from the start.
     pub fn close(&self) -> Option<ClosedDigit> {
-        let opened = self.flexing.opened();
-        if self.smallest_clearance(&self.links(&opened), INSIDE_DEPTH) < -INSIDE_DEPTH {
-            return None;
-        }
-        let mut angles = opened;
+        let mut angles = [self.preshape, 0.5 * self.preshape, 0.0]
+            .map(|share| self.flexing.closed_by(share))
+            .into_iter()
+            .find(|angles| self.is_free(angles))?;
         let mut touches = [false; 3];
         // The first joint that is not held.
         let mut free = 0;
@@ -106,9 +114,12 @@ impl Closing<'_> {
             angles = self.advance(&sweep, -TOUCH_DEPTH, f32::INFINITY);
             let links = self.links(&angles);
             // Of the links that touch now, the outermost holds all joints below it.
-            let touching = (free..3).rev().find(|&link| self.link_touches(&links[link]));
-            let Some(link) = touching else { break };
-            touches[link] = true;
+            let held = (free..3).rev().find_map(|link| {
+                let touches = self.link_touches(&links[link]);
+                (touches || self.is_obstructed(link, &links[link])).then_some((link, touches))
+            });
+            let Some((link, is_touch)) = held else { break };
+            touches[link] = is_touch;
             free = link + 1;
         }
         let links = self.links(&angles);
@@ -123,13 +134,19 @@ impl Closing<'_> {
         })
     }
 
-    /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in all, or less if the object is in
-    /// the way.
+    /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in all, or less if something is in
+    /// the way. Where the opened digit is inside the object, it is bent from the first of [`CURLED`] that is not.
     pub fn relax(&self, flexion: f32) -> ClosedDigit {
-        let sweep = self.flexing.sweep();
-        let Sweep { start, rates } = sweep;
-        let opened = start.base_pitch + start.second_pitch + start.third_pitch;
-        let most = (flexion - opened).max(0.0) / rates.iter().sum::<f32>();
+        let opened = self.flexing.opened();
+        let start = std::iter::once(0.0)
+            .chain(CURLED)
+            .map(|share| self.flexing.closed_by(share))
+            .find(|angles| self.is_free(angles))
+            .unwrap_or(opened);
+        let rates = std::array::from_fn(|joint| self.flexing.rate(joint));
+        let sweep = Sweep { start, rates };
+        let bent = start.base_pitch + start.second_pitch + start.third_pitch;
+        let most = (flexion - bent).max(0.0) / rates.iter().sum::<f32>();
         let angles = self.advance(&sweep, RELAXED_CLEARANCE, most);
         ClosedDigit {
             angles,
@@ -163,7 +180,7 @@ impl Closing<'_> {
                 }
                 // Beyond what the rest of the way can reach, nothing needs to be known.
                 let reachable = target + 2.0 * TOUCH_TOLERANCE + speed * (most - way);
-                let free = self.gap(&links[link], reachable) - target;
+                let free = self.gap(link, &links[link], reachable) - target;
                 if free <= TOUCH_TOLERANCE {
                     return angles;
                 }
@@ -174,15 +191,35 @@ impl Closing<'_> {
         self.flexing.angles_at(sweep, way)
     }
 
-    /// A gap that the surface keeps from a link, in metres: the smallest if that is small and less than `reachable`.
-    fn gap(&self, link: &TaperedCapsule, reachable: f32) -> f32 {
+    /// A gap that the surface and the obstacles keep from a link, in metres: the smallest if that is small and less than
+    /// `reachable`.
+    fn gap(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
+        let obstructed = self.gap_to_obstacles(index, link, reachable);
         let sure = self.surface.least_gap(link);
         if sure > SURE_GAP {
-            return sure;
+            return sure.min(obstructed);
         }
-        let within = reachable.min(NEAR);
+        let within = obstructed.min(NEAR);
         let gap = self.surface.closest_to_capsule(link, within);
         gap.map_or(within, |gap| gap.gap)
+    }
+
+    /// The same for the obstacles alone: `reachable` if none is nearer.
+    fn gap_to_obstacles(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
+        let ahead = self.obstacles.iter().filter(|obstacle| obstacle.stops(index));
+        ahead.fold(reachable, |least, obstacle| least.min(obstacle.gap(link, least)))
+    }
+
+    /// True if no link is inside the object or an obstacle.
+    fn is_free(&self, angles: &DigitAngles) -> bool {
+        let links = self.links(angles);
+        let is_free = |(index, link): (usize, _)| self.gap_to_obstacles(index, link, 0.0) >= -INSIDE_DEPTH;
+        links.iter().enumerate().all(is_free)
+            && self.smallest_clearance(&links, INSIDE_DEPTH) >= -INSIDE_DEPTH
+    }
+
+    fn is_obstructed(&self, index: usize, link: &TaperedCapsule) -> bool {
+        self.gap_to_obstacles(index, link, TOUCHING) < TOUCHING
     }
 
     /// Metres by which the gap of each link can shrink for a radian of the rest of a sweep.

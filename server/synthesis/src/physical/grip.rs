@@ -9,8 +9,9 @@ use super::{
     closing::{ClosedDigit, Closing, MOST_STEPS, NEAR, SURE_GAP, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     immobility::{Buffers, SoftContact, epsilon},
+    obstacle::Obstacle,
     scene::{ObjectScene, Presented},
-    shape::{HandShape, Proposal, resting_flexion},
+    shape::{HandShape, Proposal, TUCKED_FLEXION},
     solids::{HandSolids, PreparedHand, clearance, comes_within, link_radii, self_clearance},
 };
 use crate::{
@@ -30,6 +31,9 @@ pub const GIVER_CLEARANCE: f32 = 0.001;
 
 /// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way.
 pub const FORBIDDEN_CLEARANCE: f32 = 0.002;
+
+/// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.
+const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
 
 /// Why a hand was not closed to a grip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +62,7 @@ pub struct Gripper {
     pub posed: Vec<DigitAngles>,
     /// Where the hand touches.
     pub contacts: Vec<Contact>,
+    obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
 }
@@ -108,8 +113,35 @@ impl Gripper {
         }
 
         // Step 2, Finger Posing.
-        let closings = Digit::ALL.map(|digit| closing(scene, rig, digit, object_from_wrist, shape));
-        let closed = close(&closings, shape, interrupted);
+        self.obstacles.clear();
+        self.obstacles.extend(Obstacle::of_palm(&still));
+        let thumb = Closer {
+            scene,
+            giver,
+            rig,
+            shape,
+            object_from_wrist,
+            obstacles: &self.obstacles,
+        }
+        .close_thumb();
+        let closed = thumb.and_then(|thumb| {
+            let mut pose = HandPose {
+                frame_from_wrist: object_from_wrist,
+                ..opened
+            };
+            pose.digits[Digit::Thumb.index()] = thumb.angles;
+            self.obstacles
+                .extend(Obstacle::of_thumb(&HandSolids::of_pose(rig, &pose)));
+            let closer = Closer {
+                scene,
+                giver,
+                rig,
+                shape,
+                object_from_wrist,
+                obstacles: &self.obstacles,
+            };
+            closer.close_fingers(thumb, interrupted)
+        });
         stopwatch.lap(Step::FingerPosing);
         let digits = closed?;
         self.posed.extend(digits.iter().map(|digit| digit.angles));
@@ -144,7 +176,7 @@ impl Gripper {
         let bend_ratios = std::array::from_fn(|digit| {
             digits[digit]
                 .touches_object()
-                .then_some(closings[digit].flexing.bend_ratio)
+                .then_some(shape.flexing(rig, Digit::ALL[digit]).bend_ratio)
         });
         let grip = Grip {
             pose,
@@ -219,54 +251,90 @@ fn free_way(scene: &ObjectScene<'_>, still: &HandSolids, direction: Vec3, most: 
     Some(direction * way)
 }
 
-/// One digit, ready to close.
-fn closing<'a>(
-    scene: &ObjectScene<'a>,
+/// Closes the digits of a hand whose wrist stays.
+struct Closer<'a> {
+    scene: &'a ObjectScene<'a>,
+    giver: Option<&'a PreparedHand>,
     rig: &'a Rig,
-    digit: Digit,
+    shape: &'a HandShape,
     object_from_wrist: Pose,
-    shape: &HandShape,
-) -> Closing<'a> {
-    Closing {
-        surface: &scene.object.surface,
-        flexing: shape.flexing(rig, digit),
-        radii: link_radii(rig, digit),
-        object_from_wrist,
-    }
+    /// What is in the way of the digits to be closed.
+    obstacles: &'a [Obstacle],
 }
 
-/// Closes the digits, thumb first, and relaxes those that touch nothing or are not to close.
-fn close(
-    closings: &[Closing<'_>; 5],
-    shape: &HandShape,
-    interrupted: &impl Fn() -> bool,
-) -> Result<[ClosedDigit; 5], NoGrip> {
-    let mut closed = [ClosedDigit::default(); 5];
-    for digit in Digit::ALL
-        .into_iter()
-        .filter(|digit| shape.closing[digit.index()])
-    {
-        if interrupted() {
-            return Err(NoGrip::Interrupted);
+impl Closer<'_> {
+    fn closing(&self, digit: Digit) -> Closing<'_> {
+        Closing {
+            surface: &self.scene.object.surface,
+            flexing: self.shape.flexing(self.rig, digit),
+            radii: link_radii(self.rig, digit),
+            object_from_wrist: self.object_from_wrist,
+            preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
+            obstacles: self.obstacles,
         }
-        let ended = closings[digit.index()]
-            .close()
-            .ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
-        if digit == Digit::Thumb && !ended.touches_object() {
-            return Err(NoGrip::Rejected(Rejection::NoThumbEarlyStop));
-        }
-        closed[digit.index()] = ended;
     }
-    if !closed[1..].iter().any(ClosedDigit::touches_object) {
-        return Err(NoGrip::Rejected(Rejection::NoFingers));
+
+    /// A digit closed as far as it goes, if nothing is in its way before.
+    fn close(&self, digit: Digit) -> Option<ClosedDigit> {
+        let closed = self.closing(digit).close()?;
+        self.is_clear_of_giver(&closed).then_some(closed)
     }
-    Ok(std::array::from_fn(|digit| {
-        if closed[digit].touches_object() {
-            closed[digit]
+
+    fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
+        self.giver
+            .is_none_or(|giver| !giver.is_neared_by(digit.links.iter(), GIVER_CLEARANCE))
+    }
+
+    /// Closes the thumb, which must touch.
+    fn close_thumb(&self) -> Result<ClosedDigit, NoGrip> {
+        let thumb = self.close(Digit::Thumb);
+        let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        if thumb.touches_object() {
+            Ok(thumb)
         } else {
-            closings[digit].relax(resting_flexion(&closed, digit))
+            Err(NoGrip::Rejected(Rejection::NoThumbEarlyStop))
         }
-    }))
+    }
+
+    /// Closes the fingers, and lets those rest that touch nothing, have something in their way or are not to close.
+    fn close_fingers(
+        &self,
+        thumb: ClosedDigit,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<[ClosedDigit; 5], NoGrip> {
+        let mut closed = [ClosedDigit::default(); 5];
+        closed[Digit::Thumb.index()] = thumb;
+        let fingers = &Digit::ALL[1..];
+        for &finger in fingers.iter().filter(|finger| self.shape.closing[finger.index()]) {
+            if interrupted() {
+                return Err(NoGrip::Interrupted);
+            }
+            closed[finger.index()] = self.close(finger).unwrap_or_default();
+        }
+        if !closed[1..].iter().any(ClosedDigit::touches_object) {
+            return Err(NoGrip::Rejected(Rejection::NoFingers));
+        }
+        let mut rested = closed;
+        for &finger in fingers {
+            let place = finger.index();
+            if !closed[place].touches_object() {
+                rested[place] = self.rest(finger, self.shape.resting_flexion(&closed, place));
+            }
+        }
+        Ok(rested)
+    }
+
+    /// A finger that holds nothing, relaxed; tucked away or nearly stretched where it would meet the giver's hand.
+    fn rest(&self, finger: Digit, flexion: f32) -> ClosedDigit {
+        let closing = self.closing(finger);
+        let relaxed = closing.relax(flexion);
+        if self.is_clear_of_giver(&relaxed) {
+            return relaxed;
+        }
+        let others = EVASIVE_FLEXIONS.map(|flexion| closing.relax(flexion));
+        let free = others.into_iter().find(|other| self.is_clear_of_giver(other));
+        free.unwrap_or(relaxed)
+    }
 }
 
 /// True if palm or forearm sink into the object or come too near to the giver.

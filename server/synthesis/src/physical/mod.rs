@@ -11,6 +11,7 @@ pub(crate) mod contacts;
 pub mod flexing;
 pub mod grip;
 pub mod immobility;
+pub mod obstacle;
 pub mod scene;
 pub mod shape;
 pub mod solids;

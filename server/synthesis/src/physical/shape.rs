@@ -18,6 +18,9 @@ use crate::{
 /// first two and two thirds of it for the last.
 const RESTING_FLEXION: f32 = 1.15;
 
+/// The same of fingers that are tucked away: about nine tenths of their way into the palm, which stops them before.
+pub(super) const TUCKED_FLEXION: f32 = 3.8;
+
 /// What an attempt draws of the hand: how the thumb stands, how far the fingers are spread, how the digits bend, and
 /// which of them close on the object. The fingers share a spread and a bend ratio, as those of a person do; drawn one by
 /// one, half of the hands have fingers that cross.
@@ -31,6 +34,11 @@ pub struct HandShape {
     pub bend_ratios: [f32; 2],
     /// Which digits close, thumb first; the others rest.
     pub closing: [bool; 5],
+    /// How far thumb and fingers are shaped to the object before they close on it: the share of their way from opened to
+    /// closed, from 0 to 1. A hand that is shaped already does not meet with what only an opened one would.
+    pub preshape: [f32; 2],
+    /// Are fingers that do not close tucked into the palm, instead of resting beside those that do?
+    pub tucks: bool,
 }
 
 impl HandShape {
@@ -46,6 +54,8 @@ impl HandShape {
             spread: stream.unit(),
             bend_ratios,
             closing: [true; 5],
+            preshape: [0.0; 2],
+            tucks: false,
         }
     }
 
@@ -61,6 +71,32 @@ impl HandShape {
         0.5 + fan * self.spread
     }
 
+    /// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a
+    /// half more; that of a relaxed hand if none does. A digit that is tucked away bends as far as it can.
+    pub(super) fn resting_flexion(&self, closed: &[ClosedDigit; 5], digit: usize) -> f32 {
+        if self.tucks && !self.closing[digit] {
+            return TUCKED_FLEXION;
+        }
+        let neighbours = [digit.checked_sub(1).filter(|&other| other > 0), Some(digit + 1)];
+        let mut sum = 0.0;
+        let mut count = 0.0;
+        for neighbour in neighbours
+            .into_iter()
+            .flatten()
+            .filter_map(|other| closed.get(other))
+        {
+            if neighbour.touches_object() {
+                sum += neighbour.flexion();
+                count += 1.0;
+            }
+        }
+        if count == 0.0 {
+            RESTING_FLEXION
+        } else {
+            (sum / count).clamp(0.5 * RESTING_FLEXION, 1.5 * RESTING_FLEXION)
+        }
+    }
+
     /// How a digit of a hand of this shape bends.
     pub fn flexing<'a>(&self, rig: &'a Rig, digit: Digit) -> Flexing<'a> {
         let digit_rig = rig.digit(digit);
@@ -70,29 +106,6 @@ impl HandShape {
             base_yaw: min + (max - min) * self.yaw_share(digit),
             bend_ratio: self.bend_ratios[usize::from(digit != Digit::Thumb)],
         }
-    }
-}
-
-/// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a
-/// half more; that of a relaxed hand if none does.
-pub(super) fn resting_flexion(closed: &[ClosedDigit; 5], digit: usize) -> f32 {
-    let neighbours = [digit.checked_sub(1).filter(|&other| other > 0), Some(digit + 1)];
-    let mut sum = 0.0;
-    let mut count = 0.0;
-    for neighbour in neighbours
-        .into_iter()
-        .flatten()
-        .filter_map(|other| closed.get(other))
-    {
-        if neighbour.touches_object() {
-            sum += neighbour.flexion();
-            count += 1.0;
-        }
-    }
-    if count == 0.0 {
-        RESTING_FLEXION
-    } else {
-        (sum / count).clamp(0.5 * RESTING_FLEXION, 1.5 * RESTING_FLEXION)
     }
 }
 

@@ -74,6 +74,8 @@ fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Cl
         },
         radii: RADII,
         object_from_wrist: Pose::IDENTITY,
+        preshape: 0.0,
+        obstacles: &[],
     }
 }
 

@@ -123,11 +123,15 @@ fn grip_terms() -> impl Iterator<Item = Term> {
     Term::ALL.into_iter().filter(|term| term.is_of_grip())
 }
 
+/// The bit after those of the five digits that close.
+const TUCKS_BIT: u32 = 5;
+
 fn write_shape(writer: &mut Writer, shape: &HandShape) {
     let bits = (0..5).map(|digit| u8::from(shape.closing[digit]) << digit);
-    writer.u8(bits.sum());
+    writer.u8(bits.sum::<u8>() | u8::from(shape.tucks) << TUCKS_BIT);
     writer.floats(&[shape.thumb_yaw, shape.spread]);
     writer.floats(&shape.bend_ratios);
+    writer.floats(&shape.preshape);
 }
 
 fn read_shape(reader: &mut Reader<'_>) -> Result<HandShape, AtlasError> {
@@ -138,6 +142,8 @@ fn read_shape(reader: &mut Reader<'_>) -> Result<HandShape, AtlasError> {
         spread,
         bend_ratios: reader.floats()?,
         closing: std::array::from_fn(|digit| bits >> digit & 1 == 1),
+        preshape: reader.floats()?,
+        tucks: bits >> TUCKS_BIT & 1 == 1,
     })
 }
 

@@ -35,14 +35,14 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
 
 /// A solid with the ball around it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounded {
-    pub(super) solid: TaperedCapsule,
-    pub(super) centre: Vec3,
-    pub(super) radius: f32,
+pub(in crate::physical) struct Bounded {
+    pub(in crate::physical) solid: TaperedCapsule,
+    pub(in crate::physical) centre: Vec3,
+    pub(in crate::physical) radius: f32,
 }
 
 impl Bounded {
-    pub(super) fn new(solid: TaperedCapsule) -> Self {
+    pub(in crate::physical) fn new(solid: TaperedCapsule) -> Self {
         let (centre, radius) = solid.bounding_ball();
         Self {
             solid,
