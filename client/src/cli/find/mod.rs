@@ -49,6 +49,7 @@ API's FindGraspRequest; only "object" is required:
     "constraints": {
       "receiver_reach": {"client_shoulder": [0.2, 1.4, 1], "reach": 0.7},
       "approach": {"client_direction": [0, 0, -1], "half_angle": 0.8},
+      "allowed_grasp_types": ["medium_wrap", "tripod"], "excluded_grasp_types": [],
       "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1}
   }
 
