@@ -324,11 +324,13 @@ async fn what_the_grasp_must_be_like_is_laid_over_the_file() {
         "0.25",
         "--choice",
         "best",
+        "--key-frames",
     ];
     let printed = run_with_input(&arguments, file);
     assert_eq!(code(&printed), 0, "{}", text(&printed.stderr));
     let request = json(&printed.stdout);
     assert_eq!(request["choice"], "best_within_budget");
+    assert_eq!(request["plan_key_frames"], true);
     let constraints = &request["constraints"];
     let approach = &constraints["approach"];
     assert_eq!(approach["client_direction"], serde_json::json!([-1.0, 0.0, 0.0]));
