@@ -9,6 +9,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     atlas::growth::Growth,
+    constraints::ApproachCone,
     geometry::mesh::TriangleMesh,
     grasp::Grasp,
     hand::{DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
@@ -66,7 +67,7 @@ fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Pla
         .map(|grasp| Planned {
             name: name.to_owned(),
             holdout: holdout.clone(),
-            way: key_frames(&scene, &presented, rig, &grasp),
+            way: key_frames(&scene, &presented, rig, None, &grasp),
             grasp,
         })
         .collect()
@@ -285,6 +286,66 @@ fn closing_sinks_no_deeper_than_a_grasp_and_touches_nothing_forbidden() {
     }
 }
 
+/// The direction in which the hand of a way moves.
+fn direction_of(way: &[KeyFrame; 3]) -> Vec3 {
+    let [from, to] = [&way[0], &way[1]].map(|frame| frame.pose.frame_from_wrist.position);
+    (to - from).normalize_or_zero()
+}
+
+/// The direction in which a hand comes by nature: with its fingers and with its palm.
+fn natural(grasp: &Grasp) -> Vec3 {
+    (grasp.pose.frame_from_wrist.orientation * (Vec3::Y + Vec3::Z)).normalize_or_zero()
+}
+
+/// The way to a planned grasp whose hand may come from a cone only.
+fn way_from(planned: &Planned, axis: Vec3, half_angle: f32) -> Option<[KeyFrame; 3]> {
+    let object = &planned.holdout.object;
+    let scene = ObjectScene::new(object, friction(object));
+    let presented = Presented::of(&planned.holdout);
+    let cone = ApproachCone { axis, half_angle };
+    key_frames(
+        &scene,
+        &presented,
+        rig(Handedness::Right),
+        Some(cone),
+        &planned.grasp,
+    )
+}
+
+#[test]
+fn a_hand_comes_only_from_where_it_may() {
+    let (mut natural_ways, mut blocked, mut others) = (0, 0, 0);
+    for (number, planned) in PLANNED.iter().enumerate() {
+        let Some(way) = &planned.way else { continue };
+        let (free, natural) = (direction_of(way), natural(&planned.grasp));
+        // Only the natural direction is within 10° of itself. It is tried first, so another one means that it is blocked.
+        let only = way_from(planned, natural, 10_f32.to_radians());
+        if free.angle_between(natural) < 0.01 {
+            assert_eq!(only.as_ref(), Some(way), "{}", planned.name);
+            natural_ways += 1;
+        } else {
+            assert_eq!(only, None, "{}", planned.name);
+            blocked += 1;
+        }
+        // All directions are within 80° of the natural one, so none is within 57° of the opposite one.
+        assert_eq!(way_from(planned, -natural, 1.0), None, "{}", planned.name);
+        // A cone that the free choice is not in: another way, or none.
+        let side = free.any_orthonormal_vector();
+        let side = if number % 2 == 0 { side } else { -side };
+        let axis = (free * 0.5 + side).normalize_or_zero();
+        let half_angle = 50_f32.to_radians();
+        if let Some(other) = way_from(planned, axis, half_angle) {
+            let angle = direction_of(&other).angle_between(axis);
+            assert!(angle <= half_angle + 1e-3, "{}: {angle}", planned.name);
+            others += 1;
+        }
+    }
+    assert!(
+        natural_ways > 20 && blocked > 10 && others > 20,
+        "{natural_ways} as by nature, {blocked} blocked, {others} from aside"
+    );
+}
+
 /// A box with its middle in the origin, and its half edges.
 fn cuboid(half: Vec3) -> Arc<GraspObject> {
     let corner = |i: u32| {
@@ -323,7 +384,7 @@ fn the_other_hand_comes_the_mirrored_way() {
     for planned in planned.iter().take(50) {
         let mut grasp = planned.grasp.clone();
         grasp.pose.frame_from_wrist = grasp.pose.frame_from_wrist.mirrored_x();
-        let mirrored = key_frames(&scene, &Presented::of(&holdout), left, &grasp);
+        let mirrored = key_frames(&scene, &Presented::of(&holdout), left, None, &grasp);
         assert_eq!(mirrored.is_some(), planned.way.is_some());
         for (ours, theirs) in planned.way.iter().flatten().zip(mirrored.iter().flatten()) {
             let expected = ours.pose.frame_from_wrist.mirrored_x().position;
@@ -353,7 +414,7 @@ fn a_hand_that_is_stuck_has_no_way() {
     let block = cuboid(Vec3::splat(0.6));
     let scene = ObjectScene::new(&block, friction(&block));
     assert_eq!(
-        key_frames(&scene, &Presented::of(&floating(&block)), rig, grasp),
+        key_frames(&scene, &Presented::of(&floating(&block)), rig, None, grasp),
         None
     );
 }

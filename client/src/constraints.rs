@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::hand::Digit;
+use crate::{grasp_type::GraspType, hand::Digit};
 
 /// What is demanded of a grasp beyond that it is valid; the default demands nothing. All that is given must hold.
 ///
@@ -15,6 +15,12 @@ pub struct Constraints {
     pub receiver_reach: Option<Reach>,
     /// From where the hand may come; none: from everywhere.
     pub approach: Option<ApproachCone>,
+    /// The only types of grasps that will do, as [`Grasp::grasp_type`](crate::Grasp::grasp_type) tells them; empty: any,
+    /// and also grasps that are like no type. To be without those, name all.
+    pub allowed_grasp_types: Vec<GraspType>,
+    /// Types of grasps that will not do; none of those that are allowed, and not all that there are. Grasps that are like
+    /// no type are not excluded by it.
+    pub excluded_grasp_types: Vec<GraspType>,
     /// Digits of which each must touch the object.
     pub must_touch: Vec<Digit>,
     /// Digits of which none may touch the object.

@@ -161,6 +161,10 @@ pub struct FindRequest {
     /// May the object's atlas be used? None: yes.
     #[serde(default)]
     pub atlas: Option<AtlasUse>,
+    /// Plan the way to the grasp, [`Grasp::key_frames`], for who animates the hand. That takes about half a millisecond,
+    /// sometimes some milliseconds, once the grasp is found; neither budget nor [`SearchReport::search_time`] count it.
+    #[serde(default)]
+    pub plan_key_frames: bool,
 }
 
 impl FindRequest {
@@ -186,6 +190,7 @@ impl FindRequest {
             constraints: Constraints::default(),
             choice: None,
             atlas: None,
+            plan_key_frames: false,
         }
     }
 }
@@ -271,7 +276,8 @@ pub struct Grasp {
     /// How good the grasp is; none if the server did not rate it.
     #[serde(default)]
     pub score: Option<Score>,
-    /// The way to the grasp, in order; empty if the server did not plan one.
+    /// The way to the grasp, in order, if [`FindRequest::plan_key_frames`] asks for it; empty under [`Validity::Thesis`],
+    /// and if there is no straight way in that is free and along which the constraints let the hand approach.
     #[serde(default)]
     pub key_frames: Vec<KeyFrame>,
 }

@@ -1,10 +1,12 @@
 //! Values on the command line.
 
-use std::time::Duration;
+use std::{sync::LazyLock, time::Duration};
 
-use clap::ValueEnum;
+use clap::{ValueEnum, builder::PossibleValue};
 use glam::Vec3;
-use grasp_client::{BendRatios, Choice, Digit, Handedness, Strategy, Validity};
+use grasp_client::{BendRatios, Choice, Digit, GraspType, Handedness, Strategy, Validity};
+
+use super::figures::name_of;
 
 /// Reads a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
 pub(super) fn parse_duration(text: &str) -> Result<Duration, String> {
@@ -260,9 +262,43 @@ impl From<DigitName> for Digit {
     }
 }
 
+/// A type of the taxonomy, by its name with dashes, or with blanks or underscores as in answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct GraspTypeName(pub(super) GraspType);
+
+impl ValueEnum for GraspTypeName {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<[GraspTypeName; GraspType::ALL.len()]> =
+            LazyLock::new(|| GraspType::ALL.map(GraspTypeName));
+        &*ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let words = name_of(&self.0);
+        let aliases = [words.replace(' ', "_"), words.clone()];
+        Some(PossibleValue::new(words.replace(' ', "-")).aliases(aliases))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn grasp_types_are_named_as_in_answers() {
+        for grasp_type in GraspType::ALL {
+            let words = name_of(&grasp_type);
+            for name in [words.replace(' ', "-"), words.replace(' ', "_"), words.clone()] {
+                assert_eq!(
+                    GraspTypeName::from_str(&name, false),
+                    Ok(GraspTypeName(grasp_type))
+                );
+            }
+        }
+        for wrong in ["", "unclassifiable", "medium  wrap", "14"] {
+            assert!(GraspTypeName::from_str(wrong, false).is_err(), "{wrong:?}");
+        }
+    }
 
     #[test]
     fn durations_have_units_and_are_more_than_nothing() {

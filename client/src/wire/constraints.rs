@@ -3,17 +3,24 @@
 use grasp_proto::v1;
 
 use super::{geometry::vector_to_wire, hand::digit_to_wire};
-use crate::constraints::{ApproachCone, Constraints, Reach};
+use crate::{
+    constraints::{ApproachCone, Constraints, Reach},
+    grasp_type::GraspType,
+};
 
 /// Nothing if nothing is demanded.
 pub(super) fn constraints_to_wire(constraints: &Constraints) -> Option<v1::Constraints> {
     if *constraints == Constraints::default() {
         return None;
     }
+    // The contract numbers types as the taxonomy does.
+    let types = |types: &[GraspType]| types.iter().map(|&one| one as i32).collect();
     let digits = |digits: &[_]| digits.iter().map(|&digit| digit_to_wire(digit).into()).collect();
     Some(v1::Constraints {
         receiver_reach: constraints.receiver_reach.map(reach_to_wire),
         approach: constraints.approach.map(approach_to_wire),
+        allowed_grasp_types: types(&constraints.allowed_grasp_types),
+        excluded_grasp_types: types(&constraints.excluded_grasp_types),
         must_touch: digits(&constraints.must_touch),
         must_not_touch: digits(&constraints.must_not_touch),
         max_comfort_e: constraints.max_comfort_e,
@@ -52,6 +59,8 @@ mod tests {
                 client_direction: Vec3::new(5.0, 6.0, 7.0),
                 half_angle: 0.8,
             }),
+            allowed_grasp_types: vec![GraspType::Tripod, GraspType::LargeDiameter],
+            excluded_grasp_types: vec![GraspType::InferiorPincer],
             must_touch: vec![Digit::Thumb, Digit::Index],
             must_not_touch: vec![Digit::Middle, Digit::Ring, Digit::Little],
             max_comfort_e: Some(0.9),
@@ -66,6 +75,8 @@ mod tests {
                 client_direction: vector(5.0, 6.0, 7.0),
                 half_angle: 0.8,
             }),
+            allowed_grasp_types: vec![v1::GraspType::Tripod.into(), v1::GraspType::LargeDiameter.into()],
+            excluded_grasp_types: vec![v1::GraspType::InferiorPincer.into()],
             must_touch: vec![1, 2],
             must_not_touch: vec![3, 4, 5],
             max_comfort_e: Some(0.9),

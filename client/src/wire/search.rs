@@ -72,6 +72,7 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
             Some(AtlasUse::None) => v1::AtlasUse::None,
         }
         .into(),
+        plan_key_frames: request.plan_key_frames,
     }
 }
 

@@ -283,6 +283,7 @@ fn a_request_that_says_nothing_leaves_all_to_the_server() {
     assert_eq!(wire.choice(), v1::Choice::Unspecified);
     assert_eq!(wire.atlas(), v1::AtlasUse::Unspecified);
     assert_eq!(wire.constraints, None);
+    assert!(!wire.plan_key_frames);
     assert_eq!(wire.convention(), v1::Convention::Openxr);
     assert_eq!((wire.budget, wire.seed, wire.up), (None, None, None));
 }
@@ -308,6 +309,7 @@ fn a_request_keeps_what_it_says() {
         },
         choice: Some(Choice::BestWithinBudget),
         atlas: Some(AtlasUse::None),
+        plan_key_frames: true,
         ..FindRequest::new("objects/remote")
     };
     let wire = find_request_to_wire(&request);
@@ -326,5 +328,6 @@ fn a_request_keeps_what_it_says() {
     assert_eq!(wire.friction, Some(0.5));
     assert_eq!(wire.choice(), v1::Choice::BestWithinBudget);
     assert_eq!(wire.atlas(), v1::AtlasUse::None);
+    assert!(wire.plan_key_frames);
     assert_eq!(wire.constraints.unwrap().max_comfort_e, Some(0.25));
 }

@@ -302,7 +302,7 @@ async fn a_request_may_be_printed_and_read_again() {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_the_grasp_must_be_like_is_laid_over_the_file() {
     let file = r#"{"object": "objects/remote",
-        "choice": "first_valid", "constraints": {"must_touch": ["ring"], "must_not_touch": ["middle"], "max_comfort_e": 0.5}}"#;
+        "choice": "first_valid", "constraints": {"excluded_grasp_types": ["stick"], "must_touch": ["ring"], "must_not_touch": ["middle"], "max_comfort_e": 0.5}}"#;
     let arguments = [
         "find",
         "--request",
@@ -314,17 +314,23 @@ async fn what_the_grasp_must_be_like_is_laid_over_the_file() {
         "0.75",
         "--approach",
         "-1,0,0,180",
+        "--grasp-type",
+        "Medium-Wrap",
+        "--grasp-type",
+        "sphere 3 finger,tip_pinch",
         "--must-touch",
         "thumb,index",
         "--max-comfort-e",
         "0.25",
         "--choice",
         "best",
+        "--key-frames",
     ];
     let printed = run_with_input(&arguments, file);
     assert_eq!(code(&printed), 0, "{}", text(&printed.stderr));
     let request = json(&printed.stdout);
     assert_eq!(request["choice"], "best_within_budget");
+    assert_eq!(request["plan_key_frames"], true);
     let constraints = &request["constraints"];
     let approach = &constraints["approach"];
     assert_eq!(approach["client_direction"], serde_json::json!([-1.0, 0.0, 0.0]));
@@ -336,9 +342,48 @@ async fn what_the_grasp_must_be_like_is_laid_over_the_file() {
         constraints["receiver_reach"],
         serde_json::json!({"client_shoulder": [-0.5, 1.25, 0.0], "reach": 0.75})
     );
+    assert_eq!(
+        constraints["allowed_grasp_types"],
+        serde_json::json!(["medium_wrap", "sphere_3_finger", "tip_pinch"])
+    );
+    assert_eq!(constraints["excluded_grasp_types"], serde_json::json!(["stick"]));
     assert_eq!(constraints["must_touch"], serde_json::json!(["thumb", "index"]));
     assert_eq!(constraints["must_not_touch"], serde_json::json!(["middle"]));
     assert_eq!(constraints["max_comfort_e"], 0.25);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_grasp_type_that_is_none_is_refused_with_those_that_are() {
+    for (option, given) in [("--grasp-type", "unclassifiable"), ("--not-grasp-type", "pinch")] {
+        let output = run(&[
+            "find",
+            "--holdout",
+            "remote-hold1",
+            "--print-request",
+            option,
+            given,
+        ]);
+        assert_eq!(code(&output), 2, "{}", text(&output.stdout));
+        let message = text(&output.stderr);
+        assert!(message.contains(given) && message.contains(option), "{message}");
+    }
+    let option = "--not-grasp-type";
+    let output = run(&[
+        "find",
+        "--holdout",
+        "remote-hold1",
+        "--print-request",
+        option,
+        "tripod",
+        option,
+        "ring",
+    ]);
+    let constraints = &json(&output.stdout)["constraints"];
+    assert_eq!(
+        constraints["excluded_grasp_types"],
+        serde_json::json!(["tripod", "ring"])
+    );
+    assert_eq!(constraints["allowed_grasp_types"], serde_json::json!([]));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -69,9 +69,12 @@ impl Clock for SinceArrival {
 }
 
 impl FindJob {
-    /// True if preparing and a look-up are quick enough for a call's own thread.
+    /// True if preparing, a look-up and the answer are quick enough for a call's own thread: planning a way is not.
     pub(crate) fn may_be_known(&self) -> bool {
-        self.atlas.is_some() && self.query.choice == Choice::FirstValid && !self.query.reproducible
+        self.atlas.is_some()
+            && self.query.choice == Choice::FirstValid
+            && !self.query.reproducible
+            && !self.query.plan_key_frames
     }
 
     /// Poses the giver's hand.
@@ -154,8 +157,9 @@ impl PreparedJob {
     fn answer(&self, mut outcome: SearchOutcome) -> Result<v1::FindGraspResponse, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
         let search_time = self.start.elapsed();
-        if let Some(grasp) = &mut outcome.grasp {
-            plan_way(&self.holdout, rig, self.settings.friction, grasp);
+        if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
+            let approach = self.settings.constraints.approach;
+            plan_way(&self.holdout, rig, self.settings.friction, approach, grasp);
         }
         let frame = ClientFrame {
             convention: self.query.convention,
@@ -309,6 +313,7 @@ mod tests {
                         only_attempt,
                         reproducible,
                         friction,
+                        plan_key_frames: true,
                         ..Default::default()
                     }
                 },

@@ -1,11 +1,12 @@
 //! Checks `Constraints`.
 
-use std::f32::consts::PI;
+use std::{f32::consts::PI, fmt::Debug};
 
 use grasp_proto::v1;
 use grasp_synthesis::{
-    constraints::{ApproachCone, Constraints, DigitSet, Reach},
+    constraints::{ApproachCone, Constraints, DigitSet, Reach, TypeSet},
     hand::Digit,
+    taxonomy::GraspType,
 };
 
 use super::{FARTHEST, Field, Violations, direction, known, point};
@@ -27,28 +28,46 @@ pub(super) fn constraints(
     let approach = sent
         .approach
         .and_then(|sent| approach(field.child("approach"), sent, convention, violations));
-    let must_touch = digits(
-        field.child("must_touch"),
-        &sent.must_touch,
-        DigitSet::default(),
+    let types = |name, sent: &[i32], allowed: Option<TypeSet>, violations: &mut Violations| {
+        let is_allowed = |one| allowed.is_some_and(|allowed| allowed.contains(one));
+        let opposite = ("allowed_grasp_types", is_allowed);
+        listed::<_, TypeSet>(field.child(name), sent, grasp_type, opposite, violations)
+    };
+    let allowed_types = types("allowed_grasp_types", &sent.allowed_grasp_types, None, violations);
+    // No type is named by an empty list, or by one of nothing but mistakes.
+    let allowed_types = Some(allowed_types).filter(|&allowed| allowed != TypeSet::default());
+    let excluded_types = types(
+        "excluded_grasp_types",
+        &sent.excluded_grasp_types,
+        allowed_types,
         violations,
     );
-    let must_not_touch = digits(
-        field.child("must_not_touch"),
-        &sent.must_not_touch,
-        must_touch,
-        violations,
-    );
+    if GraspType::ALL.iter().all(|&one| excluded_types.contains(one)) {
+        violations.add(
+            field.child("excluded_grasp_types"),
+            format_args!(
+                "names all {} types; at least one must be left",
+                GraspType::ALL.len()
+            ),
+        );
+    }
+    let digits = |name, sent: &[i32], must_touch: DigitSet, violations: &mut Violations| {
+        let opposite = ("must_touch", |digit| must_touch.contains(digit));
+        listed::<_, DigitSet>(field.child(name), sent, digit, opposite, violations)
+    };
+    let must_touch = digits("must_touch", &sent.must_touch, DigitSet::default(), violations);
+    let must_not_touch = digits("must_not_touch", &sent.must_not_touch, must_touch, violations);
     let worst_comfort = sent
         .max_comfort_e
         .and_then(|worst| comfort(field.child("max_comfort_e"), worst, violations));
     Constraints {
         reach,
         approach,
+        allowed_types,
+        excluded_types,
         must_touch,
         must_not_touch,
         worst_comfort,
-        ..Constraints::default()
     }
 }
 
@@ -110,21 +129,40 @@ fn approach(
     })
 }
 
-/// The digits of a list, none of which may be in `opposite`.
-fn digits(field: Field<'_>, sent: &[i32], opposite: DigitSet, violations: &mut Violations) -> DigitSet {
+/// The members of a list, read one by one, none of which may be in the list that is called `opposite`.
+fn listed<M: Copy + Debug, S: FromIterator<M>>(
+    field: Field<'_>,
+    sent: &[i32],
+    read: impl Fn(Field<'_>, i32, &mut Violations) -> Option<M>,
+    (opposite, is_in_opposite): (&str, impl Fn(M) -> bool),
+    violations: &mut Violations,
+) -> S {
     let check = |(place, &value): (usize, &i32)| {
         let field = field.at(place);
-        let digit = digit(field, value, violations)?;
-        if opposite.contains(digit) {
+        let member = read(field, value, violations)?;
+        if is_in_opposite(member) {
             violations.add(
                 field,
-                format_args!("is {digit:?}, which is in must_touch, too; it cannot be in both"),
+                format_args!("is {member:?}, which is in {opposite}, too; it cannot be in both"),
             );
             return None;
         }
-        Some(digit)
+        Some(member)
     };
     sent.iter().enumerate().filter_map(check).collect()
+}
+
+fn grasp_type(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<GraspType> {
+    if v1::GraspType::try_from(value) == Ok(v1::GraspType::Unspecified) {
+        violations.add(
+            field,
+            "is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy",
+        );
+        return None;
+    }
+    let wire: v1::GraspType = known(field, value, violations);
+    // The contract numbers types as the taxonomy does.
+    u32::try_from(i32::from(wire)).ok().and_then(GraspType::of_number)
 }
 
 fn digit(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Digit> {
@@ -207,6 +245,27 @@ mod tests {
             let approach = constraints.approach.expect("an approach was sent");
             assert!(approach.axis.distance(axis) < 1e-6, "{convention:?}");
             assert_eq!(approach.half_angle, 0.4);
+        }
+    }
+
+    #[test]
+    fn every_type_is_known_by_its_name() {
+        for one in GraspType::ALL {
+            let name = one.name().to_uppercase().replace([' ', '-'], "_");
+            let wire = v1::GraspType::from_str_name(&format!("GRASP_TYPE_{name}")).expect("the same names");
+            let sent = v1::Constraints {
+                allowed_grasp_types: vec![wire.into(), wire.into()],
+                ..Default::default()
+            };
+            let allowed = Some([one].into_iter().collect());
+            assert_eq!(checked(sent, Convention::OpenXr).allowed_types, allowed, "{name}");
+            let sent = v1::Constraints {
+                excluded_grasp_types: vec![wire.into()],
+                ..Default::default()
+            };
+            let constraints = checked(sent, Convention::OpenXr);
+            assert_eq!(constraints.excluded_types, [one].into_iter().collect(), "{name}");
+            assert_eq!(constraints.allowed_types, None, "{name}");
         }
     }
 

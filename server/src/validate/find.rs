@@ -31,6 +31,10 @@ const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
 /// A request that may be searched.
 #[derive(Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "the request's switches do not hang together"
+)]
 pub(crate) struct FindQuery {
     /// The last part of the object's name.
     pub object_id: String,
@@ -70,6 +74,8 @@ pub(crate) struct FindQuery {
     pub choice: Choice,
     /// May the atlas be used?
     pub may_use_atlas: bool,
+    /// Is the way to the grasp wanted?
+    pub plan_key_frames: bool,
 }
 
 /// Checks a request. `object_exists` tells whether an id is known; an unknown one beside other violations is listed
@@ -159,6 +165,7 @@ pub(crate) fn find_query(
         choice,
         // A replayed attempt is to be that attempt.
         may_use_atlas: atlas_use != v1::AtlasUse::None && request.only_attempt.is_none(),
+        plan_key_frames: request.plan_key_frames,
     })
 }
 

@@ -2,7 +2,8 @@
 //! kind of grasp it is and which digits take part.
 //!
 //! The functions `admits_*` come in the order in which an attempt learns what they need: [`Constraints::admits_wrist`]
-//! before the digits are posed, [`Constraints::admits_contacts`] once they are, [`Constraints::admits_grasp`] at the end.
+//! before the digits are posed, [`Constraints::admits_contacts`] and [`Constraints::admits_type`] once they are,
+//! [`Constraints::admits_comfort`] once the forces are known, and [`Constraints::admits`] asks for all of it at the end.
 
 use glam::Vec3;
 
@@ -10,6 +11,7 @@ use crate::{
     grasp::{Contact, Grasp},
     hand::Digit,
     pose::Pose,
+    taxonomy::GraspType,
 };
 
 /// What is demanded of a grasp. The default demands nothing.
@@ -21,7 +23,7 @@ pub struct Constraints {
     pub approach: Option<ApproachCone>,
     /// The only types that are wanted; none: any, also grasps that cannot be classified.
     pub allowed_types: Option<TypeSet>,
-    /// Types that are not wanted.
+    /// Types that are not wanted. It excludes no grasps that cannot be classified.
     pub excluded_types: TypeSet,
     /// Digits of which each must have a contact.
     pub must_touch: DigitSet,
@@ -86,7 +88,9 @@ impl Constraints {
     /// May the wrist be here? Asks for reach and approach.
     pub fn admits_wrist(&self, object_from_wrist: Pose) -> bool {
         self.reach.is_none_or(|reach| reach.admits(object_from_wrist))
-            && self.approach.is_none_or(|cone| cone.admits(object_from_wrist))
+            && self
+                .approach
+                .is_none_or(|cone| cone.contains(approach_direction(object_from_wrist)))
     }
 
     /// Do the right digits touch? The palm may.
@@ -96,28 +100,33 @@ impl Constraints {
         touching.contains_all(self.must_touch) && !touching.intersects(self.must_not_touch)
     }
 
-    /// Does a finished grasp meet every demand?
-    pub fn admits(&self, grasp: &Grasp) -> bool {
-        let grasp_type = grasp
-            .classification
-            .grasp_type
-            .map(|grasp_type| grasp_type.number() as u8);
-        self.admits_wrist(grasp.pose.frame_from_wrist)
-            && self.admits_contacts(&grasp.contacts)
-            && self.admits_grasp(grasp_type, grasp.comfort)
+    /// Is it the right type of grasp? `classify` tells its type, none if it cannot be classified; it is asked only if
+    /// types are demanded.
+    pub fn admits_type(&self, classify: impl FnOnce() -> Option<GraspType>) -> bool {
+        if self.allowed_types.is_none() && self.excluded_types == TypeSet::default() {
+            return true;
+        }
+        match classify() {
+            None => self.allowed_types.is_none(),
+            Some(grasp_type) => {
+                self.allowed_types
+                    .is_none_or(|allowed| allowed.contains(grasp_type))
+                    && !self.excluded_types.contains(grasp_type)
+            }
+        }
     }
 
-    /// Is it the right type of grasp, and comfortable enough? `grasp_type` is its number in the taxonomy, none if it
-    /// cannot be classified; `comfort` is E of Eq. 4.6.
-    pub fn admits_grasp(&self, grasp_type: Option<u8>, comfort: f32) -> bool {
-        let right_type = match grasp_type {
-            None => self.allowed_types.is_none(),
-            Some(number) => {
-                self.allowed_types.is_none_or(|allowed| allowed.contains(number))
-                    && !self.excluded_types.contains(number)
-            }
-        };
-        right_type && self.worst_comfort.is_none_or(|worst| comfort <= worst)
+    /// Is a grasp comfortable enough? `comfort` is E of Eq. 4.6.
+    pub fn admits_comfort(&self, comfort: f32) -> bool {
+        self.worst_comfort.is_none_or(|worst| comfort <= worst)
+    }
+
+    /// Does a finished grasp meet every demand?
+    pub fn admits(&self, grasp: &Grasp) -> bool {
+        self.admits_wrist(grasp.pose.frame_from_wrist)
+            && self.admits_contacts(&grasp.contacts)
+            && self.admits_type(|| grasp.classification.grasp_type)
+            && self.admits_comfort(grasp.comfort)
     }
 }
 
@@ -128,44 +137,32 @@ impl Reach {
 }
 
 impl ApproachCone {
-    fn admits(&self, object_from_wrist: Pose) -> bool {
-        let direction = approach_direction(object_from_wrist);
+    /// May the hand move toward the object in this direction? A unit vector in the object's frame.
+    pub fn contains(&self, direction: Vec3) -> bool {
         // The cosine alone cannot tell angles below some 0.0003 rad apart, nor those as near to a half turn.
         let angle = f32::atan2(self.axis.cross(direction).length(), self.axis.dot(direction));
         angle <= self.half_angle
     }
 }
 
-/// A set of grasp types by their numbers in the taxonomy (Feix et al. 2016): 1 to 33.
+/// A set of grasp types.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TypeSet(u64);
 
 impl TypeSet {
-    /// The number of the last type; the first is 1.
-    pub const LAST: u8 = 33;
-
-    /// Is the type in the set? Numbers that no type has never are.
-    pub fn contains(self, number: u8) -> bool {
-        self.0 & Self::bit(number) != 0
+    /// Is the type in the set?
+    pub fn contains(self, grasp_type: GraspType) -> bool {
+        self.0 & Self::bit(grasp_type) != 0
     }
 
-    fn bit(number: u8) -> u64 {
-        if (1..=Self::LAST).contains(&number) {
-            1 << number
-        } else {
-            0
-        }
+    fn bit(grasp_type: GraspType) -> u64 {
+        1 << grasp_type.number()
     }
 }
 
-impl FromIterator<u8> for TypeSet {
-    /// The types of these numbers, which must be from 1 to [`TypeSet::LAST`]; others are left out.
-    fn from_iter<I: IntoIterator<Item = u8>>(numbers: I) -> Self {
-        let insert = |bits, number| {
-            debug_assert!(Self::bit(number) != 0, "no grasp type has the number {number}");
-            bits | Self::bit(number)
-        };
-        Self(numbers.into_iter().fold(0, insert))
+impl FromIterator<GraspType> for TypeSet {
+    fn from_iter<I: IntoIterator<Item = GraspType>>(types: I) -> Self {
+        Self(types.into_iter().fold(0, |bits, one| bits | Self::bit(one)))
     }
 }
 

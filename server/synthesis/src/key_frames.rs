@@ -13,7 +13,7 @@ use std::cell::{Cell, OnceCell};
 use glam::Vec3;
 
 use crate::{
-    constraints::approach_direction,
+    constraints::{ApproachCone, approach_direction},
     grasp::Grasp,
     hand::{Digit, DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
     holdout::Holdout,
@@ -87,11 +87,18 @@ pub struct KeyFrame {
     pub pose: HandPose,
 }
 
-/// Plans the way to a grasp that is valid under `PHYSICAL`; to others, which know no solids, there is none.
-pub fn plan_way(holdout: &Holdout, rig: &Rig, friction: f32, grasp: &mut Grasp) {
+/// Plans the way to a grasp that is valid under `PHYSICAL`; to others, which know no solids, there is none. `approach` is
+/// from where the hand may come, in the object's frame.
+pub fn plan_way(
+    holdout: &Holdout,
+    rig: &Rig,
+    friction: f32,
+    approach: Option<ApproachCone>,
+    grasp: &mut Grasp,
+) {
     if grasp.margins.is_some() {
         let scene = ObjectScene::new(&holdout.object, friction);
-        grasp.key_frames = key_frames(&scene, &Presented::of(holdout), rig, grasp);
+        grasp.key_frames = key_frames(&scene, &Presented::of(holdout), rig, approach, grasp);
     }
 }
 
@@ -99,17 +106,20 @@ pub fn plan_way(holdout: &Holdout, rig: &Rig, friction: f32, grasp: &mut Grasp) 
 ///
 /// `PRE_GRASP` is [`OPEN_CLEARANCE`] and more off the object and [`GIVER_CLEARANCE`] and more off the giver's hand, and
 /// not through itself. On the way there the hand touches neither; closing, it sinks no deeper into the object than
-/// [`DEEPEST`], to a tenth of a millimetre, and touches no forbidden surface.
+/// [`DEEPEST`], to a tenth of a millimetre, and touches no forbidden surface. The hand moves in a direction of the cone
+/// `approach`, which is in the object's frame as the rest is; none: in any.
 ///
 /// None if no straight way in was found. The grasp is as valid as others then, but the hand would have to wind its way in.
 pub fn key_frames(
     scene: &ObjectScene<'_>,
     presented: &Presented,
     rig: &Rig,
+    approach: Option<ApproachCone>,
     grasp: &Grasp,
 ) -> Option<[KeyFrame; 3]> {
     let planner = Planner {
         rig,
+        approach,
         close: grasp.pose,
         obstacles: Obstacles {
             object: scene.object,
@@ -141,6 +151,7 @@ fn moved(pose: &HandPose, way: Vec3) -> HandPose {
 
 struct Planner<'a> {
     rig: &'a Rig,
+    approach: Option<ApproachCone>,
     close: HandPose,
     obstacles: Obstacles<'a>,
 }
@@ -200,7 +211,7 @@ impl Planner<'_> {
     }
 
     /// The directions in which the hand may come, in the object's frame: first as hands do by nature, then more and more
-    /// from aside.
+    /// from aside; of those, the ones in which it may.
     fn directions(&self) -> impl Iterator<Item = Vec3> {
         let wrist = self.close.frame_from_wrist;
         let natural = approach_direction(wrist);
@@ -217,7 +228,9 @@ impl Planner<'_> {
                 natural * along + (ahead * cos + thumb_side * sin) * across
             })
         });
-        std::iter::once(natural).chain(aside)
+        std::iter::once(natural)
+            .chain(aside)
+            .filter(|&direction| self.approach.is_none_or(|cone| cone.contains(direction)))
     }
 
     /// True if an open hand is off the object and the giver's hand, and not through itself.

@@ -113,6 +113,47 @@ async fn an_atlas_grows_answers_and_outlives_its_server() {
     assert!(damaged.iter().any(is_replaced));
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn an_atlas_answers_with_types_that_are_asked_for() {
+    let folder = Folder::new("types");
+    let server = start(&folder).await;
+    create_box(&server).await;
+    state(&server, "objects/block", FIRST).await;
+    let ask = async |constraints: v1::Constraints| {
+        let request = v1::FindGraspRequest {
+            object: "objects/block".to_owned(),
+            budget: Some(seconds(10)),
+            constraints: Some(constraints),
+            ..Default::default()
+        };
+        let answer = server.grasps().await.find_grasp(request).await;
+        let answer = answer.unwrap().into_inner();
+        let report = answer.report.unwrap();
+        assert_eq!(report.source(), v1::GraspSource::Atlas, "{report:?}");
+        answer.grasp.expect("one from the atlas").r#type
+    };
+    // Without what has come already, until there are three types.
+    let mut seen: Vec<i32> = Vec::new();
+    while seen.len() < 3 {
+        let next = ask(v1::Constraints {
+            allowed_grasp_types: (1..=33).filter(|one| !seen.contains(one)).collect(),
+            excluded_grasp_types: seen.clone(),
+            ..Default::default()
+        });
+        let next = next.await;
+        assert!(next > 0 && !seen.contains(&next), "{next} after {seen:?}");
+        seen.push(next);
+    }
+    for one in seen {
+        let only = ask(v1::Constraints {
+            allowed_grasp_types: vec![one],
+            ..Default::default()
+        });
+        assert_eq!(only.await, one);
+    }
+    server.stop().await;
+}
+
 /// Flips a bit of every atlas of a folder, and gives what is there now.
 fn damage(folder: &Folder) -> Vec<(PathBuf, Vec<u8>)> {
     let files = fs::read_dir(&folder.0).expect("there is a folder");

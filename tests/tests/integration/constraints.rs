@@ -22,6 +22,8 @@ fn demands() -> v1::Constraints {
             client_direction: Some(vector(2.0)),
             half_angle: 0.5,
         }),
+        allowed_grasp_types: vec![v1::GraspType::Tripod.into()],
+        excluded_grasp_types: vec![v1::GraspType::Palmar.into()],
         must_touch: vec![v1::Digit::Thumb.into()],
         must_not_touch: vec![v1::Digit::Little.into()],
         max_comfort_e: Some(0.1),
@@ -74,6 +76,17 @@ async fn every_demand_is_checked() {
         ("approach.half_angle", |c| approach(c).half_angle = 0.0),
         ("approach.half_angle", |c| approach(c).half_angle = 3.2),
         ("approach.half_angle", |c| approach(c).half_angle = f32::NAN),
+        ("allowed_grasp_types[1]", |c| c.allowed_grasp_types.push(0)),
+        ("allowed_grasp_types[1]", |c| c.allowed_grasp_types.push(34)),
+        ("excluded_grasp_types[1]", |c| c.excluded_grasp_types.push(0)),
+        ("excluded_grasp_types[1]", |c| c.excluded_grasp_types.push(-1)),
+        ("excluded_grasp_types[1]", |c| {
+            c.excluded_grasp_types.push(v1::GraspType::Tripod.into());
+        }),
+        ("excluded_grasp_types", |c| {
+            c.allowed_grasp_types.clear();
+            c.excluded_grasp_types = (1..=33).collect();
+        }),
         ("must_touch[1]", |c| c.must_touch.push(0)),
         ("must_touch[1]", |c| c.must_touch.push(6)),
         ("must_not_touch[1]", |c| c.must_not_touch.push(-1)),
@@ -94,6 +107,90 @@ type Check = fn(&v1::Grasp) -> bool;
 
 fn touching(grasp: &v1::Grasp) -> Vec<v1::Digit> {
     grasp.contacts.iter().map(v1::Contact::digit).collect()
+}
+
+/// Answers to some seeds by a search without an atlas, each with the type of its grasp.
+async fn typed_answers(
+    server: &TestServer,
+    validity: v1::Validity,
+    allowed: &[v1::GraspType],
+    excluded: &[v1::GraspType],
+) -> Vec<(v1::GraspType, v1::SearchReport)> {
+    let mut client = server.grasps().await;
+    let numbers = |types: &[v1::GraspType]| types.iter().map(|&one| one.into()).collect();
+    let mut answers = Vec::new();
+    for seed in 0..10 {
+        let request = v1::FindGraspRequest {
+            seed: Some(seed),
+            reproducible: true,
+            validity: validity.into(),
+            constraints: Some(v1::Constraints {
+                allowed_grasp_types: numbers(allowed),
+                excluded_grasp_types: numbers(excluded),
+                ..Default::default()
+            }),
+            ..floating_remote()
+        };
+        let answer = client.find_grasp(request).await.unwrap().into_inner();
+        let report = answer.report.unwrap();
+        let grasp = answer
+            .grasp
+            .unwrap_or_else(|| panic!("{allowed:?}, {excluded:?}: {report:?}"));
+        answers.push((grasp.r#type(), report));
+    }
+    answers
+}
+
+fn unmet(report: &v1::SearchReport) -> u64 {
+    let of_kind = |count: &&v1::RejectionCount| count.rejection() == v1::Rejection::UnmetConstraint;
+    report
+        .rejections
+        .iter()
+        .find(of_kind)
+        .map_or(0, |count| count.count)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn types_are_allowed_and_excluded() {
+    use v1::GraspType::{PalmarPinch, Unspecified};
+    let server = TestServer::start().await;
+    for validity in [v1::Validity::Physical, v1::Validity::Thesis] {
+        let any = typed_answers(&server, validity, &[], &[]).await;
+        assert!(any.iter().all(|(_, report)| unmet(report) == 0));
+        let types: Vec<_> = any.iter().map(|(one, _)| *one).collect();
+        let is_other = |one: &v1::GraspType| ![PalmarPinch, Unspecified].contains(one);
+        // Or what follows would show nothing.
+        for comes_up in [PalmarPinch, Unspecified] {
+            assert!(types.contains(&comes_up), "{validity:?}: {types:?}");
+        }
+
+        let allowed = typed_answers(&server, validity, &[PalmarPinch], &[]).await;
+        assert!(
+            allowed.iter().all(|(one, _)| *one == PalmarPinch),
+            "{validity:?}: {allowed:?}"
+        );
+        // Where the first valid grasp was another, it was turned down.
+        for (free, (_, report)) in types.iter().zip(&allowed) {
+            assert!(*free == PalmarPinch || unmet(report) > 0, "{free:?}: {report:?}");
+        }
+
+        // Grasps like no type stay.
+        let excluded = typed_answers(&server, validity, &[], &[PalmarPinch]).await;
+        let types: Vec<_> = excluded.iter().map(|(one, _)| *one).collect();
+        assert!(!types.contains(&PalmarPinch), "{validity:?}: {types:?}");
+        assert!(types.contains(&Unspecified), "{validity:?}: {types:?}");
+
+        let others: Vec<_> = (1..=33)
+            .map(|number| v1::GraspType::try_from(number).expect("a type"))
+            .filter(is_other)
+            .collect();
+        let natural = typed_answers(&server, validity, &others, &[]).await;
+        assert!(
+            natural.iter().all(|(one, _)| is_other(one)),
+            "{validity:?}: {natural:?}"
+        );
+    }
+    server.stop().await;
 }
 
 fn wrist(grasp: &v1::Grasp) -> glam::Vec3 {

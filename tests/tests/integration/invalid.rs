@@ -256,6 +256,8 @@ async fn all_violations_are_told_at_once() {
     request.constraints = Some(v1::Constraints {
         receiver_reach: Some(v1::Reach::default()),
         approach: Some(v1::ApproachCone::default()),
+        allowed_grasp_types: vec![14, 34, 0],
+        excluded_grasp_types: vec![14, 15],
         must_touch: vec![1, 9],
         must_not_touch: vec![1],
         max_comfort_e: Some(-1.0),
@@ -270,6 +272,9 @@ async fn all_violations_are_told_at_once() {
         "constraints.receiver_reach.reach",
         "constraints.approach.client_direction",
         "constraints.approach.half_angle",
+        "constraints.allowed_grasp_types[1]",
+        "constraints.allowed_grasp_types[2]",
+        "constraints.excluded_grasp_types[0]",
         "constraints.must_touch[1]",
         "constraints.must_not_touch[0]",
         "constraints.max_comfort_e",

@@ -2,19 +2,39 @@
 
 use std::time::Duration;
 
+use glam::Vec3;
 use grasp_assets::holdouts::holdout;
-use grasp_client::{Convention, FindRequest, Grasp, KeyFrameKind, Validity, built_in::request_for};
+use grasp_client::{
+    ApproachCone, Constraints, Convention, FindRequest, Grasp, KeyFrameKind, Validity, built_in::request_for,
+};
 use grasp_tests::TestServer;
 
 /// Holdouts of which a grasp is found soon.
 const HOLDOUTS: [&str; 3] = ["remote-genhold3", "scissors-hold1", "scissors-genhold1"];
 
 async fn ask(server: &TestServer, name: &str, validity: Validity, convention: Convention) -> Grasp {
+    ask_from(server, name, validity, convention, None).await
+}
+
+/// The same with a hand that comes from a cone, if there is one.
+async fn ask_from(
+    server: &TestServer,
+    name: &str,
+    validity: Validity,
+    convention: Convention,
+    approach: Option<ApproachCone>,
+) -> Grasp {
     let mut request = FindRequest {
         validity: Some(validity),
         seed: Some(5),
+        reproducible: true,
         budget: Some(Duration::from_secs(10)),
         convention,
+        plan_key_frames: true,
+        constraints: Constraints {
+            approach,
+            ..Constraints::default()
+        },
         ..request_for(holdout(name).expect("a built-in holdout"))
     };
     if convention != Convention::OpenXr {
@@ -104,6 +124,57 @@ async fn the_way_ends_in_the_grasp() {
             }
         }
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_way_is_one_that_the_hand_may_come() {
+    let server = TestServer::start().await;
+    let half_angle = 0.7;
+    let mut ways = 0;
+    for convention in [Convention::OpenXr, Convention::Unreal] {
+        for client_direction in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
+            for name in HOLDOUTS {
+                let approach = Some(ApproachCone {
+                    client_direction,
+                    half_angle,
+                });
+                let grasp = ask_from(&server, name, Validity::Physical, convention, approach).await;
+                let [approach, pre_grasp, _] = &grasp.key_frames[..] else {
+                    continue;
+                };
+                let [from, to] = [approach, pre_grasp].map(|frame| frame.client_from_wrist.position);
+                let angle = (to - from).angle_between(client_direction);
+                assert!(
+                    angle <= half_angle + 1e-3,
+                    "{name}, {convention:?}, {client_direction}: {angle}"
+                );
+                ways += 1;
+            }
+        }
+    }
+    assert!(ways > 18, "{ways} ways");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_way_is_planned_unless_it_is_asked_for() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let mut request = FindRequest {
+        seed: Some(5),
+        reproducible: true,
+        budget: Some(Duration::from_secs(10)),
+        ..FindRequest::new("objects/remote")
+    };
+    let without = client.find_grasp(&request).await.expect("a valid request");
+    request.plan_key_frames = true;
+    let with = client.find_grasp(&request).await.expect("a valid request");
+    let [mut without, mut with] = [without, with].map(|answer| answer.grasp.expect("a grasp"));
+    assert_eq!((without.key_frames.len(), with.key_frames.len()), (0, 3));
+    // It is the same grasp.
+    for grasp in [&mut without, &mut with] {
+        grasp.key_frames.clear();
+    }
+    assert_eq!(without, with);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -4,7 +4,7 @@ use clap::Args;
 use glam::Vec3;
 use grasp_client::{ApproachCone, Constraints, Reach};
 
-use crate::cli::values::{Cone, DigitName, parse_cone, parse_vector};
+use crate::cli::values::{Cone, DigitName, GraspTypeName, parse_cone, parse_vector};
 
 /// Options that narrow which grasps will do.
 #[derive(Args, Debug)]
@@ -20,6 +20,18 @@ pub(super) struct ConstraintOptions {
     /// The direction in which the hand moves toward the object, and how many degrees it may be off.
     #[arg(long, value_name = "X,Y,Z,DEGREES", value_parser = parse_cone, allow_hyphen_values = true)]
     approach: Option<Cone>,
+    /// Only grasps of this type of the taxonomy; may be repeated.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', ignore_case = true)]
+    grasp_type: Vec<GraspTypeName>,
+    /// No grasps of this type, named as for --grasp-type; may be repeated.
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_delimiter = ',',
+        ignore_case = true,
+        hide_possible_values = true
+    )]
+    not_grasp_type: Vec<GraspTypeName>,
     /// Digits that must touch the object, such as thumb,index.
     #[arg(long, value_name = "DIGITS", value_delimiter = ',')]
     must_touch: Vec<DigitName>,
@@ -45,6 +57,13 @@ impl ConstraintOptions {
                 client_direction: cone.direction,
                 half_angle: cone.half_angle_degrees.to_radians(),
             });
+        }
+        let types = |names: &[GraspTypeName]| names.iter().map(|name| name.0).collect();
+        if !self.grasp_type.is_empty() {
+            constraints.allowed_grasp_types = types(&self.grasp_type);
+        }
+        if !self.not_grasp_type.is_empty() {
+            constraints.excluded_grasp_types = types(&self.not_grasp_type);
         }
         let digits = |names: &[DigitName]| names.iter().map(|&name| name.into()).collect();
         if !self.must_touch.is_empty() {

@@ -45,10 +45,11 @@ API's FindGraspRequest; only "object" is required:
     "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
     "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
     "record_step_times": false, "convention": "openxr", "friction": null,
-    "choice": "first_valid", "atlas": "allowed",
+    "choice": "first_valid", "atlas": "allowed", "plan_key_frames": false,
     "constraints": {
       "receiver_reach": {"client_shoulder": [0.2, 1.4, 1], "reach": 0.7},
       "approach": {"client_direction": [0, 0, -1], "half_angle": 0.8},
+      "allowed_grasp_types": ["medium_wrap", "tripod"], "excluded_grasp_types": [],
       "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1}
   }
 
@@ -65,6 +66,10 @@ a string of digits."#;
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 #[command(group(ArgGroup::new("what").required(true).args(["holdout", "request"])))]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "every switch is an option of its own"
+)]
 pub(super) struct Arguments {
     /// A built-in holdout, such as remote-hold1.
     #[arg(long, value_name = "NAME")]
@@ -111,6 +116,9 @@ pub(super) struct Arguments {
     /// Record and show the time spent in each step.
     #[arg(long)]
     step_times: bool,
+    /// Plan the way to the grasp, too: an open hand away from the object, the same at the object, and the grasp.
+    #[arg(long)]
+    key_frames: bool,
     /// Write the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
@@ -215,6 +223,7 @@ impl Arguments {
         request.only_attempt = self.only_attempt.or(request.only_attempt);
         request.reproducible |= self.reproducible;
         request.record_step_times |= self.step_times;
+        request.plan_key_frames |= self.key_frames;
         request.friction = self.friction.or(request.friction);
         self.constraints.lay_over(&mut request.constraints);
         let receiver = &mut request.receiving_hand;

@@ -61,7 +61,10 @@ impl PhysicalAttempt {
             self.gripper
                 .grip(object, rig, proposal, Some(presented), stopwatch, interrupted)?;
 
-        if !constraints.admits_contacts(&self.gripper.contacts) {
+        let contacts = &self.gripper.contacts;
+        if !constraints.admits_contacts(contacts)
+            || !constraints.admits_type(|| classify(rig, &grip.pose, contacts).grasp_type)
+        {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
 

@@ -106,15 +106,7 @@ pub fn find_known_grasp(
     if settings.choice != Choice::FirstValid || settings.reproducible {
         return None;
     }
-    let scene = Scene::new(
-        holdout,
-        rig,
-        settings.strategy,
-        settings.bend_ratios,
-        settings.friction,
-    )
-    .with_validity(settings.validity)
-    .with_constraints(settings.constraints);
+    let scene = scene(holdout, rig, settings);
     let known = KnownGrips::of(&scene, settings)?;
     let stop = AtomicBool::new(false);
     let race = Race::new(&scene, settings, Some(&known), clock, &stop);
@@ -141,15 +133,7 @@ pub fn find_grasp(
     stop: &AtomicBool,
 ) -> SearchOutcome {
     debug_assert!(settings.workers >= 1, "there must be at least one worker");
-    let scene = Scene::new(
-        holdout,
-        rig,
-        settings.strategy,
-        settings.bend_ratios,
-        settings.friction,
-    )
-    .with_validity(settings.validity)
-    .with_constraints(settings.constraints);
+    let scene = scene(holdout, rig, settings);
     let known = KnownGrips::of(&scene, settings);
     let race = Race::new(&scene, settings, known.as_ref(), clock, stop);
     // Mostly one of the first known grips is the answer, and waking a worker takes longer than looking at some dozens.
@@ -174,4 +158,17 @@ pub fn find_grasp(
         }
     });
     race.outcome()
+}
+
+/// What the attempts of a search share.
+fn scene<'a>(holdout: &'a Holdout, rig: &'a Rig, settings: &SearchSettings) -> Scene<'a> {
+    Scene::new(
+        holdout,
+        rig,
+        settings.strategy,
+        settings.bend_ratios,
+        settings.friction,
+    )
+    .with_validity(settings.validity)
+    .with_constraints(settings.constraints)
 }

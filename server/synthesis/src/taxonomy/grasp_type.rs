@@ -302,6 +302,12 @@ impl GraspType {
         Self::InferiorPincer,
     ];
 
+    /// The type of a number of the taxonomy; none but for 1 to 33.
+    pub fn of_number(number: u32) -> Option<Self> {
+        let place = usize::try_from(number.checked_sub(1)?).ok()?;
+        Self::ALL.get(place).copied()
+    }
+
     /// Its number in the taxonomy, from 1 to 33.
     pub const fn number(self) -> u32 {
         self as u32
