@@ -45,7 +45,7 @@ const BESIDE_SHARE: f32 = 0.5;
 const BESIDE: [f32; 2] = [0.006, 0.12];
 
 /// Edge in metres of the cells that palms are sorted into, and …
-const CELL: f32 = 0.03;
+const CELL: f32 = 0.02;
 
 /// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes.
 const MOST_IN_CELL: usize = 2;

@@ -11,7 +11,7 @@ use std::f32::consts::PI;
 use super::{
     flexing::{Flexing, Sweep},
     obstacle::Obstacle,
-    solids::{TaperedCapsule, clearance, link_solids},
+    solids::{Bounded, TaperedCapsule, clearance, link_solids},
 };
 use crate::{
     geometry::mesh_bvh::MeshBvh,
@@ -206,8 +206,9 @@ impl Closing<'_> {
 
     /// The same for the obstacles alone: `reachable` if none is nearer.
     fn gap_to_obstacles(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
+        let link = Bounded::new(*link);
         let ahead = self.obstacles.iter().filter(|obstacle| obstacle.stops(index));
-        ahead.fold(reachable, |least, obstacle| least.min(obstacle.gap(link, least)))
+        ahead.fold(reachable, |least, obstacle| least.min(obstacle.gap(&link, least)))
     }
 
     /// True if no link is inside the object or an obstacle.

@@ -46,13 +46,12 @@ impl Obstacle {
 
     /// A distance that it keeps from a link, in metres, on the scale on which the object is touched: the smallest if
     /// that is small and less than `enough`.
-    pub(super) fn gap(&self, link: &TaperedCapsule, enough: f32) -> f32 {
+    pub(super) fn gap(&self, link: &Bounded, enough: f32) -> f32 {
         let flesh = SOFT_CONTACT - SPARE;
-        let (middle, radius) = link.bounding_ball();
-        let sure = middle.distance(self.part.centre) - radius - self.part.radius + flesh;
+        let sure = self.part.sure_distance(link) + flesh;
         if sure > SURE_GAP.min(enough) {
             return sure;
         }
-        self.part.solid.distance(link) + flesh
+        self.part.solid.distance(&link.solid) + flesh
     }
 }

@@ -51,6 +51,14 @@ impl Bounded {
         }
     }
 
+    /// A distance that the other certainly keeps, in metres, by the same means as [`Bounded::is_beyond`].
+    pub(in crate::physical) fn sure_distance(&self, other: &Self) -> f32 {
+        let by_balls = self.centre.distance(other.centre) - self.radius - other.radius;
+        let (long, round) = self.longer_first(other);
+        let by_axis = long.distance_squared_from_axis(round.centre).sqrt() - long.thickest() - round.radius;
+        by_balls.max(by_axis)
+    }
+
     /// True if the other is certainly farther away than `distance`: by the balls around both, then by one ball and the
     /// longer solid's axis, as the ball around a forearm is wide.
     pub(super) fn is_beyond(&self, other: &Self, distance: f32) -> bool {
@@ -58,17 +66,28 @@ impl Bounded {
         if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {
             return true;
         }
-        let (long, round) = if self.radius > other.radius {
+        let (long, round) = self.longer_first(other);
+        let reach = distance + long.thickest() + round.radius;
+        reach < 0.0 || long.distance_squared_from_axis(round.centre) > reach * reach
+    }
+
+    fn longer_first<'a>(&'a self, other: &'a Self) -> (&'a Self, &'a Self) {
+        if self.radius > other.radius {
             (self, other)
         } else {
             (other, self)
-        };
-        let thickest = long.solid.start_radius.max(long.solid.end_radius);
-        let axis = long.solid.end - long.solid.start;
-        let offset = round.centre - long.solid.start;
+        }
+    }
+
+    fn thickest(&self) -> f32 {
+        self.solid.start_radius.max(self.solid.end_radius)
+    }
+
+    fn distance_squared_from_axis(&self, point: Vec3) -> f32 {
+        let axis = self.solid.end - self.solid.start;
+        let offset = point - self.solid.start;
         let along = (offset.dot(axis) / axis.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        let reach = distance + thickest + round.radius;
-        reach < 0.0 || offset.distance_squared(axis * along) > reach * reach
+        offset.distance_squared(axis * along)
     }
 }
 
