@@ -28,9 +28,9 @@ pub(crate) struct Answer {
     /// From before the call to its answer in the client, encoding and decoding included.
     pub(crate) round_trip: Duration,
     /// Bytes of the request's message.
-    pub(crate) request_bytes: usize,
+    pub(crate) sent_bytes: usize,
     /// Bytes of the answer's message.
-    pub(crate) answer_bytes: usize,
+    pub(crate) received_bytes: usize,
 }
 
 impl Answer {
@@ -42,7 +42,7 @@ impl Answer {
 
 /// Asks once.
 pub(crate) async fn ask(client: &mut GraspServiceClient<Channel>, request: v1::FindGraspRequest) -> Answer {
-    let request_bytes = request.encoded_len();
+    let sent_bytes = request.encoded_len();
     let start = Instant::now();
     let answer = client.find_grasp(request).await.expect("the request is valid");
     let round_trip = start.elapsed();
@@ -59,8 +59,8 @@ pub(crate) async fn ask(client: &mut GraspServiceClient<Channel>, request: v1::F
         search_time: time(&report.search_time),
         budget: time(&report.budget),
         round_trip,
-        request_bytes,
-        answer_bytes: answer.encoded_len(),
+        sent_bytes,
+        received_bytes: answer.encoded_len(),
     }
 }
 

@@ -42,7 +42,7 @@ const SERVING_THREADS: usize = 2;
 const LOOKS_EVERY: Duration = Duration::from_millis(100);
 
 /// How long atlases may take: each at most two minutes, if the targets are met.
-const PATIENCE: Duration = Duration::from_mins(60);
+const PATIENCE: Duration = Duration::from_hours(1);
 
 /// Everything that the rows have in common.
 pub(crate) struct Setting {
@@ -129,18 +129,9 @@ impl Setting {
         copy
     }
 
-    /// The built-in holdouts, each with its object.
-    pub(crate) fn built_in_holdouts(&self) -> Vec<(&'static str, ClientHoldout)> {
-        holdouts()
-            .iter()
-            .map(|holdout| (holdout.object.as_str(), ClientHoldout::of_built_in(holdout)))
-            .collect()
-    }
-
     /// Requests for the built-in holdouts, again and again until there are as many as random ones of an object.
     pub(crate) fn built_in_requests(&self) -> Vec<v1::FindGraspRequest> {
-        let once: Vec<_> = self
-            .built_in_holdouts()
+        let once: Vec<_> = built_in_holdouts()
             .iter()
             .map(|(object, holdout)| holdout.request(&format!("objects/{object}")))
             .collect();
@@ -177,11 +168,10 @@ impl Setting {
     fn givers(&self, id: &str, object: &GraspObject) -> Givers {
         let count = if self.quick { QUICK_GIVERS } else { GIVERS };
         let rig = &default_hand(Handedness::Right).rig;
-        let made_of: String = key(object, rig)
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
-        let file = self.folder.join(format!("givers-{}-{SEED}.json", &made_of[..32]));
+        let made_of = key(object, rig);
+        let (made_of, _) = made_of.split_first_chunk().expect("a key has as many bytes");
+        let made_of = u128::from_be_bytes(*made_of);
+        let file = self.folder.join(format!("givers-{made_of:032x}-{SEED}.json"));
         let kept = fs::read(&file)
             .ok()
             .and_then(|text| serde_json::from_slice(&text).ok());
@@ -275,6 +265,14 @@ impl Setting {
             answers
         })
     }
+}
+
+/// The built-in holdouts, each with its object.
+pub(crate) fn built_in_holdouts() -> Vec<(&'static str, ClientHoldout)> {
+    holdouts()
+        .iter()
+        .map(|holdout| (holdout.object.as_str(), ClientHoldout::of_built_in(holdout)))
+        .collect()
 }
 
 /// The hand that requests get that name none.

@@ -36,7 +36,7 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
         let mut echo = echo_server.client().await;
         for request in requests {
             let answer = ask(&mut client, request).await;
-            echoes.push(echo.time(answer.request_bytes, answer.answer_bytes).await);
+            echoes.push(echo.time(answer.sent_bytes, answer.received_bytes).await);
             answers.push(answer);
             bar.inc(1);
         }
@@ -44,7 +44,7 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
     let (answers, echoes) = (answers.split_off(unmeasured), echoes.split_off(unmeasured));
 
     let (round_trip, echo) = (round_trips(&answers), Spread::of_times(echoes));
-    let median = |bytes: fn(&Answer) -> usize| {
+    let median_of = |bytes: fn(&Answer) -> usize| {
         let bytes: Vec<f64> = answers.iter().map(|answer| bytes(answer) as f64).collect();
         Spread::of(&bytes).median
     };
@@ -53,8 +53,8 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
     vec![
         Line::new(Row::Wire, "echo", Unit::Seconds, echo).remark(format!(
             "{} bytes there and {} back, at the median",
-            median(|answer| answer.request_bytes),
-            median(|answer| answer.answer_bytes)
+            median_of(|answer| answer.sent_bytes),
+            median_of(|answer| answer.received_bytes)
         )),
         Line::new(Row::Wire, "FindGrasp, all holdouts", Unit::Seconds, round_trip)
             .target(Target::at_most(
