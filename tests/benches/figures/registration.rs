@@ -63,8 +63,13 @@ pub(crate) fn measure(setting: &Setting, others: &[Thing]) -> Vec<Line> {
             config.atlas_directory = Some(folder.clone());
         })
     };
-    let mut lines = growth(setting, &start());
-    lines.extend(meanwhile(setting, &start(), others[0]));
+    let server = start();
+    let mut lines = growth(setting, &server);
+    // What it builds next must not be noticed by the others.
+    setting.serving.block_on(server.stop());
+    let server = start();
+    lines.extend(meanwhile(setting, &server, others[0]));
+    setting.serving.block_on(server.stop());
     lines.push(callable(setting));
     lines
 }
