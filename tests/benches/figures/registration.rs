@@ -168,10 +168,12 @@ async fn judge(client: &mut GraspServiceClient<Channel>, judges: &[v1::FindGrasp
 }
 
 fn growth_lines(useful: Option<(Duration, String)>, last: &v1::AtlasState, grown: Duration) -> Vec<Line> {
-    let once = |what: &str, time: Duration, limit: f64| {
+    let once = |what: &str, time: Duration, limit: f64, came: bool| {
         let seconds = time.as_secs_f64();
-        line(what, Spread::of(&[seconds])).target(Target::at_most("time", Unit::Seconds, seconds, limit))
+        let target = Target::at_most("time", Unit::Seconds, seconds, limit).unless_given_up(!came);
+        line(what, Spread::of(&[seconds])).target(target)
     };
+    let is_useful = useful.is_some();
     let (time_to_use, use_told) = useful.unwrap_or_else(|| {
         let told = format!("not by then: {} grips answer too few", last.entries);
         (grown, told)
@@ -182,8 +184,8 @@ fn growth_lines(useful: Option<(Duration, String)>, last: &v1::AtlasState, grown
         "not complete by then: "
     };
     vec![
-        once("atlas useful", time_to_use, USEFUL).remark(use_told),
-        once("atlas complete", grown, COMPLETE).remark(format!("{end}{} grips", last.entries)),
+        once("atlas useful", time_to_use, USEFUL, is_useful).remark(use_told),
+        once("atlas complete", grown, COMPLETE, last.complete).remark(format!("{end}{} grips", last.entries)),
     ]
 }
 

@@ -17,6 +17,7 @@ use grasp_synthesis::{atlas::key::key, hand::Handedness, object::GraspObject};
 use grasp_tests::{
     TestServer,
     random_holdouts::{ClientHoldout, Givers, GivingHand, PlacedGiver, giving_hands, place},
+    recorded::data_folder,
 };
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use rand::SeedableRng as _;
@@ -171,7 +172,13 @@ impl Setting {
         let made_of = key(object, rig);
         let (made_of, _) = made_of.split_first_chunk().expect("a key has as many bytes");
         let made_of = u128::from_be_bytes(*made_of);
-        let file = self.folder.join(format!("givers-{made_of:032x}-{SEED}.json"));
+        let hands = if data_folder().is_some() {
+            "recorded"
+        } else {
+            "built-in"
+        };
+        let file = format!("givers-{hands}-{made_of:032x}-{SEED}.json");
+        let file = self.folder.join(file);
         let kept = fs::read(&file)
             .ok()
             .and_then(|text| serde_json::from_slice(&text).ok());

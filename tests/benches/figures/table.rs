@@ -128,6 +128,14 @@ impl Target {
         }
     }
 
+    /// Not met if what was waited for did not come: `value` is then how long it was waited for.
+    pub(crate) fn unless_given_up(self, given_up: bool) -> Self {
+        Self {
+            met: self.met && !given_up,
+            ..self
+        }
+    }
+
     fn told(&self) -> String {
         let side = match self.side {
             Side::AtMost => "≤",
