@@ -202,7 +202,7 @@ fn refine(object: &GraspObject, balls: &[Ball], start: Judged) -> Judged {
 }
 
 /// Uniform over all rotations (Shoemake 1992, "Uniform random rotations").
-fn random_rotation(random: &mut Xoshiro256PlusPlus) -> Quat {
+pub(crate) fn random_rotation(random: &mut Xoshiro256PlusPlus) -> Quat {
     use std::f32::consts::TAU;
     let (u, v, w) = (
         random.random::<f32>(),

@@ -1,9 +1,12 @@
-//! What the integration tests, experiments and benches share: a server inside the process, recorded hands and the
-//! placing of givers.
+//! What the integration tests, experiments and benches share: a server inside the process, recorded hands, the placing
+//! of givers and random holdouts.
 
 pub mod giver;
 mod harness;
+pub mod random_holdouts;
 pub mod recorded;
 pub mod searches;
+mod wire;
 
 pub use harness::{StoppingServer, TestServer};
+pub use wire::wire_pose;

@@ -9,11 +9,13 @@ use std::{
 };
 
 use glam::{Quat, Vec3};
+use grasp_assets::obj::{ObjLimits, read_obj};
 use grasp_synthesis::{
     hand::{
         Handedness,
         joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index},
     },
+    object::GraspObject,
     pose::Pose,
 };
 use serde::Deserialize;
@@ -34,6 +36,18 @@ pub fn data_folder_or_skip(test: &str) -> Option<PathBuf> {
         eprintln!("SKIPPED {test}: no recorded data (set GRASP_TEST_DATA to their folder)");
     }
     folder
+}
+
+/// An object of OBJ text in metres, with the mesh as the server reads it and the centre of mass at its origin: enough to
+/// place givers on. `mass` is in kilograms.
+pub fn object_of(obj: &[u8], mass: f32) -> GraspObject {
+    let limits = ObjLimits {
+        bytes: 1 << 24,
+        vertices: 1 << 20,
+        triangles: 1 << 20,
+    };
+    let read = read_obj(obj, 1.0, limits).expect("the mesh can be read");
+    GraspObject::new(read.mesh, mass, Vec3::ZERO, None, &[]).expect("the object is sound")
 }
 
 /// A hand pose that was recorded from a person or made by an artist.

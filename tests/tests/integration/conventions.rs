@@ -5,9 +5,9 @@
 
 use glam::{Mat3, Quat, Vec3};
 use grasp_proto::v1::{self, presenting_hand::Form};
-use grasp_tests::TestServer;
+use grasp_tests::{TestServer, wire_pose};
 
-use crate::support::{held_remote, wire_pose};
+use crate::support::held_remote;
 
 /// An engine's axes (columns: where `OpenXR`'s x, y and z go), its unit, and the turn of its hand joints.
 struct Engine {

@@ -11,14 +11,11 @@ use grasp_client::{
     FindAnswer, FindRequest, GraspClient, HandJoints, JointPose, JointSet, NewObject, Outcome, Pose,
     PresentingHand, Strategy,
 };
-use grasp_synthesis::{
-    hand::{Handedness, joints},
-    object::GraspObject,
-};
+use grasp_synthesis::hand::{Handedness, joints};
 use grasp_tests::{
     TestServer,
     giver::{GiverPlacement, place_giver},
-    recorded::{RecordedPose, data_folder_or_skip, read_poses},
+    recorded::{RecordedPose, data_folder_or_skip, object_of, read_poses},
 };
 
 /// Files of `objects/` with typical masses in kilograms of such things.
@@ -95,17 +92,6 @@ fn webxr_joints(pose: &RecordedPose, placement: &GiverPlacement, client_from_obj
     }
 }
 
-/// The same mesh as the server reads, for placing the giver.
-fn local_object(obj: &[u8], mass: f32) -> GraspObject {
-    let limits = grasp_assets::obj::ObjLimits {
-        bytes: 1 << 24,
-        vertices: 1 << 20,
-        triangles: 1 << 20,
-    };
-    let read = grasp_assets::obj::read_obj(obj, 1.0, limits).expect("the mesh can be read");
-    GraspObject::new(read.mesh, mass, Vec3::ZERO, None, &[]).expect("the object is sound")
-}
-
 /// Asks with strategy F, then with D where F finds nothing in its time.
 async fn ask(
     client: &GraspClient,
@@ -156,7 +142,7 @@ async fn every_real_mesh_is_grasped_from_recorded_givers() {
             .create_object(&NewObject::new(id.as_str(), obj.as_slice(), mass))
             .await
             .unwrap_or_else(|error| panic!("{file} cannot be created: {error}"));
-        let object = local_object(&obj, mass);
+        let object = object_of(&obj, mass);
         assert_eq!(
             created.triangle_count as usize,
             object.surface.mesh().triangles().len(),

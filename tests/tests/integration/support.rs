@@ -5,7 +5,7 @@ use std::{future::Future, time::Duration};
 use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::pose::Pose;
-use grasp_tests::TestServer;
+use grasp_tests::{TestServer, wire_pose};
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
 
@@ -104,16 +104,6 @@ pub(crate) fn held_remote() -> v1::FindGraspRequest {
             form: Some(v1::presenting_hand::Form::Angles(angles)),
         }),
         ..floating_remote()
-    }
-}
-
-pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
-    let [x, y, z] = pose.position.to_array();
-    let position = Some(v1::Vector3 { x, y, z });
-    let [x, y, z, w] = pose.orientation.to_array();
-    v1::Pose {
-        position,
-        orientation: Some(v1::Quaternion { x, y, z, w }),
     }
 }
 

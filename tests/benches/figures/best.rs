@@ -1,0 +1,94 @@
+//! The best grasp within the default budget of 5 ms.
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+
+use crate::{
+    Row,
+    asking::{Answer, assert_some_found, share},
+    setting::{Setting, Thing},
+    table::{Line, Spread, Target, Unit, time},
+};
+
+/// How many candidates are ranked at least, at the median.
+const CANDIDATES: f64 = 500.0;
+
+/// How many seconds beyond the budget the search may take at p99.
+const OVERSHOOT: f64 = 0.5e-3;
+
+/// Requests an object at most: each takes the whole budget.
+const MOST_REQUESTS: usize = 400;
+
+pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Line> {
+    let best = |request| v1::FindGraspRequest {
+        choice: v1::Choice::BestWithinBudget.into(),
+        ..request
+    };
+    let ask = |what: &str, requests: Vec<v1::FindGraspRequest>| {
+        let requests = requests.into_iter().take(MOST_REQUESTS).map(best);
+        setting.ask_all(server, &format!("best, {what}"), requests)
+    };
+    let mut all = ask("the 15 holdouts", setting.built_in_requests());
+    assert_some_found(&all);
+    let mut lines = vec![candidates("the 15 holdouts", &all)];
+    for thing in things {
+        let answers = ask(thing.id(), thing.requests());
+        lines.push(candidates(&format!("random {}", thing.id()), &answers));
+        all.extend(answers);
+    }
+    let spread = candidates_of(&all);
+    lines.push(candidates("all", &all).target(Target::at_least(
+        "median",
+        Unit::Count,
+        spread.median,
+        CANDIDATES,
+    )));
+    lines.extend(overshoot(&all));
+    lines
+}
+
+fn candidates_of(answers: &[Answer]) -> Spread {
+    let ranked: Vec<f64> = answers.iter().map(|answer| answer.candidates as f64).collect();
+    Spread::of(&ranked)
+}
+
+fn candidates(what: &str, answers: &[Answer]) -> Line {
+    let least = answers.iter().map(|answer| answer.candidates).min().unwrap_or(0);
+    Line::new(
+        Row::Best,
+        format!("candidates, {what}"),
+        Unit::Count,
+        candidates_of(answers),
+    )
+    .remark(format!(
+        "least {least}, {:.1} % without a grasp",
+        100.0 * share(answers, |answer| !answer.found)
+    ))
+}
+
+/// Beyond the budget, as the server's report says and as the client sees it.
+fn overshoot(answers: &[Answer]) -> [Line; 2] {
+    let beyond = |taken: fn(&Answer) -> f64| {
+        let beyond: Vec<f64> = answers
+            .iter()
+            .map(|answer| taken(answer) - answer.budget.as_secs_f64())
+            .collect();
+        Spread::of(&beyond)
+    };
+    let budget = answers[0].budget.as_secs_f64();
+    let in_server = beyond(|answer| answer.search_time.as_secs_f64());
+    let in_client = beyond(|answer| answer.round_trip.as_secs_f64());
+    let line = Line::new(Row::Best, "overshoot, search", Unit::Seconds, in_server);
+    [
+        match in_server.p99 {
+            Some(p99) => line.target(Target::at_most("p99", Unit::Seconds, p99, OVERSHOOT)),
+            None => line,
+        }
+        .remark(format!(
+            "the budget is {}, and counts from the call's arrival",
+            time(budget)
+        )),
+        Line::new(Row::Best, "overshoot, round trip", Unit::Seconds, in_client)
+            .remark("the wire and the wording of the answer included"),
+    ]
+}

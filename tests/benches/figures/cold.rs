@@ -1,0 +1,87 @@
+//! Cold: requests without an atlas.
+
+use grasp_assets::objects::objects;
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+
+use crate::{
+    Row,
+    asking::{Answer, ask, assert_some_found, search_times, share},
+    setting::{Setting, Thing, bar, copy_of},
+    table::{Line, Unit},
+};
+
+/// Limits of median and p99 in seconds.
+const MEDIAN: f64 = 2e-3;
+const P99: f64 = 33e-3;
+
+/// Requests of a kind at most: one that nothing answers takes a second.
+const MOST_REQUESTS: usize = 400;
+
+/// Objects that are registered to be asked for once: enough for a p99 of all three, and few enough for the server's
+/// cache.
+const REGISTERED: usize = 40;
+
+/// Asks without atlases, which the server does not build either.
+pub(crate) fn measure(setting: &Setting, things: &[Thing]) -> Vec<Line> {
+    let server = setting.server(|_| {});
+    let ask_all = |what: &str, requests: Vec<v1::FindGraspRequest>| {
+        let requests = requests.into_iter().take(MOST_REQUESTS).map(without_atlas);
+        setting.ask_all(&server, &format!("cold, {what}"), requests)
+    };
+    let mut all = ask_all("the 15 holdouts", setting.built_in_requests());
+    assert_some_found(&all);
+    let mut lines = vec![line("the 15 holdouts", &all)];
+    for thing in things {
+        let answers = ask_all(thing.id(), thing.requests());
+        lines.push(line(&format!("random {}", thing.id()), &answers));
+        all.extend(answers);
+    }
+    lines.push(line("all", &all));
+    lines.push(line(
+        "very first calls of new objects",
+        &first_calls(setting, &server, things),
+    ));
+    setting.serving.block_on(server.stop());
+    lines
+}
+
+/// The same request, answered without an atlas.
+pub(crate) fn without_atlas(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
+        atlas: v1::AtlasUse::None.into(),
+        ..request
+    }
+}
+
+fn line(what: &str, answers: &[Answer]) -> Line {
+    Line::new(Row::Cold, what, Unit::Seconds, search_times(answers))
+        .limits(MEDIAN, P99, None)
+        .remark(format!(
+            "{:.1} % answered in 50 ms, {:.1} % in a second",
+            100.0 * share(answers, Answer::is_in_time),
+            100.0 * share(answers, |answer| answer.found)
+        ))
+}
+
+/// Copies of the built-in objects, each registered and asked for once.
+fn first_calls(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Answer> {
+    let copies = if setting.quick { 1 } else { REGISTERED };
+    let bar = bar(copies * things.len(), "first calls of new objects".to_owned());
+    setting.calling.block_on(async {
+        let mut registry = server.objects().await;
+        let mut client = server.grasps().await;
+        let mut answers = Vec::new();
+        for (thing, built_in) in things.iter().zip(objects()) {
+            for (number, holdout) in thing.holdouts.iter().take(copies).enumerate() {
+                let id = format!("{}-{number}", thing.id());
+                let created = registry.create_object(copy_of(built_in, &id)).await;
+                created.expect("a built-in object can be registered again");
+                let request = without_atlas(holdout.request(&format!("objects/{id}")));
+                answers.push(ask(&mut client, request).await);
+                bar.inc(1);
+            }
+        }
+        answers
+    })
+}

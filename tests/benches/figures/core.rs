@@ -1,0 +1,129 @@
+//! The core alone, on the same holdouts and atlases as the server: what its own share of the time is.
+
+use std::{
+    fs,
+    path::Path,
+    sync::{Arc, atomic::AtomicBool},
+    time::{Duration, Instant},
+};
+
+use grasp_synthesis::{
+    atlas::{Atlas, codec::decode},
+    constraints::Constraints,
+    hand::{Handedness, rig::Rig},
+    holdout::Holdout,
+    object::GraspObject,
+    search::{SearchSettings, find_grasp, find_known_grasp},
+    strategy::{Choice, Strategy, Validity},
+};
+use grasp_tests::searches::MonotonicClock;
+use rayon::ThreadPool;
+
+use crate::{asking::ANSWERED_WITHIN, setting::default_hand};
+
+/// Workers of a search, as of a test's server.
+const WORKERS: usize = 2;
+
+/// How long the server looks for a known grip before it wakes its workers.
+const LOOK_UP_TIME: Duration = Duration::from_micros(200);
+
+/// What one search took.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Taken {
+    /// Was a grasp found?
+    pub(crate) found: bool,
+    /// From the clock on the wall, or of one thread alone.
+    pub(crate) time: Duration,
+}
+
+/// Searches of the core.
+pub(crate) struct Core {
+    rig: &'static Rig,
+    pool: ThreadPool,
+}
+
+impl Core {
+    /// Searches with the default right hand.
+    pub(crate) fn new() -> Self {
+        Self {
+            rig: &default_hand(Handedness::Right).rig,
+            pool: rayon::ThreadPoolBuilder::new()
+                .num_threads(WORKERS)
+                .build()
+                .expect("threads can be had"),
+        }
+    }
+
+    /// The atlas that a server left in a folder; none if there is none for the object and the hand.
+    pub(crate) fn atlas(&self, folder: &Path, object: &GraspObject) -> Option<Arc<Atlas>> {
+        let files = fs::read_dir(folder).ok()?;
+        let mut grown = files.filter_map(|file| {
+            let bytes = fs::read(file.ok()?.path()).ok()?;
+            decode(&bytes, object, self.rig).ok()
+        });
+        Some(grown.next()?.atlas)
+    }
+
+    /// The wall time of a search as the server runs it: a look on the calling thread, then a race of the workers.
+    pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Taken {
+        let settings = settings(holdout, atlas, seed);
+        let clock = MonotonicClock::default();
+        let start = Instant::now();
+        let known = find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME);
+        let outcome = known.unwrap_or_else(|| {
+            let stop = AtomicBool::new(false);
+            find_grasp(&self.pool, holdout, self.rig, &settings, &clock, &stop)
+        });
+        Taken {
+            time: start.elapsed(),
+            found: outcome.grasp.is_some(),
+        }
+    }
+
+    /// The processor time of a look through the whole atlas up to the first valid grip, on the calling thread: what else
+    /// runs on the machine shows less than in wall time.
+    pub(crate) fn look_up(&self, holdout: &Holdout, atlas: &Arc<Atlas>) -> Taken {
+        let settings = settings(holdout, atlas, 0);
+        let clock = MonotonicClock::default();
+        let start = thread_time();
+        let outcome = find_known_grasp(holdout, self.rig, &settings, &clock, ANSWERED_WITHIN);
+        Taken {
+            time: thread_time().saturating_sub(start),
+            found: outcome.is_some(),
+        }
+    }
+}
+
+/// The settings that the server's defaults come to.
+fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings {
+    SearchSettings {
+        seed,
+        strategy: Strategy::Guided,
+        validity: Validity::Physical,
+        bend_ratios: Strategy::Guided.default_bend_ratios(),
+        friction: holdout.object.friction_under(Validity::Physical),
+        constraints: Constraints::default(),
+        choice: Choice::FirstValid,
+        atlas: Some(Arc::clone(atlas)),
+        reproducible: false,
+        first_attempt: 0,
+        max_attempts: u64::MAX,
+        deadline: Some(ANSWERED_WITHIN),
+        workers: WORKERS,
+        record_step_times: false,
+    }
+}
+
+/// Processor time of this thread.
+#[cfg(target_os = "linux")]
+fn thread_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    Duration::try_from(time).expect("a thread's time is positive")
+}
+
+/// Where the system tells no thread's time, wall time must do.
+#[cfg(not(target_os = "linux"))]
+fn thread_time() -> Duration {
+    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    START.elapsed()
+}

@@ -1,0 +1,336 @@
+//! Random holdouts: recorded hands on an object, placed as givers would, under gravity from anywhere.
+//!
+//! Placing a hand takes a second, so it is done some dozens of times an object ([`place`]); a holdout then draws one of
+//! these givers and how the two are turned in the client's frame ([`Givers::draw`]). Everything follows from its seed.
+
+use std::{collections::HashMap, path::Path, sync::Arc};
+
+use glam::Vec3;
+use grasp_assets::{
+    hands::hand,
+    holdouts::{BuiltInHoldout, holdouts},
+};
+use grasp_proto::v1;
+use grasp_synthesis::{
+    hand::{
+        HandPose, Handedness,
+        joints::{HandJoints, index},
+    },
+    holdout::{Holdout, PresentingHand},
+    object::GraspObject,
+    pose::Pose,
+};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    giver::{place_giver, random_rotation},
+    recorded::{data_folder, read_poses},
+    wire_pose,
+};
+
+/// Recorded poses in which a hand can hold something; the judge of quality takes the same.
+const HOLDING: [&str; 18] = [
+    "Cup",
+    "Grip",
+    "Grip 1",
+    "Grip 2",
+    "Grip 3",
+    "Grip 4",
+    "Grip 5",
+    "Grip Shaft",
+    "Hold",
+    "OK",
+    "Pinch Flat",
+    "Pinch Large",
+    "Pinch Middle",
+    "Pinch Tight",
+    "Pinch Up",
+    "PingPong",
+    "Rounded",
+    "relax",
+];
+
+/// Files of recorded poses.
+const POSE_FILES: [&str; 2] = ["godot_xr_tools_poses.json", "handy-work_poses.json"];
+
+/// How deep a giver's skin may be in the object, in metres: flesh gives way by that much. Deeper ones are placed anew.
+const GIVER_DEPTH: f32 = 0.004;
+
+/// Digits that must touch: fewer hold nothing.
+const TOUCHING_DIGITS: usize = 2;
+
+/// How often a hand is placed anew until it holds well; then the shallowest is taken.
+const PLACEMENTS: u64 = 6;
+
+/// Where the object is in the client's frame, in metres: not at its origin, so that nobody can take the one frame for
+/// the other.
+const CLIENT_POSITION: Vec3 = Vec3::new(0.0, 1.2, 0.3);
+
+/// A hand that can hold something.
+#[derive(Clone, Debug)]
+pub struct GivingHand {
+    /// Names it among all of [`giving_hands`].
+    pub name: String,
+    /// Its joints, in the wrist's `OpenXR` frame.
+    pub joints: HandJoints,
+}
+
+/// Recorded hands that hold something; without the recorded data, those of the built-in holdouts.
+pub fn giving_hands() -> Vec<GivingHand> {
+    data_folder().map_or_else(built_in_hands, |folder| recorded_hands(&folder))
+}
+
+fn recorded_hands(folder: &Path) -> Vec<GivingHand> {
+    let adult = &hand("adult", Handedness::Right)
+        .expect("the adult rig is built in")
+        .rig;
+    let files = POSE_FILES.map(|file| read_poses(&folder.join("poses").join(file), &adult.joint_radii));
+    let holding = files
+        .into_iter()
+        .flatten()
+        .filter(|pose| HOLDING.contains(&pose.name.as_str()));
+    holding
+        .map(|mut pose| {
+            // The files have no radii: an adult's, scaled by the length of the middle finger.
+            let finger = &pose.joints.joints[index::FIRST_OF_DIGIT[2] + 1..=index::TIP_OF_DIGIT[2]];
+            let length: f32 = finger
+                .windows(2)
+                .map(|pair| pair[0].pose.position.distance(pair[1].pose.position))
+                .sum();
+            let scale = length / adult.digits[2].lengths.iter().sum::<f32>();
+            for joint in &mut pose.joints.joints {
+                joint.radius *= scale;
+            }
+            GivingHand {
+                name: format!("{} {:?}", pose.name, pose.joints.handedness),
+                joints: pose.joints,
+            }
+        })
+        .collect()
+}
+
+fn built_in_hands() -> Vec<GivingHand> {
+    let of_holdout = |holdout: &BuiltInHoldout| {
+        let rig = &hand(&holdout.giver_rig, holdout.giver_handedness)
+            .expect("the rigs of built-in holdouts are built in")
+            .rig;
+        let joints = HandJoints::of_pose(rig, &holdout.giver_pose());
+        let wrist_from_world = joints.joints[index::WRIST].pose.inverse();
+        GivingHand {
+            name: holdout.name.clone(),
+            joints: joints.transformed(wrist_from_world),
+        }
+    };
+    holdouts().iter().map(of_holdout).collect()
+}
+
+/// Where one of [`giving_hands`] holds an object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlacedGiver {
+    /// The hand's name.
+    pub hand: String,
+    /// The wrist's `OpenXR` frame in the object's frame.
+    pub object_from_wrist: Pose,
+}
+
+/// Places one of `hands`, which are not none, on an object: about a second of work, the same for the same arguments.
+pub fn place(object: &GraspObject, hands: &[GivingHand], seed: u64) -> PlacedGiver {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let hand = &hands[random.random_range(0..hands.len())];
+    let mut shallowest = None;
+    for _ in 0..PLACEMENTS {
+        let placed = place_giver(object, &hand.joints, random.random());
+        if placed.penetration <= GIVER_DEPTH && placed.touching_digits >= TOUCHING_DIGITS {
+            shallowest = Some(placed);
+            break;
+        }
+        if shallowest.is_none_or(|other| placed.penetration < other.penetration) {
+            shallowest = Some(placed);
+        }
+    }
+    PlacedGiver {
+        hand: hand.name.clone(),
+        object_from_wrist: shallowest.expect("at least one is placed").object_from_wrist,
+    }
+}
+
+/// The givers of an object, to draw holdouts from.
+#[derive(Clone, Debug)]
+pub struct Givers {
+    /// Their joints in the object's frame.
+    joints: Vec<HandJoints>,
+}
+
+impl Givers {
+    /// The givers that are placed so. None if there are none, or if one has a hand that is not among `hands`.
+    pub fn new(hands: &[GivingHand], placed: &[PlacedGiver]) -> Option<Self> {
+        let by_name: HashMap<_, _> = hands.iter().map(|hand| (&hand.name, &hand.joints)).collect();
+        let joints = placed
+            .iter()
+            .map(|giver| Some(by_name.get(&giver.hand)?.transformed(giver.object_from_wrist)))
+            .collect::<Option<Vec<_>>>()?;
+        (!joints.is_empty()).then_some(Self { joints })
+    }
+
+    /// One of the givers with the object, turned at random.
+    pub fn draw(&self, random: &mut Xoshiro256PlusPlus) -> ClientHoldout {
+        let giver = &self.joints[random.random_range(0..self.joints.len())];
+        let client_from_object = Pose::new(CLIENT_POSITION, random_rotation(random).normalize());
+        ClientHoldout {
+            client_from_object,
+            giver: giver.transformed(client_from_object),
+        }
+    }
+}
+
+/// A holdout in a client's frame, +Y up.
+#[derive(Clone, Debug)]
+pub struct ClientHoldout {
+    /// The object in the client's frame.
+    pub client_from_object: Pose,
+    /// The giver's hand in the client's frame.
+    pub giver: HandJoints,
+}
+
+impl ClientHoldout {
+    /// A built-in one, in its world.
+    pub fn of_built_in(holdout: &BuiltInHoldout) -> Self {
+        let rig = &hand(&holdout.giver_rig, holdout.giver_handedness)
+            .expect("the rigs of built-in holdouts are built in")
+            .rig;
+        let giver: HandPose = holdout.giver_pose();
+        Self {
+            client_from_object: holdout.world_from_object,
+            giver: HandJoints::of_pose(rig, &giver),
+        }
+    }
+
+    /// The same in the object's frame, ready to be searched under `PHYSICAL` validity.
+    pub fn holdout(&self, object: Arc<GraspObject>) -> Holdout {
+        let object_from_client = self.client_from_object.inverse();
+        Holdout {
+            object,
+            presenting_hand: Some(PresentingHand::of_joints(
+                self.giver.transformed(object_from_client),
+            )),
+            up: object_from_client.transform_vector(Vec3::Y),
+        }
+    }
+
+    /// Asks for a grasp of `object` ("objects/{object}") with the server's defaults.
+    pub fn request(&self, object: &str) -> v1::FindGraspRequest {
+        let handedness = match self.giver.handedness {
+            Handedness::Left => v1::Handedness::Left,
+            Handedness::Right => v1::Handedness::Right,
+        };
+        let joints = self.giver.joints.iter().map(|joint| v1::JointPose {
+            client_from_joint: Some(wire_pose(joint.pose)),
+            radius: joint.radius,
+        });
+        v1::FindGraspRequest {
+            object: object.to_owned(),
+            client_from_object: Some(wire_pose(self.client_from_object)),
+            presenting_hand: Some(v1::PresentingHand {
+                form: Some(v1::presenting_hand::Form::Joints(v1::HandJoints {
+                    handedness: handedness.into(),
+                    joint_set: v1::JointSet::Openxr26.into(),
+                    joints: joints.collect(),
+                })),
+            }),
+            ..Default::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn remote() -> Arc<GraspObject> {
+        let remote = grasp_assets::objects::object("remote").expect("the remote is built in");
+        remote.object.clone()
+    }
+
+    #[test]
+    fn a_placed_giver_holds_the_object_from_outside() {
+        let (object, hands) = (remote(), giving_hands());
+        let placed = place(&object, &hands, 3);
+        assert_eq!(
+            placed,
+            place(&object, &hands, 3),
+            "a seed places once and for all"
+        );
+        let hand = hands
+            .iter()
+            .find(|hand| hand.name == placed.hand)
+            .expect("it is one of them");
+        let joints = hand.joints.transformed(placed.object_from_wrist).joints;
+        let mut nearest = f32::INFINITY;
+        for joint in joints {
+            let position = joint.pose.position;
+            assert!(!object.surface.contains(position), "a bone is in the object");
+            if let Some(closest) = object.surface.closest_point_within(position, 0.1) {
+                nearest = nearest.min(closest.distance - joint.radius);
+            }
+        }
+        assert!(nearest < 0.005, "the skin is {nearest} m away");
+    }
+
+    #[test]
+    fn a_drawn_holdout_is_the_same_for_the_core_and_on_the_wire_under_any_gravity() {
+        const DRAWN: usize = 2000;
+        let (object, hands) = (remote(), giving_hands());
+        let placed = PlacedGiver {
+            hand: hands[0].name.clone(),
+            object_from_wrist: Pose::from_position(Vec3::new(0.1, 0.2, 0.3)),
+        };
+        let givers = Givers::new(&hands, &[placed]).expect("the hand is there");
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+        let mut sum = Vec3::ZERO;
+        for _ in 0..DRAWN {
+            let drawn = givers.draw(&mut random);
+            let holdout = drawn.holdout(object.clone());
+            assert!((holdout.up.length() - 1.0).abs() < 1e-5);
+            sum += holdout.up;
+
+            let request = drawn.request("objects/remote");
+            let Some(v1::presenting_hand::Form::Joints(hand)) = request.presenting_hand.and_then(|h| h.form)
+            else {
+                panic!("the giver has joints");
+            };
+            let wrist = &hand.joints[index::WRIST];
+            let at = wrist.client_from_joint.and_then(|pose| pose.position);
+            let at = at.expect("a joint has a place");
+            let client = request.client_from_object.expect("the object has a pose");
+            let (p, q) = (client.position.unwrap(), client.orientation.unwrap());
+            // Turned and moved by hand: what the giver was placed at must come of it.
+            let object_from_client =
+                glam::Mat3::from_quat(glam::Quat::from_xyzw(q.x, q.y, q.z, q.w)).transpose();
+            let in_object = object_from_client * Vec3::new(at.x - p.x, at.y - p.y, at.z - p.z);
+            assert!(in_object.distance(Vec3::new(0.1, 0.2, 0.3)) < 1e-5);
+            let giver = holdout.presenting_hand.expect("there is a giver");
+            assert!(
+                giver.joints.joints[index::WRIST]
+                    .pose
+                    .position
+                    .distance(in_object)
+                    < 1e-5
+            );
+        }
+        // The mean of uniform directions has a length of 1/√n or so.
+        assert!((sum / DRAWN as f32).length() < 4.0 / (DRAWN as f32).sqrt());
+    }
+
+    #[test]
+    fn givers_of_hands_that_are_not_there_are_none() {
+        let hands = giving_hands();
+        let unknown = PlacedGiver {
+            hand: "nobody's".to_owned(),
+            object_from_wrist: Pose::IDENTITY,
+        };
+        assert!(Givers::new(&hands, &[unknown]).is_none());
+        assert!(Givers::new(&hands, &[]).is_none());
+    }
+}
