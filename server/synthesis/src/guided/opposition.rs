@@ -12,8 +12,10 @@ use crate::{
     synthesis::random::AttemptStream,
 };
 
-/// Least cosine between the line through two opposed pads and each of their palmar directions: 45°.
-const LEAST_COS: f32 = 0.7;
+/// Least cosine between the line through two opposed pads and each of their palmar directions, around thin and around
+/// thicker things: 53° and 45°. A thumb whose base does not turn about its length meets a finger with the side of its
+/// pad; on what is thick, such a pad slips.
+const LEAST_COS: [f32; 2] = [0.6, 0.7];
 
 /// Smallest and largest bend ratio of thumb and fingers: from nearly straight fingers that bend at the knuckles to
 /// curled ones, around those of the thesis' Algorithm 4.
@@ -22,8 +24,34 @@ const BEND_RATIO: [f32; 2] = [0.35, 1.6];
 /// Oppositions that a hand knows. More are more varied, and take more time when a rig is first used: about 150 µs each.
 const KNOWN: usize = 1024;
 
-/// Draws at most for each opposition that a hand knows; one in thirty or so is one.
-const MOST_DRAWS_PER_KNOWN: u64 = 400;
+/// How many it looks for at most; one in five is there for a hand like a person's.
+const DRAWN: u64 = 16 * KNOWN as u64;
+
+/// The thinnest and thickest that pads are brought to, in metres: from a blade to what a hand just gets round. Drawn so
+/// that halves and doubles are as frequent: among thin things, a millimetre more or less is another grip.
+const WIDTHS: [f32; 2] = [0.003, 0.11];
+
+/// Steps in which a hand that is drawn is brought to oppose its pads at a width.
+const STEPS: usize = 96;
+
+/// Hands that are drawn for each opposition; the best is stepped on.
+const STARTS: usize = 16;
+
+/// How far a step goes at first: a share of the thumb's range of yaw and of the digits' ways to closed.
+const FIRST_STEP: f32 = 0.3;
+
+/// Pads that are this much nearer or farther than they were to be, in metres, do as well.
+const WIDTH_ROOM: f32 = 0.004;
+
+/// Where along a digit's last link it may press: from the middle of its pad to the tip.
+const PAD_SPOTS: [f32; 2] = [0.4, 0.85];
+
+/// Up to this width in metres, hands draw their fingers from the first row of [`FINGER_SETS`]' shares.
+const PINCHED_WIDTH: f32 = 0.015;
+
+/// Share of hands of several fingers whose index finger alone meets the thumb: the others lie beside it, along a thing
+/// that is too thin to be between two of them.
+const INDEX_SHARE: f32 = 0.4;
 
 /// Seed of the draws: any will do, and every hand knows the same forever.
 const SEED: u64 = 0x4f50_504f;
@@ -45,13 +73,13 @@ pub struct Opposition {
     pub fingers: Vec3,
 }
 
-/// Which fingers close, with the share of proposals that take them: pinches of the index finger are rare among people's
-/// grasps (Feix et al. 2016), and whole hands hold best.
-const FINGER_SETS: [([bool; 5], f32); 4] = [
-    ([true, true, false, false, false], 0.1),
-    ([true, true, true, false, false], 0.25),
-    ([true, true, true, true, false], 0.2),
-    ([true, true, true, true, true], 0.45),
+/// Which fingers close, with the shares of hands that close them on thin and on thicker things: people pinch what is thin
+/// (Feix et al. 2016), and whole hands hold best.
+const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
+    ([true, true, false, false, false], [0.2, 0.1]),
+    ([true, true, true, false, false], [0.4, 0.25]),
+    ([true, true, true, true, false], [0.2, 0.2]),
+    ([true, true, true, true, true], [0.2, 0.45]),
 ];
 
 /// Share of hands that tuck their idle fingers away: people do when they pinch something small, and fingers that are
@@ -62,13 +90,13 @@ const TUCKED_SHARE: f32 = 0.4;
 /// digits' ways. More meets with more of the object and the giver's hand on the way, less finds thicker parts too thick.
 const PRESHAPE_ROOM: f32 = 0.22;
 
-/// A hand's shape, before anything is closed.
-pub fn draw_shape(stream: &mut AttemptStream) -> HandShape {
+/// A hand's shape, before anything is closed, for a thing of a width in metres.
+pub fn draw_shape(width: f32, stream: &mut AttemptStream) -> HandShape {
     let mut height = stream.unit();
     let closing = FINGER_SETS
         .iter()
-        .find(|(_, share)| {
-            height -= share;
+        .find(|(_, shares)| {
+            height -= shares[usize::from(width > PINCHED_WIDTH)];
             height < 0.0
         })
         .map_or(FINGER_SETS[3].0, |(set, _)| *set);
@@ -86,6 +114,10 @@ pub fn draw_shape(stream: &mut AttemptStream) -> HandShape {
     }
 }
 
+fn least_cos(width: f32) -> f32 {
+    LEAST_COS[usize::from(width > PINCHED_WIDTH)]
+}
+
 /// How a hand can oppose its thumb and its fingers.
 #[derive(Clone, Debug, Default)]
 pub struct Oppositions {
@@ -96,19 +128,12 @@ pub struct Oppositions {
 }
 
 impl Oppositions {
-    /// Draws shapes and how far they have closed, and keeps those whose thumb and fingers oppose each other.
+    /// Draws shapes and widths, and keeps those whose thumb and fingers can be brought to oppose each other.
     pub fn of(rig: &Rig) -> Self {
-        let mut known = Vec::with_capacity(KNOWN);
-        for draw in 0..KNOWN as u64 * MOST_DRAWS_PER_KNOWN {
-            if known.len() == KNOWN {
-                break;
-            }
-            let mut stream = AttemptStream::new(SEED, draw);
-            let shape = draw_shape(&mut stream);
-            let finger_link = if stream.unit() < OUTER_SHARE { 2 } else { 1 };
-            let closed = [stream.unit(), stream.unit()];
-            known.extend(opposition(rig, &shape, finger_link, closed));
-        }
+        let mut known: Vec<Opposition> = (0..DRAWN)
+            .filter_map(|draw| Meeting::draw(rig, &mut AttemptStream::new(SEED, draw)))
+            .take(KNOWN)
+            .collect();
         known.sort_by(|a, b| a.width().total_cmp(&b.width()));
         let stretched = HandPose {
             frame_from_wrist: Pose::IDENTITY,
@@ -169,43 +194,164 @@ impl Opposition {
     }
 }
 
-/// The opposition of a shape whose thumb and fingers have closed by shares of their ways, between the thumb's tip
-/// and a link of the fingers, if there is one.
-fn opposition(rig: &Rig, shape: &HandShape, finger_link: usize, closed: [f32; 2]) -> Option<Opposition> {
-    let (thumb, thumb_facing) = pad(rig, Digit::Thumb, shape, 2, closed[0]);
-    // The two fingers next to the thumb decide: the others follow.
-    let index = pad(rig, Digit::Index, shape, finger_link, closed[1]);
-    let (fingers, fingers_facing) = if shape.closing[Digit::Middle.index()] {
-        let middle = pad(rig, Digit::Middle, shape, finger_link, closed[1]);
-        (
-            (index.0 + middle.0) * 0.5,
-            (index.1 + middle.1).normalize_or_zero(),
-        )
-    } else {
-        index
-    };
-    let across = (fingers - thumb).normalize_or_zero();
-    (across.dot(thumb_facing) >= LEAST_COS && -across.dot(fingers_facing) >= LEAST_COS).then_some(
-        Opposition {
-            shape: HandShape {
-                preshape: closed.map(|closed| (closed - PRESHAPE_ROOM).max(0.0)),
-                ..*shape
-            },
-            closed,
-            thumb,
-            fingers,
-        },
-    )
+/// A hand that is brought to oppose its thumb and its fingers.
+#[derive(Clone, Copy, Debug)]
+struct Meeting {
+    shape: HandShape,
+    /// How far thumb and fingers are closed: shares of their ways.
+    closed: [f32; 2],
+    /// Which link of the fingers meets the thumb's last one.
+    finger_link: usize,
+    /// Where along the links, thumb and fingers.
+    spots: [f32; 2],
+    /// Does the index finger alone meet the thumb, whatever others close?
+    index_alone: bool,
 }
 
-/// The middle of a link's pad on the skin and the direction it faces, in the wrist's frame.
-fn pad(rig: &Rig, digit: Digit, shape: &HandShape, link: usize, closed: f32) -> (Vec3, Vec3) {
+/// Pads of a hand.
+struct Pads {
+    /// Thumb and fingers: a point on the skin in the wrist's frame, in metres, and the direction that it faces.
+    thumb: (Vec3, Vec3),
+    fingers: (Vec3, Vec3),
+}
+
+impl Meeting {
+    /// Draws a hand and a width, and steps to where its pads oppose each other at that width; none if they never do.
+    fn draw(rig: &Rig, stream: &mut AttemptStream) -> Option<Opposition> {
+        let [least, most] = WIDTHS;
+        let width = least * (most / least).powf(stream.unit());
+        let shape = draw_shape(width, stream);
+        let outer = stream.unit() < OUTER_SHARE;
+        let mut spot = || stream.between(PAD_SPOTS[0], PAD_SPOTS[1]);
+        let spots = [spot(), if outer { spot() } else { 0.5 }];
+        let mut meeting = Self {
+            shape,
+            closed: [stream.unit(), stream.unit()],
+            finger_link: if outer { 2 } else { 1 },
+            spots,
+            index_alone: stream.unit() < INDEX_SHARE && width <= PINCHED_WIDTH,
+        };
+        let mut miss = meeting.pads(rig).miss(width);
+        for _ in 0..STARTS {
+            let start = meeting.with_shares(std::array::from_fn(|_| stream.unit()));
+            let its_miss = start.pads(rig).miss(width);
+            if its_miss < miss {
+                (meeting, miss) = (start, its_miss);
+            }
+        }
+        for step in 0..STEPS {
+            let size = FIRST_STEP * (1.0 - step as f32 / STEPS as f32);
+            let stepped = meeting.stepped(size, stream);
+            let its_miss = stepped.pads(rig).miss(width);
+            if its_miss < miss {
+                (meeting, miss) = (stepped, its_miss);
+            }
+        }
+        meeting.opposition(rig, width)
+    }
+
+    /// A hand that is a little different.
+    fn stepped(&self, size: f32, stream: &mut AttemptStream) -> Self {
+        let mut moved = self.shares();
+        let which = stream.below(moved.len());
+        moved[which] = (moved[which] + stream.between(-size, size)).clamp(0.0, 1.0);
+        self.with_shares(moved)
+    }
+
+    /// What the steps change, each from 0 to 1: the thumb's yaw, how far thumb and fingers are closed, and how they bend.
+    fn shares(&self) -> [f32; 5] {
+        let [least, most] = BEND_RATIO;
+        let [thumb, fingers] = self
+            .shape
+            .bend_ratios
+            .map(|ratio| (ratio - least) / (most - least));
+        [
+            self.shape.thumb_yaw,
+            self.closed[0],
+            self.closed[1],
+            thumb,
+            fingers,
+        ]
+    }
+
+    fn with_shares(&self, [thumb_yaw, thumb_closed, fingers_closed, thumb, fingers]: [f32; 5]) -> Self {
+        let [least, most] = BEND_RATIO;
+        Self {
+            shape: HandShape {
+                thumb_yaw,
+                bend_ratios: [thumb, fingers].map(|share| least + (most - least) * share),
+                ..self.shape
+            },
+            closed: [thumb_closed, fingers_closed],
+            ..*self
+        }
+    }
+
+    fn pads(&self, rig: &Rig) -> Pads {
+        let pad = |digit, link, closed, spot| pad(rig, digit, &self.shape, link, closed, spot);
+        let [thumb_closed, fingers_closed] = self.closed;
+        let finger = |digit| pad(digit, self.finger_link, fingers_closed, self.spots[1]);
+        let index = finger(Digit::Index);
+        // The two fingers next to the thumb decide: the others follow.
+        let fingers = if self.shape.closing[Digit::Middle.index()] && !self.index_alone {
+            let middle = finger(Digit::Middle);
+            (
+                (index.0 + middle.0) * 0.5,
+                (index.1 + middle.1).normalize_or_zero(),
+            )
+        } else {
+            index
+        };
+        Pads {
+            thumb: pad(Digit::Thumb, 2, thumb_closed, self.spots[0]),
+            fingers,
+        }
+    }
+
+    fn opposition(&self, rig: &Rig, width: f32) -> Option<Opposition> {
+        let pads = self.pads(rig);
+        let [thumb_cos, fingers_cos] = pads.facing();
+        let fits = (pads.width() - width).abs() <= WIDTH_ROOM;
+        (fits && thumb_cos.min(fingers_cos) >= least_cos(width)).then(|| Opposition {
+            shape: HandShape {
+                preshape: self.closed.map(|closed| (closed - PRESHAPE_ROOM).max(0.0)),
+                ..self.shape
+            },
+            closed: self.closed,
+            thumb: pads.thumb.0,
+            fingers: pads.fingers.0,
+        })
+    }
+}
+
+impl Pads {
+    fn width(&self) -> f32 {
+        self.thumb.0.distance(self.fingers.0)
+    }
+
+    /// Cosines between the line through the pads and the directions that they face: 1 where they face each other.
+    fn facing(&self) -> [f32; 2] {
+        let across = (self.fingers.0 - self.thumb.0).normalize_or_zero();
+        [across.dot(self.thumb.1), -across.dot(self.fingers.1)]
+    }
+
+    /// How far the pads are from opposing each other at a width: a centimetre counts as much as a right angle. What is
+    /// good enough does not count.
+    fn miss(&self, width: f32) -> f32 {
+        let off = ((self.width() - width).abs() - 0.5 * WIDTH_ROOM).max(0.0) / 0.01;
+        let turned = self.facing().map(|cos| (1.1 * least_cos(width) - cos).max(0.0));
+        off + 2.0 * (turned[0] + turned[1])
+    }
+}
+
+/// A point of a link's pad on the skin and the direction it faces, in the wrist's frame.
+fn pad(rig: &Rig, digit: Digit, shape: &HandShape, link: usize, closed: f32, along: f32) -> (Vec3, Vec3) {
     let digit_rig = rig.digit(digit);
     let radii = link_radii(rig, digit);
     let angles = shape.flexing(rig, digit).closed_by(closed);
     let frames = digit_frames(digit_rig, Pose::IDENTITY, angles);
     let frame = frames.links[link];
-    let radius = 0.5 * (radii[link] + radii[link + 1]);
-    let middle = Vec3::new(0.0, 0.5 * digit_rig.lengths[link], radius);
-    (frame.transform_point(middle), frame.transform_vector(Vec3::Z))
+    let radius = radii[link] + (radii[link + 1] - radii[link]) * along;
+    let on_skin = Vec3::new(0.0, along * digit_rig.lengths[link], radius);
+    (frame.transform_point(on_skin), frame.transform_vector(Vec3::Z))
 }

@@ -28,7 +28,7 @@ const THICKNESS_ROOM: [f32; 2] = [0.006, 0.012];
 const PALM_TILT: f32 = 0.35;
 
 /// Places that are drawn for a proposal until one has room, and …
-const MOST_PLACES: usize = 8;
+const MOST_PLACES: usize = 12;
 
 /// … turns of a hand at a place.
 const MOST_TURNS: usize = 10;
@@ -113,7 +113,7 @@ impl Place<'_> {
     fn palm_on_surface(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let shape = HandShape {
             closing: [true; 5],
-            ..draw_shape(stream)
+            ..draw_shape(f32::INFINITY, stream)
         };
         let point = self.object.surface_pairs.point(stream)?;
         if !self.is_free_of_giver(point.position, PALM_ROOM) {
