@@ -100,13 +100,9 @@ impl Constraints {
         touching.contains_all(self.must_touch) && !touching.intersects(self.must_not_touch)
     }
 
-    /// Is it the right type of grasp? `classify` tells its type, none if it cannot be classified; it is asked only if
-    /// types are demanded.
-    pub fn admits_type(&self, classify: impl FnOnce() -> Option<GraspType>) -> bool {
-        if self.allowed_types.is_none() && self.excluded_types == TypeSet::default() {
-            return true;
-        }
-        match classify() {
+    /// Is it the right type of grasp? None for one that cannot be classified.
+    pub fn admits_type(&self, grasp_type: Option<GraspType>) -> bool {
+        match grasp_type {
             None => self.allowed_types.is_none(),
             Some(grasp_type) => {
                 self.allowed_types
@@ -125,7 +121,7 @@ impl Constraints {
     pub fn admits(&self, grasp: &Grasp) -> bool {
         self.admits_wrist(grasp.pose.frame_from_wrist)
             && self.admits_contacts(&grasp.contacts)
-            && self.admits_type(|| grasp.classification.grasp_type)
+            && self.admits_type(grasp.classification.grasp_type)
             && self.admits_comfort(grasp.comfort)
     }
 }

@@ -19,6 +19,7 @@ use crate::{
         comfort::{comfort, digit_totals},
         wrenches::GRAVITY,
     },
+    taxonomy::Classification,
 };
 
 /// E at which comfort counts a third: of grasps valid by the thesis, half are below 0.04.
@@ -37,6 +38,9 @@ const WEIGHT_PER_FINGER: f32 = 1.5;
 /// Closure at which a hold looks safe, in multiples of what validity asks for.
 const SAFE_CLOSURE: f32 = 3.0;
 
+/// Confidence of a classification from which a grasp is beyond doubt of its type.
+const SURE_TYPE: f32 = 0.5;
+
 /// Distance from the giver's hand in metres from which nobody worries: half a hand's breadth.
 const EASY_CLEARANCE: f32 = 0.04;
 
@@ -44,7 +48,7 @@ const EASY_CLEARANCE: f32 = 0.04;
 const STERILE_CLEARANCE: f32 = 0.03;
 
 /// How many terms there are.
-pub const TERMS: usize = 9;
+pub const TERMS: usize = 10;
 
 /// A number for each term, in the order of [`Term::ALL`].
 pub type Values = [f32; TERMS];
@@ -69,6 +73,9 @@ pub enum Term {
     EnoughDigits,
     /// The object lies on pads, not on the sides of digits.
     Pads,
+    /// The grasp is of a type that people use: the taxonomy's, and surely. Grasps without a type look unnatural (thesis
+    /// 5.2 and 6.1).
+    NaturalType,
     /// Ferrari-Canny epsilon is well above what validity asks for.
     Closure,
     /// The palm comes from the side away from the giver's (palm-CoM-palm angle, thesis 5.3).
@@ -87,6 +94,7 @@ impl Term {
         Self::SharedFlexion,
         Self::EnoughDigits,
         Self::Pads,
+        Self::NaturalType,
         Self::Closure,
         Self::AwayFromGiver,
         Self::GiverClearance,
@@ -101,6 +109,7 @@ impl Term {
             Self::SharedFlexion => "shared_flexion",
             Self::EnoughDigits => "enough_digits",
             Self::Pads => "pads",
+            Self::NaturalType => "natural_type",
             Self::Closure => "closure",
             Self::AwayFromGiver => "away_from_giver",
             Self::GiverClearance => "giver_clearance",
@@ -113,6 +122,7 @@ impl Term {
         match self {
             Self::Comfort | Self::EnoughDigits | Self::Closure => 1.0,
             Self::SharedFlexion | Self::Pads | Self::FrictionReserve => 1.5,
+            Self::NaturalType => 2.0,
             Self::AwayFromGiver => 0.75,
             Self::GiverClearance | Self::SterileDistance => 0.5,
         }
@@ -122,7 +132,12 @@ impl Term {
     pub const fn is_of_grip(self) -> bool {
         matches!(
             self,
-            Self::SharedFlexion | Self::EnoughDigits | Self::Pads | Self::Closure | Self::SterileDistance
+            Self::SharedFlexion
+                | Self::EnoughDigits
+                | Self::Pads
+                | Self::NaturalType
+                | Self::Closure
+                | Self::SterileDistance
         )
     }
 }
@@ -169,6 +184,7 @@ pub fn grip_values(
     rig: &Rig,
     pose: &HandPose,
     contacts: &[Contact],
+    classification: Classification,
     epsilon: f32,
     solids: &HandSolids,
 ) -> Values {
@@ -176,9 +192,17 @@ pub fn grip_values(
     values[Term::SharedFlexion as usize] = shared_flexion(pose);
     values[Term::EnoughDigits as usize] = enough_digits(scene.object, contacts);
     values[Term::Pads as usize] = pads(rig, pose, contacts);
+    values[Term::NaturalType as usize] = natural_type(classification);
     values[Term::Closure as usize] = (epsilon / (SAFE_CLOSURE * scene.least_epsilon)).min(1.0);
     values[Term::SterileDistance as usize] = sterile_distance(scene.object, solids);
     values
+}
+
+/// 0 without a type.
+fn natural_type(classification: Classification) -> f32 {
+    classification
+        .grasp_type
+        .map_or(0.0, |_| (classification.confidence / SURE_TYPE).min(1.0))
 }
 
 /// The values of the terms that depend on the forces that balance gravity; the others are 0.

@@ -61,6 +61,7 @@ async fn a_score_is_the_weighted_mean_of_its_terms() {
             "shared_flexion",
             "enough_digits",
             "pads",
+            "natural_type",
             "closure",
             "away_from_giver",
             "giver_clearance",

@@ -15,6 +15,7 @@ use crate::{
         solids::{HandSolids, PreparedHand, TaperedCapsule},
     },
     score::{Score, Values, force_values, grip_values, score},
+    taxonomy::{Classification, classify},
 };
 
 /// Balls inside a hand that settle most meetings with a giver's: seven in palm and forearm, which meet most often, and
@@ -32,6 +33,8 @@ pub struct Entry {
     pub grip: Grip,
     /// Where it touches.
     pub contacts: Vec<Contact>,
+    /// Its type of the taxonomy.
+    pub classification: Classification,
     /// Ferrari-Canny epsilon under the atlas' friction.
     pub epsilon: f32,
     /// The score's terms that depend on hand and object alone.
@@ -53,7 +56,8 @@ impl Entry {
         gripper: &mut Gripper,
     ) -> Self {
         let contacts = gripper.contacts.clone();
-        let grip_values = grip_values(scene, rig, &grip.pose, &contacts, epsilon, solids);
+        let classification = classify(rig, &grip.pose, &contacts);
+        let grip_values = grip_values(scene, rig, &grip.pose, &contacts, classification, epsilon, solids);
         let of_grip = Score { values: grip_values }.of_grip();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(direction(index));
@@ -68,13 +72,22 @@ impl Entry {
                 quantised(of_grip + Score { values }.total())
             })
         });
-        Self::from_parts(grip, contacts, epsilon, grip_values, scores, solids)
+        Self::from_parts(
+            grip,
+            contacts,
+            classification,
+            epsilon,
+            grip_values,
+            scores,
+            solids,
+        )
     }
 
     /// An entry of which everything is known.
     pub(super) fn from_parts(
         grip: Grip,
         contacts: Vec<Contact>,
+        classification: Classification,
         epsilon: f32,
         grip_values: Values,
         scores: [u8; DIRECTIONS],
@@ -83,6 +96,7 @@ impl Entry {
         Self {
             grip,
             contacts,
+            classification,
             epsilon,
             grip_values,
             scores,
@@ -125,9 +139,9 @@ impl Entry {
             self.epsilon
         };
         let mut grasp = grasp(
-            rig,
             &self.grip,
             &self.contacts,
+            self.classification,
             epsilon,
             &balance,
             presented,

@@ -21,6 +21,7 @@ use crate::{
     pose::Pose,
     strategy::Validity,
     synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+    taxonomy::classify,
 };
 
 /// Grips of a complete atlas. More leave more for a giver who covers nearly everything, and take more memory (about a
@@ -159,7 +160,11 @@ impl<'a> Growth<'a> {
                 false
             })
             .ok()?;
-        if self.is_crowded(grip.pose.frame_from_wrist) {
+        // Grips without a type look unnatural: they are better than nothing, and one of them is enough.
+        let is_natural = classify(self.rig, &grip.pose, &gripper.contacts)
+            .grasp_type
+            .is_some();
+        if self.is_crowded(grip.pose.frame_from_wrist, is_natural) {
             return None;
         }
         let epsilon = gripper.closure(&self.scene)?;
@@ -197,17 +202,19 @@ impl<'a> Growth<'a> {
 
     fn take(&mut self, entry: Entry, shape: HandShape) {
         let wrist = entry.grip.pose.frame_from_wrist;
-        if self.entries.len() < ENTRIES && !self.is_crowded(wrist) {
+        let is_natural = entry.classification.grasp_type.is_some();
+        if self.entries.len() < ENTRIES && !self.is_crowded(wrist, is_natural) {
             *self.cells.entry(self.cell(wrist)).or_default() += 1;
             self.entries.push(entry);
             self.shapes.push(shape);
         }
     }
 
-    fn is_crowded(&self, wrist: Pose) -> bool {
+    fn is_crowded(&self, wrist: Pose, is_natural: bool) -> bool {
+        let most = if is_natural { MOST_IN_CELL } else { 1 };
         self.cells
             .get(&self.cell(wrist))
-            .is_some_and(|&count| count >= MOST_IN_CELL)
+            .is_some_and(|&count| count >= most)
     }
 
     /// Where a palm is, which way it faces and which way its fingers go.

@@ -44,7 +44,7 @@ const FIRST_STEP: f32 = 0.3;
 const WIDTH_ROOM: f32 = 0.004;
 
 /// Where along a digit's last link it may press: from the middle of its pad to the tip.
-const PAD_SPOTS: [f32; 2] = [0.4, 0.85];
+const PAD_SPOTS: [f32; 2] = [0.5, 1.0];
 
 /// Up to this width in metres, hands draw their fingers from the first row of [`FINGER_SETS`]' shares.
 const PINCHED_WIDTH: f32 = 0.015;
@@ -352,6 +352,8 @@ fn pad(rig: &Rig, digit: Digit, shape: &HandShape, link: usize, closed: f32, alo
     let frames = digit_frames(digit_rig, Pose::IDENTITY, angles);
     let frame = frames.links[link];
     let radius = radii[link] + (radii[link + 1] - radii[link]) * along;
-    let on_skin = Vec3::new(0.0, along * digit_rig.lengths[link], radius);
+    // The last link's solid ends where the ball of its tip has its middle.
+    let beyond = if link == 2 { radii[3] } else { 0.0 };
+    let on_skin = Vec3::new(0.0, along * (digit_rig.lengths[link] - beyond), radius);
     (frame.transform_point(on_skin), frame.transform_vector(Vec3::Z))
 }

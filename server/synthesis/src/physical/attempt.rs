@@ -16,7 +16,7 @@ use crate::{
         comfort::{comfort, digit_totals},
         stopwatch::{Step, Stopwatch},
     },
-    taxonomy::classify,
+    taxonomy::{Classification, classify},
 };
 
 /// What an attempt works with.
@@ -62,9 +62,8 @@ impl PhysicalAttempt {
                 .grip(object, rig, proposal, Some(presented), stopwatch, interrupted)?;
 
         let contacts = &self.gripper.contacts;
-        if !constraints.admits_contacts(contacts)
-            || !constraints.admits_type(|| classify(rig, &grip.pose, contacts).grasp_type)
-        {
+        let classification = classify(rig, &grip.pose, contacts);
+        if !constraints.admits_contacts(contacts) || !constraints.admits_type(classification.grasp_type) {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
 
@@ -85,15 +84,23 @@ impl PhysicalAttempt {
         let giver_clearance = clear_of_giver(&solids, presented.giver.as_ref())
             .ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         let mut grasp = grasp(
-            rig,
             &grip,
             &self.gripper.contacts,
+            classification,
             epsilon,
             &balance,
             presented,
             giver_clearance,
         );
-        let of_grip = grip_values(object, rig, &grip.pose, &grasp.contacts, epsilon, &solids);
+        let of_grip = grip_values(
+            object,
+            rig,
+            &grip.pose,
+            &grasp.contacts,
+            classification,
+            epsilon,
+            &solids,
+        );
         grasp.score = Some(score(of_grip, &grasp, object, rig, presented));
         // Palm and digits may have moved the wrist since its place was admitted.
         if !constraints.admits(&grasp) {
@@ -105,9 +112,9 @@ impl PhysicalAttempt {
 
 /// The grasp that a grip is when it holds what is presented by the forces of `balance`, not rated yet.
 pub(crate) fn grasp(
-    rig: &Rig,
     grip: &Grip,
     contacts: &[Contact],
+    classification: Classification,
     epsilon: f32,
     balance: &Balance,
     presented: &Presented,
@@ -128,7 +135,7 @@ pub(crate) fn grasp(
             penetration: grip.penetration,
             giver_clearance,
         }),
-        classification: classify(rig, &grip.pose, contacts),
+        classification,
         score: None,
         key_frames: None,
     }

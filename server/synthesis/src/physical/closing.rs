@@ -47,7 +47,7 @@ pub(super) const NEAR: f32 = 0.015;
 
 /// Steps of advancement at most. Each covers what is certainly free, so that surfaces that a link glides along need
 /// many; where it still has not arrived, it stops where it is, which is free.
-pub(super) const MOST_STEPS: usize = 40;
+pub(super) const MOST_STEPS: usize = 120;
 
 /// A digit after it was closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -14,7 +14,6 @@ use crate::{
     score::{Score, comfort_value},
     strategy::Validity,
     synthesis::attempt::Scene,
-    taxonomy::classify,
 };
 
 /// The grips of an atlas in the order in which they are tried.
@@ -82,10 +81,9 @@ impl<'a> KnownGrips<'a> {
         };
         let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();
-        let pose = &grip.grip.pose;
-        if !constraints.admits_wrist(pose.frame_from_wrist)
+        if !constraints.admits_wrist(grip.grip.pose.frame_from_wrist)
             || !constraints.admits_contacts(&grip.contacts)
-            || !constraints.admits_type(|| classify(self.rig, pose, &grip.contacts).grasp_type)
+            || !constraints.admits_type(grip.classification.grasp_type)
         {
             return Tried::Refused;
         }

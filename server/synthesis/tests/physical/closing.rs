@@ -11,7 +11,8 @@ use grasp_synthesis::{
     physical::{
         closing::{Closing, TOUCH_DEPTH},
         flexing::Flexing,
-        solids::{clearance, link_solids},
+        obstacle::Obstacle,
+        solids::{SOFT_CONTACT, TaperedCapsule, clearance, link_solids},
     },
     pose::Pose,
 };
@@ -226,4 +227,76 @@ fn nothing_is_passed_on_the_way() {
         }
     }
     assert!(closed_count > 100, "{closed_count} closed");
+}
+
+/// The distance between two capsules' skins by brute force: the closest pair of many balls on both.
+fn distance_by_balls(a: &TaperedCapsule, b: &TaperedCapsule) -> f32 {
+    const BALLS: usize = 60;
+    let shares = || (0..=BALLS).map(|i| i as f32 / BALLS as f32);
+    shares()
+        .flat_map(|s| shares().map(move |t| (s, t)))
+        .map(|(s, t)| a.at(s).distance(b.at(t)) - a.radius_at(s) - b.radius_at(t))
+        .fold(f32::INFINITY, f32::min)
+}
+
+#[test]
+fn a_digit_stops_at_the_rest_of_the_hand() {
+    let digit = finger();
+    let far = cuboid(Vec3::splat(0.5), Vec3::splat(0.6));
+    let free = closing(&far, &digit, 1.0).close().expect("nothing is near");
+    let mut random = Random::new(31);
+    let mut stopped = 0;
+    for _ in 0..200 {
+        let middle = Vec3::new(
+            random.between(-0.02, 0.02),
+            random.between(0.0, 0.09),
+            random.between(0.02, 0.09),
+        );
+        let half = random.direction() * random.between(0.005, 0.03);
+        let part = TaperedCapsule::new(middle - half, middle + half, 0.009, 0.007);
+        let first_link = random.index(2);
+        let obstacles = [Obstacle::new(part, first_link)];
+        let closing = Closing {
+            obstacles: &obstacles,
+            ..closing(&far, &digit, 1.0)
+        };
+        let Some(closed) = closing.close() else { continue };
+        assert_eq!(closed.touches, [false; 3], "the object is far away");
+        let nearest = closed.links[first_link..]
+            .iter()
+            .map(|link| distance_by_balls(link, &part))
+            .fold(f32::INFINITY, f32::min);
+        assert!(
+            nearest >= -SOFT_CONTACT,
+            "{nearest} m from {part:?}, at {:?}",
+            closed.angles
+        );
+        // What stops short of where it would end is stopped by something: it is there.
+        if closed.flexion() < free.flexion() - 0.01 {
+            stopped += 1;
+            assert!(nearest < 0.0005, "{nearest} m from {part:?}");
+        }
+    }
+    assert!(stopped > 50, "{stopped}");
+}
+
+#[test]
+fn a_shaped_digit_does_not_meet_what_only_an_opened_one_would() {
+    let digit = finger();
+    let around_the_tip = cuboid(Vec3::new(-0.02, 0.08, -0.02), Vec3::new(0.02, 0.12, 0.02));
+    let opened = closing(&around_the_tip, &digit, 1.0);
+    assert!(opened.close().is_none());
+    let shaped = Closing {
+        preshape: 0.4,
+        ..opened
+    };
+    let closed = shaped.close().expect("the tip is away from it");
+    assert!(closed.flexion() >= opened.flexing.closed_by(0.4).base_pitch);
+    assert!(
+        opened
+            .relax(0.3)
+            .links
+            .iter()
+            .all(|link| clearance(link, &around_the_tip, 1.0) > 0.0)
+    );
 }

@@ -18,6 +18,7 @@ use crate::{
     physical::{grip::Grip, shape::HandShape, solids::HandSolids},
     pose::Pose,
     score::{TERMS, Term},
+    taxonomy::classify,
 };
 
 /// Bytes of a grip at least: without contacts, and with the same score everywhere. It bounds what a count can ask for.
@@ -105,15 +106,24 @@ pub(super) fn read_entry(
     let mesh = object.surface.mesh();
     let contacts = (0..count)
         .map(|_| read_contact(reader, mesh))
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<Vec<_>, _>>()?;
     let grip = Grip {
         pose,
         bend_ratios,
         penetration,
     };
     let solids = HandSolids::of_pose(rig, &pose);
+    let classification = classify(rig, &pose, &contacts);
     Ok((
-        Entry::from_parts(grip, contacts, epsilon, grip_values, scores, &solids),
+        Entry::from_parts(
+            grip,
+            contacts,
+            classification,
+            epsilon,
+            grip_values,
+            scores,
+            &solids,
+        ),
         shape,
     ))
 }
