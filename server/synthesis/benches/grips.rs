@@ -108,6 +108,7 @@ fn proposals(criterion: &mut Criterion) {
         let scene = scene(object(name));
         let place = Place {
             object: scene.object,
+            surface: &scene.object.surface_pairs,
             giver: None,
             rig: rig(),
         };

@@ -176,6 +176,7 @@ impl<'a> Growth<'a> {
         if self.entries.is_empty() || stream.unit() >= BESIDE_SHARE {
             let place = Place {
                 object: self.scene.object,
+                surface: &self.scene.object.surface_pairs,
                 giver: None,
                 rig: self.rig,
             };

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::{Mat3, Quat, Vec3};
 
-use super::opposition::draw_shape;
+use super::{opposition::draw_shape, surface_pairs::SurfacePairs};
 use crate::{
     hand::rig::Rig,
     object::GraspObject,
@@ -33,12 +33,6 @@ const MOST_PLACES: usize = 12;
 /// … turns of a hand at a place.
 const MOST_TURNS: usize = 10;
 
-/// What a fingertip needs between a point that it presses and the giver's hand, in metres: half its thickness.
-const FINGER_ROOM: f32 = 0.006;
-
-/// The same for the palm.
-const PALM_ROOM: f32 = 0.012;
-
 /// How deep in the object digits may be where they are expected to end, in metres: they stop before. Where the object is
 /// thin, as thick as a finger ([`THIN`]), a digit is deep in it wherever it touches. Less refuses hands that would do.
 const PAD_DEPTHS: [f32; 2] = [0.0075, 0.005];
@@ -57,6 +51,8 @@ const PALM_START: f32 = 0.03;
 pub struct Place<'a> {
     /// What is to be held.
     pub object: &'a GraspObject,
+    /// Where it may be held: what the giver's hand leaves of the object's.
+    pub surface: &'a SurfacePairs,
     /// The giver's hand, if it is there already.
     pub giver: Option<&'a PreparedHand>,
     /// The hand that is to hold.
@@ -79,10 +75,7 @@ impl Place<'_> {
     /// Brings opposed pads to opposed points of the surface, and turns the hand about the line between them until palm
     /// and forearm have room.
     fn pads_on_pair(&self, stream: &mut AttemptStream) -> Option<Proposal> {
-        let pair = self.object.surface_pairs.pair(stream)?;
-        if !self.is_free_of_giver(pair.start, FINGER_ROOM) || !self.is_free_of_giver(pair.end, FINGER_ROOM) {
-            return None;
-        }
+        let pair = self.surface.pair(stream)?;
         let room = [
             pair.thickness - THICKNESS_ROOM[0],
             pair.thickness + THICKNESS_ROOM[1],
@@ -115,10 +108,7 @@ impl Place<'_> {
             closing: [true; 5],
             ..draw_shape(f32::INFINITY, stream)
         };
-        let point = self.object.surface_pairs.point(stream)?;
-        if !self.is_free_of_giver(point.position, PALM_ROOM) {
-            return None;
-        }
+        let point = self.surface.point(stream)?;
         let (a, b) = point.normal.any_orthonormal_pair();
         let tilted = point.normal
             + a * stream.between(-PALM_TILT, PALM_TILT)

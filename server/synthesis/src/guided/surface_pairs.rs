@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::{
     geometry::{Segment, mesh_bvh::MeshBvh},
+    physical::solids::PreparedHand,
     synthesis::random::AttemptStream,
 };
 
@@ -25,6 +26,12 @@ const SLANT: f32 = 0.4;
 
 /// Least cosine between the ray and the normals at both ends: 45°. Less, and pads slip off.
 const LEAST_COS: f32 = 0.7;
+
+/// What a fingertip needs between a point that it presses and the giver's hand, in metres: half its thickness.
+const FINGER_ROOM: f32 = 0.006;
+
+/// The same for the palm.
+const PALM_ROOM: f32 = 0.012;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,6 +118,27 @@ impl SurfacePairs {
             });
         }
         found
+    }
+
+    /// The pairs and points that a giver's hand leaves free: those that a finger, and a palm, has room at. Where a giver
+    /// covers most of an object, most draws would be in vain otherwise.
+    #[must_use]
+    pub fn free_of(&self, giver: &PreparedHand) -> Self {
+        let is_free = |point: Vec3, room: f32| !giver.surely_nears(point, 0.0, room);
+        Self {
+            pairs: self
+                .pairs
+                .iter()
+                .filter(|pair| is_free(pair.start, FINGER_ROOM) && is_free(pair.end, FINGER_ROOM))
+                .copied()
+                .collect(),
+            points: self
+                .points
+                .iter()
+                .filter(|point| is_free(point.position, PALM_ROOM))
+                .copied()
+                .collect(),
+        }
     }
 
     /// Bytes that pairs and points take.

@@ -135,7 +135,7 @@ impl Closing<'_> {
     }
 
     /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in all, or less if something is in
-    /// the way. Where the opened digit is inside the object, it is bent from the first of [`CURLED`] that is not.
+    /// the way. Where the opened digit is inside the object, it is bent from the first of the curled poses that is not.
     pub fn relax(&self, flexion: f32) -> ClosedDigit {
         let opened = self.flexing.opened();
         let start = std::iter::once(0.0)

@@ -2,6 +2,8 @@
 //!
 //! The thesis prints "or `ISIMMOBILIZINGGRASP`" in line 6; a grasp is invalid if it does NOT immobilize.
 
+use std::sync::OnceLock;
+
 use super::{
     closing_motion::{DigitMotion, hand_motion},
     collision_validation::collision,
@@ -17,7 +19,10 @@ use super::{
 use crate::{
     constraints::Constraints,
     grasp::{Contact, Grasp},
-    guided::proposal::{Place, propose},
+    guided::{
+        proposal::{Place, propose},
+        surface_pairs::SurfacePairs,
+    },
     hand::{Digit, HandPose, rig::Rig},
     holdout::Holdout,
     physical::{
@@ -44,6 +49,8 @@ pub struct Scene<'a> {
     load: Load,
     /// Under `PHYSICAL` validity.
     physical: Option<(ObjectScene<'a>, Presented)>,
+    /// What the giver's hand leaves of the object's surface, once it was asked for.
+    free_surface: OnceLock<SurfacePairs>,
     constraints: Constraints,
 }
 
@@ -78,6 +85,7 @@ impl<'a> Scene<'a> {
                 friction,
             },
             physical: None,
+            free_surface: OnceLock::new(),
             constraints: Constraints::default(),
         }
     }
@@ -104,12 +112,21 @@ impl<'a> Scene<'a> {
     /// it.
     fn guided_proposal(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let object = &self.holdout.object;
+        let giver = self
+            .physical
+            .as_ref()
+            .and_then(|(_, presented)| presented.giver.as_ref());
+        let surface = match giver {
+            // Only a search that comes to fresh attempts needs it.
+            Some(giver) => self
+                .free_surface
+                .get_or_init(|| object.surface_pairs.free_of(giver)),
+            None => &object.surface_pairs,
+        };
         let place = Place {
             object,
-            giver: self
-                .physical
-                .as_ref()
-                .and_then(|(_, presented)| presented.giver.as_ref()),
+            surface,
+            giver,
             rig: self.rig,
         };
         let proposal = propose(&place, stream)?;
