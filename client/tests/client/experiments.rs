@@ -12,9 +12,9 @@ fn small_run(folder: &Path, more: &[&str]) -> std::process::Output {
     let mut arguments = vec![
         "experiment",
         "--json",
-        "--strategy",
+        "--set",
         "d",
-        "--strategy",
+        "--set",
         "F",
         "--holdout",
         "scissors-hold1",
@@ -122,7 +122,7 @@ async fn a_run_that_cannot_be_is_refused_before_it_starts() {
         (["--invalid", "1000000"], "--invalid"),
         (["--threads", "65"], "--threads"),
         (["--holdout", "spoon-hold1"], "spoon-hold1"),
-        (["--strategy", "G"], "--strategy"),
+        (["--set", "G"], "--set"),
     ] {
         let output = small_run(&folder, &wrong);
         assert_eq!(code(&output), 2, "{wrong:?}");

@@ -38,9 +38,14 @@ impl<'a> Data<'a> {
         self.records.iter().copied()
     }
 
-    /// The strategies of the ladder that were asked for.
+    /// The sets that were asked for.
+    pub fn sets(&self) -> impl Iterator<Item = Set> + use<'a> {
+        self.settings.sets.iter().copied()
+    }
+
+    /// The strategies of those of them that the thesis has: A to F.
     pub fn ladder(&self) -> impl Iterator<Item = Strategy> + use<'a> {
-        self.settings.strategies.iter().copied()
+        self.sets().filter(|set| set.is_ladder()).map(|set| set.strategy)
     }
 
     /// The most threads that were asked for, if that is more than one.

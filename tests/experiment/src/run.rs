@@ -115,7 +115,7 @@ impl Made {
     fn count(&mut self, record: &Record) {
         if record.rejection.is_some() {
             self.invalid += 1;
-            self.next_invalid_attempt = record.attempt + 1;
+            self.next_invalid_attempt = record.source.attempt().map_or(0, |attempt| attempt + 1);
         } else {
             self.valid += 1;
             self.nanoseconds += record.search.map_or(0, |search| search.nanoseconds);
@@ -138,14 +138,14 @@ fn check_earlier_records(maker: &Maker, folder: &Folder) -> Result<(), FolderErr
     }
     let mut checked: Vec<_> = ends.into_values().flatten().collect();
     // Always the same one is named, whatever order the map had.
-    checked.sort_by_key(|record| (record.cell.holdout, record.seed, record.attempt));
+    checked.sort_by_key(|record| (record.cell.holdout, record.seed, record.source));
     match checked.into_iter().find(|record| !maker.comes_out_again(record)) {
         None => Ok(()),
         Some(record) => Err(FolderError::Outdated {
             path: folder.path().to_owned(),
             holdout: record.cell.built_in().name.clone(),
             seed: record.seed,
-            attempt: record.attempt,
+            hand: record.source,
         }),
     }
 }
