@@ -46,13 +46,13 @@ fn rows(path: &Path) -> Vec<HashMap<String, String>> {
 #[tokio::test(flavor = "multi_thread")]
 async fn every_listed_grasp_is_made_again_by_the_server() {
     let folder = tempfile("experiment_rows");
-    let output = small_run(&folder, &[]);
+    let output = small_run(&folder, &["--set", "guided", "--set", "PHYSICAL"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     assert_eq!(text(&output.stderr), "", "no bar where there is no terminal");
     let url = real_server().await;
     let grasps = rows(&folder.join("grasps.csv"));
-    // Sets D and F, and the five columns of Figure 5.20 beside D, on two holdouts.
-    assert_eq!(grasps.len(), 2 * 2 * (2 + 5));
+    // Four sets, and the five columns of Figure 5.20 beside D, on two holdouts.
+    assert_eq!(grasps.len(), 2 * 2 * (4 + 5));
     for row in &grasps {
         let answer = run(&[
             "find",
@@ -62,7 +62,7 @@ async fn every_listed_grasp_is_made_again_by_the_server() {
             "--holdout",
             &row["holdout"],
             "--validity",
-            "thesis",
+            &row["validity"],
             "--strategy",
             &row["strategy"],
             "--bend-ratios",

@@ -23,7 +23,7 @@ use grasp_synthesis::{
     atlas::{
         Atlas,
         codec::{AtlasError, decode, encode},
-        growth::{ENTRIES, Grown, Growth},
+        growth::{Grown, Growth, MOST_PROPOSALS},
     },
     hand::rig::Rig,
     physical::grip::Gripper,
@@ -49,7 +49,9 @@ pub struct AtlasProgress {
     pub object: &'static str,
     /// Grips that were found, in this run or before.
     pub entries: u64,
-    /// Grips at which it is complete. An object that cannot be held in so many ways ends with fewer.
+    /// Proposals that were tried for them.
+    pub proposed: u64,
+    /// Proposals after which it is complete at the latest; earlier if it has all the grips that it may have.
     pub total: u64,
     /// Why the one in the run's folder is grown again.
     pub refused: Option<AtlasError>,
@@ -130,7 +132,8 @@ fn complete(
         progress(AtlasProgress {
             object: object.name,
             entries: growth.len() as u64,
-            total: ENTRIES as u64,
+            proposed: growth.proposed(),
+            total: MOST_PROPOSALS,
             refused,
         });
         if stop.load(Ordering::Relaxed) {

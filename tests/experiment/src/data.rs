@@ -4,7 +4,7 @@ use grasp_synthesis::strategy::Strategy;
 
 use crate::{
     plan::{Cell, Set, Settings},
-    record::{Details, Record, SearchFigures},
+    record::{Details, Record, SearchFigures, Source},
 };
 
 /// The records that were asked for: a folder can have more.
@@ -60,7 +60,7 @@ impl<'a> Data<'a> {
 
     /// The positive grasp set, on one thread.
     pub fn valid(&self, set: Set) -> impl Iterator<Item = &'a Record> {
-        self.of_set(set).filter(|record| record.rejection.is_none())
+        self.of_set(set).filter(|record| record.is_valid())
     }
 
     /// The negative grasp set.
@@ -79,13 +79,30 @@ impl<'a> Data<'a> {
             .filter(move |record| record.cell.set == set && record.cell.threads == 1)
     }
 
-    /// What the searches of a cell took.
+    /// What the searches of a cell took; nothing if one of them gave up, because those that did not say nothing then of
+    /// what a grasp takes.
     pub fn searches(&self, cell: Cell) -> Vec<SearchFigures> {
-        let own = self.records().filter(|record| record.cell == cell);
-        own.filter_map(|record| record.search).collect()
+        let own = || self.records().filter(|record| record.cell == cell);
+        if own().any(|record| record.source == Source::Nowhere) {
+            return Vec::new();
+        }
+        own().filter_map(|record| record.search).collect()
     }
 
-    /// What the searches of a set took, holdout by holdout.
+    /// The holdouts in which a search of a set gave up, on whatever number of threads.
+    pub fn given_up(&self, set: Set) -> Vec<&'static str> {
+        let gave_up = |record: &&Record| record.cell.set == set && record.source == Source::Nowhere;
+        let mut names: Vec<_> = self
+            .records()
+            .filter(gave_up)
+            .map(|record| record.cell.built_in().name.as_str())
+            .collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// What the searches of a set took, holdout by holdout; nothing where one gave up.
     pub fn searches_by_holdout(&self, set: Set, threads: usize) -> Vec<Vec<SearchFigures>> {
         let of_holdout = |&holdout: &usize| {
             self.searches(Cell {

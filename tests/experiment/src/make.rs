@@ -2,8 +2,6 @@
 
 mod details;
 
-use details::Closer;
-
 pub(crate) use details::COMFORT_REPEATS;
 
 use std::{
@@ -32,6 +30,7 @@ use grasp_synthesis::{
     },
 };
 
+use self::details::Closer;
 use crate::{
     atlases::Atlases,
     plan::{Cell, PHYSICAL_RIG, Set, Settings, THESIS_RIG},
@@ -119,7 +118,8 @@ impl Maker {
         })
     }
 
-    /// Searches for the valid grasp number `number` of a cell. None if it was told to stop.
+    /// Searches for the valid grasp number `number` of a cell; the record may say that it gave up. None if it was told to
+    /// stop.
     pub fn valid(&self, settings: &Settings, cell: &Cell, number: u64, stop: &AtomicBool) -> Option<Record> {
         let seed = settings.seed_of_valid(cell, number);
         let holdout = &self.holdouts[cell.holdout];
@@ -134,7 +134,7 @@ impl Maker {
             atlas: self.atlases.of(cell).cloned(),
             reproducible: false,
             first_attempt: 0,
-            max_attempts: u64::MAX,
+            max_attempts: cell.set.most_attempts(),
             deadline: None,
             workers: cell.threads,
             record_step_times: false,
@@ -149,16 +149,16 @@ impl Maker {
         let report = outcome.report;
         let source = match outcome.end {
             SearchEnd::Found => Source::from(report.source?),
-            SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted | SearchEnd::Stopped => return None,
+            SearchEnd::AttemptsExhausted => Source::Nowhere,
+            SearchEnd::DeadlinePassed | SearchEnd::Stopped => return None,
         };
-        let closer = (cell.threads == 1).then(|| self.closer_look(cell, seed, source));
-        let is_valid = |closer: &Option<Closer>| {
-            closer
-                .as_ref()
-                .is_some_and(|closer| matches!(closer.end, AttemptEnd::Valid(_)))
-        };
+        let is_looked_at = cell.threads == 1 && source != Source::Nowhere;
+        let closer = is_looked_at
+            .then(|| self.closer_look(cell, seed, source))
+            .flatten();
+        let is_valid = |closer: &Closer| matches!(closer.end, AttemptEnd::Valid(_));
         debug_assert!(
-            closer.as_ref().is_none_or(is_valid),
+            !is_looked_at || closer.as_ref().is_some_and(is_valid),
             "{source} is not valid again"
         );
         Some(Record {
@@ -177,7 +177,7 @@ impl Maker {
                     candidates: report.candidates,
                 }),
             }),
-            details: closer.flatten().map(|closer| closer.details),
+            details: closer.map(|closer| closer.details),
         })
     }
 
@@ -213,8 +213,12 @@ impl Maker {
         records
     }
 
-    /// Looks at a record's attempt or grip again. True if it ends as recorded, with the same wrist and digits.
+    /// Looks at a record's attempt or grip again. True if it ends as recorded, with the same wrist and digits, and of a
+    /// search that gave up, which would take as long again.
     pub fn comes_out_again(&self, record: &Record) -> bool {
+        if record.source == Source::Nowhere {
+            return true;
+        }
         let Some(closer) = self.closer_look(&record.cell, record.seed, record.source) else {
             return false;
         };
@@ -234,6 +238,7 @@ impl Maker {
         let index = match record.source {
             Source::Attempt(index) => index,
             Source::AtlasEntry(entry) => return self.grip(&record.cell, entry),
+            Source::Nowhere => return None,
         };
         let scene = self.scene(&record.cell);
         let mut stream = AttemptStream::new(record.seed, index);

@@ -18,6 +18,11 @@ const SEEDS_PER_HOLDOUT: u64 = 1_000_000;
 /// The most grasps, and the most invalid attempts, of a cell: far more than there is time for.
 pub const MOST_PER_CELL: u64 = SEEDS_PER_HOLDOUT - 1;
 
+/// Attempts after which a search of a set beyond A to F gives up: not every holdout leaves a physical grasp. More take
+/// longer, up to a minute each, before that is accepted; fewer give up on holdouts that leave few. The worst holdout that
+/// leaves any takes 6,000 on average.
+const MOST_ATTEMPTS: u64 = 1_000_000;
+
 /// A way to synthesize: one grasp set of the thesis, or a column beside them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Set {
@@ -95,6 +100,15 @@ impl Set {
     /// True for the sets A to F.
     pub fn is_ladder(self) -> bool {
         Strategy::LADDER.contains(&self.strategy) && self == Self::ladder(self.strategy)
+    }
+
+    /// Attempts after which a search gives up; those of A to F never do.
+    pub fn most_attempts(self) -> u64 {
+        if self == Self::GUIDED || self.validity == Validity::Physical {
+            MOST_ATTEMPTS
+        } else {
+            u64::MAX
+        }
     }
 
     /// The rig of the receiving hand, as a server chooses it by default.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::plan::Cell;
 
 /// One attempt: the last one of a search, valid, or one of those that failed. Or the grip of an atlas that ended a
-/// search.
+/// search, or that a search gave up.
 ///
 /// Set, holdout, seed and attempt make an attempt again:
 /// `grasp find --holdout H --validity V --strategy S --bend-ratios R --seed N --only-attempt I`. A grip of an atlas is
@@ -27,11 +27,11 @@ pub struct Record {
     /// Which attempt of the seed it is, or which grip.
     #[serde(flatten)]
     pub source: Source,
-    /// Why it failed; none if it is valid.
+    /// Why it failed; none if it is valid, or if a search gave up.
     pub rejection: Option<Rejection>,
     /// What the search took that ended with it; none for a failed attempt.
     pub search: Option<SearchFigures>,
-    /// Its details; none of searches on more than one thread, which are made for their times.
+    /// Its details; none of searches on more than one thread, which are made for their times, or that gave up.
     pub details: Option<Details>,
 }
 
@@ -43,6 +43,8 @@ pub enum Source {
     Attempt(u64),
     /// The grip of this index of the object's complete atlas.
     AtlasEntry(u16),
+    /// There is none: the search gave up.
+    Nowhere,
 }
 
 impl Source {
@@ -50,7 +52,7 @@ impl Source {
     pub fn attempt(self) -> Option<u64> {
         match self {
             Self::Attempt(index) => Some(index),
-            Self::AtlasEntry(_) => None,
+            Self::AtlasEntry(_) | Self::Nowhere => None,
         }
     }
 }
@@ -60,6 +62,7 @@ impl fmt::Display for Source {
         match self {
             Self::Attempt(index) => write!(f, "attempt {index}"),
             Self::AtlasEntry(entry) => write!(f, "grip {entry} of the atlas"),
+            Self::Nowhere => f.write_str("no hand"),
         }
     }
 }
@@ -102,8 +105,9 @@ pub struct AtlasFigures {
 /// What an attempt was like.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Details {
-    /// Of its wrist placement; under `PHYSICAL` validity that of a valid grasp is where the wrist came to be.
-    pub measures: Measures,
+    /// Of its wrist placement; under `PHYSICAL` validity that of a valid grasp is where the wrist came to be. None of an
+    /// attempt at which guided search found no place.
+    pub measures: Option<Measures>,
     /// The digits that were posed, thumb first; none of failed attempts under `PHYSICAL` validity, where what the digits
     /// touch is not known.
     pub digits: Vec<DigitFigures>,
@@ -189,6 +193,11 @@ fn is_zero(count: &u32) -> bool {
 }
 
 impl Record {
+    /// True for a valid grasp.
+    pub fn is_valid(&self) -> bool {
+        self.rejection.is_none() && self.source != Source::Nowhere
+    }
+
     /// The details, of which every record on one thread has some.
     pub fn grasp(&self) -> Option<&GraspFigures> {
         self.details.as_ref()?.grasp.as_ref()

@@ -1,6 +1,6 @@
 //! The grasp types of a run's valid grasps: what the thesis calls false valid are those without one (5.2, 6.1).
 //!
-//! They are not recorded but looked at when a report is made, on grasps that are made again from their seeds: a run that
+//! They are not recorded but looked at when a report is made, on grasps that are made again from their seeds and atlases: a run that
 //! was made before types were told has them too, and all are told by the same rules.
 
 use std::fmt::Write as _;
@@ -11,8 +11,8 @@ use crate::{
     data::Data,
     make::Maker,
     plan::Set,
-    stats::{mean, standard_error_of_group_means},
-    tables::different_grasps,
+    stats::standard_error_of_group_means,
+    tables::{different_grasps, mean_of_means},
 };
 
 /// Standard errors to either side of a mean that hold it with 95 %.
@@ -37,7 +37,7 @@ impl SetTypes {
 
     /// Share of the grasps that are of a type, or of none, from 0 to 1: each holdout counts the same.
     pub fn share(&self, of: Option<GraspType>) -> Option<f64> {
-        mean_of_groups(&self.is(of))
+        mean_of_means(&self.is(of))
     }
 
     /// Half of the 95 % interval of the share of unclassifiable grasps. None if some grasps are the same: how they vary is
@@ -55,11 +55,6 @@ impl SetTypes {
         let groups = self.by_holdout.iter().filter(|types| !types.is_empty());
         groups.map(|types| types.iter().map(is_it).collect()).collect()
     }
-}
-
-fn mean_of_groups(groups: &[Vec<f64>]) -> Option<f64> {
-    let means: Vec<_> = groups.iter().filter_map(|group| mean(group)).collect();
-    mean(&means)
 }
 
 /// The types of the positive sets that were asked for, on one thread.

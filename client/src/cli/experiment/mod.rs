@@ -31,8 +31,9 @@ For each set and built-in holdout this searches for valid grasps and keeps the f
 with the crate that the server searches with. Every grasp and attempt is kept in the output folder with its seed and
 index; a run that was interrupted goes on where it was, and one that is asked for more makes only what is missing. Set
 ATLAS needs the complete atlases of the objects: where they do not come with the objects, they are grown first, which
-takes minutes for each, and kept in the folder. The report has the tables beside the thesis' own figures, every figure as a picture and as CSV, what chapter 5
-says against what this run shows, and a contact sheet of grasps in the order of comfort.
+takes minutes for each, and kept in the folder. The report has the tables beside the thesis' own figures, every figure
+as a picture and as CSV, what chapter 5 says against what this run shows, and a contact sheet of grasps in the order of
+comfort.
 
 With --json: {"folder", "report", "ladder": [{column: value, …}], "claims": [{"source", "thesis", "run", "verdict",
 "why"}]}."#;
@@ -82,7 +83,7 @@ impl From<SetName> for Set {
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 pub(super) struct Arguments {
     /// Only this set; may be repeated. Default: all.
-    #[arg(long, alias = "strategy", value_name = "SET", ignore_case = true)]
+    #[arg(long, value_name = "SET", ignore_case = true)]
     set: Vec<SetName>,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]

@@ -27,14 +27,14 @@ impl Progress {
             .is_none_or(|(object, _)| *object != now.object)
         {
             let bar = bar(now.total, "{human_pos:>6}/{human_len}");
-            let why = now.refused.map_or_else(String::new, |why| {
-                format!("; the one in the folder is not used: {why}")
-            });
-            bar.set_message(format!("atlas of {}{why}", now.object));
             self.atlas = Some((now.object, bar));
         }
         if let Some((_, bar)) = &self.atlas {
-            bar.set_position(now.entries);
+            let why = now.refused.map_or_else(String::new, |why| {
+                format!("; the one in the folder is not used: {why}")
+            });
+            bar.set_position(now.proposed);
+            bar.set_message(format!("atlas of {}, {} grips{why}", now.object, now.entries));
         }
     }
 

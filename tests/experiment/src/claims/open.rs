@@ -66,7 +66,7 @@ fn comfort(data: &Data<'_>, set: Set) -> Option<Claim> {
 fn unclassifiable(types: &[SetTypes]) -> Option<Claim> {
     let mut ladder = types.iter().filter(|types| types.set.is_ladder());
     let first = ladder.next()?;
-    let last = ladder.last()?;
+    let last = ladder.next_back()?;
     let (before, after) = (first.share(None)?, last.share(None)?);
     // Of a difference of two means.
     let margin = first.margin()?.hypot(last.margin()?);

@@ -4,6 +4,7 @@ use grasp_synthesis::{
     grasp::{Contact, Grasp},
     hand::{Digit, HandPart},
     pose::Pose,
+    rejection::Rejection,
     strategy::Validity,
     synthesis::{
         attempt::{Attempt, AttemptEnd},
@@ -47,14 +48,14 @@ pub(super) struct Closer {
 }
 
 impl Maker {
-    /// Everything about an attempt or a grip; none if there is no such grip or if it does not hold.
+    /// Everything about an attempt or a grip; none if there is no such hand or if the grip does not hold.
     pub(super) fn closer_look(&self, cell: &Cell, seed: u64, source: Source) -> Option<Closer> {
         match source {
             Source::Attempt(index) => Some(self.look_at_attempt(cell, seed, index)),
             Source::AtlasEntry(entry) => {
                 let grasp = self.grip(cell, entry)?;
                 let details = Details {
-                    measures: self.measures(cell, grasp.pose.frame_from_wrist),
+                    measures: Some(self.measures(cell, grasp.pose.frame_from_wrist)),
                     digits: held_digits(&grasp),
                     step_nanoseconds: None,
                     grasp: Some(solved_figures(&grasp)),
@@ -62,6 +63,7 @@ impl Maker {
                 let end = AttemptEnd::Valid(grasp);
                 Some(Closer { end, details })
             }
+            Source::Nowhere => None,
         }
     }
 
@@ -81,10 +83,19 @@ impl Maker {
             AttemptEnd::Valid(grasp) => Some(grasp),
             AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
         };
-        let placed = attempt.wrist().object_from_wrist;
+        let wrist = match (&end, valid) {
+            (_, Some(grasp)) => Some(grasp.pose.frame_from_wrist),
+            // Guided search had no proposal.
+            (AttemptEnd::Rejected { rejection, .. }, _)
+                if *rejection == Rejection::NoContacts && attempt.posed_digits().is_empty() =>
+            {
+                None
+            }
+            _ => Some(attempt.wrist().object_from_wrist),
+        };
         let is_of_thesis = cell.set.validity == Validity::Thesis;
         let details = Details {
-            measures: self.measures(cell, valid.map_or(placed, |grasp| grasp.pose.frame_from_wrist)),
+            measures: wrist.map(|wrist| self.measures(cell, wrist)),
             digits: match valid {
                 _ if is_of_thesis => self.posed_digits(cell, &attempt, valid.is_some()),
                 Some(grasp) => held_digits(grasp),

@@ -32,7 +32,8 @@ pub fn ladder(data: &Data<'_>) -> Table {
     header.extend(more.map(|_| "times as fast".to_owned()));
     let mut table = Table::new("ladder", "Attempts and time per valid grasp", header);
     for set in data.sets() {
-        let searches = data.searches_by_holdout(set, 1);
+        let mut searches = data.searches_by_holdout(set, 1);
+        searches.retain(|own| !own.is_empty());
         let attempts: Vec<_> = searches.iter().map(|own| attempts(own)).collect();
         let times: Vec<_> = searches.iter().map(|own| milliseconds(own)).collect();
         let all: Vec<_> = searches.concat();
@@ -71,10 +72,10 @@ pub fn ladder(data: &Data<'_>) -> Table {
     table
 }
 
-/// Mean over the holdouts of their means; none if a holdout has nothing.
+/// Mean over the holdouts of their means, without those that have nothing; none if all have nothing.
 pub(crate) fn mean_of_means(groups: &[Vec<f64>]) -> Option<f64> {
-    let means: Option<Vec<_>> = groups.iter().map(|group| mean(group)).collect();
-    mean(&means?)
+    let means: Vec<_> = groups.iter().filter_map(|group| mean(group)).collect();
+    mean(&means)
 }
 
 /// A row for each holdout and for each object, a pair of columns for each set, and the thesis' where it has them.
@@ -166,7 +167,8 @@ fn by_holdout(data: &Data<'_>, file: &'static str, title: &str, columns: &[Colum
     let holdouts = &data.settings.holdouts;
     let row_of = |name: &str, rows: &[usize]| {
         let mean_of = |column: &[f64]| {
-            let values: Vec<_> = rows.iter().map(|&row| column[row]).collect();
+            let values = rows.iter().map(|&row| column[row]);
+            let values: Vec<_> = values.filter(|value| value.is_finite()).collect();
             Value::number(mean(&values))
         };
         let means = columns

@@ -40,7 +40,7 @@ pub fn grasp_list(data: &Data<'_>) -> Table {
     ]);
     let mut table = Table::new("grasps", "All valid grasps", header);
     for record in data.records() {
-        let Some(search) = record.search else {
+        let Some(search) = record.search.filter(|_| record.is_valid()) else {
             continue;
         };
         let mut row = origin(record);
@@ -103,7 +103,7 @@ fn origin(record: &Record) -> Vec<Value> {
     let Cell { set, threads, .. } = record.cell;
     let or_missing = |index: Option<u64>| index.map_or(Value::Missing, Value::from);
     let entry = match record.source {
-        Source::Attempt(_) => None,
+        Source::Attempt(_) | Source::Nowhere => None,
         Source::AtlasEntry(entry) => Some(u64::from(entry)),
     };
     vec![
@@ -128,13 +128,13 @@ fn spelled(choice: impl Serialize) -> Value {
 }
 
 fn details_of(details: &Details) -> Vec<Value> {
-    let measures = &details.measures;
+    let measures = details.measures.as_ref();
     let mut row: Vec<_> = [
-        Some(measures.wrist_distance_cm),
-        Some(measures.palm_distance_cm),
-        Some(measures.upward_degrees),
-        Some(measures.forward_degrees),
-        measures.palm_com_palm_degrees,
+        measures.map(|measures| measures.wrist_distance_cm),
+        measures.map(|measures| measures.palm_distance_cm),
+        measures.map(|measures| measures.upward_degrees),
+        measures.map(|measures| measures.forward_degrees),
+        measures.and_then(|measures| measures.palm_com_palm_degrees),
     ]
     .map(|value| Value::number(value.map(f64::from)))
     .to_vec();

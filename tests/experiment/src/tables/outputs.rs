@@ -48,7 +48,8 @@ pub(crate) fn negative_counts(data: &Data<'_>, set: Set) -> [u64; 8] {
 
 /// Shares of all failed attempts by kind, the mean of the holdouts.
 fn shares_of_all(data: &Data<'_>, set: Set) -> [f64; 8] {
-    let by_holdout = data.searches_by_holdout(set, 1);
+    let mut by_holdout = data.searches_by_holdout(set, 1);
+    by_holdout.retain(|searches| !searches.is_empty());
     let mut shares = [0.0; 8];
     for searches in &by_holdout {
         let mut counts = [0_u64; 8];

@@ -80,7 +80,7 @@ pub(crate) const MEASURES: [Measure; 6] = [
 pub(crate) fn valid_values(data: &Data<'_>, set: Set, measure: &Measure) -> Vec<f64> {
     let details = data.valid(set).filter_map(|record| record.details.as_ref());
     details
-        .filter_map(|details| (measure.of)(&details.measures))
+        .filter_map(|details| (measure.of)(details.measures.as_ref()?))
         .collect()
 }
 

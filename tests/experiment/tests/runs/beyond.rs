@@ -14,7 +14,10 @@ use grasp_experiment::{
     folder::Folder,
     make::{MakeError, Maker},
     plan::{Set, Settings},
-    record::{Record, Source},
+    record::{Record, SearchFigures, Source},
+    report,
+    run::{RunEnd, run},
+    table::Value,
 };
 use grasp_synthesis::{
     atlas::{
@@ -148,6 +151,72 @@ fn fresh_sets_are_valid_as_they_say_and_for_their_own_hands() {
             assert_eq!(figures.comfort, grasp.comfort);
         }
     }
+}
+
+/// That a search of set Physical on the first holdout gave up after so many valid grasps on one thread.
+fn given_up(settings: &Settings, number: u64) -> Record {
+    let cell = settings.cells()[0];
+    assert_eq!((cell.set, cell.threads), (Set::PHYSICAL, 1));
+    Record {
+        cell,
+        number,
+        seed: settings.seed_of_valid(&cell, number),
+        source: Source::Nowhere,
+        rejection: None,
+        search: Some(SearchFigures {
+            attempts: Set::PHYSICAL.most_attempts(),
+            pruned_placements: 0,
+            rejections: [0; 8],
+            nanoseconds: 1_000_000_000,
+            atlas: None,
+        }),
+        details: None,
+    }
+}
+
+#[test]
+fn what_was_given_up_is_neither_tried_again_nor_averaged() {
+    let settings = Settings {
+        sets: vec![Set::PHYSICAL],
+        ..settings()
+    };
+    let scratch = Scratch::new();
+    let record = given_up(&settings, 0);
+    open(scratch.path(), &settings)
+        .add(vec![record.clone()])
+        .expect("a folder that can be written");
+    let mut folder = open(scratch.path(), &settings);
+    assert_eq!(folder.records(), &[record], "it is read as it was written");
+    let maker = maker(&settings, &folder);
+    let mut last = None;
+    let end = run(&settings, &maker, &mut folder, &AtomicBool::new(false), |now| {
+        last = Some(now);
+    });
+    assert_eq!(end.expect("a run"), RunEnd::Complete);
+    // All but the last grasp: those that are given up count as done.
+    let last = last.expect("progress");
+    assert_eq!((last.done, last.total), (3 * 4 - 1, 3 * 4));
+    let valid = folder.records().iter().filter(|record| record.is_valid()).count();
+    assert_eq!(valid, 3 * 3);
+
+    let target = scratch.path().join("report");
+    let report = report::write(&settings, &folder, &maker, &target).expect("a report");
+    let own: Vec<f64> = folder
+        .records()
+        .iter()
+        .filter(|record| record.is_valid() && record.cell.threads == 1)
+        .map(|record| record.search.expect("a search").attempts as f64)
+        .collect();
+    assert_eq!(own.len(), 3);
+    let Value::Number(mean, _) = report.ladder.rows[0][2] else {
+        panic!("{:?}", report.ladder.rows[0]);
+    };
+    assert!((mean - own.iter().sum::<f64>() / 3.0).abs() < 1e-9);
+    let page = fs::read_to_string(&report.page).expect("the page");
+    let told = "Physical found no grasp in 1,000,000 attempts for scissors-hold1: left out of its means.";
+    assert!(page.contains(told), "{page}");
+    let list = fs::read_to_string(scratch.path().join("grasps.csv")).expect("the grasps");
+    assert_eq!(list.lines().count(), 1 + 3 * 3);
 }
 
 #[test]

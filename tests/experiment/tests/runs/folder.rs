@@ -223,7 +223,7 @@ fn records_of_another_algorithm_are_not_mixed_in() {
     let (first, rest) = text.split_once('\n').expect("lines");
     let mut record: Record = serde_json::from_str(first).expect("a record");
     let details = record.details.as_mut().expect("details");
-    details.measures.palm_distance_cm += 1.0;
+    details.measures.as_mut().expect("measures").palm_distance_cm += 1.0;
     let changed = serde_json::to_string(&record).expect("a record");
     fs::write(&path, format!("{changed}\n{rest}")).expect("a file");
     let mut folder = open(scratch.path(), &settings);
