@@ -215,7 +215,8 @@ fn beyond_the_ladder(data: &Data<'_>) -> String {
     if data.sets().all(Set::is_ladder) {
         return String::new();
     }
-    let mut text = " Guided looks for the same grasps as A to F, but places hands where opposed surfaces suggest it. \
+    let mut text = " Guided looks for the same grasps as A to F, but places hands where opposed surfaces suggest it; an \
+                    attempt that finds no room for a hand counts as NoContacts. \
                     Physical and Atlas are searches for the grasps that a server gives by default: another rig \
                     (`adult`), hands as solids, forces solved for. What is valid differs, so that they compare with each \
                     other and not with the others. Physical finds its grasps afresh; Atlas tries the grips of the \

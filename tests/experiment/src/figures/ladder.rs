@@ -77,6 +77,7 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
                 true,
             ),
         ],
-        columns: 2,
+        // More sets than those of the ladder have names that need the whole width.
+        columns: if data.sets().all(Set::is_ladder) { 2 } else { 1 },
     }
 }

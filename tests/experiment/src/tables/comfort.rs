@@ -38,6 +38,7 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             .iter()
             .filter(|(_, details, _)| touching_digits(details) == 2.0)
             .count();
+        let of_thesis = |value, decimals| Value::decimals(set.is_ladder().then_some(value), decimals);
         // Forces are drawn under the thesis' validity only.
         let drawn = grasps
             .iter()
@@ -50,11 +51,11 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             (grasps.len() as u64).into(),
             Value::number(mean(&contacts)),
             Value::decimals(quantile(&contacts, 1.0), 0),
-            u64::from(thesis::MOST_CONTACTS).into(),
+            of_thesis(f64::from(thesis::MOST_CONTACTS), 0),
             Value::decimals(100.0 * two_digits as f64 / grasps.len() as f64, 0),
             Value::number(mean(&sufficient)),
             Value::number(quantile(&sufficient, 0.5)),
-            Value::number(thesis::SUFFICIENT_DISTRIBUTIONS),
+            of_thesis(thesis::SUFFICIENT_DISTRIBUTIONS, 1),
             Value::decimals(100.0 * again as f64 / tries as f64, 0),
         ]);
     }
