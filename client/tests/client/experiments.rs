@@ -12,9 +12,9 @@ fn small_run(folder: &Path, more: &[&str]) -> std::process::Output {
     let mut arguments = vec![
         "experiment",
         "--json",
-        "--strategy",
+        "--set",
         "d",
-        "--strategy",
+        "--set",
         "F",
         "--holdout",
         "scissors-hold1",
@@ -46,13 +46,13 @@ fn rows(path: &Path) -> Vec<HashMap<String, String>> {
 #[tokio::test(flavor = "multi_thread")]
 async fn every_listed_grasp_is_made_again_by_the_server() {
     let folder = tempfile("experiment_rows");
-    let output = small_run(&folder, &[]);
+    let output = small_run(&folder, &["--set", "guided", "--set", "PHYSICAL"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     assert_eq!(text(&output.stderr), "", "no bar where there is no terminal");
     let url = real_server().await;
     let grasps = rows(&folder.join("grasps.csv"));
-    // Sets D and F, and the five columns of Figure 5.20 beside D, on two holdouts.
-    assert_eq!(grasps.len(), 2 * 2 * (2 + 5));
+    // Four sets, and the five columns of Figure 5.20 beside D, on two holdouts.
+    assert_eq!(grasps.len(), 2 * 2 * (4 + 5));
     for row in &grasps {
         let answer = run(&[
             "find",
@@ -62,7 +62,7 @@ async fn every_listed_grasp_is_made_again_by_the_server() {
             "--holdout",
             &row["holdout"],
             "--validity",
-            "thesis",
+            &row["validity"],
             "--strategy",
             &row["strategy"],
             "--bend-ratios",
@@ -122,7 +122,7 @@ async fn a_run_that_cannot_be_is_refused_before_it_starts() {
         (["--invalid", "1000000"], "--invalid"),
         (["--threads", "65"], "--threads"),
         (["--holdout", "spoon-hold1"], "spoon-hold1"),
-        (["--strategy", "G"], "--strategy"),
+        (["--set", "G"], "--set"),
     ] {
         let output = small_run(&folder, &wrong);
         assert_eq!(code(&output), 2, "{wrong:?}");

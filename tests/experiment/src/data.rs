@@ -4,7 +4,7 @@ use grasp_synthesis::strategy::Strategy;
 
 use crate::{
     plan::{Cell, Set, Settings},
-    record::{Details, Record, SearchFigures},
+    record::{Details, Record, SearchFigures, Source},
 };
 
 /// The records that were asked for: a folder can have more.
@@ -38,9 +38,14 @@ impl<'a> Data<'a> {
         self.records.iter().copied()
     }
 
-    /// The strategies of the ladder that were asked for.
+    /// The sets that were asked for.
+    pub fn sets(&self) -> impl Iterator<Item = Set> + use<'a> {
+        self.settings.sets.iter().copied()
+    }
+
+    /// The strategies of those of them that the thesis has: A to F.
     pub fn ladder(&self) -> impl Iterator<Item = Strategy> + use<'a> {
-        self.settings.strategies.iter().copied()
+        self.sets().filter(|set| set.is_ladder()).map(|set| set.strategy)
     }
 
     /// The most threads that were asked for, if that is more than one.
@@ -55,7 +60,7 @@ impl<'a> Data<'a> {
 
     /// The positive grasp set, on one thread.
     pub fn valid(&self, set: Set) -> impl Iterator<Item = &'a Record> {
-        self.of_set(set).filter(|record| record.rejection.is_none())
+        self.of_set(set).filter(|record| record.is_valid())
     }
 
     /// The negative grasp set.
@@ -74,13 +79,30 @@ impl<'a> Data<'a> {
             .filter(move |record| record.cell.set == set && record.cell.threads == 1)
     }
 
-    /// What the searches of a cell took.
+    /// What the searches of a cell took; nothing if one of them gave up, because those that did not say nothing then of
+    /// what a grasp takes.
     pub fn searches(&self, cell: Cell) -> Vec<SearchFigures> {
-        let own = self.records().filter(|record| record.cell == cell);
-        own.filter_map(|record| record.search).collect()
+        let own = || self.records().filter(|record| record.cell == cell);
+        if own().any(|record| record.source == Source::Nowhere) {
+            return Vec::new();
+        }
+        own().filter_map(|record| record.search).collect()
     }
 
-    /// What the searches of a set took, holdout by holdout.
+    /// The holdouts in which a search of a set gave up, on whatever number of threads.
+    pub fn given_up(&self, set: Set) -> Vec<&'static str> {
+        let gave_up = |record: &&Record| record.cell.set == set && record.source == Source::Nowhere;
+        let mut names: Vec<_> = self
+            .records()
+            .filter(gave_up)
+            .map(|record| record.cell.built_in().name.as_str())
+            .collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// What the searches of a set took, holdout by holdout; nothing where one gave up.
     pub fn searches_by_holdout(&self, set: Set, threads: usize) -> Vec<Vec<SearchFigures>> {
         let of_holdout = |&holdout: &usize| {
             self.searches(Cell {

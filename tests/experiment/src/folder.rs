@@ -1,7 +1,7 @@
 //! The folder of a run: what was made so far, so that a run that was cut short goes on where it was.
 //!
 //! `manifest.json` says what all records have in common; `records.jsonl` has a record a line, each written at once. A
-//! last line that was cut off is dropped.
+//! last line that was cut off is dropped. `atlases/` has the atlases ([`crate::atlases`]).
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -11,10 +11,18 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{machine::Machine, make::RECEIVING_RIG, record::Record};
+use crate::{
+    machine::Machine,
+    plan::THESIS_RIG,
+    record::{Record, Source},
+};
 
-/// The layout of the records. It grows when what is recorded changes.
-const FORMAT: u32 = 1;
+/// The layout of the records. It grows when what is recorded changes. From 2 on there may be records of sets that are
+/// valid otherwise than the thesis says, or come of an atlas; those of 1 read as before.
+const FORMAT: u32 = 2;
+
+/// The oldest layout that is still read.
+const OLDEST_FORMAT: u32 = 1;
 
 const MANIFEST: &str = "manifest.json";
 const RECORDS: &str = "records.jsonl";
@@ -25,7 +33,7 @@ pub struct Manifest {
     format: u32,
     /// Start of all randomness.
     pub seed: u64,
-    /// The receiving hand.
+    /// The receiving hand of the sets under the thesis' validity.
     pub rig: String,
     /// Where it was measured.
     pub machine: Machine,
@@ -37,15 +45,15 @@ impl Manifest {
         Self {
             format: FORMAT,
             seed,
-            rig: RECEIVING_RIG.to_owned(),
+            rig: THESIS_RIG.to_owned(),
             machine: Machine::this(),
         }
     }
 
-    /// What keeps records of `self` and of `other` from standing in one table.
+    /// What keeps records of `self`, an earlier one, and of `other` from standing in one table.
     fn differences(&self, other: &Self) -> Vec<String> {
         let mut differences = Vec::new();
-        if self.format != other.format {
+        if !(OLDEST_FORMAT..=other.format).contains(&self.format) {
             differences.push(format!(
                 "its format is {}, now it is {}",
                 self.format, other.format
@@ -110,8 +118,8 @@ pub enum FolderError {
     Busy(PathBuf),
     /// The algorithm is no longer the one that made the records.
     #[error(
-        "attempt {attempt} of seed {seed} on {holdout} in {} ends otherwise than recorded: the search has changed \
-         since; give another folder, or start afresh",
+        "{hand} on {holdout}, seed {seed}, in {} ends otherwise than recorded: the search has changed since; give \
+         another folder, or start afresh",
         path.display()
     )]
     Outdated {
@@ -121,8 +129,8 @@ pub enum FolderError {
         holdout: String,
         /// The record's seed.
         seed: u64,
-        /// The record's attempt.
-        attempt: u64,
+        /// The record's attempt or grip.
+        hand: Source,
     },
 }
 
@@ -138,7 +146,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Opens a run's folder, or begins one. With `fresh`, what is there is forgotten.
+    /// Opens a run's folder, or begins one. With `fresh`, what is there is forgotten, atlases aside.
     ///
     /// # Errors
     /// The folder cannot be written, is in use, or has another run in it.
@@ -162,7 +170,7 @@ impl Folder {
         } else {
             read_manifest(&manifest_path)?
         };
-        let Some(earlier) = earlier else {
+        let Some(mut earlier) = earlier else {
             let bytes = file
                 .metadata()
                 .map_err(failed_to("look at", &records_path))?
@@ -171,8 +179,7 @@ impl Folder {
                 return Err(FolderError::NoManifest(path.to_owned()));
             }
             file.set_len(0).map_err(failed_to("empty", &records_path))?;
-            let text = serde_json::to_string_pretty(&manifest).unwrap_or_default() + "\n";
-            fs::write(&manifest_path, text).map_err(failed_to("write", &manifest_path))?;
+            write_manifest(&manifest_path, &manifest)?;
             return Ok(Self {
                 path: path.to_owned(),
                 manifest,
@@ -191,6 +198,11 @@ impl Folder {
         file.set_len(whole_bytes)
             .and_then(|()| file.seek(io::SeekFrom::End(0)))
             .map_err(failed_to("continue", &records_path))?;
+        if earlier.format < FORMAT {
+            // From now on there may be records that earlier versions would misread: they refuse the folder.
+            earlier.format = FORMAT;
+            write_manifest(&manifest_path, &earlier)?;
+        }
         Ok(Self {
             path: path.to_owned(),
             manifest: earlier,
@@ -228,9 +240,14 @@ impl Folder {
     }
 }
 
-fn failed_to(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FolderError {
+pub(crate) fn failed_to(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> FolderError {
     let path = path.to_owned();
     move |source| FolderError::Io { what, path, source }
+}
+
+fn write_manifest(path: &Path, manifest: &Manifest) -> Result<(), FolderError> {
+    let text = serde_json::to_string_pretty(manifest).unwrap_or_default() + "\n";
+    fs::write(path, text).map_err(failed_to("write", path))
 }
 
 fn read_manifest(path: &Path) -> Result<Option<Manifest>, FolderError> {

@@ -1,5 +1,6 @@
 //! The experiments of the thesis' chapter 5, on the crate that the server searches with.
 
+pub mod atlases;
 pub mod claims;
 pub mod data;
 pub mod figures;

@@ -10,14 +10,16 @@ use std::{
 };
 
 use grasp_assets::{
-    hands::hand,
+    hands::{Hand, hand},
     holdouts::{BuiltInHoldout, HoldoutError, holdouts},
 };
 use grasp_synthesis::{
     clock::Clock,
     constraints::Constraints,
+    grasp::Grasp,
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
+    physical::grip::Gripper,
     rejection::Rejection,
     search::{SearchEnd, SearchSettings, find_grasp},
     strategy::{Choice, Validity},
@@ -28,13 +30,17 @@ use grasp_synthesis::{
     },
 };
 
+use self::details::Closer;
 use crate::{
-    plan::{Cell, Set, Settings},
-    record::{Record, SearchFigures},
+    atlases::Atlases,
+    plan::{Cell, PHYSICAL_RIG, Set, Settings, THESIS_RIG},
+    record::{AtlasFigures, Record, SearchFigures, Source},
 };
 
-/// The receiving hand: the thesis' own.
-pub const RECEIVING_RIG: &str = "thesis";
+/// The hand that a set poses: the right one of its rig.
+pub fn receiving_hand(set: Set) -> Option<&'static Hand> {
+    hand(set.rig_name(), Handedness::Right)
+}
 
 /// The machine's monotonic clock.
 pub(crate) struct MonotonicClock(Instant);
@@ -52,8 +58,11 @@ pub enum MakeError {
     #[error("the built-in holdout {0} is broken")]
     Holdout(&'static str, #[source] HoldoutError),
     /// A built-in rig is missing.
-    #[error("the rig {RECEIVING_RIG:?} is not built in")]
-    Rig,
+    #[error("the rig {0:?} is not built in")]
+    Rig(&'static str),
+    /// A set asks for an atlas that is not there.
+    #[error("there is no atlas of {0}")]
+    Atlas(&'static str),
     /// The system gives no threads.
     #[error("cannot start {0} threads")]
     Threads(usize, #[source] rayon::ThreadPoolBuildError),
@@ -62,7 +71,9 @@ pub enum MakeError {
 /// The holdouts, ready to be searched, and the threads to do it.
 pub struct Maker {
     holdouts: Vec<Holdout>,
-    rig: &'static Rig,
+    thesis_rig: &'static Rig,
+    physical_rig: &'static Rig,
+    atlases: Atlases,
     pools: Vec<(usize, rayon::ThreadPool)>,
     clock: MonotonicClock,
 }
@@ -71,8 +82,16 @@ impl Maker {
     /// Gets everything ready that the settings need.
     ///
     /// # Errors
-    /// A built-in holdout or hand is broken, or there are no threads to be had.
-    pub fn new(settings: &Settings) -> Result<Self, MakeError> {
+    /// A built-in holdout or hand is broken, an atlas is missing that a set asks for, or there are no threads to be had.
+    pub fn new(settings: &Settings, atlases: Atlases) -> Result<Self, MakeError> {
+        let mut cells = settings.cells().into_iter().filter(|cell| cell.set.atlas);
+        if let Some(cell) = cells.find(|cell| atlases.of(cell).is_none()) {
+            return Err(MakeError::Atlas(&cell.built_in().object));
+        }
+        let rig = |name| {
+            let hand = hand(name, Handedness::Right).ok_or(MakeError::Rig(name))?;
+            Ok(&hand.rig)
+        };
         let ready = |holdout: &'static BuiltInHoldout| {
             holdout
                 .to_holdout()
@@ -91,13 +110,16 @@ impl Maker {
         };
         Ok(Self {
             holdouts: holdouts().iter().map(ready).collect::<Result<_, _>>()?,
-            rig: &hand(RECEIVING_RIG, Handedness::Right).ok_or(MakeError::Rig)?.rig,
+            thesis_rig: rig(THESIS_RIG)?,
+            physical_rig: rig(PHYSICAL_RIG)?,
+            atlases,
             pools: threads.into_iter().map(pool).collect::<Result<_, _>>()?,
             clock: MonotonicClock(Instant::now()),
         })
     }
 
-    /// Searches for the valid grasp number `number` of a cell. None if it was told to stop.
+    /// Searches for the valid grasp number `number` of a cell; the record may say that it gave up. None if it was told to
+    /// stop.
     pub fn valid(&self, settings: &Settings, cell: &Cell, number: u64, stop: &AtomicBool) -> Option<Record> {
         let seed = settings.seed_of_valid(cell, number);
         let holdout = &self.holdouts[cell.holdout];
@@ -105,14 +127,14 @@ impl Maker {
             seed,
             strategy: cell.set.strategy,
             bend_ratios: cell.set.bend_ratios,
-            validity: Validity::Thesis,
-            friction: holdout.object.friction_under(Validity::Thesis),
+            validity: cell.set.validity,
+            friction: holdout.object.friction_under(cell.set.validity),
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
-            atlas: None,
+            atlas: self.atlases.of(cell).cloned(),
             reproducible: false,
             first_attempt: 0,
-            max_attempts: u64::MAX,
+            max_attempts: cell.set.most_attempts(),
             deadline: None,
             workers: cell.threads,
             record_step_times: false,
@@ -121,31 +143,41 @@ impl Maker {
         // From inside the pool, so that waking a thread is not measured where one thread is asked for.
         let (outcome, took) = pool.install(|| {
             let start = self.clock.now();
-            let outcome = find_grasp(pool, holdout, self.rig, &search, &self.clock, stop);
+            let outcome = find_grasp(pool, holdout, self.rig(cell.set), &search, &self.clock, stop);
             (outcome, self.clock.now().saturating_sub(start))
         });
-        let attempt = match outcome.end {
-            SearchEnd::Found => outcome.report.attempt?,
-            SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted | SearchEnd::Stopped => return None,
+        let report = outcome.report;
+        let source = match outcome.end {
+            SearchEnd::Found => Source::from(report.source?),
+            SearchEnd::AttemptsExhausted => Source::Nowhere,
+            SearchEnd::DeadlinePassed | SearchEnd::Stopped => return None,
         };
-        let details = (cell.threads == 1).then(|| {
-            let closer = self.closer_look(cell, seed, attempt);
-            debug_assert!(matches!(closer.end, AttemptEnd::Valid(_)), "attempt {attempt}");
-            closer.details
-        });
+        let is_looked_at = cell.threads == 1 && source != Source::Nowhere;
+        let closer = is_looked_at
+            .then(|| self.closer_look(cell, seed, source))
+            .flatten();
+        let is_valid = |closer: &Closer| matches!(closer.end, AttemptEnd::Valid(_));
+        debug_assert!(
+            !is_looked_at || closer.as_ref().is_some_and(is_valid),
+            "{source} is not valid again"
+        );
         Some(Record {
             cell: *cell,
             number,
             seed,
-            attempt,
+            source,
             rejection: None,
             search: Some(SearchFigures {
-                attempts: outcome.report.attempts,
-                pruned_placements: outcome.report.pruned_placements,
-                rejections: Rejection::OF_THESIS.map(|kind| outcome.report.rejections[kind.index()]),
+                attempts: report.attempts,
+                pruned_placements: report.pruned_placements,
+                rejections: Rejection::OF_THESIS.map(|kind| report.rejections[kind.index()]),
                 nanoseconds: nanoseconds(took),
+                atlas: cell.set.atlas.then_some(AtlasFigures {
+                    entries: report.known_grips as u64,
+                    candidates: report.candidates,
+                }),
             }),
-            details,
+            details: closer.map(|closer| closer.details),
         })
     }
 
@@ -163,13 +195,13 @@ impl Maker {
         let mut number = numbers.start;
         let mut attempt = first_attempt;
         while number < numbers.end {
-            let closer = self.closer_look(cell, seed, attempt);
+            let closer = self.look_at_attempt(cell, seed, attempt);
             if let AttemptEnd::Rejected { rejection, .. } = closer.end {
                 records.push(Record {
                     cell: *cell,
                     number,
                     seed,
-                    attempt,
+                    source: Source::Attempt(attempt),
                     rejection: Some(rejection),
                     search: None,
                     details: Some(closer.details),
@@ -181,9 +213,15 @@ impl Maker {
         records
     }
 
-    /// Runs a record's attempt again. True if it ends as recorded, with the same wrist and digits.
+    /// Looks at a record's attempt or grip again. True if it ends as recorded, with the same wrist and digits, and of a
+    /// search that gave up, which would take as long again.
     pub fn comes_out_again(&self, record: &Record) -> bool {
-        let closer = self.closer_look(&record.cell, record.seed, record.attempt);
+        if record.source == Source::Nowhere {
+            return true;
+        }
+        let Some(closer) = self.closer_look(&record.cell, record.seed, record.source) else {
+            return false;
+        };
         let rejection = match closer.end {
             AttemptEnd::Valid(_) => None,
             AttemptEnd::Rejected { rejection, .. } => Some(rejection),
@@ -196,9 +234,14 @@ impl Maker {
     }
 
     /// The valid grasp of a record, made again.
-    pub fn grasp_of(&self, record: &Record) -> Option<Box<grasp_synthesis::grasp::Grasp>> {
+    pub fn grasp_of(&self, record: &Record) -> Option<Box<Grasp>> {
+        let index = match record.source {
+            Source::Attempt(index) => index,
+            Source::AtlasEntry(entry) => return self.grip(&record.cell, entry),
+            Source::Nowhere => return None,
+        };
         let scene = self.scene(&record.cell);
-        let mut stream = AttemptStream::new(record.seed, record.attempt);
+        let mut stream = AttemptStream::new(record.seed, index);
         let end = Attempt::default().try_synthesize_grasp(&scene, &mut stream, &mut NoStopwatch, &|| false);
         match end {
             AttemptEnd::Valid(grasp) => Some(grasp),
@@ -206,14 +249,29 @@ impl Maker {
         }
     }
 
+    /// A grip of the atlas as it holds the cell's holdout; none if it does not, or if there is no such grip.
+    fn grip(&self, cell: &Cell, entry: u16) -> Option<Box<Grasp>> {
+        let scene = self.scene(cell);
+        let (object, presented) = scene.physical()?;
+        let entry = self.atlases.of(cell)?.entries().get(usize::from(entry))?;
+        // The friction is the object's own, as the atlas'.
+        let grasp = entry.hold(object, scene.rig(), presented, false, &mut Gripper::default())?;
+        Some(Box::new(grasp))
+    }
+
+    fn rig(&self, set: Set) -> &'static Rig {
+        match set.validity {
+            Validity::Thesis => self.thesis_rig,
+            Validity::Physical => self.physical_rig,
+        }
+    }
+
     fn scene(&self, cell: &Cell) -> Scene<'_> {
         let holdout = &self.holdouts[cell.holdout];
-        let Set {
-            strategy,
-            bend_ratios,
-        } = cell.set;
-        let friction = holdout.object.friction_under(Validity::Thesis);
-        Scene::new(holdout, self.rig, strategy, bend_ratios, friction)
+        let set = cell.set;
+        let friction = holdout.object.friction_under(set.validity);
+        Scene::new(holdout, self.rig(set), set.strategy, set.bend_ratios, friction)
+            .with_validity(set.validity)
     }
 }
 

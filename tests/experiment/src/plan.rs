@@ -1,8 +1,16 @@
 //! What a run makes: sets of grasps, cell by cell.
 
+use std::ops::Not;
+
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
-use grasp_synthesis::strategy::{BendRatioChoice, Strategy};
+use grasp_synthesis::strategy::{BendRatioChoice, Strategy, Validity};
 use serde::{Deserialize, Serialize};
+
+/// The receiving hand under the thesis' validity: the thesis' own.
+pub const THESIS_RIG: &str = "thesis";
+
+/// The receiving hand under `PHYSICAL` validity: the one that a server poses by default.
+pub const PHYSICAL_RIG: &str = "adult";
 
 /// Distance between the seeds of two holdouts, and with it one more than the most grasps that a cell can have.
 const SEEDS_PER_HOLDOUT: u64 = 1_000_000;
@@ -10,53 +18,115 @@ const SEEDS_PER_HOLDOUT: u64 = 1_000_000;
 /// The most grasps, and the most invalid attempts, of a cell: far more than there is time for.
 pub const MOST_PER_CELL: u64 = SEEDS_PER_HOLDOUT - 1;
 
-/// A way to synthesize: one grasp set of the thesis.
+/// Attempts after which a search of a set beyond A to F gives up: not every holdout leaves a physical grasp. More take
+/// longer, up to a minute each, before that is accepted; fewer give up on holdouts that leave few. The worst holdout that
+/// leaves any takes 6,000 on average.
+const MOST_ATTEMPTS: u64 = 1_000_000;
+
+/// A way to synthesize: one grasp set of the thesis, or a column beside them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Set {
-    /// The step of the ladder.
+    /// How grasps are searched for.
     pub strategy: Strategy,
     /// Which bend ratios a digit tries.
     pub bend_ratios: BendRatioChoice,
+    /// Which grasps count as valid. Records of the thesis' own validity do not say it.
+    #[serde(default, skip_serializing_if = "is_of_thesis")]
+    pub validity: Validity,
+    /// Are the grips of the object's complete atlas tried first? Records of sets without do not say it.
+    #[serde(default, skip_serializing_if = "Not::not")]
+    pub atlas: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_of_thesis(validity: &Validity) -> bool {
+    *validity == Validity::Thesis
 }
 
 impl Set {
     /// Grasp set A to F.
     pub fn ladder(strategy: Strategy) -> Self {
-        Self {
-            strategy,
-            bend_ratios: strategy.default_bend_ratios(),
-        }
+        Self::of_thesis(strategy, strategy.default_bend_ratios())
     }
+
+    /// Another search for the same grasps: GUIDED, with the hand and the validity of the thesis.
+    pub const GUIDED: Self = Self::of_thesis(Strategy::Guided, BendRatioChoice::OneRandom);
+
+    /// GUIDED for the grasps that a server gives by default, found afresh.
+    pub const PHYSICAL: Self = Self {
+        validity: Validity::Physical,
+        ..Self::GUIDED
+    };
+
+    /// The same with the object's complete atlas: as a server answers by default.
+    pub const ATLAS: Self = Self {
+        atlas: true,
+        ..Self::PHYSICAL
+    };
+
+    /// Everything that is compared: sets A to F, and what goes beyond them.
+    pub const ALL: [Self; 9] = [
+        Self::of_thesis(Strategy::A, BendRatioChoice::All),
+        Self::of_thesis(Strategy::B, BendRatioChoice::All),
+        Self::of_thesis(Strategy::C, BendRatioChoice::All),
+        Self::of_thesis(Strategy::D, BendRatioChoice::All),
+        Self::of_thesis(Strategy::E, BendRatioChoice::OneRandom),
+        Self::of_thesis(Strategy::F, BendRatioChoice::OneRandom),
+        Self::GUIDED,
+        Self::PHYSICAL,
+        Self::ATLAS,
+    ];
 
     /// The columns of Figure 5.20 in its order, (a) to (f). Column (a) is set D and column (c) set E: the thesis names
     /// them so.
     pub const BEND_RATIO_COLUMNS: [Self; 6] = [
-        Self::column(Strategy::D, BendRatioChoice::All),
-        Self::column(Strategy::D, BendRatioChoice::AllFingersWithoutLow),
-        Self::column(Strategy::E, BendRatioChoice::OneRandom),
-        Self::column(Strategy::D, BendRatioChoice::OneRandomFingersWithoutLow),
-        Self::column(Strategy::D, BendRatioChoice::OnlyOne),
-        Self::column(Strategy::D, BendRatioChoice::OnlyHigh),
+        Self::of_thesis(Strategy::D, BendRatioChoice::All),
+        Self::of_thesis(Strategy::D, BendRatioChoice::AllFingersWithoutLow),
+        Self::of_thesis(Strategy::E, BendRatioChoice::OneRandom),
+        Self::of_thesis(Strategy::D, BendRatioChoice::OneRandomFingersWithoutLow),
+        Self::of_thesis(Strategy::D, BendRatioChoice::OnlyOne),
+        Self::of_thesis(Strategy::D, BendRatioChoice::OnlyHigh),
     ];
 
-    const fn column(strategy: Strategy, bend_ratios: BendRatioChoice) -> Self {
+    const fn of_thesis(strategy: Strategy, bend_ratios: BendRatioChoice) -> Self {
         Self {
             strategy,
             bend_ratios,
+            validity: Validity::Thesis,
+            atlas: false,
         }
     }
 
     /// True for the sets A to F.
     pub fn is_ladder(self) -> bool {
-        self == Self::ladder(self.strategy)
+        Strategy::LADDER.contains(&self.strategy) && self == Self::ladder(self.strategy)
     }
 
-    /// "A" to "F", or "D, only 1.0" and so on.
-    pub fn name(self) -> String {
-        if self.is_ladder() {
-            format!("{:?}", self.strategy)
+    /// Attempts after which a search gives up; those of A to F never do.
+    pub fn most_attempts(self) -> u64 {
+        if self == Self::GUIDED || self.validity == Validity::Physical {
+            MOST_ATTEMPTS
         } else {
-            format!("{:?}, {}", self.strategy, choice_name(self.bend_ratios))
+            u64::MAX
+        }
+    }
+
+    /// The rig of the receiving hand, as a server chooses it by default.
+    pub fn rig_name(self) -> &'static str {
+        match self.validity {
+            Validity::Thesis => THESIS_RIG,
+            Validity::Physical => PHYSICAL_RIG,
+        }
+    }
+
+    /// "A" to "F", "Guided", "Physical" or "Atlas", or "D, only 1.0" and so on.
+    pub fn name(self) -> String {
+        match self {
+            Self::PHYSICAL => "Physical".to_owned(),
+            Self::ATLAS => "Atlas".to_owned(),
+            Self::GUIDED => "Guided".to_owned(),
+            _ if self.is_ladder() => format!("{:?}", self.strategy),
+            _ => format!("{:?}, {}", self.strategy, choice_name(self.bend_ratios)),
         }
     }
 }
@@ -121,13 +191,13 @@ pub struct Settings {
     pub valid: u64,
     /// Invalid attempts of each set and holdout; the thesis kept 100.
     pub invalid: u64,
-    /// The sets of the ladder.
-    pub strategies: Vec<Strategy>,
+    /// The sets, in the order of [`Set::ALL`].
+    pub sets: Vec<Set>,
     /// The holdouts, as indices.
     pub holdouts: Vec<usize>,
     /// Also the columns of Figure 5.20?
     pub bend_ratio_columns: bool,
-    /// Numbers of threads with which the ladder is run; the first is the one that all but the times is taken from.
+    /// Numbers of threads with which the sets are run; the first is the one that all but the times is taken from.
     pub threads: Vec<usize>,
 }
 
@@ -137,7 +207,7 @@ impl Default for Settings {
             seed: 1,
             valid: 25,
             invalid: 100,
-            strategies: Strategy::LADDER.to_vec(),
+            sets: Set::ALL.to_vec(),
             holdouts: (0..holdouts().len()).collect(),
             bend_ratio_columns: true,
             threads: vec![1, 2],
@@ -152,12 +222,8 @@ impl Settings {
     /// will take in the next.
     pub fn cells(&self) -> Vec<Cell> {
         let mut runs: Vec<(Set, usize)> = Vec::new();
-        for &strategy in &self.strategies {
-            runs.extend(
-                self.threads
-                    .iter()
-                    .map(|&threads| (Set::ladder(strategy), threads)),
-            );
+        for &set in &self.sets {
+            runs.extend(self.threads.iter().map(|&threads| (set, threads)));
         }
         if self.bend_ratio_columns {
             runs.extend(Set::BEND_RATIO_COLUMNS.map(|set| (set, 1)));
@@ -176,10 +242,10 @@ impl Settings {
         cells
     }
 
-    /// How many invalid attempts a cell keeps: on one thread, in the sets of the ladder that were asked for.
+    /// How many invalid attempts a cell keeps: on one thread, in the sets that were asked for. Where an atlas answers,
+    /// attempts are those of the same set without.
     pub fn invalid_of(&self, cell: &Cell) -> u64 {
-        let is_asked = cell.set.is_ladder() && self.strategies.contains(&cell.set.strategy);
-        if is_asked && cell.threads == 1 {
+        if self.sets.contains(&cell.set) && !cell.set.atlas && cell.threads == 1 {
             self.invalid
         } else {
             0
@@ -213,8 +279,8 @@ mod tests {
     #[test]
     fn every_cell_is_made_once() {
         let cells = Settings::default().cells();
-        // Six sets on one and two threads, and four columns of Figure 5.20 that are no set of their own.
-        assert_eq!(cells.len(), (6 * 2 + 4) * 15);
+        // Nine sets on one and two threads, and four columns of Figure 5.20 that are no set of their own.
+        assert_eq!(cells.len(), (9 * 2 + 4) * 15);
         assert_eq!(cells.iter().collect::<HashSet<_>>().len(), cells.len());
     }
 
@@ -225,6 +291,33 @@ mod tests {
         assert_eq!(names[2], "E");
         assert_eq!(names[4], "D, only 1.0");
         assert_eq!(names.iter().collect::<HashSet<_>>().len(), 6);
+    }
+
+    #[test]
+    fn the_first_sets_are_the_ladder() {
+        let (ladder, beyond) = Set::ALL.split_at(6);
+        assert_eq!(ladder, Strategy::LADDER.map(Set::ladder));
+        assert!(ladder.iter().all(|set| set.is_ladder()));
+        assert!(!beyond.iter().any(|set| set.is_ladder()));
+        assert_eq!(Set::GUIDED.bend_ratios, Strategy::Guided.default_bend_ratios());
+        let names: Vec<_> = beyond.iter().map(|set| set.name()).collect();
+        assert_eq!(names, ["Guided", "Physical", "Atlas"]);
+    }
+
+    #[test]
+    fn cells_of_earlier_versions_are_read_and_written_as_they_were() {
+        let earlier = r#"{"strategy":"B","bend_ratios":"all","threads":1,"holdout":"scissors-hold1"}"#;
+        let cell: Cell = serde_json::from_str(earlier).expect("a cell");
+        assert_eq!(cell.set, Set::ladder(Strategy::B));
+        assert_eq!(serde_json::to_string(&cell).expect("text"), earlier);
+        for set in Set::ALL {
+            let text = serde_json::to_string(&Cell { set, ..cell }).expect("text");
+            assert_eq!(
+                serde_json::from_str::<Cell>(&text).expect("a cell").set,
+                set,
+                "{text}"
+            );
+        }
     }
 
     #[test]
@@ -245,13 +338,14 @@ mod tests {
     }
 
     #[test]
-    fn invalid_attempts_are_kept_where_the_ladder_was_asked_for() {
+    fn invalid_attempts_are_kept_of_sets_that_were_asked_for() {
         let settings = Settings {
-            strategies: vec![Strategy::F],
+            sets: vec![Set::ladder(Strategy::F), Set::PHYSICAL, Set::ATLAS],
             ..Settings::default()
         };
         for cell in settings.cells() {
-            let expected = if cell.set.name() == "F" && cell.threads == 1 {
+            let is_negative_set = ["F", "Physical"].contains(&cell.set.name().as_str());
+            let expected = if is_negative_set && cell.threads == 1 {
                 100
             } else {
                 0

@@ -15,9 +15,9 @@ use crate::{
     plan::{Set, Settings},
     plot::figure,
     sheet::comfort_sheet,
-    table::Table,
+    table::{Table, with_separators},
     tables,
-    types::{SetTypes, set_types},
+    types::{SetTypes, set_types, unclassifiable_in_words},
 };
 
 const PAGE: &str = "README.md";
@@ -75,7 +75,8 @@ pub fn write(
         let svg = figure(drawn.title, &drawn.panels, drawn.columns);
         write_file(&target.join(format!("{}.svg", drawn.file)), svg.as_bytes())?;
     }
-    let sheet_set = data.ladder().last().map(Set::ladder);
+    // The question is the thesis' own (6.1).
+    let sheet_set = data.ladder().last().map(Set::ladder).or(data.sets().last());
     let sheet = sheet_set.and_then(|set| Some((set, comfort_sheet(&data, maker, set)?)));
     if let Some((_, image)) = &sheet {
         write_file(&target.join(SHEET), &image.to_png())?;
@@ -99,54 +100,70 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
 /// A part of the page.
 struct Section {
     title: &'static str,
-    text: &'static str,
+    text: String,
     figures: Vec<Figure>,
     tables: Vec<Table>,
+}
+
+impl Section {
+    /// A part without figures.
+    fn new(title: &'static str, text: impl Into<String>, tables: Vec<Table>) -> Self {
+        Self {
+            title,
+            text: text.into(),
+            figures: Vec::new(),
+            tables,
+        }
+    }
 }
 
 /// The page without what stands around it. Figures go to the section that has the table they are drawn from.
 fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table, types: &[SetTypes]) -> Vec<Section> {
     let mut sections = vec![
-        Section {
-            title: "The ladder",
-            text: "Means over the holdouts, of which each counts the same. An attempt is one accepted placement, as \
-                   the thesis counts; placements that the measures pruned before it stand beside it. Times are \
-                   wall-clock times of whole searches. ± is half of a 95 % interval.",
-            figures: Vec::new(),
-            tables: vec![ladder.clone(), tables::per_holdout(data)],
-        },
-        Section {
-            title: "What chapter 5 says",
-            text: "\"In part\" means: in the same direction, but not of the same size.",
-            figures: Vec::new(),
-            tables: vec![claims::table(claims)],
-        },
-        Section {
-            title: "How attempts end",
-            text: "The negative sets are the first failed attempts of each holdout, as in the thesis. \"% of all\" is \
-                   the share in all failed attempts that the searches made.",
-            figures: Vec::new(),
-            tables: vec![tables::output_types(data)],
-        },
-        Section {
-            title: "What the steps take",
-            text: "Each attempt of the positive and negative sets was replayed alone; a step's time is the median of \
-                   the replays, with one reading of the clock in it and everything already in the processor's caches. Wrist Placement includes the pruned placements.",
-            figures: Vec::new(),
-            tables: vec![tables::step_times(data), tables::step_totals(data)],
-        },
-        Section {
-            title: "Wrist placement",
-            text: "Of failed attempts the plots show at most as many as the thesis had; the CSV has all.",
-            figures: Vec::new(),
-            tables: vec![tables::measure_ranges(data), tables::palm_angle_bins(data)],
-        },
-        Section {
-            title: "Finger posing",
-            text: "Lost contacts: wrist and yaw of every valid grasp of set C are kept, and each touching digit \
-                   closes with another bend ratio alone.",
-            figures: Vec::new(),
-            tables: vec![
+        Section::new(
+            "The ladder",
+            "Means over the holdouts, of which each counts the same. An attempt is one accepted placement, as \
+             the thesis counts; placements that the measures pruned before it stand beside it. Times are \
+             wall-clock times of whole searches. ± is half of a 95 % interval."
+                .to_owned()
+                + &beyond_the_ladder(data),
+            vec![ladder.clone(), tables::per_holdout(data)],
+        ),
+        Section::new(
+            "The atlas",
+            "Answers of set Atlas on one thread. No attempt is run where a grip of the atlas is valid; the first \
+             that is ends the search, so that there is one candidate, and an answer from the atlas is the same grip \
+             every time. The atlases were complete before the first search. Failed attempts are those of Physical.",
+            vec![tables::atlas_answers(data)],
+        ),
+        Section::new(
+            "What chapter 5 says",
+            "\"In part\" means: in the same direction, but not of the same size.",
+            vec![claims::table(claims)],
+        ),
+        Section::new(
+            "How attempts end",
+            "The negative sets are the first failed attempts of each holdout, as in the thesis. \"% of all\" is \
+             the share in all failed attempts that the searches made.",
+            vec![tables::output_types(data)],
+        ),
+        Section::new(
+            "What the steps take",
+            "Each attempt of the positive and negative sets was replayed alone; a step's time is the median of \
+             the replays, with one reading of the clock in it and everything already in the processor's caches. \
+             Wrist Placement includes the pruned placements.",
+            vec![tables::step_times(data), tables::step_totals(data)],
+        ),
+        Section::new(
+            "Wrist placement",
+            "Of failed attempts the plots show at most as many as the thesis had; the CSV has all.",
+            vec![tables::measure_ranges(data), tables::palm_angle_bins(data)],
+        ),
+        Section::new(
+            "Finger posing",
+            "Lost contacts: wrist and yaw of every valid grasp of set C are kept, and each touching digit \
+             closes with another bend ratio alone.",
+            vec![
                 tables::yaw_spread(data),
                 tables::bend_angles(data),
                 tables::ratio_counts(data),
@@ -154,23 +171,24 @@ fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table, types: &[SetTypes
                 tables::columns(data),
                 tables::columns_per_holdout(data),
             ],
-        },
-        Section {
-            title: "Contacts, forces and comfort",
-            text: "\"Valid again\" is how often Immobility Validation passes when it is repeated for the same contacts. \
-                   \"By the draw\" is the share of E's variance that stays when the grasp is kept and only the random \
-                   force distributions are drawn anew: E cannot tell grasps apart by that share.",
-            figures: Vec::new(),
-            tables: vec![tables::contact_counts(data), tables::comfort_spread(data)],
-        },
-        Section {
-            title: "Grasp types",
-            text: "Each valid grasp on one thread is made again from its seed and classified by pose and contacts \
-                   alone. A grasp that is like no type of the taxonomy counts as unnatural, as in the thesis. Means over \
-                   the holdouts; ± is half of a 95 % interval.",
-            figures: Vec::new(),
-            tables: vec![tables::unclassifiable(types), tables::grasp_types(types)],
-        },
+        ),
+        Section::new(
+            "Contacts, forces and comfort",
+            "\"Valid again\" is how often Immobility Validation passes when it is repeated for the same contacts. \
+             \"By the draw\" is the share of E's variance that stays when the grasp is kept and only the random \
+             force distributions are drawn anew: E cannot tell grasps apart by that share.",
+            vec![tables::contact_counts(data), tables::comfort_spread(data)],
+        ),
+        Section::new(
+            "Grasp types",
+            format!(
+                "Each valid grasp on one thread is made again and classified by pose and contacts alone. A grasp that is \
+                 like no type of the taxonomy counts as unnatural, as in the thesis. Means over the holdouts; ± is half of \
+                 a 95 % interval. {}",
+                unclassifiable_in_words(types)
+            ),
+            vec![tables::unclassifiable(types), tables::grasp_types(types)],
+        ),
     ];
     for figure in figures(data) {
         let owner = match figure.data {
@@ -192,16 +210,43 @@ fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table, types: &[SetTypes
     sections
 }
 
+/// What is to be said of the sets beside A to F.
+fn beyond_the_ladder(data: &Data<'_>) -> String {
+    if data.sets().all(Set::is_ladder) {
+        return String::new();
+    }
+    let mut text = " Guided looks for the same grasps as A to F, but places hands where opposed surfaces suggest it; an \
+                    attempt that finds no room for a hand counts as NoContacts. \
+                    Physical and Atlas are searches for the grasps that a server gives by default: another rig \
+                    (`adult`), hands as solids, forces solved for. What is valid differs, so that they compare with each \
+                    other and not with the others. Physical finds its grasps afresh; Atlas tries the grips of the \
+                    object's complete atlas first."
+        .to_owned();
+    for set in data.sets() {
+        let names = data.given_up(set);
+        if !names.is_empty() {
+            let _ = write!(
+                text,
+                " {} found no grasp in {} attempts for {}: left out of its means.",
+                set.name(),
+                with_separators(&set.most_attempts().to_string()),
+                names.join(", ")
+            );
+        }
+    }
+    text
+}
+
 fn page_text(data: &Data<'_>, folder: &Folder, sections: &[Section], sheet: Option<Set>) -> String {
     let settings = data.settings;
     let mut text = String::from("# Chapter 5, made again\n\n");
-    let sets: Vec<_> = data.ladder().map(|strategy| format!("{strategy:?}")).collect();
+    let sets: Vec<_> = data.sets().map(Set::name).collect();
     let _ = writeln!(
         text,
-        "Made by `{}`: grasp sets {} over {} holdouts, {} valid grasps and {} invalid attempts each; seed {}, \
-         receiving rig `{}`, as valid counts what the thesis prints. Measured on {}; reading the clock takes {} ns. \
-         `grasps.csv` and `attempts.csv` in the run's folder list every grasp and attempt with its seed and index: \
-         `grasp find --holdout H --strategy S --bend-ratios R --seed N --only-attempt I` makes it again.",
+        "Made by `{}`: grasp sets {} over {} holdouts, {} valid grasps and {} invalid attempts each; seed {}. In sets A to \
+         F and Guided, as valid counts what the thesis prints, for the rig `{}`. Measured on {}; reading the clock takes \
+         {} ns. `grasps.csv` and `attempts.csv` in the run's folder list every grasp and attempt with its seed and index: \
+         `grasp find --holdout H --validity V --strategy S --bend-ratios R --seed N --only-attempt I` makes it again.",
         command_line(settings),
         sets.join(", "),
         settings.holdouts.len(),
@@ -242,9 +287,9 @@ fn page_text(data: &Data<'_>, folder: &Folder, sections: &[Section], sheet: Opti
 pub fn command_line(settings: &Settings) -> String {
     let usual = Settings::default();
     let mut text = "grasp experiment".to_owned();
-    if settings.strategies != usual.strategies {
-        for strategy in &settings.strategies {
-            let _ = write!(text, " --strategy {strategy:?}");
+    if settings.sets != usual.sets {
+        for set in &settings.sets {
+            let _ = write!(text, " --set {}", set.name());
         }
     }
     if settings.holdouts != usual.holdouts {

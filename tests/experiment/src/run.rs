@@ -11,13 +11,13 @@ use crate::{
     folder::{Folder, FolderError},
     make::Maker,
     plan::{Cell, Settings},
-    record::Record,
+    record::{Record, Source},
 };
 
 /// How far a run is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Valid grasps that were made, in this run or before.
+    /// Valid grasps that were made, in this run or before, or that were given up.
     pub done: u64,
     /// All valid grasps that were asked for.
     pub total: u64,
@@ -43,6 +43,8 @@ struct Made {
     invalid: u64,
     next_invalid_attempt: u64,
     nanoseconds: u64,
+    /// A search gave up: others would, too.
+    gave_up: bool,
 }
 
 /// Makes what the folder does not have yet.
@@ -106,7 +108,7 @@ fn missing(settings: &Settings, cell: &Cell, made: Option<&Made>) -> Option<Part
             first_attempt: made.next_invalid_attempt,
         })
     } else {
-        (made.valid < settings.valid).then_some(Part::Valid { number: made.valid })
+        (made.valid_left(settings) > 0).then_some(Part::Valid { number: made.valid })
     }
 }
 
@@ -115,10 +117,21 @@ impl Made {
     fn count(&mut self, record: &Record) {
         if record.rejection.is_some() {
             self.invalid += 1;
-            self.next_invalid_attempt = record.attempt + 1;
+            self.next_invalid_attempt = record.source.attempt().map_or(0, |attempt| attempt + 1);
+        } else if record.source == Source::Nowhere {
+            self.gave_up = true;
         } else {
             self.valid += 1;
             self.nanoseconds += record.search.map_or(0, |search| search.nanoseconds);
+        }
+    }
+
+    /// Valid grasps that are still to be made.
+    fn valid_left(&self, settings: &Settings) -> u64 {
+        if self.gave_up {
+            0
+        } else {
+            settings.valid.saturating_sub(self.valid)
         }
     }
 
@@ -138,22 +151,25 @@ fn check_earlier_records(maker: &Maker, folder: &Folder) -> Result<(), FolderErr
     }
     let mut checked: Vec<_> = ends.into_values().flatten().collect();
     // Always the same one is named, whatever order the map had.
-    checked.sort_by_key(|record| (record.cell.holdout, record.seed, record.attempt));
+    checked.sort_by_key(|record| (record.cell.holdout, record.seed, record.source));
     match checked.into_iter().find(|record| !maker.comes_out_again(record)) {
         None => Ok(()),
         Some(record) => Err(FolderError::Outdated {
             path: folder.path().to_owned(),
             holdout: record.cell.built_in().name.clone(),
             seed: record.seed,
-            attempt: record.attempt,
+            hand: record.source,
         }),
     }
 }
 
 fn progress_at(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>, cell: Cell) -> Progress {
-    let valid = |cell: &Cell| made.get(cell).map_or(0, |made| made.valid.min(settings.valid));
+    let done = |cell: &Cell| {
+        made.get(cell)
+            .map_or(0, |made| settings.valid - made.valid_left(settings))
+    };
     Progress {
-        done: cells.iter().map(valid).sum(),
+        done: cells.iter().map(done).sum(),
         total: settings.valid * cells.len() as u64,
         cell,
         left: time_left(settings, cells, made),
@@ -176,7 +192,7 @@ fn time_left(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>) ->
             of_holdout.insert(cell.holdout, mean);
         }
         let mean = of_holdout.get(&cell.holdout).copied().unwrap_or(overall);
-        left += mean * settings.valid.saturating_sub(made.valid) as f64;
+        left += mean * made.valid_left(settings) as f64;
     }
     Some(Duration::from_nanos(left as u64))
 }

@@ -3,11 +3,11 @@
 use glam::Vec3;
 use grasp_assets::hands::hand;
 use grasp_scene::{ContactMark, HandoverScene, Image, PosedHand, RenderOptions, contact_sheet};
-use grasp_synthesis::hand::{Handedness, joints::HandJoints};
+use grasp_synthesis::hand::joints::HandJoints;
 
 use crate::{
     data::Data,
-    make::{Maker, RECEIVING_RIG},
+    make::{Maker, receiving_hand},
     plan::Set,
     record::Record,
     tables::valid_with_figures,
@@ -67,7 +67,7 @@ fn picture(maker: &Maker, record: &Record) -> Option<Image> {
     let built_in = record.cell.built_in();
     let object = &grasp_assets::objects::object(&built_in.object)?.object;
     let giver = hand(&built_in.giver_rig, built_in.giver_handedness)?;
-    let receiver = hand(RECEIVING_RIG, Handedness::Right)?;
+    let receiver = receiving_hand(record.cell.set)?;
     let world_from_object = built_in.world_from_object;
     let forbidden: Vec<u32> = (0..object.surface.mesh().triangles().len() as u32)
         .filter(|&triangle| object.is_forbidden(triangle))

@@ -32,12 +32,14 @@ impl From<u64> for Value {
 }
 
 impl Value {
-    /// A number with as many decimals as leave it three digits or so; missing if there is none.
+    /// A number with as many decimals as leave it three digits or so, a plain 0 if it is nothing; missing if there is
+    /// none.
     pub fn number(value: impl Into<Option<f64>>) -> Self {
         let Some(value) = value.into().filter(|value| value.is_finite()) else {
             return Self::Missing;
         };
         let decimals = match value.abs() {
+            0.0 => 0,
             ..0.1 => 3,
             ..9.995 => 2,
             ..99.95 => 1,
@@ -218,6 +220,8 @@ mod tests {
         assert_eq!(Value::number(12.345).to_text(), "12.3");
         assert_eq!(Value::number(9.999).to_text(), "10.0");
         assert_eq!(Value::Number(-0.01, 1).to_text(), "0.0");
+        assert_eq!(Value::number(0.0).to_text(), "0");
+        assert_eq!(Value::number(0.0004).to_text(), "0.000");
         assert_eq!(Value::number(None).to_text(), "–");
     }
 

@@ -1,5 +1,6 @@
 //! The tables of chapter 5 from a run's records, beside the thesis' own figures.
 
+mod atlas;
 mod bend_ratios;
 mod comfort;
 mod ladder;
@@ -8,6 +9,8 @@ mod outputs;
 mod placement;
 mod types;
 
+pub use atlas::atlas_answers;
+pub(crate) use atlas::different_grasps;
 pub(crate) use bend_ratios::{BEND_BIN_DEGREES, bend_angle_bins, column_means, lost};
 pub use bend_ratios::{bend_angles, columns, lost_contacts, ratio_counts};
 pub(crate) use comfort::{comfort_share_by_draw, contacts_of, touching_digits, valid_with_figures};

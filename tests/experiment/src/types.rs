@@ -1,15 +1,18 @@
 //! The grasp types of a run's valid grasps: what the thesis calls false valid are those without one (5.2, 6.1).
 //!
-//! They are not recorded but looked at when a report is made, on grasps that are made again from their seeds: a run that
+//! They are not recorded but looked at when a report is made, on grasps that are made again from their seeds and atlases: a run that
 //! was made before types were told has them too, and all are told by the same rules.
 
-use grasp_synthesis::{strategy::Strategy, taxonomy::GraspType};
+use std::fmt::Write as _;
+
+use grasp_synthesis::taxonomy::GraspType;
 
 use crate::{
     data::Data,
     make::Maker,
     plan::Set,
-    stats::{mean, standard_error_of_group_means},
+    stats::standard_error_of_group_means,
+    tables::{different_grasps, mean_of_means},
 };
 
 /// Standard errors to either side of a mean that hold it with 95 %.
@@ -18,10 +21,12 @@ const STANDARD_ERRORS: f64 = 1.96;
 /// The types of a positive grasp set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SetTypes {
-    /// The step of the ladder.
-    pub strategy: Strategy,
+    /// The set.
+    pub set: Set,
     /// Of each grasp, holdout by holdout in the order of the settings; none for an unclassifiable one.
     pub by_holdout: Vec<Vec<Option<GraspType>>>,
+    /// How many of the grasps are different ones.
+    pub different: u64,
 }
 
 impl SetTypes {
@@ -32,11 +37,15 @@ impl SetTypes {
 
     /// Share of the grasps that are of a type, or of none, from 0 to 1: each holdout counts the same.
     pub fn share(&self, of: Option<GraspType>) -> Option<f64> {
-        mean_of_groups(&self.is(of))
+        mean_of_means(&self.is(of))
     }
 
-    /// Half of the 95 % interval of the share of unclassifiable grasps.
+    /// Half of the 95 % interval of the share of unclassifiable grasps. None if some grasps are the same: how they vary is
+    /// then not how grasps do.
     pub fn margin(&self) -> Option<f64> {
+        if self.different < self.count() as u64 {
+            return None;
+        }
         standard_error_of_group_means(&self.is(None)).map(|error| STANDARD_ERRORS * error)
     }
 
@@ -48,28 +57,43 @@ impl SetTypes {
     }
 }
 
-fn mean_of_groups(groups: &[Vec<f64>]) -> Option<f64> {
-    let means: Vec<_> = groups.iter().filter_map(|group| mean(group)).collect();
-    mean(&means)
-}
-
-/// The types of the positive sets of the ladder, on one thread.
+/// The types of the positive sets that were asked for, on one thread.
 pub fn set_types(data: &Data<'_>, maker: &Maker) -> Vec<SetTypes> {
-    let of_set = |strategy| {
+    let of_set = |set| {
         let of_holdout = |&holdout: &usize| {
-            let own = data
-                .valid(Set::ladder(strategy))
-                .filter(|record| record.cell.holdout == holdout);
+            let own = data.valid(set).filter(|record| record.cell.holdout == holdout);
             own.filter_map(|record| maker.grasp_of(record))
                 .map(|grasp| grasp.classification.grasp_type)
                 .collect()
         };
         SetTypes {
-            strategy,
+            set,
             by_holdout: data.settings.holdouts.iter().map(of_holdout).collect(),
+            different: different_grasps(data.valid(set)),
         }
     };
-    data.ladder().map(of_set).collect()
+    data.sets().map(of_set).collect()
+}
+
+/// The shares of unclassifiable grasps in a sentence or two; empty without grasps.
+pub fn unclassifiable_in_words(types: &[SetTypes]) -> String {
+    let share = |of: &SetTypes| Some(format!("{:.1} % in {}", 100.0 * of.share(None)?, of.set.name()));
+    let shares: Vec<_> = types.iter().filter_map(share).collect();
+    if shares.is_empty() {
+        return String::new();
+    }
+    let mut text = format!("Of no type are {}.", shares.join(", "));
+    for of in types.iter().filter(|of| of.different < of.count() as u64) {
+        let _ = write!(
+            text,
+            " The {} grasps of {} are {} different ones, because an atlas answers a holdout with the same grip again; \
+             an interval would say nothing of others.",
+            of.count(),
+            of.set.name(),
+            of.different
+        );
+    }
+    text
 }
 
 #[cfg(test)]
@@ -80,8 +104,9 @@ mod tests {
     fn each_holdout_counts_the_same() {
         let ring = Some(GraspType::Ring);
         let types = SetTypes {
-            strategy: Strategy::A,
+            set: Set::ALL[0],
             by_holdout: vec![vec![None, None, None, ring], vec![ring, ring], vec![]],
+            different: 6,
         };
         assert_eq!(types.count(), 6);
         assert_eq!(types.share(None), Some(0.375));
@@ -90,5 +115,24 @@ mod tests {
         // Variances 1/4 of four and 0 of two grasps, over two holdouts.
         let margin = types.margin().expect("two holdouts have grasps");
         assert!((margin - 1.96 * 0.25 / 2.0).abs() < 1e-9, "{margin}");
+    }
+
+    #[test]
+    fn grasps_that_are_the_same_have_no_interval() {
+        let ring = Some(GraspType::Ring);
+        let types = SetTypes {
+            set: Set::ATLAS,
+            by_holdout: vec![vec![None, None], vec![ring, ring]],
+            different: 2,
+        };
+        assert_eq!(types.share(None), Some(0.5));
+        assert_eq!(types.margin(), None);
+        let text = unclassifiable_in_words(&[types]);
+        assert!(text.starts_with("Of no type are 50.0 % in Atlas."), "{text}");
+        assert!(
+            text.contains("The 4 grasps of Atlas are 2 different ones"),
+            "{text}"
+        );
+        assert_eq!(unclassifiable_in_words(&[]), "");
     }
 }

@@ -11,44 +11,87 @@ use std::{
     },
 };
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use grasp_experiment::{
+    atlases::Atlases,
     folder::{Folder, Manifest},
     make::Maker,
-    plan::{MOST_PER_CELL, Settings},
+    plan::{MOST_PER_CELL, Set, Settings},
     run::{RunEnd, run as run_missing},
 };
 use grasp_synthesis::strategy::Strategy;
 
-use super::{EXIT_CODES, Ending, blocking, failure::Failure, holdout, output::Output, values::StrategyName};
+use super::{EXIT_CODES, Ending, blocking, failure::Failure, holdout, output::Output};
 use progress::Progress;
 
 /// The long help.
 const ABOUT: &str = r#"Make the grasp sets of the thesis' chapter 5 again, and report on them.
 
-For each strategy and built-in holdout this searches for valid grasps and keeps the first failed attempts, in this
-process, with the crate that the server searches with. Every grasp and attempt is kept in the output folder with its
-seed and index; a run that was interrupted goes on where it was, and one that is asked for more makes only what is
-missing. The report has the tables beside the thesis' own figures, every figure as a picture and as CSV, what chapter 5
-says against what this run shows, and a contact sheet of grasps in the order of comfort.
+For each set and built-in holdout this searches for valid grasps and keeps the first failed attempts, in this process,
+with the crate that the server searches with. Every grasp and attempt is kept in the output folder with its seed and
+index; a run that was interrupted goes on where it was, and one that is asked for more makes only what is missing. Set
+ATLAS needs the complete atlases of the objects: where they do not come with the objects, they are grown first, which
+takes minutes for each, and kept in the folder. The report has the tables beside the thesis' own figures, every figure
+as a picture and as CSV, what chapter 5 says against what this run shows, and a contact sheet of grasps in the order of
+comfort.
 
 With --json: {"folder", "report", "ladder": [{column: value, …}], "claims": [{"source", "thesis", "run", "verdict",
 "why"}]}."#;
+
+/// What a run can make.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+#[value(rename_all = "UPPER")]
+enum SetName {
+    /// Naive synthesis.
+    A,
+    /// Placement measures relative to the object.
+    B,
+    /// Palm-CoM-palm angle.
+    C,
+    /// Early stop when the thumb has no contact.
+    D,
+    /// One way of choosing the bend ratios.
+    E,
+    /// First sufficient force distribution.
+    F,
+    /// Guided search for grasps that are valid as the thesis says.
+    Guided,
+    /// Guided search for physically valid grasps, without an atlas.
+    Physical,
+    /// The same with the object's complete atlas, as a server answers by default.
+    Atlas,
+}
+
+impl From<SetName> for Set {
+    fn from(name: SetName) -> Self {
+        match name {
+            SetName::A => Self::ladder(Strategy::A),
+            SetName::B => Self::ladder(Strategy::B),
+            SetName::C => Self::ladder(Strategy::C),
+            SetName::D => Self::ladder(Strategy::D),
+            SetName::E => Self::ladder(Strategy::E),
+            SetName::F => Self::ladder(Strategy::F),
+            SetName::Guided => Self::GUIDED,
+            SetName::Physical => Self::PHYSICAL,
+            SetName::Atlas => Self::ATLAS,
+        }
+    }
+}
 
 /// Make the grasp sets of the thesis' chapter 5 again, and report on them.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 pub(super) struct Arguments {
-    /// Only this strategy; may be repeated. Default: all.
-    #[arg(long, ignore_case = true)]
-    strategy: Vec<StrategyName>,
+    /// Only this set; may be repeated. Default: all.
+    #[arg(long, value_name = "SET", ignore_case = true)]
+    set: Vec<SetName>,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
-    /// Valid grasps for each strategy and holdout.
+    /// Valid grasps for each set and holdout.
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u64).range(1..=MOST_PER_CELL))]
     valid: u64,
-    /// Failed attempts that are kept for each strategy and holdout.
+    /// Failed attempts that are kept for each set and holdout.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=MOST_PER_CELL))]
     invalid: u64,
     /// Start of all randomness.
@@ -66,7 +109,7 @@ pub(super) struct Arguments {
     /// The folder of the report. Default: `report` in the folder of the run.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
-    /// Forget what the folder has of an earlier run.
+    /// Forget what the folder has of an earlier run; atlases stay.
     #[arg(long)]
     fresh: bool,
 }
@@ -89,8 +132,11 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         let manifest = Manifest::new(settings.seed);
         let mut folder = Folder::open(&arguments.out, manifest, arguments.fresh)
             .map_err(|error| Failure::other("cannot use the folder of the run", error))?;
-        let maker = Maker::new(&settings).map_err(|error| Failure::other("cannot search", error))?;
         let mut progress = Progress::default();
+        let atlases = Atlases::complete(&settings, &folder, &stop, |now| progress.grow(&now))
+            .map_err(|error| Failure::other("the atlases cannot be made", error))?
+            .ok_or(Failure::Interrupted)?;
+        let maker = Maker::new(&settings, atlases).map_err(|error| Failure::other("cannot search", error))?;
         let end = run_missing(&settings, &maker, &mut folder, &stop, |now| progress.show(&now))
             .map_err(|error| Failure::other("the run cannot go on", error))?;
         if end == RunEnd::Stopped {
@@ -109,9 +155,9 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 impl Arguments {
     fn settings(&self) -> Result<Settings, Failure> {
         let usual = Settings::default();
-        let mut strategies: Vec<Strategy> = self.strategy.iter().map(|name| (*name).into()).collect();
-        strategies.sort_unstable();
-        strategies.dedup();
+        let asked: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
+        let mut sets = usual.sets;
+        sets.retain(|set| asked.is_empty() || asked.contains(set));
         let mut holdouts = Vec::new();
         for name in &self.holdout {
             let built_in = holdout::built_in(name)?;
@@ -126,11 +172,7 @@ impl Arguments {
             seed: self.seed,
             valid: self.valid,
             invalid: self.invalid,
-            strategies: if strategies.is_empty() {
-                usual.strategies
-            } else {
-                strategies
-            },
+            sets,
             holdouts: if holdouts.is_empty() {
                 usual.holdouts
             } else {

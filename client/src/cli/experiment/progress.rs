@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use grasp_experiment::run;
+use grasp_experiment::{atlases::AtlasProgress, run};
 use indicatif::{HumanDuration, ProgressBar};
 
 use crate::cli::progress::bar;
@@ -10,16 +10,37 @@ use crate::cli::progress::bar;
 /// How often the message changes at most: grasps can be found by the thousand a second.
 const MESSAGE_EVERY: Duration = Duration::from_millis(50);
 
-/// A bar that counts valid grasps.
+/// A bar that counts valid grasps, after one for each atlas that has to grow.
 #[derive(Debug, Default)]
 pub(super) struct Progress {
+    atlas: Option<(&'static str, ProgressBar)>,
     bar: Option<ProgressBar>,
     last_message: Option<Instant>,
 }
 
 impl Progress {
+    /// Shows how far an atlas is.
+    pub(super) fn grow(&mut self, now: &AtlasProgress) {
+        if self
+            .atlas
+            .as_ref()
+            .is_none_or(|(object, _)| *object != now.object)
+        {
+            let bar = bar(now.total, "{human_pos:>6}/{human_len}");
+            self.atlas = Some((now.object, bar));
+        }
+        if let Some((_, bar)) = &self.atlas {
+            let why = now.refused.map_or_else(String::new, |why| {
+                format!("; the one in the folder is not used: {why}")
+            });
+            bar.set_position(now.proposed);
+            bar.set_message(format!("atlas of {}, {} grips{why}", now.object, now.entries));
+        }
+    }
+
     /// Shows how far the run is.
     pub(super) fn show(&mut self, now: &run::Progress) {
+        self.atlas = None;
         let bar = self
             .bar
             .get_or_insert_with(|| bar(now.total, "{human_pos:>6}/{human_len}"));

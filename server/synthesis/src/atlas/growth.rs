@@ -33,7 +33,7 @@ pub const ROUND: u64 = 64;
 
 /// Proposals after which an atlas is complete even with fewer grips: an object that cannot be held must not be worked on
 /// forever.
-const MOST_PROPOSALS: u64 = 300_000;
+pub const MOST_PROPOSALS: u64 = 300_000;
 
 /// The seed of all atlases.
 const SEED: u64 = 0x4154_4c53;

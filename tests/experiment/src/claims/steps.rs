@@ -147,7 +147,7 @@ pub(super) fn immobility(data: &Data<'_>) -> Vec<Claim> {
     let best_of_hundred = strategies.iter().copied().filter(|strategy| *strategy < F);
     let sufficient: Vec<_> = best_of_hundred
         .flat_map(|strategy| valid_with_figures(data, Set::ladder(strategy)))
-        .map(|(.., grasp)| f64::from(grasp.sufficient_distributions))
+        .filter_map(|(.., grasp)| grasp.sufficient_distributions.map(f64::from))
         .collect();
     if let Some(ours) = mean(&sufficient) {
         claims.push(Claim {

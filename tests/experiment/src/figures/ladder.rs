@@ -18,9 +18,9 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
                  printed: fn(PerGrasp) -> f64,
                  is_time: bool| {
         let ours = |threads| {
-            data.ladder()
-                .map(|strategy| {
-                    let searches = data.searches_by_holdout(Set::ladder(strategy), threads);
+            data.sets()
+                .map(|set| {
+                    let searches = data.searches_by_holdout(set, threads);
                     let groups: Vec<_> = searches.iter().map(|own| of(own)).collect();
                     mean_of_means(&groups).unwrap_or(f64::NAN)
                 })
@@ -31,8 +31,8 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
                 name: "thesis, one thread".to_owned(),
                 colour: palette::THESIS,
                 values: data
-                    .ladder()
-                    .map(|strategy| thesis::ladder(strategy).map_or(f64::NAN, printed))
+                    .sets()
+                    .map(|set| thesis::ladder(set.strategy).map_or(f64::NAN, printed))
                     .collect(),
             },
             Series {
@@ -52,7 +52,7 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
             title: title.to_owned(),
             chart: Chart::GroupedBars {
                 label: label.to_owned(),
-                groups: data.ladder().map(|strategy| format!("{strategy:?}")).collect(),
+                groups: data.sets().map(Set::name).collect(),
                 series,
             },
         }
@@ -77,6 +77,7 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
                 true,
             ),
         ],
-        columns: 2,
+        // More sets than those of the ladder have names that need the whole width.
+        columns: if data.sets().all(Set::is_ladder) { 2 } else { 1 },
     }
 }

@@ -13,9 +13,8 @@ use crate::{
 
 /// Figures 5.5b, 5.12b, 5.14b, 5.16b and 5.21b in one.
 pub(super) fn output_types(data: &Data<'_>) -> Figure {
-    let counts: Vec<_> = data
-        .ladder()
-        .map(|strategy| negative_counts(data, Set::ladder(strategy)))
+    let counts: Vec<_> = negative_sets(data)
+        .map(|set| negative_counts(data, set))
         .collect();
     let series = Rejection::OF_THESIS.map(|rejection| Series {
         name: output_type(Some(rejection)).to_owned(),
@@ -43,10 +42,7 @@ pub(super) fn output_types(data: &Data<'_>) -> Figure {
 
 /// Figure 5.7, for every set.
 pub(super) fn totals(data: &Data<'_>) -> Figure {
-    let shares: Vec<_> = data
-        .ladder()
-        .map(|strategy| step_shares(data, Set::ladder(strategy)).1)
-        .collect();
+    let shares: Vec<_> = negative_sets(data).map(|set| step_shares(data, set).1).collect();
     Figure {
         file: "figure-5-07",
         title: "Figure 5.7: time of the negative grasp sets by step",
@@ -101,6 +97,11 @@ fn steps_of(values: impl Fn(usize) -> Vec<f64>) -> Vec<Series<f64>> {
         .collect()
 }
 
+/// The sets of which there are failed attempts.
+fn negative_sets(data: &Data<'_>) -> impl Iterator<Item = Set> {
+    data.sets().filter(|set| data.invalid(*set).next().is_some())
+}
+
 fn set_names(data: &Data<'_>) -> Vec<String> {
-    data.ladder().map(|strategy| format!("{strategy:?}")).collect()
+    negative_sets(data).map(Set::name).collect()
 }

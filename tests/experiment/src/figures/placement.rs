@@ -38,7 +38,7 @@ fn placements<'a>(data: &Data<'a>, set: Set) -> Vec<(Option<Rejection>, &'a Meas
     let limit = (MOST_DOTS / data.settings.holdouts.len().max(1)) as u64;
     data.both(set)
         .filter(|(record, _)| record.number < limit)
-        .map(|(record, details)| (record.rejection, &details.measures))
+        .filter_map(|(record, details)| Some((record.rejection, details.measures.as_ref()?)))
         .collect()
 }
 

@@ -1,7 +1,10 @@
-//! A closer look at one attempt.
+//! A closer look at one attempt, or at one grip of an atlas.
 
 use grasp_synthesis::{
     grasp::{Contact, Grasp},
+    hand::{Digit, HandPart},
+    pose::Pose,
+    rejection::Rejection,
     strategy::Validity,
     synthesis::{
         attempt::{Attempt, AttemptEnd},
@@ -23,7 +26,7 @@ use grasp_synthesis::{
 use super::{Maker, nanoseconds};
 use crate::{
     plan::Cell,
-    record::{Details, DigitFigures, GraspFigures},
+    record::{Details, DigitFigures, GraspFigures, Measures, Source},
 };
 
 /// Runs of an attempt of which the median time is taken: the first ones find nothing in the processor's caches, and
@@ -38,15 +41,34 @@ pub(crate) const COMFORT_REPEATS: u64 = 8;
 /// found. Any number that is far from those of other seeds will do.
 const SEED_OF_AFTERTHOUGHTS: u64 = 1 << 60;
 
-/// An attempt that was looked at.
+/// An attempt or a grip that was looked at.
 pub(super) struct Closer {
     pub(super) end: AttemptEnd,
     pub(super) details: Details,
 }
 
 impl Maker {
+    /// Everything about an attempt or a grip; none if there is no such hand or if the grip does not hold.
+    pub(super) fn closer_look(&self, cell: &Cell, seed: u64, source: Source) -> Option<Closer> {
+        match source {
+            Source::Attempt(index) => Some(self.look_at_attempt(cell, seed, index)),
+            Source::AtlasEntry(entry) => {
+                let grasp = self.grip(cell, entry)?;
+                let details = Details {
+                    measures: Some(self.measures(cell, grasp.pose.frame_from_wrist)),
+                    digits: held_digits(&grasp),
+                    step_nanoseconds: None,
+                    grasp: Some(solved_figures(&grasp)),
+                };
+                let end = AttemptEnd::Valid(grasp);
+                Some(Closer { end, details })
+            }
+            Source::Nowhere => None,
+        }
+    }
+
     /// Runs an attempt some times for its times, and tells everything about it.
-    pub(super) fn closer_look(&self, cell: &Cell, seed: u64, index: u64) -> Closer {
+    pub(super) fn look_at_attempt(&self, cell: &Cell, seed: u64, index: u64) -> Closer {
         let scene = self.scene(cell);
         let mut attempt = Attempt::default();
         let mut times = Vec::with_capacity(REPLAYS);
@@ -57,30 +79,51 @@ impl Maker {
             end = attempt.try_synthesize_grasp(&scene, &mut stream, &mut stopwatch, &|| false);
             times.extend(stopwatch.times().map(in_order));
         }
-        let contacts = match &end {
-            AttemptEnd::Valid(grasp) => Some(&grasp.contacts[..]),
+        let valid = match &end {
+            AttemptEnd::Valid(grasp) => Some(grasp),
             AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
         };
-        let measures = PlacementMeasures::of(
-            &self.holdouts[cell.holdout],
-            self.rig,
-            attempt.wrist().object_from_wrist,
-        );
+        let wrist = match (&end, valid) {
+            (_, Some(grasp)) => Some(grasp.pose.frame_from_wrist),
+            // Guided search had no proposal.
+            (AttemptEnd::Rejected { rejection, .. }, _)
+                if *rejection == Rejection::NoContacts && attempt.posed_digits().is_empty() =>
+            {
+                None
+            }
+            _ => Some(attempt.wrist().object_from_wrist),
+        };
+        let is_of_thesis = cell.set.validity == Validity::Thesis;
         let details = Details {
-            measures: measures.into(),
-            digits: self.digits(cell, &attempt, contacts.is_some()),
-            step_nanoseconds: std::array::from_fn(|step| median(times.iter().map(|times| times[step]))),
-            grasp: match &end {
-                AttemptEnd::Valid(grasp) => Some(self.grasp_figures(cell, grasp, seed, index)),
-                AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
+            measures: wrist.map(|wrist| self.measures(cell, wrist)),
+            digits: match valid {
+                _ if is_of_thesis => self.posed_digits(cell, &attempt, valid.is_some()),
+                Some(grasp) => held_digits(grasp),
+                None => Vec::new(),
             },
+            step_nanoseconds: Some(std::array::from_fn(|step| {
+                median(times.iter().map(|times| times[step]))
+            })),
+            grasp: valid.map(|grasp| {
+                if is_of_thesis {
+                    self.drawn_figures(cell, grasp, seed, index)
+                } else {
+                    solved_figures(grasp)
+                }
+            }),
         };
         Closer { end, details }
     }
 
-    fn digits(&self, cell: &Cell, attempt: &Attempt, is_valid: bool) -> Vec<DigitFigures> {
+    fn measures(&self, cell: &Cell, object_from_wrist: Pose) -> Measures {
+        let holdout = &self.holdouts[cell.holdout];
+        PlacementMeasures::of(holdout, self.rig(cell.set), object_from_wrist).into()
+    }
+
+    /// The digits of an attempt under the thesis' validity.
+    fn posed_digits(&self, cell: &Cell, attempt: &Attempt, is_valid: bool) -> Vec<DigitFigures> {
         let object = &self.holdouts[cell.holdout].object;
-        let motions = hand_motion(self.rig);
+        let motions = hand_motion(self.rig(cell.set));
         let touches_with = |digit: usize, posed: &PosedDigit| {
             // Figure 5.19: wrist and yaw are kept, and the digit closes with each ratio alone.
             std::array::from_fn(|ratio| {
@@ -100,8 +143,8 @@ impl Maker {
             .collect()
     }
 
-    /// What there is to tell of a grasp, with force distributions for its contacts drawn anew.
-    fn grasp_figures(&self, cell: &Cell, grasp: &Grasp, seed: u64, index: u64) -> GraspFigures {
+    /// What there is to tell of a grasp under the thesis' validity, with force distributions for its contacts drawn anew.
+    fn drawn_figures(&self, cell: &Cell, grasp: &Grasp, seed: u64, index: u64) -> GraspFigures {
         let contacts = &grasp.contacts;
         let holdout = &self.holdouts[cell.holdout];
         let load = Load {
@@ -130,10 +173,42 @@ impl Maker {
         GraspFigures {
             wrench_angle_degrees: grasp.wrench_angle.to_degrees(),
             comfort: grasp.comfort,
-            sufficient_distributions: count_sufficient(contacts, &load, &mut stream_of(0)),
+            sufficient_distributions: Some(count_sufficient(contacts, &load, &mut stream_of(0))),
             comfort_again,
+            palm_contacts: 0,
         }
     }
+}
+
+/// What there is to tell of a grasp whose forces were solved for.
+fn solved_figures(grasp: &Grasp) -> GraspFigures {
+    GraspFigures {
+        wrench_angle_degrees: grasp.wrench_angle.to_degrees(),
+        comfort: grasp.comfort,
+        sufficient_distributions: None,
+        comfort_again: Vec::new(),
+        palm_contacts: count_contacts(grasp, |part| part == HandPart::Palm),
+    }
+}
+
+/// The digits of a grasp under `PHYSICAL` validity.
+fn held_digits(grasp: &Grasp) -> Vec<DigitFigures> {
+    let figures = |digit: Digit| {
+        let angles = &grasp.pose.digits[digit.index()];
+        DigitFigures {
+            yaw_degrees: angles.base_yaw.to_degrees(),
+            bend_degrees: angles.base_pitch.to_degrees(),
+            bend_ratio: grasp.bend_ratios[digit.index()],
+            contacts: count_contacts(grasp, |part| part.digit() == Some(digit)),
+            touches_with: None,
+        }
+    };
+    Digit::ALL.map(figures).to_vec()
+}
+
+fn count_contacts(grasp: &Grasp, is_counted: impl Fn(HandPart) -> bool) -> u32 {
+    let parts = grasp.contacts.iter().map(|contact| contact.part);
+    parts.filter(|part| is_counted(*part)).count() as u32
 }
 
 /// How many of 100 random force distributions oppose gravity within the accepted angle.

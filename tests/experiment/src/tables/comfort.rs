@@ -28,8 +28,7 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             "valid again with new draws, %",
         ],
     );
-    for strategy in data.ladder() {
-        let set = Set::ladder(strategy);
+    for set in data.sets() {
         let grasps: Vec<_> = valid_with_figures(data, set).collect();
         let contacts: Vec<_> = grasps
             .iter()
@@ -39,22 +38,24 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             .iter()
             .filter(|(_, details, _)| touching_digits(details) == 2.0)
             .count();
-        let sufficient: Vec<_> = grasps
+        let of_thesis = |value, decimals| Value::decimals(set.is_ladder().then_some(value), decimals);
+        // Forces are drawn under the thesis' validity only.
+        let drawn = grasps
             .iter()
-            .map(|(.., grasp)| f64::from(grasp.sufficient_distributions))
-            .collect();
-        let again: usize = grasps.iter().map(|(.., grasp)| grasp.comfort_again.len()).sum();
-        let tries = grasps.len() * COMFORT_REPEATS as usize;
+            .filter_map(|(.., grasp)| Some((f64::from(grasp.sufficient_distributions?), *grasp)));
+        let (sufficient, drawn): (Vec<_>, Vec<_>) = drawn.unzip();
+        let again: usize = drawn.iter().map(|grasp| grasp.comfort_again.len()).sum();
+        let tries = drawn.len() * COMFORT_REPEATS as usize;
         table.push(vec![
             set.name().into(),
             (grasps.len() as u64).into(),
             Value::number(mean(&contacts)),
             Value::decimals(quantile(&contacts, 1.0), 0),
-            u64::from(thesis::MOST_CONTACTS).into(),
+            of_thesis(f64::from(thesis::MOST_CONTACTS), 0),
             Value::decimals(100.0 * two_digits as f64 / grasps.len() as f64, 0),
             Value::number(mean(&sufficient)),
             Value::number(quantile(&sufficient, 0.5)),
-            Value::number(thesis::SUFFICIENT_DISTRIBUTIONS),
+            of_thesis(thesis::SUFFICIENT_DISTRIBUTIONS, 1),
             Value::decimals(100.0 * again as f64 / tries as f64, 0),
         ]);
     }
@@ -81,8 +82,7 @@ pub fn comfort_spread(data: &Data<'_>) -> Table {
             "with the wrench angle",
         ],
     );
-    for strategy in data.ladder() {
-        let set = Set::ladder(strategy);
+    for set in data.sets() {
         let grasps: Vec<_> = valid_with_figures(data, set).collect();
         let comforts: Vec<_> = grasps
             .iter()
@@ -159,9 +159,10 @@ pub(crate) fn valid_with_figures<'a>(
     })
 }
 
-/// Links that touch.
+/// Links that touch, and contacts of the palm.
 pub(crate) fn contacts_of(details: &Details) -> f64 {
-    f64::from(details.digits.iter().map(|digit| digit.contacts).sum::<u32>())
+    let palm = details.grasp.as_ref().map_or(0, |grasp| grasp.palm_contacts);
+    f64::from(palm + details.digits.iter().map(|digit| digit.contacts).sum::<u32>())
 }
 
 /// Digits that touch.

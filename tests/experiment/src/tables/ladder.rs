@@ -12,7 +12,7 @@ use crate::{
 /// Half the width of an interval that has the true mean in it 19 times of 20, in standard errors.
 const STANDARD_ERRORS: f64 = 1.96;
 
-/// One row for each set of the ladder: means over the holdouts, each of which counts the same.
+/// One row for each set: means over the holdouts, each of which counts the same.
 pub fn ladder(data: &Data<'_>) -> Table {
     let more = data.more_threads();
     let mut header = vec![
@@ -31,16 +31,16 @@ pub fn ladder(data: &Data<'_>) -> Table {
     header.extend(more.map(|threads| format!("ms on {threads} threads")));
     header.extend(more.map(|_| "times as fast".to_owned()));
     let mut table = Table::new("ladder", "Attempts and time per valid grasp", header);
-    for strategy in data.ladder() {
-        let set = Set::ladder(strategy);
-        let searches = data.searches_by_holdout(set, 1);
+    for set in data.sets() {
+        let mut searches = data.searches_by_holdout(set, 1);
+        searches.retain(|own| !own.is_empty());
         let attempts: Vec<_> = searches.iter().map(|own| attempts(own)).collect();
         let times: Vec<_> = searches.iter().map(|own| milliseconds(own)).collect();
         let all: Vec<_> = searches.concat();
         let total_attempts: u64 = all.iter().map(|search| search.attempts).sum();
         let total_prunes: u64 = all.iter().map(|search| search.pruned_placements).sum();
         let total_ms: f64 = times.iter().flatten().sum();
-        let thesis = thesis::ladder(strategy);
+        let thesis = thesis::ladder(set.strategy);
         let mean_ms = mean_of_means(&times);
         let error =
             |groups: &[Vec<f64>]| standard_error_of_group_means(groups).map(|error| STANDARD_ERRORS * error);
@@ -72,21 +72,17 @@ pub fn ladder(data: &Data<'_>) -> Table {
     table
 }
 
-/// Mean over the holdouts of their means; none if a holdout has nothing.
+/// Mean over the holdouts of their means, without those that have nothing; none if all have nothing.
 pub(crate) fn mean_of_means(groups: &[Vec<f64>]) -> Option<f64> {
-    let means: Option<Vec<_>> = groups.iter().map(|group| mean(group)).collect();
-    mean(&means?)
+    let means: Vec<_> = groups.iter().filter_map(|group| mean(group)).collect();
+    mean(&means)
 }
 
 /// A row for each holdout and for each object, a pair of columns for each set, and the thesis' where it has them.
 pub fn per_holdout(data: &Data<'_>) -> Table {
     let mut columns = Vec::new();
-    for strategy in data.ladder() {
-        columns.push(Columns::of_set(
-            data,
-            format!("{strategy:?}"),
-            Set::ladder(strategy),
-        ));
+    for set in data.sets() {
+        columns.push(Columns::of_set(data, set.name(), set));
     }
     for strategy in data.ladder() {
         let printed: Option<Vec<_>> = data
@@ -171,7 +167,8 @@ fn by_holdout(data: &Data<'_>, file: &'static str, title: &str, columns: &[Colum
     let holdouts = &data.settings.holdouts;
     let row_of = |name: &str, rows: &[usize]| {
         let mean_of = |column: &[f64]| {
-            let values: Vec<_> = rows.iter().map(|&row| column[row]).collect();
+            let values = rows.iter().map(|&row| column[row]);
+            let values: Vec<_> = values.filter(|value| value.is_finite()).collect();
             Value::number(mean(&values))
         };
         let means = columns

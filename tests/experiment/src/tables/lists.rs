@@ -1,27 +1,32 @@
 //! Everything, row by row: what the figures are drawn from, and what makes every row again.
 
 use grasp_synthesis::{hand::Digit, rejection::Rejection};
+use serde::Serialize;
 
 use super::comfort::{contacts_of, touching_digits};
 use crate::{
     data::Data,
     plan::Cell,
-    record::{Details, Record, STEP_NAMES, output_type},
+    record::{Details, Record, STEP_NAMES, Source, output_type},
     table::{Table, Value},
 };
 
 /// The columns of [`origin`].
-const ORIGIN: [&str; 7] = [
+const ORIGIN: [&str; 10] = [
+    "validity",
     "strategy",
     "bend_ratios",
+    "atlas",
     "threads",
     "holdout",
     "number",
     "seed",
     "attempt",
+    "atlas_entry",
 ];
 
-/// All valid grasps, also those of more threads and of Figure 5.20's columns.
+/// All valid grasps, also those of more threads and of Figure 5.20's columns. `atlas` says whether an atlas was asked;
+/// `attempt` or `atlas_entry`, what gave the grasp.
 pub fn grasp_list(data: &Data<'_>) -> Table {
     let mut header: Vec<_> = ORIGIN.to_vec();
     header.extend(["attempts", "prunes", "milliseconds"]);
@@ -35,7 +40,7 @@ pub fn grasp_list(data: &Data<'_>) -> Table {
     ]);
     let mut table = Table::new("grasps", "All valid grasps", header);
     for record in data.records() {
-        let Some(search) = record.search else {
+        let Some(search) = record.search.filter(|_| record.is_valid()) else {
             continue;
         };
         let mut row = origin(record);
@@ -53,9 +58,8 @@ pub fn grasp_list(data: &Data<'_>) -> Table {
             grasp.map(|grasp| f64::from(grasp.wrench_angle_degrees)),
         ));
         row.push(Value::number(grasp.map(|grasp| f64::from(grasp.comfort))));
-        row.push(grasp.map_or(Value::Missing, |grasp| {
-            u64::from(grasp.sufficient_distributions).into()
-        }));
+        let sufficient = grasp.and_then(|grasp| grasp.sufficient_distributions);
+        row.push(Value::decimals(sufficient.map(f64::from), 0));
         table.push(row);
     }
     table
@@ -97,28 +101,40 @@ pub fn attempt_list(data: &Data<'_>) -> Table {
 /// What makes a record again.
 fn origin(record: &Record) -> Vec<Value> {
     let Cell { set, threads, .. } = record.cell;
-    let bend_ratios = serde_json::to_value(set.bend_ratios);
-    let bend_ratios = bend_ratios.ok().and_then(|name| name.as_str().map(str::to_owned));
+    let or_missing = |index: Option<u64>| index.map_or(Value::Missing, Value::from);
+    let entry = match record.source {
+        Source::Attempt(_) | Source::Nowhere => None,
+        Source::AtlasEntry(entry) => Some(u64::from(entry)),
+    };
     vec![
-        format!("{:?}", set.strategy).into(),
-        // As the command line spells it.
-        bend_ratios.map_or(Value::Missing, |name| name.replace('_', "-").into()),
+        spelled(set.validity),
+        format!("{:?}", set.strategy).to_uppercase().into(),
+        spelled(set.bend_ratios),
+        if set.atlas { "allowed" } else { "none" }.into(),
         (threads as u64).into(),
         record.cell.built_in().name.clone().into(),
         record.number.into(),
         record.seed.into(),
-        record.attempt.into(),
+        or_missing(record.source.attempt()),
+        or_missing(entry),
     ]
 }
 
+/// A choice as the command line spells it.
+fn spelled(choice: impl Serialize) -> Value {
+    let name = serde_json::to_value(choice);
+    let name = name.ok().and_then(|name| name.as_str().map(str::to_owned));
+    name.map_or(Value::Missing, |name| name.replace('_', "-").into())
+}
+
 fn details_of(details: &Details) -> Vec<Value> {
-    let measures = &details.measures;
+    let measures = details.measures.as_ref();
     let mut row: Vec<_> = [
-        Some(measures.wrist_distance_cm),
-        Some(measures.palm_distance_cm),
-        Some(measures.upward_degrees),
-        Some(measures.forward_degrees),
-        measures.palm_com_palm_degrees,
+        measures.map(|measures| measures.wrist_distance_cm),
+        measures.map(|measures| measures.palm_distance_cm),
+        measures.map(|measures| measures.upward_degrees),
+        measures.map(|measures| measures.forward_degrees),
+        measures.and_then(|measures| measures.palm_com_palm_degrees),
     ]
     .map(|value| Value::number(value.map(f64::from)))
     .to_vec();
@@ -133,10 +149,9 @@ fn details_of(details: &Details) -> Vec<Value> {
             None => row.extend([const { Value::Missing }; 4]),
         }
     }
-    row.extend(
-        details
-            .step_nanoseconds
-            .map(|time| Value::number(time as f64 / 1e3)),
-    );
+    row.extend(match details.step_nanoseconds {
+        Some(times) => times.map(|time| Value::number(time as f64 / 1e3)),
+        None => [const { Value::Missing }; 5],
+    });
     row
 }

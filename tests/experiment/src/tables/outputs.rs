@@ -18,10 +18,12 @@ pub fn output_types(data: &Data<'_>) -> Table {
         header.extend([name.to_owned(), format!("{name}, %"), format!("{name}, % of all")]);
     }
     let mut table = Table::new("output-types", "Output types of the negative grasp sets", header);
-    for strategy in data.ladder() {
-        let set = Set::ladder(strategy);
+    for set in data.sets() {
         let counts = negative_counts(data, set);
         let total: u64 = counts.iter().sum();
+        if total == 0 {
+            continue;
+        }
         let of_all = shares_of_all(data, set);
         let mut row = vec![Value::from(set.name()), total.into()];
         for (count, share) in counts.into_iter().zip(of_all) {
@@ -46,7 +48,8 @@ pub(crate) fn negative_counts(data: &Data<'_>, set: Set) -> [u64; 8] {
 
 /// Shares of all failed attempts by kind, the mean of the holdouts.
 fn shares_of_all(data: &Data<'_>, set: Set) -> [f64; 8] {
-    let by_holdout = data.searches_by_holdout(set, 1);
+    let mut by_holdout = data.searches_by_holdout(set, 1);
+    by_holdout.retain(|searches| !searches.is_empty());
     let mut shares = [0.0; 8];
     for searches in &by_holdout {
         let mut counts = [0_u64; 8];
@@ -70,8 +73,7 @@ pub fn step_times(data: &Data<'_>) -> Table {
     header.extend(STEP_NAMES.map(|name| format!("{name}, µs")));
     header.push("together, µs".to_owned());
     let mut table = Table::new("step-times", "Time per attempt by step and output type", header);
-    for strategy in data.ladder() {
-        let set = Set::ladder(strategy);
+    for set in data.sets() {
         for kind in Rejection::OF_THESIS.map(Some).into_iter().chain([None]) {
             let (count, means) = mean_step_times(data, set, kind);
             if count == 0 {
@@ -96,9 +98,9 @@ pub(crate) fn mean_step_times(data: &Data<'_>, set: Set, kind: Option<Rejection>
 fn sum_steps<'a>(details: impl Iterator<Item = &'a Details>) -> (u64, [f64; 5]) {
     let mut sums = [0.0; 5];
     let mut count = 0;
-    for details in details {
+    for times in details.filter_map(|details| details.step_nanoseconds) {
         count += 1;
-        for (sum, &time) in sums.iter_mut().zip(&details.step_nanoseconds) {
+        for (sum, time) in sums.iter_mut().zip(times) {
             *sum += time as f64;
         }
     }
@@ -110,9 +112,11 @@ pub fn step_totals(data: &Data<'_>) -> Table {
     let mut header = vec!["set".to_owned(), "attempts".to_owned(), "together, ms".to_owned()];
     header.extend(STEP_NAMES.map(|name| format!("{name}, %")));
     let mut table = Table::new("step-totals", "Time of the negative grasp sets by step", header);
-    for strategy in data.ladder() {
-        let set = Set::ladder(strategy);
+    for set in data.sets() {
         let (count, shares, total) = step_shares(data, set);
+        if count == 0 {
+            continue;
+        }
         let mut row = vec![Value::from(set.name()), count.into(), Value::number(total / 1e6)];
         row.extend(shares.map(|share| Value::decimals(100.0 * share, 1)));
         table.push(row);

@@ -12,8 +12,7 @@ use grasp_synthesis::{
 
 use crate::{
     data::Data,
-    make::RECEIVING_RIG,
-    plan::Set,
+    plan::{Set, THESIS_RIG},
     record::Measures,
     stats::{distance_from_uniform, quantile},
     table::{Table, Value},
@@ -81,7 +80,7 @@ pub(crate) const MEASURES: [Measure; 6] = [
 pub(crate) fn valid_values(data: &Data<'_>, set: Set, measure: &Measure) -> Vec<f64> {
     let details = data.valid(set).filter_map(|record| record.details.as_ref());
     details
-        .filter_map(|details| (measure.of)(&details.measures))
+        .filter_map(|details| (measure.of)(details.measures.as_ref()?))
         .collect()
 }
 
@@ -191,7 +190,7 @@ pub fn yaw_spread(data: &Data<'_>) -> Table {
 
 /// The Kolmogorov-Smirnov distance of those angles from an even spread over the digit's range.
 pub(crate) fn yaw_distance(data: &Data<'_>, digit: Digit) -> Option<f64> {
-    let range = hand(RECEIVING_RIG, Handedness::Right)?
+    let range = hand(THESIS_RIG, Handedness::Right)?
         .rig
         .digit(digit)
         .limits

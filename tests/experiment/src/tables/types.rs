@@ -12,13 +12,21 @@ pub fn unclassifiable(types: &[SetTypes]) -> Table {
     let mut table = Table::new(
         "unclassifiable",
         "Valid grasps that are of no type of the taxonomy",
-        ["set", "grasps", "unclassifiable, %", "±", "types that occur"],
+        [
+            "set",
+            "grasps",
+            "different ones",
+            "unclassifiable, %",
+            "±",
+            "types that occur",
+        ],
     );
     for set in types.iter().filter(|set| set.count() > 0) {
         let occur = GraspType::ALL.into_iter().filter(|&of| occurs(set, of)).count();
         table.push(vec![
-            format!("{:?}", set.strategy).into(),
+            set.set.name().into(),
             (set.count() as u64).into(),
+            set.different.into(),
             Value::decimals(set.share(None).map(|share| 100.0 * share), 1),
             Value::decimals(set.margin().map(|margin| 100.0 * margin), 1),
             (occur as u64).into(),
@@ -30,7 +38,7 @@ pub fn unclassifiable(types: &[SetTypes]) -> Table {
 /// The share of each type that occurs, by set.
 pub fn grasp_types(types: &[SetTypes]) -> Table {
     let mut header = vec!["number".to_owned(), "type".to_owned()];
-    header.extend(types.iter().map(|set| format!("{:?}, %", set.strategy)));
+    header.extend(types.iter().map(|set| format!("{}, %", set.set.name())));
     let mut table = Table::new("grasp-types", "Types of valid grasps by set", header);
     let shares = |of| types.iter().map(move |set| percent(set, of));
     for of in GraspType::ALL {

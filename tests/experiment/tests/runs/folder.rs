@@ -8,13 +8,14 @@ use std::{
 
 use grasp_experiment::{
     folder::{Folder, FolderError, Manifest},
-    make::Maker,
-    plan::Settings,
-    record::Record,
+    plan::{Set, Settings},
+    record::{Record, Source},
     run::{RunEnd, run},
 };
 
-use crate::support::{Scratch, complete, open, small, timeless};
+use grasp_synthesis::strategy::Strategy;
+
+use crate::support::{Scratch, complete, maker, open, small, timeless};
 
 fn records(folder: &Folder) -> Vec<Record> {
     folder.records().iter().map(timeless).collect()
@@ -27,7 +28,7 @@ fn a_run_that_was_cut_short_goes_on_where_it_was() {
     let expected = records(&complete(whole.path(), &settings));
 
     let cut = Scratch::new();
-    let maker = Maker::new(&settings).expect("built-in holdouts are sound");
+    let maker = maker(&settings, &open(cut.path(), &settings));
     let mut runs = 0;
     loop {
         let mut folder = open(cut.path(), &settings);
@@ -113,6 +114,65 @@ fn a_folder_of_another_run_is_refused_and_kept() {
     assert!(fresh.records().is_empty());
 }
 
+/// Says in the manifest that the folder has another format.
+fn set_format(scratch: &Scratch, format: u32) {
+    let path = scratch.path().join("manifest.json");
+    let text = fs::read_to_string(&path).expect("a manifest");
+    let other = text.replace(r#""format": 2"#, &format!(r#""format": {format}"#));
+    assert_ne!(text, other);
+    fs::write(&path, other).expect("a file");
+}
+
+#[test]
+fn a_folder_of_the_earlier_format_is_continued_in_todays() {
+    let scratch = Scratch::new();
+    let settings = small();
+    let before = complete(scratch.path(), &settings).records().to_vec();
+    set_format(&scratch, 1);
+    let folder = complete(scratch.path(), &settings);
+    assert_eq!(folder.records(), &before[..]);
+    // An earlier version, which would misread what may now be added, must refuse it.
+    let manifest = fs::read_to_string(scratch.path().join("manifest.json")).expect("a manifest");
+    assert!(manifest.contains(r#""format": 2"#), "{manifest}");
+}
+
+#[test]
+fn a_folder_of_a_later_format_is_refused() {
+    let scratch = Scratch::new();
+    let settings = small();
+    drop(complete(scratch.path(), &settings));
+    set_format(&scratch, 3);
+    let error = Folder::open(scratch.path(), Manifest::new(7), false).expect_err("another format");
+    assert!(
+        matches!(&error, FolderError::OtherRun { differences, .. } if differences == &["its format is 3, now it is 2"]),
+        "{error}"
+    );
+}
+
+/// As version 1 wrote them.
+#[test]
+fn records_of_the_earlier_format_are_read() {
+    let valid = r#"{"strategy":"F","bend_ratios":"one_random","threads":1,"holdout":"scissors-hold1","number":0,
+        "seed":13000001,"attempt":208,"rejection":null,"search":{"attempts":209,"pruned_placements":10233,
+        "rejections":[0,0,150,20,10,5,0,23],"nanoseconds":1000000},"details":{"measures":{"wrist_distance_cm":8.5,
+        "palm_distance_cm":4.5,"upward_degrees":100.0,"forward_degrees":90.0,"palm_com_palm_degrees":null},"digits":[],
+        "step_nanoseconds":[1,2,3,4,5],"grasp":{"wrench_angle_degrees":4.5,"comfort":0.25,"sufficient_distributions":3,
+        "comfort_again":[0.5]}}}"#;
+    let record: Record = serde_json::from_str(valid).expect("a record");
+    assert_eq!(record.cell.set, Set::ladder(Strategy::F));
+    assert_eq!(record.source, Source::Attempt(208));
+    assert_eq!(record.search.expect("a search").atlas, None);
+    let details = record.details.as_ref().expect("details");
+    assert_eq!(details.step_nanoseconds, Some([1, 2, 3, 4, 5]));
+    assert_eq!(record.grasp().expect("figures").sufficient_distributions, Some(3));
+    // Sets A to F are written as they were.
+    let written = serde_json::to_value(&record).expect("a record");
+    assert_eq!(
+        written,
+        serde_json::from_str::<serde_json::Value>(valid).expect("JSON")
+    );
+}
+
 #[test]
 fn records_without_a_manifest_are_not_thrown_away() {
     let scratch = Scratch::new();
@@ -163,16 +223,16 @@ fn records_of_another_algorithm_are_not_mixed_in() {
     let (first, rest) = text.split_once('\n').expect("lines");
     let mut record: Record = serde_json::from_str(first).expect("a record");
     let details = record.details.as_mut().expect("details");
-    details.measures.palm_distance_cm += 1.0;
+    details.measures.as_mut().expect("measures").palm_distance_cm += 1.0;
     let changed = serde_json::to_string(&record).expect("a record");
     fs::write(&path, format!("{changed}\n{rest}")).expect("a file");
     let mut folder = open(scratch.path(), &settings);
-    let maker = Maker::new(&settings).expect("built-in holdouts are sound");
+    let maker = maker(&settings, &folder);
     let error =
         run(&settings, &maker, &mut folder, &AtomicBool::new(false), |_| ()).expect_err("outdated records");
     assert!(
-        matches!(&error, FolderError::Outdated { holdout, attempt, .. }
-            if *holdout == record.cell.built_in().name && *attempt == record.attempt),
+        matches!(&error, FolderError::Outdated { holdout, hand, .. }
+            if *holdout == record.cell.built_in().name && *hand == record.source),
         "{error}"
     );
 }

@@ -1,5 +1,6 @@
 //! Small runs, whole, cut short, extended and refused.
 
+mod beyond;
 mod folder;
 mod made;
 mod reported;

@@ -4,18 +4,20 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use grasp_experiment::{
     claims::Verdict,
-    make::Maker,
     plan::{Set, Settings},
     report::{self, Report, command_line},
 };
 use grasp_synthesis::{strategy::Strategy, taxonomy::GraspType};
 
-use crate::support::{Scratch, complete, index_of, small};
+use crate::{
+    beyond,
+    support::{Scratch, complete, index_of, maker, small},
+};
 
 fn reported(settings: &Settings) -> (Scratch, Report) {
     let scratch = Scratch::new();
     let folder = complete(scratch.path(), settings);
-    let maker = Maker::new(settings).expect("built-in holdouts are sound");
+    let maker = maker(settings, &folder);
     let report = report::write(settings, &folder, &maker, &scratch.path().join("report")).expect("a report");
     (scratch, report)
 }
@@ -146,7 +148,7 @@ fn what_must_hold_by_construction_is_found_to_agree() {
 #[test]
 fn claims_about_sets_that_were_not_asked_for_are_left_out() {
     let settings = Settings {
-        strategies: vec![Strategy::F],
+        sets: vec![Set::ladder(Strategy::F)],
         bend_ratio_columns: false,
         threads: vec![1],
         valid: 1,
@@ -167,16 +169,91 @@ fn claims_about_sets_that_were_not_asked_for_are_left_out() {
 fn the_command_is_written_as_it_must_be_typed() {
     assert_eq!(command_line(&Settings::default()), "grasp experiment");
     let settings = Settings {
-        strategies: vec![Strategy::F],
+        sets: vec![Set::ladder(Strategy::F)],
         threads: vec![1],
         bend_ratio_columns: false,
         ..small()
     };
     assert_eq!(
         command_line(&settings),
-        "grasp experiment --strategy F --holdout scalpel-hold2 --holdout scissors-hold1 --valid 3 --invalid 20 --seed 7 \
+        "grasp experiment --set F --holdout scalpel-hold2 --holdout scissors-hold1 --valid 3 --invalid 20 --seed 7 \
          --threads 1 --no-bend-ratio-columns"
     );
+}
+
+#[test]
+fn what_goes_beyond_the_ladder_is_reported_beside_it() {
+    let settings = beyond::settings();
+    let scratch = beyond::with_atlas();
+    let folder = complete(scratch.path(), &settings);
+    let maker = maker(&settings, &folder);
+    let target = scratch.path().join("report");
+    let report = report::write(&settings, &folder, &maker, &target).expect("a report");
+    let names = ["D", "Guided", "Physical", "Atlas"];
+    let sets = |file: &str| -> Vec<String> {
+        let rows = csv_rows(&target.join("csv").join(file));
+        rows.into_iter()
+            .map(|mut row| row.remove("set").expect("a set"))
+            .collect()
+    };
+    assert_eq!(sets("ladder.csv"), names);
+    assert_eq!(sets("unclassifiable.csv"), names);
+    assert_eq!(sets("contacts.csv"), names);
+    // An atlas fails no attempts.
+    assert_eq!(sets("output-types.csv"), names[..3]);
+    assert_eq!(sets("step-totals.csv"), names[..3]);
+    let ladder = csv_rows(&target.join("csv/ladder.csv"));
+    assert_eq!(ladder[3]["attempts"], "0");
+    assert_eq!(ladder[3]["µs per attempt"], "");
+    for row in &ladder[1..] {
+        assert_eq!(row["thesis: attempts"], "");
+        assert!(number(row, "ms") > 0.0);
+    }
+    // Forces that are solved for are not drawn.
+    for row in &csv_rows(&target.join("csv/contacts.csv"))[2..] {
+        assert_eq!(row["valid again with new draws, %"], "");
+        assert!(number(row, "contacts: mean") >= 2.0);
+    }
+    // Claims are about the thesis' sets: only D.
+    for claim in &report.claims {
+        assert!(
+            !claim.run.contains("Guided") && !claim.run.contains("Atlas"),
+            "{claim:?}"
+        );
+    }
+
+    let grasps = csv_rows(&scratch.path().join("grasps.csv"));
+    for row in csv_rows(&target.join("csv/atlas.csv")) {
+        let own: Vec<_> = grasps
+            .iter()
+            .filter(|grasp| {
+                grasp["atlas"] == "allowed" && grasp["threads"] == "1" && grasp["holdout"] == row["holdout"]
+            })
+            .collect();
+        assert_eq!(own.len(), 3);
+        assert!(
+            own.iter()
+                .all(|grasp| grasp["atlas_entry"] == own[0]["atlas_entry"])
+        );
+        assert_ne!(own[0]["atlas_entry"], "");
+        assert_eq!(number(&row, "answers"), 3.0);
+        assert_eq!(number(&row, "different grasps"), 1.0);
+        assert_eq!(number(&row, "from the atlas, %"), 100.0);
+        let mut times: Vec<_> = own
+            .iter()
+            .map(|grasp| 1e3 * number(grasp, "milliseconds"))
+            .collect();
+        times.sort_by(f64::total_cmp);
+        assert!((number(&row, "median µs") / times[1] - 1.0).abs() < 1e-3);
+    }
+
+    let unclassifiable = csv_rows(&target.join("csv/unclassifiable.csv"));
+    assert_eq!(number(&unclassifiable[3], "different ones"), 2.0);
+    assert_eq!(unclassifiable[3]["±"], "");
+    assert_eq!(number(&unclassifiable[2], "different ones"), 6.0);
+    let page = fs::read_to_string(&report.page).expect("the page");
+    let share = number(&unclassifiable[3], "unclassifiable, %");
+    assert!(page.contains(&format!("{share:.1} % in Atlas.")), "{share}");
 }
 
 #[test]
@@ -184,17 +261,17 @@ fn types_are_those_of_the_grasps_made_again() {
     let settings = small();
     let scratch = Scratch::new();
     let folder = complete(scratch.path(), &settings);
-    let maker = Maker::new(&settings).expect("built-in holdouts are sound");
+    let maker = maker(&settings, &folder);
     let report = scratch.path().join("report");
     report::write(&settings, &folder, &maker, &report).expect("a report");
     let shares = csv_rows(&report.join("csv/grasp-types.csv"));
-    for strategy in settings.strategies {
+    for set in settings.sets {
         let own: Vec<_> = folder
             .records()
             .iter()
             .filter(|record| {
                 let cell = record.cell;
-                record.rejection.is_none() && cell.threads == 1 && cell.set == Set::ladder(strategy)
+                record.rejection.is_none() && cell.threads == 1 && cell.set == set
             })
             .map(|record| maker.grasp_of(record).expect("the grasp comes out again"))
             .map(|grasp| {
@@ -205,7 +282,7 @@ fn types_are_those_of_the_grasps_made_again() {
             })
             .collect();
         assert_eq!(own.len(), 6);
-        let column = format!("{strategy:?}, %");
+        let column = format!("{}, %", set.name());
         let mut sum = 0.0;
         for row in &shares {
             // Each holdout has as many grasps.
@@ -216,10 +293,7 @@ fn types_are_those_of_the_grasps_made_again() {
         }
         assert!((sum - 100.0).abs() < 1e-2, "{sum}");
         let rows = csv_rows(&report.join("csv/unclassifiable.csv"));
-        let row = rows
-            .iter()
-            .find(|row| row["set"] == format!("{strategy:?}"))
-            .expect("the set");
+        let row = rows.iter().find(|row| row["set"] == set.name()).expect("the set");
         let none = own.iter().filter(|name| **name == "unclassifiable").count();
         assert!((number(row, "unclassifiable, %") - 100.0 * none as f64 / 6.0).abs() < 1e-3);
     }

@@ -7,10 +7,11 @@ use std::{
 
 use grasp_assets::holdouts::holdouts;
 use grasp_experiment::{
+    atlases::Atlases,
     folder::{Folder, Manifest},
     make::Maker,
-    plan::Settings,
-    record::Record,
+    plan::{Set, Settings},
+    record::{Record, Source},
     run::{RunEnd, run},
 };
 use grasp_synthesis::strategy::Strategy;
@@ -56,7 +57,7 @@ pub(crate) fn small() -> Settings {
         seed: 7,
         valid: 3,
         invalid: 20,
-        strategies: vec![Strategy::C, Strategy::D],
+        sets: vec![Set::ladder(Strategy::C), Set::ladder(Strategy::D)],
         holdouts: vec![index_of("scalpel-hold2"), index_of("scissors-hold1")],
         ..Settings::default()
     }
@@ -66,10 +67,17 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Folder {
     Folder::open(path, Manifest::new(settings.seed), false).expect("a folder of this run")
 }
 
+/// A maker with the atlases of a folder, which must be there if they are asked for: growing one takes minutes.
+pub(crate) fn maker(settings: &Settings, folder: &Folder) -> Maker {
+    let atlases = Atlases::complete(settings, folder, &AtomicBool::new(true), |_| ());
+    let atlases = atlases.expect("atlases").expect("complete atlases in the folder");
+    Maker::new(settings, atlases).expect("built-in holdouts are sound")
+}
+
 /// Runs to the end.
 pub(crate) fn complete(path: &Path, settings: &Settings) -> Folder {
     let mut folder = open(path, settings);
-    let maker = Maker::new(settings).expect("built-in holdouts are sound");
+    let maker = maker(settings, &folder);
     let end = run(settings, &maker, &mut folder, &AtomicBool::new(false), |_| ()).expect("a run");
     assert_eq!(end, RunEnd::Complete);
     folder
@@ -79,14 +87,14 @@ pub(crate) fn complete(path: &Path, settings: &Settings) -> Folder {
 pub(crate) fn timeless(record: &Record) -> Record {
     let mut record = record.clone();
     if record.cell.threads > 1 {
-        record.attempt = 0;
+        record.source = Source::Attempt(0);
         record.search = None;
     }
     if let Some(search) = &mut record.search {
         search.nanoseconds = 0;
     }
     if let Some(details) = &mut record.details {
-        details.step_nanoseconds = [0; 5];
+        details.step_nanoseconds = None;
     }
     record
 }
