@@ -1,6 +1,7 @@
 //! The threads that let atlases grow, one turn after the other.
 
 use std::{
+    cell::Cell,
     fmt,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{Arc, atomic::Ordering},
@@ -73,7 +74,6 @@ pub(super) fn start(number: usize, workshop: &Arc<Workshop>) -> std::io::Result<
         .name(format!("grasp-atlas-{number}"))
         .spawn(move || {
             let _present = Present(&of_thread);
-            be_nice();
             while let Some(job) = of_thread.next_job() {
                 work(&of_thread, job);
             }
@@ -84,8 +84,15 @@ pub(super) fn start(number: usize, workshop: &Arc<Workshop>) -> std::io::Result<
     thread.map(|_| ())
 }
 
-/// Lowers the priority of this thread alone, where the system has such a thing.
+/// Lowers the priority of this thread alone, where the system has such a thing. For good: that needs no rights, and the
+/// way back does.
 fn be_nice() {
+    thread_local! {
+        static IS_NICE: Cell<bool> = const { Cell::new(false) };
+    }
+    if IS_NICE.replace(true) {
+        return;
+    }
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::nice(NICENESS) {
         tracing::warn!(%error, "atlases are built at the priority of searches");
@@ -137,6 +144,8 @@ fn turn(workshop: &Workshop, object: &Arc<StoredObject>, hand: &'static Hand) ->
     if growth.is_complete() {
         return Turn::Finished;
     }
+    // Not before: what comes with the server is there a moment after its start, however busy that is.
+    be_nice();
     let enough = USEFUL.max(published + published / GROWN_BY);
     let mut gripper = Gripper::default();
     let mut worked = Duration::ZERO;

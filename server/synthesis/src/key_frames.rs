@@ -121,6 +121,7 @@ pub fn key_frames(
         rig,
         approach,
         close: grasp.pose,
+        holding: grasp.bend_ratios.map(|ratio| ratio.is_some()),
         obstacles: Obstacles {
             object: scene.object,
             has_forbidden: scene.object.forbidden_count() > 0,
@@ -153,18 +154,26 @@ struct Planner<'a> {
     rig: &'a Rig,
     approach: Option<ApproachCone>,
     close: HandPose,
+    /// Which digits hold the object, thumb first.
+    holding: [bool; 5],
     obstacles: Obstacles<'a>,
 }
 
 impl Planner<'_> {
     /// The direction in which the hand comes, and the hand of `PRE_GRASP`.
     fn plan(&self) -> Option<(Vec3, HandPose)> {
-        let opened = OPENINGS.map(|opening| {
-            let pose = self.opened(opening);
+        // Digits that hold nothing open with the others, or stay out of the way where they are.
+        let opened: [_; 2 * OPENINGS.len()] = std::array::from_fn(|i| {
+            let opens = if i < OPENINGS.len() {
+                [true; 5]
+            } else {
+                self.holding
+            };
+            let pose = self.opened(OPENINGS[i % OPENINGS.len()], opens);
             (pose, HandSolids::of_pose(self.rig, &pose))
         });
         // Where the hand opens in its place, that does not depend on the direction.
-        let in_place: [OnceCell<bool>; OPENINGS.len()] = Default::default();
+        let in_place: [OnceCell<bool>; 2 * OPENINGS.len()] = Default::default();
         for direction in self.directions() {
             for back in DRAWN_BACK {
                 for ((pose, solids), in_place) in opened.iter().zip(&in_place) {
@@ -186,13 +195,16 @@ impl Planner<'_> {
         None
     }
 
-    /// The hand with its digits opened in their place, until the tips are `opening` metres from where they were, or as
-    /// far as the joints go.
-    fn opened(&self, opening: f32) -> HandPose {
+    /// The hand with the digits that `opens` says opened in their place, until the tips are `opening` metres from where
+    /// they were, or as far as the joints go.
+    fn opened(&self, opening: f32, opens: [bool; 5]) -> HandPose {
         let wrist = self.close.frame_from_wrist;
         let digits = Digit::ALL.map(|digit| {
             let rig = self.rig.digit(digit);
             let closed = self.close.digits[digit.index()];
+            if !opens[digit.index()] {
+                return closed;
+            }
             let flexing = Flexing {
                 digit: rig,
                 base_yaw: closed.base_yaw,

@@ -16,7 +16,7 @@ use std::{
 };
 
 use grasp_assets::{
-    atlases::{atlas, file_name},
+    atlases::file_name,
     objects::{BuiltInObject, object},
 };
 use grasp_synthesis::{
@@ -57,19 +57,24 @@ pub struct AtlasProgress {
     pub refused: Option<AtlasError>,
 }
 
+/// Where atlases that need not be grown come from: the bytes of an object's and a hand's, if there are any.
+pub type Shipped = fn(&str, &Rig) -> Option<&'static [u8]>;
+
 /// Complete atlases by their objects.
 #[derive(Debug, Default)]
 pub struct Atlases(HashMap<&'static str, Arc<Atlas>>);
 
 impl Atlases {
-    /// The atlases that the settings and what a folder has ask for: read if they are there, else grown to the end. None
-    /// if it was told to stop; what has grown by then is in the folder.
+    /// The atlases that the settings and what a folder has ask for: read from the folder if they are there, so that a run
+    /// goes on with what it began with, or `shipped`, or else grown to the end. None if it was told to stop; what has grown
+    /// by then is in the folder.
     ///
     /// # Errors
     /// An atlas in the folder cannot be read, or none can be written.
     pub fn complete(
         settings: &Settings,
         folder: &Folder,
+        shipped: Shipped,
         stop: &AtomicBool,
         mut progress: impl FnMut(AtlasProgress),
     ) -> Result<Option<Self>, FolderError> {
@@ -89,7 +94,7 @@ impl Atlases {
             let Some((object, hand)) = object(name).zip(receiving_hand(Set::ATLAS)) else {
                 continue;
             };
-            match complete(object, &hand.rig, &folder, stop, &mut progress)? {
+            match complete(object, &hand.rig, &folder, shipped, stop, &mut progress)? {
                 Some(atlas) => atlases.0.insert(name, atlas),
                 None => return Ok(None),
             };
@@ -109,19 +114,20 @@ fn complete(
     object: &'static BuiltInObject,
     rig: &Rig,
     folder: &Path,
+    shipped: Shipped,
     stop: &AtomicBool,
     progress: &mut impl FnMut(AtlasProgress),
 ) -> Result<Option<Arc<Atlas>>, FolderError> {
     let path = folder.join(file_name(object.name, rig)).with_extension("atlas");
-    let shipped = atlas(object.name, rig).and_then(|bytes| decode(bytes, &object.object, rig).ok());
-    if let Some(shipped) = shipped.filter(|shipped| shipped.atlas.is_complete()) {
-        return Ok(Some(shipped.atlas));
-    }
     let (known, refused) = match read(&path, object, rig)?.transpose() {
         Ok(Some(known)) if known.atlas.is_complete() => return Ok(Some(known.atlas)),
         Ok(known) => (known, None),
         Err(error) => (None, Some(error)),
     };
+    let shipped = shipped(object.name, rig).and_then(|bytes| decode(bytes, &object.object, rig).ok());
+    if let Some(shipped) = shipped.filter(|shipped| shipped.atlas.is_complete()) {
+        return Ok(Some(shipped.atlas));
+    }
     let mut growth = match &known {
         Some(known) => Growth::resume(&object.object, rig, known),
         None => Growth::new(&object.object, rig),

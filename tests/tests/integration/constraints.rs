@@ -152,32 +152,36 @@ fn unmet(report: &v1::SearchReport) -> u64 {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn types_are_allowed_and_excluded() {
-    use v1::GraspType::{PalmarPinch, Unspecified};
+    use v1::GraspType::{PalmarPinch, Prismatic2Finger, Unspecified};
     let server = TestServer::start().await;
-    for validity in [v1::Validity::Physical, v1::Validity::Thesis] {
+    // Types that come up, or what follows would show nothing.
+    let common = [
+        (v1::Validity::Physical, Prismatic2Finger),
+        (v1::Validity::Thesis, PalmarPinch),
+    ];
+    for (validity, common) in common {
         let any = typed_answers(&server, validity, &[], &[]).await;
         assert!(any.iter().all(|(_, report)| unmet(report) == 0));
         let types: Vec<_> = any.iter().map(|(one, _)| *one).collect();
-        let is_other = |one: &v1::GraspType| ![PalmarPinch, Unspecified].contains(one);
-        // Or what follows would show nothing.
-        for comes_up in [PalmarPinch, Unspecified] {
+        let is_other = |one: &v1::GraspType| ![common, Unspecified].contains(one);
+        for comes_up in [common, Unspecified] {
             assert!(types.contains(&comes_up), "{validity:?}: {types:?}");
         }
 
-        let allowed = typed_answers(&server, validity, &[PalmarPinch], &[]).await;
+        let allowed = typed_answers(&server, validity, &[common], &[]).await;
         assert!(
-            allowed.iter().all(|(one, _)| *one == PalmarPinch),
+            allowed.iter().all(|(one, _)| *one == common),
             "{validity:?}: {allowed:?}"
         );
         // Where the first valid grasp was another, it was turned down.
         for (free, (_, report)) in types.iter().zip(&allowed) {
-            assert!(*free == PalmarPinch || unmet(report) > 0, "{free:?}: {report:?}");
+            assert!(*free == common || unmet(report) > 0, "{free:?}: {report:?}");
         }
 
         // Grasps like no type stay.
-        let excluded = typed_answers(&server, validity, &[], &[PalmarPinch]).await;
+        let excluded = typed_answers(&server, validity, &[], &[common]).await;
         let types: Vec<_> = excluded.iter().map(|(one, _)| *one).collect();
-        assert!(!types.contains(&PalmarPinch), "{validity:?}: {types:?}");
+        assert!(!types.contains(&common), "{validity:?}: {types:?}");
         assert!(types.contains(&Unspecified), "{validity:?}: {types:?}");
 
         let others: Vec<_> = (1..=33)

@@ -13,7 +13,8 @@ use std::{
 use clap::Args;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
 use grasp_client::{
-    FindAnswer, FindRequest, GraspClient, Handedness, Outcome, ReceivingHand, Validity, built_in::request_for,
+    FindAnswer, FindRequest, GraspClient, Handedness, Object, Outcome, ReceivingHand, Validity,
+    built_in::request_for,
 };
 
 use super::{
@@ -33,6 +34,10 @@ went; the output folder gets a picture (PNG) and a scene (GLB) of each holdout, 
 With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "outcome", "grasp",
 "report", "round_trip_seconds"}]}, the last four as `grasp find --json` writes them."#;
 
+/// How long the server may take to read what comes with it; some tenths of a second are usual. After that, or without it,
+/// searches start from nothing.
+const READING_TIME: Duration = Duration::from_secs(10);
+
 /// Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
@@ -44,8 +49,9 @@ pub(super) struct Arguments {
     /// same grasps.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// How to search: A to F as in chapter 5, with the thesis' hand and notion of valid.
-    #[arg(long, ignore_case = true, default_value = "F")]
+    /// How to search: GUIDED as the server does by default, or A to F as in chapter 5, with the thesis' hand and notion of
+    /// valid.
+    #[arg(long, ignore_case = true, default_value = "GUIDED")]
     strategy: StrategyName,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
@@ -71,6 +77,9 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let chosen = arguments.chosen()?;
     let server = server::start(arguments.budget).await?;
     let progress = Progress::new(2 * chosen.len() as u64 + 1);
+    if arguments.validity().is_none() {
+        wait_for_atlases(&server.client).await?;
+    }
     let asked = ask_all(&arguments, &chosen, &server.client, &progress).await?;
     server.stop().await?;
     let drawn = draw::draw_all(&asked, &arguments.out, arguments.view_size, &progress).await?;
@@ -94,6 +103,20 @@ impl Arguments {
             return Ok(holdouts().iter().collect());
         }
         self.holdout.iter().map(|name| holdout::built_in(name)).collect()
+    }
+}
+
+/// Waits until the grips that come with the server are read, a moment after its start: so that the same seed always shows
+/// the same grasps.
+async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
+    let start = Instant::now();
+    loop {
+        let objects = client.list_objects().await?;
+        let is_read = |object: &Object| object.atlas.as_ref().is_some_and(|atlas| atlas.complete);
+        if objects.iter().all(is_read) || start.elapsed() > READING_TIME {
+            return Ok(());
+        }
+        tokio::time::sleep(Duration::from_millis(10)).await;
     }
 }
 

@@ -133,9 +133,11 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         let mut folder = Folder::open(&arguments.out, manifest, arguments.fresh)
             .map_err(|error| Failure::other("cannot use the folder of the run", error))?;
         let mut progress = Progress::default();
-        let atlases = Atlases::complete(&settings, &folder, &stop, |now| progress.grow(&now))
-            .map_err(|error| Failure::other("the atlases cannot be made", error))?
-            .ok_or(Failure::Interrupted)?;
+        let atlases = Atlases::complete(&settings, &folder, grasp_assets::atlases::atlas, &stop, |now| {
+            progress.grow(&now);
+        })
+        .map_err(|error| Failure::other("the atlases cannot be made", error))?
+        .ok_or(Failure::Interrupted)?;
         let maker = Maker::new(&settings, atlases).map_err(|error| Failure::other("cannot search", error))?;
         let end = run_missing(&settings, &maker, &mut folder, &stop, |now| progress.show(&now))
             .map_err(|error| Failure::other("the run cannot go on", error))?;

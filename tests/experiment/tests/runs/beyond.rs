@@ -240,10 +240,16 @@ fn grow(scratch: &Scratch, until: u64) -> [AtlasProgress; 2] {
     let folder = open(scratch.path(), &settings);
     let stop = AtomicBool::new(false);
     let mut ends = None;
-    let atlases = Atlases::complete(&settings, &folder, &stop, |now| {
-        ends.get_or_insert([now; 2])[1] = now;
-        stop.store(now.entries >= until, Ordering::Relaxed);
-    });
+    let atlases = Atlases::complete(
+        &settings,
+        &folder,
+        |_, _| None,
+        &stop,
+        |now| {
+            ends.get_or_insert([now; 2])[1] = now;
+            stop.store(now.entries >= until, Ordering::Relaxed);
+        },
+    );
     assert!(atlases.expect("a folder that can be written").is_none());
     ends.expect("the atlas has to grow")
 }
@@ -273,4 +279,17 @@ fn an_atlas_that_cannot_be_used_is_grown_again_and_it_is_said_why() {
     assert_eq!((first.entries, first.refused), (0, Some(AtlasError::Damaged)));
     let [next, _] = grow(&scratch, 1);
     assert_eq!(next.refused, None);
+}
+
+#[test]
+fn an_atlas_that_is_shipped_need_not_grow() {
+    let scratch = Scratch::new();
+    let settings = settings();
+    let folder = open(scratch.path(), &settings);
+    let shipped = |name: &str, _: &Rig| (name == "scissors").then_some(SMALL_ATLAS.1.as_slice());
+    let never = |now| panic!("it grows: {now:?}");
+    let atlases = Atlases::complete(&settings, &folder, shipped, &AtomicBool::new(true), never);
+    let atlases = atlases.expect("a folder").expect("no atlas has to grow");
+    assert!(Maker::new(&settings, atlases).is_ok());
+    assert!(!scratch.path().join(FILE).exists());
 }

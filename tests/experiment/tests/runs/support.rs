@@ -69,7 +69,7 @@ pub(crate) fn open(path: &Path, settings: &Settings) -> Folder {
 
 /// A maker with the atlases of a folder, which must be there if they are asked for: growing one takes minutes.
 pub(crate) fn maker(settings: &Settings, folder: &Folder) -> Maker {
-    let atlases = Atlases::complete(settings, folder, &AtomicBool::new(true), |_| ());
+    let atlases = Atlases::complete(settings, folder, |_, _| None, &AtomicBool::new(true), |_| ());
     let atlases = atlases.expect("atlases").expect("complete atlases in the folder");
     Maker::new(settings, atlases).expect("built-in holdouts are sound")
 }
