@@ -10,7 +10,7 @@ use std::{
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{FindAnswer, FindRequest, Outcome, built_in::request_for};
+use grasp_client::{AtlasUse, FindAnswer, FindRequest, Outcome, built_in::request_for};
 use serde::Serialize;
 
 use constraints::ConstraintOptions;
@@ -104,6 +104,9 @@ pub(super) struct Arguments {
     /// The valid attempt of the lowest index wins, the same for any number of workers.
     #[arg(long)]
     reproducible: bool,
+    /// Search afresh: do not try the grips that the server knows of the object already.
+    #[arg(long)]
+    no_atlas: bool,
     /// The hand to pose. Default: the right one.
     #[arg(long, value_name = "HAND")]
     receiving_hand: Option<HandName>,
@@ -222,6 +225,9 @@ impl Arguments {
         request.seed = self.seed.or(request.seed);
         request.only_attempt = self.only_attempt.or(request.only_attempt);
         request.reproducible |= self.reproducible;
+        if self.no_atlas {
+            request.atlas = Some(AtlasUse::None);
+        }
         request.record_step_times |= self.step_times;
         request.plan_key_frames |= self.key_frames;
         request.friction = self.friction.or(request.friction);
