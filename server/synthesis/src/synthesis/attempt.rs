@@ -45,7 +45,8 @@ pub struct Scene<'a> {
     strategy: Strategy,
     bend_ratios: BendRatioChoice,
     placer: WristPlacer<'a>,
-    motion: [DigitMotion; 5],
+    /// How the digits close in steps, once it was asked for: `PHYSICAL` never does, and it takes longer than a look-up.
+    motion: OnceLock<[DigitMotion; 5]>,
     load: Load,
     /// Under `PHYSICAL` validity.
     physical: Option<(ObjectScene<'a>, Presented)>,
@@ -78,7 +79,7 @@ impl<'a> Scene<'a> {
             strategy,
             bend_ratios,
             placer: WristPlacer::new(holdout, rig, strategy),
-            motion: hand_motion(rig),
+            motion: OnceLock::new(),
             load: Load {
                 gravity: Wrench::of_gravity(holdout.object.mass, holdout.up),
                 centre_of_mass: holdout.object.centre_of_mass,
@@ -378,7 +379,8 @@ impl Attempt {
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> bool {
-        for (digit, motion) in Digit::ALL.into_iter().zip(&scene.motion) {
+        let motions = scene.motion.get_or_init(|| hand_motion(scene.rig));
+        for (digit, motion) in Digit::ALL.into_iter().zip(motions) {
             if interrupted() {
                 return false;
             }
