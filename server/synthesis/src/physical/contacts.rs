@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{
     closing::{ClosedDigit, TOUCHING},
     immobility::SoftContact,
-    solids::{HandSolids, TaperedCapsule, Touch, closest},
+    solids::{BALL_SOLIDS, HandSolids, TaperedCapsule, Touch, closest},
 };
 use crate::{
     grasp::Contact,
@@ -43,7 +43,8 @@ pub(super) fn collect_contacts(
         }
     }
     let first_of_palm = contacts.len();
-    for solid in solids.palm.iter().chain(&solids.thenar) {
+    // The web of the thumb is a fold of skin: it gives way and bears nothing.
+    for solid in solids.palm.iter().chain(&solids.thenar[..BALL_SOLIDS]) {
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
             continue;
         };

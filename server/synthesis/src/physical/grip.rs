@@ -115,16 +115,14 @@ impl Gripper {
         // Step 2, Finger Posing.
         self.obstacles.clear();
         self.obstacles.extend(Obstacle::of_palm(&still));
-        let thumb = Closer {
+        let closer = Closer {
             scene,
             giver,
             rig,
             shape,
             object_from_wrist,
-            obstacles: &self.obstacles,
-        }
-        .close_thumb();
-        let closed = thumb.and_then(|thumb| {
+        };
+        let closed = closer.close_thumb(&self.obstacles).and_then(|thumb| {
             let mut pose = HandPose {
                 frame_from_wrist: object_from_wrist,
                 ..opened
@@ -132,15 +130,7 @@ impl Gripper {
             pose.digits[Digit::Thumb.index()] = thumb.angles;
             self.obstacles
                 .extend(Obstacle::of_thumb(&HandSolids::of_pose(rig, &pose)));
-            let closer = Closer {
-                scene,
-                giver,
-                rig,
-                shape,
-                object_from_wrist,
-                obstacles: &self.obstacles,
-            };
-            closer.close_fingers(thumb, interrupted)
+            closer.close_fingers(thumb, &self.obstacles, interrupted)
         });
         stopwatch.lap(Step::FingerPosing);
         let digits = closed?;
@@ -258,25 +248,23 @@ struct Closer<'a> {
     rig: &'a Rig,
     shape: &'a HandShape,
     object_from_wrist: Pose,
-    /// What is in the way of the digits to be closed.
-    obstacles: &'a [Obstacle],
 }
 
 impl Closer<'_> {
-    fn closing(&self, digit: Digit) -> Closing<'_> {
+    fn closing<'a>(&'a self, digit: Digit, obstacles: &'a [Obstacle]) -> Closing<'a> {
         Closing {
             surface: &self.scene.object.surface,
             flexing: self.shape.flexing(self.rig, digit),
             radii: link_radii(self.rig, digit),
             object_from_wrist: self.object_from_wrist,
             preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
-            obstacles: self.obstacles,
+            obstacles,
         }
     }
 
     /// A digit closed as far as it goes, if nothing is in its way before.
-    fn close(&self, digit: Digit) -> Option<ClosedDigit> {
-        let closed = self.closing(digit).close()?;
+    fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
+        let closed = self.closing(digit, obstacles).close()?;
         self.is_clear_of_giver(&closed).then_some(closed)
     }
 
@@ -286,8 +274,8 @@ impl Closer<'_> {
     }
 
     /// Closes the thumb, which must touch.
-    fn close_thumb(&self) -> Result<ClosedDigit, NoGrip> {
-        let thumb = self.close(Digit::Thumb);
+    fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, NoGrip> {
+        let thumb = self.close(Digit::Thumb, obstacles);
         let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         if thumb.touches_object() {
             Ok(thumb)
@@ -300,6 +288,7 @@ impl Closer<'_> {
     fn close_fingers(
         &self,
         thumb: ClosedDigit,
+        obstacles: &[Obstacle],
         interrupted: &impl Fn() -> bool,
     ) -> Result<[ClosedDigit; 5], NoGrip> {
         let mut closed = [ClosedDigit::default(); 5];
@@ -309,7 +298,7 @@ impl Closer<'_> {
             if interrupted() {
                 return Err(NoGrip::Interrupted);
             }
-            closed[finger.index()] = self.close(finger).unwrap_or_default();
+            closed[finger.index()] = self.close(finger, obstacles).unwrap_or_default();
         }
         if !closed[1..].iter().any(ClosedDigit::touches_object) {
             return Err(NoGrip::Rejected(Rejection::NoFingers));
@@ -318,15 +307,16 @@ impl Closer<'_> {
         for &finger in fingers {
             let place = finger.index();
             if !closed[place].touches_object() {
-                rested[place] = self.rest(finger, self.shape.resting_flexion(&closed, place));
+                let flexion = self.shape.resting_flexion(&closed, place);
+                rested[place] = self.rest(finger, obstacles, flexion);
             }
         }
         Ok(rested)
     }
 
     /// A finger that holds nothing, relaxed; tucked away or nearly stretched where it would meet the giver's hand.
-    fn rest(&self, finger: Digit, flexion: f32) -> ClosedDigit {
-        let closing = self.closing(finger);
+    fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
+        let closing = self.closing(finger, obstacles);
         let relaxed = closing.relax(flexion);
         if self.is_clear_of_giver(&relaxed) {
             return relaxed;
