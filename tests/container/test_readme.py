@@ -61,11 +61,12 @@ def test_the_sum_of_the_default_memory_is_the_server_s():
     printed = run("docker", "run", "--rm", "--env", "GRASP_WORKERS=30", "grasp-server", "--print-config").stdout
     value = {key: int(text) for key, text in re.findall(r"^(\w+) = (\d+)$", printed, flags=re.MULTILINE)}
     mib = 1 << 20
-    upload = 2 * value["maximum_object_bytes"] + 512 * value["maximum_object_triangles"]
+    upload = 2 * value["maximum_object_bytes"] + 512 * value["maximum_object_triangles"] + 512 * 1024
     total = (
         16 * mib
         + value["cache_bytes"]
         + value["maximum_uploads"] * upload
+        + 12 * mib * value["builder_threads"]
         + 2 * mib * value["maximum_searches"]
         + 32 * 1024 * value["maximum_connections"]
         + 64 * 1024 * (30 + value["io_threads"])
