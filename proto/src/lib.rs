@@ -1,5 +1,7 @@
 //! The contract of the grasp service, compiled from `proto/grasp/v1`.
 
+pub mod codec;
+
 /// Messages, clients and servers of package `grasp.v1`.
 #[allow(missing_docs, clippy::pedantic, unreachable_pub)]
 pub mod v1 {
