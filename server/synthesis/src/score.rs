@@ -14,6 +14,7 @@ use crate::{
         contacts::TORSION_LEVER,
         scene::{ObjectScene, Presented},
         solids::HandSolids,
+        stiffness::give,
     },
     synthesis::{
         comfort::{comfort, digit_totals},
@@ -38,6 +39,10 @@ const WEIGHT_PER_FINGER: f32 = 1.5;
 /// Closure at which a hold looks safe, in multiples of what validity asks for.
 const SAFE_CLOSURE: f32 = 3.0;
 
+/// Ways in metres that an object gives when it is pushed with its weight: where a hold looks steady, and where it looks
+/// loose. Between them, each time as far counts as much less.
+const STEADY: [f32; 2] = [1e-5, 1e-3];
+
 /// Confidence of a classification from which a grasp is beyond doubt of its type.
 const SURE_TYPE: f32 = 0.5;
 
@@ -48,7 +53,7 @@ const EASY_CLEARANCE: f32 = 0.04;
 const STERILE_CLEARANCE: f32 = 0.03;
 
 /// How many terms there are.
-pub const TERMS: usize = 10;
+pub const TERMS: usize = 11;
 
 /// A number for each term, in the order of [`Term::ALL`].
 pub type Values = [f32; TERMS];
@@ -78,6 +83,8 @@ pub enum Term {
     NaturalType,
     /// Ferrari-Canny epsilon is well above what validity asks for.
     Closure,
+    /// The object gives way little when it is pushed: palm and inner phalanges bear it, or many digits.
+    Steadiness,
     /// The palm comes from the side away from the giver's (palm-CoM-palm angle, thesis 5.3).
     AwayFromGiver,
     /// The hand keeps off the giver's.
@@ -96,6 +103,7 @@ impl Term {
         Self::Pads,
         Self::NaturalType,
         Self::Closure,
+        Self::Steadiness,
         Self::AwayFromGiver,
         Self::GiverClearance,
         Self::SterileDistance,
@@ -111,6 +119,7 @@ impl Term {
             Self::Pads => "pads",
             Self::NaturalType => "natural_type",
             Self::Closure => "closure",
+            Self::Steadiness => "steadiness",
             Self::AwayFromGiver => "away_from_giver",
             Self::GiverClearance => "giver_clearance",
             Self::SterileDistance => "sterile_distance",
@@ -122,9 +131,11 @@ impl Term {
         match self {
             Self::Comfort | Self::EnoughDigits => 1.0,
             Self::SharedFlexion | Self::Pads | Self::FrictionReserve => 1.5,
-            Self::NaturalType => 2.0,
-            // In a simulation by others, nine in ten grasps with all of it held against gravity, and four in ten with half.
-            Self::Closure => 3.0,
+            Self::NaturalType => 3.0,
+            // Of all terms, steadiness tells best in a simulation by others what is held: of the steadiest quarter of 300
+            // grips 83 % bore pushes of their object's weight from all sides, of the least steady one 36 %.
+            Self::Steadiness => 4.0,
+            Self::Closure => 2.0,
             Self::AwayFromGiver => 0.75,
             Self::GiverClearance | Self::SterileDistance => 0.5,
         }
@@ -139,6 +150,7 @@ impl Term {
                 | Self::Pads
                 | Self::NaturalType
                 | Self::Closure
+                | Self::Steadiness
                 | Self::SterileDistance
         )
     }
@@ -196,6 +208,7 @@ pub fn grip_values(
     values[Term::Pads as usize] = pads(rig, pose, contacts);
     values[Term::NaturalType as usize] = natural_type(classification);
     values[Term::Closure as usize] = (epsilon / (SAFE_CLOSURE * scene.least_epsilon)).min(1.0);
+    values[Term::Steadiness as usize] = steadiness(scene.object, rig, pose, contacts);
     values[Term::SterileDistance as usize] = sterile_distance(scene.object, solids);
     values
 }
@@ -287,6 +300,13 @@ fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
         touching[1..].iter().filter(|touches| **touches).count() as f32 + if palm { 2.0 } else { 0.0 };
     let wanted = 1.0 + object.mass * GRAVITY / WEIGHT_PER_FINGER;
     (fingers / wanted.min(4.0)).min(1.0)
+}
+
+/// 1 for what hardly moves, 0 for what hangs loose.
+fn steadiness(object: &GraspObject, rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> f32 {
+    let way = object.mass * GRAVITY * give(rig, pose, contacts, object.centre_of_mass);
+    let [steady, loose] = STEADY;
+    ((loose / way).ln() / (loose / steady).ln()).clamp(0.0, 1.0)
 }
 
 /// How far the phalanges' contacts lie toward their palmar sides, on average; a contact on the back counts as none.

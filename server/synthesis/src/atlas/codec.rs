@@ -27,7 +27,7 @@ use crate::{hand::rig::Rig, object::GraspObject};
 const MARK: [u8; 8] = *b"GRASPATL";
 
 /// Counts the formats.
-const FORMAT: u16 = 1;
+const FORMAT: u16 = 2;
 
 /// Bytes of the checksum.
 const CHECKSUM_BYTES: usize = 32;
@@ -65,6 +65,7 @@ pub fn encode(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
     writer.u8(u8::from(grown.atlas.is_complete()));
     writer.u32(entries.len() as u32);
     writer.u64(grown.proposed);
+    writer.u64(grown.early_stamp);
     for (entry, shape) in entries.iter().zip(&grown.shapes) {
         write_entry(&mut writer, entry, shape, object, rig);
     }
@@ -105,6 +106,7 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
     };
     let count = reader.u32()? as usize;
     let proposed = reader.u64()?;
+    let early_stamp = reader.u64()?;
     if count > ENTRIES || count > reader.left() / LEAST_ENTRY_BYTES {
         return Err(AtlasError::Malformed("it cannot have as many grips as it says"));
     }
@@ -119,8 +121,9 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
         return Err(AtlasError::Malformed("something follows the last grip"));
     }
     Ok(Grown {
-        atlas: Arc::new(Atlas::new(entries, complete)),
+        atlas: Arc::new(Atlas::new(object, rig, entries, complete)),
         shapes,
         proposed,
+        early_stamp,
     })
 }

@@ -157,7 +157,7 @@ impl Entry {
     }
 
     /// True if a ball inside the hand comes too near to the giver's: then so does the hand.
-    fn surely_meets(&self, giver: &PreparedHand) -> bool {
+    pub(super) fn surely_meets(&self, giver: &PreparedHand) -> bool {
         self.cores
             .iter()
             .any(|&(middle, radius)| giver.surely_nears(middle, radius, GIVER_CLEARANCE))

@@ -1,5 +1,7 @@
 //! The order of the grips by gravity's direction.
 
+use std::sync::LazyLock;
+
 use glam::Vec3;
 
 use super::entry::Entry;
@@ -23,10 +25,14 @@ pub fn direction(index: usize) -> Vec3 {
     Vec3::new(radius * cos, radius * sin, z)
 }
 
+/// All of them: a look-up asks for them, and their sines take as long as trying a grip.
+static ALL: LazyLock<[Vec3; DIRECTIONS]> = LazyLock::new(|| std::array::from_fn(direction));
+
 /// The nearest direction to a unit vector.
 pub fn nearest(up: Vec3) -> usize {
+    let of = |index: usize| ALL[index].dot(up);
     (0..DIRECTIONS)
-        .max_by(|&a, &b| direction(a).dot(up).total_cmp(&direction(b).dot(up)))
+        .max_by(|&a, &b| of(a).total_cmp(&of(b)))
         .unwrap_or(0)
 }
 

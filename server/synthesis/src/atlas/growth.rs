@@ -1,24 +1,38 @@
 //! How an atlas grows: rounds of proposals, half of them new and half beside grips that are known, and a limit on how
-//! many grips may be alike.
+//! many grips may be alike ([`spread`](super::spread)).
+//!
+//! Every other round has a giver: one of the known grips is taken for the hand that holds the object out, and grips are
+//! looked for that keep clear of it. So the atlas comes to answer where a giver leaves little room.
 //!
 //! A round's proposals depend on the rounds before and on nothing else, and what comes of them is taken over in their
 //! order, so that an atlas is the same however many threads make it and whenever they are interrupted.
 
-use std::{collections::HashMap, sync::Arc};
+use std::sync::Arc;
 
-use glam::{IVec3, Quat, Vec3};
+use glam::{Quat, Vec3};
 
-use super::{Atlas, entry::Entry};
+use super::{
+    Atlas,
+    entry::Entry,
+    spread::{Cell, Room, Spread, worth},
+    stamp,
+};
 use crate::{
-    guided::proposal::{Place, propose},
+    grasp::Contact,
+    guided::{
+        proposal::{Place, propose},
+        surface_pairs::SurfacePairs,
+    },
     hand::rig::Rig,
     object::GraspObject,
     physical::{
-        grip::Gripper,
-        scene::ObjectScene,
+        grip::{GIVER_CLEARANCE, Gripper},
+        scene::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
+        solids::{HandSolids, PreparedHand},
     },
     pose::Pose,
+    score::{Score, grip_values},
     strategy::Validity,
     synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
     taxonomy::classify,
@@ -33,7 +47,10 @@ pub const ROUND: u64 = 64;
 
 /// Proposals after which an atlas is complete even with fewer grips: an object that cannot be held must not be worked on
 /// forever.
-pub const MOST_PROPOSALS: u64 = 300_000;
+pub const MOST_PROPOSALS: u64 = 200_000;
+
+/// Proposals after which an atlas is stamped: what grows otherwise now shows there, after a second instead of minutes.
+pub const EARLY_PROPOSALS: u64 = 40 * ROUND;
 
 /// The seed of all atlases.
 const SEED: u64 = 0x4154_4c53;
@@ -45,15 +62,15 @@ const BESIDE_SHARE: f32 = 0.5;
 /// How far beside a known grip a proposal's wrist lies at most, in metres and radians.
 const BESIDE: [f32; 2] = [0.006, 0.12];
 
-/// Edge in metres of the cells that palms are sorted into, and …
-const CELL: f32 = 0.02;
+/// The seed of the choice of givers.
+const GIVERS_SEED: u64 = 0x4749_5645;
 
-/// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes.
-const MOST_IN_CELL: usize = 3;
+/// Grips from which on some are taken for givers.
+const ENOUGH_FOR_GIVERS: usize = 256;
 
-/// Closure from which a grip is firm, in multiples of what validity asks for: in a simulation by others, four in five
-/// with more held against gravity, and two in five with less.
-const FIRM_CLOSURE: f32 = 1.8;
+/// A giver that this many grips keep clear of leaves enough, whatever gravity does to them; for one that leaves fewer,
+/// grips are kept even where others are like them.
+const ENOUGH_FREE: usize = 24;
 
 /// What has grown so far, and all that it takes to go on.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,9 +81,16 @@ pub struct Grown {
     pub(super) shapes: Vec<HandShape>,
     /// Proposals that were tried.
     pub(super) proposed: u64,
+    /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before.
+    pub(super) early_stamp: u64,
 }
 
 impl Grown {
+    /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before. Growth that differs has another.
+    pub fn early_stamp(&self) -> u64 {
+        self.early_stamp
+    }
+
     /// Bytes that it takes in memory.
     pub fn bytes(&self) -> usize {
         self.atlas.bytes() + size_of_val(self.shapes.as_slice())
@@ -76,6 +100,15 @@ impl Grown {
 /// What a proposal gave.
 type Found = Option<(Entry, HandShape)>;
 
+/// A grip that is taken for the giver's.
+#[derive(Debug)]
+struct Giver {
+    presented: Presented,
+    surface: SurfacePairs,
+    /// Is there need of grips that keep clear of it?
+    is_needy: bool,
+}
+
 /// An atlas in the making.
 #[derive(Debug)]
 pub struct Growth<'a> {
@@ -83,8 +116,9 @@ pub struct Growth<'a> {
     rig: &'a Rig,
     entries: Vec<Entry>,
     shapes: Vec<HandShape>,
-    cells: HashMap<(IVec3, [u8; 2]), usize>,
+    spread: Spread,
     proposed: u64,
+    early_stamp: u64,
 }
 
 impl<'a> Growth<'a> {
@@ -95,8 +129,9 @@ impl<'a> Growth<'a> {
             rig,
             entries: Vec::new(),
             shapes: Vec::new(),
-            cells: HashMap::new(),
+            spread: Spread::default(),
             proposed: 0,
+            early_stamp: 0,
         }
     }
 
@@ -104,8 +139,9 @@ impl<'a> Growth<'a> {
     pub fn resume(object: &'a GraspObject, rig: &'a Rig, grown: &Grown) -> Self {
         let mut growth = Self::new(object, rig);
         growth.proposed = grown.proposed;
+        growth.early_stamp = grown.early_stamp;
         for (entry, shape) in grown.atlas.entries().iter().zip(&grown.shapes) {
-            growth.take(entry.clone(), *shape);
+            growth.push(entry.clone(), *shape);
         }
         growth
     }
@@ -132,7 +168,8 @@ impl<'a> Growth<'a> {
 
     /// The atlas as it stands.
     pub fn atlas(&self) -> Atlas {
-        Atlas::new(self.entries.clone(), self.is_complete())
+        let entries = self.entries.clone();
+        Atlas::new(self.scene.object, self.rig, entries, self.is_complete())
     }
 
     /// What has grown so far.
@@ -141,51 +178,104 @@ impl<'a> Growth<'a> {
             atlas: Arc::new(self.atlas()),
             shapes: self.shapes.clone(),
             proposed: self.proposed,
+            early_stamp: self.early_stamp,
         }
     }
 
-    /// One round: some milliseconds. `run` is given the proposals' indices and a function that tries one, which may be
-    /// called on any thread; it returns what that returned, in the order of the indices.
+    /// One round: some milliseconds.
     pub fn round(&mut self, gripper: &mut Gripper) {
+        let giver = self.giver();
         let found: Vec<Found> = (self.proposed..self.proposed + ROUND)
-            .map(|index| self.try_proposal(index, gripper))
+            .map(|index| self.try_proposal(index, giver.as_ref(), gripper))
             .collect();
         self.proposed += ROUND;
+        let is_needy = giver.is_some_and(|giver| giver.is_needy);
         for (entry, shape) in found.into_iter().flatten() {
-            self.take(entry, shape);
+            self.take(entry, shape, is_needy);
+        }
+        if self.proposed == EARLY_PROPOSALS {
+            self.early_stamp = stamp(&self.entries);
         }
     }
 
-    fn try_proposal(&self, index: u64, gripper: &mut Gripper) -> Found {
+    /// The giver of this round, if it has one.
+    fn giver(&self) -> Option<Giver> {
+        let round = self.proposed / ROUND;
+        if self.entries.len() < ENOUGH_FOR_GIVERS || round.is_multiple_of(2) {
+            return None;
+        }
+        let mut stream = AttemptStream::new(GIVERS_SEED, round);
+        let pose = &self.entries[stream.below(self.entries.len())].grip.pose;
+        let hand = PreparedHand::new(&HandSolids::of_pose(self.rig, pose));
+        let is_needy = self.count_free(&hand) < ENOUGH_FREE;
+        Some(Giver {
+            surface: self.scene.object.surface_pairs.free_of(&hand),
+            presented: Presented {
+                giver: Some(hand),
+                giver_palm: None,
+                up: Vec3::Y,
+            },
+            is_needy,
+        })
+    }
+
+    /// How many grips keep clear of a giver's hand, up to enough.
+    fn count_free(&self, giver: &PreparedHand) -> usize {
+        let is_free = |entry: &&Entry| {
+            !entry.surely_meets(giver) && {
+                let solids = HandSolids::of_pose(self.rig, &entry.grip.pose);
+                !giver.is_neared_by(solids.iter(), GIVER_CLEARANCE)
+            }
+        };
+        self.entries.iter().filter(is_free).take(ENOUGH_FREE).count()
+    }
+
+    fn try_proposal(&self, index: u64, giver: Option<&Giver>, gripper: &mut Gripper) -> Found {
         let mut stream = AttemptStream::new(SEED, index);
-        let proposal = self.propose(&mut stream)?;
+        let proposal = self.propose(giver, &mut stream)?;
+        let presented = giver.map(|giver| &giver.presented);
         let (grip, solids) = gripper
-            .grip(&self.scene, self.rig, &proposal, None, &mut NoStopwatch, &|| {
-                false
-            })
+            .grip(
+                &self.scene,
+                self.rig,
+                &proposal,
+                presented,
+                &mut NoStopwatch,
+                &|| false,
+            )
             .ok()?;
-        // Grips without a type look unnatural, and those of little closure turn in the hand: they are better than nothing,
-        // and one of them is enough.
-        let is_natural = classify(self.rig, &grip.pose, &gripper.contacts)
-            .grasp_type
-            .is_some();
-        if self.is_crowded(grip.pose.frame_from_wrist, is_natural) {
+        // Closure takes long, and what comes after it longer still: what is crowded out anyhow is dropped before.
+        let cell = Cell::of(self.rig, &grip.pose, &gripper.contacts);
+        let is_needy = giver.is_some_and(|giver| giver.is_needy);
+        let classification = classify(self.rig, &grip.pose, &gripper.contacts);
+        let worth_with = |epsilon: f32, contacts: &[Contact]| {
+            let (scene, rig, pose) = (&self.scene, self.rig, &grip.pose);
+            let values = grip_values(scene, rig, pose, contacts, classification, epsilon, &solids);
+            Score { values }.of_grip()
+        };
+        if !is_needy
+            && self
+                .spread
+                .room(cell, worth_with(f32::INFINITY, &gripper.contacts))
+                == Room::Crowded
+        {
             return None;
         }
         let epsilon = gripper.closure(&self.scene)?;
-        if self.is_crowded(grip.pose.frame_from_wrist, is_natural && self.is_firm(epsilon)) {
+        if !is_needy && self.spread.room(cell, worth_with(epsilon, &gripper.contacts)) == Room::Crowded {
             return None;
         }
         let entry = Entry::new(&self.scene, self.rig, grip, &solids, epsilon, gripper);
         Some((entry, proposal.shape))
     }
 
-    fn propose(&self, stream: &mut AttemptStream) -> Option<Proposal> {
-        if self.entries.is_empty() || stream.unit() >= BESIDE_SHARE {
+    fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
+        // Beside a giver most known grips are of no use.
+        if giver.is_some() || self.entries.is_empty() || stream.unit() >= BESIDE_SHARE {
             let place = Place {
                 object: self.scene.object,
-                surface: &self.scene.object.surface_pairs,
-                giver: None,
+                surface: giver.map_or(&self.scene.object.surface_pairs, |giver| &giver.surface),
+                giver: giver.and_then(|giver| giver.presented.giver.as_ref()),
                 rig: self.rig,
             };
             return propose(&place, stream);
@@ -209,39 +299,25 @@ impl<'a> Growth<'a> {
         })
     }
 
-    fn take(&mut self, entry: Entry, shape: HandShape) {
-        let wrist = entry.grip.pose.frame_from_wrist;
-        let is_good = entry.classification.grasp_type.is_some() && self.is_firm(entry.epsilon);
-        if self.entries.len() < ENTRIES && !self.is_crowded(wrist, is_good) {
-            *self.cells.entry(self.cell(wrist)).or_default() += 1;
-            self.entries.push(entry);
-            self.shapes.push(shape);
+    /// Takes a grip over, if there is room for it or it is needed.
+    fn take(&mut self, entry: Entry, shape: HandShape, is_needed: bool) {
+        let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
+        match self.spread.room(cell, worth(&entry)) {
+            Room::InsteadOf(index) if !is_needed => {
+                self.spread.note(cell, index, worth(&entry));
+                self.entries[index] = entry;
+                self.shapes[index] = shape;
+            }
+            Room::Crowded if !is_needed => {}
+            _ if self.entries.len() < ENTRIES => self.push(entry, shape),
+            _ => {}
         }
     }
 
-    fn is_firm(&self, epsilon: f32) -> bool {
-        epsilon >= FIRM_CLOSURE * self.scene.least_epsilon
+    fn push(&mut self, entry: Entry, shape: HandShape) {
+        let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
+        self.spread.note(cell, self.entries.len(), worth(&entry));
+        self.entries.push(entry);
+        self.shapes.push(shape);
     }
-
-    fn is_crowded(&self, wrist: Pose, is_good: bool) -> bool {
-        let most = if is_good { MOST_IN_CELL } else { 1 };
-        self.cells
-            .get(&self.cell(wrist))
-            .is_some_and(|&count| count >= most)
-    }
-
-    /// Where a palm is, which way it faces and which way its fingers go.
-    fn cell(&self, wrist: Pose) -> (IVec3, [u8; 2]) {
-        let palm = wrist.transform_point(self.rig.palm);
-        let mut fingers = wrist.transform_vector(Vec3::Y);
-        let facing = nearest_axis(wrist.transform_vector(Vec3::Z));
-        fingers[usize::from(facing / 2)] = 0.0;
-        ((palm / CELL).floor().as_ivec3(), [facing, nearest_axis(fingers)])
-    }
-}
-
-/// The axis that a direction is nearest to, from 0 to 5: x, -x, y, -y, z, -z.
-fn nearest_axis(direction: Vec3) -> u8 {
-    let axis = direction.abs().max_position();
-    2 * axis as u8 + u8::from(direction[axis] < 0.0)
 }

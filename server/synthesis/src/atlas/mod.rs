@@ -11,27 +11,35 @@ pub mod entry;
 pub mod gravity;
 pub mod growth;
 pub mod key;
+mod occupancy;
+mod spread;
 
 use glam::Vec3;
 use sha2::{Digest as _, Sha256};
 
+use crate::{hand::rig::Rig, object::GraspObject, physical::solids::PreparedHand};
+
 use entry::Entry;
 use gravity::GravityOrder;
+pub use occupancy::Excluded;
+use occupancy::Occupancy;
 
 /// What is known of how a hand holds an object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Atlas {
     entries: Vec<Entry>,
     order: GravityOrder,
+    occupancy: Occupancy,
     complete: bool,
     stamp: u64,
 }
 
 impl Atlas {
-    /// An atlas of entries; `complete` if it is not going to grow.
-    pub fn new(entries: Vec<Entry>, complete: bool) -> Self {
+    /// An atlas of entries for an object and a rig; `complete` if it is not going to grow.
+    pub fn new(object: &GraspObject, rig: &Rig, entries: Vec<Entry>, complete: bool) -> Self {
         Self {
             order: GravityOrder::of(&entries),
+            occupancy: Occupancy::of(object, rig, &entries),
             stamp: stamp(&entries),
             entries,
             complete,
@@ -59,9 +67,14 @@ impl Atlas {
         self.order.under(up)
     }
 
+    /// The grips that certainly come too near to a giver's hand, or to its forearm; others may, too.
+    pub fn excluded_by(&self, giver: &PreparedHand) -> Excluded {
+        self.occupancy.excluded_by(giver)
+    }
+
     /// Bytes that it takes in memory.
     pub fn bytes(&self) -> usize {
-        self.entries.iter().map(Entry::bytes).sum::<usize>() + self.order.bytes()
+        self.entries.iter().map(Entry::bytes).sum::<usize>() + self.order.bytes() + self.occupancy.bytes()
     }
 }
 

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{
     closing::{ClosedDigit, TOUCHING},
     immobility::SoftContact,
-    solids::{BALL_SOLIDS, HandSolids, TaperedCapsule, Touch, closest},
+    solids::{HandSolids, TaperedCapsule, Touch, closest},
 };
 use crate::{
     grasp::Contact,
@@ -43,8 +43,8 @@ pub(super) fn collect_contacts(
         }
     }
     let first_of_palm = contacts.len();
-    // The web of the thumb is a fold of skin: it gives way and bears nothing.
-    for solid in solids.palm.iter().chain(&solids.thenar[..BALL_SOLIDS]) {
+    // The ball of the thumb gives way with its metacarpal, and the web is a fold of skin: neither bears anything.
+    for solid in &solids.palm {
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
             continue;
         };

@@ -15,3 +15,4 @@ pub mod obstacle;
 pub mod scene;
 pub mod shape;
 pub mod solids;
+pub mod stiffness;

@@ -10,7 +10,7 @@ mod hand_solids;
 mod mesh_clearance;
 mod prepared_hand;
 
-pub use flesh::{BALL_SOLIDS, PALM_SOLIDS, THENAR_SOLIDS};
+pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
 pub(super) use hand_clearance::Bounded;
 pub use hand_clearance::{SOFT_CONTACT, self_clearance};
 pub use hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};

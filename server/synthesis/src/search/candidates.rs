@@ -1,10 +1,13 @@
 //! The grips of an atlas as candidates of a race.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{
+    OnceLock,
+    atomic::{AtomicUsize, Ordering},
+};
 
 use super::SearchSettings;
 use crate::{
-    atlas::Atlas,
+    atlas::{Atlas, Excluded},
     grasp::Grasp,
     hand::rig::Rig,
     physical::{
@@ -16,6 +19,10 @@ use crate::{
     synthesis::attempt::Scene,
 };
 
+/// Grips that are tried before it is asked which are out of the question: asking takes as long as trying dozens, and one of
+/// the first is often the answer.
+const TRIED_ONE_BY_ONE: usize = 8;
+
 /// The grips of an atlas in the order in which they are tried.
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
@@ -25,6 +32,8 @@ pub(super) struct KnownGrips<'a> {
     object: &'a ObjectScene<'a>,
     presented: &'a Presented,
     rig: &'a Rig,
+    /// Those that certainly meet the giver, once somebody asks.
+    excluded: OnceLock<Excluded>,
     /// Is the search's friction another than the one that the atlas was made under?
     friction_differs: bool,
     /// The next place in the order that nobody has taken.
@@ -63,8 +72,16 @@ impl<'a> KnownGrips<'a> {
             object,
             presented,
             rig: scene.rig(),
+            excluded: OnceLock::new(),
             friction_differs: settings.friction != object.object.friction_under(Validity::Physical),
             next: AtomicUsize::new(0),
+        })
+    }
+
+    fn excluded(&self) -> &Excluded {
+        self.excluded.get_or_init(|| {
+            let giver = self.presented.giver.as_ref();
+            giver.map_or_else(Excluded::default, |giver| self.atlas.excluded_by(giver))
         })
     }
 
@@ -75,9 +92,13 @@ impl<'a> KnownGrips<'a> {
 
     /// Tries the next one.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
-        let place = self.next.fetch_add(1, Ordering::Relaxed);
-        let Some(&entry) = self.order.get(place) else {
-            return Tried::NoneLeft;
+        let entry = loop {
+            let place = self.next.fetch_add(1, Ordering::Relaxed);
+            match self.order.get(place) {
+                None => return Tried::NoneLeft,
+                Some(&entry) if place >= TRIED_ONE_BY_ONE && self.excluded().contains(entry) => {}
+                Some(&entry) => break entry,
+            }
         };
         let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();

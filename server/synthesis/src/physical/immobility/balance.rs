@@ -19,16 +19,17 @@ pub const BALANCE_TOLERANCE: f32 = 0.02;
 
 /// How firmly the digits press where balance leaves it open: the sum of their normal forces times friction, over the
 /// weight. 1 is the least with which two opposed digits hold anything; people keep a margin of about half above that
-/// (Westling and Johansson 1984).
-const FIRMNESS: f64 = 1.5;
+/// (Westling and Johansson 1984) for what they expect, and what a giver lets go of may be pushed with as much as it weighs.
+const FIRMNESS: f64 = 3.0;
 
 /// The firmness aimed at puts no digit beyond this share of [`MAX_CONTACT_FORCE`]; nobody lifts with all their strength
 /// more firmly than necessary.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
-/// Share of friction and torsion that the forces use if they can: nobody holds a thing just so that it does not slip.
-/// A smaller share gives safer forces to fewer grasps; the others use all of it.
-const SAFE_FRICTION: f64 = 0.8;
+/// Share of friction and torsion that the forces use if they can, so that twice the load does not slip either. A smaller
+/// share gives safer forces to fewer grasps; the others use all of it. In a simulation by others, of 240 grips 72 % bore
+/// pushes from all sides with this and [`FIRMNESS`], 70 % with 0.6 and 2.2.
+const SAFE_FRICTION: f64 = 0.45;
 
 /// All of it, but for what rounding to single precision may add.
 const ALL_FRICTION: f64 = 1.0 - 2e-6;
@@ -51,7 +52,7 @@ const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
 /// A push that goes less than this with the residual makes the forces no more comfortable: shares that differ by some
 /// percent are equally so. A smaller one takes up to three times as long.
-const NEGLIGIBLE_COMFORT: f64 = 1e-4;
+const NEGLIGIBLE_COMFORT: f64 = 3e-4;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
@@ -81,7 +82,7 @@ pub fn balance(
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
     if expected == Expected::Balance
-        && let Some(found) = problem.comfortable_balance(SAFE_FRICTION, solver, column)
+        && let Some(found) = problem.safest_balance(solver, column)
     {
         return Some(found);
     }
@@ -100,10 +101,12 @@ pub fn balance(
     if found.residual > BALANCE_TOLERANCE {
         return None;
     }
-    [SAFE_FRICTION, ALL_FRICTION]
-        .into_iter()
-        .find_map(|share| problem.comfortable_balance(share, solver, column))
-        .or(Some(found))
+    let better = match expected {
+        Expected::Nothing => problem.safest_balance(solver, column),
+        // There is none, or it would have been the answer.
+        Expected::Balance => None,
+    };
+    Some(better.unwrap_or(found))
 }
 
 /// What is asked first: it changes how soon the answer is there, and not the answer.
@@ -167,6 +170,13 @@ impl<'a> Problem<'a> {
             limited: false,
             comfortable: false,
         }
+    }
+
+    /// The comfortable balance that keeps off the friction limits, or else one within them, if there is one.
+    fn safest_balance(&mut self, solver: &mut ConicLeastSquares, column: &mut Vec<f64>) -> Option<Balance> {
+        [SAFE_FRICTION, ALL_FRICTION]
+            .into_iter()
+            .find_map(|share| self.comfortable_balance(share, solver, column))
     }
 
     /// The comfortable balance within a share of friction and torsion, if there is one.

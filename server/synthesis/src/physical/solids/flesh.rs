@@ -21,9 +21,6 @@ pub const PALM_SOLIDS: usize = 10;
 /// finger.
 pub const THENAR_SOLIDS: usize = 4;
 
-/// How many of them are the ball and its root, which come first; the others are the web.
-pub const BALL_SOLIDS: usize = 2;
-
 /// From the wrist to the middle finger's knuckle of the hand that the figures are fitted to, in metres.
 const FITTED_SIZE: f32 = 0.097_674;
 

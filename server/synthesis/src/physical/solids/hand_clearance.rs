@@ -9,6 +9,10 @@ use super::{HandSolids, TaperedCapsule};
 /// lets fingers visibly share room, less refuses hands that are closed like every other.
 pub const SOFT_CONTACT: f32 = 0.002;
 
+/// How much thicker the first phalanx of a finger is at the knuckle than at its far joint where neighbours are compared.
+/// The radius of a knuckle includes the palm's flesh, which the neighbours share.
+const KNUCKLE_TAPER: f32 = 1.03;
+
 /// The smallest distance between parts of a hand that can meet in metres, with what soft flesh allows
 /// ([`SOFT_CONTACT`]) added: negative if one goes through the other, [`SOFT_CONTACT`] if none touches another.
 ///
@@ -16,7 +20,11 @@ pub const SOFT_CONTACT: f32 = 0.002;
 /// ball of the thumb. The inner links and the thumb's ball overlap the palm in every pose.
 pub fn self_clearance(hand: &HandSolids) -> f32 {
     let mut least = 0.0;
-    let digits = hand.phalanges.map(|links| links.map(Bounded::new));
+    let mut phalanges = hand.phalanges;
+    for [first, ..] in &mut phalanges[1..] {
+        first.start_radius = first.start_radius.min(first.end_radius * KNUCKLE_TAPER);
+    }
+    let digits = phalanges.map(|links| links.map(Bounded::new));
     for (i, digit) in digits.iter().enumerate() {
         for other in &digits[i + 1..] {
             least = between(digit, other, least);

@@ -32,10 +32,6 @@ const FOREARM_RADII: [f32; 2] = [0.95, 2.3];
 /// thick, a forearm 1.4 times.
 const FOREARM_SIDES: [f32; 2] = [0.65, 0.85];
 
-/// How much thicker the first phalanx of a finger is at the knuckle than at its far joint. The radius of a knuckle
-/// includes the palm's flesh, which does not bend with the finger.
-const KNUCKLE_TAPER: f32 = 1.03;
-
 /// A posed hand and its forearm as solids, in the frame of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandSolids {
@@ -64,7 +60,7 @@ impl HandSolids {
         let radius = |joint: usize| joints.joints[joint].radius;
         let phalanges = array::from_fn(|digit| {
             let joints = joints_of_digit(digit);
-            link_solids(joints.map(at), slimmed(digit, joints.map(radius)))
+            link_solids(joints.map(at), joints.map(radius))
         });
         let skeleton = Skeleton::new(joints);
         Self {
@@ -122,19 +118,7 @@ fn joints_of_digit(digit: usize) -> [usize; 4] {
 
 /// Distances from bone to skin at the ends of a digit's three links, in metres.
 pub fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
-    let radii = joints_of_digit(digit.index()).map(|joint| rig.joint_radii[joint]);
-    slimmed(digit.index(), radii)
-}
-
-/// The radii of a digit's links from those of its joints: without the palm's flesh at a finger's knuckle.
-fn slimmed(digit: usize, [first, second, third, tip]: [f32; 4]) -> [f32; 4] {
-    let is_finger = digit != Digit::Thumb.index();
-    let first = if is_finger {
-        first.min(second * KNUCKLE_TAPER)
-    } else {
-        first
-    };
-    [first, second, third, tip]
+    joints_of_digit(digit.index()).map(|joint| rig.joint_radii[joint])
 }
 
 /// The links of a digit, whose joints and tip are at `points`, with distances from there to the skin. The tip lies on

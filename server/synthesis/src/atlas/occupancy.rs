@@ -1,0 +1,172 @@
+//! Which grips of an atlas are certainly in a giver's way, found for all of them at once.
+//!
+//! Most known grips meet the giver's hand. Instead of comparing hands one by one, space around the object is cut into
+//! cells, and each cell knows, a bit a grip, which hands fill it. The balls that a giver's hand is made of then look up
+//! their cells, and what these say together is out of the question.
+
+use glam::{IVec3, Vec3};
+
+use super::entry::Entry;
+use crate::{
+    hand::rig::Rig,
+    object::GraspObject,
+    physical::{
+        grip::GIVER_CLEARANCE,
+        solids::{HandSolids, PreparedHand, TaperedCapsule},
+    },
+};
+
+/// Edge of a cell in metres. Smaller ones tell more hands apart and take memory by the third power.
+const CELL: f32 = 0.012;
+
+/// Cells at most: those around larger objects than a forearm's length are larger, and tell fewer hands apart.
+const MOST_CELLS: f32 = 40_000.0;
+
+/// From a cell's middle to its corners, as a multiple of its edge.
+const HALF_DIAGONAL: f32 = 0.866_026;
+
+/// The smallest radius in metres of a giver's balls that are looked up: inner phalanges, palm and forearm. A larger one
+/// counts more cells as filled and looks up fewer balls.
+const LEAST_RADIUS: f32 = 0.01;
+
+/// How far around the object's box space is cut into cells, in metres: a hand's thickness and more.
+const MARGIN: f32 = 0.07;
+
+/// Distance between the balls of one of the giver's solids, in metres: each cell on the way is looked up about once.
+const SPACING: f32 = 0.01;
+
+/// Grips that share a word.
+const WORD: usize = u64::BITS as usize;
+
+/// The row of cells that nothing fills.
+const EMPTY: u32 = 0;
+
+/// For each cell around an object, the grips whose hands fill it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Occupancy {
+    low: Vec3,
+    /// Edge of a cell in metres.
+    edge: f32,
+    counts: IVec3,
+    /// Words of a row.
+    words: usize,
+    /// The row of each cell.
+    rows: Vec<u32>,
+    bits: Vec<u64>,
+}
+
+/// Grips that a giver is certainly met by, a bit each.
+#[derive(Clone, Debug, Default)]
+pub struct Excluded(Vec<u64>);
+
+impl Excluded {
+    /// True if a grip is out of the question.
+    pub fn contains(&self, entry: u16) -> bool {
+        let entry = usize::from(entry);
+        let word = self.0.get(entry / WORD);
+        word.is_some_and(|word| word >> (entry % WORD) & 1 == 1)
+    }
+}
+
+impl Occupancy {
+    /// What the hands of some grips fill.
+    pub(super) fn of(object: &GraspObject, rig: &Rig, entries: &[Entry]) -> Self {
+        let surface = object.surface.mesh().aabb();
+        let low = Vec3::from(surface.min) - MARGIN;
+        let extents = Vec3::from(surface.max) + MARGIN - low;
+        let edge = CELL.max((extents.element_product() / MOST_CELLS).cbrt());
+        let counts = (extents / edge).ceil().as_ivec3();
+        let words = entries.len().div_ceil(WORD);
+        let mut occupancy = Self {
+            low,
+            edge,
+            counts,
+            words,
+            rows: vec![EMPTY; counts.element_product() as usize],
+            bits: vec![0; words],
+        };
+        for (index, entry) in entries.iter().enumerate() {
+            for solid in HandSolids::of_pose(rig, &entry.grip.pose).iter() {
+                occupancy.fill(solid, index);
+            }
+        }
+        occupancy
+    }
+
+    /// The grips whose hands a giver's certainly comes too near to.
+    pub(super) fn excluded_by(&self, giver: &PreparedHand) -> Excluded {
+        let mut excluded = vec![0; self.words];
+        for solid in giver.iter() {
+            let steps = (solid.length() / SPACING).ceil().max(1.0);
+            for step in 0..=steps as u32 {
+                let along = step as f32 / steps;
+                if solid.radius_at(along) < LEAST_RADIUS {
+                    continue;
+                }
+                let Some(cell) = self.cell(self.place_of(solid.at(along))) else {
+                    continue;
+                };
+                let row = self.rows[cell];
+                if row != EMPTY {
+                    let from = row as usize * self.words;
+                    for (word, filled) in excluded.iter_mut().zip(&self.bits[from..from + self.words]) {
+                        *word |= filled;
+                    }
+                }
+            }
+        }
+        Excluded(excluded)
+    }
+
+    /// Bytes that it takes in memory.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.rows.as_slice()) + size_of_val(self.bits.as_slice())
+    }
+
+    /// Notes that a hand's solid fills cells: every ball of a giver that has its middle there comes too near.
+    fn fill(&mut self, solid: &TaperedCapsule, entry: usize) {
+        let reach = LEAST_RADIUS + GIVER_CLEARANCE - HALF_DIAGONAL * self.edge;
+        let thickest = solid.start_radius.max(solid.end_radius) + reach.max(0.0);
+        let first = self
+            .place_of(solid.start.min(solid.end) - thickest)
+            .max(IVec3::ZERO);
+        let last = self
+            .place_of(solid.start.max(solid.end) + thickest)
+            .min(self.counts - 1);
+        let axis = solid.end - solid.start;
+        let inverse_square = axis.length_squared().max(f32::MIN_POSITIVE).recip();
+        for z in first.z..=last.z {
+            for y in first.y..=last.y {
+                for x in first.x..=last.x {
+                    let place = IVec3::new(x, y, z);
+                    let middle = self.low + (place.as_vec3() + 0.5) * self.edge;
+                    let along = ((middle - solid.start).dot(axis) * inverse_square).clamp(0.0, 1.0);
+                    // The ball around the foot is one of those that the solid is made of.
+                    let within = solid.radius_at(along) + reach;
+                    if within > 0.0 && middle.distance_squared(solid.at(along)) < within * within {
+                        self.set(place, entry);
+                    }
+                }
+            }
+        }
+    }
+
+    fn set(&mut self, place: IVec3, entry: usize) {
+        let Some(cell) = self.cell(place) else { return };
+        if self.rows[cell] == EMPTY {
+            self.rows[cell] = (self.bits.len() / self.words) as u32;
+            self.bits.resize(self.bits.len() + self.words, 0);
+        }
+        self.bits[self.rows[cell] as usize * self.words + entry / WORD] |= 1 << (entry % WORD);
+    }
+
+    /// Which cell along each axis a point is in.
+    fn place_of(&self, point: Vec3) -> IVec3 {
+        ((point - self.low) / self.edge).floor().as_ivec3()
+    }
+
+    fn cell(&self, place: IVec3) -> Option<usize> {
+        let is_inside = place.cmpge(IVec3::ZERO).all() && place.cmplt(self.counts).all();
+        is_inside.then(|| ((place.z * self.counts.y + place.y) * self.counts.x + place.x) as usize)
+    }
+}

@@ -1,0 +1,99 @@
+//! How the grips of an atlas are spread over an object: only so many may be alike, and the better ones stay.
+
+use std::collections::HashMap;
+
+use glam::{IVec3, Vec3};
+
+use super::entry::Entry;
+use crate::{
+    grasp::Contact,
+    hand::{Digit, HandPart, HandPose, rig::Rig},
+    score::Score,
+};
+
+/// Edge in metres of the cells that palms are sorted into, and …
+const CELL: f32 = 0.02;
+
+/// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes, few fingers and many apart.
+const MOST_IN_CELL: usize = 3;
+
+/// Fingers from which a hand takes much room: two keep clear of givers that more do not.
+const MANY_FINGERS: usize = 3;
+
+/// Grips that are alike: where the palm is, which way it faces and which way its fingers go, and whether many of them
+/// touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Cell(IVec3, [u8; 2], bool);
+
+impl Cell {
+    /// The cell of a hand that touches an object.
+    pub(super) fn of(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> Self {
+        let wrist = pose.frame_from_wrist;
+        let palm = wrist.transform_point(rig.palm);
+        let mut fingers = wrist.transform_vector(Vec3::Y);
+        let facing = nearest_axis(wrist.transform_vector(Vec3::Z));
+        fingers[usize::from(facing / 2)] = 0.0;
+        let touches = |finger: &&Digit| {
+            let is_of_finger = |part: HandPart| part.digit() == Some(**finger);
+            contacts.iter().any(|contact| is_of_finger(contact.part))
+        };
+        Self(
+            (palm / CELL).floor().as_ivec3(),
+            [facing, nearest_axis(fingers)],
+            Digit::ALL[1..].iter().filter(touches).count() >= MANY_FINGERS,
+        )
+    }
+}
+
+/// What becomes of a grip that is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Room {
+    /// There are enough like it that are as good.
+    Crowded,
+    /// It is added.
+    Free,
+    /// It takes the place of this entry, which is worse.
+    InsteadOf(usize),
+}
+
+/// Which entries are alike, with what they are worth.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Spread {
+    cells: HashMap<Cell, Vec<(usize, f32)>>,
+}
+
+impl Spread {
+    /// What becomes of a grip of a cell that is worth so much.
+    pub(super) fn room(&self, cell: Cell, worth: f32) -> Room {
+        let Some(alike) = self.cells.get(&cell).filter(|alike| alike.len() >= MOST_IN_CELL) else {
+            return Room::Free;
+        };
+        match alike.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some(&(entry, least)) if worth > least => Room::InsteadOf(entry),
+            _ => Room::Crowded,
+        }
+    }
+
+    /// Notes the grip that is at an index of the entries from now on.
+    pub(super) fn note(&mut self, cell: Cell, index: usize, worth: f32) {
+        let alike = self.cells.entry(cell).or_default();
+        match alike.iter_mut().find(|(entry, _)| *entry == index) {
+            Some(known) => known.1 = worth,
+            None => alike.push((index, worth)),
+        }
+    }
+}
+
+/// What an entry is worth beside others like it: the part of its score that neither gravity nor giver change.
+pub(super) fn worth(entry: &Entry) -> f32 {
+    Score {
+        values: entry.grip_values,
+    }
+    .of_grip()
+}
+
+/// The axis that a direction is nearest to, from 0 to 5: x, -x, y, -y, z, -z.
+fn nearest_axis(direction: Vec3) -> u8 {
+    let axis = direction.abs().max_position();
+    2 * axis as u8 + u8::from(direction[axis] < 0.0)
+}
