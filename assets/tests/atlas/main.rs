@@ -1,4 +1,5 @@
 //! Atlases of the built-in objects and hands: grown, written, read.
 
 mod codec;
+mod exclusion;
 mod support;

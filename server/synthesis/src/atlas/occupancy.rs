@@ -19,8 +19,8 @@ use crate::{
 /// Edge of a cell in metres. Smaller ones tell more hands apart and take memory by the third power.
 const CELL: f32 = 0.012;
 
-/// Cells at most: those around larger objects than a forearm's length are larger, and tell fewer hands apart.
-const MOST_CELLS: f32 = 40_000.0;
+/// Cells at most, each half a kilobyte for 4,096 grips: those around large objects are larger, and tell fewer hands apart.
+const MOST_CELLS: f32 = 12_000.0;
 
 /// From a cell's middle to its corners, as a multiple of its edge.
 const HALF_DIAGONAL: f32 = 0.866_026;

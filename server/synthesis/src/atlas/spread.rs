@@ -97,3 +97,30 @@ fn nearest_axis(direction: Vec3) -> u8 {
     let axis = direction.abs().max_position();
     2 * axis as u8 + u8::from(direction[axis] < 0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cell(x: i32) -> Cell {
+        Cell(IVec3::new(x, 0, 0), [0, 2], false)
+    }
+
+    #[test]
+    fn a_cell_keeps_the_best_that_it_has_room_for() {
+        let mut spread = Spread::default();
+        for (index, worth) in [0.5, 0.2, 0.7].into_iter().enumerate() {
+            assert_eq!(spread.room(cell(0), worth), Room::Free);
+            spread.note(cell(0), index, worth);
+        }
+        assert_eq!(spread.room(cell(0), 0.1), Room::Crowded);
+        assert_eq!(spread.room(cell(0), 0.2), Room::Crowded, "as good is not better");
+        assert_eq!(spread.room(cell(0), 0.3), Room::InsteadOf(1));
+        assert_eq!(spread.room(cell(1), 0.1), Room::Free, "the next cell is empty");
+        spread.note(cell(0), 1, 0.6);
+        assert_eq!(spread.room(cell(0), 0.55), Room::InsteadOf(0));
+        // One that was needed is noted beyond the room, and may give way later.
+        spread.note(cell(0), 3, 0.05);
+        assert_eq!(spread.room(cell(0), 0.1), Room::InsteadOf(3));
+    }
+}

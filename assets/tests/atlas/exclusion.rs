@@ -1,0 +1,78 @@
+//! What a giver excludes, against comparing hands one by one.
+
+use glam::{Quat, Vec3};
+use grasp_assets::objects::object as built_in;
+use grasp_synthesis::{
+    atlas::{Atlas, growth::Growth},
+    geometry::mesh::TriangleMesh,
+    hand::Handedness,
+    object::GraspObject,
+    physical::{
+        grip::GIVER_CLEARANCE,
+        solids::{HandSolids, PreparedHand},
+    },
+    pose::Pose,
+};
+
+use crate::support::{adult, grown, object};
+
+/// A mesh `scale` times as large.
+fn scaled(object: &GraspObject, scale: f32) -> GraspObject {
+    let mesh = object.surface.mesh();
+    let positions = mesh.positions().iter().map(|place| *place * scale).collect();
+    let mesh = TriangleMesh::new(positions, mesh.triangles().to_vec()).expect("it was one before");
+    GraspObject::new(mesh, object.mass, object.centre_of_mass * scale, None, &[]).expect("it was one before")
+}
+
+#[test]
+fn what_is_excluded_meets_the_giver() {
+    let rig = adult(Handedness::Right);
+    for name in ["remote", "scissors"] {
+        let object = object(name);
+        let atlas = grown(Growth::new(object, rig), 60).atlas;
+        let (mut meeting, mut excluded, mut free) = (0, 0, 0);
+        // Known grips as givers, where they are and some way off; then the object lies between two hands.
+        for (turn, giver) in atlas.entries().iter().step_by(7).enumerate() {
+            let mut pose = giver.grip.pose;
+            let off = 0.01 * (turn % 6) as f32;
+            pose.frame_from_wrist = Pose::new(
+                pose.frame_from_wrist.position - off * pose.frame_from_wrist.transform_vector(Vec3::Z),
+                Quat::from_rotation_x(0.05 * turn as f32) * pose.frame_from_wrist.orientation,
+            );
+            let hand = PreparedHand::new(&HandSolids::of_pose(rig, &pose));
+            let out_of_question = atlas.excluded_by(&hand);
+            for (index, entry) in atlas.entries().iter().enumerate() {
+                let solids = HandSolids::of_pose(rig, &entry.grip.pose);
+                let meets = hand.is_neared_by(solids.iter(), GIVER_CLEARANCE);
+                let is_excluded = out_of_question.contains(index as u16);
+                assert!(meets || !is_excluded, "{name}: {index} keeps clear of giver {turn}");
+                meeting += usize::from(meets);
+                excluded += usize::from(is_excluded);
+                free += usize::from(!meets);
+            }
+        }
+        assert!(free > 50, "{name}: only {free} keep clear of anybody");
+        // It is worth asking only if it settles most.
+        assert!(2 * excluded > meeting, "{name}: {excluded} of {meeting} are excluded");
+    }
+}
+
+#[test]
+fn without_grips_nothing_is_excluded() {
+    let rig = adult(Handedness::Right);
+    let solids = HandSolids::of_pose(rig, &grown(Growth::new(object("remote"), rig), 2).atlas.entries()[0].grip.pose);
+    let empty = Atlas::new(object("remote"), rig, Vec::new(), false);
+    assert!(!empty.excluded_by(&PreparedHand::new(&solids)).contains(0));
+    assert!(!Atlas::default().excluded_by(&PreparedHand::new(&solids)).contains(0));
+}
+
+#[test]
+fn a_large_object_takes_no_more_memory_than_a_small_one() {
+    let rig = adult(Handedness::Right);
+    let small = built_in("remote").expect("it is built in");
+    let entries = grown(Growth::new(&small.object, rig), 20).atlas.entries().to_vec();
+    let bytes_of = |object: &GraspObject| Atlas::new(object, rig, entries.clone(), false).bytes();
+    let usual = bytes_of(&small.object);
+    let large = bytes_of(&scaled(&small.object, 40.0));
+    assert!(large < 3 * usual, "{large} bytes instead of {usual}");
+}
