@@ -19,7 +19,9 @@ const FLESH: f64 = 15_000.0;
 const LEVER: f64 = 0.0033;
 
 fn adult() -> &'static Rig {
-    &hands::hand("adult", Handedness::Right).expect("it is built in").rig
+    &hands::hand("adult", Handedness::Right)
+        .expect("it is built in")
+        .rig
 }
 
 /// Where a point of a link is, and which way it turned, when a joint is bent by `angle` more.
@@ -47,7 +49,10 @@ fn stretches(rig: &Rig, pose: &HandPose, contact: &Contact, centre: Vec3) -> [([
             let mut axis = Vec3::ZERO;
             axis[unknown - 3] = 1.0;
             let arm = contact.position - centre;
-            return (Quat::from_axis_angle(axis, step) * arm - arm, normal[unknown - 3] * step);
+            return (
+                Quat::from_axis_angle(axis, step) * arm - arm,
+                normal[unknown - 3] * step,
+            );
         }
         let (digit, joint) = (Digit::ALL[(unknown - 6) / 3], (unknown - 6) % 3);
         let HandPart::Phalanx(of, phalanx) = contact.part else {
@@ -140,7 +145,10 @@ fn gives_way_as_all_springs_together_do() {
             let pose = &entry.grip.pose;
             let found = f64::from(give(rig, pose, &entry.contacts, object.centre_of_mass));
             let wanted = give_of_all(rig, pose, &entry.contacts, object.centre_of_mass);
-            assert!((found / wanted - 1.0).abs() < 0.01, "{name}: {found}, not {wanted}");
+            assert!(
+                (found / wanted - 1.0).abs() < 0.01,
+                "{name}: {found}, not {wanted}"
+            );
         }
     }
 }
@@ -167,7 +175,10 @@ fn a_palm_gives_way_by_its_flesh_alone() {
     let contacts = around.map(|place| at(place, HandPart::Palm));
     let found = give(rig, &pose, &contacts, middle);
     let wanted = 3.0_f64.sqrt() / (3.0 * FLESH);
-    assert!((f64::from(found) / wanted - 1.0).abs() < 1e-3, "{found}, not {wanted}");
+    assert!(
+        (f64::from(found) / wanted - 1.0).abs() < 1e-3,
+        "{found}, not {wanted}"
+    );
 
     // Nothing holds at all; and a digit alone gives way more than the palm.
     assert_eq!(give(rig, &pose, &[], middle), f32::INFINITY);

@@ -45,7 +45,10 @@ fn what_is_excluded_meets_the_giver() {
                 let solids = HandSolids::of_pose(rig, &entry.grip.pose);
                 let meets = hand.is_neared_by(solids.iter(), GIVER_CLEARANCE);
                 let is_excluded = out_of_question.contains(index as u16);
-                assert!(meets || !is_excluded, "{name}: {index} keeps clear of giver {turn}");
+                assert!(
+                    meets || !is_excluded,
+                    "{name}: {index} keeps clear of giver {turn}"
+                );
                 meeting += usize::from(meets);
                 excluded += usize::from(is_excluded);
                 free += usize::from(!meets);
@@ -53,24 +56,39 @@ fn what_is_excluded_meets_the_giver() {
         }
         assert!(free > 50, "{name}: only {free} keep clear of anybody");
         // It is worth asking only if it settles most.
-        assert!(2 * excluded > meeting, "{name}: {excluded} of {meeting} are excluded");
+        assert!(
+            2 * excluded > meeting,
+            "{name}: {excluded} of {meeting} are excluded"
+        );
     }
 }
 
 #[test]
 fn without_grips_nothing_is_excluded() {
     let rig = adult(Handedness::Right);
-    let solids = HandSolids::of_pose(rig, &grown(Growth::new(object("remote"), rig), 2).atlas.entries()[0].grip.pose);
+    let solids = HandSolids::of_pose(
+        rig,
+        &grown(Growth::new(object("remote"), rig), 2).atlas.entries()[0]
+            .grip
+            .pose,
+    );
     let empty = Atlas::new(object("remote"), rig, Vec::new(), false);
     assert!(!empty.excluded_by(&PreparedHand::new(&solids)).contains(0));
-    assert!(!Atlas::default().excluded_by(&PreparedHand::new(&solids)).contains(0));
+    assert!(
+        !Atlas::default()
+            .excluded_by(&PreparedHand::new(&solids))
+            .contains(0)
+    );
 }
 
 #[test]
 fn a_large_object_takes_no_more_memory_than_a_small_one() {
     let rig = adult(Handedness::Right);
     let small = built_in("remote").expect("it is built in");
-    let entries = grown(Growth::new(&small.object, rig), 20).atlas.entries().to_vec();
+    let entries = grown(Growth::new(&small.object, rig), 20)
+        .atlas
+        .entries()
+        .to_vec();
     let bytes_of = |object: &GraspObject| Atlas::new(object, rig, entries.clone(), false).bytes();
     let usual = bytes_of(&small.object);
     let large = bytes_of(&scaled(&small.object, 40.0));
