@@ -12,6 +12,7 @@ use crate::{
     object::GraspObject,
     physical::{
         contacts::TORSION_LEVER,
+        immobility::firm_force,
         scene::{ObjectScene, Presented},
         solids::HandSolids,
         stiffness::give,
@@ -49,12 +50,9 @@ const SURE_TYPE: f32 = 0.5;
 /// … and what it counts right below that: nobody can name it.
 const DOUBTFUL_TYPE: f32 = 0.6;
 
-/// The strongest contact's force, over the weight and [`LIGHT_TOUCH`], at which a hold looks easy, and where it looks
-/// strained.
-const EASY: [f32; 2] = [1.0, 6.0];
-
-/// Newtons that nobody feels: what a finger presses with to hold a pen.
-const LIGHT_TOUCH: f32 = 1.0;
+/// The strongest contact's force, over what all digits together press with to hold the object firmly, at which a hold
+/// looks easy (the thumb bears half), and where it looks strained.
+const EASY: [f32; 2] = [0.6, 2.0];
 
 /// Distance from the giver's hand in metres from which nobody worries: half a hand's breadth.
 const EASY_CLEARANCE: f32 = 0.04;
@@ -251,14 +249,15 @@ pub fn force_values(
     values[Term::Comfort as usize] = comfort_value(comfort(digit_totals(contacts, forces)));
     let reserve = friction_reserve(scene.friction, contacts, forces, torsions);
     values[Term::FrictionReserve as usize] = (reserve / SAFE_RESERVE).clamp(0.0, 1.0);
-    values[Term::Ease as usize] = ease(scene.object, forces);
+    values[Term::Ease as usize] = ease(scene, forces);
     values
 }
 
-fn ease(object: &GraspObject, forces: &[Vec3]) -> f32 {
+fn ease(scene: &ObjectScene<'_>, forces: &[Vec3]) -> f32 {
     let strongest = forces.iter().map(|force| force.length()).fold(0.0, f32::max);
     let [easy, strained] = EASY;
-    let share = strongest / (object.mass * GRAVITY + LIGHT_TOUCH);
+    let weight = f64::from(scene.object.mass * GRAVITY);
+    let share = strongest / firm_force(weight, f64::from(scene.friction)) as f32;
     ((strained / share).ln() / (strained / easy).ln()).clamp(0.0, 1.0)
 }
 

@@ -20,6 +20,7 @@ mod polytope;
 use glam::Vec3;
 
 use crate::hand::Digit;
+pub(crate) use balance::firm_force;
 pub use balance::{BALANCE_TOLERANCE, Expected, MAX_CONTACT_FORCE, balance};
 pub use closure::{EPSILON_TOLERANCE, epsilon};
 
