@@ -260,7 +260,7 @@ mod tests {
         }
     }
 
-    const NEEDED: u64 = (16 + 100 + 3 * 2 + 5 * 2 + 12) * MIB
+    const NEEDED: u64 = (16 + 100 + 3 * 2 + 5 * 2 + 20) * MIB
         + 3 * (512 << 10)
         + 2 * (64 << 10)
         + 3 * 512_000
@@ -309,8 +309,8 @@ mod tests {
         assert_eq!(
             lines[..4],
             [
-                "too little memory: the limit is 30 MiB (a test); this configuration may take 148 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may take 170 MiB",
+                "too little memory: the limit is 30 MiB (a test); this configuration may take 156 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may take 178 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]

@@ -119,7 +119,7 @@ async fn typed_answers(
     let mut client = server.grasps().await;
     let numbers = |types: &[v1::GraspType]| types.iter().map(|&one| one.into()).collect();
     let mut answers = Vec::new();
-    for seed in 0..10 {
+    for seed in 0..30 {
         let request = v1::FindGraspRequest {
             seed: Some(seed),
             reproducible: true,

@@ -58,11 +58,13 @@ async fn a_score_is_the_weighted_mean_of_its_terms() {
         let expected = [
             "comfort",
             "friction_reserve",
+            "ease",
             "shared_flexion",
             "enough_digits",
             "pads",
             "natural_type",
             "closure",
+            "steadiness",
             "away_from_giver",
             "giver_clearance",
             "sterile_distance",

@@ -56,7 +56,7 @@ const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
 /// A push that goes less than this with the residual makes the forces no more comfortable: shares that differ by some
 /// percent are equally so. A smaller one takes up to three times as long.
-const NEGLIGIBLE_COMFORT: f64 = 3e-4;
+const NEGLIGIBLE_COMFORT: f64 = 1e-4;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
