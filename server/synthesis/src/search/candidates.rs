@@ -21,7 +21,7 @@ use crate::{
 
 /// Grips that are tried before it is asked which are out of the question: asking takes as long as trying dozens, and one of
 /// the first is often the answer.
-const TRIED_ONE_BY_ONE: usize = 8;
+const TRIED_ONE_BY_ONE: usize = 24;
 
 /// The grips of an atlas in the order in which they are tried.
 #[derive(Debug)]

@@ -54,9 +54,10 @@ const FOUND: f64 = 0.5;
 /// A push that goes less than this with the residual does not help to balance any more.
 const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
-/// A push that goes less than this with the residual makes the forces no more comfortable: shares that differ by some
-/// percent are equally so. A smaller one takes up to three times as long.
-const NEGLIGIBLE_COMFORT: f64 = 1e-4;
+/// A push that goes less than this with the residual, for each weight that the digits are to press with together, makes
+/// the forces no more comfortable: shares that differ by some percent are equally so. A smaller one takes up to three times
+/// as long.
+const NEGLIGIBLE_COMFORT: f64 = 1e-5;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
@@ -247,7 +248,7 @@ impl<'a> Problem<'a> {
             }
             let mut best = (
                 if self.comfortable {
-                    NEGLIGIBLE_COMFORT
+                    NEGLIGIBLE_COMFORT * self.firm_sum.max(1.0)
                 } else {
                     NEGLIGIBLE_GAIN
                 },
