@@ -72,8 +72,8 @@ impl Occupancy {
     /// What the hands of some grips fill.
     pub(super) fn of(object: &GraspObject, rig: &Rig, entries: &[Entry]) -> Self {
         let surface = object.surface.mesh().aabb();
-        let low = Vec3::from(surface.min) - MARGIN;
-        let extents = Vec3::from(surface.max) + MARGIN - low;
+        let low = surface.min - MARGIN;
+        let extents = surface.max + MARGIN - low;
         let edge = CELL.max((extents.element_product() / MOST_CELLS).cbrt());
         let counts = (extents / edge).ceil().as_ivec3();
         let words = entries.len().div_ceil(WORD);

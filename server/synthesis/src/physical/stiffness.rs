@@ -42,7 +42,7 @@ pub fn give(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3) -> f
     for digit in Digit::ALL {
         add_digit(&mut stiffness, rig, pose, contacts, centre, digit);
     }
-    translational_compliance(stiffness).map_or(f32::INFINITY, |norm| norm as f32)
+    translational_compliance(&stiffness).map_or(f32::INFINITY, |norm| norm as f32)
 }
 
 /// A contact's springs: how much each is stretched by each of the object's six motions, and its stiffness. Three
@@ -160,9 +160,9 @@ fn subtract_joints(
 }
 
 /// The norm of the part of the inverse that turns pushes into shifts; none if the matrix is not positive definite.
-fn translational_compliance(stiffness: Matrix6) -> Option<f64> {
+fn translational_compliance(stiffness: &Matrix6) -> Option<f64> {
     // The turns are eliminated first, which leaves a 3 × 3 matrix to invert.
-    let mut left = stiffness;
+    let mut left = *stiffness;
     let scale = left
         .iter()
         .enumerate()
