@@ -66,7 +66,7 @@ def test_the_sum_of_the_default_memory_is_the_server_s():
         16 * mib
         + value["cache_bytes"]
         + value["maximum_uploads"] * upload
-        + 12 * mib * value["builder_threads"]
+        + 20 * mib * value["builder_threads"]
         + 2 * mib * value["maximum_searches"]
         + 32 * 1024 * value["maximum_connections"]
         + 64 * 1024 * (30 + value["io_threads"])
