@@ -1,5 +1,5 @@
 //! How an atlas grows: rounds of proposals, half of them new and half beside grips that are known, and a limit on how
-//! many grips may be alike ([`spread`](super::spread)).
+//! many grips may be alike (`spread.rs`), of which the better ones stay.
 //!
 //! Every other round has a giver: one of the known grips is taken for the hand that holds the object out, and grips are
 //! looked for that keep clear of it. So the atlas comes to answer where a giver leaves little room.
