@@ -1,13 +1,13 @@
 """Does the hand keep hold of the object in a physics engine (MuJoCo), which knows nothing of the search?
 
 The world is the object's frame. Wrist and palm do not move; each phalanx is a body on a hinge, its joint's pitch (yaw is
-held). First both hold, as in every handover: the object stays where it is while the digits find what they press with; then the
-giver lets go. Flesh is the judge's capsules, in slices of even radius; the object is its convex pieces.
+held). First both hold, as in every handover: the object stays where it is while the digits find what they press with;
+then the giver lets go. Flesh is the judge's capsules, in slices of even radius; the object is its convex pieces.
 
 What the fingers do. Each hinge has a constant torque, which makes the digit press on the object with the forces (and
 torsions) that the reply tells: the torque about the hinge of all forces on the phalanges beyond it. Beside it, each hinge
-holds the answered posture like a damped spring of limited strength, as a hand that grips does: where nothing moves the
-spring adds nothing, so what presses is the answered forces. The palm presses back and does no more.
+holds the posture that it has when the giver lets go like a damped spring of limited strength, as a hand that grips does:
+where nothing moves the spring adds nothing, so what presses is the answered forces. The palm presses back and does no more.
 """
 
 import enum
@@ -23,9 +23,10 @@ from measures import GRAVITY, TORSION_RADIUS
 # Seconds of each stage and of a step. With steps of 0.5 ms, 11 of fourteen grasps survived gravity
 # instead of 10, and 39 pushes instead of 37.
 SETTLING, PUSHING, STEP = 1.0, 2.0, 0.002
-# Seconds for which the giver still holds: a handover takes some tenths of a second (Mason and MacKenzie 2005, from memory).
-# It takes out what the touch of the answered pose adds: its pads are half a millimetre deep, which between posture and
-# object pressed with up to ten times the answered forces.
+# Seconds for which the giver still holds: a handover takes some tenths of a second (Mason and MacKenzie 2005, from
+# memory). It takes out what the touch of the answered pose adds: its pads are half a millimetre deep, which between
+# posture and object pressed with up to ten times the answered forces. Of the same 75 grasps, which pressed gently, 79 %
+# survived gravity and 55 % all pushes with that addition, and 72 % and 37 % without it.
 HANDING = 0.25
 # Steps from one look at the object to the next; what falls is seen a little later.
 STRIDE = 5

@@ -48,6 +48,7 @@ class TestPads:
         data = mujoco.MjData(model)
         for name, torque in physics.torques(hand, contacts).items():
             data.qfrc_applied[model.joint(name).dofadr[0]] = torque
+        physics.hand_over(model, data)
         mujoco.mj_step(model, data, 500)
         forces = np.zeros((data.ncon, 6))
         for i, force in enumerate(forces):
@@ -55,6 +56,23 @@ class TestPads:
         # Thumb and index press alike, and both together bear the weight by friction.
         assert forces[:, 0].sum() == pytest.approx(2 * 5.0, rel=0.05)
         assert np.linalg.norm(forces[:, 1:3], axis=1).sum() == pytest.approx(WEIGHT, rel=0.1)
+
+    @pytest.mark.parametrize("depth", [0.0005, 0.0015])
+    def test_how_deep_a_pad_touches_adds_nothing_to_what_it_presses_with(self, depth):
+        thing, hand, contacts, up, axes = held_block(5.0)
+        thing.pieces[0] = thing.pieces[0] + depth * (thing.pieces[0] - thing.centre_of_mass) @ np.outer(axes[0], axes[0]) / (
+            np.abs((thing.pieces[0] - thing.centre_of_mass) @ axes[0]).max()
+        )
+        model = mujoco.MjModel.from_xml_string(physics.world(thing, hand, contacts, -measures.GRAVITY * up))
+        data = mujoco.MjData(model)
+        for name, torque in physics.torques(hand, contacts).items():
+            data.qfrc_applied[model.joint(name).dofadr[0]] = torque
+        physics.hand_over(model, data)
+        assert not data.eq_active.any()
+        forces = np.zeros((data.ncon, 6))
+        for i, force in enumerate(forces):
+            mujoco.mj_contactForce(model, data, i, force)
+        assert forces[:, 0].sum() == pytest.approx(2 * 5.0, rel=0.15)
 
     # Each pad has to bear half of the weight by friction, so half of weight / friction would be just enough.
     @pytest.mark.parametrize(("force", "friction"), [(0.2 * WEIGHT / FRICTION, FRICTION), (WEIGHT / FRICTION, 0.1)])
