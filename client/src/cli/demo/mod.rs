@@ -60,7 +60,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
     /// How long each search may take.
-    #[arg(long, value_name = "DURATION", default_value = "10s", value_parser = parse_duration)]
+    #[arg(long, value_name = "DURATION", default_value = "20s", value_parser = parse_duration)]
     budget: Duration,
 }
 
