@@ -147,8 +147,8 @@ impl Term {
             Self::FrictionReserve => 2.5,
             Self::NaturalType => 3.0,
             // What is held in a simulation by others, closure tells best against gravity (in 75 of 100 pairs of grips, of
-            // which one fell, that one had less), and steadiness against pushes (73); then friction reserve (68 and 62),
-            // pads (60 and 59) and ease (59 and 59). The others tell nothing there, and are for the eye.
+            // which one fell, that one had less), and steadiness against pushes (73); then friction reserve (68 and 62)
+            // and pads (60 and 59). The others tell little or nothing there, and are for the eye.
             Self::Steadiness => 5.0,
             Self::Closure => 4.0,
             Self::AwayFromGiver => 0.75,
