@@ -51,7 +51,8 @@ impl<T: Message> Encoder for SliceEncoder<T> {
 
     fn encode(&mut self, message: T, buffer: &mut EncodeBuf<'_>) -> Result<(), Status> {
         let mut bytes = vec![0; message.encoded_len()];
-        message.encode_raw(&mut bytes.as_mut_slice());
+        let written = message.encode(&mut bytes.as_mut_slice());
+        written.map_err(|error| Status::internal(error.to_string()))?;
         buffer.put_slice(&bytes);
         Ok(())
     }

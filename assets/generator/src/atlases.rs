@@ -9,12 +9,14 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     atlas::{
+        Atlas,
         codec::{AtlasError, decode, encode},
         growth::{EARLY_PROPOSALS, Growth},
     },
     hand::{Handedness, rig::Rig},
     object::GraspObject,
-    physical::grip::Gripper,
+    physical::{grip::Gripper, scene::ObjectScene},
+    strategy::Validity,
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -26,6 +28,9 @@ const RIG: &str = "adult";
 
 /// Bytes of a file at most. More make the program larger, by six times as much.
 const MOST_BYTES: usize = 1_200_000;
+
+/// Grips of a file that are assessed anew: some tenths of a second. More notice rarer differences.
+const CHECKED: usize = 200;
 
 /// Why a file is not what would be made now.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
@@ -40,6 +45,10 @@ enum Difference {
         "grips are found differently now: make them again, and raise ALGORITHM of grasp_synthesis::atlas::key"
     )]
     OtherGrips,
+    #[error(
+        "grip {0} is worth something else now: make them again, and raise ALGORITHM of grasp_synthesis::atlas::key"
+    )]
+    OtherWorth(usize),
 }
 
 /// Every object with every hand.
@@ -114,11 +123,22 @@ fn compare(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<(), Differen
     if bytes.len() > MOST_BYTES {
         return Err(Difference::TooLarge(bytes.len()));
     }
-    if made.early_stamp() == early_stamp(object, rig) {
-        Ok(())
-    } else {
-        Err(Difference::OtherGrips)
+    if made.early_stamp() != early_stamp(object, rig) {
+        return Err(Difference::OtherGrips);
     }
+    first_difference(&made.atlas, object, rig).map_or(Ok(()), |place| Err(Difference::OtherWorth(place)))
+}
+
+/// The first grip of an atlas, of [`CHECKED`] from all over it, that is worth something else now.
+fn first_difference(made: &Atlas, object: &GraspObject, rig: &Rig) -> Option<usize> {
+    let scene = ObjectScene::new(object, object.friction_under(Validity::Physical));
+    let mut gripper = Gripper::default();
+    let entries = made.entries();
+    let apart = entries.len().div_ceil(CHECKED).max(1);
+    (0..entries.len()).step_by(apart).find(|&place| {
+        let entry = &entries[place];
+        entry.assessed_anew(&scene, rig, &mut gripper).as_ref() != Some(entry)
+    })
 }
 
 /// The stamp that an atlas has now after its first proposals: a second of work.
@@ -137,6 +157,8 @@ fn path(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use grasp_synthesis::atlas::entry::Entry;
+
     use super::*;
 
     #[test]
@@ -160,6 +182,27 @@ mod tests {
         // The other hand's is another: the stamp tells growth apart.
         let (_, other) = PAIRS[1];
         assert_ne!(early_stamp(object, other), early);
+    }
+
+    #[test]
+    fn a_grip_that_is_worth_something_else_is_named() {
+        let (object, rig) = PAIRS[0];
+        let object = &object.object;
+        let mut growth = Growth::new(object, rig);
+        let mut gripper = Gripper::default();
+        while growth.len() < 20 {
+            growth.round(&mut gripper);
+        }
+        let made = growth.atlas();
+        assert_eq!(first_difference(&made, object, rig), None);
+        let changed = |change: fn(&mut Entry)| {
+            let mut entries = made.entries().to_vec();
+            change(&mut entries[7]);
+            first_difference(&Atlas::new(object, rig, entries, false), object, rig)
+        };
+        assert_eq!(changed(|entry| entry.epsilon *= 1.5), Some(7));
+        assert_eq!(changed(|entry| entry.scores[3] ^= 1), Some(7));
+        assert_eq!(changed(|entry| entry.contacts.truncate(1)), Some(7));
     }
 
     #[test]

@@ -83,6 +83,22 @@ impl Entry {
         )
     }
 
+    /// What a grip of the same hand and contacts is worth now; none if its closure is not enough.
+    pub fn assessed_anew(&self, scene: &ObjectScene<'_>, rig: &Rig, gripper: &mut Gripper) -> Option<Self> {
+        gripper.contacts.clone_from(&self.contacts);
+        soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
+        let epsilon = gripper.closure(scene)?;
+        let solids = HandSolids::of_pose(rig, &self.grip.pose);
+        Some(Self::new(
+            scene,
+            rig,
+            self.grip.clone(),
+            &solids,
+            epsilon,
+            gripper,
+        ))
+    }
+
     /// An entry of which everything is known.
     pub(super) fn from_parts(
         grip: Grip,

@@ -20,7 +20,7 @@ use crate::{
 const CELL: f32 = 0.012;
 
 /// Cells at most, each half a kilobyte for 4,096 grips: those around large objects are larger, and tell fewer hands apart.
-const MOST_CELLS: f32 = 12_000.0;
+const MOST_CELLS: f32 = 10_000.0;
 
 /// From a cell's middle to its corners, as a multiple of its edge.
 const HALF_DIAGONAL: f32 = 0.866_026;
