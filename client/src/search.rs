@@ -210,7 +210,8 @@ pub enum Outcome {
 pub struct Contact {
     /// The point on the surface, in the client's frame.
     pub client_position: Vec3,
-    /// The surface's outward unit normal there, in the client's frame.
+    /// The surface's outward unit normal there, in the client's frame; at an edge or a corner, under PHYSICAL validity,
+    /// that of the directions between its faces' normals which points to the bone.
     pub client_normal: Vec3,
     /// The same point in the object's frame.
     pub object_position: Vec3,

@@ -7,7 +7,7 @@ the request's pose of the object. Lengths in metres, angles in degrees, forces i
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import lsq_linear, nnls
 from scipy.spatial.transform import Rotation
 
 from hand import DIGITS, PHALANGES, Hand
@@ -29,6 +29,9 @@ BONE_TOLERANCE = 0.001
 STRETCHED = 10.0
 # A contact's normal may be that of any triangle so near, within so many degrees.
 NORMAL_REACH, NORMAL_ANGLE = 0.0005, 15.0
+# At an edge or a corner it may also be any between those of the triangles that meet there, which are so near: rounding
+# in single precision and no more, so that both sides of a blade are not taken for an edge.
+EDGE_REACH = 0.00002
 # Most that a digit presses with, in newtons (thesis 2.5).
 STRONGEST = 27.0
 # A contact resists twisting about its normal by up to friction times force times this: two thirds of the radius of a
@@ -261,17 +264,26 @@ def contact_places(mesh, hand, contacts):
         axis = part.ends[nearest] - part.starts[nearest]
         along = np.clip(np.dot(point - part.starts[nearest], axis) / np.dot(axis, axis), 0.0, 1.0)
         away += np.dot(contact["normal"], part.starts[nearest] + along * axis - point) <= 0
-        # One of the triangles at the place has this normal; which way is out, the winding number tells.
-        near = np.flatnonzero(np.linalg.norm(mesh.centres - point, axis=1) < mesh.radii + NORMAL_REACH)
-        near = [t for t in near if Mesh(mesh.triangles[t], [[0, 1, 2]]).closest([point])[0][0] < NORMAL_REACH]
-        agree = np.abs(mesh.normals[near] @ contact["normal"]) > np.cos(np.radians(NORMAL_ANGLE))
-        wrong += not agree.any()
+        wrong += not is_normal(mesh, point, contact["normal"])
     return {
         "off_mesh": float(off_mesh.max()),
         "off_skin": float(max(off_skin)),
         "faces_away": int(away),
         "normal_wrong": int(wrong),
     }
+
+
+def is_normal(mesh, point, normal):
+    """True if the surface has this normal at the point; which of both ways is out, the winding number tells elsewhere."""
+    near = np.flatnonzero(np.linalg.norm(mesh.centres - point, axis=1) < mesh.radii + NORMAL_REACH)
+    away = np.array([Mesh(mesh.triangles[t], [[0, 1, 2]]).closest([point])[0][0] for t in near])
+    if (np.abs(mesh.normals[near[away < NORMAL_REACH]] @ normal) > np.cos(np.radians(NORMAL_ANGLE))).any():
+        return True
+    # A direction between normals is a sum of them with weights that are not negative. Meshes may be inside out.
+    at_edge = mesh.normals[near[away < EDGE_REACH]]
+    return len(at_edge) > 1 and any(
+        nnls(sign * at_edge.T, normal)[1] < np.sin(np.radians(NORMAL_ANGLE)) for sign in (1, -1)
+    )
 
 
 def giver_clearance(mesh, hand, giver):

@@ -221,6 +221,27 @@ class TestFaults:
         assert "normal" in faults(scene, grasp)
         assert "faces_away" not in faults(scene, grasp)
 
+    @pytest.mark.parametrize("inside_out", [False, True])
+    def test_normals_at_an_edge_lie_between_those_of_its_faces(self, inside_out):
+        faces = [face[::-1] for face in BOX_FACES] if inside_out else BOX_FACES
+        mesh, edge, face = Mesh(box([1.0, 1.0, 1.0]), faces), [1.0, 1.0, 0.2], [1.0, 0.99, 0.2]
+        x, y, z = np.eye(3)
+        slanted = (x + y) / np.sqrt(2)
+        for normal in (x, y, slanted, -slanted):
+            assert measures.is_normal(mesh, edge, normal)
+        for normal in ((x - y) / np.sqrt(2), (x + z) / np.sqrt(2), z):
+            assert not measures.is_normal(mesh, edge, normal)
+        assert not measures.is_normal(mesh, face, slanted)
+
+    def test_a_corner_has_all_normals_of_its_octant(self):
+        mesh, corner = Mesh(box([1.0, 1.0, 1.0]), BOX_FACES), [1.0, 1.0, 1.0]
+        assert measures.is_normal(mesh, corner, np.ones(3) / np.sqrt(3))
+        assert not measures.is_normal(mesh, corner, np.array([1.0, 1.0, -1.0]) / np.sqrt(3))
+
+    def test_the_sides_of_a_thin_plate_are_no_edge(self):
+        mesh = Mesh(box([1.0, 1.0, 0.0001]), BOX_FACES)
+        assert not measures.is_normal(mesh, [0.3, 0.2, 0.0001], np.array([1.0, 0.0, 0.0]))
+
     def test_mirrored_hand(self):
         scene, grasp, _ = good()
         hand = measures.hand_of_reply(grasp)

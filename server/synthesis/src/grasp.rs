@@ -14,7 +14,8 @@ use crate::{
 pub struct Contact {
     /// On the surface, in metres.
     pub position: Vec3,
-    /// The surface's outward unit normal.
+    /// The surface's outward unit normal; at an edge or a corner, under `PHYSICAL` validity, that of the directions
+    /// between its faces' normals which points to the bone.
     pub normal: Vec3,
     /// The triangle that is touched.
     pub triangle: u32,

@@ -38,8 +38,8 @@ pub(super) fn collect_contacts(
             if !closed.touches[phalanx.index()] {
                 continue;
             }
-            let touch = closest(link, &object.surface, 0.0).filter(|touch| faces(link, touch));
-            contacts.extend(touch.map(|touch| contact(&touch, HandPart::Phalanx(digit, phalanx))));
+            let touch = closest(link, &object.surface, 0.0);
+            contacts.extend(touch.and_then(|touch| contact(link, &touch, HandPart::Phalanx(digit, phalanx))));
         }
     }
     let first_of_palm = contacts.len();
@@ -49,8 +49,8 @@ pub(super) fn collect_contacts(
             continue;
         };
         let is_new = |other: &Contact| other.position.distance(touch.point) >= PALM_SPACING;
-        if faces(solid, &touch) && contacts[first_of_palm..].iter().all(is_new) {
-            contacts.push(contact(&touch, HandPart::Palm));
+        if contacts[first_of_palm..].iter().all(is_new) {
+            contacts.extend(contact(solid, &touch, HandPart::Palm));
         }
     }
 }
@@ -76,17 +76,15 @@ pub(super) fn are_opposed(contacts: &[Contact]) -> bool {
         .any(|(i, a)| contacts[..i].iter().any(|b| a.normal.dot(b.normal) < 0.0))
 }
 
-/// True if the surface faces the bone.
-fn faces(solid: &TaperedCapsule, touch: &Touch) -> bool {
+/// The contact of a touch, if the surface faces the bone there.
+fn contact(solid: &TaperedCapsule, touch: &Touch, part: HandPart) -> Option<Contact> {
+    // The way to the bone is the triangle's normal inside of it; at an edge or a corner it is the one of all directions
+    // between its triangles' normals in which round flesh presses.
     let outward: Vec3 = (solid.at(touch.along) - touch.point).normalize_or_zero();
-    outward.dot(touch.normal) >= FACING_COS
-}
-
-fn contact(touch: &Touch, part: HandPart) -> Contact {
-    Contact {
+    (outward.dot(touch.normal) >= FACING_COS).then_some(Contact {
         position: touch.point,
-        normal: touch.normal,
+        normal: outward,
         triangle: touch.triangle,
         part,
-    }
+    })
 }

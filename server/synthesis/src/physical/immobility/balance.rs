@@ -20,7 +20,8 @@ pub const BALANCE_TOLERANCE: f32 = 0.02;
 /// How firmly the digits press where balance leaves it open: the sum of their normal forces times friction, over the
 /// weight. 1 is the least with which two opposed digits hold anything; people keep a margin above that (Westling and
 /// Johansson 1984), and what a giver lets go of may be pushed. In a simulation by others, of 150 grips 38 % bore pushes of
-/// their object's weight from all sides with 3, 67 % where 16 N were the least, and 67 % with 5 and [`SURE_GRIP`].
+/// their object's weight from all sides with 3, 67 % where 16 N were the least, and 67 % with 5 and [`SURE_GRIP`] (all
+/// three before [`FRICTION_SHARES`]).
 const FIRMNESS: f64 = 5.0;
 
 /// Newtons that the digits press with together beside that: nobody takes even a scalpel of 20 grams more gingerly than a
@@ -31,19 +32,24 @@ const SURE_GRIP: f64 = 8.0;
 /// more firmly than necessary.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
-/// Share of friction and torsion that the forces use if they can, so that twice the load does not slip either. A smaller
-/// share gives safer forces to fewer grasps; the others use all of it.
-const SAFE_FRICTION: f64 = 0.45;
-
 /// All of it, but for what rounding to single precision may add.
 const ALL_FRICTION: f64 = 1.0 - 2e-6;
 
-/// Weight of uncomfortable shares against unbalanced wrench. The balance pays with the square of it: ten times as much
-/// would spend the whole tolerance on comfort, and a tenth would drown in rounding.
-const SHARE_WEIGHT: f64 = 0.03;
+/// Shares of friction and torsion that the forces may use, tried in this order until the digits press firmly: with the
+/// first, twice the load does not slip either. More of them find safer forces, and take longer where the first do not do.
+const FRICTION_SHARES: [f64; 3] = [0.45, 0.7, ALL_FRICTION];
 
-/// Weight of firmness: well below that of the shares, which matter more.
-const FIRMNESS_WEIGHT: f64 = 0.006;
+/// Digits that press with this share of the sum aimed at press firmly. A larger one uses up friction for the last newtons,
+/// a smaller one lets what is thin be held by a few tenths of a newton, out of which it creeps.
+const FIRM_ENOUGH: f64 = 0.5;
+
+/// Weight of uncomfortable shares, as shares of the firm sum, against unbalanced wrench.
+const SHARE_WEIGHT: f64 = 0.04;
+
+/// Weight of firmness, as a share of the firm sum, against unbalanced wrench: of contacts that cannot press firmly without
+/// upsetting the balance, firmness takes at most half of this, which is the whole [`BALANCE_TOLERANCE`]. More would
+/// refuse their forces, far less would drown in rounding.
+const FIRMNESS_WEIGHT: f64 = 0.04;
 
 /// Weight of a contact's limit against unbalanced wrench: what is over the limit costs a thousand times as much.
 const LIMIT_WEIGHT: f64 = 30.0;
@@ -54,10 +60,9 @@ const FOUND: f64 = 0.5;
 /// A push that goes less than this with the residual does not help to balance any more.
 const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
-/// A push that goes less than this with the residual, for each weight that the digits are to press with together, makes
-/// the forces no more comfortable: shares that differ by some percent are equally so. A smaller one takes up to three times
-/// as long.
-const NEGLIGIBLE_COMFORT: f64 = 1e-5;
+/// A push that gains less than this share of what the first newton gains for firmness makes the forces no more
+/// comfortable: sums and shares that differ by some percent are equally so. A smaller one takes longer.
+const NEGLIGIBLE_COMFORT: f64 = 0.01;
 
 /// Columns tried for each of the two questions. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
@@ -66,9 +71,9 @@ const MAX_COLUMNS: usize = 60;
 const WRENCH_ROWS: usize = 6;
 
 /// Forces inside the friction limits, each at most [`MAX_CONTACT_FORCE`], that balance gravity within
-/// [`BALANCE_TOLERANCE`]. Of those, ones that keep off the friction limits if there are any; their digits' shares as near
-/// to the comfortable ones (Eq. 4.6) as balance allows, and their sum near to a firm grip. The palm may press as it
-/// likes. `None` if there are none.
+/// [`BALANCE_TOLERANCE`]. Of those, ones that are firm and keep off the friction limits if there are any; their digits'
+/// shares as near to the comfortable ones (Eq. 4.6) as balance allows, and their sum near to a firm grip. The palm may
+/// press as it likes. `None` if there are none.
 ///
 /// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
 pub fn balance(
@@ -143,6 +148,9 @@ struct Problem<'a> {
     shares: [f64; 5],
     /// Sum of the digits' normal forces to aim at.
     firm_sum: f64,
+    /// Weights of a weight's force in the rows of shares and of firmness.
+    share_weight: f64,
+    firmness_weight: f64,
     /// Of friction and torsion, how much may be used.
     friction_share: f64,
     limited: bool,
@@ -176,17 +184,40 @@ impl<'a> Problem<'a> {
             up: load.up.as_dvec3(),
             shares: shares.map(|share| if sum > 0.0 { share / sum } else { 0.0 }),
             firm_sum,
+            share_weight: SHARE_WEIGHT / firm_sum.max(1.0),
+            firmness_weight: FIRMNESS_WEIGHT / firm_sum.max(1.0),
             friction_share: ALL_FRICTION,
             limited: false,
             comfortable: false,
         }
     }
 
-    /// The comfortable balance that keeps off the friction limits, or else one within them, if there is one.
+    /// The comfortable balance that is firm with the least friction, or else the firmest, if there is one.
     fn safest_balance(&mut self, solver: &mut ConicLeastSquares, column: &mut Vec<f64>) -> Option<Balance> {
-        [SAFE_FRICTION, ALL_FRICTION]
-            .into_iter()
-            .find_map(|share| self.comfortable_balance(share, solver, column))
+        let mut firmest: Option<(f64, Balance)> = None;
+        for share in FRICTION_SHARES {
+            let Some(found) = self.comfortable_balance(share, solver, column) else {
+                continue;
+            };
+            let sum = self.sum_of_digits(&found);
+            if sum >= FIRM_ENOUGH * self.firm_sum {
+                return Some(found);
+            }
+            if firmest.as_ref().is_none_or(|&(firmer, _)| sum > firmer) {
+                firmest = Some((sum, found));
+            }
+        }
+        firmest.map(|(_, found)| found)
+    }
+
+    /// Sum of the digits' normal forces over the weight.
+    fn sum_of_digits(&self, found: &Balance) -> f64 {
+        let pressed = self.contacts.iter().zip(&found.forces);
+        let sum: f32 = pressed
+            .filter(|(contact, _)| contact.digit.is_some())
+            .map(|(contact, force)| -force.dot(contact.normal))
+            .sum();
+        f64::from(sum) / self.weight
     }
 
     /// The comfortable balance within a share of friction and torsion, if there is one.
@@ -230,7 +261,7 @@ impl<'a> Problem<'a> {
         entries[..3].copy_from_slice(&self.up.to_array());
         entries[WRENCH_ROWS..WRENCH_ROWS + self.limit_rows()].fill(LIMIT_WEIGHT);
         if self.comfortable {
-            entries[rows - 1] = FIRMNESS_WEIGHT * self.firm_sum;
+            entries[rows - 1] = self.firmness_weight * self.firm_sum;
         }
         solver.reset(entries);
         let strength = (self.limit() + 1.0) * self.contacts.len() as f64;
@@ -248,7 +279,7 @@ impl<'a> Problem<'a> {
             }
             let mut best = (
                 if self.comfortable {
-                    NEGLIGIBLE_COMFORT * self.firm_sum.max(1.0)
+                    NEGLIGIBLE_COMFORT * self.firmness_weight.powi(2) * self.firm_sum.max(1.0)
                 } else {
                     NEGLIGIBLE_GAIN
                 },
@@ -307,8 +338,8 @@ impl<'a> Problem<'a> {
             return [0.0; 5];
         }
         let rows = &residual[residual.len() - 6..];
-        let common = FIRMNESS_WEIGHT * rows[5] - SHARE_WEIGHT * dot(&rows[..5], &self.shares);
-        std::array::from_fn(|digit| common + SHARE_WEIGHT * rows[digit])
+        let common = self.firmness_weight * rows[5] - self.share_weight * dot(&rows[..5], &self.shares);
+        std::array::from_fn(|digit| common + self.share_weight * rows[digit])
     }
 
     /// The column of a push.
@@ -323,10 +354,10 @@ impl<'a> Problem<'a> {
         if let (true, Some(digit)) = (self.comfortable, self.contacts[contact].digit) {
             // Of digit d: its normal force less its share of the sum of all digits.
             for (row, share) in comfort.iter_mut().zip(self.shares) {
-                *row = -SHARE_WEIGHT * share;
+                *row = -self.share_weight * share;
             }
-            comfort[digit.index()] += SHARE_WEIGHT;
-            comfort[5] = FIRMNESS_WEIGHT;
+            comfort[digit.index()] += self.share_weight;
+            comfort[5] = self.firmness_weight;
         }
     }
 
