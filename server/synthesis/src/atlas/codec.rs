@@ -3,7 +3,7 @@
 //! A header (a mark, the format, the key, flags and counts), the grips, and the SHA-256 of all before. Numbers are
 //! little-endian, and every one is kept bit by bit, so that an atlas that was read is the one that was written. What
 //! follows from other numbers is not written but computed: yaws and bend ratios from the hand's shape, a contact's
-//! third coordinate and normal from its triangle.
+//! third coordinate from its triangle, the normal from that and the hand.
 
 mod entry;
 mod numbers;

@@ -81,7 +81,7 @@ impl TaperedCapsule {
     ///
     /// The solid is the union of the balls around its axis, so that the distance is the least of |p - a(t)| - r(t):
     /// convex in t, and stationary where the way to the point leaves the axis at the angle at which the cone opens.
-    pub(super) fn nearest(&self, point: DVec3) -> (f64, f64) {
+    pub(crate) fn nearest(&self, point: DVec3) -> (f64, f64) {
         let start = self.start.as_dvec3();
         let axis = self.end.as_dvec3() - start;
         let (r0, r1) = (f64::from(self.start_radius), f64::from(self.end_radius));

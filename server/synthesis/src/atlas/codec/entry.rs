@@ -15,7 +15,7 @@ use crate::{
     grasp::Contact,
     hand::{Digit, DigitAngles, HandPart, HandPose, Phalanx, rig::Rig},
     object::GraspObject,
-    physical::{grip::Grip, shape::HandShape, solids::HandSolids},
+    physical::{contacts::contact_normal, grip::Grip, shape::HandShape, solids::HandSolids},
     pose::Pose,
     score::{TERMS, Term},
     taxonomy::classify,
@@ -104,15 +104,15 @@ pub(super) fn read_entry(
         return Err(AtlasError::Malformed("a grip has too many contacts"));
     }
     let mesh = object.surface.mesh();
+    let solids = HandSolids::of_pose(rig, &pose);
     let contacts = (0..count)
-        .map(|_| read_contact(reader, mesh))
+        .map(|_| read_contact(reader, mesh, &solids))
         .collect::<Result<Vec<_>, _>>()?;
     let grip = Grip {
         pose,
         bend_ratios,
         penetration,
     };
-    let solids = HandSolids::of_pose(rig, &pose);
     let classification = classify(rig, &pose, &contacts);
     Ok((
         Entry::from_parts(
@@ -271,7 +271,11 @@ fn write_contact(writer: &mut Writer, contact: &Contact, mesh: &TriangleMesh) {
     }
 }
 
-fn read_contact(reader: &mut Reader<'_>, mesh: &TriangleMesh) -> Result<Contact, AtlasError> {
+fn read_contact(
+    reader: &mut Reader<'_>,
+    mesh: &TriangleMesh,
+    solids: &HandSolids,
+) -> Result<Contact, AtlasError> {
     let place = reader.short()?;
     let triangle = u32::try_from(place / PARTS)
         .ok()
@@ -296,7 +300,7 @@ fn read_contact(reader: &mut Reader<'_>, mesh: &TriangleMesh) -> Result<Contact,
     }
     Ok(Contact {
         position,
-        normal: mesh.normal(triangle as usize),
+        normal: contact_normal(solids, part, position, mesh.normal(triangle as usize)),
         triangle,
         part,
     })
