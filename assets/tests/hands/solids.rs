@@ -107,6 +107,43 @@ fn solids_of_tracked_joints_are_those_of_the_pose() {
     }
 }
 
+/// A giver whose joints tell of a thicker palm than the fitted one is as thick as told along the metacarpals, and nowhere
+/// thinner than fitted.
+#[test]
+fn a_giver_is_as_thick_as_told() {
+    let hand = built_in("adult", Handedness::Right);
+    for more in [0.0, 0.004, 0.02] {
+        let mut joints = HandJoints::of_pose(&hand.rig, &posed(relaxed()));
+        for joint in &mut joints.joints {
+            joint.radius += more;
+        }
+        let fitted = HandSolids::of_joints(&joints);
+        let giver = HandSolids::of_giver(&joints);
+        let inside = |ball: Vec3, radius: f32| {
+            let depths = giver.palm.iter().map(|solid| -solid.signed_distance(ball));
+            depths.fold(f32::NEG_INFINITY, f32::max) >= radius - 1e-6
+        };
+        // OpenXR's metacarpals of the four fingers, and the knuckles at their ends.
+        for [base, knuckle] in [[6, 7], [11, 12], [16, 17], [21, 22]] {
+            let [base, knuckle] = [base, knuckle].map(|joint| joints.joints[joint]);
+            for step in 0..=10 {
+                let along = step as f32 / 10.0;
+                let place = base.pose.position.lerp(knuckle.pose.position, along);
+                let radius = base.radius + (knuckle.radius - base.radius) * along;
+                assert!(inside(place, radius), "{more} more, {along} along");
+            }
+        }
+        for solid in &fitted.palm {
+            for along in [0.0, 0.3, 1.0] {
+                assert!(inside(solid.at(along), solid.radius_at(along)));
+            }
+        }
+        assert_eq!(giver.phalanges, fitted.phalanges);
+        assert_eq!(giver.thenar, fitted.thenar);
+        assert_eq!(giver.forearm, fitted.forearm);
+    }
+}
+
 #[test]
 fn a_left_hand_is_the_mirror_image_of_the_right() {
     let flip = |point: Vec3| point * Vec3::new(-1.0, 1.0, 1.0);

@@ -141,11 +141,11 @@ impl Term {
     /// How much it counts.
     pub const fn weight(self) -> f32 {
         match self {
-            Self::Comfort | Self::SharedFlexion | Self::EnoughDigits => 1.0,
+            Self::Comfort | Self::EnoughDigits => 1.0,
             Self::Pads => 1.5,
-            Self::Ease => 2.0,
+            Self::Ease | Self::SharedFlexion => 2.0,
             Self::FrictionReserve => 2.5,
-            Self::NaturalType => 3.0,
+            Self::NaturalType => 6.0,
             // What is held in a simulation by others, closure tells best against gravity (in 75 of 100 pairs of grips, of
             // which one fell, that one had less), and steadiness against pushes (73); then friction reserve (68 and 62)
             // and pads (60 and 59). The others tell little or nothing there, and are for the eye.

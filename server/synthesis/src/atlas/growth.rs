@@ -23,7 +23,7 @@ use crate::{
         proposal::{Place, propose},
         surface_pairs::SurfacePairs,
     },
-    hand::rig::Rig,
+    hand::{joints::HandJoints, rig::Rig},
     object::GraspObject,
     physical::{
         grip::{GIVER_CLEARANCE, Gripper},
@@ -206,7 +206,7 @@ impl<'a> Growth<'a> {
         }
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
         let pose = &self.entries[stream.below(self.entries.len())].grip.pose;
-        let hand = PreparedHand::new(&HandSolids::of_pose(self.rig, pose));
+        let hand = PreparedHand::new(&HandSolids::of_giver(&HandJoints::of_pose(self.rig, pose)));
         let is_needy = self.count_free(&hand) < ENOUGH_FREE;
         Some(Giver {
             surface: self.scene.object.surface_pairs.free_of(&hand),

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{
     closing::{ClosedDigit, TOUCHING},
     immobility::SoftContact,
-    solids::{HandSolids, TaperedCapsule, Touch, closest},
+    solids::{HandSolids, Touch, closest},
 };
 use crate::{
     grasp::Contact,

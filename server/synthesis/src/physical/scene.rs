@@ -73,7 +73,7 @@ impl Presented {
     pub fn of(holdout: &Holdout) -> Self {
         let giver = holdout.presenting_hand.as_ref();
         Self {
-            giver: giver.map(|hand| PreparedHand::new(&HandSolids::of_joints(&hand.joints))),
+            giver: giver.map(|hand| PreparedHand::new(&HandSolids::of_giver(&hand.joints))),
             giver_palm: giver.map(|hand| hand.palm),
             up: holdout.up,
         }

@@ -150,6 +150,26 @@ impl<'a> Skeleton<'a> {
         PALM.map(|ends| self.solid(ends))
     }
 
+    /// The palm's solids, those along the metacarpals at least as thick as the joints' radii say: what a hand's owner tells
+    /// of its thickness may be more than what was fitted to another hand's skin.
+    pub(super) fn palm_as_told(&self) -> [TaperedCapsule; PALM_SOLIDS] {
+        PALM.map(|ends| {
+            let fitted = self.solid(ends);
+            let [(start, start_radius), (end, end_radius)] = [
+                (ends[0].0, fitted.start, fitted.start_radius),
+                (ends[1].0, fitted.end, fitted.end_radius),
+            ]
+            .map(|(anchor, place, radius)| match anchor {
+                Between(joint, same, _) if joint == same => {
+                    let told = self.joints.joints[joint];
+                    TaperedCapsule::new(place, told.pose.position, radius, told.radius).bounding_ball()
+                }
+                _ => (place, radius),
+            });
+            TaperedCapsule::new(start, end, start_radius, end_radius)
+        })
+    }
+
     /// The solids that move with the thumb.
     pub(super) fn thenar(&self) -> [TaperedCapsule; THENAR_SOLIDS] {
         THENAR.map(|ends| self.solid(ends))

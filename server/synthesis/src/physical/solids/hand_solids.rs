@@ -74,6 +74,15 @@ impl HandSolids {
         }
     }
 
+    /// The solids of a giver's tracked joints, which are not to be touched: nowhere along the metacarpals thinner than the
+    /// joints' radii say.
+    pub fn of_giver(joints: &HandJoints) -> Self {
+        Self {
+            palm: Skeleton::new(joints).palm_as_told(),
+            ..Self::of_joints(joints)
+        }
+    }
+
     /// The same hand elsewhere.
     #[must_use]
     pub fn moved(&self, way: Vec3) -> Self {
