@@ -37,6 +37,10 @@ const UNRELATED_FLEXION: f32 = 1.2;
 /// behavior: object characteristics and grasp type", 2014).
 const WEIGHT_PER_FINGER: f32 = 1.5;
 
+/// Fingers that anything wants beside the thumb: between two digits, even what is light turns about the line from one to the
+/// other. With 1, half of the holds of a scalpel that a simulation lost were such pinches.
+const LEAST_FINGERS: f32 = 2.0;
+
 /// Closure at which a hold looks safe, in multiples of what validity asks for.
 const SAFE_CLOSURE: f32 = 3.0;
 
@@ -141,15 +145,15 @@ impl Term {
     /// How much it counts.
     pub const fn weight(self) -> f32 {
         match self {
-            Self::Comfort | Self::EnoughDigits => 1.0,
+            Self::Comfort => 1.0,
             Self::Pads => 1.5,
-            Self::Ease | Self::SharedFlexion => 2.0,
+            Self::Ease | Self::EnoughDigits | Self::SharedFlexion => 2.0,
             Self::FrictionReserve => 2.5,
-            Self::NaturalType => 6.0,
+            Self::NaturalType => 5.0,
             // Of what holds in a simulation by others against pushes from all sides, steadiness tells most (its correlation
             // over 600 grips is 0.17), then closure (0.12) and friction reserve (0.10); more so while forces were less
             // firm. The others tell nothing there, and are for the eye.
-            Self::Steadiness => 5.0,
+            Self::Steadiness => 7.0,
             Self::Closure => 4.0,
             Self::AwayFromGiver => 0.75,
             Self::GiverClearance | Self::SterileDistance => 0.5,
@@ -326,7 +330,7 @@ fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
     let fingers =
         touching[1..].iter().filter(|touches| **touches).count() as f32 + if palm { 2.0 } else { 0.0 };
     let wanted = 1.0 + object.mass * GRAVITY / WEIGHT_PER_FINGER;
-    (fingers / wanted.min(4.0)).min(1.0)
+    (fingers / wanted.clamp(LEAST_FINGERS, 4.0)).min(1.0)
 }
 
 /// 1 for what hardly moves, 0 for what hangs loose.
