@@ -19,9 +19,12 @@ use crate::{
     synthesis::attempt::Scene,
 };
 
-/// Grips that are tried before it is asked which are out of the question: asking takes as long as trying dozens, and one of
-/// the first is often the answer.
-const TRIED_ONE_BY_ONE: usize = 24;
+/// Grips that are tried before it is asked which are out of the question: asking takes as long as looking at hundreds one by
+/// one, and one of the first is often the answer.
+const TRIED_ONE_BY_ONE: usize = 128;
+
+/// Grips that are passed over at most before somebody looks at the clock: one or two microseconds' worth.
+const PASSED_AT_ONCE: usize = 64;
 
 /// The grips of an atlas in the order in which they are tried.
 #[derive(Debug)]
@@ -90,15 +93,37 @@ impl<'a> KnownGrips<'a> {
         self.order.len()
     }
 
+    /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such; none if
+    /// there are no more at all.
+    fn take(&self) -> Option<Option<u16>> {
+        let giver = self.presented.giver.as_ref();
+        loop {
+            let from = self.next.load(Ordering::Relaxed);
+            let left = self.order.get(from..).filter(|left| !left.is_empty())?;
+            let excluded = (from >= TRIED_ONE_BY_ONE).then(|| self.excluded());
+            let is_open = |entry: u16| {
+                excluded.is_none_or(|excluded| !excluded.contains(entry))
+                    && giver.is_none_or(|giver| !self.atlas.surely_meets(entry, giver))
+            };
+            let next = &left[..left.len().min(PASSED_AT_ONCE)];
+            let place = next.iter().position(|&entry| is_open(entry));
+            let to = from + place.map_or(next.len(), |place| place + 1);
+            // Another worker may have taken the same meanwhile; then they are looked at in vain.
+            let taken = self
+                .next
+                .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
+            if taken.is_ok() {
+                return Some(place.map(|place| next[place]));
+            }
+        }
+    }
+
     /// Tries the next one.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
-        let entry = loop {
-            let place = self.next.fetch_add(1, Ordering::Relaxed);
-            match self.order.get(place) {
-                None => return Tried::NoneLeft,
-                Some(&entry) if place >= TRIED_ONE_BY_ONE && self.excluded().contains(entry) => {}
-                Some(&entry) => break entry,
-            }
+        let entry = match self.take() {
+            None => return Tried::NoneLeft,
+            Some(None) => return Tried::Refused,
+            Some(Some(entry)) => entry,
         };
         let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();

@@ -3,10 +3,26 @@
 
 use glam::Vec3;
 
-use super::{HandSolids, TaperedCapsule, hand_clearance::Bounded};
+use super::{
+    HandSolids, TaperedCapsule,
+    balls::{BALLS, Balls},
+    hand_clearance::Bounded,
+};
 
 /// Solids that are compared at once: those of a hand, filled up to whole registers.
 const LANES: usize = HandSolids::COUNT.next_multiple_of(8);
+
+/// The solids of a giver, indices of [`HandSolids::iter`], in the order in which they settle most: each is the one that
+/// met most of the receiving hands that those before it did not, of 32,203 known grips of the built-in objects that meet
+/// a recorded giver. The first four meet 88 % of them, eight 98 %.
+const MET_FIRST: [usize; HandSolids::COUNT] = [
+    6, 21, 5, 8, 2, 15, 12, 3, 22, 11, 25, 14, 9, 29, 1, 7, 26, 16, 18, 4, 13, 30, 10, 24, 0, 17, 19, 20, 23,
+    27, 28,
+];
+
+/// Solids that some balls are compared with before it is asked whether that settled it. Fewer ask more often, more
+/// compare in vain.
+const SOLIDS_AT_ONCE: usize = 4;
 
 /// More than what single precision makes of distances within reach of an arm, in metres: what is decided at once is right
 /// by that much, and the rest is left to exact distances.
@@ -40,7 +56,8 @@ struct ToAxes {
 impl PreparedHand {
     /// Prepares a hand: below a microsecond.
     pub fn new(hand: &HandSolids) -> Self {
-        let solids = hand.to_array().map(Bounded::new);
+        let all = hand.to_array();
+        let solids = MET_FIRST.map(|solid| Bounded::new(all[solid]));
         // The rest repeats the last solid, which changes nothing.
         let lanes = |number: &dyn Fn(&TaperedCapsule) -> f32| -> Lanes {
             std::array::from_fn(|i| number(&solids[i.min(HandSolids::COUNT - 1)].solid))
@@ -78,6 +95,33 @@ impl PreparedHand {
             nears |= u32::from(squares[i] < reach * reach);
         }
         nears != 0
+    }
+
+    /// True only if one of some balls comes nearer to the hand than `distance` metres; not always then. Some 20 ns where
+    /// the first solids settle it.
+    #[inline]
+    pub fn surely_nears_any(&self, balls: &Balls, distance: f32) -> bool {
+        let [xs, ys, zs] = &balls.middles;
+        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
+        let mut reaches = balls.radii;
+        for reach in &mut reaches {
+            *reach += distance - ROUNDING;
+        }
+        (0..LANES).step_by(SOLIDS_AT_ONCE).any(|first| {
+            let mut nears = [0_u32; BALLS];
+            for k in first..first + SOLIDS_AT_ONCE {
+                for i in 0..BALLS {
+                    // As in `to_axes` and `surely_nears`.
+                    let (x, y, z) = (xs[i] - sx[k], ys[i] - sy[k], zs[i] - sz[k]);
+                    let t = (x * ax[k] + y * ay[k] + z * az[k]) * self.inverse_squares[k];
+                    let t = t.clamp(0.0, 1.0);
+                    let (x, y, z) = (x - ax[k] * t, y - ay[k] * t, z - az[k] * t);
+                    let reach = (reaches[i] + self.start_radii[k] + self.rises[k] * t).max(0.0);
+                    nears[i] |= u32::from(x * x + y * y + z * z < reach * reach);
+                }
+            }
+            nears.iter().fold(0, |any, near| any | near) != 0
+        })
     }
 
     /// True if any of some solids comes nearer to the hand than `distance` metres.
