@@ -58,24 +58,28 @@ impl PreparedHand {
     pub fn new(hand: &HandSolids) -> Self {
         let all = hand.to_array();
         let solids = MET_FIRST.map(|solid| Bounded::new(all[solid]));
-        // The rest repeats the last solid, which changes nothing.
-        let lanes = |number: &dyn Fn(&TaperedCapsule) -> f32| -> Lanes {
-            std::array::from_fn(|i| number(&solids[i.min(HandSolids::COUNT - 1)].solid))
-        };
-        Self {
-            starts: [0, 1, 2].map(|axis| lanes(&|solid| solid.start[axis])),
-            axes: [0, 1, 2].map(|axis| lanes(&|solid| (solid.end - solid.start)[axis])),
-            inverse_squares: lanes(&|solid| {
-                solid
-                    .start
-                    .distance_squared(solid.end)
-                    .max(f32::MIN_POSITIVE)
-                    .recip()
-            }),
-            start_radii: lanes(&|solid| solid.start_radius),
-            rises: lanes(&|solid| solid.end_radius - solid.start_radius),
+        let mut prepared = Self {
             solids,
+            starts: [[0.0; LANES]; 3],
+            axes: [[0.0; LANES]; 3],
+            inverse_squares: [0.0; LANES],
+            start_radii: [0.0; LANES],
+            rises: [0.0; LANES],
+        };
+        for i in 0..LANES {
+            // The rest repeats the last solid, which changes nothing.
+            let solid = &solids[i.min(HandSolids::COUNT - 1)].solid;
+            let way = solid.end - solid.start;
+            for axis in 0..3 {
+                prepared.starts[axis][i] = solid.start[axis];
+                prepared.axes[axis][i] = way[axis];
+            }
+            let square = solid.start.distance_squared(solid.end);
+            prepared.inverse_squares[i] = square.max(f32::MIN_POSITIVE).recip();
+            prepared.start_radii[i] = solid.start_radius;
+            prepared.rises[i] = solid.end_radius - solid.start_radius;
         }
+        prepared
     }
 
     /// Its solids.
@@ -137,21 +141,39 @@ impl PreparedHand {
 
     /// The smallest distance of another hand in metres, if it is at least `required`.
     pub fn clearance(&self, other: &HandSolids, required: f32) -> Option<f32> {
-        // Middle by middle, a distance that the smallest does not exceed.
+        // Middle by middle, a distance that the smallest does not exceed, and for each pair one that it surely keeps.
         let mut bounds = [f32::INFINITY; LANES];
-        for solid in other.iter() {
-            let ToAxes { squares, along } = self.to_axes(solid.at(0.5));
-            let radius = solid.radius_at(0.5);
+        let mut sure = [[0.0; LANES]; HandSolids::COUNT];
+        for (our, sure) in other.iter().zip(&mut sure) {
+            let ToAxes { squares, along } = self.to_axes(our.at(0.5));
+            let radius = our.radius_at(0.5);
+            let around = 0.5 * our.length() + our.start_radius.max(our.end_radius) + ROUNDING;
             for i in 0..LANES {
-                let distance = squares[i].sqrt() - (radius + self.start_radii[i] + self.rises[i] * along[i]);
+                let to_axis = squares[i].sqrt();
+                let distance = to_axis - (radius + self.start_radii[i] + self.rises[i] * along[i]);
                 bounds[i] = if distance < bounds[i] { distance } else { bounds[i] };
+                sure[i] = to_axis - (around + self.start_radii[i] + self.rises[i].max(0.0));
             }
         }
-        let bound = bounds.into_iter().fold(f32::INFINITY, f32::min) + ROUNDING;
-        if bound < required {
+        let mut least = bounds.into_iter().fold(f32::INFINITY, f32::min) + ROUNDING;
+        if least < required {
             return None;
         }
-        self.least_distance(other.iter(), bound, required)
+        for (our, sure) in other.iter().zip(&sure) {
+            if sure.iter().fold(0, |any, sure| any | u32::from(*sure <= least)) == 0 {
+                continue;
+            }
+            let our = Bounded::new(*our);
+            for (their, sure) in self.solids.iter().zip(sure) {
+                if *sure <= least && !our.is_beyond(their, least) {
+                    least = least.min(our.solid.distance(&their.solid));
+                    if least < required {
+                        return None;
+                    }
+                }
+            }
+        }
+        Some(least)
     }
 
     /// The smallest distance of some solids in metres, or `enough` if it is more than that; none if it is below
