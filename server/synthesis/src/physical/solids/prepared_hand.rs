@@ -57,7 +57,10 @@ impl PreparedHand {
     /// Prepares a hand: below a microsecond.
     pub fn new(hand: &HandSolids) -> Self {
         let all = hand.to_array();
-        let solids = MET_FIRST.map(|solid| Bounded::new(all[solid]));
+        let mut solids = [Bounded::new(all[0]); HandSolids::COUNT];
+        for (place, solid) in solids.iter_mut().zip(MET_FIRST) {
+            *place = Bounded::new(all[solid]);
+        }
         let mut prepared = Self {
             solids,
             starts: [[0.0; LANES]; 3],
@@ -160,7 +163,7 @@ impl PreparedHand {
             return None;
         }
         for (our, sure) in other.iter().zip(&sure) {
-            if sure.iter().fold(0, |any, sure| any | u32::from(*sure <= least)) == 0 {
+            if !sure.iter().fold(false, |any, sure| any | (*sure <= least)) {
                 continue;
             }
             let our = Bounded::new(*our);
