@@ -28,6 +28,10 @@ const HALF_DIAGONAL: f32 = 0.866_026;
 /// counts more cells as filled and looks up fewer balls.
 const LEAST_RADIUS: f32 = 0.01;
 
+/// Solids of a giver that are looked up, those first that most hands meet. With all of them it takes twice as long, and
+/// three grips in a hundred more are excluded.
+const SOLIDS: usize = 16;
+
 /// How far around the object's box space is cut into cells, in metres: a hand's thickness and more.
 const MARGIN: f32 = 0.07;
 
@@ -97,7 +101,7 @@ impl Occupancy {
         let mut excluded = vec![0; self.words];
         // Solids of a hand overlap, so that half of the balls lie in a cell that was looked up before.
         let mut is_done = vec![false; self.bits.len() / self.words.max(1)];
-        for solid in giver.iter() {
+        for solid in giver.iter().take(SOLIDS) {
             let steps = (solid.length() / SPACING).ceil().max(1.0);
             for step in 0..=steps as u32 {
                 let along = step as f32 / steps;

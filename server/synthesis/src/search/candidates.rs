@@ -19,9 +19,9 @@ use crate::{
     synthesis::attempt::Scene,
 };
 
-/// Grips that are tried before it is asked which are out of the question: asking takes as long as looking at hundreds one by
-/// one, and one of the first is often the answer.
-const TRIED_ONE_BY_ONE: usize = 128;
+/// Grips that are tried before it is asked which are out of the question: asking takes as long as looking at some fifty one
+/// by one, and one of the first is often the answer.
+const TRIED_ONE_BY_ONE: usize = 48;
 
 /// Grips that are passed over at most before somebody looks at the clock: one or two microseconds' worth.
 const PASSED_AT_ONCE: usize = 64;

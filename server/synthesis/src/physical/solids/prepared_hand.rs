@@ -85,7 +85,7 @@ impl PreparedHand {
         prepared
     }
 
-    /// Its solids.
+    /// Its solids, those first that most other hands meet.
     pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> {
         self.solids.iter().map(|bounded| &bounded.solid)
     }
