@@ -43,6 +43,16 @@ pub(super) struct KnownGrips<'a> {
     next: AtomicUsize,
 }
 
+/// What was taken of the known grips.
+enum Taken {
+    /// There are no more.
+    NoneLeft,
+    /// Some that certainly meet the giver.
+    NoneOpen,
+    /// One that may not, an index of the atlas, and those before it.
+    Open(u16),
+}
+
 /// What became of a known grip.
 pub(super) enum Tried {
     /// There are no more.
@@ -93,13 +103,14 @@ impl<'a> KnownGrips<'a> {
         self.order.len()
     }
 
-    /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such; none if
-    /// there are no more at all.
-    fn take(&self) -> Option<Option<u16>> {
+    /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such.
+    fn take(&self) -> Taken {
         let giver = self.presented.giver.as_ref();
         loop {
             let from = self.next.load(Ordering::Relaxed);
-            let left = self.order.get(from..).filter(|left| !left.is_empty())?;
+            let Some(left) = self.order.get(from..).filter(|left| !left.is_empty()) else {
+                return Taken::NoneLeft;
+            };
             let excluded = (from >= TRIED_ONE_BY_ONE).then(|| self.excluded());
             let is_open = |entry: u16| {
                 excluded.is_none_or(|excluded| !excluded.contains(entry))
@@ -113,7 +124,7 @@ impl<'a> KnownGrips<'a> {
                 .next
                 .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
             if taken.is_ok() {
-                return Some(place.map(|place| next[place]));
+                return place.map_or(Taken::NoneOpen, |place| Taken::Open(next[place]));
             }
         }
     }
@@ -121,9 +132,9 @@ impl<'a> KnownGrips<'a> {
     /// Tries the next one.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
         let entry = match self.take() {
-            None => return Tried::NoneLeft,
-            Some(None) => return Tried::Refused,
-            Some(Some(entry)) => entry,
+            Taken::NoneLeft => return Tried::NoneLeft,
+            Taken::NoneOpen => return Tried::Refused,
+            Taken::Open(entry) => entry,
         };
         let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();

@@ -163,7 +163,7 @@ impl PreparedHand {
             return None;
         }
         for (our, sure) in other.iter().zip(&sure) {
-            if !sure.iter().fold(false, |any, sure| any | (*sure <= least)) {
+            if sure.iter().fold(0, |any, sure| any | u32::from(*sure <= least)) == 0 {
                 continue;
             }
             let our = Bounded::new(*our);
