@@ -157,15 +157,19 @@ impl<'a> Skeleton<'a> {
 
     fn solids<const N: usize>(&self, ends: &[[End; 2]; N]) -> [TaperedCapsule; N] {
         let mut solids = [TaperedCapsule::default(); N];
-        for (solid, [start, end]) in solids.iter_mut().zip(ends) {
-            *solid = TaperedCapsule::new(
-                self.place(start),
-                self.place(end),
-                start.2 * self.millimetre,
-                end.2 * self.millimetre,
-            );
+        for (solid, ends) in solids.iter_mut().zip(ends) {
+            *solid = self.solid(*ends);
         }
         solids
+    }
+
+    fn solid(&self, [start, end]: [End; 2]) -> TaperedCapsule {
+        TaperedCapsule::new(
+            self.place(&start),
+            self.place(&end),
+            start.2 * self.millimetre,
+            end.2 * self.millimetre,
+        )
     }
 
     fn place(&self, &(anchor, offset, _): &End) -> Vec3 {
