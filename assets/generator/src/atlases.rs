@@ -198,7 +198,7 @@ mod tests {
         let changed = |change: fn(&mut Entry)| {
             let mut entries = made.entries().to_vec();
             change(&mut entries[7]);
-            first_difference(&Atlas::new(object, rig, entries, false), object, rig)
+            first_difference(&Atlas::new(object, entries, false), object, rig)
         };
         assert_eq!(changed(|entry| entry.epsilon *= 1.5), Some(7));
         assert_eq!(changed(|entry| entry.scores[3] ^= 1), Some(7));

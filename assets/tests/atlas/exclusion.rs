@@ -72,7 +72,7 @@ fn without_grips_nothing_is_excluded() {
             .grip
             .pose,
     );
-    let empty = Atlas::new(object("remote"), rig, Vec::new(), false);
+    let empty = Atlas::new(object("remote"), Vec::new(), false);
     assert!(!empty.excluded_by(&PreparedHand::new(&solids)).contains(0));
     assert!(
         !Atlas::default()
@@ -89,7 +89,7 @@ fn a_large_object_takes_no_more_memory_than_a_small_one() {
         .atlas
         .entries()
         .to_vec();
-    let bytes_of = |object: &GraspObject| Atlas::new(object, rig, entries.clone(), false).bytes();
+    let bytes_of = |object: &GraspObject| Atlas::new(object, entries.clone(), false).bytes();
     let usual = bytes_of(&small.object);
     let large = bytes_of(&scaled(&small.object, 40.0));
     assert!(large < 3 * usual, "{large} bytes instead of {usual}");

@@ -121,7 +121,7 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
         return Err(AtlasError::Malformed("something follows the last grip"));
     }
     Ok(Grown {
-        atlas: Arc::new(Atlas::new(object, rig, entries, complete)),
+        atlas: Arc::new(Atlas::new(object, entries, complete)),
         shapes,
         proposed,
         early_stamp,

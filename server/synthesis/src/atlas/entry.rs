@@ -1,27 +1,23 @@
 //! A grip of the atlas, and what is left to check when an object is held out.
 
-use glam::Vec3;
-
-use super::gravity::{DIRECTIONS, direction};
+use super::{
+    cores::surely_meets,
+    gravity::{DIRECTIONS, direction},
+};
 use crate::{
     grasp::{Contact, Grasp},
     hand::rig::Rig,
     physical::{
         attempt::grasp,
         contacts::soften,
-        grip::{GIVER_CLEARANCE, Grip, Gripper, clear_of_giver},
+        grip::{Grip, Gripper, clear_of_giver},
         immobility::{Expected, balance},
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, PreparedHand, TaperedCapsule},
+        solids::{HandSolids, PreparedHand},
     },
     score::{Score, Values, force_values, grip_values, score},
     taxonomy::{Classification, classify},
 };
-
-/// Balls inside a hand that settle most meetings with a giver's: seven in palm and forearm, which meet most often, and
-/// the middle of each link. More leave fewer to the distance of the hands, which takes as long as hundreds of them, and
-/// take 16 bytes each.
-const CORES: usize = 22;
 
 /// The score of a grip that cannot hold the object in a direction.
 pub const SLIPS: u8 = 0;
@@ -41,8 +37,8 @@ pub struct Entry {
     pub grip_values: Values,
     /// For each of [`DIRECTIONS`] against gravity: the score of grip and comfort in 1 … 255, or [`SLIPS`].
     pub scores: [u8; DIRECTIONS],
-    /// Balls inside the hand: middle and radius in metres.
-    cores: [(Vec3, f32); CORES],
+    /// The hand's solids: posing it takes as long as comparing it with dozens of givers.
+    pub(super) solids: HandSolids,
 }
 
 impl Entry {
@@ -116,7 +112,7 @@ impl Entry {
             epsilon,
             grip_values,
             scores,
-            cores: cores(solids),
+            solids: *solids,
         }
     }
 
@@ -130,17 +126,7 @@ impl Entry {
         friction_differs: bool,
         gripper: &mut Gripper,
     ) -> Option<Grasp> {
-        let giver = presented.giver.as_ref();
-        if giver.is_some_and(|giver| self.surely_meets(giver)) {
-            return None;
-        }
-        let giver_clearance = match giver {
-            None => None,
-            Some(giver) => {
-                let solids = HandSolids::of_pose(rig, &self.grip.pose);
-                clear_of_giver(&solids, Some(giver))?
-            }
-        };
+        let giver_clearance = clear_of_giver(&self.solids, presented.giver.as_ref())?;
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
         let balance = balance(
@@ -172,33 +158,13 @@ impl Entry {
         size_of::<Self>() + size_of_val(self.contacts.as_slice())
     }
 
-    /// True if a ball inside the hand comes too near to the giver's: then so does the hand.
+    /// True if some balls inside the hand come too near to the giver's: then so does the hand.
     pub(super) fn surely_meets(&self, giver: &PreparedHand) -> bool {
-        self.cores
-            .iter()
-            .any(|&(middle, radius)| giver.surely_nears(middle, radius, GIVER_CLEARANCE))
+        surely_meets(&self.solids, giver)
     }
 }
 
 /// A score as a number from 1 to 255.
 fn quantised(score: f32) -> u8 {
     (1.0 + score.clamp(0.0, 1.0) * 254.0).round() as u8
-}
-
-fn cores(solids: &HandSolids) -> [(Vec3, f32); CORES] {
-    let ball = |solid: &TaperedCapsule, along: f32| (solid.at(along), solid.radius_at(along));
-    let palm_and_forearm = [
-        ball(&solids.palm[1], 0.5),
-        ball(&solids.palm[2], 0.9),
-        ball(&solids.forearm[0], 0.3),
-        ball(&solids.forearm[1], 0.8),
-        ball(&solids.thenar[1], 0.5),
-        ball(&solids.forearm[0], 0.8),
-        ball(&solids.forearm[1], 0.3),
-    ];
-    let links = solids.phalanges.as_flattened();
-    std::array::from_fn(|core| {
-        let link = || ball(&links[core - palm_and_forearm.len()], 0.5);
-        palm_and_forearm.get(core).copied().unwrap_or_else(link)
-    })
 }

@@ -169,7 +169,7 @@ impl<'a> Growth<'a> {
     /// The atlas as it stands.
     pub fn atlas(&self) -> Atlas {
         let entries = self.entries.clone();
-        Atlas::new(self.scene.object, self.rig, entries, self.is_complete())
+        Atlas::new(self.scene.object, entries, self.is_complete())
     }
 
     /// What has grown so far.

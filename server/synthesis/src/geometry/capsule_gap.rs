@@ -8,7 +8,7 @@ use glam::{Vec3, Vec4};
 
 use super::{
     closest::{closest_on_triangle, pack_distances},
-    crossing::{cross, dot, lanes},
+    crossing::{cross, dot, lanes, minus, on_way},
     mesh::TriangleMesh,
     mesh_bvh::CapsuleGap,
     tapered_capsule::TaperedCapsule,
@@ -131,15 +131,17 @@ fn descend(bvh: &WideBvh, query: &Query, limit: f32, mut found: impl FnMut(f32, 
                     let bounds = box_gaps(node, query);
                     let near = bounds.cmple(Vec4::splat(limit)).bitmask();
                     let keys = (bounds + query.largest_radius).max(Vec4::ZERO).to_array();
-                    let children = sorted_falling(std::array::from_fn(|lane| {
+                    let mut children = [Waiting::default(); WIDTH];
+                    for lane in 0..WIDTH {
                         if near >> lane & 1 == 1 {
-                            Waiting::new(keys[lane], node.children[lane])
-                        } else {
-                            Waiting::default()
+                            children[lane] = Waiting::new(keys[lane], node.children[lane]);
                         }
-                    }));
+                    }
+                    let children = sorted_falling(children);
                     // The closest child is taken up next; what is no child is overwritten.
-                    stack[height..height + WIDTH].copy_from_slice(&children);
+                    if let Some(places) = stack[height..].first_chunk_mut() {
+                        *places = children;
+                    }
                     height += near.count_ones() as usize;
                 }
                 Child::Pack(index) => {
@@ -240,12 +242,10 @@ fn box_gaps(node: &Node, query: &Query) -> Vec4 {
 /// Every value that is taken into account is one that occurs, so that the least of them is right.
 #[inline]
 fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
-    let from =
-        |point: &Four, corner: &Four| -> Four { std::array::from_fn(|axis| point[axis] - corner[axis]) };
-    let first = from(&query.start, &pack.corner);
-    let second = from(&first, &pack.edge1);
-    let third = from(&first, &pack.edge2);
-    let edge3 = from(&pack.edge2, &pack.edge1);
+    let first = minus(&query.start, &pack.corner);
+    let second = minus(&first, &pack.edge1);
+    let third = minus(&first, &pack.edge2);
+    let edge3 = minus(&pack.edge2, &pack.edge1);
 
     let starts = pack_distances(pack, &query.start).sqrt() - query.start_radius;
     let ends = pack_distances(pack, &query.end).sqrt() - query.end_radius;
@@ -260,9 +260,9 @@ fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
     let height = dot(&pack.normal, &first);
     let climb = dot(&pack.normal, &query.axis);
     let t = -height / climb;
-    let crossing: Four = std::array::from_fn(|axis| first[axis] + query.axis[axis] * t);
+    let crossing = on_way(&first, &query.axis, t);
     let around_first = cross(&crossing, &pack.normal);
-    let around_second = cross(&from(&crossing, &pack.edge1), &pack.normal);
+    let around_second = cross(&minus(&crossing, &pack.edge1), &pack.normal);
     let least_side = dot(&pack.edge1, &around_first)
         .min(-dot(&pack.edge2, &around_first))
         .min(dot(&edge3, &around_second));
@@ -276,11 +276,11 @@ fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
 #[inline]
 fn corner_gap(query: &Query, start: &Four) -> Vec4 {
     let along = -dot(start, &query.direction);
-    let across: Four = std::array::from_fn(|axis| start[axis] + query.direction[axis] * along);
+    let across = on_way(start, &query.direction, along);
     let across = dot(&across, &across).sqrt();
     let t = query.foot + (along + across * query.lean) * query.inverse_length;
     let t = t.max(Vec4::ZERO).min(Vec4::ONE);
-    let way: Four = std::array::from_fn(|axis| start[axis] + query.axis[axis] * t);
+    let way = on_way(start, &query.axis, t);
     dot(&way, &way).sqrt() - query.radius_at(t)
 }
 
@@ -302,7 +302,10 @@ fn edge_gap(query: &Query, start: &Four, edge: &Four) -> Vec4 {
     let u = ((along_axis * ab - along_edge * aa) / determinant)
         .max(Vec4::ZERO)
         .min(Vec4::ONE);
-    let way: Four = std::array::from_fn(|axis| start[axis] + query.axis[axis] * t - edge[axis] * u);
+    let way = minus(
+        &on_way(start, &query.axis, t),
+        &[edge[0] * u, edge[1] * u, edge[2] * u],
+    );
     dot(&way, &way).sqrt() - query.radius_at(t)
 }
 

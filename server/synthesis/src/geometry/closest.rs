@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3, Vec4};
 
 use super::{
     aabb::Aabb,
-    crossing::{cross, dot, lanes},
+    crossing::{cross, dot, lanes, minus},
     mesh::TriangleMesh,
     waiting::{Waiting, sorted_falling},
     wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
@@ -53,15 +53,17 @@ pub(super) fn closest(
                     let distances = box_distances(node, &splat);
                     let near = distances.cmple(Vec4::splat(best)).bitmask();
                     let distances = distances.to_array();
-                    let children = sorted_falling(std::array::from_fn(|lane| {
+                    let mut children = [Waiting::default(); WIDTH];
+                    for lane in 0..WIDTH {
                         if near >> lane & 1 == 1 {
-                            Waiting::new(distances[lane], node.children[lane])
-                        } else {
-                            Waiting::default()
+                            children[lane] = Waiting::new(distances[lane], node.children[lane]);
                         }
-                    }));
+                    }
+                    let children = sorted_falling(children);
                     // The closest child is taken up next; what is no child is overwritten.
-                    stack[height..height + WIDTH].copy_from_slice(&children);
+                    if let Some(places) = stack[height..].first_chunk_mut() {
+                        *places = children;
+                    }
                     height += near.count_ones() as usize;
                 }
                 Child::Pack(index) => {
@@ -88,11 +90,12 @@ pub(super) fn closest(
 #[inline]
 fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
     let [least, most] = &node.bounds;
-    let outside: [Vec4; 3] = std::array::from_fn(|axis| {
-        (least[axis] - point[axis])
-            .max(point[axis] - most[axis])
-            .max(Vec4::ZERO)
-    });
+    let (below, above) = (minus(least, point), minus(point, most));
+    let outside = [
+        below[0].max(above[0]).max(Vec4::ZERO),
+        below[1].max(above[1]).max(Vec4::ZERO),
+        below[2].max(above[2]).max(Vec4::ZERO),
+    ];
     dot(&outside, &outside) * BOX_SLACK
 }
 
@@ -102,9 +105,9 @@ fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
 /// distances to the three edges.
 #[inline]
 pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
-    let c: [Vec4; 3] = std::array::from_fn(|axis| point[axis] - pack.corner[axis]);
-    let edge3: [Vec4; 3] = std::array::from_fn(|axis| pack.edge2[axis] - pack.edge1[axis]);
-    let from_second: [Vec4; 3] = std::array::from_fn(|axis| c[axis] - pack.edge1[axis]);
+    let c = minus(point, &pack.corner);
+    let edge3 = minus(&pack.edge2, &pack.edge1);
+    let from_second = minus(&c, &pack.edge1);
 
     let d1 = dot(&pack.edge1, &c);
     let d2 = dot(&pack.edge2, &c);
@@ -137,7 +140,7 @@ pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
 #[inline]
 fn edge_distance(from_start: &[Vec4; 3], edge: &[Vec4; 3], along: Vec4, squared_length: Vec4) -> Vec4 {
     let t = (along / squared_length).max(Vec4::ZERO).min(Vec4::ONE);
-    let offset: [Vec4; 3] = std::array::from_fn(|axis| from_start[axis] - edge[axis] * t);
+    let offset = minus(from_start, &[edge[0] * t, edge[1] * t, edge[2] * t]);
     dot(&offset, &offset)
 }
 

@@ -78,7 +78,7 @@ impl Query {
     #[inline]
     fn filter(&self, pack: &TrianglePack) -> (BVec4A, BVec4A) {
         let d = &self.direction;
-        let c: [Vec4; 3] = std::array::from_fn(|axis| pack.corner[axis] - self.start[axis]);
+        let c: [Vec4; 3] = minus(&pack.corner, &self.start);
         let r = cross(&c, d);
         let facing = dot(&pack.normal, d);
         // Everything is mirrored so that the segment runs along the normal.
@@ -314,6 +314,22 @@ pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
 #[inline]
 pub(super) fn dot(a: &[Vec4; 3], b: &[Vec4; 3]) -> Vec4 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Four differences. Axis by axis, as an array that is made by a closure is made by calls.
+#[inline]
+pub(super) fn minus(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// Four points on the way from others.
+#[inline]
+pub(super) fn on_way(from: &[Vec4; 3], way: &[Vec4; 3], share: Vec4) -> [Vec4; 3] {
+    [
+        from[0] + way[0] * share,
+        from[1] + way[1] * share,
+        from[2] + way[2] * share,
+    ]
 }
 
 /// Four cross products.

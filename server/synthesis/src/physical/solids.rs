@@ -4,12 +4,14 @@
 //! is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far from other parts of itself
 //! by [`self_clearance`], and how far from another hand, of that hand when it is a [`PreparedHand`].
 
+mod balls;
 mod flesh;
 mod hand_clearance;
 mod hand_solids;
 mod mesh_clearance;
 mod prepared_hand;
 
+pub use balls::{BALLS, Balls};
 pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
 pub(super) use hand_clearance::Bounded;
 pub use hand_clearance::{SOFT_CONTACT, self_clearance};

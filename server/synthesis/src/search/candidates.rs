@@ -19,9 +19,12 @@ use crate::{
     synthesis::attempt::Scene,
 };
 
-/// Grips that are tried before it is asked which are out of the question: asking takes as long as trying dozens, and one of
-/// the first is often the answer.
-const TRIED_ONE_BY_ONE: usize = 24;
+/// Grips that are tried before it is asked which are out of the question: asking takes as long as looking at some fifty one
+/// by one, and one of the first is often the answer.
+const TRIED_ONE_BY_ONE: usize = 48;
+
+/// Grips that are passed over at most before somebody looks at the clock: one or two microseconds' worth.
+const PASSED_AT_ONCE: usize = 64;
 
 /// The grips of an atlas in the order in which they are tried.
 #[derive(Debug)]
@@ -38,6 +41,16 @@ pub(super) struct KnownGrips<'a> {
     friction_differs: bool,
     /// The next place in the order that nobody has taken.
     next: AtomicUsize,
+}
+
+/// What was taken of the known grips.
+enum Taken {
+    /// There are no more.
+    NoneLeft,
+    /// Some that certainly meet the giver.
+    NoneOpen,
+    /// One that may not, an index of the atlas, and those before it.
+    Open(u16),
 }
 
 /// What became of a known grip.
@@ -90,15 +103,38 @@ impl<'a> KnownGrips<'a> {
         self.order.len()
     }
 
+    /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such.
+    fn take(&self) -> Taken {
+        let giver = self.presented.giver.as_ref();
+        loop {
+            let from = self.next.load(Ordering::Relaxed);
+            let Some(left) = self.order.get(from..).filter(|left| !left.is_empty()) else {
+                return Taken::NoneLeft;
+            };
+            let excluded = (from >= TRIED_ONE_BY_ONE).then(|| self.excluded());
+            let is_open = |entry: u16| {
+                excluded.is_none_or(|excluded| !excluded.contains(entry))
+                    && giver.is_none_or(|giver| !self.atlas.surely_meets(entry, giver))
+            };
+            let next = &left[..left.len().min(PASSED_AT_ONCE)];
+            let place = next.iter().position(|&entry| is_open(entry));
+            let to = from + place.map_or(next.len(), |place| place + 1);
+            // Another worker may have taken the same meanwhile; then they are looked at in vain.
+            let taken = self
+                .next
+                .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
+            if taken.is_ok() {
+                return place.map_or(Taken::NoneOpen, |place| Taken::Open(next[place]));
+            }
+        }
+    }
+
     /// Tries the next one.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
-        let entry = loop {
-            let place = self.next.fetch_add(1, Ordering::Relaxed);
-            match self.order.get(place) {
-                None => return Tried::NoneLeft,
-                Some(&entry) if place >= TRIED_ONE_BY_ONE && self.excluded().contains(entry) => {}
-                Some(&entry) => break entry,
-            }
+        let entry = match self.take() {
+            Taken::NoneLeft => return Tried::NoneLeft,
+            Taken::NoneOpen => return Tried::Refused,
+            Taken::Open(entry) => entry,
         };
         let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();

@@ -287,17 +287,19 @@ impl<'a> Problem<'a> {
             );
             let of_comfort = self.comfort_gains(solver.residual());
             for (contact, cone) in self.cones.iter().enumerate() {
-                let (reach, push) = cone.with_share(self.friction_share).farthest_push(&unbalanced);
+                let cone = cone.with_share(self.friction_share);
                 // The residual times the push's column, without writing that.
-                let mut gain = reach;
-                if self.limited {
-                    gain += solver.residual()[WRENCH_ROWS + contact] * self.limit_entry(&push);
-                }
+                let mut gain = if self.limited {
+                    let (reach, push) = cone.farthest_push(&unbalanced);
+                    reach + solver.residual()[WRENCH_ROWS + contact] * self.limit_entry(&push)
+                } else {
+                    cone.reach(&unbalanced)
+                };
                 if let Some(digit) = self.contacts[contact].digit {
                     gain += of_comfort[digit.index()];
                 }
                 if gain > best.0 {
-                    best = (gain, Some((contact, push)));
+                    best = (gain, Some(contact));
                 }
             }
             let slack = (0..self.limit_rows())
@@ -316,9 +318,11 @@ impl<'a> Problem<'a> {
                     continue;
                 }
             }
-            let Some((contact, push)) = best.1 else {
+            let Some(contact) = best.1 else {
                 return;
             };
+            let cone = self.cones[contact].with_share(self.friction_share);
+            let (_, push) = cone.farthest_push(&unbalanced);
             self.write_entries(contact, &push, entries);
             if !solver.add(entries, Column::Push { contact, push }) {
                 return;

@@ -14,12 +14,16 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a_fours, a_rest) = a.as_chunks::<4>();
     let (b_fours, b_rest) = b.as_chunks::<4>();
     let mut sums = [0.0; 4];
-    for (a, b) in a_fours.iter().zip(b_fours) {
+    // Indices, as zipped iterators stay calls where this is called from.
+    for four in 0..a_fours.len() {
         for k in 0..4 {
-            sums[k] += a[k] * b[k];
+            sums[k] += a_fours[four][k] * b_fours[four][k];
         }
     }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    let mut rest = -0.0;
+    for k in 0..a_rest.len() {
+        rest += a_rest[k] * b_rest[k];
+    }
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
@@ -42,6 +46,18 @@ pub(super) struct UnitPush {
     pub(super) torsion: f64,
 }
 
+/// A direction as a contact meets it, in the words of [`ContactCone::farthest_push`].
+struct Along {
+    /// a·n.
+    normal: f64,
+    /// aₜ.
+    across: DVec3,
+    /// b.
+    about_normal: f64,
+    /// q.
+    gain: f64,
+}
+
 impl ContactCone {
     pub(super) fn new(contact: &SoftContact, load: &Load) -> Self {
         let length = f64::from(load.characteristic_length);
@@ -62,27 +78,29 @@ impl ContactCone {
         }
     }
 
+    /// How far the push reaches whose wrench reaches farthest along `direction`: [`ContactCone::farthest_push`] without the
+    /// push, in half the time.
+    pub(super) fn reach(&self, direction: &ScaledWrench) -> f64 {
+        let Along { normal, gain, .. } = self.along(direction);
+        normal + gain
+    }
+
     /// The push whose wrench reaches farthest along `direction`, and how far.
     ///
     /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is
     /// (n + t)·a + s b with a = u + v × arm and b = v·n; over an ellipsoid that is largest at t = μ² aₜ / q, s = σ² b / q
     /// with q² = μ² |aₜ|² + σ² b², where it is a·n + q.
     pub(super) fn farthest_push(&self, direction: &ScaledWrench) -> (f64, UnitPush) {
-        let [ux, uy, uz, vx, vy, vz] = *direction;
-        let twist = DVec3::new(vx, vy, vz);
-        let along = DVec3::new(ux, uy, uz) + twist.cross(self.arm);
-        let along_normal = along.dot(self.inward);
-        let across = along - self.inward * along_normal;
-        let about_normal = twist.dot(self.inward);
-        let (friction_squared, torsion_squared) =
-            (self.friction * self.friction, self.torsion * self.torsion);
-        let gain = (friction_squared * across.length_squared()
-            + torsion_squared * about_normal * about_normal)
-            .sqrt();
+        let Along {
+            normal,
+            across,
+            about_normal,
+            gain,
+        } = self.along(direction);
         let push = if gain > 0.0 {
             UnitPush {
-                force: self.inward + across * (friction_squared / gain),
-                torsion: torsion_squared * about_normal / gain,
+                force: self.inward + across * (self.friction * self.friction / gain),
+                torsion: self.torsion * self.torsion * about_normal / gain,
             }
         } else {
             UnitPush {
@@ -90,7 +108,28 @@ impl ContactCone {
                 torsion: 0.0,
             }
         };
-        (along_normal + gain, push)
+        (normal + gain, push)
+    }
+
+    #[inline]
+    fn along(&self, direction: &ScaledWrench) -> Along {
+        let [ux, uy, uz, vx, vy, vz] = *direction;
+        let twist = DVec3::new(vx, vy, vz);
+        let along = DVec3::new(ux, uy, uz) + twist.cross(self.arm);
+        let normal = along.dot(self.inward);
+        let across = along - self.inward * normal;
+        let about_normal = twist.dot(self.inward);
+        let (friction_squared, torsion_squared) =
+            (self.friction * self.friction, self.torsion * self.torsion);
+        let gain = (friction_squared * across.length_squared()
+            + torsion_squared * about_normal * about_normal)
+            .sqrt();
+        Along {
+            normal,
+            across,
+            about_normal,
+            gain,
+        }
     }
 
     /// The wrench of a push, or of a sum of pushes.
@@ -115,14 +154,14 @@ pub(super) fn farthest_wrench(cones: &[ContactCone], direction: &ScaledWrench) -
     let mut best = (f64::NEG_INFINITY, [0.0; 6]);
     let mut chosen = None;
     for cone in cones {
-        let (reach, push) = cone.farthest_push(direction);
+        let reach = cone.reach(direction);
         if reach > best.0 {
             best.0 = reach;
-            chosen = Some((cone, push));
+            chosen = Some(cone);
         }
     }
-    if let Some((cone, push)) = chosen {
-        best.1 = cone.wrench(&push);
+    if let Some(cone) = chosen {
+        best.1 = cone.wrench(&cone.farthest_push(direction).1);
     }
     best
 }

@@ -147,7 +147,7 @@ impl<'a> Skeleton<'a> {
 
     /// The palm's solids.
     pub(super) fn palm(&self) -> [TaperedCapsule; PALM_SOLIDS] {
-        PALM.map(|ends| self.solid(ends))
+        self.solids(&PALM)
     }
 
     /// The palm's solids, those along the metacarpals at least as thick as the joints' radii say: what a hand's owner tells
@@ -172,20 +172,33 @@ impl<'a> Skeleton<'a> {
 
     /// The solids that move with the thumb.
     pub(super) fn thenar(&self) -> [TaperedCapsule; THENAR_SOLIDS] {
-        THENAR.map(|ends| self.solid(ends))
+        self.solids(&THENAR)
     }
 
-    fn solid(&self, ends: [End; 2]) -> TaperedCapsule {
-        let [(start, start_radius), (end, end_radius)] = ends.map(|(anchor, offset, radius)| {
-            let at = |joint: usize| self.joints.joints[joint].pose.position;
-            let offset = Vec3::from(offset) * self.millimetre;
-            let place = match anchor {
-                Wrist => at(index::WRIST) + self.frame_from_palm * offset,
-                Between(a, b, share) => at(a).lerp(at(b), share) + self.frame_from_palm * offset,
-                Thumb => at(index::FIRST_OF_DIGIT[0]) + self.frame_from_thumb * offset,
-            };
-            (place, radius * self.millimetre)
-        });
-        TaperedCapsule::new(start, end, start_radius, end_radius)
+    fn solids<const N: usize>(&self, ends: &[[End; 2]; N]) -> [TaperedCapsule; N] {
+        let mut solids = [TaperedCapsule::default(); N];
+        for (solid, ends) in solids.iter_mut().zip(ends) {
+            *solid = self.solid(*ends);
+        }
+        solids
+    }
+
+    fn solid(&self, [start, end]: [End; 2]) -> TaperedCapsule {
+        TaperedCapsule::new(
+            self.place(&start),
+            self.place(&end),
+            start.2 * self.millimetre,
+            end.2 * self.millimetre,
+        )
+    }
+
+    fn place(&self, &(anchor, offset, _): &End) -> Vec3 {
+        let at = |joint: usize| self.joints.joints[joint].pose.position;
+        let offset = Vec3::from(offset) * self.millimetre;
+        match anchor {
+            Wrist => at(index::WRIST) + self.frame_from_palm * offset,
+            Between(a, b, share) => at(a).lerp(at(b), share) + self.frame_from_palm * offset,
+            Thumb => at(index::FIRST_OF_DIGIT[0]) + self.frame_from_thumb * offset,
+        }
     }
 }

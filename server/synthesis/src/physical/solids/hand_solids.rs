@@ -47,7 +47,7 @@ pub struct HandSolids {
 
 impl HandSolids {
     /// How many solids there are.
-    pub(super) const COUNT: usize = 15 + PALM_SOLIDS + THENAR_SOLIDS + FOREARM_SOLIDS;
+    pub(crate) const COUNT: usize = 15 + PALM_SOLIDS + THENAR_SOLIDS + FOREARM_SOLIDS;
 
     /// The solids of a posed rig.
     pub fn of_pose(rig: &Rig, pose: &HandPose) -> Self {
@@ -100,7 +100,7 @@ impl HandSolids {
     }
 
     /// All solids in the order of [`HandSolids::iter`], side by side.
-    pub(super) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
+    pub(crate) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
         let mut all = [self.palm[0]; Self::COUNT];
         for (place, solid) in all.iter_mut().zip(self.iter()) {
             *place = *solid;

@@ -3,10 +3,26 @@
 
 use glam::Vec3;
 
-use super::{HandSolids, TaperedCapsule, hand_clearance::Bounded};
+use super::{
+    HandSolids, TaperedCapsule,
+    balls::{BALLS, Balls},
+    hand_clearance::Bounded,
+};
 
 /// Solids that are compared at once: those of a hand, filled up to whole registers.
 const LANES: usize = HandSolids::COUNT.next_multiple_of(8);
+
+/// The solids of a giver, indices of [`HandSolids::iter`], in the order in which they settle most: each is the one that
+/// met most of the receiving hands that those before it did not, of 32,203 known grips of the built-in objects that meet
+/// a recorded giver. The first four meet 88 % of them, eight 98 %.
+const MET_FIRST: [usize; HandSolids::COUNT] = [
+    6, 21, 5, 8, 2, 15, 12, 3, 22, 11, 25, 14, 9, 29, 1, 7, 26, 16, 18, 4, 13, 30, 10, 24, 0, 17, 19, 20, 23,
+    27, 28,
+];
+
+/// Solids that some balls are compared with before it is asked whether that settled it. Fewer ask more often, more
+/// compare in vain.
+const SOLIDS_AT_ONCE: usize = 4;
 
 /// More than what single precision makes of distances within reach of an arm, in metres: what is decided at once is right
 /// by that much, and the rest is left to exact distances.
@@ -40,28 +56,36 @@ struct ToAxes {
 impl PreparedHand {
     /// Prepares a hand: below a microsecond.
     pub fn new(hand: &HandSolids) -> Self {
-        let solids = hand.to_array().map(Bounded::new);
-        // The rest repeats the last solid, which changes nothing.
-        let lanes = |number: &dyn Fn(&TaperedCapsule) -> f32| -> Lanes {
-            std::array::from_fn(|i| number(&solids[i.min(HandSolids::COUNT - 1)].solid))
-        };
-        Self {
-            starts: [0, 1, 2].map(|axis| lanes(&|solid| solid.start[axis])),
-            axes: [0, 1, 2].map(|axis| lanes(&|solid| (solid.end - solid.start)[axis])),
-            inverse_squares: lanes(&|solid| {
-                solid
-                    .start
-                    .distance_squared(solid.end)
-                    .max(f32::MIN_POSITIVE)
-                    .recip()
-            }),
-            start_radii: lanes(&|solid| solid.start_radius),
-            rises: lanes(&|solid| solid.end_radius - solid.start_radius),
-            solids,
+        let all = hand.to_array();
+        let mut solids = [Bounded::new(all[0]); HandSolids::COUNT];
+        for (place, solid) in solids.iter_mut().zip(MET_FIRST) {
+            *place = Bounded::new(all[solid]);
         }
+        let mut prepared = Self {
+            solids,
+            starts: [[0.0; LANES]; 3],
+            axes: [[0.0; LANES]; 3],
+            inverse_squares: [0.0; LANES],
+            start_radii: [0.0; LANES],
+            rises: [0.0; LANES],
+        };
+        for i in 0..LANES {
+            // The rest repeats the last solid, which changes nothing.
+            let solid = &solids[i.min(HandSolids::COUNT - 1)].solid;
+            let way = solid.end - solid.start;
+            for axis in 0..3 {
+                prepared.starts[axis][i] = solid.start[axis];
+                prepared.axes[axis][i] = way[axis];
+            }
+            let square = solid.start.distance_squared(solid.end);
+            prepared.inverse_squares[i] = square.max(f32::MIN_POSITIVE).recip();
+            prepared.start_radii[i] = solid.start_radius;
+            prepared.rises[i] = solid.end_radius - solid.start_radius;
+        }
+        prepared
     }
 
-    /// Its solids.
+    /// Its solids, those first that most other hands meet.
     pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> {
         self.solids.iter().map(|bounded| &bounded.solid)
     }
@@ -80,6 +104,33 @@ impl PreparedHand {
         nears != 0
     }
 
+    /// True only if one of some balls comes nearer to the hand than `distance` metres; not always then. Some 20 ns where
+    /// the first solids settle it.
+    #[inline]
+    pub fn surely_nears_any(&self, balls: &Balls, distance: f32) -> bool {
+        let [xs, ys, zs] = &balls.middles;
+        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
+        let mut reaches = balls.radii;
+        for reach in &mut reaches {
+            *reach += distance - ROUNDING;
+        }
+        (0..LANES).step_by(SOLIDS_AT_ONCE).any(|first| {
+            let mut nears = [0_u32; BALLS];
+            for k in first..first + SOLIDS_AT_ONCE {
+                for i in 0..BALLS {
+                    // As in `to_axes` and `surely_nears`.
+                    let (x, y, z) = (xs[i] - sx[k], ys[i] - sy[k], zs[i] - sz[k]);
+                    let t = (x * ax[k] + y * ay[k] + z * az[k]) * self.inverse_squares[k];
+                    let t = t.clamp(0.0, 1.0);
+                    let (x, y, z) = (x - ax[k] * t, y - ay[k] * t, z - az[k] * t);
+                    let reach = (reaches[i] + self.start_radii[k] + self.rises[k] * t).max(0.0);
+                    nears[i] |= u32::from(x * x + y * y + z * z < reach * reach);
+                }
+            }
+            nears.iter().fold(0, |any, near| any | near) != 0
+        })
+    }
+
     /// True if any of some solids comes nearer to the hand than `distance` metres.
     pub fn is_neared_by<'a>(
         &self,
@@ -93,21 +144,39 @@ impl PreparedHand {
 
     /// The smallest distance of another hand in metres, if it is at least `required`.
     pub fn clearance(&self, other: &HandSolids, required: f32) -> Option<f32> {
-        // Middle by middle, a distance that the smallest does not exceed.
+        // Middle by middle, a distance that the smallest does not exceed, and for each pair one that it surely keeps.
         let mut bounds = [f32::INFINITY; LANES];
-        for solid in other.iter() {
-            let ToAxes { squares, along } = self.to_axes(solid.at(0.5));
-            let radius = solid.radius_at(0.5);
+        let mut sure = [[0.0; LANES]; HandSolids::COUNT];
+        for (our, sure) in other.iter().zip(&mut sure) {
+            let ToAxes { squares, along } = self.to_axes(our.at(0.5));
+            let radius = our.radius_at(0.5);
+            let around = 0.5 * our.length() + our.start_radius.max(our.end_radius) + ROUNDING;
             for i in 0..LANES {
-                let distance = squares[i].sqrt() - (radius + self.start_radii[i] + self.rises[i] * along[i]);
+                let to_axis = squares[i].sqrt();
+                let distance = to_axis - (radius + self.start_radii[i] + self.rises[i] * along[i]);
                 bounds[i] = if distance < bounds[i] { distance } else { bounds[i] };
+                sure[i] = to_axis - (around + self.start_radii[i] + self.rises[i].max(0.0));
             }
         }
-        let bound = bounds.into_iter().fold(f32::INFINITY, f32::min) + ROUNDING;
-        if bound < required {
+        let mut least = bounds.into_iter().fold(f32::INFINITY, f32::min) + ROUNDING;
+        if least < required {
             return None;
         }
-        self.least_distance(other.iter(), bound, required)
+        for (our, sure) in other.iter().zip(&sure) {
+            if sure.iter().fold(0, |any, sure| any | u32::from(*sure <= least)) == 0 {
+                continue;
+            }
+            let our = Bounded::new(*our);
+            for (their, sure) in self.solids.iter().zip(sure) {
+                if *sure <= least && !our.is_beyond(their, least) {
+                    least = least.min(our.solid.distance(&their.solid));
+                    if least < required {
+                        return None;
+                    }
+                }
+            }
+        }
+        Some(least)
     }
 
     /// The smallest distance of some solids in metres, or `enough` if it is more than that; none if it is below
