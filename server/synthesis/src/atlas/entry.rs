@@ -64,7 +64,7 @@ impl Entry {
                 &mut gripper.buffers,
             )
             .map_or(SLIPS, |balance| {
-                let values = force_values(scene, &contacts, &balance.forces, &balance.torsions);
+                let values = force_values(scene, &contacts, &balance.forces);
                 quantised(of_grip + Score { values }.total())
             })
         });
