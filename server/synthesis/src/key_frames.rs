@@ -19,7 +19,7 @@ use crate::{
     holdout::Holdout,
     physical::{
         flexing::Flexing,
-        grip::{DEEPEST, FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},
+        grip::{DEEPEST, GIVER_CLEARANCE},
         scene::{ObjectScene, Presented},
         solids::{HandSolids, comes_within, self_clearance},
     },
@@ -29,7 +29,7 @@ use motion::{Keep, Motion, Obstacles};
 
 /// How far the hand of `PRE_GRASP` is from the object at least, in metres: seen as not touching yet. More opens hands
 /// wider and finds fewer ways.
-pub const OPEN_CLEARANCE: f32 = FORBIDDEN_CLEARANCE;
+pub const OPEN_CLEARANCE: f32 = 0.002;
 
 /// How far `APPROACH` lies before `PRE_GRASP`, in metres: more than a finger's length, so that the hand is out of the
 /// object. More looks more like reaching, and meets the giver more often.

@@ -29,8 +29,9 @@ pub const DEEPEST: f32 = 0.002;
 /// How far the receiving hand and forearm stay from the giver's, in metres. More is safer and finds fewer grasps.
 pub const GIVER_CLEARANCE: f32 = 0.001;
 
-/// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way.
-pub const FORBIDDEN_CLEARANCE: f32 = 0.002;
+/// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way by two, and skin is
+/// one thicker than the solids.
+pub const FORBIDDEN_CLEARANCE: f32 = 0.003;
 
 /// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.
 const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
