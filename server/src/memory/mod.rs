@@ -43,7 +43,7 @@ const PER_BUILT_TRIANGLE: u64 = 512;
 const PER_BUILT_OBJECT: u64 = 512 << 10;
 
 /// Bytes of an atlas that grows, beside what is published of it: its grips twice, while they are published, and their
-/// bytes for the disk. Complete ones take 11 MB.
+/// bytes for the disk. Complete ones take 10 MB.
 const PER_BUILDER: u64 = 20 * MIB;
 
 /// Bytes of address space that a thread reserves: the stack of a Rust thread, which the async runtime uses too.

@@ -38,7 +38,7 @@ pub const APPROACH_DISTANCE: f32 = 0.12;
 /// How far fingertips open at least, where their joints allow it, in metres: the first that is free is taken. Thumb and
 /// finger together open to some 4 cm more than the object is thick, as people's do; the others are for hands that are
 /// not free of the object or the giver by then.
-const OPENINGS: [f32; 5] = [0.025, 0.035, 0.05, 0.07, f32::INFINITY];
+const OPENINGS: [f32; 7] = [0.02, 0.025, 0.03, 0.04, 0.05, 0.07, f32::INFINITY];
 
 /// How far `PRE_GRASP` lies before `CLOSE`, in metres: nothing if the hand can open where it is, and some room for a palm
 /// that lies on the object.
