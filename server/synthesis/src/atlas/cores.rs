@@ -39,34 +39,28 @@ const SECOND: [Core; BALLS] = [
     (14, 0.9),
 ];
 
-/// Balls inside the hand of each grip.
+/// The first balls inside the hand of each grip.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Cores {
-    first: Vec<Balls>,
-    second: Vec<Balls>,
-}
+pub(super) struct Cores(Vec<Balls>);
 
 impl Cores {
     /// Those of the hands of some grips.
     pub(super) fn of(entries: &[Entry]) -> Self {
-        let all = |cores| entries.iter().map(move |entry| balls(&entry.solids, cores));
-        Self {
-            first: all(&FIRST).collect(),
-            second: all(&SECOND).collect(),
-        }
+        Self(entries.iter().map(|entry| balls(&entry.solids, &FIRST)).collect())
     }
 
-    /// True only if a grip's hand comes too near to the giver's; not always then.
+    /// True only if the hand of one of those grips comes too near to the giver's; not always then.
     #[inline]
-    pub(super) fn surely_meet(&self, entry: u16, giver: &PreparedHand) -> bool {
-        [&self.first, &self.second]
-            .into_iter()
-            .any(|balls| giver.surely_nears_any(&balls[usize::from(entry)], GIVER_CLEARANCE))
+    pub(super) fn surely_meet(&self, entries: &[Entry], entry: u16, giver: &PreparedHand) -> bool {
+        let entry = usize::from(entry);
+        // One in fifty that meet gets as far as the second ones, which are not kept for that.
+        giver.surely_nears_any(&self.0[entry], GIVER_CLEARANCE)
+            || giver.surely_nears_any(&balls(&entries[entry].solids, &SECOND), GIVER_CLEARANCE)
     }
 
     /// Bytes that they take in memory.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.first.as_slice()) + size_of_val(self.second.as_slice())
+        size_of_val(self.0.as_slice())
     }
 }
 

@@ -80,7 +80,7 @@ impl Atlas {
     /// than by [`Atlas::excluded_by`] for some hundreds of grips.
     #[inline]
     pub fn surely_meets(&self, entry: u16, giver: &PreparedHand) -> bool {
-        self.cores.surely_meet(entry, giver)
+        self.cores.surely_meet(&self.entries, entry, giver)
     }
 
     /// Bytes that it takes in memory.

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Edge of a cell in metres. Smaller ones tell more hands apart and take memory by the third power.
-const CELL: f32 = 0.0135;
+const CELL: f32 = 0.0125;
 
 /// Cells at most, each half a kilobyte for 4,096 grips: those around large objects are larger, and tell fewer hands apart.
 const MOST_CELLS: f32 = 10_000.0;

@@ -114,6 +114,67 @@ fn pinch_is_firm() {
     }
 }
 
+/// Sum of the normal forces in newtons, and the largest share of friction and torsion that a contact uses.
+fn pressing(contacts: &[SoftContact], balance: &Balance) -> (f32, f32) {
+    let mut sum = 0.0;
+    let mut used = 0.0_f32;
+    for ((contact, &force), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
+        let normal = -force.dot(contact.normal);
+        let rubbing = (force + contact.normal * normal).length() / contact.friction;
+        sum += normal;
+        if normal > 0.01 {
+            used = used.max(rubbing.hypot(torsion / contact.torsion_radius) / normal);
+        }
+    }
+    (sum, used)
+}
+
+/// Where contacts leave the digits only uncomfortable shares, they press as firmly with those: here the middle finger may
+/// bear no more than a fifteenth of what the index finger does.
+#[test]
+fn uncomfortable_shares_are_firm_too() {
+    let places = [
+        (Vec3::new(-0.003, 0.0, 0.0), Vec3::NEG_X),
+        (Vec3::new(0.003, 0.0, 0.002), Vec3::X),
+        (Vec3::new(0.003, 0.0, -0.03), Vec3::X),
+    ];
+    for mass in [0.02_f32, 0.1] {
+        let contacts = contacts_at(&places, 0.6, 0.0033);
+        let load = load(mass, Vec3::Y, 0.05);
+        let found = solve(&contacts, &load).expect("a pinch holds it");
+        assert_sound(&contacts, &load, &found, "uneven");
+        let (sum, _) = pressing(&contacts, &found);
+        let firm = 8.0 + 5.0 * mass * 9.81 / 0.6;
+        assert!(sum > 0.5 * firm, "{sum} of {firm} N at {mass} kg");
+    }
+}
+
+/// What cannot be held firmly with 45 % of friction is held with 70 % if it can be, and only else with all of it: fingertips
+/// on a wedge need the tangent of half its angle.
+#[test]
+fn no_more_friction_is_used_than_firmness_takes() {
+    for (degrees, least, most) in [(5.0_f32, 0.0, 0.45), (19.0, 0.45, 0.7), (27.0, 0.7, 1.0)] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let places = [
+            (Vec3::X * 0.01, Vec3::new(cos, 0.0, sin)),
+            (Vec3::NEG_X * 0.01, Vec3::new(-cos, 0.0, sin)),
+        ];
+        let contacts = contacts_at(&places, 0.6, 0.0033);
+        let load = load(0.02, Vec3::Y, 0.05);
+        let found = solve(&contacts, &load).expect("friction is enough");
+        assert_sound(&contacts, &load, &found, "wedge");
+        let (sum, used) = pressing(&contacts, &found);
+        assert!(
+            sum > 0.5 * (8.0 + 5.0 * 0.02 * 9.81 / 0.6),
+            "{sum} N at {degrees} degrees"
+        );
+        assert!(
+            (least..most + 1e-3).contains(&used),
+            "{used} of friction at {degrees} degrees"
+        );
+    }
+}
+
 /// A pinch beside the centre of mass needs torsion of mass times lever, which the pads must be wide enough for.
 #[test]
 fn pinch_beside_the_centre_of_mass_needs_torsion() {
