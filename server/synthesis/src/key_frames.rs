@@ -35,10 +35,10 @@ pub const OPEN_CLEARANCE: f32 = 0.002;
 /// object. More looks more like reaching, and meets the giver more often.
 pub const APPROACH_DISTANCE: f32 = 0.12;
 
-/// How far fingertips open at least, where their joints allow it, in metres: the first that is free is taken. Thumb and
-/// finger together open to some 4 cm more than the object is thick, as people's do; the others are for hands that are
-/// not free of the object or the giver by then.
-const OPENINGS: [f32; 7] = [0.02, 0.025, 0.03, 0.04, 0.05, 0.07, f32::INFINITY];
+/// How far fingertips open at least, where their joints allow it, in metres: the first that is free for all digits is taken,
+/// and then for each digit the first that is free beside the others. Thumb and finger together open to some 4 cm more than
+/// the object is thick, as people's do; the others are for hands that are not free of the object or the giver by then.
+const OPENINGS: [f32; 5] = [0.025, 0.035, 0.05, 0.07, f32::INFINITY];
 
 /// How far `PRE_GRASP` lies before `CLOSE`, in metres: nothing if the hand can open where it is, and some room for a palm
 /// that lies on the object.
@@ -163,20 +163,22 @@ impl Planner<'_> {
     /// The direction in which the hand comes, and the hand of `PRE_GRASP`.
     fn plan(&self) -> Option<(Vec3, HandPose)> {
         // Digits that hold nothing open with the others, or stay out of the way where they are.
-        let opened: [_; 2 * OPENINGS.len()] = std::array::from_fn(|i| {
-            let opens = if i < OPENINGS.len() {
+        let opens_of = |i: usize| {
+            if i < OPENINGS.len() {
                 [true; 5]
             } else {
                 self.holding
-            };
-            let pose = self.opened(OPENINGS[i % OPENINGS.len()], opens);
+            }
+        };
+        let opened: [_; 2 * OPENINGS.len()] = std::array::from_fn(|i| {
+            let pose = self.opened(OPENINGS[i % OPENINGS.len()], opens_of(i));
             (pose, HandSolids::of_pose(self.rig, &pose))
         });
         // Where the hand opens in its place, that does not depend on the direction.
         let in_place: [OnceCell<bool>; 2 * OPENINGS.len()] = Default::default();
         for direction in self.directions() {
             for back in DRAWN_BACK {
-                for ((pose, solids), in_place) in opened.iter().zip(&in_place) {
+                for (i, ((pose, solids), in_place)) in opened.iter().zip(&in_place).enumerate() {
                     let opens = if back == 0.0 {
                         *in_place.get_or_init(|| self.is_clear(solids) && self.closes_from(pose, 0.0))
                     } else {
@@ -187,7 +189,11 @@ impl Planner<'_> {
                     }
                     let pose = moved(pose, direction * -back);
                     if back == 0.0 || self.closes_from(&pose, back) {
-                        return Some((direction, pose));
+                        let narrower = &OPENINGS[..i % OPENINGS.len()];
+                        return Some((
+                            direction,
+                            self.narrowed(pose, narrower, opens_of(i), direction, back),
+                        ));
                     }
                 }
             }
@@ -198,28 +204,57 @@ impl Planner<'_> {
     /// The hand with the digits that `opens` says opened in their place, until the tips are `opening` metres from where
     /// they were, or as far as the joints go.
     fn opened(&self, opening: f32, opens: [bool; 5]) -> HandPose {
-        let wrist = self.close.frame_from_wrist;
         let digits = Digit::ALL.map(|digit| {
-            let rig = self.rig.digit(digit);
-            let closed = self.close.digits[digit.index()];
-            if !opens[digit.index()] {
-                return closed;
+            if opens[digit.index()] {
+                self.opened_digit(digit, opening)
+            } else {
+                self.close.digits[digit.index()]
             }
-            let flexing = Flexing {
-                digit: rig,
-                base_yaw: closed.base_yaw,
-                // How it bends does not matter to how it is when it is open.
-                bend_ratio: 1.0,
-            };
-            let open = flexing.opened();
-            let tip = |angles| digit_frames(rig, wrist, angles).tip;
-            let whole = tip(closed).distance(tip(open));
-            between(&closed, &open, (opening / whole).min(1.0))
         });
         HandPose {
-            frame_from_wrist: wrist,
+            frame_from_wrist: self.close.frame_from_wrist,
             digits,
         }
+    }
+
+    fn opened_digit(&self, digit: Digit, opening: f32) -> DigitAngles {
+        let rig = self.rig.digit(digit);
+        let closed = self.close.digits[digit.index()];
+        let flexing = Flexing {
+            digit: rig,
+            base_yaw: closed.base_yaw,
+            // How it bends does not matter to how it is when it is open.
+            bend_ratio: 1.0,
+        };
+        let open = flexing.opened();
+        let tip = |angles| digit_frames(rig, self.close.frame_from_wrist, angles).tip;
+        let whole = tip(closed).distance(tip(open));
+        between(&closed, &open, (opening / whole).min(1.0))
+    }
+
+    /// An open hand, `back` metres before the grasp, whose digits open no farther than they must: one that lies on the object
+    /// with its first link opens far, and the others need not.
+    fn narrowed(
+        &self,
+        mut pose: HandPose,
+        narrower: &[f32],
+        opens: [bool; 5],
+        direction: Vec3,
+        back: f32,
+    ) -> HandPose {
+        for digit in Digit::ALL.into_iter().filter(|digit| opens[digit.index()]) {
+            for &opening in narrower {
+                let mut tried = pose;
+                tried.digits[digit.index()] = self.opened_digit(digit, opening);
+                let solids = HandSolids::of_pose(self.rig, &tried);
+                if self.is_clear(&solids) && self.comes(&solids, direction) && self.closes_from(&tried, back)
+                {
+                    pose = tried;
+                    break;
+                }
+            }
+        }
+        pose
     }
 
     /// The directions in which the hand may come, in the object's frame: first as hands do by nature, then more and more
