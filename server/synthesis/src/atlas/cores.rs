@@ -1,7 +1,6 @@
 //! Which grips of an atlas certainly meet a giver, one by one: by some balls inside each hand, side by side for all
 //! grips, so that looking at one mostly takes two lines of the cache.
 
-use super::entry::Entry;
 use crate::physical::{
     grip::GIVER_CLEARANCE,
     solids::{BALLS, Balls, HandSolids, PreparedHand},
@@ -44,18 +43,17 @@ const SECOND: [Core; BALLS] = [
 pub(super) struct Cores(Vec<Balls>);
 
 impl Cores {
-    /// Those of the hands of some grips.
-    pub(super) fn of(entries: &[Entry]) -> Self {
-        Self(entries.iter().map(|entry| balls(&entry.solids, &FIRST)).collect())
+    /// Those of some hands.
+    pub(super) fn of<'a>(hands: impl Iterator<Item = &'a HandSolids>) -> Self {
+        Self(hands.map(|solids| balls(solids, &FIRST)).collect())
     }
 
-    /// True only if the hand of one of those grips comes too near to the giver's; not always then.
+    /// True only if one of those hands, whose solids are known, comes too near to the giver's; not always then.
     #[inline]
-    pub(super) fn surely_meet(&self, entries: &[Entry], entry: u16, giver: &PreparedHand) -> bool {
-        let entry = usize::from(entry);
+    pub(super) fn surely_meet(&self, hand: usize, solids: &HandSolids, giver: &PreparedHand) -> bool {
         // One in fifty that meet gets as far as the second ones, which are not kept for that.
-        giver.surely_nears_any(&self.0[entry], GIVER_CLEARANCE)
-            || giver.surely_nears_any(&balls(&entries[entry].solids, &SECOND), GIVER_CLEARANCE)
+        giver.surely_nears_any(&self.0[hand], GIVER_CLEARANCE)
+            || giver.surely_nears_any(&balls(solids, &SECOND), GIVER_CLEARANCE)
     }
 
     /// Bytes that they take in memory.

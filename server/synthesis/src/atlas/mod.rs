@@ -42,7 +42,7 @@ impl Atlas {
     pub fn new(object: &GraspObject, entries: Vec<Entry>, complete: bool) -> Self {
         Self {
             order: GravityOrder::of(&entries),
-            cores: Cores::of(&entries),
+            cores: Cores::of(entries.iter().map(|entry| &entry.solids)),
             occupancy: Occupancy::of(object, &entries),
             stamp: stamp(&entries),
             entries,
@@ -80,7 +80,8 @@ impl Atlas {
     /// than by [`Atlas::excluded_by`] for some hundreds of grips.
     #[inline]
     pub fn surely_meets(&self, entry: u16, giver: &PreparedHand) -> bool {
-        self.cores.surely_meet(&self.entries, entry, giver)
+        let entry = usize::from(entry);
+        self.cores.surely_meet(entry, &self.entries[entry].solids, giver)
     }
 
     /// Bytes that it takes in memory.
