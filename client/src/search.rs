@@ -161,7 +161,7 @@ pub struct FindRequest {
     /// May the object's atlas be used? None: yes.
     #[serde(default)]
     pub atlas: Option<AtlasUse>,
-    /// Plan the way to the grasp, [`Grasp::key_frames`], for who animates the hand. That takes about half a millisecond,
+    /// Plan the way to the grasp, [`Grasp::key_frames`], for who animates the hand. That takes half a millisecond to two,
     /// sometimes some milliseconds, once the grasp is found; neither budget nor [`SearchReport::search_time`] count it.
     #[serde(default)]
     pub plan_key_frames: bool,
