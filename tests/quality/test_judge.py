@@ -238,9 +238,13 @@ class TestFaults:
         assert measures.is_normal(mesh, corner, np.ones(3) / np.sqrt(3))
         assert not measures.is_normal(mesh, corner, np.array([1.0, 1.0, -1.0]) / np.sqrt(3))
 
-    def test_the_sides_of_a_thin_plate_are_no_edge(self):
-        mesh = Mesh(box([1.0, 1.0, 0.0001]), BOX_FACES)
-        assert not measures.is_normal(mesh, [0.3, 0.2, 0.0001], np.array([1.0, 0.0, 0.0]))
+    def test_the_sides_of_a_blade_are_an_edge_only_where_they_meet(self):
+        # 2 cm long, 2 mm thick at the back; two millimetres from its edge, the sides are 0.2 mm apart.
+        corners = [[0, y, z] for y in (-0.02, 0.02) for z in (-0.001, 0.001)] + [[0.02, -0.02, 0], [0.02, 0.02, 0]]
+        faces = [[1, 4, 5], [1, 5, 3], [0, 5, 4], [0, 2, 5], [0, 1, 3], [0, 3, 2], [0, 4, 1], [2, 3, 5]]
+        mesh, onward = Mesh(np.array(corners), faces), np.array([1.0, 0.0, 0.0])
+        assert measures.is_normal(mesh, [0.02, 0.003, 0.0], onward)
+        assert not measures.is_normal(mesh, [0.018, 0.003, 0.0001], onward)
 
     def test_mirrored_hand(self):
         scene, grasp, _ = good()

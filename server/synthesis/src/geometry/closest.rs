@@ -61,9 +61,9 @@ pub(super) fn closest(
                     }
                     let children = sorted_falling(children);
                     // The closest child is taken up next; what is no child is overwritten.
-                    if let Some(places) = stack[height..].first_chunk_mut() {
-                        *places = children;
-                    }
+                    *stack[height..]
+                        .first_chunk_mut()
+                        .expect("the stack is large enough for any tree") = children;
                     height += near.count_ones() as usize;
                 }
                 Child::Pack(index) => {

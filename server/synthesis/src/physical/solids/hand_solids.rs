@@ -56,30 +56,32 @@ impl HandSolids {
 
     /// The solids of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
+        let skeleton = Skeleton::new(joints);
+        Self::around(joints, &skeleton, skeleton.palm())
+    }
+
+    /// The solids of a giver's tracked joints, which are not to be touched: nowhere along the metacarpals thinner than the
+    /// joints' radii say.
+    pub fn of_giver(joints: &HandJoints) -> Self {
+        let skeleton = Skeleton::new(joints);
+        Self::around(joints, &skeleton, skeleton.palm_as_told())
+    }
+
+    fn around(joints: &HandJoints, skeleton: &Skeleton<'_>, palm: [TaperedCapsule; PALM_SOLIDS]) -> Self {
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
         let phalanges = array::from_fn(|digit| {
             let joints = joints_of_digit(digit);
             link_solids(joints.map(at), joints.map(radius))
         });
-        let skeleton = Skeleton::new(joints);
         Self {
             phalanges,
-            palm: skeleton.palm(),
+            palm,
             thenar: skeleton.thenar(),
             forearm: forearm(
                 thesis_from_openxr_frame(joints.joints[index::WRIST].pose),
                 radius(index::WRIST),
             ),
-        }
-    }
-
-    /// The solids of a giver's tracked joints, which are not to be touched: nowhere along the metacarpals thinner than the
-    /// joints' radii say.
-    pub fn of_giver(joints: &HandJoints) -> Self {
-        Self {
-            palm: Skeleton::new(joints).palm_as_told(),
-            ..Self::of_joints(joints)
         }
     }
 
