@@ -57,17 +57,17 @@ impl HandSolids {
     /// The solids of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
         let skeleton = Skeleton::new(joints);
-        Self::around(joints, &skeleton, skeleton.palm())
+        Self::around(joints, &skeleton, &skeleton.palm())
     }
 
     /// The solids of a giver's tracked joints, which are not to be touched: nowhere along the metacarpals thinner than the
     /// joints' radii say.
     pub fn of_giver(joints: &HandJoints) -> Self {
         let skeleton = Skeleton::new(joints);
-        Self::around(joints, &skeleton, skeleton.palm_as_told())
+        Self::around(joints, &skeleton, &skeleton.palm_as_told())
     }
 
-    fn around(joints: &HandJoints, skeleton: &Skeleton<'_>, palm: [TaperedCapsule; PALM_SOLIDS]) -> Self {
+    fn around(joints: &HandJoints, skeleton: &Skeleton<'_>, palm: &[TaperedCapsule; PALM_SOLIDS]) -> Self {
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
         let phalanges = array::from_fn(|digit| {
@@ -76,7 +76,7 @@ impl HandSolids {
         });
         Self {
             phalanges,
-            palm,
+            palm: *palm,
             thenar: skeleton.thenar(),
             forearm: forearm(
                 thesis_from_openxr_frame(joints.joints[index::WRIST].pose),
