@@ -54,8 +54,8 @@ impl Drop for Present<'_> {
 
 /// How a turn ended.
 enum Turn {
-    /// There is more to be found.
-    More,
+    /// There is more to be found, after so much work.
+    More(Duration),
     /// All was found that there is room for.
     Finished,
     /// The object is gone, or the server ends.
@@ -105,9 +105,12 @@ fn work(workshop: &Workshop, job: Job) {
         return;
     };
     // A panic costs this atlas alone: all that it could leave half done is local to the turn.
-    let turn = catch_unwind(AssertUnwindSafe(|| turn(workshop, &object, job.hand)));
+    let turn = catch_unwind(AssertUnwindSafe(|| turn(workshop, &object, &job)));
     match turn {
-        Ok(Turn::More) => workshop.enqueue(job),
+        Ok(Turn::More(worked)) => workshop.enqueue(Job {
+            worked: job.worked + worked,
+            ..job
+        }),
         Ok(Turn::Dropped) => {}
         Ok(Turn::Finished) => {
             object.shelf.finish(job.hand);
@@ -124,8 +127,9 @@ fn work(workshop: &Workshop, job: Job) {
 }
 
 /// Lets an atlas grow until it is published.
-fn turn(workshop: &Workshop, object: &Arc<StoredObject>, hand: &'static Hand) -> Turn {
+fn turn(workshop: &Workshop, object: &Arc<StoredObject>, job: &Job) -> Turn {
     let start = Instant::now();
+    let hand = job.hand;
     let known = object.shelf.slot(hand).and_then(|slot| slot.grown);
     let known = match known {
         Some(known) => Some(known),
@@ -159,6 +163,10 @@ fn turn(workshop: &Workshop, object: &Arc<StoredObject>, hand: &'static Hand) ->
         let took = round.elapsed();
         worked += took;
         give_way(workshop, took);
+        // What has had a turn makes room for what has not.
+        if !job.worked.is_zero() && workshop.has_new_job() {
+            break;
+        }
     }
     let grown = Arc::new(growth.grown());
     if let Some(files) = &workshop.files
@@ -180,7 +188,7 @@ fn turn(workshop: &Workshop, object: &Arc<StoredObject>, hand: &'static Hand) ->
     if growth.is_complete() || !has_room {
         Turn::Finished
     } else {
-        Turn::More
+        Turn::More(worked)
     }
 }
 

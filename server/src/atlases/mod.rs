@@ -44,6 +44,8 @@ const MANY_JOBS: usize = 1024;
 struct Job {
     object: Weak<StoredObject>,
     hand: &'static Hand,
+    /// How long it has been worked on since it was asked for.
+    worked: Duration,
 }
 
 /// All atlases and the threads that build them; dropped, the threads end.
@@ -209,6 +211,7 @@ impl Workshop {
             self.enqueue(Job {
                 object: Arc::downgrade(object),
                 hand,
+                worked: Duration::ZERO,
             });
         }
     }
@@ -222,18 +225,25 @@ impl Workshop {
         self.has_jobs.notify_one();
     }
 
-    /// The job that waits longest; none when it is time to stop.
+    /// The job that was worked on least, so that what is new is soon of use however much others can still grow; of several,
+    /// the one that waits longest. None when it is time to stop.
     fn next_job(&self) -> Option<Job> {
         let mut jobs = self.jobs();
         loop {
             if self.is_stopped() {
                 return None;
             }
-            match jobs.pop_front() {
+            let least = (0..jobs.len()).min_by_key(|&place| jobs[place].worked);
+            match least.and_then(|place| jobs.remove(place)) {
                 Some(job) => return Some(job),
                 None => jobs = self.has_jobs.wait(jobs).unwrap_or_else(PoisonError::into_inner),
             }
         }
+    }
+
+    /// True if an atlas waits that was not worked on yet.
+    fn has_new_job(&self) -> bool {
+        self.jobs().iter().any(|job| job.worked.is_zero())
     }
 
     /// Puts what has grown on its shelf if there is room for it, or if there is after those were dropped that were used

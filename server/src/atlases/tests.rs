@@ -116,6 +116,28 @@ fn what_gave_way_is_built_again_when_it_is_asked_for() {
 }
 
 #[test]
+fn what_is_new_comes_before_what_has_grown() {
+    let atlases = start(0, &store(10, 1 << 30));
+    let objects = ["a", "b", "c", "d"].map(|id| Arc::new(small(id)));
+    let milliseconds = [300, 0, 20, 0];
+    for (object, worked) in objects.iter().zip(milliseconds) {
+        atlases.workshop.enqueue(Job {
+            object: Arc::downgrade(object),
+            hand: adult(),
+            worked: Duration::from_millis(worked),
+        });
+    }
+    let next = || {
+        let is_new = atlases.workshop.has_new_job();
+        let object = atlases.workshop.next_job().unwrap().object.upgrade().unwrap();
+        (object.id.clone(), is_new)
+    };
+    let order = [next(), next(), next(), next()];
+    let expected = [("b", true), ("d", true), ("c", false), ("a", false)];
+    assert_eq!(order, expected.map(|(id, is_new)| (id.to_owned(), is_new)));
+}
+
+#[test]
 fn nothing_is_built_for_an_object_that_was_evicted() {
     // No hand gets round it: its atlas would grow for minutes.
     let store = store(1, 1 << 30);
