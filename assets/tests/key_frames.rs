@@ -277,10 +277,7 @@ fn closing_sinks_no_deeper_than_a_grasp_and_touches_nothing_forbidden() {
                 "{} at {moment}: {depth} m, {giver} m",
                 planned.name
             );
-            let touches = solids.iter().any(|solid| {
-                let surface = &object.surface;
-                surface.comes_within_of(solid, 0.0, |triangle| object.is_forbidden(triangle))
-            });
+            let touches = solids.iter().any(|solid| object.is_forbidden_within(solid, 0.0));
             assert!(!touches, "{} at {moment}", planned.name);
         }
     }

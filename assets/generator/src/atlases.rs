@@ -200,7 +200,7 @@ mod tests {
             change(&mut entries[7]);
             first_difference(&Atlas::new(object, entries, false), object, rig)
         };
-        assert_eq!(changed(|entry| entry.epsilon *= 1.5), Some(7));
+        assert_eq!(changed(|entry| entry.grip.epsilon *= 1.5), Some(7));
         assert_eq!(changed(|entry| entry.scores[3] ^= 1), Some(7));
         assert_eq!(changed(|entry| entry.contacts.truncate(1)), Some(7));
     }

@@ -52,6 +52,18 @@ fn neither_the_side_nor_the_size_nor_the_place_of_a_hand_matters() {
 }
 
 #[test]
+fn an_index_finger_that_points_past_the_object_holds_nothing() {
+    let along = cases()
+        .into_iter()
+        .find(|(expected, _)| *expected == GraspType::IndexFingerExtension);
+    let (_, mut held) = along.expect("every type has a case");
+    held.contacts
+        .retain(|contact| contact.part.digit() != Some(Index));
+    let found = held.classify();
+    assert_ne!(found.grasp_type, Some(GraspType::IndexFingerExtension), "{found:?}");
+}
+
+#[test]
 fn what_nobody_would_hold_so_has_no_type() {
     let pinch = [0.0, 55.0, 45.0, 20.0];
     let thumb = (Thumb, Third, MIDDLE);

@@ -9,7 +9,7 @@ pub(crate) mod store;
 use std::sync::Arc;
 
 use grasp_proto::v1;
-use grasp_synthesis::{object::GraspObject, strategy::Validity};
+use grasp_synthesis::{geometry::mesh::TriangleMesh, object::GraspObject, strategy::Validity};
 use sha2::{Digest as _, Sha256};
 
 use crate::{
@@ -63,10 +63,16 @@ impl StoredObject {
 
     /// About how many bytes it takes, without its atlases.
     pub(crate) fn bytes(&self) -> usize {
-        let mesh = self.object.surface.mesh();
-        size_of_val(mesh.positions())
-            + size_of_val(mesh.triangles())
-            + mesh.triangles().len() * SEARCH_BYTES_PER_TRIANGLE
+        let of_mesh = |mesh: &TriangleMesh| {
+            size_of_val(mesh.positions())
+                + size_of_val(mesh.triangles())
+                + mesh.triangles().len() * SEARCH_BYTES_PER_TRIANGLE
+        };
+        of_mesh(self.object.surface.mesh())
+            + self
+                .object
+                .forbidden_surface()
+                .map_or(0, |surface| of_mesh(surface.mesh()))
             + self.object.surface.field_bytes()
             + self.object.surface_pairs.bytes()
             + self.warnings.iter().map(String::len).sum::<usize>()

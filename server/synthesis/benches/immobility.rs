@@ -6,7 +6,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use grasp_synthesis::{
     hand::Digit,
-    physical::immobility::{Buffers, Expected, Load, SoftContact, balance, epsilon},
+    physical::immobility::{Buffers, Load, SoftContact, balance, epsilon},
 };
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -59,7 +59,7 @@ fn bench_immobility(criterion: &mut Criterion) {
         let (held, lost): (Vec<_>, Vec<_>) = all
             .iter()
             .cloned()
-            .partition(|(contacts, load)| balance(contacts, load, Expected::Nothing, &mut buffers).is_some());
+            .partition(|(contacts, load)| balance(contacts, load, &mut buffers).is_some());
         let closed = |(contacts, load): &&(Vec<SoftContact>, Load)| {
             epsilon(contacts, load, REQUIRED, &mut Buffers::default()) >= REQUIRED
         };
@@ -78,13 +78,7 @@ fn bench_immobility(criterion: &mut Criterion) {
             group.bench_function(format!("balance/{name}"), |bencher| {
                 bencher.iter(|| {
                     let found = grasps.iter().filter(|(contacts, load)| {
-                        balance(
-                            black_box(contacts),
-                            black_box(load),
-                            Expected::Nothing,
-                            &mut buffers,
-                        )
-                        .is_some()
+                        balance(black_box(contacts), black_box(load), &mut buffers).is_some()
                     });
                     found.count()
                 });

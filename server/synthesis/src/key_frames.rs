@@ -124,7 +124,6 @@ pub fn key_frames(
         holding: grasp.bend_ratios.map(|ratio| ratio.is_some()),
         obstacles: Obstacles {
             object: scene.object,
-            has_forbidden: scene.object.forbidden_count() > 0,
             giver: presented.giver.as_ref(),
             looks_left: Cell::new(MOST_LOOKS),
         },

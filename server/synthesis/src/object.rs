@@ -3,7 +3,9 @@
 use glam::Vec3;
 
 use crate::{
-    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox},
+    geometry::{
+        mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox, tapered_capsule::TaperedCapsule,
+    },
     guided::surface_pairs::SurfacePairs,
     strategy::Validity,
 };
@@ -37,6 +39,9 @@ pub struct GraspObject {
     pub surface_pairs: SurfacePairs,
     /// One flag a triangle: may it not be touched?
     forbidden: Vec<bool>,
+    /// What these triangles make, if there are any. Much smaller than the whole in most cases, and far from most hands: it
+    /// is asked first.
+    forbidden_surface: Option<MeshBvh>,
 }
 
 /// Why an object was refused.
@@ -120,10 +125,14 @@ impl GraspObject {
         Ok(Self {
             bounding_box,
             surface_pairs: SurfacePairs::of(&surface, |triangle| forbidden[triangle as usize]),
-            surface,
             mass,
             centre_of_mass,
             friction,
+            forbidden_surface: surface
+                .mesh()
+                .part(|triangle| forbidden[triangle])
+                .map(MeshBvh::build_quick),
+            surface,
             forbidden,
         })
     }
@@ -143,7 +152,19 @@ impl GraspObject {
 
     /// How many triangles may not be touched.
     pub fn forbidden_count(&self) -> usize {
-        self.forbidden.iter().filter(|&&f| f).count()
+        let surface = self.forbidden_surface.as_ref();
+        surface.map_or(0, |surface| surface.mesh().triangles().len())
+    }
+
+    /// What may not be touched, if there is such.
+    pub fn forbidden_surface(&self) -> Option<&MeshBvh> {
+        self.forbidden_surface.as_ref()
+    }
+
+    /// True if what may not be touched is less than `distance` metres off a capsule's skin.
+    pub fn is_forbidden_within(&self, capsule: &TaperedCapsule, distance: f32) -> bool {
+        let surface = self.forbidden_surface.as_ref();
+        surface.is_some_and(|surface| surface.comes_within(capsule, distance))
     }
 }
 

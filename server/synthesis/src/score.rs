@@ -351,11 +351,9 @@ fn sterile_distance(object: &GraspObject, solids: &HandSolids) -> f32 {
     }
     // By halves: nobody sees the difference of a few millimetres.
     let is_near = |distance: f32| {
-        solids.iter().any(|part| {
-            object
-                .surface
-                .comes_within_of(part, distance, |triangle| object.is_forbidden(triangle))
-        })
+        solids
+            .iter()
+            .any(|part| object.is_forbidden_within(part, distance))
     };
     if !is_near(STERILE_CLEARANCE) {
         1.0

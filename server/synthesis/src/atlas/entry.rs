@@ -11,7 +11,7 @@ use crate::{
         attempt::grasp,
         contacts::soften,
         grip::{Grip, Gripper, clear_of_giver},
-        immobility::{Expected, balance},
+        immobility::balance,
         scene::{ObjectScene, Presented},
         solids::{HandSolids, PreparedHand},
     },
@@ -31,8 +31,6 @@ pub struct Entry {
     pub contacts: Vec<Contact>,
     /// Its type of the taxonomy.
     pub classification: Classification,
-    /// Ferrari-Canny epsilon under the atlas' friction.
-    pub epsilon: f32,
     /// The score's terms that depend on hand and object alone.
     pub grip_values: Values,
     /// For each of [`DIRECTIONS`] against gravity: the score of grip and comfort in 1 … 255, or [`SLIPS`].
@@ -48,51 +46,40 @@ impl Entry {
         rig: &Rig,
         grip: Grip,
         solids: &HandSolids,
-        epsilon: f32,
         gripper: &mut Gripper,
     ) -> Self {
         let contacts = gripper.contacts.clone();
         let classification = classify(rig, &grip.pose, &contacts);
-        let grip_values = grip_values(scene, rig, &grip.pose, &contacts, classification, epsilon, solids);
+        let grip_values = grip_values(
+            scene,
+            rig,
+            &grip.pose,
+            &contacts,
+            classification,
+            grip.epsilon,
+            solids,
+        );
         let of_grip = Score { values: grip_values }.of_grip();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(direction(index));
-            balance(
-                &gripper.soft_contacts,
-                &load,
-                Expected::Balance,
-                &mut gripper.buffers,
-            )
-            .map_or(SLIPS, |balance| {
+            balance(&gripper.soft_contacts, &load, &mut gripper.buffers).map_or(SLIPS, |balance| {
                 let values = force_values(scene, &contacts, &balance.forces);
                 quantised(of_grip + Score { values }.total())
             })
         });
-        Self::from_parts(
-            grip,
-            contacts,
-            classification,
-            epsilon,
-            grip_values,
-            scores,
-            solids,
-        )
+        Self::from_parts(grip, contacts, classification, grip_values, scores, solids)
     }
 
     /// What a grip of the same hand and contacts is worth now; none if its closure is not enough.
     pub fn assessed_anew(&self, scene: &ObjectScene<'_>, rig: &Rig, gripper: &mut Gripper) -> Option<Self> {
         gripper.contacts.clone_from(&self.contacts);
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
-        let epsilon = gripper.closure(scene)?;
-        let solids = HandSolids::of_pose(rig, &self.grip.pose);
-        Some(Self::new(
-            scene,
-            rig,
-            self.grip.clone(),
-            &solids,
-            epsilon,
-            gripper,
-        ))
+        let grip = Grip {
+            epsilon: gripper.closure(scene)?,
+            ..self.grip.clone()
+        };
+        let solids = HandSolids::of_pose(rig, &grip.pose);
+        Some(Self::new(scene, rig, grip, &solids, gripper))
     }
 
     /// An entry of which everything is known.
@@ -100,7 +87,6 @@ impl Entry {
         grip: Grip,
         contacts: Vec<Contact>,
         classification: Classification,
-        epsilon: f32,
         grip_values: Values,
         scores: [u8; DIRECTIONS],
         solids: &HandSolids,
@@ -109,7 +95,6 @@ impl Entry {
             grip,
             contacts,
             classification,
-            epsilon,
             grip_values,
             scores,
             solids: *solids,
@@ -129,16 +114,11 @@ impl Entry {
         let giver_clearance = clear_of_giver(&self.solids, presented.giver.as_ref())?;
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
-        let balance = balance(
-            &gripper.soft_contacts,
-            &load,
-            Expected::Balance,
-            &mut gripper.buffers,
-        )?;
+        let balance = balance(&gripper.soft_contacts, &load, &mut gripper.buffers)?;
         let epsilon = if friction_differs {
             gripper.closure(scene)?
         } else {
-            self.epsilon
+            self.grip.epsilon
         };
         let mut grasp = grasp(
             &self.grip,

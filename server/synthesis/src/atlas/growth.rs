@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::{
     Atlas,
@@ -18,7 +18,6 @@ use super::{
     stamp,
 };
 use crate::{
-    grasp::Contact,
     guided::{
         proposal::{Place, propose},
         surface_pairs::SurfacePairs,
@@ -31,7 +30,6 @@ use crate::{
         shape::{HandShape, Proposal},
         solids::{HandSolids, PreparedHand},
     },
-    pose::Pose,
     score::{Score, grip_values},
     strategy::Validity,
     synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
@@ -58,9 +56,6 @@ const SEED: u64 = 0x4154_4c53;
 /// Share of proposals beside known grips, once there are any: they succeed ten times as often as new ones, which find
 /// what is not known yet.
 const BESIDE_SHARE: f32 = 0.5;
-
-/// How far beside a known grip a proposal's wrist lies at most, in metres and radians.
-const BESIDE: [f32; 2] = [0.006, 0.12];
 
 /// The seed of the choice of givers.
 const GIVERS_SEED: u64 = 0x4749_5645;
@@ -244,28 +239,24 @@ impl<'a> Growth<'a> {
                 &|| false,
             )
             .ok()?;
-        // Closure takes long, and what comes after it longer still: what is crowded out anyhow is dropped before.
-        let cell = Cell::of(self.rig, &grip.pose, &gripper.contacts);
+        // What comes next takes longest: what is crowded out anyhow is dropped before.
         let is_needy = giver.is_some_and(|giver| giver.is_needy);
-        let classification = classify(self.rig, &grip.pose, &gripper.contacts);
-        let worth_with = |epsilon: f32, contacts: &[Contact]| {
-            let (scene, rig, pose) = (&self.scene, self.rig, &grip.pose);
-            let values = grip_values(scene, rig, pose, contacts, classification, epsilon, &solids);
-            Score { values }.of_grip()
-        };
-        if !is_needy
-            && self
-                .spread
-                .room(cell, worth_with(f32::INFINITY, &gripper.contacts))
-                == Room::Crowded
-        {
+        let contacts = &gripper.contacts;
+        let classification = classify(self.rig, &grip.pose, contacts);
+        let values = grip_values(
+            &self.scene,
+            self.rig,
+            &grip.pose,
+            contacts,
+            classification,
+            grip.epsilon,
+            &solids,
+        );
+        let cell = Cell::of(self.rig, &grip.pose, contacts);
+        if !is_needy && self.spread.room(cell, Score { values }.of_grip()) == Room::Crowded {
             return None;
         }
-        let epsilon = gripper.closure(&self.scene)?;
-        if !is_needy && self.spread.room(cell, worth_with(epsilon, &gripper.contacts)) == Room::Crowded {
-            return None;
-        }
-        let entry = Entry::new(&self.scene, self.rig, grip, &solids, epsilon, gripper);
+        let entry = Entry::new(&self.scene, self.rig, grip, &solids, gripper);
         Some((entry, proposal.shape))
     }
 
@@ -281,22 +272,12 @@ impl<'a> Growth<'a> {
             return propose(&place, stream);
         }
         let place = stream.below(self.entries.len());
-        let known = self.entries[place].grip.pose.frame_from_wrist;
-        let axis = stream.in_cube().normalize_or(Vec3::X);
-        let turn = Quat::from_axis_angle(axis, stream.between(-BESIDE[1], BESIDE[1]));
-        let shape = self.shapes[place];
-        Some(Proposal {
-            object_from_wrist: Pose::new(
-                known.position + stream.in_cube() * BESIDE[0],
-                (turn * known.orientation).normalize(),
-            ),
-            shape: HandShape {
-                thumb_yaw: (shape.thumb_yaw + stream.between(-0.1, 0.1)).clamp(0.0, 1.0),
-                spread: (shape.spread + stream.between(-0.1, 0.1)).clamp(0.0, 1.0),
-                ..shape
-            },
+        let known = Proposal {
+            object_from_wrist: self.entries[place].grip.pose.frame_from_wrist,
+            shape: self.shapes[place],
             advance: 0.0,
-        })
+        };
+        Some(known.beside(stream))
     }
 
     /// Takes a grip over, if there is room for it or it is needed.

@@ -93,21 +93,12 @@ impl Query {
     }
 }
 
-/// True if any of the triangles that count is less than `distance` metres off the capsule's skin.
-pub(super) fn is_within(
-    bvh: &WideBvh,
-    capsule: &TaperedCapsule,
-    distance: f32,
-    counts: impl Fn(u32) -> bool,
-) -> bool {
+/// True if any of the triangles is less than `distance` metres off the capsule's skin.
+pub(super) fn is_within(bvh: &WideBvh, capsule: &TaperedCapsule, distance: f32) -> bool {
     let mut is_within = false;
-    descend(bvh, &Query::new(capsule), distance, |_, triangle| {
-        if counts(triangle) {
-            is_within = true;
-            f32::NEG_INFINITY
-        } else {
-            distance
-        }
+    descend(bvh, &Query::new(capsule), distance, |_, _| {
+        is_within = true;
+        f32::NEG_INFINITY
     });
     is_within
 }

@@ -83,6 +83,24 @@ impl TriangleMesh {
         })
     }
 
+    /// The triangles that `is_chosen` says by their indices, with the vertices that they have; none if it says none.
+    pub fn part(&self, is_chosen: impl Fn(usize) -> bool) -> Option<Self> {
+        let mut part = Self {
+            positions: Vec::new(),
+            triangles: Vec::new(),
+        };
+        let mut moved_to = vec![None; self.positions.len()];
+        for (_, corners) in self.triangles.iter().enumerate().filter(|&(i, _)| is_chosen(i)) {
+            part.triangles.push(corners.map(|vertex| {
+                *moved_to[vertex as usize].get_or_insert_with(|| {
+                    part.positions.push(self.positions[vertex as usize]);
+                    (part.positions.len() - 1) as u32
+                })
+            }));
+        }
+        (!part.triangles.is_empty()).then_some(part)
+    }
+
     /// The vertices in metres.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions

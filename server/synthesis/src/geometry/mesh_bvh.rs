@@ -166,17 +166,7 @@ impl MeshBvh {
     /// True if any of the surface is less than `distance` metres off a capsule's skin; below 0, deeper than that below
     /// it.
     pub fn comes_within(&self, capsule: &TaperedCapsule, distance: f32) -> bool {
-        self.comes_within_of(capsule, distance, |_| true)
-    }
-
-    /// The same for those triangles of the surface that `counts` says.
-    pub fn comes_within_of(
-        &self,
-        capsule: &TaperedCapsule,
-        distance: f32,
-        counts: impl Fn(u32) -> bool,
-    ) -> bool {
-        self.least_gap(capsule) < distance && capsule_gap::is_within(&self.bvh, capsule, distance, counts)
+        self.least_gap(capsule) < distance && capsule_gap::is_within(&self.bvh, capsule, distance)
     }
 
     /// True if the mesh's volume contains the point: if its generalised winding number is more than one half, so that

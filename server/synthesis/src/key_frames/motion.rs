@@ -24,8 +24,6 @@ const NEAR: f32 = 0.008;
 pub(super) struct Obstacles<'a> {
     /// The object.
     pub object: &'a GraspObject,
-    /// True if any of its surface is forbidden.
-    pub has_forbidden: bool,
     /// The giver's hand, in the object's frame.
     pub giver: Option<&'a PreparedHand>,
     /// How many more times a hand may be looked at until it counts as blocked: what bounds the time of hopeless cases.
@@ -136,13 +134,8 @@ fn beside_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, least: f32, 
         .closest_to_capsule(solid, enough)
         .map_or(enough, |gap| gap.gap);
     let part = settle(gap, least, travel);
-    let is_forbidden = |triangle| object.is_forbidden(triangle);
     // A part that is halved is looked at again.
-    if obstacles.has_forbidden
-        && part == Part::Free
-        && gap < travel
-        && surface.comes_within_of(solid, travel, is_forbidden)
-    {
+    if part == Part::Free && gap < travel && object.is_forbidden_within(solid, travel) {
         return if travel > RESOLUTION {
             Part::Open
         } else {

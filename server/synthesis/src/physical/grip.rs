@@ -1,7 +1,9 @@
 //! A grip: a hand closed on an object, whoever holds it out and wherever gravity pulls. Steps 2 to 4 of Algorithm 1 with
 //! the hand as solids, and closure.
 //!
-//! The checks come by cost: palm and forearm before any digit closes, solids before contacts, closure last.
+//! The checks come by cost: palm and forearm before any digit closes, what settles most hands before what settles few.
+//! Half of the hands that close on something touch it where they cannot hold it; fingers that hold nothing are rested
+//! after that is known.
 
 use glam::Vec3;
 
@@ -12,7 +14,7 @@ use super::{
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::{HandShape, Proposal, TUCKED_FLEXION},
-    solids::{HandSolids, PreparedHand, clearance, comes_within, link_radii, self_clearance},
+    solids::{HandSolids, PreparedHand, TaperedCapsule, clearance, comes_within, link_radii, self_clearance},
 };
 use crate::{
     grasp::Contact,
@@ -32,6 +34,9 @@ pub const GIVER_CLEARANCE: f32 = 0.001;
 /// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way by two, and skin is
 /// one thicker than the solids.
 pub const FORBIDDEN_CLEARANCE: f32 = 0.003;
+
+/// The share of enough closure from which a hand is a near miss. Less closure says little of what there is beside it.
+const NEARLY: f32 = 0.1;
 
 /// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.
 const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
@@ -54,6 +59,8 @@ pub struct Grip {
     pub bend_ratios: [Option<f32>; 5],
     /// How deep it sinks into the object at its deepest, in metres; 0 if it does nowhere.
     pub penetration: f32,
+    /// Ferrari-Canny epsilon of its contacts.
+    pub epsilon: f32,
 }
 
 /// Closes hands, and keeps its buffers from one to the next.
@@ -66,6 +73,8 @@ pub struct Gripper {
     obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
+    /// The closure that was found last, as a share of what is enough; 0 before a hand has come that far.
+    closure_share: f32,
 }
 
 impl Gripper {
@@ -84,9 +93,10 @@ impl Gripper {
         interrupted: &impl Fn() -> bool,
     ) -> Result<(Grip, HandSolids), NoGrip> {
         self.posed.clear();
+        self.closure_share = 0.0;
         let giver = presented.and_then(|presented| presented.giver.as_ref());
 
-        // Step 3 for what does not move: palm and forearm.
+        // Steps 3 and 4 for what does not move: palm and forearm.
         let Proposal { shape, advance, .. } = proposal;
         let opened = HandPose {
             frame_from_wrist: proposal.object_from_wrist,
@@ -112,6 +122,10 @@ impl Gripper {
         if collides {
             return Err(NoGrip::Rejected(Rejection::PalmCollision));
         }
+        if nears_forbidden_surface(scene, still.palm.iter().chain(&still.thenar)) {
+            stopwatch.lap(Step::ContactValidation);
+            return Err(NoGrip::Rejected(Rejection::UnwantedContact));
+        }
 
         // Step 2, Finger Posing.
         self.obstacles.clear();
@@ -134,35 +148,48 @@ impl Gripper {
             closer.close_fingers(thumb, &self.obstacles, interrupted)
         });
         stopwatch.lap(Step::FingerPosing);
-        let digits = closed?;
-        self.posed.extend(digits.iter().map(|digit| digit.angles));
+        let closed = closed?;
+        let posed = |digits: &[ClosedDigit; 5]| HandPose {
+            frame_from_wrist: object_from_wrist,
+            digits: digits.map(|digit| digit.angles),
+        };
+        self.posed.extend(closed.iter().map(|digit| digit.angles));
         if interrupted() {
             return Err(NoGrip::Interrupted);
         }
 
+        // Step 4, Contact Validation, for the digits that hold.
+        let solids = HandSolids::of_pose(rig, &posed(&closed));
+        collect_contacts(scene.object, &closed, &solids, &mut self.contacts);
+        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+        stopwatch.lap(Step::ContactValidation);
+
+        // Step 5, Immobility Validation: whether they can hold anything.
+        let epsilon = are_opposed(&self.contacts).then(|| self.closure(scene)).flatten();
+        stopwatch.lap(Step::ImmobilityValidation);
+        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
+        if interrupted() {
+            return Err(NoGrip::Interrupted);
+        }
+
+        // Step 2 for the fingers that hold nothing.
+        let digits = closer.rest_idle(&closed, &self.obstacles);
+        stopwatch.lap(Step::FingerPosing);
+        self.posed.clear();
+        self.posed.extend(digits.iter().map(|digit| digit.angles));
+
         // Step 3, Collision Validation.
-        let pose = HandPose {
-            frame_from_wrist: object_from_wrist,
-            digits: digits.map(|digit| digit.angles),
-        };
+        let pose = posed(&digits);
         let solids = HandSolids::of_pose(rig, &pose);
         let penetration = penetration(scene, giver, &solids);
         stopwatch.lap(Step::CollisionValidation);
         let penetration = penetration.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
 
-        // Step 4, Contact Validation.
-        collect_contacts(scene.object, &digits, &solids, &mut self.contacts);
-        let refused = if nears_forbidden_surface(scene, &solids) {
-            Some(Rejection::UnwantedContact)
-        } else if !are_opposed(&self.contacts) {
-            Some(Rejection::NotImmobilizing)
-        } else {
-            None
-        };
-        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+        // Step 4 for the whole hand.
+        let is_unwanted = nears_forbidden_surface(scene, solids.iter());
         stopwatch.lap(Step::ContactValidation);
-        if let Some(rejection) = refused {
-            return Err(NoGrip::Rejected(rejection));
+        if is_unwanted {
+            return Err(NoGrip::Rejected(Rejection::UnwantedContact));
         }
         let bend_ratios = std::array::from_fn(|digit| {
             digits[digit]
@@ -173,6 +200,7 @@ impl Gripper {
             pose,
             bend_ratios,
             penetration,
+            epsilon,
         };
         Ok((grip, solids))
     }
@@ -181,8 +209,17 @@ impl Gripper {
     pub fn closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
         // Closure is the same wherever gravity pulls.
         let load = scene.load(Vec3::Y);
-        let epsilon = epsilon(&self.soft_contacts, &load, scene.least_epsilon, &mut self.buffers);
+        let nearly = NEARLY * scene.least_epsilon;
+        let epsilon = epsilon(&self.soft_contacts, &load, nearly, &mut self.buffers);
+        self.closure_share = epsilon / scene.least_epsilon;
         (epsilon >= scene.least_epsilon).then_some(epsilon)
+    }
+
+    /// After a hand that was refused: its closure as a share of what is enough, if that nearly was.
+    pub(super) fn near_miss(&self) -> Option<f32> {
+        (NEARLY..1.0)
+            .contains(&self.closure_share)
+            .then_some(self.closure_share)
     }
 }
 
@@ -263,10 +300,13 @@ impl Closer<'_> {
         }
     }
 
-    /// A digit closed as far as it goes, if nothing is in its way before.
+    /// A digit closed as far as it goes, if nothing is in its way before and it comes near to nothing that is not to be
+    /// touched.
     fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
         let closed = self.closing(digit, obstacles).close()?;
-        self.is_clear_of_giver(&closed).then_some(closed)
+        let is_free =
+            self.is_clear_of_giver(&closed) && !nears_forbidden_surface(self.scene, closed.links.iter());
+        is_free.then_some(closed)
     }
 
     fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
@@ -285,7 +325,7 @@ impl Closer<'_> {
         }
     }
 
-    /// Closes the fingers, and lets those rest that touch nothing, have something in their way or are not to close.
+    /// Closes the fingers; those that have something in their way or are not to close hold nothing.
     fn close_fingers(
         &self,
         thumb: ClosedDigit,
@@ -304,15 +344,20 @@ impl Closer<'_> {
         if !closed[1..].iter().any(ClosedDigit::touches_object) {
             return Err(NoGrip::Rejected(Rejection::NoFingers));
         }
-        let mut rested = closed;
-        for &finger in fingers {
+        Ok(closed)
+    }
+
+    /// The digits with those at rest that hold nothing.
+    fn rest_idle(&self, closed: &[ClosedDigit; 5], obstacles: &[Obstacle]) -> [ClosedDigit; 5] {
+        let mut rested = *closed;
+        for &finger in &Digit::ALL[1..] {
             let place = finger.index();
             if !closed[place].touches_object() {
-                let flexion = self.shape.resting_flexion(&closed, place);
+                let flexion = self.shape.resting_flexion(closed, place);
                 rested[place] = self.rest(finger, obstacles, flexion);
             }
         }
-        Ok(rested)
+        rested
     }
 
     /// A finger that holds nothing, relaxed; tucked away or nearly stretched where it would meet the giver's hand.
@@ -356,14 +401,9 @@ fn penetration(scene: &ObjectScene<'_>, giver: Option<&PreparedHand>, solids: &H
     (least >= -DEEPEST).then_some(-least)
 }
 
-fn nears_forbidden_surface(scene: &ObjectScene<'_>, solids: &HandSolids) -> bool {
-    let object = scene.object;
-    object.forbidden_count() > 0
-        && solids.iter().any(|part| {
-            object
-                .surface
-                .comes_within_of(part, FORBIDDEN_CLEARANCE, |triangle| {
-                    object.is_forbidden(triangle)
-                })
-        })
+fn nears_forbidden_surface<'a>(
+    scene: &ObjectScene<'_>,
+    mut parts: impl Iterator<Item = &'a TaperedCapsule>,
+) -> bool {
+    parts.any(|part| scene.object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
 }

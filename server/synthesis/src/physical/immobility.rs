@@ -21,7 +21,7 @@ use glam::Vec3;
 
 use crate::hand::Digit;
 pub(crate) use balance::firm_force;
-pub use balance::{BALANCE_TOLERANCE, Expected, MAX_CONTACT_FORCE, balance};
+pub use balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance};
 pub use closure::{EPSILON_TOLERANCE, epsilon};
 
 /// A soft-finger contact: it pushes, rubs along the surface and resists twist about the normal.

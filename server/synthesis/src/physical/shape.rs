@@ -1,5 +1,7 @@
 //! How a hand is held while it closes, and how idle fingers rest.
 
+use glam::{Quat, Vec3};
+
 use super::{closing::ClosedDigit, flexing::Flexing};
 use crate::{
     hand::{
@@ -109,6 +111,12 @@ impl HandShape {
     }
 }
 
+/// How far beside a proposal another one's wrist lies at most, in metres and radians, …
+const BESIDE: [f32; 2] = [0.006, 0.12];
+
+/// … and how much the thumb's yaw and the fingers' spread differ, as shares of their ranges.
+const SHAPED_BESIDE: f32 = 0.1;
+
 /// A hand to be closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proposal {
@@ -119,4 +127,30 @@ pub struct Proposal {
     /// How far the hand goes along its +z, in metres, until the palm touches; 0 if it stays where it is. A palm that does
     /// not touch by then is no grip.
     pub advance: f32,
+}
+
+impl Proposal {
+    /// One a little beside, of a hand that is a little different.
+    #[must_use]
+    pub fn beside(&self, stream: &mut AttemptStream) -> Self {
+        let Pose {
+            position,
+            orientation,
+        } = self.object_from_wrist;
+        let [shift, turn] = BESIDE;
+        let axis = stream.in_cube().normalize_or(Vec3::X);
+        let turn = Quat::from_axis_angle(axis, stream.between(-turn, turn));
+        let position = position + stream.in_cube() * shift;
+        let mut differing =
+            |share: f32| (share + stream.between(-SHAPED_BESIDE, SHAPED_BESIDE)).clamp(0.0, 1.0);
+        Self {
+            object_from_wrist: Pose::new(position, (turn * orientation).normalize()),
+            shape: HandShape {
+                thumb_yaw: differing(self.shape.thumb_yaw),
+                spread: differing(self.shape.spread),
+                ..self.shape
+            },
+            ..*self
+        }
+    }
 }

@@ -288,7 +288,7 @@ impl Attempt {
                 rig: scene.rig,
                 constraints: &scene.constraints,
             };
-            return self.hold_physically(&around, &proposal, stopwatch, interrupted);
+            return self.hold_physically(&around, &proposal, scene.strategy, stream, stopwatch, interrupted);
         }
 
         // Step 2, Finger Posing.
@@ -349,10 +349,16 @@ impl Attempt {
         &mut self,
         around: &Surroundings<'_>,
         proposal: &Proposal,
+        strategy: Strategy,
+        stream: &mut AttemptStream,
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
     ) -> AttemptEnd {
-        let end = self.physical.hold(around, proposal, stopwatch, interrupted);
+        let physical = &mut self.physical;
+        let end = match strategy {
+            Strategy::Guided => physical.hold_or_refine(around, proposal, stream, stopwatch, interrupted),
+            _ => physical.hold(around, proposal, stopwatch, interrupted),
+        };
         let posed = &self.physical.gripper.posed;
         for (digit, angles) in self.digits.iter_mut().zip(posed) {
             *digit = PosedDigit {

@@ -185,6 +185,8 @@ impl<'a> View<'a> {
                 self.curled * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
             }
 
+            // An index finger that lies on nothing points past the object.
+            GraspType::IndexFingerExtension if !index.touches => 0.0,
             GraspType::IndexFingerExtension => {
                 let others = fingers[1..].iter().map(|finger| finger.curl).sum::<f32>() / 3.0;
                 self.index_stretched() * bent(others, CURLED)

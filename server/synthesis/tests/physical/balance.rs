@@ -4,7 +4,7 @@ use glam::Vec3;
 use grasp_synthesis::{
     hand::Digit,
     physical::immobility::{
-        BALANCE_TOLERANCE, Balance, Buffers, Expected, Load, MAX_CONTACT_FORCE, SoftContact, balance,
+        BALANCE_TOLERANCE, Balance, Buffers, Load, MAX_CONTACT_FORCE, SoftContact, balance,
     },
     synthesis::comfort::comfort,
 };
@@ -12,7 +12,7 @@ use grasp_synthesis::{
 use crate::support::{Random, contacts_at, load, moved, scaled};
 
 fn solve(contacts: &[SoftContact], load: &Load) -> Option<Balance> {
-    balance(contacts, load, Expected::Nothing, &mut Buffers::default())
+    balance(contacts, load, &mut Buffers::default())
 }
 
 /// What is left unbalanced over the weight, in single steps from the reply alone.
@@ -248,7 +248,7 @@ fn random_grasps_keep_every_limit() {
     for case in 0..4000 {
         let contacts = random.contacts(1 + case % 10);
         let load = load(random.between(0.02, 4.0), random.direction(), 0.04);
-        let Some(found) = balance(&contacts, &load, Expected::Nothing, &mut buffers) else {
+        let Some(found) = balance(&contacts, &load, &mut buffers) else {
             continue;
         };
         held += 1;

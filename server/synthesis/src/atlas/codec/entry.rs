@@ -54,6 +54,7 @@ pub(super) fn write_entry(
         pose,
         bend_ratios,
         penetration,
+        epsilon,
     } = &entry.grip;
     let Pose {
         position,
@@ -63,7 +64,7 @@ pub(super) fn write_entry(
     writer.floats(&orientation.to_array());
     write_shape(writer, shape);
     write_digits(writer, pose, bend_ratios, shape, rig);
-    writer.floats(&[*penetration, entry.epsilon]);
+    writer.floats(&[*penetration, *epsilon]);
     for term in grip_terms() {
         writer.floats(&[entry.grip_values[term as usize]]);
     }
@@ -112,18 +113,11 @@ pub(super) fn read_entry(
         pose,
         bend_ratios,
         penetration,
+        epsilon,
     };
     let classification = classify(rig, &pose, &contacts);
     Ok((
-        Entry::from_parts(
-            grip,
-            contacts,
-            classification,
-            epsilon,
-            grip_values,
-            scores,
-            &solids,
-        ),
+        Entry::from_parts(grip, contacts, classification, grip_values, scores, &solids),
         shape,
     ))
 }

@@ -76,12 +76,7 @@ const WRENCH_ROWS: usize = 6;
 /// press as it likes. `None` if there are none.
 ///
 /// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
-pub fn balance(
-    contacts: &[SoftContact],
-    load: &Load,
-    expected: Expected,
-    buffers: &mut Buffers,
-) -> Option<Balance> {
+pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
     let Buffers {
         cones,
         solver,
@@ -91,12 +86,10 @@ pub fn balance(
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
-    if expected == Expected::Balance
-        && let Some(found) = problem.safest_balance(solver, column)
-    {
+    // Contacts that have closure hold nearly everything.
+    if let Some(found) = problem.safest_balance(solver, column) {
         return Some(found);
     }
-    // First whether there are any: that settles most grasps, at once.
     problem.solve(solver, column);
     if unbalanced_length(solver) > f64::from(BALANCE_TOLERANCE) {
         return None;
@@ -108,29 +101,12 @@ pub fn balance(
         found = problem.balance(solver);
     }
     problem.keep_limits(&mut found);
-    if found.residual > BALANCE_TOLERANCE {
-        return None;
-    }
-    let better = match expected {
-        Expected::Nothing => problem.safest_balance(solver, column),
-        // There is none, or it would have been the answer.
-        Expected::Balance => None,
-    };
-    Some(better.unwrap_or(found))
+    (found.residual <= BALANCE_TOLERANCE).then_some(found)
 }
 
 /// Newtons that the digits press with together, normal to the surface, to hold a weight in newtons firmly.
 pub(crate) fn firm_force(weight: f64, friction: f64) -> f64 {
     SURE_GRIP + FIRMNESS / friction * weight
-}
-
-/// What is asked first: it changes how soon the answer is there, and not the answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Expected {
-    /// Most contacts that come cannot hold the load: first whether there are any forces at all.
-    Nothing,
-    /// The contacts have closure, so that they hold nearly everything: first the comfortable forces.
-    Balance,
 }
 
 /// Non-negative least squares for one grasp. Forces are in units of the weight.
