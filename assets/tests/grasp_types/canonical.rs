@@ -60,7 +60,11 @@ fn an_index_finger_that_points_past_the_object_holds_nothing() {
     held.contacts
         .retain(|contact| contact.part.digit() != Some(Index));
     let found = held.classify();
-    assert_ne!(found.grasp_type, Some(GraspType::IndexFingerExtension), "{found:?}");
+    assert_ne!(
+        found.grasp_type,
+        Some(GraspType::IndexFingerExtension),
+        "{found:?}"
+    );
 }
 
 #[test]

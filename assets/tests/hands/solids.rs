@@ -7,7 +7,9 @@ use grasp_synthesis::{
         DigitAngles, HandPose, Handedness,
         joints::{HandJoints, index},
     },
-    physical::solids::{HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, self_clearance},
+    physical::solids::{
+        HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, off_told_palm, self_clearance,
+    },
     pose::Pose,
 };
 
@@ -107,8 +109,8 @@ fn solids_of_tracked_joints_are_those_of_the_pose() {
     }
 }
 
-/// A giver whose joints tell of a thicker palm than the fitted one is as thick as told along the metacarpals, and nowhere
-/// thinner than fitted.
+/// A giver whose joints tell of a thicker palm than the fitted one is as thick as told along the metacarpals, nearly so
+/// between them, and nowhere thinner than fitted.
 #[test]
 fn a_giver_is_as_thick_as_told() {
     let hand = built_in("adult", Handedness::Right);
@@ -119,10 +121,11 @@ fn a_giver_is_as_thick_as_told() {
         }
         let fitted = HandSolids::of_joints(&joints);
         let giver = HandSolids::of_giver(&joints);
-        let inside = |ball: Vec3, radius: f32| {
+        let within = |ball: Vec3, radius: f32, room: f32| {
             let depths = giver.palm.iter().map(|solid| -solid.signed_distance(ball));
-            depths.fold(f32::NEG_INFINITY, f32::max) >= radius - 1e-6
+            depths.fold(f32::NEG_INFINITY, f32::max) >= radius - room
         };
+        let inside = |ball, radius| within(ball, radius, 1e-6);
         // OpenXR's metacarpals of the four fingers, and the knuckles at their ends.
         for [base, knuckle] in [[6, 7], [11, 12], [16, 17], [21, 22]] {
             let [base, knuckle] = [base, knuckle].map(|joint| joints.joints[joint]);
@@ -133,6 +136,19 @@ fn a_giver_is_as_thick_as_told() {
                 assert!(inside(place, radius), "{more} more, {along} along");
             }
         }
+        // Across the knuckles and the metacarpals' bases, the solids are balls half a finger's breadth apart.
+        for neighbours in [[7, 12], [12, 17], [17, 22], [6, 11], [11, 16], [16, 21]] {
+            let [a, b] = neighbours.map(|joint| joints.joints[joint]);
+            for step in 0..=10 {
+                let along = step as f32 / 10.0;
+                let place = a.pose.position.lerp(b.pose.position, along);
+                let radius = a.radius + (b.radius - a.radius) * along;
+                assert!(
+                    within(place, radius, 0.0015),
+                    "{more} more, {neighbours:?}, {along} along"
+                );
+            }
+        }
         for solid in &fitted.palm {
             for along in [0.0, 0.3, 1.0] {
                 assert!(inside(solid.at(along), solid.radius_at(along)));
@@ -141,6 +157,45 @@ fn a_giver_is_as_thick_as_told() {
         assert_eq!(giver.phalanges, fitted.phalanges);
         assert_eq!(giver.thenar, fitted.thenar);
         assert_eq!(giver.forearm, fitted.forearm);
+    }
+}
+
+/// The told palm is what balls that travel from joint to joint sweep, as wide as the joints say.
+#[test]
+fn a_point_is_as_far_off_the_told_palm_as_off_its_balls() {
+    const STEPS: usize = 200;
+    let hand = built_in("adult", Handedness::Right);
+    let joints = HandJoints::of_pose(&hand.rig, &posed(relaxed()));
+    let metacarpals = [(6, 7), (11, 12), (16, 17), (21, 22)];
+    let across = [(6, 11), (11, 16), (16, 21), (7, 12), (12, 17), (17, 22)];
+    let from_wrist = [(1, 2), (1, 6), (1, 11), (1, 16), (1, 21)];
+    let bones = metacarpals.iter().chain(&across).chain(&from_wrist);
+    let balls: Vec<(Vec3, f32)> = bones
+        .flat_map(|&(a, b)| {
+            let [a, b] = [a, b].map(|joint| joints.joints[joint]);
+            (0..=STEPS).map(move |step| {
+                let along = step as f32 / STEPS as f32;
+                (
+                    a.pose.position.lerp(b.pose.position, along),
+                    a.radius + (b.radius - a.radius) * along,
+                )
+            })
+        })
+        .collect();
+    let mut numbers = Numbers(31);
+    let middle = joints.joints[11].pose.position;
+    for _ in 0..300 {
+        let mut within = || 0.16 * numbers.next() - 0.08;
+        let point = middle + Vec3::new(within(), within(), within());
+        let expected = balls
+            .iter()
+            .map(|(ball, radius)| ball.distance(point) - radius)
+            .fold(f32::INFINITY, f32::min);
+        let found = off_told_palm(&joints, point);
+        assert!(
+            (found - expected.abs()).abs() < 3e-4,
+            "{point}: {found}, not {expected}"
+        );
     }
 }
 

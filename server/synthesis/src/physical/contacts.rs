@@ -5,11 +5,11 @@ use glam::Vec3;
 use super::{
     closing::{ClosedDigit, TOUCHING},
     immobility::SoftContact,
-    solids::{HandSolids, Touch, closest},
+    solids::{HandSolids, Touch, closest, off_told_palm},
 };
 use crate::{
     grasp::Contact,
-    hand::{Digit, HandPart, Phalanx},
+    hand::{Digit, HandPart, Phalanx, joints::HandJoints},
     object::GraspObject,
 };
 
@@ -29,10 +29,17 @@ const INSIDE_COS: f32 = 0.9962;
 /// touch with the same piece of skin. Fewer make the palm pivot, more cost time in the immobility checks.
 const PALM_SPACING: f32 = 0.015;
 
-/// Puts the contacts of the digits that touch and of the palm into `contacts`, thumb first and the palm last.
+/// How far from the palm that the joints' radii tell a contact of it may be, in metres. Flesh that stands farther off, as
+/// the ball of the little finger does, gives way before it bears; and whoever draws the hand by its radii sees a contact in
+/// the air there.
+const PALM_SLACK: f32 = 0.0015;
+
+/// Puts the contacts of the digits that touch and of the palm into `contacts`, thumb first and the palm last. The solids are
+/// those of the joints.
 pub(super) fn collect_contacts(
     object: &GraspObject,
     digits: &[ClosedDigit; 5],
+    joints: &HandJoints,
     solids: &HandSolids,
     contacts: &mut Vec<Contact>,
 ) {
@@ -54,7 +61,7 @@ pub(super) fn collect_contacts(
             continue;
         };
         let is_new = |other: &Contact| other.position.distance(touch.point) >= PALM_SPACING;
-        if contacts[first_of_palm..].iter().all(is_new) {
+        if contacts[first_of_palm..].iter().all(is_new) && off_told_palm(joints, touch.point) <= PALM_SLACK {
             contacts.extend(contact(solids, &touch, HandPart::Palm));
         }
     }

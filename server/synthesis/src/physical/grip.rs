@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     grasp::Contact,
-    hand::{Digit, DigitAngles, HandPose, rig::Rig},
+    hand::{Digit, DigitAngles, HandPose, joints::HandJoints, rig::Rig},
     pose::Pose,
     rejection::Rejection,
     synthesis::stopwatch::{Step, Stopwatch},
@@ -159,8 +159,9 @@ impl Gripper {
         }
 
         // Step 4, Contact Validation, for the digits that hold.
-        let solids = HandSolids::of_pose(rig, &posed(&closed));
-        collect_contacts(scene.object, &closed, &solids, &mut self.contacts);
+        let joints = HandJoints::of_pose(rig, &posed(&closed));
+        let solids = HandSolids::of_joints(&joints);
+        collect_contacts(scene.object, &closed, &joints, &solids, &mut self.contacts);
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
         stopwatch.lap(Step::ContactValidation);
 

@@ -12,7 +12,7 @@ mod mesh_clearance;
 mod prepared_hand;
 
 pub use balls::{BALLS, Balls};
-pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
+pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS, off_told_palm};
 pub(super) use hand_clearance::Bounded;
 pub use hand_clearance::{SOFT_CONTACT, self_clearance};
 pub use hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};

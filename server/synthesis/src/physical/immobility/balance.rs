@@ -263,13 +263,12 @@ impl<'a> Problem<'a> {
             );
             let of_comfort = self.comfort_gains(solver.residual());
             for (contact, cone) in self.cones.iter().enumerate() {
-                let cone = cone.with_share(self.friction_share);
                 // The residual times the push's column, without writing that.
                 let mut gain = if self.limited {
-                    let (reach, push) = cone.farthest_push(&unbalanced);
+                    let (reach, push) = cone.farthest_push(&unbalanced, self.friction_share);
                     reach + solver.residual()[WRENCH_ROWS + contact] * self.limit_entry(&push)
                 } else {
-                    cone.reach(&unbalanced)
+                    cone.reach(&unbalanced, self.friction_share)
                 };
                 if let Some(digit) = self.contacts[contact].digit {
                     gain += of_comfort[digit.index()];
@@ -297,8 +296,7 @@ impl<'a> Problem<'a> {
             let Some(contact) = best.1 else {
                 return;
             };
-            let cone = self.cones[contact].with_share(self.friction_share);
-            let (_, push) = cone.farthest_push(&unbalanced);
+            let (_, push) = self.cones[contact].farthest_push(&unbalanced, self.friction_share);
             self.write_entries(contact, &push, entries);
             if !solver.add(entries, Column::Push { contact, push }) {
                 return;

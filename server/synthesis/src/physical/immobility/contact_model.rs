@@ -33,9 +33,10 @@ pub(super) struct ContactCone {
     inward: DVec3,
     /// From the centre of mass to the contact, over the characteristic length.
     arm: DVec3,
-    friction: f64,
-    /// Torsion radius over characteristic length.
-    torsion: f64,
+    /// μ².
+    friction_squared: f64,
+    /// σ²: of the torsion radius over the characteristic length.
+    torsion_squared: f64,
 }
 
 /// What a contact applies with a normal force of one newton.
@@ -64,33 +65,24 @@ impl ContactCone {
         Self {
             inward: -contact.normal.as_dvec3().normalize_or_zero(),
             arm: (contact.position.as_dvec3() - load.centre_of_mass.as_dvec3()) / length,
-            friction: f64::from(contact.friction),
-            torsion: f64::from(contact.torsion_radius) / length,
-        }
-    }
-
-    /// The same contact with a share of its friction and torsion.
-    pub(super) fn with_share(&self, share: f64) -> Self {
-        Self {
-            friction: self.friction * share,
-            torsion: self.torsion * share,
-            ..*self
+            friction_squared: f64::from(contact.friction).powi(2),
+            torsion_squared: (f64::from(contact.torsion_radius) / length).powi(2),
         }
     }
 
     /// How far the push reaches whose wrench reaches farthest along `direction`: [`ContactCone::farthest_push`] without the
     /// push, in half the time.
-    pub(super) fn reach(&self, direction: &ScaledWrench) -> f64 {
+    pub(super) fn reach(&self, direction: &ScaledWrench, share: f64) -> f64 {
         let Along { normal, gain, .. } = self.along(direction);
-        normal + gain
+        normal + share * gain
     }
 
-    /// The push whose wrench reaches farthest along `direction`, and how far.
+    /// The push whose wrench reaches farthest along `direction`, and how far, when `share` of friction and torsion may be used.
     ///
     /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is
     /// (n + t)·a + s b with a = u + v × arm and b = v·n; over an ellipsoid that is largest at t = μ² aₜ / q, s = σ² b / q
-    /// with q² = μ² |aₜ|² + σ² b², where it is a·n + q.
-    pub(super) fn farthest_push(&self, direction: &ScaledWrench) -> (f64, UnitPush) {
+    /// with q² = μ² |aₜ|² + σ² b², where it is a·n + q. With a share of both, t, s and q are that share of these.
+    pub(super) fn farthest_push(&self, direction: &ScaledWrench, share: f64) -> (f64, UnitPush) {
         let Along {
             normal,
             across,
@@ -99,8 +91,8 @@ impl ContactCone {
         } = self.along(direction);
         let push = if gain > 0.0 {
             UnitPush {
-                force: self.inward + across * (self.friction * self.friction / gain),
-                torsion: self.torsion * self.torsion * about_normal / gain,
+                force: self.inward + across * (share * self.friction_squared / gain),
+                torsion: share * self.torsion_squared * about_normal / gain,
             }
         } else {
             UnitPush {
@@ -108,7 +100,7 @@ impl ContactCone {
                 torsion: 0.0,
             }
         };
-        (normal + gain, push)
+        (normal + share * gain, push)
     }
 
     #[inline]
@@ -119,10 +111,8 @@ impl ContactCone {
         let normal = along.dot(self.inward);
         let across = along - self.inward * normal;
         let about_normal = twist.dot(self.inward);
-        let (friction_squared, torsion_squared) =
-            (self.friction * self.friction, self.torsion * self.torsion);
-        let gain = (friction_squared * across.length_squared()
-            + torsion_squared * about_normal * about_normal)
+        let gain = (self.friction_squared * across.length_squared()
+            + self.torsion_squared * about_normal * about_normal)
             .sqrt();
         Along {
             normal,
@@ -154,14 +144,14 @@ pub(super) fn farthest_wrench(cones: &[ContactCone], direction: &ScaledWrench) -
     let mut best = (f64::NEG_INFINITY, [0.0; 6]);
     let mut chosen = None;
     for cone in cones {
-        let reach = cone.reach(direction);
+        let reach = cone.reach(direction, 1.0);
         if reach > best.0 {
             best.0 = reach;
             chosen = Some(cone);
         }
     }
     if let Some(cone) = chosen {
-        best.1 = cone.wrench(&cone.farthest_push(direction).1);
+        best.1 = cone.wrench(&cone.farthest_push(direction, 1.0).1);
     }
     best
 }

@@ -150,8 +150,8 @@ impl<'a> Skeleton<'a> {
         self.solids(&PALM)
     }
 
-    /// The palm's solids, those along the metacarpals at least as thick as the joints' radii say: what a hand's owner tells
-    /// of its thickness may be more than what was fitted to another hand's skin.
+    /// The palm's solids, those along the metacarpals and between them at least as thick as the joints' radii say: what a
+    /// hand's owner tells of its thickness may be more than what was fitted to another hand's skin.
     pub(super) fn palm_as_told(&self) -> [TaperedCapsule; PALM_SOLIDS] {
         PALM.map(|ends| {
             let fitted = self.solid(ends);
@@ -160,9 +160,11 @@ impl<'a> Skeleton<'a> {
                 (ends[1].0, fitted.end, fitted.end_radius),
             ]
             .map(|(anchor, place, radius)| match anchor {
-                Between(joint, same, _) if joint == same => {
-                    let told = self.joints.joints[joint];
-                    TaperedCapsule::new(place, told.pose.position, radius, told.radius).bounding_ball()
+                Between(a, b, share) => {
+                    let [a, b] = [a, b].map(|joint| self.joints.joints[joint]);
+                    let told = a.pose.position.lerp(b.pose.position, share);
+                    let told_radius = a.radius + (b.radius - a.radius) * share;
+                    TaperedCapsule::new(place, told, radius, told_radius).bounding_ball()
                 }
                 _ => (place, radius),
             });
@@ -201,4 +203,23 @@ impl<'a> Skeleton<'a> {
             Thumb => at(index::FIRST_OF_DIGIT[0]) + self.frame_from_thumb * offset,
         }
     }
+}
+
+/// How far a point is from the skin of the palm that the joints' radii tell, in metres, from outside or inside: around the
+/// four metacarpals, from one to the next across knuckles and bases, and from the wrist to the bases and the thumb's.
+pub fn off_told_palm(joints: &HandJoints, point: Vec3) -> f32 {
+    let bases = [1, 2, 3, 4].map(|finger| index::FIRST_OF_DIGIT[finger]);
+    let knuckles = bases.map(|base| base + 1);
+    let along = (0..4).map(|k| (bases[k], knuckles[k]));
+    let across = (1..4).flat_map(|k| [(bases[k - 1], bases[k]), (knuckles[k - 1], knuckles[k])]);
+    let from_wrist = [0, 1, 2, 3, 4].map(|digit| (index::WRIST, index::FIRST_OF_DIGIT[digit]));
+    along
+        .chain(across)
+        .chain(from_wrist)
+        .map(|(a, b)| {
+            let [a, b] = [a, b].map(|joint| joints.joints[joint]);
+            TaperedCapsule::new(a.pose.position, b.pose.position, a.radius, b.radius).signed_distance(point)
+        })
+        .fold(f32::INFINITY, f32::min)
+        .abs()
 }
