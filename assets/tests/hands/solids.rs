@@ -121,11 +121,11 @@ fn a_giver_is_as_thick_as_told() {
         }
         let fitted = HandSolids::of_joints(&joints);
         let giver = HandSolids::of_giver(&joints);
-        let within = |ball: Vec3, radius: f32, room: f32| {
-            let depths = giver.palm.iter().map(|solid| -solid.signed_distance(ball));
-            depths.fold(f32::NEG_INFINITY, f32::max) >= radius - room
+        let depth = |point: Vec3| {
+            let depths = giver.palm.iter().map(|solid| -solid.signed_distance(point));
+            depths.fold(f32::NEG_INFINITY, f32::max)
         };
-        let inside = |ball, radius| within(ball, radius, 1e-6);
+        let inside = |ball: Vec3, radius: f32| depth(ball) >= radius - 1e-6;
         // OpenXR's metacarpals of the four fingers, and the knuckles at their ends.
         for [base, knuckle] in [[6, 7], [11, 12], [16, 17], [21, 22]] {
             let [base, knuckle] = [base, knuckle].map(|joint| joints.joints[joint]);
@@ -136,17 +136,19 @@ fn a_giver_is_as_thick_as_told() {
                 assert!(inside(place, radius), "{more} more, {along} along");
             }
         }
-        // Across the knuckles and the metacarpals' bases, the solids are balls half a finger's breadth apart.
+        // Across the knuckles and the metacarpals' bases, the solids are balls half a finger's breadth apart: skin above and
+        // below dips between them.
         for neighbours in [[7, 12], [12, 17], [17, 22], [6, 11], [11, 16], [16, 21]] {
             let [a, b] = neighbours.map(|joint| joints.joints[joint]);
+            let axis = (b.pose.position - a.pose.position).normalize();
             for step in 0..=10 {
                 let along = step as f32 / 10.0;
                 let place = a.pose.position.lerp(b.pose.position, along);
                 let radius = a.radius + (b.radius - a.radius) * along;
-                assert!(
-                    within(place, radius, 0.0015),
-                    "{more} more, {neighbours:?}, {along} along"
-                );
+                for out in [Vec3::Z, Vec3::NEG_Z].map(|out| out.reject_from_normalized(axis).normalize()) {
+                    let dip = -depth(place + out * radius);
+                    assert!(dip < 0.0015, "{more} more, {neighbours:?}, {along} along: {dip}");
+                }
             }
         }
         for solid in &fitted.palm {
