@@ -50,7 +50,8 @@ impl PhysicalAttempt {
     /// the one that had most.
     ///
     /// # Errors
-    /// The first check that the proposed hand fails, or the stop signal.
+    /// The first check that the proposed hand fails, an unmet constraint if that is all that another one fails, or the stop
+    /// signal.
     pub fn hold_or_refine(
         &mut self,
         around: &Surroundings<'_>,
@@ -59,9 +60,9 @@ impl PhysicalAttempt {
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
     ) -> Result<Box<Grasp>, NoGrip> {
-        let first = self.hold(around, proposal, stopwatch, interrupted);
-        let (Err(NoGrip::Rejected(_)), Some(share)) = (&first, self.gripper.near_miss()) else {
-            return first;
+        let mut refused = self.hold(around, proposal, stopwatch, interrupted);
+        let (Err(NoGrip::Rejected(_)), Some(share)) = (&refused, self.gripper.near_miss()) else {
+            return refused;
         };
         // What is told of a hand that fails is the proposed one's.
         let posed = self.gripper.posed.clone();
@@ -71,6 +72,11 @@ impl PhysicalAttempt {
             in_vain += 1;
             let beside = nearest.1.beside(stream);
             match self.hold(around, &beside, stopwatch, interrupted) {
+                // It holds, and is not wanted so.
+                Err(NoGrip::Rejected(Rejection::UnmetConstraint)) => {
+                    refused = Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+                    break;
+                }
                 Err(NoGrip::Rejected(_)) => {}
                 end => return end,
             }
@@ -80,7 +86,7 @@ impl PhysicalAttempt {
             }
         }
         self.gripper.posed = posed;
-        first
+        refused
     }
 
     /// Everything after a hand was proposed.

@@ -35,8 +35,9 @@ pub const GIVER_CLEARANCE: f32 = 0.001;
 /// one thicker than the solids.
 pub const FORBIDDEN_CLEARANCE: f32 = 0.003;
 
-/// The share of enough closure from which a hand is a near miss. Less closure says little of what there is beside it.
-const NEARLY: f32 = 0.1;
+/// The share of enough closure, by a bound from above, from which a hand is a near miss. Less closure says little of what
+/// there is beside it.
+const NEARLY: f32 = 0.3;
 
 /// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.
 const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
@@ -73,7 +74,8 @@ pub struct Gripper {
     obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
-    /// The closure that was found last, as a share of what is enough; 0 before a hand has come that far.
+    /// The closure that was found last, as a share of what is enough; a bound from above where it is not. 0 before a hand
+    /// has come that far.
     closure_share: f32,
 }
 
@@ -210,13 +212,12 @@ impl Gripper {
     pub fn closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
         // Closure is the same wherever gravity pulls.
         let load = scene.load(Vec3::Y);
-        let nearly = NEARLY * scene.least_epsilon;
-        let epsilon = epsilon(&self.soft_contacts, &load, nearly, &mut self.buffers);
+        let epsilon = epsilon(&self.soft_contacts, &load, scene.least_epsilon, &mut self.buffers);
         self.closure_share = epsilon / scene.least_epsilon;
         (epsilon >= scene.least_epsilon).then_some(epsilon)
     }
 
-    /// After a hand that was refused: its closure as a share of what is enough, if that nearly was.
+    /// After a hand that was refused: at most how much of enough closure it has, if that is near.
     pub(super) fn near_miss(&self) -> Option<f32> {
         (NEARLY..1.0)
             .contains(&self.closure_share)
