@@ -140,12 +140,14 @@ fn a_giver_is_as_thick_as_told() {
         // below dips between them.
         for neighbours in [[7, 12], [12, 17], [17, 22], [6, 11], [11, 16], [16, 21]] {
             let [a, b] = neighbours.map(|joint| joints.joints[joint]);
-            let axis = (b.pose.position - a.pose.position).normalize();
+            let axis = (b.pose.position - a.pose.position).normalize_or_zero();
             for step in 0..=10 {
                 let along = step as f32 / 10.0;
                 let place = a.pose.position.lerp(b.pose.position, along);
                 let radius = a.radius + (b.radius - a.radius) * along;
-                for out in [Vec3::Z, Vec3::NEG_Z].map(|out| out.reject_from_normalized(axis).normalize()) {
+                for out in
+                    [Vec3::Z, Vec3::NEG_Z].map(|out| out.reject_from_normalized(axis).normalize_or_zero())
+                {
                     let dip = -depth(place + out * radius);
                     assert!(dip < 0.0015, "{more} more, {neighbours:?}, {along} along: {dip}");
                 }
