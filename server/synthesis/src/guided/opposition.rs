@@ -74,8 +74,8 @@ pub struct Opposition {
 }
 
 /// Which fingers close, with the shares of hands that close them on thin and on thicker things. What is thin turns between
-/// two digits: of hands that touch it with one finger and the thumb, one in two hundred has closure, with three fingers one
-/// in four. So most bring all of their fingers there, and those that find nothing rest.
+/// two digits: of hands that touch scissors with one finger and the thumb, one in three hundred has closure, with three
+/// fingers one in five. So most bring all of their fingers there, and those that find nothing rest.
 const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
     ([true, true, false, false, false], [0.05, 0.1]),
     ([true, true, true, false, false], [0.1, 0.25]),

@@ -302,13 +302,14 @@ impl Closer<'_> {
         }
     }
 
-    /// A digit closed as far as it goes, if nothing is in its way before and it comes near to nothing that is not to be
-    /// touched.
+    /// A digit closed as far as it goes, if nothing is in its way before.
     fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
         let closed = self.closing(digit, obstacles).close()?;
-        let is_free =
-            self.is_clear_of_giver(&closed) && !nears_forbidden_surface(self.scene, closed.links.iter());
-        is_free.then_some(closed)
+        self.is_clear_of_giver(&closed).then_some(closed)
+    }
+
+    fn nears_forbidden(&self, digit: &ClosedDigit) -> bool {
+        nears_forbidden_surface(self.scene, digit.links.iter())
     }
 
     fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
@@ -320,14 +321,17 @@ impl Closer<'_> {
     fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, NoGrip> {
         let thumb = self.close(Digit::Thumb, obstacles);
         let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
-        if thumb.touches_object() {
-            Ok(thumb)
-        } else {
+        if !thumb.touches_object() {
             Err(NoGrip::Rejected(Rejection::NoThumbEarlyStop))
+        } else if self.nears_forbidden(&thumb) {
+            Err(NoGrip::Rejected(Rejection::UnwantedContact))
+        } else {
+            Ok(thumb)
         }
     }
 
-    /// Closes the fingers; those that have something in their way or are not to close hold nothing.
+    /// Closes the fingers; those that have something in their way, come near to what is not to be touched or are not to
+    /// close hold nothing.
     fn close_fingers(
         &self,
         thumb: ClosedDigit,
@@ -341,7 +345,9 @@ impl Closer<'_> {
             if interrupted() {
                 return Err(NoGrip::Interrupted);
             }
-            closed[finger.index()] = self.close(finger, obstacles).unwrap_or_default();
+            let free = self.close(finger, obstacles);
+            let free = free.filter(|closed| !self.nears_forbidden(closed));
+            closed[finger.index()] = free.unwrap_or_default();
         }
         if !closed[1..].iter().any(ClosedDigit::touches_object) {
             return Err(NoGrip::Rejected(Rejection::NoFingers));
