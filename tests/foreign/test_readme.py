@@ -5,6 +5,7 @@ and stopped at the end, `grpcurl` is replaced by the equal `buf curl` call (grpc
 `tests/run` is the run that this test is part of.
 """
 
+import itertools
 import pathlib
 import re
 import shlex
@@ -16,6 +17,8 @@ import pytest
 from conftest import ROOT
 
 SERVER = "http://[::1]:50051"
+# Where the README's experiments leave their runs.
+EXPERIMENT = ROOT / "target/experiment"
 
 
 def commands():
@@ -36,6 +39,17 @@ def as_buf_curl(line):
     if method == "list":
         return [*common, "--list-services", f"http://{address}"]
     return [*common, *(["-d", data] if data else []), f"http://{address}/{method}"]
+
+
+@pytest.fixture(scope="module")
+def no_earlier_experiment():
+    """Experiments start afresh, as a new user's do: a run that another state of the search has made is refused.
+
+    It may have taken hours, so it is put aside under a name that is free.
+    """
+    if EXPERIMENT.exists():
+        aside = (EXPERIMENT.with_name(f"experiment-before-tests-{number}") for number in itertools.count(1))
+        EXPERIMENT.rename(next(place for place in aside if not place.exists()))
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +75,7 @@ def test_the_readme_shows_the_two_commands_and_a_call():
 
 
 @pytest.mark.parametrize("line", commands())
-def test_command(line, server):
+def test_command(line, server, no_earlier_experiment):
     if line == "tests/run" or line == "cargo run --release -p grasp-server":
         return  # The one is running now; the other is the fixture.
     arguments = as_buf_curl(line) if line.startswith("grpcurl ") else ["bash", "-c", line]
