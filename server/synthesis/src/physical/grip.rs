@@ -98,7 +98,7 @@ impl Gripper {
         self.closure_share = 0.0;
         let giver = presented.and_then(|presented| presented.giver.as_ref());
 
-        // Steps 3 and 4 for what does not move: palm and forearm.
+        // Steps 3 and 4 for palm and forearm, which do not move, and for the ball of the thumb where it starts.
         let Proposal { shape, advance, .. } = proposal;
         let opened = HandPose {
             frame_from_wrist: proposal.object_from_wrist,

@@ -70,14 +70,15 @@ impl ContactCone {
         }
     }
 
-    /// How far the push reaches whose wrench reaches farthest along `direction`: [`ContactCone::farthest_push`] without the
-    /// push, in half the time.
+    /// How far the push reaches whose wrench reaches farthest along `direction` with a share of friction and torsion:
+    /// [`ContactCone::farthest_push`] without the push, in half the time.
     pub(super) fn reach(&self, direction: &ScaledWrench, share: f64) -> f64 {
         let Along { normal, gain, .. } = self.along(direction);
         normal + share * gain
     }
 
-    /// The push whose wrench reaches farthest along `direction`, and how far, when `share` of friction and torsion may be used.
+    /// The push whose wrench reaches farthest along `direction`, and how far, when `share` of friction and torsion may be
+    /// used.
     ///
     /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is
     /// (n + t)·a + s b with a = u + v × arm and b = v·n; over an ellipsoid that is largest at t = μ² aₜ / q, s = σ² b / q
