@@ -4,7 +4,10 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 use grasp_assets::objects::{BuiltInObject, Manifest, object, objects};
-use grasp_synthesis::{geometry::mesh::TriangleMesh, strategy::Validity};
+use grasp_synthesis::{
+    geometry::{mesh::TriangleMesh, tapered_capsule::TaperedCapsule},
+    strategy::Validity,
+};
 
 /// Thesis Table 5.1: name, mass in kg, triangles.
 const THESIS: [(&str, f32, usize); 3] = [
@@ -266,6 +269,45 @@ fn forbidden_surfaces_are_where_they_should_be() {
                 "the edge at {centre} may be touched"
             );
         }
+    }
+}
+
+/// By points of the triangles that are forbidden one by one.
+#[test]
+fn what_comes_near_a_forbidden_surface_comes_near_one_of_its_triangles() {
+    const STEPS: u16 = 12;
+    const RADIUS: f32 = 0.002;
+    for (name, least_near) in [("remote", 50), ("scalpel", 20), ("scissors", 0)] {
+        let object = object(name).unwrap();
+        let mesh = mesh(object);
+        let mut points = Vec::new();
+        let mut slack: f32 = 0.0;
+        for [a, b, c] in forbidden(object).map(|triangle| mesh.corners(triangle)) {
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            slack = slack.max(longest / f32::from(STEPS));
+            for i in 0..=STEPS {
+                for j in 0..=STEPS - i {
+                    let [u, v] = [i, j].map(|step| f32::from(step) / f32::from(STEPS));
+                    points.push(a + (b - a) * u + (c - a) * v);
+                }
+            }
+        }
+        let (mut near, mut far) = (0, 0);
+        for triangle in (0..mesh.triangles().len()).step_by(7) {
+            for (above, distance) in [(0.003, 0.002), (0.006, 0.006), (0.012, 0.004)] {
+                let middle = centroid(mesh, triangle) + mesh.normal(triangle) * above;
+                let away = points.iter().map(|point| point.distance(middle));
+                let gap = away.fold(f32::INFINITY, f32::min) - RADIUS;
+                if (gap - distance).abs() <= slack {
+                    continue;
+                }
+                let ball = TaperedCapsule::new(middle, middle, RADIUS, RADIUS);
+                let is_near = object.object.is_forbidden_within(&ball, distance);
+                assert_eq!(is_near, gap < distance, "{name}: {gap} from {middle}");
+                *if is_near { &mut near } else { &mut far } += 1;
+            }
+        }
+        assert!(near >= least_near && far >= 20, "{name}: {near} near, {far} far");
     }
 }
 
