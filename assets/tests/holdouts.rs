@@ -320,6 +320,7 @@ fn synthesized_grasps_are_found_again() {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
+            starts: None,
         };
         let grasp = search(&free, &settings)
             .grasp
@@ -357,6 +358,7 @@ fn a_receiver_finds_a_grasp_on_each() {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
+            starts: None,
         };
         let outcome = search(&held, &settings);
         assert!(outcome.grasp.is_some(), "{}: {:?}", built_in.name, outcome.report);

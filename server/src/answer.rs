@@ -258,9 +258,9 @@ fn report(
         .into(),
         atlas_entries: u32::try_from(report.known_grips).unwrap_or(u32::MAX),
         atlas_stamp: settings
-            .atlas
+            .starts
             .as_ref()
-            .filter(|_| report.known_grips > 0)
+            .filter(|atlas| !atlas.entries().is_empty())
             .map(|atlas| stamp(atlas))
             .unwrap_or_default(),
     }

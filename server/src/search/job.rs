@@ -72,6 +72,7 @@ impl FindJob {
     /// True if preparing, a look-up and the answer are quick enough for a call's own thread: planning a way is not.
     pub(crate) fn may_be_known(&self) -> bool {
         self.atlas.is_some()
+            && !self.query.is_replay
             && self.query.choice == Choice::FirstValid
             && !self.query.reproducible
             && !self.query.plan_key_frames
@@ -110,7 +111,9 @@ impl FindJob {
                 .unwrap_or_else(|| holdout.object.friction_under(query.validity)),
             constraints: query.constraints.transformed(object_from_client),
             choice: query.choice,
-            atlas: self.atlas,
+            // A replay runs one attempt, which the atlas' own grips would come before.
+            atlas: self.atlas.clone().filter(|_| !query.is_replay),
+            starts: self.atlas,
             reproducible: query.reproducible,
             first_attempt: query.first_attempt,
             max_attempts: query.max_attempts,

@@ -14,7 +14,7 @@ use grasp_synthesis::{
     grasp::Grasp,
     hand::rig::Rig,
     holdout::Holdout,
-    search::{NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes, find_grasp},
+    search::{NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes, find_grasp_in, prepare},
     strategy::Choice,
 };
 use rayon::ThreadPool;
@@ -38,6 +38,7 @@ pub(super) fn race(
     clock: &dyn Clock,
     stop: &AtomicBool,
 ) -> SearchOutcome {
+    let scene = prepare(holdout, rig, settings);
     let workers = settings.workers as u64;
     let mut total = SearchReport::default();
     let mut slice = settings.clone();
@@ -47,7 +48,7 @@ pub(super) fn race(
     loop {
         slice.max_attempts = left.min(per_worker.saturating_mul(workers));
         let start = clock.now();
-        let outcome = find_grasp(pool, holdout, rig, &slice, clock, stop);
+        let outcome = find_grasp_in(pool, &scene, &slice, clock, stop);
         // Known grips are all tried in the first slice.
         slice.atlas = None;
         left -= slice.max_attempts;

@@ -74,6 +74,8 @@ pub(crate) struct FindQuery {
     pub choice: Choice,
     /// May the atlas be used?
     pub may_use_atlas: bool,
+    /// Is one attempt to be run again?
+    pub is_replay: bool,
     /// Is the way to the grasp wanted?
     pub plan_key_frames: bool,
 }
@@ -164,7 +166,8 @@ pub(crate) fn find_query(
         constraints,
         choice,
         // A replayed attempt is to be that attempt.
-        may_use_atlas: atlas_use != v1::AtlasUse::None && request.only_attempt.is_none(),
+        may_use_atlas: atlas_use != v1::AtlasUse::None,
+        is_replay: request.only_attempt.is_some(),
         plan_key_frames: request.plan_key_frames,
     })
 }

@@ -105,6 +105,7 @@ fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings 
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: Some(Arc::clone(atlas)),
+        starts: Some(Arc::clone(atlas)),
         reproducible: false,
         first_attempt: 0,
         max_attempts: u64::MAX,

@@ -132,6 +132,7 @@ impl Maker {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: self.atlases.of(cell).cloned(),
+            starts: self.atlases.of(cell).cloned(),
             reproducible: false,
             first_attempt: 0,
             max_attempts: cell.set.most_attempts(),

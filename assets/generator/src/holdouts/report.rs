@@ -114,6 +114,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
+            starts: None,
         };
         let outcome = find_grasp(
             &pool,

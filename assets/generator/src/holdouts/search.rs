@@ -100,6 +100,7 @@ fn next_grasp(
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
+        starts: None,
     };
     let outcome = find_grasp(pool, holdout, rig, &settings, &NoClock, &AtomicBool::new(false));
     outcome.report.attempt.zip(outcome.grasp)

@@ -5,6 +5,7 @@ use super::{
     gravity::{DIRECTIONS, direction},
 };
 use crate::{
+    constraints::Constraints,
     grasp::{Contact, Grasp},
     hand::rig::Rig,
     physical::{
@@ -99,6 +100,13 @@ impl Entry {
             scores,
             solids: *solids,
         }
+    }
+
+    /// True if wrist, contacts and type are what is demanded.
+    pub fn is_wanted(&self, constraints: &Constraints) -> bool {
+        constraints.admits_wrist(self.grip.pose.frame_from_wrist)
+            && constraints.admits_contacts(&self.contacts)
+            && constraints.admits_type(self.classification.grasp_type)
     }
 
     /// The grasp that this grip is for what is presented, with its score; none if it comes too near to the giver or the

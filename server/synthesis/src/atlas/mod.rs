@@ -14,6 +14,7 @@ pub mod growth;
 pub mod key;
 mod occupancy;
 mod spread;
+pub mod starts;
 
 use glam::Vec3;
 use sha2::{Digest as _, Sha256};
@@ -21,7 +22,7 @@ use sha2::{Digest as _, Sha256};
 use crate::{object::GraspObject, physical::solids::PreparedHand};
 
 use cores::Cores;
-use entry::Entry;
+use entry::{Entry, SLIPS};
 use gravity::GravityOrder;
 pub use occupancy::Excluded;
 use occupancy::Occupancy;
@@ -69,6 +70,14 @@ impl Atlas {
     /// indices of [`Atlas::entries`]; those that the object would slip out of come last.
     pub fn by_score(&self, up: Vec3) -> &[u16] {
         self.order.under(up)
+    }
+
+    /// Those of [`Atlas::by_score`] that the object does not slip out of.
+    pub fn holding_under(&self, up: Vec3) -> &[u16] {
+        let order = self.by_score(up);
+        let direction = gravity::nearest(up);
+        let holds = |entry: &u16| self.entries[usize::from(*entry)].scores[direction] != SLIPS;
+        &order[..order.partition_point(holds)]
     }
 
     /// The grips that certainly come too near to a giver's hand, or to its forearm; others may, too.

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::{closing::ClosedDigit, flexing::Flexing};
+use super::{closing::ClosedDigit, flexing::Flexing, grip::Grip};
 use crate::{
     hand::{
         Digit,
@@ -56,6 +56,25 @@ impl HandShape {
             spread: stream.unit(),
             bend_ratios,
             closing: [true; 5],
+            preshape: [0.0; 2],
+            tucks: false,
+        }
+    }
+
+    /// The shape that a known grip was closed from, as far as its hand shows that: not how it was shaped to the object
+    /// before.
+    pub fn of_grip(rig: &Rig, grip: &Grip) -> Self {
+        let yaw_share = |digit: Digit| {
+            let AngleRange { min, max } = rig.digit(digit).limits.base_yaw;
+            (grip.pose.digits[digit.index()].base_yaw - min) / (max - min).max(f32::MIN_POSITIVE)
+        };
+        let [thumb, fingers @ ..] = grip.bend_ratios;
+        let of_any = |ratios: &[Option<f32>]| ratios.iter().flatten().copied().next();
+        Self {
+            thumb_yaw: yaw_share(Digit::Thumb),
+            spread: (1.0 - 2.0 * yaw_share(Digit::Index)).clamp(0.0, 1.0),
+            bend_ratios: [of_any(&[thumb]), of_any(&fingers)].map(|ratio| ratio.unwrap_or(BEND_RATIOS[1])),
+            closing: grip.bend_ratios.map(|ratio| ratio.is_some()),
             preshape: [0.0; 2],
             tucks: false,
         }

@@ -138,10 +138,7 @@ impl<'a> KnownGrips<'a> {
         };
         let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();
-        if !constraints.admits_wrist(grip.grip.pose.frame_from_wrist)
-            || !constraints.admits_contacts(&grip.contacts)
-            || !constraints.admits_type(grip.classification.grasp_type)
-        {
+        if !grip.is_wanted(constraints) {
             return Tried::Refused;
         }
         match grip.hold(

@@ -48,6 +48,8 @@ pub struct SearchSettings {
     pub choice: Choice,
     /// Grips that are known, to be tried first under `GUIDED` and `PHYSICAL`; made for this object and rig.
     pub atlas: Option<Arc<Atlas>>,
+    /// Grips that are known, for attempts to start from where the giver is in their way; likewise.
+    pub starts: Option<Arc<Atlas>>,
     /// Answer with the valid grip of the atlas that is first in its order, or else with the valid attempt of the lowest
     /// index, instead of with the first to finish.
     pub reproducible: bool,
@@ -106,7 +108,7 @@ pub fn find_known_grasp(
     if settings.choice != Choice::FirstValid || settings.reproducible {
         return None;
     }
-    let scene = scene(holdout, rig, settings);
+    let scene = prepare(holdout, rig, settings);
     let known = KnownGrips::of(&scene, settings)?;
     let stop = AtomicBool::new(false);
     let race = Race::new(&scene, settings, Some(&known), clock, &stop);
@@ -132,10 +134,24 @@ pub fn find_grasp(
     clock: &dyn Clock,
     stop: &AtomicBool,
 ) -> SearchOutcome {
+    find_grasp_in(pool, &prepare(holdout, rig, settings), settings, clock, stop)
+}
+
+/// [`find_grasp`] in a scene that was prepared for the same settings, but for which of the attempts are to be run and
+/// whether known grips are tried before them: what attempts find out about the holdout once serves further ones.
+///
+/// # Panics
+/// As [`find_grasp`].
+pub fn find_grasp_in(
+    pool: &rayon::ThreadPool,
+    scene: &Scene<'_>,
+    settings: &SearchSettings,
+    clock: &dyn Clock,
+    stop: &AtomicBool,
+) -> SearchOutcome {
     debug_assert!(settings.workers >= 1, "there must be at least one worker");
-    let scene = scene(holdout, rig, settings);
-    let known = KnownGrips::of(&scene, settings);
-    let race = Race::new(&scene, settings, known.as_ref(), clock, stop);
+    let known = KnownGrips::of(scene, settings);
+    let race = Race::new(scene, settings, known.as_ref(), clock, stop);
     // Mostly one of the first known grips is the answer, and waking a worker takes longer than looking at some dozens.
     if race.looks_ahead() {
         return race.outcome();
@@ -161,8 +177,8 @@ pub fn find_grasp(
 }
 
 /// What the attempts of a search share.
-fn scene<'a>(holdout: &'a Holdout, rig: &'a Rig, settings: &SearchSettings) -> Scene<'a> {
-    Scene::new(
+pub fn prepare<'a>(holdout: &'a Holdout, rig: &'a Rig, settings: &SearchSettings) -> Scene<'a> {
+    let scene = Scene::new(
         holdout,
         rig,
         settings.strategy,
@@ -170,5 +186,8 @@ fn scene<'a>(holdout: &'a Holdout, rig: &'a Rig, settings: &SearchSettings) -> S
         settings.friction,
     )
     .with_validity(settings.validity)
-    .with_constraints(settings.constraints)
+    .with_constraints(settings.constraints);
+    let starts = settings.starts.as_ref();
+    let starts = starts.filter(|_| uses_atlas(settings.strategy, settings.validity));
+    scene.starting_from(starts.cloned())
 }

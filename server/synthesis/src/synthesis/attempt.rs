@@ -2,7 +2,7 @@
 //!
 //! The thesis prints "or `ISIMMOBILIZINGGRASP`" in line 6; a grasp is invalid if it does NOT immobilize.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use super::{
     closing_motion::{DigitMotion, hand_motion},
@@ -17,6 +17,7 @@ use super::{
     wrist_placement::{WristFrame, WristPlacer},
 };
 use crate::{
+    atlas::{Atlas, starts::Starts},
     constraints::Constraints,
     grasp::{Contact, Grasp},
     guided::{
@@ -53,6 +54,10 @@ pub struct Scene<'a> {
     /// What the giver's hand leaves of the object's surface, once it was asked for.
     free_surface: OnceLock<SurfacePairs>,
     constraints: Constraints,
+    /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`, …
+    known: Option<Arc<Atlas>>,
+    /// … and which of them, once it was asked for.
+    starts: OnceLock<Starts>,
 }
 
 impl<'a> Scene<'a> {
@@ -88,7 +93,15 @@ impl<'a> Scene<'a> {
             physical: None,
             free_surface: OnceLock::new(),
             constraints: Constraints::default(),
+            known: None,
+            starts: OnceLock::new(),
         }
+    }
+
+    /// The same with attempts that, having failed, start from known grips; for `GUIDED` and `PHYSICAL`.
+    #[must_use]
+    pub fn starting_from(self, known: Option<Arc<Atlas>>) -> Self {
+        Self { known, ..self }
     }
 
     /// The same with demands on the grasps, in the object's frame.
@@ -143,6 +156,20 @@ impl<'a> Scene<'a> {
         })
     }
 
+    /// Of the known grips, those that attempts start from: the ones that hold under this gravity and are what is
+    /// demanded, if the giver were not in their way. None if interrupted.
+    fn starts(&self, known: &Atlas, presented: &Presented, interrupted: &impl Fn() -> bool) -> Option<&Starts> {
+        if let Some(starts) = self.starts.get() {
+            return Some(starts);
+        }
+        let holding = known.holding_under(presented.up).iter().copied();
+        let wanted = holding.filter(|&entry| known.entries()[usize::from(entry)].is_wanted(&self.constraints));
+        let giver = presented.giver.as_ref();
+        let found = Starts::of(known.entries(), wanted, giver, interrupted)?;
+        // Another worker may have found the same meanwhile.
+        Some(self.starts.get_or_init(|| found))
+    }
+
     /// What is demanded of the grasps.
     pub fn constraints(&self) -> &Constraints {
         &self.constraints
@@ -164,6 +191,13 @@ impl<'a> Scene<'a> {
         }
     }
 }
+
+/// Hands beside known grips that an attempt tries after its own. They hold forty times as often where a giver leaves little
+/// room, and only where something like them is known: hands that are placed anew keep some of the time.
+const BESIDE_KNOWN: usize = 4;
+
+/// The stop signal came.
+struct Interrupted;
 
 /// How an attempt ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -237,7 +271,8 @@ impl Attempt {
         }
     }
 
-    /// `TRYSYNTHESIZEGRASP`. `interrupted` is asked often enough that at most some 50 µs of work lie between two calls.
+    /// `TRYSYNTHESIZEGRASP`; where grips are known, also with some hands beside those, if it fails. `interrupted` is asked
+    /// often enough that at most some 50 µs of work lie between two calls.
     pub fn try_synthesize_grasp(
         &mut self,
         scene: &Scene<'_>,
@@ -246,6 +281,66 @@ impl Attempt {
         interrupted: &impl Fn() -> bool,
     ) -> AttemptEnd {
         stopwatch.start();
+        let end = self.try_anew(scene, stream, stopwatch, interrupted);
+        match (&end, &scene.known) {
+            (AttemptEnd::Rejected { .. }, Some(known)) => {
+                match self.try_beside_known(scene, known, stream, stopwatch, interrupted) {
+                    Ok(Some(grasp)) => AttemptEnd::Valid(grasp),
+                    // What is told of an attempt that fails is the hand that was placed anew.
+                    Ok(None) => end,
+                    Err(Interrupted) => AttemptEnd::Interrupted,
+                }
+            }
+            _ => end,
+        }
+    }
+
+    /// Tries [`BESIDE_KNOWN`] hands beside known grips.
+    fn try_beside_known(
+        &mut self,
+        scene: &Scene<'_>,
+        known: &Atlas,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<Option<Box<Grasp>>, Interrupted> {
+        let Some((object, presented)) = &scene.physical else {
+            return Ok(None);
+        };
+        let starts = scene.starts(known, presented, interrupted).ok_or(Interrupted)?;
+        let around = Surroundings {
+            object: *object,
+            presented,
+            rig: scene.rig,
+            constraints: &scene.constraints,
+        };
+        for _ in 0..BESIDE_KNOWN {
+            if interrupted() {
+                return Err(Interrupted);
+            }
+            let proposal = starts.propose(known.entries(), scene.rig, presented.giver.as_ref(), stream);
+            let proposal =
+                proposal.filter(|proposal| scene.constraints.admits_wrist(proposal.object_from_wrist));
+            stopwatch.lap(Step::WristPlacement);
+            let Some(proposal) = proposal else { continue };
+            let physical = &mut self.physical;
+            match physical.hold_or_refine(&around, &proposal, stream, stopwatch, interrupted) {
+                Ok(grasp) => return Ok(Some(grasp)),
+                Err(NoGrip::Rejected(_)) => {}
+                Err(NoGrip::Interrupted) => return Err(Interrupted),
+            }
+        }
+        Ok(None)
+    }
+
+    /// All five steps, with a hand that is placed anew.
+    fn try_anew(
+        &mut self,
+        scene: &Scene<'_>,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> AttemptEnd {
         self.pruned_placements = 0;
         self.posed = 0;
         let reject = |rejection| AttemptEnd::Rejected {

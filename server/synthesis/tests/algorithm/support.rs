@@ -255,6 +255,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
+        starts: None,
     }
 }
 

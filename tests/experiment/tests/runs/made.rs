@@ -50,6 +50,7 @@ fn search(record: &Record, first_attempt: u64, max_attempts: u64) -> SearchOutco
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
+        starts: None,
     };
     find_grasp(&pool, &holdout, rig, &settings, &NoClock, &AtomicBool::new(false))
 }

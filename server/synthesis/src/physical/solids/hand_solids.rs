@@ -88,16 +88,26 @@ impl HandSolids {
     /// The same hand elsewhere.
     #[must_use]
     pub fn moved(&self, way: Vec3) -> Self {
-        let moved = |solid: TaperedCapsule| TaperedCapsule {
-            start: solid.start + way,
-            end: solid.end + way,
+        self.map(|point| point + way)
+    }
+
+    /// The same hand in another frame, or elsewhere and turned.
+    #[must_use]
+    pub fn transformed(&self, to_from_from: Pose) -> Self {
+        self.map(|point| to_from_from.transform_point(point))
+    }
+
+    fn map(&self, place: impl Fn(Vec3) -> Vec3) -> Self {
+        let placed = |solid: TaperedCapsule| TaperedCapsule {
+            start: place(solid.start),
+            end: place(solid.end),
             ..solid
         };
         Self {
-            phalanges: self.phalanges.map(|links| links.map(moved)),
-            palm: self.palm.map(moved),
-            thenar: self.thenar.map(moved),
-            forearm: self.forearm.map(moved),
+            phalanges: self.phalanges.map(|links| links.map(placed)),
+            palm: self.palm.map(placed),
+            thenar: self.thenar.map(placed),
+            forearm: self.forearm.map(placed),
         }
     }
 
