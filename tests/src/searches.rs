@@ -111,7 +111,7 @@ impl Bench {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-        starts: None,
+            starts: None,
         };
         let clock = MonotonicClock::default();
         find_grasp(

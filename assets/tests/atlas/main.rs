@@ -2,4 +2,5 @@
 
 mod codec;
 mod exclusion;
+mod starts;
 mod support;

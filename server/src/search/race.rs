@@ -14,7 +14,10 @@ use grasp_synthesis::{
     grasp::Grasp,
     hand::rig::Rig,
     holdout::Holdout,
-    search::{NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes, find_grasp_in, prepare},
+    search::{
+        NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes, find_grasp_in,
+        prepare,
+    },
     strategy::Choice,
 };
 use rayon::ThreadPool;

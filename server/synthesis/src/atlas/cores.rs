@@ -70,6 +70,9 @@ pub(super) fn surely_meets(solids: &HandSolids, giver: &PreparedHand) -> bool {
 }
 
 fn balls(solids: &HandSolids, cores: &[Core; BALLS]) -> Balls {
-    let all = solids.to_array();
-    Balls::new(cores.map(|(solid, along)| (all[solid].at(along), all[solid].radius_at(along))))
+    Balls::new(|i| {
+        let (solid, along) = cores[i];
+        let solid = solids.solid(solid);
+        (solid.at(along), solid.radius_at(along))
+    })
 }

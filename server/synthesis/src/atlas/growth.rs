@@ -16,6 +16,7 @@ use super::{
     entry::Entry,
     spread::{Cell, Room, Spread, worth},
     stamp,
+    starts::Starts,
 };
 use crate::{
     guided::{
@@ -100,8 +101,15 @@ type Found = Option<(Entry, HandShape)>;
 struct Giver {
     presented: Presented,
     surface: SurfacePairs,
+    /// Known grips that it is nearly clear of, if there is need of more that keep clear of it.
+    starts: Option<Starts>,
+}
+
+impl Giver {
     /// Is there need of grips that keep clear of it?
-    is_needy: bool,
+    fn is_needy(&self) -> bool {
+        self.starts.is_some()
+    }
 }
 
 /// An atlas in the making.
@@ -184,7 +192,7 @@ impl<'a> Growth<'a> {
             .map(|index| self.try_proposal(index, giver.as_ref(), gripper))
             .collect();
         self.proposed += ROUND;
-        let is_needy = giver.is_some_and(|giver| giver.is_needy);
+        let is_needy = giver.as_ref().is_some_and(Giver::is_needy);
         for (entry, shape) in found.into_iter().flatten() {
             self.take(entry, shape, is_needy);
         }
@@ -202,7 +210,12 @@ impl<'a> Growth<'a> {
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
         let pose = &self.entries[stream.below(self.entries.len())].grip.pose;
         let hand = PreparedHand::new(&HandSolids::of_giver(&HandJoints::of_pose(self.rig, pose)));
-        let is_needy = self.count_free(&hand) < ENOUGH_FREE;
+        let all = 0..self.entries.len() as u16;
+        let starts = if self.count_free(&hand) < ENOUGH_FREE {
+            Starts::of(&self.entries, all, Some(&hand), || false)
+        } else {
+            None
+        };
         Some(Giver {
             surface: self.scene.object.surface_pairs.free_of(&hand),
             presented: Presented {
@@ -210,7 +223,7 @@ impl<'a> Growth<'a> {
                 giver_palm: None,
                 up: Vec3::Y,
             },
-            is_needy,
+            starts,
         })
     }
 
@@ -240,7 +253,7 @@ impl<'a> Growth<'a> {
             )
             .ok()?;
         // What comes next takes longest: what is crowded out anyhow is dropped before.
-        let is_needy = giver.is_some_and(|giver| giver.is_needy);
+        let is_needy = giver.is_some_and(Giver::is_needy);
         let contacts = &gripper.contacts;
         let classification = classify(self.rig, &grip.pose, contacts);
         let values = grip_values(
@@ -261,7 +274,14 @@ impl<'a> Growth<'a> {
     }
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
-        // Beside a giver most known grips are of no use.
+        if let Some(giver) = giver
+            && let Some(starts) = &giver.starts
+            && stream.unit() < BESIDE_SHARE
+        {
+            let hand = giver.presented.giver.as_ref();
+            return starts.propose(&self.entries, self.rig, hand, stream);
+        }
+        // Beside a giver who leaves enough, most known grips are of no use.
         if giver.is_some() || self.entries.is_empty() || stream.unit() >= BESIDE_SHARE {
             let place = Place {
                 object: self.scene.object,

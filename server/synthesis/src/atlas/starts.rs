@@ -70,6 +70,11 @@ impl Starts {
         Some(Self(nearest.into_iter().map(|(_, index)| index).collect()))
     }
 
+    /// Which they are, by falling clearance.
+    pub fn entries(&self) -> &[u16] {
+        &self.0
+    }
+
     /// A hand beside one of them that may keep clear of the giver; none if none was drawn.
     pub fn propose(
         &self,

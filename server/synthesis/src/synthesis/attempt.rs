@@ -158,12 +158,18 @@ impl<'a> Scene<'a> {
 
     /// Of the known grips, those that attempts start from: the ones that hold under this gravity and are what is
     /// demanded, if the giver were not in their way. None if interrupted.
-    fn starts(&self, known: &Atlas, presented: &Presented, interrupted: &impl Fn() -> bool) -> Option<&Starts> {
+    fn starts(
+        &self,
+        known: &Atlas,
+        presented: &Presented,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<&Starts> {
         if let Some(starts) = self.starts.get() {
             return Some(starts);
         }
         let holding = known.holding_under(presented.up).iter().copied();
-        let wanted = holding.filter(|&entry| known.entries()[usize::from(entry)].is_wanted(&self.constraints));
+        let wanted =
+            holding.filter(|&entry| known.entries()[usize::from(entry)].is_wanted(&self.constraints));
         let giver = presented.giver.as_ref();
         let found = Starts::of(known.entries(), wanted, giver, interrupted)?;
         // Another worker may have found the same meanwhile.

@@ -37,6 +37,8 @@ pub(super) struct ConicLeastSquares {
     residual: Vec<f64>,
     /// The Cholesky factor L of `AᵀA`, the rows of its lower triangle.
     factor: Vec<f64>,
+    /// One over its diagonal: a division takes as long as multiplying four columns.
+    inverse_diagonal: Vec<f64>,
     /// How many rows of it belong to the columns that are there now.
     factored: usize,
     /// The solution of L y = Aᵀb.
@@ -137,13 +139,14 @@ impl ConicLeastSquares {
         let rows = self.target.len();
         self.factor.resize(first_of_row(count), 0.0);
         self.forward.resize(count, 0.0);
+        self.inverse_diagonal.resize(count, 0.0);
         for i in self.factored..count {
             let column = &self.entries[i * rows..(i + 1) * rows];
             let (before, of_i) = self.factor.split_at_mut(first_of_row(i));
             for j in 0..i {
                 let of_j = &before[first_of_row(j)..=first_of_row(j) + j];
                 let product = dot(column, &self.entries[j * rows..(j + 1) * rows]);
-                of_i[j] = (product - dot(&of_i[..j], &of_j[..j])) / of_j[j];
+                of_i[j] = (product - dot(&of_i[..j], &of_j[..j])) * self.inverse_diagonal[j];
             }
             let product = dot(column, column);
             let rest = product - dot(&of_i[..i], &of_i[..i]);
@@ -151,13 +154,15 @@ impl ConicLeastSquares {
                 return false;
             }
             of_i[i] = rest.sqrt();
-            self.forward[i] = (dot(column, &self.target) - dot(&of_i[..i], &self.forward[..i])) / of_i[i];
+            let inverse = of_i[i].recip();
+            self.inverse_diagonal[i] = inverse;
+            self.forward[i] = (dot(column, &self.target) - dot(&of_i[..i], &self.forward[..i])) * inverse;
             self.factored = i + 1;
         }
         self.free.clone_from(&self.forward);
         for i in (0..count).rev() {
             let row = &self.factor[first_of_row(i)..=first_of_row(i) + i];
-            let value = self.free[i] / row[i];
+            let value = self.free[i] * self.inverse_diagonal[i];
             self.free[i] = value;
             for (above, entry) in self.free[..i].iter_mut().zip(row) {
                 *above -= value * entry;

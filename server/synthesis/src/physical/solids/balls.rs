@@ -17,10 +17,17 @@ pub struct Balls {
 
 impl Balls {
     /// Balls of middle and radius in metres.
-    pub fn new(balls: [(Vec3, f32); BALLS]) -> Self {
-        Self {
-            middles: [0, 1, 2].map(|axis| balls.map(|(middle, _)| middle[axis])),
-            radii: balls.map(|(_, radius)| radius),
+    #[inline]
+    pub fn new(ball: impl Fn(usize) -> (Vec3, f32)) -> Self {
+        let mut balls = Self::default();
+        // A loop, as mapped arrays stay calls.
+        for i in 0..BALLS {
+            let (middle, radius) = ball(i);
+            for axis in 0..3 {
+                balls.middles[axis][i] = middle[axis];
+            }
+            balls.radii[i] = radius;
         }
+        balls
     }
 }

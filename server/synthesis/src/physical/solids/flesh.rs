@@ -153,23 +153,25 @@ impl<'a> Skeleton<'a> {
     /// The palm's solids, those along the metacarpals and between them at least as thick as the joints' radii say: what a
     /// hand's owner tells of its thickness may be more than what was fitted to another hand's skin.
     pub(super) fn palm_as_told(&self) -> [TaperedCapsule; PALM_SOLIDS] {
-        PALM.map(|ends| {
-            let fitted = self.solid(ends);
-            let [(start, start_radius), (end, end_radius)] = [
-                (ends[0].0, fitted.start, fitted.start_radius),
-                (ends[1].0, fitted.end, fitted.end_radius),
-            ]
-            .map(|(anchor, place, radius)| match anchor {
-                Between(a, b, share) => {
-                    let [a, b] = [a, b].map(|joint| self.joints.joints[joint]);
-                    let told = a.pose.position.lerp(b.pose.position, share);
-                    let told_radius = a.radius + (b.radius - a.radius) * share;
-                    TaperedCapsule::new(place, told, radius, told_radius).bounding_ball()
-                }
-                _ => (place, radius),
-            });
-            TaperedCapsule::new(start, end, start_radius, end_radius)
-        })
+        let mut solids = self.palm();
+        for (solid, ends) in solids.iter_mut().zip(&PALM) {
+            let (start, start_radius) = self.as_told(ends[0].0, solid.start, solid.start_radius);
+            let (end, end_radius) = self.as_told(ends[1].0, solid.end, solid.end_radius);
+            *solid = TaperedCapsule::new(start, end, start_radius, end_radius);
+        }
+        solids
+    }
+
+    /// The smallest ball around a fitted one that is as thick as the joints' radii say where it hangs.
+    #[inline]
+    fn as_told(&self, anchor: Anchor, place: Vec3, radius: f32) -> (Vec3, f32) {
+        let Between(a, b, share) = anchor else {
+            return (place, radius);
+        };
+        let (a, b) = (&self.joints.joints[a], &self.joints.joints[b]);
+        let told = a.pose.position.lerp(b.pose.position, share);
+        let told_radius = a.radius + (b.radius - a.radius) * share;
+        TaperedCapsule::new(place, told, radius, told_radius).bounding_ball()
     }
 
     /// The solids that move with the thumb.

@@ -120,6 +120,25 @@ impl HandSolids {
         all
     }
 
+    /// The solid that [`HandSolids::iter`] gives at an index, at once.
+    pub(crate) fn solid(&self, index: usize) -> &TaperedCapsule {
+        let Self {
+            phalanges,
+            palm,
+            thenar,
+            forearm,
+        } = self;
+        let phalanges = phalanges.as_flattened();
+        let mut index = index;
+        for solids in [phalanges, palm, thenar] {
+            match solids.get(index) {
+                Some(solid) => return solid,
+                None => index -= solids.len(),
+            }
+        }
+        &forearm[index]
+    }
+
     /// All solids: phalanges by digit, palm, ball of the thumb, forearm.
     pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
         self.phalanges

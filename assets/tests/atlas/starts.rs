@@ -1,0 +1,242 @@
+//! Hands beside known grips, for givers of whom no known grip keeps clear.
+
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Duration,
+};
+
+use glam::Vec3;
+use grasp_assets::{atlases::atlas, objects::object as built_in};
+use grasp_synthesis::{
+    atlas::{Atlas, codec::decode, entry::Entry, starts::Starts},
+    clock::Clock,
+    constraints::Constraints,
+    guided::proposal::{Place, propose},
+    hand::{Handedness, joints::HandJoints},
+    holdout::{Holdout, PresentingHand},
+    physical::{
+        attempt::{PhysicalAttempt, Surroundings},
+        grip::GIVER_CLEARANCE,
+        scene::{ObjectScene, Presented},
+        shape::Proposal,
+        solids::HandSolids,
+    },
+    search::{SearchOutcome, SearchSettings, find_grasp},
+    strategy::{BendRatioChoice, Choice, Strategy, Validity},
+    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+};
+
+use crate::support::adult;
+
+/// Where the grips of the built-in scissors are asked about as if they were givers'.
+const UP: Vec3 = Vec3::Y;
+
+fn known() -> Arc<Atlas> {
+    let rig = adult(Handedness::Right);
+    let bytes = atlas("scissors", rig).expect("it is shipped");
+    let scissors = &built_in("scissors").expect("they are built in").object;
+    decode(bytes, scissors, rig).expect("it is today's").atlas
+}
+
+/// The scissors in the hand of a known grip.
+fn held_out(known: &Atlas, grip: usize) -> Holdout {
+    let pose = &known.entries()[grip].grip.pose;
+    let giver = HandJoints::of_pose(adult(Handedness::Right), pose);
+    let scissors = Arc::clone(&built_in("scissors").expect("they are built in").object);
+    Holdout::new(scissors, Some(PresentingHand::of_joints(giver)), UP).expect("up is a unit vector")
+}
+
+/// How far the digits that hold, palm and forearm are from the giver's, pair by pair.
+fn clearance(entry: &Entry, giver: &HandSolids) -> f32 {
+    let solids = HandSolids::of_pose(adult(Handedness::Right), &entry.grip.pose);
+    let touches = |digit: usize| {
+        let of_digit =
+            |part: grasp_synthesis::hand::HandPart| part.digit().map(|of| of.index()) == Some(digit);
+        entry.contacts.iter().any(|contact| of_digit(contact.part))
+    };
+    let of_digits = (0..5)
+        .filter(|&digit| touches(digit))
+        .flat_map(|digit| solids.phalanges[digit]);
+    let still = solids.palm.into_iter().chain(solids.thenar).chain(solids.forearm);
+    of_digits
+        .chain(still)
+        .flat_map(|ours| giver.iter().map(move |theirs| ours.distance(theirs)))
+        .fold(f32::INFINITY, f32::min)
+}
+
+#[test]
+fn starts_are_what_is_least_in_the_givers_way() {
+    let known = known();
+    for grip in [0, 700, 1400] {
+        let holdout = held_out(&known, grip);
+        let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
+        let giver = HandSolids::of_giver(&hand.joints);
+        let presented = Presented::of(&holdout);
+        let holding = known.holding_under(UP);
+        let of = |order: &[u16]| {
+            Starts::of(
+                known.entries(),
+                order.iter().copied(),
+                presented.giver.as_ref(),
+                || false,
+            )
+        };
+        let starts = of(holding).expect("nobody interrupts");
+        let mut clearances: Vec<f32> = holding
+            .iter()
+            .map(|&entry| clearance(&known.entries()[usize::from(entry)], &giver).min(GIVER_CLEARANCE))
+            .collect();
+        clearances.sort_by(|a, b| b.total_cmp(a));
+        assert!(starts.entries().len() >= 32, "{}", starts.entries().len());
+        for (&entry, expected) in starts.entries().iter().zip(clearances) {
+            let found = clearance(&known.entries()[usize::from(entry)], &giver).min(GIVER_CLEARANCE);
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "giver {grip}, {entry}: {found}, not {expected}"
+            );
+        }
+        let interrupted = Starts::of(
+            known.entries(),
+            holding.iter().copied(),
+            presented.giver.as_ref(),
+            || true,
+        );
+        assert_eq!(interrupted, None);
+        assert!(of(&[]).is_some_and(|none| none.entries().is_empty()));
+    }
+}
+
+/// Known grips that are givers of whom at most `most` keep clear.
+fn tight_givers(known: &Atlas, most: usize) -> Vec<usize> {
+    let free_of = |grip: usize| {
+        let giver = Presented::of(&held_out(known, grip)).giver.expect("there is one");
+        let entries = known.entries().iter();
+        entries
+            .filter(|entry| {
+                let solids = HandSolids::of_pose(adult(Handedness::Right), &entry.grip.pose);
+                giver.clearance(&solids, GIVER_CLEARANCE).is_some()
+            })
+            .take(most + 1)
+            .count()
+    };
+    (0..known.entries().len())
+        .step_by(40)
+        .filter(|&grip| free_of(grip) <= most)
+        .collect()
+}
+
+#[test]
+fn hands_beside_known_grips_hold_more_often_where_a_giver_leaves_little() {
+    const PROPOSALS: u64 = 150;
+    let known = known();
+    let rig = adult(Handedness::Right);
+    let givers = tight_givers(&known, 3);
+    assert!(givers.len() >= 3, "only {} givers are tight", givers.len());
+    let (mut beside, mut anew) = (0, 0);
+    for grip in givers.into_iter().take(6) {
+        let holdout = held_out(&known, grip);
+        let presented = Presented::of(&holdout);
+        let giver = presented.giver.as_ref().expect("there is one");
+        let scissors = &holdout.object;
+        let around = Surroundings {
+            object: ObjectScene::new(scissors, scissors.friction_under(Validity::Physical)),
+            presented: &presented,
+            rig,
+            constraints: &Constraints::default(),
+        };
+        let holding = known.holding_under(UP).iter().copied();
+        let starts = Starts::of(known.entries(), holding, Some(giver), || false).expect("nobody interrupts");
+        let surface = scissors.surface_pairs.free_of(giver);
+        let place = Place {
+            object: scissors,
+            surface: &surface,
+            giver: Some(giver),
+            rig,
+        };
+        let mut attempt = PhysicalAttempt::default();
+        let mut count = |propose: &dyn Fn(&mut AttemptStream) -> Option<Proposal>| {
+            (0..PROPOSALS)
+                .filter(|&index| {
+                    let mut stream = AttemptStream::new(29, index);
+                    let proposal = propose(&mut stream);
+                    proposal.is_some_and(|proposal| {
+                        let end = attempt.hold(&around, &proposal, &mut NoStopwatch, &|| false);
+                        let clearance = end.ok().and_then(|grasp| grasp.margins?.giver_clearance);
+                        assert!(clearance.is_none_or(|distance| distance >= GIVER_CLEARANCE));
+                        clearance.is_some()
+                    })
+                })
+                .count()
+        };
+        beside += count(&|stream| starts.propose(known.entries(), rig, Some(giver), stream));
+        anew += count(&|stream| propose(&place, stream));
+    }
+    assert!(beside >= 10, "only {beside} hold");
+    assert!(
+        beside > 4 * anew,
+        "{beside} hold beside known grips and {anew} others"
+    );
+}
+
+/// Searches without a deadline ask for no time.
+struct NoClock;
+
+impl Clock for NoClock {
+    fn now(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+fn search(
+    holdout: &Holdout,
+    starts: Option<&Arc<Atlas>>,
+    attempts: std::ops::Range<u64>,
+    workers: usize,
+) -> SearchOutcome {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(workers)
+        .build()
+        .expect("threads");
+    let settings = SearchSettings {
+        seed: 5,
+        strategy: Strategy::Guided,
+        validity: Validity::Physical,
+        bend_ratios: BendRatioChoice::OneRandom,
+        friction: holdout.object.friction_under(Validity::Physical),
+        constraints: Constraints::default(),
+        choice: Choice::FirstValid,
+        atlas: None,
+        starts: starts.cloned(),
+        reproducible: true,
+        first_attempt: attempts.start,
+        max_attempts: attempts.end - attempts.start,
+        deadline: None,
+        workers,
+        record_step_times: false,
+    };
+    let rig = adult(Handedness::Right);
+    find_grasp(&pool, holdout, rig, &settings, &NoClock, &AtomicBool::new(false))
+}
+
+#[test]
+fn attempts_that_start_from_known_grips_are_as_reproducible_as_others() {
+    let known = known();
+    let grip = *tight_givers(&known, 3).first().expect("one giver is tight");
+    let holdout = held_out(&known, grip);
+    let found = search(&holdout, Some(&known), 0..2000, 1);
+    let grasp = found.grasp.as_ref().expect("something beside a known grip holds");
+    let attempt = found.report.attempt.expect("an attempt gave it");
+    // However many look, and if that attempt alone is run.
+    let by_three = search(&holdout, Some(&known), 0..2000, 3);
+    assert_eq!(
+        (by_three.grasp.as_ref(), by_three.report.attempt),
+        (Some(grasp), Some(attempt))
+    );
+    let replayed = search(&holdout, Some(&known), attempt..attempt + 1, 1);
+    assert_eq!(replayed.grasp.as_ref(), Some(grasp));
+    // Attempts that hold by themselves are the same with known grips and without.
+    let nothing_known = search(&holdout, None, 0..2000, 2);
+    assert!(nothing_known.report.attempt.is_none_or(|first| first >= attempt));
+    // No known grip is an answer itself.
+    assert_eq!((found.report.known_grips, found.report.candidates), (0, 1));
+}
