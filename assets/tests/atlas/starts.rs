@@ -12,7 +12,7 @@ use grasp_synthesis::{
     clock::Clock,
     constraints::Constraints,
     guided::proposal::{Place, propose},
-    hand::{Handedness, joints::HandJoints},
+    hand::{Digit, HandPart, Handedness, joints::HandJoints},
     holdout::{Holdout, PresentingHand},
     physical::{
         attempt::{PhysicalAttempt, Surroundings},
@@ -50,8 +50,7 @@ fn held_out(known: &Atlas, grip: usize) -> Holdout {
 fn clearance(entry: &Entry, giver: &HandSolids) -> f32 {
     let solids = HandSolids::of_pose(adult(Handedness::Right), &entry.grip.pose);
     let touches = |digit: usize| {
-        let of_digit =
-            |part: grasp_synthesis::hand::HandPart| part.digit().map(|of| of.index()) == Some(digit);
+        let of_digit = |part: HandPart| part.digit().map(Digit::index) == Some(digit);
         entry.contacts.iter().any(|contact| of_digit(contact.part))
     };
     let of_digits = (0..5)
