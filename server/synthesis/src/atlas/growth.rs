@@ -274,30 +274,30 @@ impl<'a> Growth<'a> {
     }
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
-        if let Some(giver) = giver
-            && let Some(starts) = &giver.starts
-            && stream.unit() < BESIDE_SHARE
-        {
-            let hand = giver.presented.giver.as_ref();
-            return starts.propose(&self.entries, self.rig, hand, stream);
+        let is_beside = !self.entries.is_empty() && stream.unit() < BESIDE_SHARE;
+        let place = Place {
+            object: self.scene.object,
+            surface: giver.map_or(&self.scene.object.surface_pairs, |giver| &giver.surface),
+            giver: giver.and_then(|giver| giver.presented.giver.as_ref()),
+            rig: self.rig,
+        };
+        match giver.map(|giver| &giver.starts) {
+            Some(Some(starts)) if is_beside => starts.propose(&self.entries, &place, stream),
+            None if is_beside => Some(self.beside_known(stream)),
+            // Beside a giver who leaves enough, most known grips are of no use.
+            _ => propose(&place, stream),
         }
-        // Beside a giver who leaves enough, most known grips are of no use.
-        if giver.is_some() || self.entries.is_empty() || stream.unit() >= BESIDE_SHARE {
-            let place = Place {
-                object: self.scene.object,
-                surface: giver.map_or(&self.scene.object.surface_pairs, |giver| &giver.surface),
-                giver: giver.and_then(|giver| giver.presented.giver.as_ref()),
-                rig: self.rig,
-            };
-            return propose(&place, stream);
-        }
-        let place = stream.below(self.entries.len());
+    }
+
+    /// A hand beside a known grip.
+    fn beside_known(&self, stream: &mut AttemptStream) -> Proposal {
+        let index = stream.below(self.entries.len());
         let known = Proposal {
-            object_from_wrist: self.entries[place].grip.pose.frame_from_wrist,
-            shape: self.shapes[place],
+            object_from_wrist: self.entries[index].grip.pose.frame_from_wrist,
+            shape: self.shapes[index],
             advance: 0.0,
         };
-        Some(known.beside(stream))
+        known.beside(stream)
     }
 
     /// Takes a grip over, if there is room for it or it is needed.

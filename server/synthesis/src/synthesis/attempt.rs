@@ -122,9 +122,8 @@ impl<'a> Scene<'a> {
         self.rig
     }
 
-    /// A hand as GUIDED search proposes it, with the palm laid on where it is to be; none if the object has nothing for
-    /// it.
-    fn guided_proposal(&self, stream: &mut AttemptStream) -> Option<Proposal> {
+    /// Where GUIDED search proposes hands.
+    fn place(&self) -> Place<'_> {
         let object = &self.holdout.object;
         let giver = self
             .physical
@@ -137,18 +136,23 @@ impl<'a> Scene<'a> {
                 .get_or_init(|| object.surface_pairs.free_of(giver)),
             None => &object.surface_pairs,
         };
-        let place = Place {
+        Place {
             object,
             surface,
             giver,
             rig: self.rig,
-        };
-        let proposal = propose(&place, stream)?;
+        }
+    }
+
+    /// A hand as GUIDED search proposes it, with the palm laid on where it is to be; none if the object has nothing for
+    /// it.
+    fn guided_proposal(&self, stream: &mut AttemptStream) -> Option<Proposal> {
+        let proposal = propose(&self.place(), stream)?;
         if self.physical.is_some() {
             // Palm and forearm are looked at on the way there.
             return Some(proposal);
         }
-        let scene = ObjectScene::new(object, self.load.friction);
+        let scene = ObjectScene::new(&self.holdout.object, self.load.friction);
         Some(Proposal {
             object_from_wrist: settled_wrist(&scene, self.rig, &proposal)?,
             advance: 0.0,
@@ -320,13 +324,14 @@ impl Attempt {
             rig: scene.rig,
             constraints: &scene.constraints,
         };
+        let place = scene.place();
         for _ in 0..BESIDE_KNOWN {
             if interrupted() {
                 return Err(Interrupted);
             }
-            let proposal = starts.propose(known.entries(), scene.rig, presented.giver.as_ref(), stream);
-            let proposal =
-                proposal.filter(|proposal| scene.constraints.admits_wrist(proposal.object_from_wrist));
+            let proposal = starts
+                .propose(known.entries(), &place, stream)
+                .filter(|proposal| scene.constraints.admits_wrist(proposal.object_from_wrist));
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
             let physical = &mut self.physical;
