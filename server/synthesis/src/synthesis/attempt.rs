@@ -204,7 +204,7 @@ impl<'a> Scene<'a> {
 
 /// Hands beside known grips that an attempt tries after its own. They hold forty times as often where a giver leaves little
 /// room, and only where something like them is known: hands that are placed anew keep some of the time.
-const BESIDE_KNOWN: usize = 4;
+const BESIDE_KNOWN: usize = 8;
 
 /// The stop signal came.
 struct Interrupted;
