@@ -9,6 +9,9 @@ use crate::physical::{
 /// A ball inside a hand: the index of its solid in [`HandSolids::iter`], and where on its axis, from 0 to 1.
 type Core = (usize, f32);
 
+/// Solids of a digit, which come first in [`HandSolids::iter`].
+const LINKS: usize = 3;
+
 /// The balls that settle most, each the one that settled most of what those before it had left: of 32,203 pairs of hands
 /// that meet, grips of the built-in objects by falling score beside recorded givers, these leave 2 %, …
 const FIRST: [Core; BALLS] = [
@@ -45,7 +48,7 @@ pub(super) struct Cores(Vec<Balls>);
 impl Cores {
     /// Those of some hands.
     pub(super) fn of<'a>(hands: impl Iterator<Item = &'a HandSolids>) -> Self {
-        Self(hands.map(|solids| balls(solids, &FIRST)).collect())
+        Self(hands.map(|solids| balls(solids, &FIRST, [true; 5])).collect())
     }
 
     /// True only if one of those hands, whose solids are known, comes too near to the giver's; not always then.
@@ -53,7 +56,7 @@ impl Cores {
     pub(super) fn surely_meet(&self, hand: usize, solids: &HandSolids, giver: &PreparedHand) -> bool {
         // One in fifty that meet gets as far as the second ones, which are not kept for that.
         giver.surely_nears_any(&self.0[hand], GIVER_CLEARANCE)
-            || giver.surely_nears_any(&balls(solids, &SECOND), GIVER_CLEARANCE)
+            || giver.surely_nears_any(&balls(solids, &SECOND, [true; 5]), GIVER_CLEARANCE)
     }
 
     /// Bytes that they take in memory.
@@ -62,17 +65,31 @@ impl Cores {
     }
 }
 
-/// True only if a hand comes too near to the giver's; not always then.
-pub(super) fn surely_meets(solids: &HandSolids, giver: &PreparedHand) -> bool {
+/// True only if one of some digits, palm or forearm of a hand comes nearer to the giver's than `distance` metres; not
+/// always then.
+pub(super) fn surely_nears(
+    solids: &HandSolids,
+    digits: [bool; 5],
+    giver: &PreparedHand,
+    distance: f32,
+) -> bool {
     [&FIRST, &SECOND]
         .into_iter()
-        .any(|cores| giver.surely_nears_any(&balls(solids, cores), GIVER_CLEARANCE))
+        .any(|cores| giver.surely_nears_any(&balls(solids, cores, digits), distance))
 }
 
-fn balls(solids: &HandSolids, cores: &[Core; BALLS]) -> Balls {
+/// The balls of some digits, palm and forearm; in place of the others' nothing that is near to anything.
+#[inline]
+fn balls(solids: &HandSolids, cores: &[Core; BALLS], digits: [bool; 5]) -> Balls {
     Balls::new(|i| {
-        let (solid, along) = cores[i];
-        let solid = solids.solid(solid);
-        (solid.at(along), solid.radius_at(along))
+        let (index, along) = cores[i];
+        let solid = solids.solid(index);
+        let counts = digits.get(index / LINKS).is_none_or(|&counts| counts);
+        let radius = if counts {
+            solid.radius_at(along)
+        } else {
+            f32::NEG_INFINITY
+        };
+        (solid.at(along), radius)
     })
 }

@@ -1,7 +1,7 @@
 //! A grip of the atlas, and what is left to check when an object is held out.
 
 use super::{
-    cores::surely_meets,
+    cores::surely_nears,
     gravity::{DIRECTIONS, direction},
 };
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     physical::{
         attempt::grasp,
         contacts::soften,
-        grip::{Grip, Gripper, clear_of_giver},
+        grip::{GIVER_CLEARANCE, Grip, Gripper, clear_of_giver},
         immobility::balance,
         scene::{ObjectScene, Presented},
         solids::{HandSolids, PreparedHand},
@@ -148,7 +148,7 @@ impl Entry {
 
     /// True if some balls inside the hand come too near to the giver's: then so does the hand.
     pub(super) fn surely_meets(&self, giver: &PreparedHand) -> bool {
-        surely_meets(&self.solids, giver)
+        surely_nears(&self.solids, [true; 5], giver, GIVER_CLEARANCE)
     }
 }
 

@@ -5,7 +5,7 @@
 //! that are proposed without knowledge (280 grasps instead of 7 in the same time, for the 16 of 60 recorded givers whom
 //! the atlas of the built-in scalpel does not answer).
 
-use super::entry::Entry;
+use super::{cores::surely_nears, entry::Entry};
 use crate::{
     grasp::Contact,
     guided::proposal::Place,
@@ -66,9 +66,11 @@ impl Starts {
                 nearest[STARTS - 1].0
             };
             let entry = &entries[usize::from(index)];
-            let Some(clearance) =
-                giver.least_distance(holding_solids(entry, &entry.solids), GIVER_CLEARANCE, least)
-            else {
+            if surely_nears(&entry.solids, holding_digits(entry), giver, least) {
+                continue;
+            }
+            let solids = holding_solids(entry, &entry.solids);
+            let Some(clearance) = giver.least_distance(solids, GIVER_CLEARANCE, least) else {
                 continue;
             };
             let place = nearest.partition_point(|&(other, _)| other >= clearance);
@@ -145,6 +147,10 @@ fn keeps_off(entry: &Entry, object: &GraspObject, moved: &HandSolids) -> bool {
     holding_solids(entry, moved).all(|part| !object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
 }
 
+fn holding_digits(entry: &Entry) -> [bool; 5] {
+    entry.grip.bend_ratios.map(|ratio| ratio.is_some())
+}
+
 /// A hand's solids but those of fingers that do not hold: they rest where there is room.
 fn holding_solids<'a>(
     entry: &Entry,
@@ -156,8 +162,7 @@ fn holding_solids<'a>(
         thenar,
         forearm,
     } = solids;
-    let holds = entry.grip.bend_ratios.map(|ratio| ratio.is_some());
-    let digits = phalanges.iter().zip(holds);
+    let digits = phalanges.iter().zip(holding_digits(entry));
     digits
         .filter_map(|(links, holds)| holds.then_some(links))
         .flatten()

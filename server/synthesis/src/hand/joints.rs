@@ -124,25 +124,34 @@ impl HandJoints {
             position: (metacarpal.position + knuckle.position) * 0.5,
             orientation: metacarpal.orientation,
         };
+        let mut joints = [Joint {
+            pose: wrist,
+            radius: 0.0,
+        }; JOINT_COUNT];
+        for (joint, (frame, radius)) in joints
+            .iter_mut()
+            .zip(thesis_frames.into_iter().zip(rig.joint_radii))
+        {
+            *joint = Joint {
+                pose: openxr_from_thesis_frame(frame),
+                radius,
+            };
+        }
         Self {
             handedness: rig.handedness,
-            joints: std::array::from_fn(|i| Joint {
-                pose: openxr_from_thesis_frame(thesis_frames[i]),
-                radius: rig.joint_radii[i],
-            }),
+            joints,
         }
     }
 
     /// The same joints seen from another frame.
     #[must_use]
     pub fn transformed(&self, a_from_b: Pose) -> Self {
-        Self {
-            handedness: self.handedness,
-            joints: self.joints.map(|joint| Joint {
-                pose: a_from_b * joint.pose,
-                radius: joint.radius,
-            }),
+        let mut transformed = self.clone();
+        // A loop, as mapped arrays stay calls.
+        for joint in &mut transformed.joints {
+            joint.pose = a_from_b * joint.pose;
         }
+        transformed
     }
 
     /// The middle of the palm's skin: one radius out of the palm joint on the palm's side.

@@ -1,7 +1,5 @@
 //! The solids of a hand.
 
-use std::array;
-
 use glam::Vec3;
 
 use super::{
@@ -70,10 +68,14 @@ impl HandSolids {
     fn around(joints: &HandJoints, skeleton: &Skeleton<'_>, palm: &[TaperedCapsule; PALM_SOLIDS]) -> Self {
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
-        let phalanges = array::from_fn(|digit| {
-            let joints = joints_of_digit(digit);
-            link_solids(joints.map(at), joints.map(radius))
-        });
+        let mut phalanges = [[TaperedCapsule::default(); 3]; 5];
+        for (digit, links) in phalanges.iter_mut().enumerate() {
+            let [a, b, c, d] = joints_of_digit(digit);
+            *links = link_solids(
+                [at(a), at(b), at(c), at(d)],
+                [radius(a), radius(b), radius(c), radius(d)],
+            );
+        }
         Self {
             phalanges,
             palm: *palm,
@@ -98,17 +100,20 @@ impl HandSolids {
     }
 
     fn map(&self, place: impl Fn(Vec3) -> Vec3) -> Self {
-        let placed = |solid: TaperedCapsule| TaperedCapsule {
-            start: place(solid.start),
-            end: place(solid.end),
-            ..solid
-        };
-        Self {
-            phalanges: self.phalanges.map(|links| links.map(placed)),
-            palm: self.palm.map(placed),
-            thenar: self.thenar.map(placed),
-            forearm: self.forearm.map(placed),
+        let mut placed = *self;
+        let Self {
+            phalanges,
+            palm,
+            thenar,
+            forearm,
+        } = &mut placed;
+        let others = palm.iter_mut().chain(thenar).chain(forearm);
+        // Mapped arrays stay calls, which take longer than what they do.
+        for solid in phalanges.as_flattened_mut().iter_mut().chain(others) {
+            solid.start = place(solid.start);
+            solid.end = place(solid.end);
         }
+        placed
     }
 
     /// All solids in the order of [`HandSolids::iter`], side by side.
