@@ -140,7 +140,8 @@ pub struct FindRequest {
     /// Answer with the valid attempt of the lowest index, the same for any number of workers.
     #[serde(default)]
     pub reproducible: bool,
-    /// Replay: run this attempt of the seed and no other.
+    /// Replay: run this attempt of the seed and no other, without trying the atlas' own grips. An attempt that fails by
+    /// itself goes on beside those: with the atlas of the same stamp, or without one, it does the same again.
     #[serde(default)]
     pub only_attempt: Option<u64>,
     /// Record the time spent in each step.

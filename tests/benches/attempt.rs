@@ -8,11 +8,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_synthesis::{
     object::THESIS_FRICTION,
     strategy::Strategy,
-    synthesis::{
-        attempt::{Attempt, Scene},
-        random::AttemptStream,
-        stopwatch::NoStopwatch,
-    },
+    synthesis::{attempt::Attempt, random::AttemptStream, scene::Scene, stopwatch::NoStopwatch},
     taxonomy::classify,
 };
 use grasp_tests::searches::Bench;

@@ -207,12 +207,14 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     shares
 }
 
-/// What threads reserve but do not use: the pools' own, and one for each search and upload.
+/// What threads reserve but do not use: the pools' own, one for each search, and two for each upload, whose object's box
+/// and surface are looked at side by side.
 fn stacks(config: &Config) -> MemoryShare {
     let threads = [
         config.workers.get(),
         config.io_threads.get(),
         config.maximum_searches.get(),
+        config.maximum_uploads.get(),
         config.maximum_uploads.get(),
         config.builder_threads,
     ]
@@ -276,12 +278,12 @@ mod tests {
 
     #[test]
     fn what_is_reserved_includes_a_stack_for_every_thread() {
-        let reserved = NEEDED + (1 + 1 + 5 + 3 + 1) * 2 * MIB;
+        let reserved = NEEDED + (1 + 1 + 5 + 2 * 3 + 1) * 2 * MIB;
         let check = |bytes| check_memory(&config(), 0, &[limit(bytes, LimitKind::Reserved)]);
         assert_eq!(check(reserved), Ok(()));
         let text = check(reserved - 1).unwrap_err().to_string();
         assert!(
-            text.contains("22 MiB reserved for the stacks of 11 threads"),
+            text.contains("28 MiB reserved for the stacks of 14 threads"),
             "{text}"
         );
     }
@@ -310,7 +312,7 @@ mod tests {
             lines[..4],
             [
                 "too little memory: the limit is 30 MiB (a test); this configuration may take 156 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may take 178 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may take 184 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]

@@ -24,8 +24,9 @@ use grasp_synthesis::{
     search::{SearchEnd, SearchSettings, find_grasp},
     strategy::{Choice, Validity},
     synthesis::{
-        attempt::{Attempt, AttemptEnd, Scene},
+        attempt::{Attempt, AttemptEnd},
         random::AttemptStream,
+        scene::Scene,
         stopwatch::NoStopwatch,
     },
 };

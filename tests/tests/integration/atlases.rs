@@ -36,7 +36,7 @@ async fn start(folder: &Folder) -> TestServer {
 }
 
 /// The state of an object's atlas as soon as it has `least` grips.
-async fn state(server: &TestServer, name: &str, least: u32) -> v1::AtlasState {
+pub(crate) async fn state(server: &TestServer, name: &str, least: u32) -> v1::AtlasState {
     let mut client = server.objects().await;
     bounded("the growth of an atlas", async {
         loop {

@@ -1,10 +1,19 @@
 //! The same question gets the same answer, whoever asks whomever.
 
+use grasp_assets::{atlases::atlas, hands::hand, objects::object};
 use grasp_proto::v1;
-use grasp_tests::TestServer;
+use grasp_synthesis::{
+    atlas::codec::decode,
+    hand::{Handedness, joints::HandJoints},
+    pose::Pose,
+};
+use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 use prost::Message as _;
 
-use crate::support::{floating_remote, held_remote, impossible, seconds};
+use crate::{
+    atlases::state,
+    support::{floating_remote, held_remote, impossible, seconds},
+};
 
 async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
     server
@@ -114,6 +123,64 @@ async fn the_told_seed_and_attempt_replay_the_grasp() {
     assert_eq!(second.grasp, first.grasp);
     let replayed = second.report.unwrap();
     assert_eq!((replayed.attempts, replayed.attempt), (1, report.attempt));
+    server.stop().await;
+}
+
+/// The scissors in the hands of known grips, as if those were givers': some leave no known grip.
+fn scissors_held_by_known_grips() -> impl Iterator<Item = v1::FindGraspRequest> {
+    let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
+    let scissors = &object("scissors").expect("they are built in").object;
+    let shipped = atlas("scissors", rig).expect("it is shipped");
+    let known = decode(shipped, scissors, rig).expect("it is today's").atlas;
+    (0..known.entries().len()).step_by(20).map(move |index| {
+        let holdout = ClientHoldout {
+            client_from_object: Pose::IDENTITY,
+            giver: HandJoints::of_pose(rig, &known.entries()[index].grip.pose),
+        };
+        v1::FindGraspRequest {
+            budget: Some(seconds(10)),
+            max_attempts: Some(400),
+            seed: Some(7),
+            reproducible: true,
+            ..holdout.request("objects/scissors")
+        }
+    })
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_grasp_beside_a_known_one_is_replayed_with_the_same_atlas() {
+    let server = TestServer::start_with(|config| config.builder_threads = 1).await;
+    state(&server, "objects/scissors", 1000).await;
+    let replay_of = |request: &v1::FindGraspRequest, report: &v1::SearchReport, atlas: v1::AtlasUse| {
+        v1::FindGraspRequest {
+            only_attempt: report.attempt,
+            max_attempts: None,
+            atlas: atlas.into(),
+            ..request.clone()
+        }
+    };
+    let mut replayed = 0;
+    for request in scissors_held_by_known_grips() {
+        let first = ask(&server, request.clone()).await;
+        let report = first.report.as_ref().expect("every answer has a report");
+        if report.source() != v1::GraspSource::Search {
+            continue;
+        }
+        let again = ask(&server, replay_of(&request, report, v1::AtlasUse::Allowed)).await;
+        assert_eq!(again.grasp, first.grasp);
+        let replay = again.report.expect("every answer has a report");
+        assert_eq!(replay.source(), v1::GraspSource::Search);
+        assert_eq!((replay.attempts, replay.atlas_entries), (1, 0));
+        assert_eq!(replay.atlas_stamp, report.atlas_stamp);
+        assert!(!replay.atlas_stamp.is_empty());
+        // By itself, that attempt gives another grasp or, mostly, none.
+        let without = ask(&server, replay_of(&request, report, v1::AtlasUse::None)).await;
+        replayed += usize::from(without.grasp.is_none());
+        if replayed == 2 {
+            break;
+        }
+    }
+    assert_eq!(replayed, 2);
     server.stop().await;
 }
 

@@ -98,7 +98,7 @@ pub(super) struct Arguments {
     /// Start of every random stream. Default: drawn by the server.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Replay: run this attempt of the seed and no other.
+    /// Replay: run this attempt of the seed and no other, without trying known grips before it.
     #[arg(long, value_name = "N", requires = "seed")]
     only_attempt: Option<u64>,
     /// The valid attempt of the lowest index wins, the same for any number of workers.

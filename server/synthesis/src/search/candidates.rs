@@ -16,7 +16,7 @@ use crate::{
     },
     score::{Score, comfort_value},
     strategy::Validity,
-    synthesis::attempt::Scene,
+    synthesis::scene::Scene,
 };
 
 /// Grips that are tried before it is asked which are out of the question: asking takes as long as looking at some fifty one

@@ -19,7 +19,7 @@ use crate::{
     holdout::Holdout,
     strategy::{BendRatioChoice, Choice, Strategy, Validity},
     synthesis::{
-        attempt::Scene,
+        scene::Scene,
         stopwatch::{NoStopwatch, StepStopwatch},
     },
 };

@@ -22,8 +22,9 @@ use crate::{
     rejection::Rejection,
     strategy::Choice,
     synthesis::{
-        attempt::{Attempt, AttemptEnd, Scene},
+        attempt::{Attempt, AttemptEnd},
         random::AttemptStream,
+        scene::Scene,
         stopwatch::Stopwatch,
     },
 };

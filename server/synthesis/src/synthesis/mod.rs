@@ -27,6 +27,7 @@ pub mod force_distribution;
 pub mod immobility_validation;
 pub mod placement_measures;
 pub mod random;
+pub mod scene;
 pub mod stopwatch;
 pub mod wrenches;
 pub mod wrist_placement;

@@ -1,0 +1,188 @@
+//! What all attempts of a search share.
+
+use std::sync::{Arc, OnceLock};
+
+use super::{
+    closing_motion::DigitMotion, immobility_validation::Load, random::AttemptStream, wrenches::Wrench,
+    wrist_placement::WristPlacer,
+};
+use crate::{
+    atlas::{Atlas, starts::Starts},
+    constraints::Constraints,
+    guided::{
+        proposal::{Place, propose},
+        surface_pairs::SurfacePairs,
+    },
+    hand::rig::Rig,
+    holdout::Holdout,
+    physical::{
+        grip::settled_wrist,
+        scene::{ObjectScene, Presented},
+        shape::Proposal,
+    },
+    strategy::{BendRatioChoice, Strategy, Validity},
+};
+
+/// A holdout and how attempts at it go, with what they find out about it once.
+#[derive(Clone, Debug)]
+pub struct Scene<'a> {
+    pub(super) holdout: &'a Holdout,
+    pub(super) rig: &'a Rig,
+    pub(super) strategy: Strategy,
+    pub(super) bend_ratios: BendRatioChoice,
+    pub(super) placer: WristPlacer<'a>,
+    /// How the digits close in steps, once it was asked for: `PHYSICAL` never does, and it takes longer than a look-up.
+    pub(super) motion: OnceLock<[DigitMotion; 5]>,
+    pub(super) load: Load,
+    /// Under `PHYSICAL` validity.
+    pub(super) physical: Option<(ObjectScene<'a>, Presented)>,
+    /// What the giver's hand leaves of the object's surface, once it was asked for.
+    free_surface: OnceLock<SurfacePairs>,
+    pub(super) constraints: Constraints,
+    /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`, …
+    pub(super) known: Option<Arc<Atlas>>,
+    /// … and which of them, once it was asked for.
+    starts: OnceLock<Starts>,
+}
+
+impl<'a> Scene<'a> {
+    /// Prepares attempts at a holdout. `friction` is the coefficient of static friction.
+    pub fn new(
+        holdout: &'a Holdout,
+        rig: &'a Rig,
+        strategy: Strategy,
+        bend_ratios: BendRatioChoice,
+        friction: f32,
+    ) -> Self {
+        debug_assert!(
+            friction.is_finite() && friction > 0.0,
+            "friction {friction} is not positive"
+        );
+        debug_assert!(
+            holdout.up.is_normalized(),
+            "up {} is not a unit vector",
+            holdout.up
+        );
+        Self {
+            holdout,
+            rig,
+            strategy,
+            bend_ratios,
+            placer: WristPlacer::new(holdout, rig, strategy),
+            motion: OnceLock::new(),
+            load: Load {
+                gravity: Wrench::of_gravity(holdout.object.mass, holdout.up),
+                centre_of_mass: holdout.object.centre_of_mass,
+                friction,
+            },
+            physical: None,
+            free_surface: OnceLock::new(),
+            constraints: Constraints::default(),
+            known: None,
+            starts: OnceLock::new(),
+        }
+    }
+
+    /// The same with attempts that, having failed, start from known grips; for `GUIDED` and `PHYSICAL`.
+    #[must_use]
+    pub fn starting_from(self, known: Option<Arc<Atlas>>) -> Self {
+        Self { known, ..self }
+    }
+
+    /// The same with demands on the grasps, in the object's frame.
+    #[must_use]
+    pub fn with_constraints(self, constraints: Constraints) -> Self {
+        Self { constraints, ..self }
+    }
+
+    /// Under `PHYSICAL` validity: the object, and how it is held out.
+    pub fn physical(&self) -> Option<(&ObjectScene<'a>, &Presented)> {
+        self.physical
+            .as_ref()
+            .map(|(object, presented)| (object, presented))
+    }
+
+    /// The receiving hand.
+    pub fn rig(&self) -> &'a Rig {
+        self.rig
+    }
+
+    /// Where GUIDED search proposes hands.
+    pub(super) fn place(&self) -> Place<'_> {
+        let object = &self.holdout.object;
+        let giver = self
+            .physical
+            .as_ref()
+            .and_then(|(_, presented)| presented.giver.as_ref());
+        let surface = match giver {
+            // Only a search that comes to fresh attempts needs it.
+            Some(giver) => self
+                .free_surface
+                .get_or_init(|| object.surface_pairs.free_of(giver)),
+            None => &object.surface_pairs,
+        };
+        Place {
+            object,
+            surface,
+            giver,
+            rig: self.rig,
+        }
+    }
+
+    /// A hand as GUIDED search proposes it, with the palm laid on where it is to be; none if the object has nothing for
+    /// it.
+    pub(super) fn guided_proposal(&self, stream: &mut AttemptStream) -> Option<Proposal> {
+        let proposal = propose(&self.place(), stream)?;
+        if self.physical.is_some() {
+            // Palm and forearm are looked at on the way there.
+            return Some(proposal);
+        }
+        let scene = ObjectScene::new(&self.holdout.object, self.load.friction);
+        Some(Proposal {
+            object_from_wrist: settled_wrist(&scene, self.rig, &proposal)?,
+            advance: 0.0,
+            ..proposal
+        })
+    }
+
+    /// Of the known grips, those that attempts start from: the ones that hold under this gravity and are what is
+    /// demanded, if the giver were not in their way. None if interrupted.
+    pub(super) fn starts(
+        &self,
+        known: &Atlas,
+        presented: &Presented,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<&Starts> {
+        if let Some(starts) = self.starts.get() {
+            return Some(starts);
+        }
+        let holding = known.holding_under(presented.up).iter().copied();
+        let wanted =
+            holding.filter(|&entry| known.entries()[usize::from(entry)].is_wanted(&self.constraints));
+        let giver = presented.giver.as_ref();
+        let found = Starts::of(known.entries(), wanted, giver, interrupted)?;
+        // Another worker may have found the same meanwhile.
+        Some(self.starts.get_or_init(|| found))
+    }
+
+    /// What is demanded of the grasps.
+    pub fn constraints(&self) -> &Constraints {
+        &self.constraints
+    }
+
+    /// The same with grasps that count as valid as `validity` says.
+    #[must_use]
+    pub fn with_validity(self, validity: Validity) -> Self {
+        let friction = self.load.friction;
+        Self {
+            physical: match validity {
+                Validity::Thesis => None,
+                Validity::Physical => Some((
+                    ObjectScene::new(&self.holdout.object, friction),
+                    Presented::of(self.holdout),
+                )),
+            },
+            ..self
+        }
+    }
+}
