@@ -35,8 +35,9 @@ const SOLIDS: usize = 24;
 /// How far around the object's box space is cut into cells, in metres: a hand's thickness and more.
 const MARGIN: f32 = 0.07;
 
-/// Distance between the balls of one of the giver's solids, in metres: each cell on the way is looked up about once.
-const SPACING: f32 = 0.01;
+/// Distance between the balls of one of the giver's solids, in metres: half a cell's edge, so that hardly a cell on the way is
+/// left out. A larger one leaves out more, a smaller one looks up the same cells again.
+const SPACING: f32 = 0.006;
 
 /// Grips that share a word.
 const WORD: usize = u64::BITS as usize;

@@ -36,7 +36,7 @@ const NEAR_DRAWS: usize = 12;
 /// mostly miss it. Asking that of all near ones finds half as many grasps again.
 const TOUCHING: f32 = 0.005;
 
-/// Grips that are compared with the giver between two looks at the clock: at most some twenty microseconds' worth.
+/// Grips that are compared with the giver between two looks at the clock: at most some forty microseconds' worth.
 const AT_ONCE: usize = 4;
 
 /// The known grips that are least in a giver's way, by its clearance of the digits that hold, of palm and forearm.
