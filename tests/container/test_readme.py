@@ -61,7 +61,7 @@ def test_the_sum_of_the_default_memory_is_the_server_s():
     printed = run("docker", "run", "--rm", "--env", "GRASP_WORKERS=30", "grasp-server", "--print-config").stdout
     value = {key: int(text) for key, text in re.findall(r"^(\w+) = (\d+)$", printed, flags=re.MULTILINE)}
     mib = 1 << 20
-    upload = 2 * value["maximum_object_bytes"] + 512 * value["maximum_object_triangles"] + 512 * 1024
+    upload = 2 * value["maximum_object_bytes"] + 640 * value["maximum_object_triangles"] + 512 * 1024
     total = (
         16 * mib
         + value["cache_bytes"]

@@ -8,7 +8,7 @@ from conftest import grasp, limits_memory, skip
 SMALL = {
     "GRASP_CACHE_BYTES": str(64 << 20),
     "GRASP_MAXIMUM_UPLOADS": "1",
-    "GRASP_MAXIMUM_SEARCHES": "16",
+    "GRASP_MAXIMUM_SEARCHES": "4",
     "GRASP_MAXIMUM_CONNECTIONS": "100",
 }
 
