@@ -141,16 +141,11 @@ impl Attempt {
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
     ) -> Result<Option<Box<Grasp>>, Interrupted> {
-        let Some((object, presented)) = &scene.physical else {
+        let Some(around) = scene.surroundings() else {
             return Ok(None);
         };
-        let starts = scene.starts(known, presented, interrupted).ok_or(Interrupted)?;
-        let around = Surroundings {
-            object: *object,
-            presented,
-            rig: scene.rig,
-            constraints: &scene.constraints,
-        };
+        let starts = scene.starts(known, around.presented, interrupted);
+        let starts = starts.ok_or(Interrupted)?;
         let place = scene.place();
         for _ in 0..BESIDE_KNOWN {
             if interrupted() {
@@ -209,18 +204,12 @@ impl Attempt {
         if !scene.constraints.admits_wrist(self.wrist.object_from_wrist) {
             return reject(Rejection::UnmetConstraint);
         }
-        if let Some((object, presented)) = &scene.physical {
+        if let Some(around) = scene.surroundings() {
             let proposal = proposal.unwrap_or_else(|| Proposal {
                 object_from_wrist: self.wrist.object_from_wrist,
                 shape: HandShape::draw(scene.bend_ratios, stream),
                 advance: 0.0,
             });
-            let around = Surroundings {
-                object: *object,
-                presented,
-                rig: scene.rig,
-                constraints: &scene.constraints,
-            };
             return self.hold_physically(&around, &proposal, scene.strategy, stream, stopwatch, interrupted);
         }
 

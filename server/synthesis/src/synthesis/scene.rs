@@ -16,6 +16,7 @@ use crate::{
     hand::rig::Rig,
     holdout::Holdout,
     physical::{
+        attempt::Surroundings,
         grip::settled_wrist,
         scene::{ObjectScene, Presented},
         shape::Proposal,
@@ -105,6 +106,17 @@ impl<'a> Scene<'a> {
     /// The receiving hand.
     pub fn rig(&self) -> &'a Rig {
         self.rig
+    }
+
+    /// Under `PHYSICAL` validity: what an attempt works with.
+    pub(super) fn surroundings(&self) -> Option<Surroundings<'_>> {
+        let (object, presented) = self.physical.as_ref()?;
+        Some(Surroundings {
+            object: *object,
+            presented,
+            rig: self.rig,
+            constraints: &self.constraints,
+        })
     }
 
     /// Where GUIDED search proposes hands.
