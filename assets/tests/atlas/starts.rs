@@ -1,6 +1,7 @@
 //! Hands beside known grips, for givers of whom no known grip keeps clear.
 
 use std::{
+    collections::HashSet,
     sync::{Arc, atomic::AtomicBool},
     time::Duration,
 };
@@ -86,7 +87,13 @@ fn starts_are_what_is_least_in_the_givers_way() {
             .map(|&entry| clearance(&known.entries()[usize::from(entry)], &giver).min(GIVER_CLEARANCE))
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
-        assert!(starts.entries().len() >= 32, "{}", starts.entries().len());
+        // Nobody in the way: the best ones, as many.
+        let nobody = Starts::of(known.entries(), holding.iter().copied(), None, || false);
+        let best = nobody.expect("nobody interrupts");
+        assert!(best.entries().len() >= 32 && holding.starts_with(best.entries()));
+        assert_eq!(starts.entries().len(), best.entries().len());
+        let distinct: HashSet<u16> = starts.entries().iter().copied().collect();
+        assert_eq!(distinct.len(), starts.entries().len());
         for (&entry, expected) in starts.entries().iter().zip(clearances) {
             let found = clearance(&known.entries()[usize::from(entry)], &giver).min(GIVER_CLEARANCE);
             assert!(

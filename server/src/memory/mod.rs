@@ -244,7 +244,7 @@ mod tests {
     }
 
     /// 16 MiB at rest, 2 threads of 64 KiB, a cache of 100 MiB, 3 uploads of 2.5 MiB and 1000 triangles, 5 searches of
-    /// 2 MiB, 7 connections of 32 KiB, 1 builder of 12 MiB.
+    /// 2 MiB, 7 connections of 32 KiB, 1 builder of 20 MiB.
     fn config() -> Config {
         let count = |n: usize| n.try_into().unwrap();
         Config {

@@ -95,8 +95,8 @@ impl HandSolids {
 
     /// The same hand in another frame, or elsewhere and turned.
     #[must_use]
-    pub fn transformed(&self, to_from_from: Pose) -> Self {
-        self.map(|point| to_from_from.transform_point(point))
+    pub fn transformed(&self, a_from_b: Pose) -> Self {
+        self.map(|point| a_from_b.transform_point(point))
     }
 
     fn map(&self, place: impl Fn(Vec3) -> Vec3) -> Self {
