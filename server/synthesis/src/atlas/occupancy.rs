@@ -103,13 +103,15 @@ impl Occupancy {
         // Solids of a hand overlap, so that half of the balls lie in a cell that was looked up before.
         let mut is_done = vec![false; self.bits.len() / self.words.max(1)];
         for solid in giver.iter().take(SOLIDS) {
-            let steps = (solid.length() / SPACING).ceil().max(1.0);
-            for step in 0..=steps as u32 {
-                let along = step as f32 / steps;
+            let steps = (solid.length() / SPACING) as u32 + 1;
+            let of_step = (steps as f32).recip();
+            let (from, way) = (self.in_cells(solid.start), (solid.end - solid.start) / self.edge);
+            for step in 0..=steps {
+                let along = step as f32 * of_step;
                 if solid.radius_at(along) < LEAST_RADIUS {
                     continue;
                 }
-                let Some(cell) = self.cell(self.place_of(solid.at(along))) else {
+                let Some(cell) = self.cell(rounded_down(from + way * along)) else {
                     continue;
                 };
                 let row = self.rows[cell];
@@ -166,13 +168,24 @@ impl Occupancy {
         self.bits[self.rows[cell] as usize * self.words + entry / WORD] |= 1 << (entry % WORD);
     }
 
-    /// Which cell along each axis a point is in.
+    /// Which cell along each axis a point is in; before the first, something negative.
     fn place_of(&self, point: Vec3) -> IVec3 {
-        ((point - self.low) / self.edge).floor().as_ivec3()
+        rounded_down(self.in_cells(point))
+    }
+
+    /// A point in edges of a cell from the first one's corner.
+    fn in_cells(&self, point: Vec3) -> Vec3 {
+        (point - self.low) / self.edge
     }
 
     fn cell(&self, place: IVec3) -> Option<usize> {
         let is_inside = place.cmpge(IVec3::ZERO).all() && place.cmplt(self.counts).all();
         is_inside.then(|| ((place.z * self.counts.y + place.y) * self.counts.x + place.x) as usize)
     }
+}
+
+/// The next whole numbers below; of what is below -1, something negative. Conversion takes an instruction where rounding
+/// takes a call on many processors.
+fn rounded_down(place: Vec3) -> IVec3 {
+    (place + 1.0).as_ivec3() - 1
 }

@@ -20,6 +20,9 @@ const MET_FIRST: [usize; HandSolids::COUNT] = [
     27, 28,
 ];
 
+/// Solids of a hand that one solid is compared with at once: a register's worth of single precision.
+const GROUP: usize = 8;
+
 /// Solids that some balls are compared with before it is asked whether that settled it. Fewer ask more often, more
 /// compare in vain.
 const SOLIDS_AT_ONCE: usize = 4;
@@ -162,14 +165,18 @@ impl PreparedHand {
         if least < required {
             return None;
         }
+        // Of the pairs that this leaves, one or two are left by what a better direction shows.
         for (our, sure) in other.iter().zip(&sure) {
-            if sure.iter().fold(0, |any, sure| any | u32::from(*sure <= least)) == 0 {
-                continue;
-            }
-            let our = Bounded::new(*our);
-            for (their, sure) in self.solids.iter().zip(sure) {
-                if *sure <= least && !our.is_beyond(their, least) {
-                    least = least.min(our.solid.distance(&their.solid));
+            for (group, sure) in sure.as_chunks::<GROUP>().0.iter().enumerate() {
+                if sure.iter().fold(0, |any, sure| any | u32::from(*sure <= least)) == 0 {
+                    continue;
+                }
+                let kept = self.kept_distances(our, group);
+                let theirs = self.solids.iter().skip(group * GROUP);
+                for (their, kept) in theirs.zip(kept) {
+                    if kept <= least {
+                        least = least.min(our.distance(&their.solid));
+                    }
                     if least < required {
                         return None;
                     }
@@ -177,6 +184,45 @@ impl PreparedHand {
             }
         }
         Some(least)
+    }
+
+    /// Distances in metres that a group of the solids surely keep from another one.
+    ///
+    /// Whatever the direction, two convex solids are at least as far apart as what they take up along it. The way between
+    /// about the nearest points of their axes is a direction that shows nearly the whole distance.
+    #[inline]
+    fn kept_distances(&self, our: &TaperedCapsule, group: usize) -> [f32; GROUP] {
+        let of = |lanes: &Lanes| lanes.as_chunks::<GROUP>().0[group];
+        let [sx, sy, sz] = self.starts.each_ref().map(of);
+        let [ax, ay, az] = self.axes.each_ref().map(of);
+        let (inverse_squares, start_radii, rises) =
+            (of(&self.inverse_squares), of(&self.start_radii), of(&self.rises));
+        let (middle, axis) = (our.at(0.5), our.end - our.start);
+        let inverse_square = axis.length_squared().max(f32::MIN_POSITIVE).recip();
+        let rise = our.end_radius - our.start_radius;
+        let mut kept = [0.0; GROUP];
+        for i in 0..GROUP {
+            // The foot of our middle on their axis, its foot on ours, and that one's on theirs again.
+            let (x, y, z) = (middle.x - sx[i], middle.y - sy[i], middle.z - sz[i]);
+            let t = ((x * ax[i] + y * ay[i] + z * az[i]) * inverse_squares[i]).clamp(0.0, 1.0);
+            let (x, y, z) = (our.start.x - sx[i], our.start.y - sy[i], our.start.z - sz[i]);
+            let (fx, fy, fz) = (x - ax[i] * t, y - ay[i] * t, z - az[i] * t);
+            let u = -(fx * axis.x + fy * axis.y + fz * axis.z) * inverse_square;
+            let u = u.clamp(0.0, 1.0);
+            let (px, py, pz) = (x + axis.x * u, y + axis.y * u, z + axis.z * u);
+            let t = ((px * ax[i] + py * ay[i] + pz * az[i]) * inverse_squares[i]).clamp(0.0, 1.0);
+
+            let (nx, ny, nz) = (px - ax[i] * t, py - ay[i] * t, pz - az[i] * t);
+            let square = nx * nx + ny * ny + nz * nz;
+            let inverse = square.max(f32::MIN_POSITIVE).sqrt().recip();
+            let (nx, ny, nz) = (nx * inverse, ny * inverse, nz * inverse);
+            // Both are the hulls of their balls at the ends; from their start, along the direction.
+            let our_start = x * nx + y * ny + z * nz - our.start_radius;
+            let our_end = our_start + axis.x * nx + axis.y * ny + axis.z * nz - rise;
+            let their_end = ax[i] * nx + ay[i] * ny + az[i] * nz + rises[i];
+            kept[i] = our_start.min(our_end) - start_radii[i] - their_end.max(0.0) - ROUNDING;
+        }
+        kept
     }
 
     /// The smallest distance of some solids in metres, or `enough` if it is more than that; none if it is below
