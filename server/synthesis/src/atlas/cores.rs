@@ -73,9 +73,14 @@ pub(super) fn surely_nears(
     giver: &PreparedHand,
     distance: f32,
 ) -> bool {
-    [&FIRST, &SECOND]
-        .into_iter()
-        .any(|cores| giver.surely_nears_any(&balls(solids, cores, digits), distance))
+    inner_balls(solids, digits)
+        .iter()
+        .any(|balls| giver.surely_nears_any(balls, distance))
+}
+
+/// Balls inside of some digits, palm and forearm, those first that settle most.
+pub(super) fn inner_balls(solids: &HandSolids, digits: [bool; 5]) -> [Balls; 2] {
+    [&FIRST, &SECOND].map(|cores| balls(solids, cores, digits))
 }
 
 /// The balls of some digits, palm and forearm; in place of the others' nothing that is near to anything.

@@ -102,6 +102,7 @@ impl Occupancy {
         let mut excluded = vec![0; self.words];
         // Solids of a hand overlap, so that half of the balls lie in a cell that was looked up before.
         let mut is_done = vec![false; self.bits.len() / self.words.max(1)];
+        let mut filled = Vec::with_capacity(128);
         for solid in giver.iter().take(SOLIDS) {
             let steps = (solid.length() / SPACING) as u32 + 1;
             let of_step = (steps as f32).recip();
@@ -116,11 +117,14 @@ impl Occupancy {
                 };
                 let row = self.rows[cell];
                 if row != EMPTY && !std::mem::replace(&mut is_done[row as usize], true) {
-                    let from = row as usize * self.words;
-                    for (word, filled) in excluded.iter_mut().zip(&self.bits[from..from + self.words]) {
-                        *word |= filled;
-                    }
+                    filled.push(row as usize * self.words);
                 }
+            }
+        }
+        // Now that nothing else is done between, the rows' words are fetched ahead.
+        for from in filled {
+            for (word, filled) in excluded.iter_mut().zip(&self.bits[from..from + self.words]) {
+                *word |= filled;
             }
         }
         Excluded(excluded)

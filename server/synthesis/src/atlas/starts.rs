@@ -5,7 +5,10 @@
 //! that are proposed without knowledge (280 grasps instead of 7 in the same time, for the 16 of 60 recorded givers whom
 //! the atlas of the built-in scalpel does not answer).
 
-use super::{cores::surely_nears, entry::Entry};
+use super::{
+    cores::{inner_balls, surely_nears},
+    entry::Entry,
+};
 use crate::{
     grasp::Contact,
     guided::proposal::Place,
@@ -106,6 +109,7 @@ impl Starts {
             },
             advance: 0.0,
         };
+        let inside = inner_balls(&entry.solids, holding_digits(entry));
         (0..DRAWS).find_map(|draw| {
             let is_near = draw < NEAR_DRAWS;
             let mut beside = known.beside(stream);
@@ -113,6 +117,12 @@ impl Starts {
                 beside = beside.beside(stream);
             }
             let way = beside.object_from_wrist * known.object_from_wrist.inverse();
+            let is_met = |giver: &PreparedHand| {
+                inside.iter().any(|balls| giver.surely_nears_any(&balls.transformed(way), GIVER_CLEARANCE))
+            };
+            if place.giver.is_some_and(is_met) {
+                return None;
+            }
             let moved = entry.solids.transformed(way);
             let keeps_clear = place
                 .giver

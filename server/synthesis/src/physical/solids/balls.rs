@@ -1,6 +1,8 @@
 //! Some balls of a hand, coordinate by coordinate: all of them are compared with one solid at once.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
+
+use crate::pose::Pose;
 
 /// How many balls are compared at once: a register's worth of single precision, and two cache lines.
 pub const BALLS: usize = 8;
@@ -29,5 +31,20 @@ impl Balls {
             balls.radii[i] = radius;
         }
         balls
+    }
+
+    /// The same balls in another frame, or elsewhere and turned.
+    #[must_use]
+    pub fn transformed(&self, a_from_b: Pose) -> Self {
+        let [x_axis, y_axis, z_axis] = Mat3::from_quat(a_from_b.orientation).to_cols_array_2d();
+        let [xs, ys, zs] = &self.middles;
+        let mut moved = *self;
+        for axis in 0..3 {
+            let from = a_from_b.position[axis];
+            for i in 0..BALLS {
+                moved.middles[axis][i] = from + x_axis[axis] * xs[i] + y_axis[axis] * ys[i] + z_axis[axis] * zs[i];
+            }
+        }
+        moved
     }
 }
