@@ -152,14 +152,19 @@ impl Proposal {
     /// One a little beside, of a hand that is a little different.
     #[must_use]
     pub fn beside(&self, stream: &mut AttemptStream) -> Self {
+        self.beside_about(self.object_from_wrist.position, BESIDE, stream)
+    }
+
+    /// The same, turned about a pivot in the object's frame, and shifted, by other limits than those: metres, radians.
+    #[must_use]
+    pub fn beside_about(&self, pivot: Vec3, [shift, turn]: [f32; 2], stream: &mut AttemptStream) -> Self {
         let Pose {
             position,
             orientation,
         } = self.object_from_wrist;
-        let [shift, turn] = BESIDE;
         let axis = stream.in_cube().normalize_or(Vec3::X);
         let turn = Quat::from_axis_angle(axis, stream.between(-turn, turn));
-        let position = position + stream.in_cube() * shift;
+        let position = pivot + turn * (position - pivot) + stream.in_cube() * shift;
         let mut differing =
             |share: f32| (share + stream.between(-SHAPED_BESIDE, SHAPED_BESIDE)).clamp(0.0, 1.0);
         Self {

@@ -42,7 +42,8 @@ impl Balls {
         for axis in 0..3 {
             let from = a_from_b.position[axis];
             for i in 0..BALLS {
-                moved.middles[axis][i] = from + x_axis[axis] * xs[i] + y_axis[axis] * ys[i] + z_axis[axis] * zs[i];
+                moved.middles[axis][i] =
+                    from + x_axis[axis] * xs[i] + y_axis[axis] * ys[i] + z_axis[axis] * zs[i];
             }
         }
         moved
