@@ -1,7 +1,10 @@
 //! A prepared hand against the distances of all pairs of solids.
 
-use glam::Vec3;
-use grasp_synthesis::physical::solids::{HandSolids, PreparedHand, TaperedCapsule};
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    physical::solids::{BALLS, Balls, HandSolids, PreparedHand, TaperedCapsule},
+    pose::Pose,
+};
 
 use crate::support::Random;
 
@@ -76,4 +79,31 @@ fn distances_and_verdicts_are_those_of_all_pairs() {
         near > 500 && far > 500 && sure > 300,
         "{near} near, {far} far, {sure} sure"
     );
+}
+
+/// Eight balls that are moved together near to a hand exactly where one of them does, moved by itself.
+#[test]
+fn moved_balls_are_near_where_one_of_them_is() {
+    let mut random = Random::new(32);
+    let (mut near, mut far) = (0, 0);
+    for case in 0..2000 {
+        let giver = PreparedHand::new(&hand(&mut random, Vec3::ZERO));
+        let middles: [Vec3; BALLS] =
+            std::array::from_fn(|_| random.direction() * random.between(0.1, 0.2) + Vec3::X * 0.1);
+        let radii: [f32; BALLS] = std::array::from_fn(|_| random.between(0.004, 0.012));
+        let turn = Quat::from_axis_angle(random.direction(), random.between(-3.0, 3.0));
+        let way = Pose::new(random.direction() * random.between(0.0, 0.1), turn);
+        let balls = Balls::new(|i| (middles[i], radii[i])).transformed(way);
+        let nears = |distance: f32| {
+            let mut each = middles.iter().zip(radii);
+            each.any(|(middle, radius)| giver.surely_nears(way.transform_point(*middle), radius, distance))
+        };
+        // Where rounding of the places decides, either is right.
+        let (surely, perhaps) = (nears(0.001 - 1e-6), nears(0.001 + 1e-6));
+        let found = giver.surely_nears_any(&balls, 0.001);
+        assert!(found || !surely, "case {case}: one of them is near");
+        assert!(!found || perhaps, "case {case}: none of them is near");
+        if found { near += 1 } else { far += 1 }
+    }
+    assert!(near > 300 && far > 300, "{near} near, {far} far");
 }
