@@ -172,7 +172,7 @@ impl Occupancy {
         self.bits[self.rows[cell] as usize * self.words + entry / WORD] |= 1 << (entry % WORD);
     }
 
-    /// Which cell along each axis a point is in; before the first, something negative.
+    /// Which cell along each axis a point is in; before the first, -1.
     fn place_of(&self, point: Vec3) -> IVec3 {
         rounded_down(self.in_cells(point))
     }
@@ -188,8 +188,8 @@ impl Occupancy {
     }
 }
 
-/// The next whole numbers below; of what is below -1, something negative. Conversion takes an instruction where rounding
-/// takes a call on many processors.
+/// The next whole numbers below, but -1 for all that are less. Conversion takes an instruction where rounding takes a call on
+/// many processors.
 fn rounded_down(place: Vec3) -> IVec3 {
-    (place + 1.0).as_ivec3() - 1
+    (place.max(Vec3::NEG_ONE) + 1.0).as_ivec3() - 1
 }
