@@ -15,9 +15,7 @@ use crate::{
     grasp::Contact,
     hand::{Digit, DigitAngles, HandPart, HandPose, Phalanx, rig::Rig},
     object::GraspObject,
-    physical::{
-        contacts::contact_normal, grip::Grip, immobility::MOST_CONTACTS, shape::HandShape, solids::HandSolids,
-    },
+    physical::{contacts::contact_normal, grip::Grip, shape::HandShape, solids::HandSolids},
     pose::Pose,
     score::{TERMS, Term},
     taxonomy::classify,
@@ -25,6 +23,9 @@ use crate::{
 
 /// Bytes of a grip at least: without contacts, and with the same score everywhere. It bounds what a count can ask for.
 pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 1 + 17 + 60 + 8 + 20 + 10 + 1;
+
+/// Contacts of a grip at most: the hand has some thirty solids.
+const MOST_CONTACTS: usize = 64;
 
 /// By how much the square of a quaternion's length may differ from 1: what rounding leaves is a thousandth of it.
 const QUATERNION_SLACK: f32 = 1e-3;
