@@ -39,6 +39,9 @@ const MARGIN: f32 = 0.07;
 /// left out. A larger one leaves out more, a smaller one looks up the same cells again.
 const SPACING: f32 = 0.006;
 
+/// Room for the rows that are looked up for a giver. Where there are more, it grows.
+const USUAL_ROWS: usize = 128;
+
 /// Grips that share a word.
 const WORD: usize = u64::BITS as usize;
 
@@ -102,7 +105,7 @@ impl Occupancy {
         let mut excluded = vec![0; self.words];
         // Solids of a hand overlap, so that half of the balls lie in a cell that was looked up before.
         let mut is_done = vec![false; self.bits.len() / self.words.max(1)];
-        let mut filled = Vec::with_capacity(128);
+        let mut filled = Vec::with_capacity(USUAL_ROWS);
         for solid in giver.iter().take(SOLIDS) {
             let steps = (solid.length() / SPACING) as u32 + 1;
             let of_step = (steps as f32).recip();
