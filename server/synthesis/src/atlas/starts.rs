@@ -27,12 +27,12 @@ use crate::{
 /// often.
 const STARTS: usize = 32;
 
-/// Hands beside a grip that are looked at until one keeps clear, most of them by balls inside alone. More find one more often
+/// Hands beside a grip that are looked at until one keeps clear, first by balls inside alone. More find one more often
 /// beside grips that are deep in the giver: of 31 holdouts of the built-in scalpel that the atlas does not answer, 22 had a
 /// hand that holds among 9,000 tries with 24 of them, and 26 with 48.
 const DRAWS: usize = 48;
 
-/// How far the hand is shifted at most, in metres: farther ones miss what they touched.
+/// How far the hand is shifted along each axis at most, in metres: farther ones miss what they touched.
 const SHIFT: f32 = 0.003;
 
 /// How far it is turned about what it touches at most, in radians. Less does not get out of some givers' way, more finds
