@@ -19,10 +19,14 @@ mod polytope;
 
 use glam::Vec3;
 
+use super::solids::PALM_SOLIDS;
 use crate::hand::Digit;
 pub(crate) use balance::firm_force;
 pub use balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance};
 pub use closure::{EPSILON_TOLERANCE, epsilon};
+
+/// Contacts of a hand at most: one a link of each digit, and one a solid of the palm.
+pub const MOST_CONTACTS: usize = 15 + PALM_SOLIDS;
 
 /// A soft-finger contact: it pushes, rubs along the surface and resists twist about the normal.
 ///
@@ -72,7 +76,6 @@ pub struct Balance {
 #[derive(Clone, Debug, Default)]
 pub struct Buffers {
     cones: Vec<contact_model::ContactCone>,
-    column: Vec<f64>,
-    solver: least_squares::ConicLeastSquares,
+    solvers: balance::Solvers,
     polytope: polytope::Polytope,
 }

@@ -313,7 +313,7 @@ fn finds_a_balance_where_one_was_made() {
 fn is_invariant() {
     let mut random = Random::new(5);
     let (mut held, mut differing) = (0, 0);
-    for case in 0..600 {
+    for case in 0..3000 {
         let contacts = random.contacts(3 + case % 5);
         let load = load(random.between(0.05, 0.6), random.direction(), 0.04);
         let found = solve(&contacts, &load);
@@ -338,7 +338,7 @@ fn is_invariant() {
         }
         held += u32::from(found.is_some());
     }
-    assert!(held > 100, "only {held} grasps hold");
+    assert!(held > 500, "only {held} grasps hold");
     // At the very edge of the tolerance, rounding decides.
     assert!(differing <= 3, "{differing} differ");
 }

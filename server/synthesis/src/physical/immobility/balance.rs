@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    Balance, Buffers, Load, SoftContact,
+    Balance, Buffers, Load, MOST_CONTACTS, SoftContact,
     contact_model::{ContactCone, ScaledWrench, UnitPush, dot},
     least_squares::{Column, ConicLeastSquares},
 };
@@ -70,35 +70,43 @@ const MAX_COLUMNS: usize = 60;
 /// Rows in front of all: the wrench.
 const WRENCH_ROWS: usize = 6;
 
+/// Rows behind all: the digits' shares and their sum.
+const COMFORT_ROWS: usize = 6;
+
+/// Fours of rows where forces are not limited, and where those of up to [`MOST_CONTACTS`] are.
+const UNLIMITED_FOURS: usize = (WRENCH_ROWS + COMFORT_ROWS).div_ceil(4);
+const LIMITED_FOURS: usize = (WRENCH_ROWS + MOST_CONTACTS + COMFORT_ROWS).div_ceil(4);
+
+/// What finds forces, kept for its memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Solvers {
+    unlimited: ConicLeastSquares<UNLIMITED_FOURS>,
+    limited: ConicLeastSquares<LIMITED_FOURS>,
+    column: Vec<f64>,
+}
+
 /// Forces inside the friction limits, each at most [`MAX_CONTACT_FORCE`], that balance gravity within
 /// [`BALANCE_TOLERANCE`]. Of those, ones that are firm and keep off the friction limits if there are any; their digits'
 /// shares as near to the comfortable ones (Eq. 4.6) as balance allows, and their sum near to a firm grip. The palm may
 /// press as it likes. `None` if there are none.
 ///
 /// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
+///
+/// # Panics
+/// There are more than [`MOST_CONTACTS`].
 pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
-    let Buffers {
-        cones,
-        solver,
-        column,
-        ..
-    } = buffers;
+    let Buffers { cones, solvers, .. } = buffers;
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
     // Contacts that have closure hold nearly everything.
-    if let Some(found) = problem.safest_balance(solver, column) {
+    if let Some(found) = problem.safest_balance(solvers) {
         return Some(found);
     }
-    problem.solve(solver, column);
-    if unbalanced_length(solver) > f64::from(BALANCE_TOLERANCE) {
-        return None;
-    }
-    let mut found = problem.balance(solver);
-    if exceeds_limit(&found) {
+    let mut found = problem.best(solvers);
+    if found.residual <= BALANCE_TOLERANCE && exceeds_limit(&found) {
         problem.limited = true;
-        problem.solve(solver, column);
-        found = problem.balance(solver);
+        found = problem.best(solvers);
     }
     problem.keep_limits(&mut found);
     (found.residual <= BALANCE_TOLERANCE).then_some(found)
@@ -169,10 +177,10 @@ impl<'a> Problem<'a> {
     }
 
     /// The comfortable balance that is firm with the least friction, or else the firmest, if there is one.
-    fn safest_balance(&mut self, solver: &mut ConicLeastSquares, column: &mut Vec<f64>) -> Option<Balance> {
+    fn safest_balance(&mut self, solvers: &mut Solvers) -> Option<Balance> {
         let mut firmest: Option<(f64, Balance)> = None;
         for share in FRICTION_SHARES {
-            let Some(found) = self.comfortable_balance(share, solver, column) else {
+            let Some(found) = self.comfortable_balance(share, solvers) else {
                 continue;
             };
             let sum = self.sum_of_digits(&found);
@@ -197,21 +205,14 @@ impl<'a> Problem<'a> {
     }
 
     /// The comfortable balance within a share of friction and torsion, if there is one.
-    fn comfortable_balance(
-        &mut self,
-        friction_share: f64,
-        solver: &mut ConicLeastSquares,
-        column: &mut Vec<f64>,
-    ) -> Option<Balance> {
+    fn comfortable_balance(&mut self, friction_share: f64, solvers: &mut Solvers) -> Option<Balance> {
         let was_limited = self.limited;
         self.comfortable = true;
         self.friction_share = friction_share;
-        self.solve(solver, column);
-        let mut found = self.balance(solver);
+        let mut found = self.best(solvers);
         if !self.limited && exceeds_limit(&found) {
             self.limited = true;
-            self.solve(solver, column);
-            found = self.balance(solver);
+            found = self.best(solvers);
         }
         self.keep_limits(&mut found);
         self.comfortable = false;
@@ -229,9 +230,25 @@ impl<'a> Problem<'a> {
         if self.limited { self.contacts.len() } else { 0 }
     }
 
+    /// The best forces, by what is asked for.
+    fn best(&self, solvers: &mut Solvers) -> Balance {
+        let Solvers {
+            unlimited,
+            limited,
+            column,
+        } = solvers;
+        if self.limited {
+            self.solve(limited, column);
+            self.balance(limited)
+        } else {
+            self.solve(unlimited, column);
+            self.balance(unlimited)
+        }
+    }
+
     /// Adds pushes until none helps. `entries` is a buffer.
-    fn solve(&self, solver: &mut ConicLeastSquares, entries: &mut Vec<f64>) {
-        let rows = WRENCH_ROWS + self.limit_rows() + if self.comfortable { 6 } else { 0 };
+    fn solve<const FOURS: usize>(&self, solver: &mut ConicLeastSquares<FOURS>, entries: &mut Vec<f64>) {
+        let rows = WRENCH_ROWS + self.limit_rows() + if self.comfortable { COMFORT_ROWS } else { 0 };
         entries.clear();
         entries.resize(rows, 0.0);
         entries[..3].copy_from_slice(&self.up.to_array());
@@ -265,8 +282,7 @@ impl<'a> Problem<'a> {
             for (contact, cone) in self.cones.iter().enumerate() {
                 // The residual times the push's column, without writing that.
                 let mut gain = if self.limited {
-                    let (reach, push) = cone.farthest_push(&unbalanced, self.friction_share);
-                    reach + solver.residual()[WRENCH_ROWS + contact] * self.limit_entry(&push)
+                    self.worthiest_push(contact, solver.residual()).0
                 } else {
                     cone.reach(&unbalanced, self.friction_share)
                 };
@@ -296,12 +312,24 @@ impl<'a> Problem<'a> {
             let Some(contact) = best.1 else {
                 return;
             };
-            let (_, push) = self.cones[contact].farthest_push(&unbalanced, self.friction_share);
+            let push = if self.limited {
+                self.worthiest_push(contact, solver.residual()).1
+            } else {
+                self.cones[contact].farthest_push(&unbalanced, self.friction_share).1
+            };
             self.write_entries(contact, &push, entries);
             if !solver.add(entries, Column::Push { contact, push }) {
                 return;
             }
         }
+    }
+
+    /// The push of a contact that helps most where forces are limited, and how much it helps beside comfort.
+    fn worthiest_push(&self, contact: usize, residual: &[f64]) -> (f64, UnitPush) {
+        let unbalanced: ScaledWrench = std::array::from_fn(|k| residual[k]);
+        // Once a contact's forces are over its limit, each newton more is to be paid for.
+        let price = (-residual[WRENCH_ROWS + contact] * LIMIT_WEIGHT / self.limit()).max(0.0);
+        self.cones[contact].worthiest_push(&unbalanced, self.friction_share, price)
     }
 
     /// What a push takes of its contact's limit.
@@ -315,7 +343,7 @@ impl<'a> Problem<'a> {
         if !self.comfortable {
             return [0.0; 5];
         }
-        let rows = &residual[residual.len() - 6..];
+        let rows = &residual[residual.len() - COMFORT_ROWS..];
         let common = self.firmness_weight * rows[5] - self.share_weight * dot(&rows[..5], &self.shares);
         std::array::from_fn(|digit| common + self.share_weight * rows[digit])
     }
@@ -339,7 +367,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    fn balance(&self, solver: &ConicLeastSquares) -> Balance {
+    fn balance<const FOURS: usize>(&self, solver: &ConicLeastSquares<FOURS>) -> Balance {
         let mut pushes = vec![UnitPush::default(); self.contacts.len()];
         for (factor, column) in solver.weighted_columns() {
             if let Column::Push { contact, push } = column {
@@ -395,12 +423,6 @@ impl<'a> Problem<'a> {
             .collect();
         balance.residual = self.residual(&pushes);
     }
-}
-
-/// Length of the wrench that is left.
-fn unbalanced_length(solver: &ConicLeastSquares) -> f64 {
-    let wrench = &solver.residual()[..WRENCH_ROWS];
-    dot(wrench, wrench).sqrt()
 }
 
 fn exceeds_limit(balance: &Balance) -> bool {

@@ -27,6 +27,10 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
+/// Halvings of a right angle in the search for [`ContactCone::worthiest_push`]: down to what double precision tells of a gain,
+/// which changes by the angle's square. Fewer stop the search for forces early.
+const HALVINGS: usize = 30;
+
 /// A contact's friction limits, prepared for questions. Everything is per newton of normal force.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactCone {
@@ -104,6 +108,50 @@ impl ContactCone {
         (normal + share * gain, push)
     }
 
+    /// The push whose reach along `direction`, less `price` for each newton of its force, is most, and how much that is, when
+    /// `share` of friction and torsion may be used. `price` is not negative.
+    ///
+    /// In the words of [`ContactCone::farthest_push`], with r = |aₜ|: all of the torsion that friction leaves is free of charge,
+    /// so that t = μ sin φ along aₜ and s = σ cos φ. What they gain, r μ sin φ + |b| σ cos φ − price √(1 + μ² sin² φ), is concave
+    /// in t, so that its slope changes its sign once between φ = 0 and π / 2.
+    pub(super) fn worthiest_push(&self, direction: &ScaledWrench, share: f64, price: f64) -> (f64, UnitPush) {
+        let Along {
+            normal,
+            across,
+            about_normal,
+            ..
+        } = self.along(direction);
+        let rub = across.length();
+        let (most_rub, most_twist) = (
+            share * self.friction_squared.sqrt(),
+            share * self.torsion_squared.sqrt(),
+        );
+        let length = |sin: f64| (1.0 + (most_rub * sin).powi(2)).sqrt();
+        let (mut low, mut high) = (0.0, std::f64::consts::FRAC_PI_2);
+        for _ in 0..HALVINGS {
+            let angle = 0.5 * (low + high);
+            let (sin, cos) = angle.sin_cos();
+            let charged = price * most_rub * most_rub * sin * cos / length(sin);
+            if rub * most_rub * cos - about_normal.abs() * most_twist * sin > charged {
+                low = angle;
+            } else {
+                high = angle;
+            }
+        }
+        let (sin, cos) = high.sin_cos();
+        let torsion = if about_normal == 0.0 {
+            0.0
+        } else {
+            most_twist * cos * about_normal.signum()
+        };
+        let push = UnitPush {
+            force: self.inward + across.normalize_or_zero() * (most_rub * sin),
+            torsion,
+        };
+        let reach = normal + rub * most_rub * sin + about_normal * torsion;
+        (reach - price * push.force.length(), push)
+    }
+
     #[inline]
     fn along(&self, direction: &ScaledWrench) -> Along {
         let [ux, uy, uz, vx, vy, vz] = *direction;
@@ -155,4 +203,79 @@ pub(super) fn farthest_wrench(cones: &[ContactCone], direction: &ScaledWrench) -
         best.1 = cone.wrench(&cone.farthest_push(direction, 1.0).1);
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    use glam::Vec3;
+    use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    use super::*;
+    use crate::hand::Digit;
+
+    /// Steps of each angle that pushes are tried at.
+    const STEPS: usize = 160;
+
+    /// Of pushes at the limits of friction, in steps over all of them: the most that one is worth.
+    fn most_worth(cone: &ContactCone, direction: &ScaledWrench, share: f64, price: f64) -> f64 {
+        let (side, other) = cone.inward.any_orthonormal_pair();
+        let at = |turn: usize, tilt: usize| {
+            let (turn, tilt) = (
+                TAU * turn as f64 / STEPS as f64,
+                FRAC_PI_2 * (tilt as f64 / STEPS as f64 * 2.0 - 1.0),
+            );
+            let rub = share * cone.friction_squared.sqrt() * tilt.cos();
+            let push = UnitPush {
+                force: cone.inward + (side * turn.cos() + other * turn.sin()) * rub,
+                torsion: share * cone.torsion_squared.sqrt() * tilt.sin(),
+            };
+            dot(&cone.wrench(&push), direction) - price * push.force.length()
+        };
+        let pushes = (0..STEPS).flat_map(|turn| (0..=STEPS).map(move |tilt| (turn, tilt)));
+        let most = pushes.map(|(turn, tilt)| at(turn, tilt));
+        most.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    #[test]
+    fn no_push_is_worth_more() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
+        let load = Load {
+            mass: 0.2,
+            centre_of_mass: Vec3::ZERO,
+            characteristic_length: 0.05,
+            up: Vec3::Y,
+        };
+        for case in 0..60 {
+            let mut vector = || Vec3::from_array(std::array::from_fn(|_| random.random_range(-1.0..1.0)));
+            let cone = ContactCone::new(
+                &SoftContact {
+                    position: vector() * 0.05,
+                    normal: vector().normalize(),
+                    friction: 0.8,
+                    torsion_radius: 0.004,
+                    digit: Some(Digit::Thumb),
+                },
+                &load,
+            );
+            let direction: ScaledWrench = std::array::from_fn(|_| random.random_range(-1.0..1.0));
+            let share = [0.45, 1.0][case % 2];
+            let price = [0.0, 0.3, 2.0][case % 3];
+            let (worth, push) = cone.worthiest_push(&direction, share, price);
+            let own = dot(&cone.wrench(&push), &direction) - price * push.force.length();
+            assert!((worth - own).abs() < 1e-12, "case {case}: {worth} is told, {own} is had");
+            let rub = (push.force - cone.inward).length_squared() / cone.friction_squared;
+            let used = rub + push.torsion.powi(2) / cone.torsion_squared;
+            assert!(used < share * share + 1e-9, "case {case}: {used} of friction is used");
+            let most = most_worth(&cone, &direction, share, price);
+            assert!(worth > most - 1e-12, "case {case}: {worth}, and {most} is to be had");
+            assert!(worth < most + 1e-3, "case {case}: {worth} is more than {most}");
+            if price == 0.0 {
+                let (reach, _) = cone.farthest_push(&direction, share);
+                assert!((worth - reach).abs() < 1e-9, "case {case}: free of charge, {reach}");
+            }
+        }
+    }
 }

@@ -4,7 +4,7 @@
 //! cone that goes with it best, and adds it. What is kept is the passive set, the columns with a positive weight; the
 //! weights always solve the least-squares problem over it.
 
-use super::contact_model::{UnitPush, dot};
+use super::contact_model::UnitPush;
 
 /// A pivot of the Cholesky factorisation below this share of its diagonal means that a column depends on the others.
 const DEPENDENT_PIVOT: f64 = 1e-11;
@@ -23,52 +23,88 @@ pub(super) enum Column {
     Slack,
 }
 
-/// The smallest |A x − b| over x ≥ 0, for the columns added so far.
-#[derive(Clone, Debug, Default)]
-pub(super) struct ConicLeastSquares {
+/// Numbers that are worked on side by side; what there are fewer of is filled up with zeros.
+type Four = [f64; 4];
+
+/// The smallest |A x − b| over x ≥ 0, for the columns added so far, which have at most four times `FOURS` rows.
+#[derive(Clone, Debug)]
+pub(super) struct ConicLeastSquares<const FOURS: usize> {
+    rows: usize,
     /// b.
-    target: Vec<f64>,
+    target: [Four; FOURS],
     /// A by columns.
-    entries: Vec<f64>,
+    entries: Vec<[Four; FOURS]>,
     columns: Vec<Column>,
     /// x.
     weights: Vec<f64>,
     /// b − A x.
-    residual: Vec<f64>,
-    /// The Cholesky factor L of `AᵀA`, the rows of its lower triangle.
-    factor: Vec<f64>,
-    /// One over its diagonal: a division takes as long as multiplying four columns.
-    inverse_diagonal: Vec<f64>,
-    /// How many rows of it belong to the columns that are there now.
-    factored: usize,
-    /// The solution of L y = Aᵀb.
-    forward: Vec<f64>,
+    residual: [Four; FOURS],
+    factor: Factor<FOURS>,
     /// The solution without regard to signs.
-    free: Vec<f64>,
+    free: [Four; FOURS],
 }
 
-impl ConicLeastSquares {
+/// The Cholesky factor L of `AᵀA`, and what is solved with it. Each number that is found is at once taken off all that wait
+/// for it: to sum up what one number waits for would take as long for each as for all.
+#[derive(Clone, Debug)]
+struct Factor<const FOURS: usize> {
+    /// How many rows of it belong to the columns that are there now.
+    count: usize,
+    /// L by rows, without its diagonal: zeros from there on.
+    by_rows: Vec<[Four; FOURS]>,
+    /// L by columns; above the diagonal, anything.
+    by_columns: Vec<[Four; FOURS]>,
+    /// One over its diagonal: a division takes as long as multiplying four columns.
+    inverse_diagonal: Vec<f64>,
+    /// The solution of L y = Aᵀb.
+    forward: [Four; FOURS],
+}
+
+impl<const FOURS: usize> Default for ConicLeastSquares<FOURS> {
+    fn default() -> Self {
+        let none = [[0.0; 4]; FOURS];
+        Self {
+            rows: 0,
+            target: none,
+            entries: Vec::new(),
+            columns: Vec::new(),
+            weights: Vec::new(),
+            residual: none,
+            factor: Factor {
+                count: 0,
+                by_rows: Vec::new(),
+                by_columns: Vec::new(),
+                inverse_diagonal: Vec::new(),
+                forward: none,
+            },
+            free: none,
+        }
+    }
+}
+
+impl<const FOURS: usize> ConicLeastSquares<FOURS> {
     /// Starts anew, without columns.
+    ///
+    /// # Panics
+    /// There are more rows than there is room for.
     pub(super) fn reset(&mut self, target: &[f64]) {
-        self.target.clear();
-        self.target.extend_from_slice(target);
-        self.residual.clear();
-        self.residual.extend_from_slice(target);
+        self.rows = target.len();
+        self.target = filled_up(target);
+        self.residual = self.target;
         self.entries.clear();
         self.columns.clear();
         self.weights.clear();
-        self.factored = 0;
-        // There are hardly more columns than rows, as columns are independent: room for them at once.
-        let most = target.len();
-        self.entries.reserve(most * most);
-        self.columns.reserve(most);
-        self.weights.reserve(most);
-        self.factor.reserve(first_of_row(most));
+        self.factor.count = 0;
+        // There are never more columns than rows, as columns are independent.
+        self.entries.reserve(self.rows);
+        self.columns.reserve(self.rows);
+        self.weights.reserve(self.rows);
+        self.factor.reserve(self.rows);
     }
 
     /// b − A x.
     pub(super) fn residual(&self) -> &[f64] {
-        &self.residual
+        &self.residual.as_flattened()[..self.rows]
     }
 
     /// The passive columns and their weights.
@@ -79,27 +115,30 @@ impl ConicLeastSquares {
     /// Adds a column and solves again. False, and nothing is changed, if it depends on those that are there or would
     /// get no positive weight.
     pub(super) fn add(&mut self, entries: &[f64], column: Column) -> bool {
-        debug_assert_eq!(entries.len(), self.target.len(), "a column has other rows");
-        self.entries.extend_from_slice(entries);
+        debug_assert_eq!(entries.len(), self.rows, "a column has other rows");
+        let newest = self.columns.len();
+        if newest == self.rows {
+            return false;
+        }
+        self.entries.push(filled_up(entries));
         self.columns.push(column);
         self.weights.push(0.0);
-        let newest = self.columns.len() - 1;
-        if !self.solve_freely() || self.free[newest] <= 0.0 {
+        if !self.solve_freely() || self.free()[newest] <= 0.0 {
             self.remove(newest);
             return false;
         }
         // Lawson and Hanson's inner loop: as far toward the free solution as no weight becomes negative; the columns
         // whose weight vanishes leave the passive set.
-        while self.free.iter().any(|&weight| weight <= 0.0) {
+        while self.free().iter().any(|&weight| weight <= 0.0) {
             let mut step = 1.0_f64;
             let mut blocking = 0;
-            for (k, (&weight, &free)) in self.weights.iter().zip(&self.free).enumerate() {
+            for (k, (&weight, &free)) in self.weights.iter().zip(self.free()).enumerate() {
                 if free <= 0.0 && weight < step * (weight - free) {
                     step = weight / (weight - free);
                     blocking = k;
                 }
             }
-            for (weight, &free) in self.weights.iter_mut().zip(&self.free) {
+            for (weight, &free) in self.weights.iter_mut().zip(self.free.as_flattened()) {
                 *weight += step * (free - *weight);
             }
             self.weights[blocking] = 0.0;
@@ -110,77 +149,138 @@ impl ConicLeastSquares {
             }
             if !self.solve_freely() {
                 // Columns of an independent set are independent; only rounding comes here. The weights stand.
-                self.free.clone_from(&self.weights);
+                self.free = filled_up(&self.weights);
             }
         }
-        self.weights.clone_from(&self.free);
+        let free = self.free.as_flattened();
+        for (weight, &free) in self.weights.iter_mut().zip(free) {
+            *weight = free;
+        }
         self.update_residual();
         true
     }
 
+    /// The free solution's weights of the columns that are there.
+    fn free(&self) -> &[f64] {
+        &self.free.as_flattened()[..self.columns.len()]
+    }
+
     fn remove(&mut self, column: usize) {
-        let rows = self.target.len();
-        let last = self.columns.len() - 1;
-        self.factored = self.factored.min(column);
+        self.factor.count = self.factor.count.min(column);
         self.columns.swap_remove(column);
         self.weights.swap_remove(column);
-        self.entries
-            .copy_within(last * rows..(last + 1) * rows, column * rows);
-        self.entries.truncate(last * rows);
+        self.entries.swap_remove(column);
     }
 
     fn update_residual(&mut self) {
-        self.residual.copy_from_slice(&self.target);
-        for (column, &weight) in self.entries.chunks_exact(self.target.len()).zip(&self.weights) {
-            for (residual, entry) in self.residual.iter_mut().zip(column) {
-                *residual -= weight * entry;
-            }
+        let mut residual = self.target;
+        for (column, &weight) in self.entries.iter().zip(&self.weights) {
+            subtract(&mut residual, weight, column);
         }
+        self.residual = residual;
     }
 
     /// Solves `AᵀA x = Aᵀb` by Cholesky into `free`, from the first row on that has changed. False if columns are
     /// dependent.
     fn solve_freely(&mut self) -> bool {
-        let count = self.columns.len();
-        let rows = self.target.len();
-        self.factor.resize(first_of_row(count), 0.0);
-        self.forward.resize(count, 0.0);
-        self.inverse_diagonal.resize(count, 0.0);
-        for i in self.factored..count {
-            let column = &self.entries[i * rows..(i + 1) * rows];
-            let (before, of_i) = self.factor.split_at_mut(first_of_row(i));
-            for j in 0..i {
-                let of_j = &before[first_of_row(j)..=first_of_row(j) + j];
-                let product = dot(column, &self.entries[j * rows..(j + 1) * rows]);
-                of_i[j] = (product - dot(&of_i[..j], &of_j[..j])) * self.inverse_diagonal[j];
-            }
-            let product = dot(column, column);
-            let rest = product - dot(&of_i[..i], &of_i[..i]);
-            if rest <= DEPENDENT_PIVOT * product {
+        while self.factor.count < self.columns.len() {
+            if !self.factor.add_row(&self.entries, &self.target) {
                 return false;
             }
-            of_i[i] = rest.sqrt();
-            let inverse = of_i[i].recip();
-            self.inverse_diagonal[i] = inverse;
-            self.forward[i] = (dot(column, &self.target) - dot(&of_i[..i], &self.forward[..i])) * inverse;
-            self.factored = i + 1;
         }
-        self.free.clone_from(&self.forward);
-        for i in (0..count).rev() {
-            let row = &self.factor[first_of_row(i)..=first_of_row(i) + i];
-            let value = self.free[i] * self.inverse_diagonal[i];
-            self.free[i] = value;
-            for (above, entry) in self.free[..i].iter_mut().zip(row) {
-                *above -= value * entry;
-            }
-        }
+        self.free = self.factor.solution();
         true
     }
 }
 
-/// Where row i of a lower triangle starts.
-fn first_of_row(i: usize) -> usize {
-    i * (i + 1) / 2
+impl<const FOURS: usize> Factor<FOURS> {
+    /// Makes room for so many rows.
+    fn reserve(&mut self, rows: usize) {
+        let more = rows.saturating_sub(self.by_rows.len());
+        self.by_rows.reserve(more);
+        self.by_columns.reserve(more);
+        self.inverse_diagonal.reserve(more);
+    }
+
+    /// Factors the next row of `AᵀA`. False if its column depends on those before it.
+    fn add_row(&mut self, columns: &[[Four; FOURS]], target: &[Four; FOURS]) -> bool {
+        let i = self.count;
+        // What was there was of a column that has left.
+        self.by_rows.truncate(i);
+        self.by_columns.truncate(i);
+        self.inverse_diagonal.truncate(i);
+
+        let (before, newest) = (&columns[..i], &columns[i]);
+        let mut waiting = [[0.0; 4]; FOURS];
+        for (product, column) in waiting.as_flattened_mut().iter_mut().zip(before) {
+            *product = dot(newest, column);
+        }
+        let square = dot(newest, newest);
+        let mut rest = square;
+        let mut answer = dot(newest, target);
+        let mut row = [[0.0; 4]; FOURS];
+        let found = row.as_flattened_mut().iter_mut();
+        let columns = self.by_columns.iter_mut().zip(&self.inverse_diagonal);
+        for (j, (value, (of_j, inverse))) in found.zip(columns).enumerate() {
+            *value = waiting.as_flattened()[j] * inverse;
+            rest -= *value * *value;
+            answer -= *value * self.forward.as_flattened()[j];
+            subtract(&mut waiting, *value, of_j);
+            of_j.as_flattened_mut()[i] = *value;
+        }
+        if rest <= DEPENDENT_PIVOT * square {
+            return false;
+        }
+        let inverse = rest.sqrt().recip();
+        self.by_rows.push(row);
+        self.by_columns.push([[0.0; 4]; FOURS]);
+        self.inverse_diagonal.push(inverse);
+        self.forward.as_flattened_mut()[i] = answer * inverse;
+        self.count = i + 1;
+        true
+    }
+
+    /// Solves Lᵀ x = y.
+    fn solution(&self) -> [Four; FOURS] {
+        let mut waiting = self.forward;
+        let mut solution = [[0.0; 4]; FOURS];
+        let places = solution.as_flattened_mut()[..self.count].iter_mut().enumerate();
+        let rows = self.by_rows.iter().zip(&self.inverse_diagonal);
+        for ((i, place), (row, inverse)) in places.zip(rows).rev() {
+            *place = waiting.as_flattened()[i] * inverse;
+            subtract(&mut waiting, *place, row);
+        }
+        solution
+    }
+}
+
+/// Numbers with zeros behind them.
+fn filled_up<const FOURS: usize>(numbers: &[f64]) -> [Four; FOURS] {
+    let mut filled = [[0.0; 4]; FOURS];
+    filled.as_flattened_mut()[..numbers.len()].copy_from_slice(numbers);
+    filled
+}
+
+/// Takes a multiple of some numbers off others.
+#[inline]
+fn subtract<const FOURS: usize>(from: &mut [Four; FOURS], factor: f64, numbers: &[Four; FOURS]) {
+    for i in 0..FOURS {
+        for k in 0..4 {
+            from[i][k] -= factor * numbers[i][k];
+        }
+    }
+}
+
+/// Product of two columns.
+#[inline]
+fn dot<const FOURS: usize>(a: &[Four; FOURS], b: &[Four; FOURS]) -> f64 {
+    let mut sums = [0.0; 4];
+    for i in 0..FOURS {
+        for k in 0..4 {
+            sums[k] += a[i][k] * b[i][k];
+        }
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3])
 }
 
 #[cfg(test)]
@@ -188,12 +288,12 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    use super::*;
+    use super::{super::contact_model::dot, *};
 
     const ROWS: usize = 6;
 
     /// The residual's length when the best of some columns is added again and again.
-    fn solved(columns: &[[f64; ROWS]], target: &[f64; ROWS], solver: &mut ConicLeastSquares) -> f64 {
+    fn solved(columns: &[[f64; ROWS]], target: &[f64; ROWS], solver: &mut ConicLeastSquares<2>) -> f64 {
         solver.reset(target);
         loop {
             let gain = |column: &[f64; ROWS]| dot(column, solver.residual());
@@ -267,7 +367,7 @@ mod tests {
     #[test]
     fn agrees_with_all_sets_of_columns() {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
-        let mut solver = ConicLeastSquares::default();
+        let mut solver = ConicLeastSquares::<2>::default();
         let (mut exact, mut inexact) = (0, 0);
         for case in 0..2000 {
             let mut vector =
