@@ -48,6 +48,51 @@ pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngle
     }
 }
 
+/// The plane in which a digit bends once its yaw is set: where its joints are takes a third of the time of their frames.
+#[derive(Clone, Copy, Debug)]
+pub struct DigitPlane {
+    /// The base joint.
+    base: Vec3,
+    /// The direction of the stretched digit, and the one that its pad faces then: where all pitches turn to.
+    along: Vec3,
+    pad: Vec3,
+    /// Lengths of the links in metres.
+    lengths: [f32; 3],
+}
+
+impl DigitPlane {
+    /// The plane of a digit with a yaw of ψ1 radians, in the frame of `frame_from_wrist`.
+    pub fn new(digit: &DigitRig, frame_from_wrist: Pose, base_yaw: f32) -> Self {
+        let frame_from_base = frame_from_wrist * digit.wrist_from_base;
+        let (sin, cos) = (digit.yaw_sign * base_yaw).sin_cos();
+        Self {
+            base: frame_from_base.position,
+            along: frame_from_base.transform_vector(Vec3::new(-sin, cos, 0.0)),
+            pad: frame_from_base.transform_vector(Vec3::Z),
+            lengths: digit.lengths,
+        }
+    }
+
+    /// The joints and the tip of the digit with these pitches; its yaw is the plane's.
+    pub fn joints(&self, angles: &DigitAngles) -> [Vec3; 4] {
+        let mut joints = [self.base; 4];
+        let mut pitch = 0.0;
+        let pitches = [angles.base_pitch, angles.second_pitch, angles.third_pitch];
+        for (link, turned) in pitches.into_iter().enumerate() {
+            pitch += turned;
+            let (sin, cos) = pitch.sin_cos();
+            joints[link + 1] = joints[link] + (self.along * cos + self.pad * sin) * self.lengths[link];
+        }
+        joints
+    }
+
+    /// The direction that the pad of the first link faces when it is bent by θ1 radians.
+    pub fn first_pad(&self, base_pitch: f32) -> Vec3 {
+        let (sin, cos) = base_pitch.sin_cos();
+        self.pad * cos - self.along * sin
+    }
+}
+
 /// The frames of all digits.
 pub fn hand_frames(rig: &Rig, pose: &HandPose) -> HandFrames {
     HandFrames {

@@ -15,8 +15,7 @@ use super::{
 };
 use crate::{
     geometry::mesh_bvh::MeshBvh,
-    hand::{DigitAngles, kinematics::digit_frames},
-    pose::Pose,
+    hand::{DigitAngles, kinematics::DigitPlane},
 };
 
 /// How deep a link's capsule is in the surface when it is said to touch, in metres: soft pads give way that much under a
@@ -81,8 +80,8 @@ pub struct Closing<'a> {
     pub flexing: Flexing<'a>,
     /// Radii of the digit's joints and tip, in metres.
     pub radii: [f32; 4],
-    /// The wrist in the object's frame.
-    pub object_from_wrist: Pose,
+    /// Where it bends, in the object's frame.
+    pub plane: DigitPlane,
     /// The share of its way from opened to closed that the digit is shaped by before it closes, from 0 to 1; where it
     /// would start inside of something then, by half of it or opened.
     pub preshape: f32,
@@ -258,9 +257,7 @@ impl Closing<'_> {
     }
 
     fn links(&self, angles: &DigitAngles) -> [TaperedCapsule; 3] {
-        let frames = digit_frames(self.flexing.digit, self.object_from_wrist, *angles);
-        let [first, second, third] = frames.links.map(|link| link.position);
-        link_solids([first, second, third, frames.tip], self.radii)
+        link_solids(self.plane.joints(angles), self.radii)
     }
 
     /// The smallest clearance of some links, up to `enough`.

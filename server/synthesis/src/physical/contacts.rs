@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     grasp::Contact,
-    hand::{Digit, HandPart, Phalanx, joints::HandJoints},
+    hand::{Digit, HandPart, HandPose, Phalanx, joints::HandJoints, rig::Rig},
     object::GraspObject,
 };
 
@@ -34,15 +34,16 @@ const PALM_SPACING: f32 = 0.015;
 /// the air there.
 const PALM_SLACK: f32 = 0.0015;
 
-/// Puts the contacts of the digits that touch and of the palm into `contacts`, thumb first and the palm last. The solids are
-/// those of the joints.
+/// Puts the contacts of the digits that touch and of the palm into `contacts`, thumb first and the palm last. The pose is
+/// that of the digits.
 pub(super) fn collect_contacts(
     object: &GraspObject,
+    rig: &Rig,
+    pose: &HandPose,
     digits: &[ClosedDigit; 5],
-    joints: &HandJoints,
-    solids: &HandSolids,
     contacts: &mut Vec<Contact>,
 ) {
+    let solids = &HandSolids::of_pose(rig, pose);
     contacts.clear();
     for (digit, closed) in Digit::ALL.into_iter().zip(digits) {
         for (phalanx, link) in Phalanx::ALL.into_iter().zip(&closed.links) {
@@ -61,7 +62,8 @@ pub(super) fn collect_contacts(
             continue;
         };
         let is_new = |other: &Contact| other.position.distance(touch.point) >= PALM_SPACING;
-        if contacts[first_of_palm..].iter().all(is_new) && off_told_palm(joints, touch.point) <= PALM_SLACK {
+        let is_told = || off_told_palm(&HandJoints::of_pose(rig, pose), touch.point) <= PALM_SLACK;
+        if contacts[first_of_palm..].iter().all(is_new) && is_told() {
             contacts.extend(contact(solids, &touch, HandPart::Palm));
         }
     }

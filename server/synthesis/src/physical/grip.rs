@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     grasp::Contact,
-    hand::{Digit, DigitAngles, HandPose, joints::HandJoints, rig::Rig},
+    hand::{Digit, DigitAngles, HandPose, kinematics::DigitPlane, rig::Rig},
     pose::Pose,
     rejection::Rejection,
     synthesis::stopwatch::{Step, Stopwatch},
@@ -161,9 +161,7 @@ impl Gripper {
         }
 
         // Step 4, Contact Validation, for the digits that hold.
-        let joints = HandJoints::of_pose(rig, &posed(&closed));
-        let solids = HandSolids::of_joints(&joints);
-        collect_contacts(scene.object, &closed, &joints, &solids, &mut self.contacts);
+        collect_contacts(scene.object, rig, &posed(&closed), &closed, &mut self.contacts);
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
         stopwatch.lap(Step::ContactValidation);
 
@@ -292,11 +290,12 @@ struct Closer<'a> {
 
 impl Closer<'_> {
     fn closing<'a>(&'a self, digit: Digit, obstacles: &'a [Obstacle]) -> Closing<'a> {
+        let flexing = self.shape.flexing(self.rig, digit);
         Closing {
             surface: &self.scene.object.surface,
-            flexing: self.shape.flexing(self.rig, digit),
+            flexing,
             radii: link_radii(self.rig, digit),
-            object_from_wrist: self.object_from_wrist,
+            plane: DigitPlane::new(flexing.digit, self.object_from_wrist, flexing.base_yaw),
             preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
             obstacles,
         }

@@ -5,7 +5,7 @@ use grasp_synthesis::{
     geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh},
     hand::{
         DigitAngles,
-        kinematics::digit_frames,
+        kinematics::{DigitPlane, digit_frames},
         rig::{AngleRange, DigitLimits, DigitRig},
     },
     physical::{
@@ -74,7 +74,7 @@ fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Cl
             bend_ratio,
         },
         radii: RADII,
-        object_from_wrist: Pose::IDENTITY,
+        plane: DigitPlane::new(digit, Pose::IDENTITY, 0.0),
         preshape: 0.0,
         obstacles: &[],
     }
@@ -193,7 +193,7 @@ fn nothing_is_passed_on_the_way() {
         };
         let ratio = [0.7, 1.0, 1.42][random.index(3)];
         let closing = Closing {
-            object_from_wrist: wrist,
+            plane: DigitPlane::new(&digit, wrist, 0.0),
             ..closing(&box_mesh, &digit, ratio)
         };
         let Some(closed) = closing.close() else { continue };

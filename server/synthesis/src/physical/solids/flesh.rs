@@ -8,9 +8,13 @@
 use glam::{Mat3, Vec3};
 
 use super::TaperedCapsule;
-use crate::hand::{
-    Handedness,
-    joints::{HandJoints, index, thesis_from_openxr_frame},
+use crate::{
+    hand::{
+        Handedness,
+        joints::{HandJoints, index, thesis_from_openxr_frame},
+        rig::Rig,
+    },
+    pose::Pose,
 };
 
 /// Solids of the palm that do not move with a digit: over the four metacarpals, between them, the ball of the little
@@ -27,6 +31,17 @@ const FITTED_SIZE: f32 = 0.097_674;
 /// Metres in a millimetre.
 const MILLIMETRE: f32 = 1e-3;
 
+/// The ends of the fingers' metacarpals, numbered.
+const METACARPAL_ENDS: usize = 8;
+const INDEX_BASE: usize = 0;
+const INDEX_KNUCKLE: usize = 1;
+const MIDDLE_BASE: usize = 2;
+const MIDDLE_KNUCKLE: usize = 3;
+const RING_BASE: usize = 4;
+const RING_KNUCKLE: usize = 5;
+const LITTLE_BASE: usize = 6;
+const LITTLE_KNUCKLE: usize = 7;
+
 use Anchor::{Between, Thumb, Wrist};
 
 /// Where an end of a solid hangs on the skeleton.
@@ -34,7 +49,7 @@ use Anchor::{Between, Thumb, Wrist};
 enum Anchor {
     /// On the wrist, in the frame of the palm.
     Wrist,
-    /// At a share of the way between two joints (`OpenXR` indices), in the frame of the palm.
+    /// At a share of the way between two ends of metacarpals, in the frame of the palm.
     Between(usize, usize, f32),
     /// On the thumb's base, in the frame of its metacarpal.
     Thumb,
@@ -49,32 +64,32 @@ type End = (Anchor, [f32; 3], f32);
 /// The palm: see [`PALM_SOLIDS`].
 const PALM: [[End; 2]; PALM_SOLIDS] = [
     [
-        (Between(6, 6, 0.5), [0.0, 0.0, 1.9], 11.9),
-        (Between(7, 7, 0.5), [0.0, 0.0, 1.1], 12.3),
+        (Between(INDEX_BASE, INDEX_BASE, 0.5), [0.0, 0.0, 1.9], 11.9),
+        (Between(INDEX_KNUCKLE, INDEX_KNUCKLE, 0.5), [0.0, 0.0, 1.1], 12.3),
     ],
     [
-        (Between(11, 11, 0.5), [0.0, 0.0, -0.1], 15.2),
-        (Between(12, 12, 0.5), [0.0, 2.7, 2.4], 11.4),
+        (Between(MIDDLE_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -0.1], 15.2),
+        (Between(MIDDLE_KNUCKLE, MIDDLE_KNUCKLE, 0.5), [0.0, 2.7, 2.4], 11.4),
     ],
     [
-        (Between(16, 16, 0.5), [0.0, 0.0, 1.8], 11.6),
-        (Between(17, 17, 0.5), [0.0, -0.2, 1.2], 12.2),
+        (Between(RING_BASE, RING_BASE, 0.5), [0.0, 0.0, 1.8], 11.6),
+        (Between(RING_KNUCKLE, RING_KNUCKLE, 0.5), [0.0, -0.2, 1.2], 12.2),
     ],
     [
-        (Between(21, 21, 0.5), [0.0, 0.0, 1.9], 12.5),
-        (Between(22, 22, 0.5), [0.0, -1.3, 1.0], 11.3),
+        (Between(LITTLE_BASE, LITTLE_BASE, 0.5), [0.0, 0.0, 1.9], 12.5),
+        (Between(LITTLE_KNUCKLE, LITTLE_KNUCKLE, 0.5), [0.0, -1.3, 1.0], 11.3),
     ],
     [
-        (Between(6, 11, 0.5), [0.0, 0.0, -1.0], 13.4),
-        (Between(7, 12, 0.5), [0.0, -0.6, 1.7], 10.6),
+        (Between(INDEX_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -1.0], 13.4),
+        (Between(INDEX_KNUCKLE, MIDDLE_KNUCKLE, 0.5), [0.0, -0.6, 1.7], 10.6),
     ],
     [
-        (Between(11, 16, 0.5), [0.0, 0.0, 0.9], 15.7),
-        (Between(12, 17, 0.5), [0.0, 1.0, 1.5], 10.3),
+        (Between(MIDDLE_BASE, RING_BASE, 0.5), [0.0, 0.0, 0.9], 15.7),
+        (Between(MIDDLE_KNUCKLE, RING_KNUCKLE, 0.5), [0.0, 1.0, 1.5], 10.3),
     ],
     [
-        (Between(16, 21, 0.5), [0.0, 0.0, 0.6], 17.1),
-        (Between(17, 22, 0.5), [0.0, 0.2, 1.8], 9.7),
+        (Between(RING_BASE, LITTLE_BASE, 0.5), [0.0, 0.0, 0.6], 17.1),
+        (Between(RING_KNUCKLE, LITTLE_KNUCKLE, 0.5), [0.0, 0.2, 1.8], 9.7),
     ],
     [
         (Wrist, [-17.5, 14.7, 2.5], 16.1),
@@ -99,46 +114,106 @@ const THENAR: [[End; 2]; THENAR_SOLIDS] = [
     [(Thumb, [-1.0, -6.7, 4.9], 16.1), (Thumb, [1.8, 24.8, 4.6], 15.5)],
     [
         (Thumb, [-11.0, 45.3, 3.6], 3.2),
-        (Between(6, 7, 0.69), [0.0; 3], 5.6),
+        (Between(INDEX_BASE, INDEX_KNUCKLE, 0.69), [0.0; 3], 5.6),
     ],
     [
         (Thumb, [1.0, 18.2, 0.7], 14.0),
-        (Between(6, 7, 0.75), [0.0; 3], 3.2),
+        (Between(INDEX_BASE, INDEX_KNUCKLE, 0.75), [0.0; 3], 3.2),
     ],
 ];
 
+/// The bones that flesh hangs on, in the frame of the hand's pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bones {
+    handedness: Handedness,
+    wrist: Vec3,
+    metacarpal_ends: [Vec3; METACARPAL_ENDS],
+    /// From there to the skin, in metres.
+    radii: [f32; METACARPAL_ENDS],
+    /// The thumb's base and second joint.
+    thumb: [Vec3; 2],
+    /// The direction that the pad of the thumb's metacarpal faces.
+    thumb_pad: Vec3,
+}
+
+impl Bones {
+    /// Those of tracked joints.
+    pub(super) fn of_joints(joints: &HandJoints) -> Self {
+        let at = |joint: usize| joints.joints[joint].pose.position;
+        let thumb = index::FIRST_OF_DIGIT[0];
+        let thumb_frame = thesis_from_openxr_frame(joints.joints[thumb].pose);
+        Self {
+            handedness: joints.handedness,
+            wrist: at(index::WRIST),
+            metacarpal_ends: std::array::from_fn(|end| at(joint_of_end(end))),
+            radii: std::array::from_fn(|end| joints.joints[joint_of_end(end)].radius),
+            thumb: [at(thumb), at(thumb + 1)],
+            thumb_pad: thumb_frame.transform_vector(Vec3::Z),
+        }
+    }
+
+    /// Those of a rig whose wrist and joints of the digits are there.
+    pub(super) fn of_rig(
+        rig: &Rig,
+        frame_from_wrist: Pose,
+        digits: &[[Vec3; 4]; 5],
+        thumb_pad: Vec3,
+    ) -> Self {
+        Self {
+            handedness: rig.handedness,
+            wrist: frame_from_wrist.position,
+            metacarpal_ends: std::array::from_fn(|end| {
+                let finger = end / 2;
+                if end.is_multiple_of(2) {
+                    frame_from_wrist.transform_point(rig.finger_metacarpals[finger])
+                } else {
+                    digits[finger + 1][0]
+                }
+            }),
+            radii: std::array::from_fn(|end| rig.joint_radii[joint_of_end(end)]),
+            thumb: [digits[0][0], digits[0][1]],
+            thumb_pad,
+        }
+    }
+}
+
+/// The `OpenXR` joint at the end of a metacarpal.
+fn joint_of_end(end: usize) -> usize {
+    index::FIRST_OF_DIGIT[end / 2 + 1] + end % 2
+}
+
 /// A skeleton to hang flesh on.
-pub(super) struct Skeleton<'a> {
-    joints: &'a HandJoints,
+pub(super) struct Skeleton {
+    bones: Bones,
     frame_from_palm: Mat3,
     frame_from_thumb: Mat3,
     /// Metres in a millimetre of the fitted hand.
     millimetre: f32,
 }
 
-impl<'a> Skeleton<'a> {
+impl Skeleton {
     /// The skeleton of a hand. Its frames follow the joints' positions, which trackers know better than orientations.
-    pub(super) fn new(joints: &'a HandJoints) -> Self {
-        let at = |joint: usize| joints.joints[joint].pose.position;
+    pub(super) fn new(bones: Bones) -> Self {
         let [index_knuckle, middle_knuckle, little_knuckle] =
-            [1, 2, 4].map(|digit| at(index::FIRST_OF_DIGIT[digit] + 1));
-        let thumb = index::FIRST_OF_DIGIT[0];
-        let thumb_pose = thesis_from_openxr_frame(joints.joints[thumb].pose);
-        let side = match joints.handedness {
+            [INDEX_KNUCKLE, MIDDLE_KNUCKLE, LITTLE_KNUCKLE].map(|end| bones.metacarpal_ends[end]);
+        let side = match bones.handedness {
             Handedness::Right => 1.0,
             Handedness::Left => -1.0,
         };
 
-        let up = middle_knuckle - at(index::WRIST);
+        let up = middle_knuckle - bones.wrist;
         let y = up.normalize_or(Vec3::Y);
         let x = (index_knuckle - little_knuckle)
             .reject_from_normalized(y)
             .normalize_or(Vec3::X * side);
-        let thumb_y = (at(thumb + 1) - at(thumb)).normalize_or(Vec3::Y);
-        let pad = thumb_pose.transform_vector(Vec3::Z);
-        let thumb_z = pad.reject_from_normalized(thumb_y).normalize_or(Vec3::Z);
+        let [base, second] = bones.thumb;
+        let thumb_y = (second - base).normalize_or(Vec3::Y);
+        let thumb_z = bones
+            .thumb_pad
+            .reject_from_normalized(thumb_y)
+            .normalize_or(Vec3::Z);
         Self {
-            joints,
+            bones,
             frame_from_palm: Mat3::from_cols(x, y, x.cross(y) * side),
             frame_from_thumb: Mat3::from_cols(thumb_y.cross(thumb_z) * side, thumb_y, thumb_z),
             millimetre: MILLIMETRE * up.length() / FITTED_SIZE,
@@ -168,9 +243,13 @@ impl<'a> Skeleton<'a> {
         let Between(a, b, share) = anchor else {
             return (place, radius);
         };
-        let (a, b) = (&self.joints.joints[a], &self.joints.joints[b]);
-        let told = a.pose.position.lerp(b.pose.position, share);
-        let told_radius = a.radius + (b.radius - a.radius) * share;
+        let Bones {
+            metacarpal_ends: ends,
+            radii,
+            ..
+        } = &self.bones;
+        let told = ends[a].lerp(ends[b], share);
+        let told_radius = radii[a] + (radii[b] - radii[a]) * share;
         TaperedCapsule::new(place, told, radius, told_radius).bounding_ball()
     }
 
@@ -197,12 +276,17 @@ impl<'a> Skeleton<'a> {
     }
 
     fn place(&self, &(anchor, offset, _): &End) -> Vec3 {
-        let at = |joint: usize| self.joints.joints[joint].pose.position;
+        let Bones {
+            wrist,
+            metacarpal_ends: ends,
+            thumb,
+            ..
+        } = &self.bones;
         let offset = Vec3::from(offset) * self.millimetre;
         match anchor {
-            Wrist => at(index::WRIST) + self.frame_from_palm * offset,
-            Between(a, b, share) => at(a).lerp(at(b), share) + self.frame_from_palm * offset,
-            Thumb => at(index::FIRST_OF_DIGIT[0]) + self.frame_from_thumb * offset,
+            Wrist => wrist + self.frame_from_palm * offset,
+            Between(a, b, share) => ends[a].lerp(ends[b], share) + self.frame_from_palm * offset,
+            Thumb => thumb[0] + self.frame_from_thumb * offset,
         }
     }
 }
