@@ -315,7 +315,9 @@ impl<'a> Problem<'a> {
             let push = if self.limited {
                 self.worthiest_push(contact, solver.residual()).1
             } else {
-                self.cones[contact].farthest_push(&unbalanced, self.friction_share).1
+                self.cones[contact]
+                    .farthest_push(&unbalanced, self.friction_share)
+                    .1
             };
             self.write_entries(contact, &push, entries);
             if !solver.add(entries, Column::Push { contact, push }) {

@@ -27,9 +27,9 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
-/// Halvings of a right angle in the search for [`ContactCone::worthiest_push`]: down to what double precision tells of a gain,
-/// which changes by the angle's square. Fewer stop the search for forces early.
-const HALVINGS: usize = 30;
+/// Halvings of the share of friction in the search for [`ContactCone::worthiest_push`]: down to a ten-millionth, and what is
+/// gained changes by less than that. Fewer stop the search for forces early.
+const HALVINGS: usize = 24;
 
 /// A contact's friction limits, prepared for questions. Everything is per newton of normal force.
 #[derive(Clone, Copy, Debug)]
@@ -112,9 +112,12 @@ impl ContactCone {
     /// `share` of friction and torsion may be used. `price` is not negative.
     ///
     /// In the words of [`ContactCone::farthest_push`], with r = |aₜ|: all of the torsion that friction leaves is free of charge,
-    /// so that t = μ sin φ along aₜ and s = σ cos φ. What they gain, r μ sin φ + |b| σ cos φ − price √(1 + μ² sin² φ), is concave
-    /// in t, so that its slope changes its sign once between φ = 0 and π / 2.
+    /// so that t = μ u along aₜ and s = σ √(1 − u²). What they gain, r μ u + |b| σ √(1 − u²) − price √(1 + μ² u²), is concave in
+    /// u, so that its slope changes its sign once between 0 and 1.
     pub(super) fn worthiest_push(&self, direction: &ScaledWrench, share: f64, price: f64) -> (f64, UnitPush) {
+        if price <= 0.0 {
+            return self.farthest_push(direction, share);
+        }
         let Along {
             normal,
             across,
@@ -122,33 +125,32 @@ impl ContactCone {
             ..
         } = self.along(direction);
         let rub = across.length();
-        let (most_rub, most_twist) = (
-            share * self.friction_squared.sqrt(),
-            share * self.torsion_squared.sqrt(),
-        );
-        let length = |sin: f64| (1.0 + (most_rub * sin).powi(2)).sqrt();
-        let (mut low, mut high) = (0.0, std::f64::consts::FRAC_PI_2);
+        let most_rub = share * self.friction_squared.sqrt();
+        let most_twist = share * self.torsion_squared.sqrt();
+        let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..HALVINGS {
-            let angle = 0.5 * (low + high);
-            let (sin, cos) = angle.sin_cos();
-            let charged = price * most_rub * most_rub * sin * cos / length(sin);
-            if rub * most_rub * cos - about_normal.abs() * most_twist * sin > charged {
-                low = angle;
+            let used = 0.5 * (low + high);
+            let tangential = most_rub * used;
+            let gained = most_rub * (rub - price * tangential / (1.0 + tangential * tangential).sqrt());
+            // The slope times √(1 − u²), which is finite where all of the friction is used.
+            if gained * (1.0 - used * used).sqrt() > about_normal.abs() * most_twist * used {
+                low = used;
             } else {
-                high = angle;
+                high = used;
             }
         }
-        let (sin, cos) = high.sin_cos();
+        let tangential = most_rub * high;
+        // Where there is nothing to gain by it, no torsion.
         let torsion = if about_normal == 0.0 {
             0.0
         } else {
-            most_twist * cos * about_normal.signum()
+            most_twist * (1.0 - high * high).sqrt() * about_normal.signum()
         };
         let push = UnitPush {
-            force: self.inward + across.normalize_or_zero() * (most_rub * sin),
+            force: self.inward + across.normalize_or_zero() * tangential,
             torsion,
         };
-        let reach = normal + rub * most_rub * sin + about_normal * torsion;
+        let reach = normal + rub * tangential + about_normal * torsion;
         (reach - price * push.force.length(), push)
     }
 
@@ -253,7 +255,7 @@ mod tests {
             let cone = ContactCone::new(
                 &SoftContact {
                     position: vector() * 0.05,
-                    normal: vector().normalize(),
+                    normal: vector().normalize_or(Vec3::X),
                     friction: 0.8,
                     torsion_radius: 0.004,
                     digit: Some(Digit::Thumb),
@@ -265,16 +267,28 @@ mod tests {
             let price = [0.0, 0.3, 2.0][case % 3];
             let (worth, push) = cone.worthiest_push(&direction, share, price);
             let own = dot(&cone.wrench(&push), &direction) - price * push.force.length();
-            assert!((worth - own).abs() < 1e-12, "case {case}: {worth} is told, {own} is had");
+            assert!(
+                (worth - own).abs() < 1e-12,
+                "case {case}: {worth} is told, {own} is had"
+            );
             let rub = (push.force - cone.inward).length_squared() / cone.friction_squared;
             let used = rub + push.torsion.powi(2) / cone.torsion_squared;
-            assert!(used < share * share + 1e-9, "case {case}: {used} of friction is used");
+            assert!(
+                used < share * share + 1e-9,
+                "case {case}: {used} of friction is used"
+            );
             let most = most_worth(&cone, &direction, share, price);
-            assert!(worth > most - 1e-12, "case {case}: {worth}, and {most} is to be had");
+            assert!(
+                worth > most - 1e-12,
+                "case {case}: {worth}, and {most} is to be had"
+            );
             assert!(worth < most + 1e-3, "case {case}: {worth} is more than {most}");
             if price == 0.0 {
                 let (reach, _) = cone.farthest_push(&direction, share);
-                assert!((worth - reach).abs() < 1e-9, "case {case}: free of charge, {reach}");
+                assert!(
+                    (worth - reach).abs() < 1e-9,
+                    "case {case}: free of charge, {reach}"
+                );
             }
         }
     }
