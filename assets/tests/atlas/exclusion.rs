@@ -3,7 +3,7 @@
 use glam::{Quat, Vec3};
 use grasp_assets::objects::object as built_in;
 use grasp_synthesis::{
-    atlas::{Atlas, growth::Growth},
+    atlas::{Atlas, grips::Grips, growth::Growth},
     geometry::mesh::TriangleMesh,
     hand::Handedness,
     object::GraspObject,
@@ -72,7 +72,7 @@ fn without_grips_nothing_is_excluded() {
             .grip
             .pose,
     );
-    let empty = Atlas::new(object("remote"), Vec::new(), false);
+    let empty = Atlas::new(object("remote"), rig, Grips::default(), false);
     assert!(!empty.excluded_by(&PreparedHand::new(&solids)).contains(0));
     assert!(
         !Atlas::default()
@@ -85,11 +85,8 @@ fn without_grips_nothing_is_excluded() {
 fn a_large_object_takes_no_more_memory_than_a_small_one() {
     let rig = adult(Handedness::Right);
     let small = built_in("remote").expect("it is built in");
-    let entries = grown(Growth::new(&small.object, rig), 20)
-        .atlas
-        .entries()
-        .to_vec();
-    let bytes_of = |object: &GraspObject| Atlas::new(object, entries.clone(), false).bytes();
+    let known = grown(Growth::new(&small.object, rig), 20).atlas;
+    let bytes_of = |object: &GraspObject| Atlas::new(object, rig, known.grips().clone(), false).bytes();
     let usual = bytes_of(&small.object);
     let large = bytes_of(&scaled(&small.object, 40.0));
     assert!(large < 3 * usual, "{large} bytes instead of {usual}");

@@ -66,7 +66,7 @@ fn clearance(entry: &Entry, giver: &HandSolids) -> f32 {
 
 #[test]
 fn starts_are_what_is_least_in_the_givers_way() {
-    let known = known();
+    let (known, rig) = (known(), adult(Handedness::Right));
     for grip in [0, 700, 1400] {
         let holdout = held_out(&known, grip);
         let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
@@ -75,7 +75,8 @@ fn starts_are_what_is_least_in_the_givers_way() {
         let holding = known.holding_under(UP);
         let of = |order: &[u16]| {
             Starts::of(
-                known.entries(),
+                known.grips(),
+                rig,
                 order.iter().copied(),
                 presented.giver.as_ref(),
                 || false,
@@ -88,7 +89,7 @@ fn starts_are_what_is_least_in_the_givers_way() {
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
         // Nobody in the way: the best ones, as many.
-        let nobody = Starts::of(known.entries(), holding.iter().copied(), None, || false);
+        let nobody = Starts::of(known.grips(), rig, holding.iter().copied(), None, || false);
         let best = nobody.expect("nobody interrupts");
         assert!(best.entries().len() >= 32 && holding.starts_with(best.entries()));
         assert_eq!(starts.entries().len(), best.entries().len());
@@ -102,7 +103,8 @@ fn starts_are_what_is_least_in_the_givers_way() {
             );
         }
         let interrupted = Starts::of(
-            known.entries(),
+            known.grips(),
+            rig,
             holding.iter().copied(),
             presented.giver.as_ref(),
             || true,
@@ -151,7 +153,8 @@ fn hands_beside_known_grips_hold_more_often_where_a_giver_leaves_little() {
             constraints: &Constraints::default(),
         };
         let holding = known.holding_under(UP).iter().copied();
-        let starts = Starts::of(known.entries(), holding, Some(giver), || false).expect("nobody interrupts");
+        let starts =
+            Starts::of(known.grips(), rig, holding, Some(giver), || false).expect("nobody interrupts");
         let surface = scissors.surface_pairs.free_of(giver);
         let place = Place {
             object: scissors,

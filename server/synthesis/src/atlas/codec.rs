@@ -18,6 +18,7 @@ use self::{
 };
 use super::{
     Atlas,
+    grips::Grips,
     growth::{ENTRIES, Grown},
     key::{KEY_BYTES, key},
 };
@@ -121,7 +122,7 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
         return Err(AtlasError::Malformed("something follows the last grip"));
     }
     Ok(Grown {
-        atlas: Arc::new(Atlas::new(object, entries, complete)),
+        atlas: Arc::new(Atlas::new(object, rig, Grips::new(rig, entries), complete)),
         shapes,
         proposed,
         early_stamp,

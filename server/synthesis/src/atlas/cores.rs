@@ -1,10 +1,6 @@
-//! Which grips of an atlas certainly meet a giver, one by one: by some balls inside each hand, side by side for all
-//! grips, so that looking at one mostly takes two lines of the cache.
+//! Balls inside a hand: what they come too near to, the hand does.
 
-use crate::physical::{
-    grip::GIVER_CLEARANCE,
-    solids::{BALLS, Balls, HandSolids, PreparedHand},
-};
+use crate::physical::solids::{BALLS, Balls, HandSolids};
 
 /// A ball inside a hand: the index of its solid in [`HandSolids::iter`], and where on its axis, from 0 to 1.
 type Core = (usize, f32);
@@ -41,60 +37,37 @@ const SECOND: [Core; BALLS] = [
     (14, 0.9),
 ];
 
-/// The first balls inside the hand of each grip.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Cores(Vec<Balls>);
-
-impl Cores {
-    /// Those of some hands.
-    pub(super) fn of<'a>(hands: impl Iterator<Item = &'a HandSolids>) -> Self {
-        Self(hands.map(|solids| balls(solids, &FIRST, [true; 5])).collect())
-    }
-
-    /// True only if one of those hands, whose solids are known, comes too near to the giver's; not always then.
-    #[inline]
-    pub(super) fn surely_meet(&self, hand: usize, solids: &HandSolids, giver: &PreparedHand) -> bool {
-        // One in fifty that meet gets as far as the second ones, which are not kept for that.
-        giver.surely_nears_any(&self.0[hand], GIVER_CLEARANCE)
-            || giver.surely_nears_any(&balls(solids, &SECOND, [true; 5]), GIVER_CLEARANCE)
-    }
-
-    /// Bytes that they take in memory.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.0.as_slice())
-    }
+/// The first balls inside a hand.
+pub(super) fn first_balls(solids: &HandSolids) -> Balls {
+    balls(solids, &FIRST)
 }
 
-/// True only if one of some digits, palm or forearm of a hand comes nearer to the giver's than `distance` metres; not
-/// always then.
-pub(super) fn surely_nears(
-    solids: &HandSolids,
-    digits: [bool; 5],
-    giver: &PreparedHand,
-    distance: f32,
-) -> bool {
-    inner_balls(solids, digits)
-        .iter()
-        .any(|balls| giver.surely_nears_any(balls, distance))
+/// The second ones.
+pub(super) fn second_balls(solids: &HandSolids) -> Balls {
+    balls(solids, &SECOND)
 }
 
 /// Balls inside of some digits, palm and forearm, those first that settle most.
 pub(super) fn inner_balls(solids: &HandSolids, digits: [bool; 5]) -> [Balls; 2] {
-    [&FIRST, &SECOND].map(|cores| balls(solids, cores, digits))
+    let kept = |cores: &[Core; BALLS]| kept_of(balls(solids, cores), cores, digits);
+    [kept(&FIRST), kept(&SECOND)]
 }
 
-/// The balls of some digits, palm and forearm; in place of the others' nothing that is near to anything.
+/// Of first balls, those of some digits, palm and forearm.
+pub(super) fn of_digits(first: &Balls, digits: [bool; 5]) -> Balls {
+    kept_of(*first, &FIRST, digits)
+}
+
+/// The balls of some digits, palm and forearm; in place of the others nothing that is near to anything.
+fn kept_of(balls: Balls, cores: &[Core; BALLS], digits: [bool; 5]) -> Balls {
+    balls.kept(|i| digits.get(cores[i].0 / LINKS).is_none_or(|&counts| counts))
+}
+
 #[inline]
-fn balls(solids: &HandSolids, cores: &[Core; BALLS], digits: [bool; 5]) -> Balls {
+fn balls(solids: &HandSolids, cores: &[Core; BALLS]) -> Balls {
     Balls::new(|i| {
         let (index, along) = cores[i];
         let solid = solids.solid(index);
-        let counts = digits.get(index / LINKS).is_none_or(|&counts| counts);
-        let radius = if counts {
-            solid.radius_at(along)
-        } else {
-            f32::NEG_INFINITY
-        };
-        (solid.at(along), radius)
+        (solid.at(along), solid.radius_at(along))
     })
 }

@@ -1,9 +1,6 @@
 //! A grip of the atlas, and what is left to check when an object is held out.
 
-use super::{
-    cores::surely_nears,
-    gravity::{DIRECTIONS, direction},
-};
+use super::gravity::{DIRECTIONS, direction};
 use crate::{
     constraints::Constraints,
     grasp::{Contact, Grasp},
@@ -11,10 +8,10 @@ use crate::{
     physical::{
         attempt::grasp,
         contacts::soften,
-        grip::{GIVER_CLEARANCE, Grip, Gripper, clear_of_giver},
+        grip::{Grip, Gripper, clear_of_giver},
         immobility::balance,
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, PreparedHand},
+        solids::HandSolids,
     },
     score::{Score, Values, force_values, grip_values, score},
     taxonomy::{Classification, classify},
@@ -36,8 +33,6 @@ pub struct Entry {
     pub grip_values: Values,
     /// For each of [`DIRECTIONS`] against gravity: the score of grip and comfort in 1 … 255, or [`SLIPS`].
     pub scores: [u8; DIRECTIONS],
-    /// The hand's solids: posing it takes as long as comparing it with dozens of givers.
-    pub(super) solids: HandSolids,
 }
 
 impl Entry {
@@ -68,7 +63,13 @@ impl Entry {
                 quantised(of_grip + Score { values }.total())
             })
         });
-        Self::from_parts(grip, contacts, classification, grip_values, scores, solids)
+        Self {
+            grip,
+            contacts,
+            classification,
+            grip_values,
+            scores,
+        }
     }
 
     /// What a grip of the same hand and contacts is worth now; none if its closure is not enough.
@@ -83,23 +84,14 @@ impl Entry {
         Some(Self::new(scene, rig, grip, &solids, gripper))
     }
 
-    /// An entry of which everything is known.
-    pub(super) fn from_parts(
-        grip: Grip,
-        contacts: Vec<Contact>,
-        classification: Classification,
-        grip_values: Values,
-        scores: [u8; DIRECTIONS],
-        solids: &HandSolids,
-    ) -> Self {
-        Self {
-            grip,
-            contacts,
-            classification,
-            grip_values,
-            scores,
-            solids: *solids,
-        }
+    /// The hand as solids, in the object's frame. They are not kept, as they would take twice as much memory as the rest.
+    pub fn solids(&self, rig: &Rig) -> HandSolids {
+        HandSolids::of_pose(rig, &self.grip.pose)
+    }
+
+    /// Which digits hold, thumb first.
+    pub(super) fn holding_digits(&self) -> [bool; 5] {
+        self.grip.bend_ratios.map(|ratio| ratio.is_some())
     }
 
     /// True if wrist, contacts and type are what is demanded.
@@ -119,7 +111,7 @@ impl Entry {
         friction_differs: bool,
         gripper: &mut Gripper,
     ) -> Option<Grasp> {
-        let giver_clearance = clear_of_giver(&self.solids, presented.giver.as_ref())?;
+        let giver_clearance = clear_of_giver(&self.solids(rig), presented.giver.as_ref())?;
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
         let balance = balance(&gripper.soft_contacts, &load, &mut gripper.buffers)?;
@@ -144,11 +136,6 @@ impl Entry {
     /// Bytes that the entry takes.
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + size_of_val(self.contacts.as_slice())
-    }
-
-    /// True if some balls inside the hand come too near to the giver's: then so does the hand.
-    pub(super) fn surely_meets(&self, giver: &PreparedHand) -> bool {
-        surely_nears(&self.solids, [true; 5], giver, GIVER_CLEARANCE)
     }
 }
 

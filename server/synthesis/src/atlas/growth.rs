@@ -14,6 +14,7 @@ use glam::Vec3;
 use super::{
     Atlas,
     entry::Entry,
+    grips::Grips,
     spread::{Cell, Room, Spread, worth},
     stamp,
     starts::Starts,
@@ -37,9 +38,8 @@ use crate::{
     taxonomy::classify,
 };
 
-/// Grips of a complete atlas. More leave more for a giver who covers nearly everything, and take more memory (about a
-/// kilobyte each) and time.
-pub const ENTRIES: usize = 4096;
+/// Grips of a complete atlas. More leave more to choose from, and take more memory (some 1.2 kilobytes each) and time.
+pub const ENTRIES: usize = 8192;
 
 /// Proposals of a round.
 pub const ROUND: u64 = 64;
@@ -117,7 +117,7 @@ impl Giver {
 pub struct Growth<'a> {
     scene: ObjectScene<'a>,
     rig: &'a Rig,
-    entries: Vec<Entry>,
+    grips: Grips,
     shapes: Vec<HandShape>,
     spread: Spread,
     proposed: u64,
@@ -130,7 +130,7 @@ impl<'a> Growth<'a> {
         Self {
             scene: ObjectScene::new(object, object.friction_under(Validity::Physical)),
             rig,
-            entries: Vec::new(),
+            grips: Grips::default(),
             shapes: Vec::new(),
             spread: Spread::default(),
             proposed: 0,
@@ -151,12 +151,12 @@ impl<'a> Growth<'a> {
 
     /// How many grips there are.
     pub fn len(&self) -> usize {
-        self.entries.len()
+        self.grips.entries().len()
     }
 
     /// True if there is no grip yet.
     pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
+        self.grips.entries().is_empty()
     }
 
     /// How many proposals were tried.
@@ -166,13 +166,13 @@ impl<'a> Growth<'a> {
 
     /// True if there is nothing left to do.
     pub fn is_complete(&self) -> bool {
-        self.entries.len() >= ENTRIES || self.proposed >= MOST_PROPOSALS
+        self.len() >= ENTRIES || self.proposed >= MOST_PROPOSALS
     }
 
     /// The atlas as it stands.
     pub fn atlas(&self) -> Atlas {
-        let entries = self.entries.clone();
-        Atlas::new(self.scene.object, entries, self.is_complete())
+        let grips = self.grips.clone();
+        Atlas::new(self.scene.object, self.rig, grips, self.is_complete())
     }
 
     /// What has grown so far.
@@ -197,22 +197,22 @@ impl<'a> Growth<'a> {
             self.take(entry, shape, is_needy);
         }
         if self.proposed == EARLY_PROPOSALS {
-            self.early_stamp = stamp(&self.entries);
+            self.early_stamp = stamp(self.grips.entries());
         }
     }
 
     /// The giver of this round, if it has one.
     fn giver(&self) -> Option<Giver> {
         let round = self.proposed / ROUND;
-        if self.entries.len() < ENOUGH_FOR_GIVERS || round.is_multiple_of(2) {
+        if self.len() < ENOUGH_FOR_GIVERS || round.is_multiple_of(2) {
             return None;
         }
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
-        let pose = &self.entries[stream.below(self.entries.len())].grip.pose;
+        let pose = &self.grips.entries()[stream.below(self.len())].grip.pose;
         let hand = PreparedHand::new(&HandSolids::of_giver(&HandJoints::of_pose(self.rig, pose)));
-        let all = 0..self.entries.len() as u16;
+        let all = 0..self.len() as u16;
         let starts = if self.count_free(&hand) < ENOUGH_FREE {
-            Starts::of(&self.entries, all, Some(&hand), || false)
+            Starts::of(&self.grips, self.rig, all, Some(&hand), || false)
         } else {
             None
         };
@@ -229,13 +229,13 @@ impl<'a> Growth<'a> {
 
     /// How many grips keep clear of a giver's hand, up to enough.
     fn count_free(&self, giver: &PreparedHand) -> usize {
-        let is_free = |entry: &&Entry| {
-            !entry.surely_meets(giver) && {
-                let solids = HandSolids::of_pose(self.rig, &entry.grip.pose);
+        let is_free = |&entry: &usize| {
+            !self.grips.surely_meets(entry, self.rig, giver) && {
+                let solids = self.grips.entries()[entry].solids(self.rig);
                 !giver.is_neared_by(solids.iter(), GIVER_CLEARANCE)
             }
         };
-        self.entries.iter().filter(is_free).take(ENOUGH_FREE).count()
+        (0..self.len()).filter(is_free).take(ENOUGH_FREE).count()
     }
 
     fn try_proposal(&self, index: u64, giver: Option<&Giver>, gripper: &mut Gripper) -> Found {
@@ -274,7 +274,7 @@ impl<'a> Growth<'a> {
     }
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
-        let is_beside = !self.entries.is_empty() && stream.unit() < BESIDE_SHARE;
+        let is_beside = !self.is_empty() && stream.unit() < BESIDE_SHARE;
         let place = Place {
             object: self.scene.object,
             surface: giver.map_or(&self.scene.object.surface_pairs, |giver| &giver.surface),
@@ -282,7 +282,7 @@ impl<'a> Growth<'a> {
             rig: self.rig,
         };
         match giver.map(|giver| &giver.starts) {
-            Some(Some(starts)) if is_beside => starts.propose(&self.entries, &place, stream),
+            Some(Some(starts)) if is_beside => starts.propose(self.grips.entries(), &place, stream),
             None if is_beside => Some(self.beside_known(stream)),
             // Beside a giver who leaves enough, most known grips are of no use.
             _ => propose(&place, stream),
@@ -291,9 +291,9 @@ impl<'a> Growth<'a> {
 
     /// A hand beside a known grip.
     fn beside_known(&self, stream: &mut AttemptStream) -> Proposal {
-        let index = stream.below(self.entries.len());
+        let index = stream.below(self.len());
         let known = Proposal {
-            object_from_wrist: self.entries[index].grip.pose.frame_from_wrist,
+            object_from_wrist: self.grips.entries()[index].grip.pose.frame_from_wrist,
             shape: self.shapes[index],
             advance: 0.0,
         };
@@ -306,19 +306,19 @@ impl<'a> Growth<'a> {
         match self.spread.room(cell, worth(&entry)) {
             Room::InsteadOf(index) if !is_needed => {
                 self.spread.note(cell, index, worth(&entry));
-                self.entries[index] = entry;
+                self.grips.replace(self.rig, index, entry);
                 self.shapes[index] = shape;
             }
             Room::Crowded if !is_needed => {}
-            _ if self.entries.len() < ENTRIES => self.push(entry, shape),
+            _ if self.len() < ENTRIES => self.push(entry, shape),
             _ => {}
         }
     }
 
     fn push(&mut self, entry: Entry, shape: HandShape) {
         let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-        self.spread.note(cell, self.entries.len(), worth(&entry));
-        self.entries.push(entry);
+        self.spread.note(cell, self.len(), worth(&entry));
+        self.grips.push(self.rig, entry);
         self.shapes.push(shape);
     }
 }

@@ -10,6 +10,7 @@ pub mod codec;
 mod cores;
 pub mod entry;
 pub mod gravity;
+pub mod grips;
 pub mod growth;
 pub mod key;
 mod occupancy;
@@ -19,41 +20,45 @@ pub mod starts;
 use glam::Vec3;
 use sha2::{Digest as _, Sha256};
 
-use crate::{object::GraspObject, physical::solids::PreparedHand};
+use crate::{hand::rig::Rig, object::GraspObject, physical::solids::PreparedHand};
 
-use cores::Cores;
 use entry::{Entry, SLIPS};
 use gravity::GravityOrder;
+use grips::Grips;
 pub use occupancy::Excluded;
 use occupancy::Occupancy;
 
 /// What is known of how a hand holds an object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Atlas {
-    entries: Vec<Entry>,
+    grips: Grips,
     order: GravityOrder,
-    cores: Cores,
     occupancy: Occupancy,
     complete: bool,
     stamp: u64,
 }
 
 impl Atlas {
-    /// An atlas of entries for an object; `complete` if it is not going to grow.
-    pub fn new(object: &GraspObject, entries: Vec<Entry>, complete: bool) -> Self {
+    /// An atlas of what is known of an object and a rig; `complete` if it is not going to grow.
+    pub fn new(object: &GraspObject, rig: &Rig, grips: Grips, complete: bool) -> Self {
+        let entries = grips.entries();
         Self {
-            order: GravityOrder::of(&entries),
-            cores: Cores::of(entries.iter().map(|entry| &entry.solids)),
-            occupancy: Occupancy::of(object, &entries),
-            stamp: stamp(&entries),
-            entries,
+            order: GravityOrder::of(entries),
+            occupancy: Occupancy::of(object, rig, entries),
+            stamp: stamp(entries),
+            grips,
             complete,
         }
     }
 
     /// The grips, in the order in which they were found.
     pub fn entries(&self) -> &[Entry] {
-        &self.entries
+        self.grips.entries()
+    }
+
+    /// The same with what tells soonest that they are in a giver's way.
+    pub fn grips(&self) -> &Grips {
+        &self.grips
     }
 
     /// True if it is not going to grow.
@@ -76,7 +81,7 @@ impl Atlas {
     pub fn holding_under(&self, up: Vec3) -> &[u16] {
         let order = self.by_score(up);
         let direction = gravity::nearest(up);
-        let holds = |entry: &u16| self.entries[usize::from(*entry)].scores[direction] != SLIPS;
+        let holds = |entry: &u16| self.entries()[usize::from(*entry)].scores[direction] != SLIPS;
         &order[..order.partition_point(holds)]
     }
 
@@ -85,20 +90,9 @@ impl Atlas {
         self.occupancy.excluded_by(giver)
     }
 
-    /// True only if a grip, an index of [`Atlas::entries`], comes too near to a giver's hand; not always then. Sooner told
-    /// than by [`Atlas::excluded_by`] for some hundreds of grips.
-    #[inline]
-    pub fn surely_meets(&self, entry: u16, giver: &PreparedHand) -> bool {
-        let entry = usize::from(entry);
-        self.cores.surely_meet(entry, &self.entries[entry].solids, giver)
-    }
-
     /// Bytes that it takes in memory.
     pub fn bytes(&self) -> usize {
-        self.entries.iter().map(Entry::bytes).sum::<usize>()
-            + self.order.bytes()
-            + self.cores.bytes()
-            + self.occupancy.bytes()
+        self.grips.bytes() + self.order.bytes() + self.occupancy.bytes()
     }
 }
 

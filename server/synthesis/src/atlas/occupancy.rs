@@ -8,6 +8,7 @@ use glam::{IVec3, Vec3};
 
 use super::entry::Entry;
 use crate::{
+    hand::rig::Rig,
     object::GraspObject,
     physical::{
         grip::GIVER_CLEARANCE,
@@ -18,8 +19,11 @@ use crate::{
 /// Edge of a cell in metres. Smaller ones tell more hands apart and take memory by the third power.
 const CELL: f32 = 0.0125;
 
-/// Cells at most, each half a kilobyte for 4,096 grips: those around large objects are larger, and tell fewer hands apart.
+/// Cells at most: those around large objects are larger, and tell fewer hands apart.
 const MOST_CELLS: f32 = 10_000.0;
+
+/// Cells that are kept at most, each a kilobyte for 8,192 grips: those that most hands fill. Fewer exclude fewer hands.
+const MOST_ROWS: usize = 3_500;
 
 /// From a cell's middle to its corners, as a multiple of its edge.
 const HALF_DIAGONAL: f32 = 0.866_026;
@@ -77,7 +81,7 @@ impl Excluded {
 
 impl Occupancy {
     /// What the hands of some grips fill.
-    pub(super) fn of(object: &GraspObject, entries: &[Entry]) -> Self {
+    pub(super) fn of(object: &GraspObject, rig: &Rig, entries: &[Entry]) -> Self {
         let surface = object.surface.mesh().aabb();
         let low = surface.min - MARGIN;
         let extents = surface.max + MARGIN - low;
@@ -93,11 +97,39 @@ impl Occupancy {
             bits: vec![0; words],
         };
         for (index, entry) in entries.iter().enumerate() {
-            for solid in entry.solids.iter() {
+            for solid in entry.solids(rig).iter() {
                 occupancy.fill(solid, index);
             }
         }
+        occupancy.keep_fullest();
         occupancy
+    }
+
+    /// Empties the cells that fewest hands fill, if there are more than [`MOST_ROWS`].
+    fn keep_fullest(&mut self) {
+        let count = self.bits.len() / self.words.max(1);
+        if count <= MOST_ROWS {
+            return;
+        }
+        let filled = |row: &usize| -> u32 {
+            let words = &self.bits[row * self.words..(row + 1) * self.words];
+            words.iter().map(|word| word.count_ones()).sum()
+        };
+        // The first one is the row that nothing fills; of equally full ones, those that were filled first stay.
+        let mut kept: Vec<usize> = (1..count).collect();
+        kept.sort_by_cached_key(|row| std::cmp::Reverse(filled(row)));
+        kept.truncate(MOST_ROWS - 1);
+        kept.sort_unstable();
+        let mut new_rows = vec![EMPTY; count];
+        let mut bits = vec![0; self.words];
+        for row in kept {
+            new_rows[row] = (bits.len() / self.words) as u32;
+            bits.extend_from_slice(&self.bits[row * self.words..(row + 1) * self.words]);
+        }
+        for row in &mut self.rows {
+            *row = new_rows[*row as usize];
+        }
+        self.bits = bits;
     }
 
     /// The grips whose hands a giver's certainly comes too near to.

@@ -14,8 +14,9 @@ use crate::{
 /// Edge in metres of the cells that palms are sorted into, and …
 const CELL: f32 = 0.02;
 
-/// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes, few fingers and many apart.
-const MOST_IN_CELL: usize = 3;
+/// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes, few fingers and many apart. With
+/// fewer, an atlas of a thin object is not filled by as many proposals as there are; more are alike.
+const MOST_IN_CELL: usize = 8;
 
 /// Fingers from which a hand takes much room: two keep clear of givers that more do not.
 const MANY_FINGERS: usize = 3;
@@ -109,7 +110,8 @@ mod tests {
     #[test]
     fn a_cell_keeps_the_best_that_it_has_room_for() {
         let mut spread = Spread::default();
-        for (index, worth) in [0.5, 0.2, 0.7].into_iter().enumerate() {
+        let worths = [0.5, 0.2, 0.7].into_iter().chain(std::iter::repeat(0.9));
+        for (index, worth) in worths.take(MOST_IN_CELL).enumerate() {
             assert_eq!(spread.room(cell(0), worth), Room::Free);
             spread.note(cell(0), index, worth);
         }
@@ -120,7 +122,7 @@ mod tests {
         spread.note(cell(0), 1, 0.6);
         assert_eq!(spread.room(cell(0), 0.55), Room::InsteadOf(0));
         // One that was needed is noted beyond the room, and may give way later.
-        spread.note(cell(0), 3, 0.05);
-        assert_eq!(spread.room(cell(0), 0.1), Room::InsteadOf(3));
+        spread.note(cell(0), MOST_IN_CELL, 0.05);
+        assert_eq!(spread.room(cell(0), 0.1), Room::InsteadOf(MOST_IN_CELL));
     }
 }

@@ -5,14 +5,11 @@
 
 use glam::Vec3;
 
-use super::{
-    cores::{inner_balls, surely_nears},
-    entry::Entry,
-};
+use super::{cores::inner_balls, entry::Entry, grips::Grips};
 use crate::{
     grasp::Contact,
     guided::proposal::Place,
-    hand::Digit,
+    hand::{Digit, rig::Rig},
     object::GraspObject,
     physical::{
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},
@@ -51,9 +48,10 @@ const AT_ONCE: usize = 4;
 pub struct Starts(Vec<u16>);
 
 impl Starts {
-    /// Those of `candidates`, indices of `entries`; of those that keep clear, the first. None if interrupted.
+    /// Those of `candidates`, indices of the entries of `known`; of those that keep clear, the first. None if interrupted.
     pub fn of(
-        entries: &[Entry],
+        known: &Grips,
+        rig: &Rig,
         candidates: impl Iterator<Item = u16>,
         giver: Option<&PreparedHand>,
         interrupted: impl Fn() -> bool,
@@ -72,12 +70,17 @@ impl Starts {
             } else {
                 nearest[STARTS - 1].0
             };
-            let entry = &entries[usize::from(index)];
-            if surely_nears(&entry.solids, holding_digits(entry), giver, least) {
+            if known.surely_nears(usize::from(index), giver, least) {
                 continue;
             }
-            let solids = holding_solids(entry, &entry.solids);
-            let Some(clearance) = giver.least_distance(solids, GIVER_CLEARANCE, least) else {
+            let entry = &known.entries()[usize::from(index)];
+            let solids = entry.solids(rig);
+            let [_, second] = inner_balls(&solids, entry.holding_digits());
+            if giver.surely_nears_any(&second, least) {
+                continue;
+            }
+            let holding = holding_solids(entry, &solids);
+            let Some(clearance) = giver.least_distance(holding, GIVER_CLEARANCE, least) else {
                 continue;
             };
             let place = nearest.partition_point(|&(other, _)| other >= clearance);
@@ -113,7 +116,8 @@ impl Starts {
             },
             advance: 0.0,
         };
-        let inside = inner_balls(&entry.solids, holding_digits(entry));
+        let solids = entry.solids(place.rig);
+        let inside = inner_balls(&solids, entry.holding_digits());
         let pivot = middle_of_contacts(entry);
         (0..DRAWS).find_map(|_| {
             let beside = known.beside_about(pivot, [SHIFT, TURN], stream);
@@ -125,7 +129,7 @@ impl Starts {
             if place.giver.is_some_and(is_met) {
                 return None;
             }
-            let moved = entry.solids.transformed(way);
+            let moved = solids.transformed(way);
             let keeps_clear = place
                 .giver
                 .is_none_or(|giver| !giver.is_neared_by(holding_solids(entry, &moved), GIVER_CLEARANCE));
@@ -165,10 +169,6 @@ fn keeps_off(entry: &Entry, object: &GraspObject, moved: &HandSolids) -> bool {
     holding_solids(entry, moved).all(|part| !object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
 }
 
-fn holding_digits(entry: &Entry) -> [bool; 5] {
-    entry.grip.bend_ratios.map(|ratio| ratio.is_some())
-}
-
 /// A hand's solids but those of fingers that do not hold: they rest where there is room.
 fn holding_solids<'a>(
     entry: &Entry,
@@ -180,7 +180,7 @@ fn holding_solids<'a>(
         thenar,
         forearm,
     } = solids;
-    let digits = phalanges.iter().zip(holding_digits(entry));
+    let digits = phalanges.iter().zip(entry.holding_digits());
     digits
         .filter_map(|(links, holds)| holds.then_some(links))
         .flatten()

@@ -114,7 +114,12 @@ impl<'a> KnownGrips<'a> {
             let excluded = (from >= TRIED_ONE_BY_ONE).then(|| self.excluded());
             let is_open = |entry: u16| {
                 excluded.is_none_or(|excluded| !excluded.contains(entry))
-                    && giver.is_none_or(|giver| !self.atlas.surely_meets(entry, giver))
+                    && giver.is_none_or(|giver| {
+                        !self
+                            .atlas
+                            .grips()
+                            .surely_meets(usize::from(entry), self.rig, giver)
+                    })
             };
             let next = &left[..left.len().min(PASSED_AT_ONCE)];
             let place = next.iter().position(|&entry| is_open(entry));

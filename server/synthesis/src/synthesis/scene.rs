@@ -172,7 +172,7 @@ impl<'a> Scene<'a> {
         let wanted =
             holding.filter(|&entry| known.entries()[usize::from(entry)].is_wanted(&self.constraints));
         let giver = presented.giver.as_ref();
-        let found = Starts::of(known.entries(), wanted, giver, interrupted)?;
+        let found = Starts::of(known.grips(), self.rig(), wanted, giver, interrupted)?;
         // Another worker may have found the same meanwhile.
         Some(self.starts.get_or_init(|| found))
     }

@@ -116,10 +116,14 @@ pub(super) fn read_entry(
         epsilon,
     };
     let classification = classify(rig, &pose, &contacts);
-    Ok((
-        Entry::from_parts(grip, contacts, classification, grip_values, scores, &solids),
-        shape,
-    ))
+    let entry = Entry {
+        grip,
+        contacts,
+        classification,
+        grip_values,
+        scores,
+    };
+    Ok((entry, shape))
 }
 
 /// The terms of the score that a grip has; the others are 0.

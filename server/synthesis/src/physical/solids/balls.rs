@@ -33,6 +33,17 @@ impl Balls {
         balls
     }
 
+    /// The balls that are to be kept; in place of the others nothing that is near to anything.
+    #[must_use]
+    pub fn kept(mut self, is_kept: impl Fn(usize) -> bool) -> Self {
+        for (i, radius) in self.radii.iter_mut().enumerate() {
+            if !is_kept(i) {
+                *radius = f32::NEG_INFINITY;
+            }
+        }
+        self
+    }
+
     /// The same balls in another frame, or elsewhere and turned.
     #[must_use]
     pub fn transformed(&self, a_from_b: Pose) -> Self {

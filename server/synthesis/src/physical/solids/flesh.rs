@@ -69,7 +69,11 @@ const PALM: [[End; 2]; PALM_SOLIDS] = [
     ],
     [
         (Between(MIDDLE_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -0.1], 15.2),
-        (Between(MIDDLE_KNUCKLE, MIDDLE_KNUCKLE, 0.5), [0.0, 2.7, 2.4], 11.4),
+        (
+            Between(MIDDLE_KNUCKLE, MIDDLE_KNUCKLE, 0.5),
+            [0.0, 2.7, 2.4],
+            11.4,
+        ),
     ],
     [
         (Between(RING_BASE, RING_BASE, 0.5), [0.0, 0.0, 1.8], 11.6),
@@ -77,11 +81,19 @@ const PALM: [[End; 2]; PALM_SOLIDS] = [
     ],
     [
         (Between(LITTLE_BASE, LITTLE_BASE, 0.5), [0.0, 0.0, 1.9], 12.5),
-        (Between(LITTLE_KNUCKLE, LITTLE_KNUCKLE, 0.5), [0.0, -1.3, 1.0], 11.3),
+        (
+            Between(LITTLE_KNUCKLE, LITTLE_KNUCKLE, 0.5),
+            [0.0, -1.3, 1.0],
+            11.3,
+        ),
     ],
     [
         (Between(INDEX_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -1.0], 13.4),
-        (Between(INDEX_KNUCKLE, MIDDLE_KNUCKLE, 0.5), [0.0, -0.6, 1.7], 10.6),
+        (
+            Between(INDEX_KNUCKLE, MIDDLE_KNUCKLE, 0.5),
+            [0.0, -0.6, 1.7],
+            10.6,
+        ),
     ],
     [
         (Between(MIDDLE_BASE, RING_BASE, 0.5), [0.0, 0.0, 0.9], 15.7),

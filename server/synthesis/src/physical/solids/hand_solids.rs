@@ -51,8 +51,7 @@ impl HandSolids {
     /// The solids of a posed rig: some 600 ns.
     pub fn of_pose(rig: &Rig, pose: &HandPose) -> Self {
         let wrist = pose.frame_from_wrist;
-        let plane =
-            |digit: usize| DigitPlane::new(&rig.digits[digit], wrist, pose.digits[digit].base_yaw);
+        let plane = |digit: usize| DigitPlane::new(&rig.digits[digit], wrist, pose.digits[digit].base_yaw);
         let mut joints = [[Vec3::ZERO; 4]; 5];
         for (digit, joints) in joints.iter_mut().enumerate() {
             *joints = plane(digit).joints(&pose.digits[digit]);
@@ -60,7 +59,9 @@ impl HandSolids {
         let thumb_pad = plane(0).first_pad(pose.digits[0].base_pitch);
         let skeleton = Skeleton::new(Bones::of_rig(rig, wrist, &joints, thumb_pad));
         Self {
-            phalanges: std::array::from_fn(|digit| link_solids(joints[digit], link_radii(rig, Digit::ALL[digit]))),
+            phalanges: std::array::from_fn(|digit| {
+                link_solids(joints[digit], link_radii(rig, Digit::ALL[digit]))
+            }),
             palm: skeleton.palm(),
             thenar: skeleton.thenar(),
             forearm: forearm(wrist, rig.joint_radii[index::WRIST]),
@@ -70,17 +71,17 @@ impl HandSolids {
     /// The solids of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
         let skeleton = Skeleton::new(Bones::of_joints(joints));
-        Self::around(joints, &skeleton, skeleton.palm())
+        Self::around(joints, &skeleton, &skeleton.palm())
     }
 
     /// The solids of a giver's tracked joints, which are not to be touched: nowhere along the metacarpals thinner than the
     /// joints' radii say.
     pub fn of_giver(joints: &HandJoints) -> Self {
         let skeleton = Skeleton::new(Bones::of_joints(joints));
-        Self::around(joints, &skeleton, skeleton.palm_as_told())
+        Self::around(joints, &skeleton, &skeleton.palm_as_told())
     }
 
-    fn around(joints: &HandJoints, skeleton: &Skeleton, palm: [TaperedCapsule; PALM_SOLIDS]) -> Self {
+    fn around(joints: &HandJoints, skeleton: &Skeleton, palm: &[TaperedCapsule; PALM_SOLIDS]) -> Self {
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
         let mut phalanges = [[TaperedCapsule::default(); 3]; 5];
@@ -93,7 +94,7 @@ impl HandSolids {
         }
         Self {
             phalanges,
-            palm,
+            palm: *palm,
             thenar: skeleton.thenar(),
             forearm: forearm(
                 thesis_from_openxr_frame(joints.joints[index::WRIST].pose),

@@ -1,0 +1,70 @@
+//! Known grips, each with what tells soonest that it is in a giver's way.
+
+use super::{
+    cores::{first_balls, of_digits, second_balls},
+    entry::Entry,
+};
+use crate::{
+    hand::rig::Rig,
+    physical::{
+        grip::GIVER_CLEARANCE,
+        solids::{Balls, PreparedHand},
+    },
+};
+
+/// Grips of a hand in the order in which they were found. Of the rig only what is handed in is used, always the same.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Grips {
+    entries: Vec<Entry>,
+    /// The first balls inside each hand, side by side, so that looking at one mostly takes two lines of the cache.
+    cores: Vec<Balls>,
+}
+
+impl Grips {
+    /// Some grips of a rig.
+    pub fn new(rig: &Rig, entries: Vec<Entry>) -> Self {
+        let core = |entry: &Entry| first_balls(&entry.solids(rig));
+        Self {
+            cores: entries.iter().map(core).collect(),
+            entries,
+        }
+    }
+
+    /// The grips.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Adds a grip.
+    pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
+        self.cores.push(first_balls(&entry.solids(rig)));
+        self.entries.push(entry);
+    }
+
+    /// Puts a grip in the place of another one.
+    pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
+        self.cores[index] = first_balls(&entry.solids(rig));
+        self.entries[index] = entry;
+    }
+
+    /// True only if a grip, an index of [`Grips::entries`], comes too near to a giver's hand; not always then. Sooner told
+    /// than exactly: mostly by some 20 ns of work.
+    #[inline]
+    pub fn surely_meets(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> bool {
+        // One in fifty that meet gets as far as the second ones, which are not kept for that.
+        giver.surely_nears_any(&self.cores[entry], GIVER_CLEARANCE)
+            || giver.surely_nears_any(&second_balls(&self.entries[entry].solids(rig)), GIVER_CLEARANCE)
+    }
+
+    /// True only if one of the digits that hold, palm or forearm of a grip comes nearer to the giver's hand than `distance`
+    /// metres by the first balls inside alone; not always then.
+    pub(super) fn surely_nears(&self, entry: usize, giver: &PreparedHand, distance: f32) -> bool {
+        let holding = self.entries[entry].holding_digits();
+        giver.surely_nears_any(&of_digits(&self.cores[entry], holding), distance)
+    }
+
+    /// Bytes that they take in memory.
+    pub(super) fn bytes(&self) -> usize {
+        self.entries.iter().map(Entry::bytes).sum::<usize>() + size_of_val(self.cores.as_slice())
+    }
+}
