@@ -43,7 +43,7 @@ fn what_is_read_is_what_was_written() {
             let read = decode(&bytes, object, rig).expect("it is whole");
             assert_eq!(read, written);
             assert_eq!(encode(&read, object, rig), bytes);
-            // 8,192 grips must fit into 2.2 MB, with some to spare.
+            // 8,192 grips take some 2 MB.
             assert!(
                 bytes.len() <= 290 * entries + 128,
                 "{name}: {entries} in {}",

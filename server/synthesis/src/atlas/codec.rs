@@ -56,7 +56,7 @@ pub enum AtlasError {
     Malformed(&'static str),
 }
 
-/// The bytes of what has grown for an object and a hand: some 270 a grip.
+/// The bytes of what has grown for an object and a hand: some 250 a grip.
 pub fn encode(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
     let entries = grown.atlas.entries();
     let mut writer = Writer::default();
