@@ -12,7 +12,7 @@ use crate::{
     },
 };
 
-/// Grips of a hand in the order in which they were found. Of the rig only what is handed in is used, always the same.
+/// Grips in the order in which they were found. Whoever asks hands in the rig that they were made for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grips {
     entries: Vec<Entry>,
