@@ -1,6 +1,9 @@
 //! A grip of the atlas, and what is left to check when an object is held out.
 
-use super::gravity::{DIRECTIONS, direction};
+use super::{
+    friction_uses::FrictionUses,
+    gravity::{DIRECTIONS, direction, nearest},
+};
 use crate::{
     constraints::Constraints,
     grasp::{Contact, Grasp},
@@ -9,7 +12,7 @@ use crate::{
         attempt::grasp,
         contacts::soften,
         grip::{Grip, Gripper, clear_of_giver},
-        immobility::balance,
+        immobility::{FrictionUse, balance, balance_with},
         scene::{ObjectScene, Presented},
         solids::HandSolids,
     },
@@ -33,6 +36,8 @@ pub struct Entry {
     pub grip_values: Values,
     /// For each of [`DIRECTIONS`] against gravity: the score of grip and comfort in 1 … 255, or [`SLIPS`].
     pub scores: [u8; DIRECTIONS],
+    /// For each of them, how much friction the forces use; all of it where there are none.
+    pub friction_uses: FrictionUses,
 }
 
 impl Entry {
@@ -56,9 +61,16 @@ impl Entry {
             solids,
         );
         let of_grip = Score { values: grip_values }.of_grip();
+        let mut friction_uses = FrictionUses::default();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(direction(index));
-            balance(&gripper.soft_contacts, &load, &mut gripper.buffers).map_or(SLIPS, |balance| {
+            let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
+            friction_uses.set(
+                index,
+                held.as_ref()
+                    .map_or(FrictionUse::Full, |balance| balance.friction_use),
+            );
+            held.map_or(SLIPS, |balance| {
                 let values = force_values(scene, &contacts, &balance.forces);
                 quantised(of_grip + Score { values }.total())
             })
@@ -69,6 +81,7 @@ impl Entry {
             classification,
             grip_values,
             scores,
+            friction_uses,
         }
     }
 
@@ -114,7 +127,12 @@ impl Entry {
         let giver_clearance = clear_of_giver(&self.solids(rig), presented.giver.as_ref())?;
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
-        let balance = balance(&gripper.soft_contacts, &load, &mut gripper.buffers)?;
+        let least_use = if friction_differs {
+            FrictionUse::default()
+        } else {
+            self.friction_uses.get(nearest(presented.up))
+        };
+        let balance = balance_with(&gripper.soft_contacts, &load, least_use, &mut gripper.buffers)?;
         let epsilon = if friction_differs {
             gripper.closure(scene)?
         } else {

@@ -9,6 +9,7 @@
 pub mod codec;
 mod cores;
 pub mod entry;
+pub mod friction_uses;
 pub mod gravity;
 pub mod grips;
 pub mod growth;

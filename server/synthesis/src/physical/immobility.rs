@@ -22,7 +22,7 @@ use glam::Vec3;
 use super::solids::PALM_SOLIDS;
 use crate::hand::Digit;
 pub(crate) use balance::firm_force;
-pub use balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance};
+pub use balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance, balance_with};
 pub use closure::{EPSILON_TOLERANCE, epsilon};
 
 /// Contacts of a hand at most: one a link of each digit, and one a solid of the palm.
@@ -70,6 +70,26 @@ pub struct Balance {
     pub torsions: Vec<f32>,
     /// Length of the wrench that is left unbalanced (torque over characteristic length), as a share of the weight.
     pub residual: f32,
+    /// Within which limits of friction the forces were sought.
+    pub friction_use: FrictionUse,
+}
+
+/// How much of friction and torsion forces may use. [`balance`] tries them in this order until the digits press firmly:
+/// more of them would find safer forces, and take longer where the first do not do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FrictionUse {
+    /// Less than half, so that twice the load is held, too.
+    #[default]
+    Sparing,
+    /// Most of it.
+    Moderate,
+    /// All of it.
+    Full,
+}
+
+impl FrictionUse {
+    /// All, the safest first.
+    pub const ALL: [Self; 3] = [Self::Sparing, Self::Moderate, Self::Full];
 }
 
 /// What [`balance`] and [`epsilon`] keep from one call to the next, so that they need not allocate.

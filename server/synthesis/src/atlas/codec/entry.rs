@@ -9,23 +9,23 @@ use super::{
 use crate::{
     atlas::{
         entry::{Entry, SLIPS},
+        friction_uses::FrictionUses,
         gravity::DIRECTIONS,
     },
     geometry::mesh::TriangleMesh,
     grasp::Contact,
     hand::{Digit, DigitAngles, HandPart, HandPose, Phalanx, rig::Rig},
     object::GraspObject,
-    physical::{contacts::contact_normal, grip::Grip, shape::HandShape, solids::HandSolids},
+    physical::{
+        contacts::contact_normal, grip::Grip, immobility::MOST_CONTACTS, shape::HandShape, solids::HandSolids,
+    },
     pose::Pose,
     score::{TERMS, Term},
     taxonomy::classify,
 };
 
 /// Bytes of a grip at least: without contacts, and with the same score everywhere. It bounds what a count can ask for.
-pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 1 + 17 + 60 + 8 + 20 + 10 + 1;
-
-/// Contacts of a grip at most: the hand has some thirty solids.
-const MOST_CONTACTS: usize = 64;
+pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 1 + 17 + 60 + 8 + 20 + 10 + 1 + 1;
 
 /// By how much the square of a quaternion's length may differ from 1: what rounding leaves is a thousandth of it.
 const QUATERNION_SLACK: f32 = 1e-3;
@@ -69,6 +69,7 @@ pub(super) fn write_entry(
         writer.floats(&[entry.grip_values[term as usize]]);
     }
     write_scores(writer, &entry.scores);
+    write_friction_uses(writer, entry.friction_uses);
     writer.u8(entry.contacts.len() as u8);
     for contact in &entry.contacts {
         write_contact(writer, contact, object.surface.mesh());
@@ -100,6 +101,7 @@ pub(super) fn read_entry(
         grip_values[term as usize] = reader.float()?;
     }
     let scores = read_scores(reader)?;
+    let friction_uses = read_friction_uses(reader)?;
     let count = usize::from(reader.u8()?);
     if count > MOST_CONTACTS {
         return Err(AtlasError::Malformed("a grip has too many contacts"));
@@ -122,6 +124,7 @@ pub(super) fn read_entry(
         classification,
         grip_values,
         scores,
+        friction_uses,
     };
     Ok((entry, shape))
 }
@@ -247,6 +250,29 @@ fn read_scores(reader: &mut Reader<'_>) -> Result<[u8; DIRECTIONS], AtlasError> 
             .ok_or(AtlasError::Malformed("scores are out of range"))?;
     }
     Ok(scores)
+}
+
+/// Many grips need more than a little friction nowhere, and few need all of it: bits of which none is set are left out.
+fn write_friction_uses(writer: &mut Writer, uses: FrictionUses) {
+    let planes = uses.to_bits();
+    let count = planes
+        .iter()
+        .rposition(|bits| *bits != 0)
+        .map_or(0, |last| last + 1);
+    writer.u8(count as u8);
+    for &bits in &planes[..count] {
+        writer.u64(bits);
+    }
+}
+
+fn read_friction_uses(reader: &mut Reader<'_>) -> Result<FrictionUses, AtlasError> {
+    let mut planes = [0; 2];
+    let count = usize::from(reader.u8()?);
+    let written = planes.get_mut(..count);
+    for bits in written.ok_or(AtlasError::Malformed("uses of friction are out of range"))? {
+        *bits = reader.u64()?;
+    }
+    FrictionUses::from_bits(planes).ok_or(AtlasError::Malformed("a grip uses all friction and some of it"))
 }
 
 fn write_contact(writer: &mut Writer, contact: &Contact, mesh: &TriangleMesh) {

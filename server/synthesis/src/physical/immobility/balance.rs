@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    Balance, Buffers, Load, MOST_CONTACTS, SoftContact,
+    Balance, Buffers, FrictionUse, Load, MOST_CONTACTS, SoftContact,
     contact_model::{ContactCone, ScaledWrench, UnitPush, dot},
     least_squares::{Column, ConicLeastSquares},
 };
@@ -21,7 +21,7 @@ pub const BALANCE_TOLERANCE: f32 = 0.02;
 /// weight. 1 is the least with which two opposed digits hold anything; people keep a margin above that (Westling and
 /// Johansson 1984), and what a giver lets go of may be pushed. In a simulation by others, of 150 grips 38 % bore pushes of
 /// their object's weight from all sides with 3, 67 % where 16 N were the least, and 67 % with 5 and [`SURE_GRIP`] (all
-/// three before [`FRICTION_SHARES`]).
+/// three before [`FrictionUse`]).
 const FIRMNESS: f64 = 5.0;
 
 /// Newtons that the digits press with together beside that: nobody takes even a scalpel of 20 grams more gingerly than a
@@ -32,12 +32,14 @@ const SURE_GRIP: f64 = 8.0;
 /// more firmly than necessary.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
-/// All of it, but for what rounding to single precision may add.
-const ALL_FRICTION: f64 = 1.0 - 2e-6;
+/// Share of friction and torsion of [`FrictionUse::Sparing`]: with it, twice the load does not slip either.
+const SPARING_SHARE: f64 = 0.45;
 
-/// Shares of friction and torsion that the forces may use, tried in this order until the digits press firmly: with the
-/// first, twice the load does not slip either. More of them find safer forces, and take longer where the first do not do.
-const FRICTION_SHARES: [f64; 3] = [0.45, 0.7, ALL_FRICTION];
+/// Of [`FrictionUse::Moderate`]: half as much again as the load holds.
+const MODERATE_SHARE: f64 = 0.7;
+
+/// Of [`FrictionUse::Full`]: all of it, but for what rounding to single precision may add.
+const FULL_SHARE: f64 = 1.0 - 2e-6;
 
 /// Digits that press with this share of the sum aimed at press firmly. A larger one uses up friction for the last newtons,
 /// a smaller one lets what is thin be held by a few tenths of a newton, out of which it creeps.
@@ -95,12 +97,26 @@ pub(super) struct Solvers {
 /// # Panics
 /// There are more than [`MOST_CONTACTS`].
 pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
+    balance_with(contacts, load, FrictionUse::Sparing, buffers)
+}
+
+/// [`balance`] with forces that use at least as much friction as is said: for contacts of which it is known that they
+/// press firmly with no less under a load like this one. It takes half as long as to find that out.
+///
+/// # Panics
+/// As [`balance`].
+pub fn balance_with(
+    contacts: &[SoftContact],
+    load: &Load,
+    least_use: FrictionUse,
+    buffers: &mut Buffers,
+) -> Option<Balance> {
     let Buffers { cones, solvers, .. } = buffers;
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
     // Contacts that have closure hold nearly everything.
-    if let Some(found) = problem.safest_balance(solvers) {
+    if let Some(found) = problem.safest_balance(least_use, solvers) {
         return Some(found);
     }
     let mut found = problem.best(solvers);
@@ -135,8 +151,7 @@ struct Problem<'a> {
     /// Weights of a weight's force in the rows of shares and of firmness.
     share_weight: f64,
     firmness_weight: f64,
-    /// Of friction and torsion, how much may be used.
-    friction_share: f64,
+    friction_use: FrictionUse,
     limited: bool,
     comfortable: bool,
 }
@@ -170,17 +185,21 @@ impl<'a> Problem<'a> {
             firm_sum,
             share_weight: SHARE_WEIGHT / firm_sum.max(1.0),
             firmness_weight: FIRMNESS_WEIGHT / firm_sum.max(1.0),
-            friction_share: ALL_FRICTION,
+            friction_use: FrictionUse::Full,
             limited: false,
             comfortable: false,
         }
     }
 
-    /// The comfortable balance that is firm with the least friction, or else the firmest, if there is one.
-    fn safest_balance(&mut self, solvers: &mut Solvers) -> Option<Balance> {
+    /// The comfortable balance that is firm with the least friction from `least_use` on, or else the firmest, if there is
+    /// one.
+    fn safest_balance(&mut self, least_use: FrictionUse, solvers: &mut Solvers) -> Option<Balance> {
         let mut firmest: Option<(f64, Balance)> = None;
-        for share in FRICTION_SHARES {
-            let Some(found) = self.comfortable_balance(share, solvers) else {
+        for friction_use in FrictionUse::ALL {
+            if friction_use < least_use {
+                continue;
+            }
+            let Some(found) = self.comfortable_balance(friction_use, solvers) else {
                 continue;
             };
             let sum = self.sum_of_digits(&found);
@@ -204,11 +223,11 @@ impl<'a> Problem<'a> {
         f64::from(sum) / self.weight
     }
 
-    /// The comfortable balance within a share of friction and torsion, if there is one.
-    fn comfortable_balance(&mut self, friction_share: f64, solvers: &mut Solvers) -> Option<Balance> {
+    /// The comfortable balance with so much friction, if there is one.
+    fn comfortable_balance(&mut self, friction_use: FrictionUse, solvers: &mut Solvers) -> Option<Balance> {
         let was_limited = self.limited;
         self.comfortable = true;
-        self.friction_share = friction_share;
+        self.friction_use = friction_use;
         let mut found = self.best(solvers);
         if !self.limited && exceeds_limit(&found) {
             self.limited = true;
@@ -216,7 +235,7 @@ impl<'a> Problem<'a> {
         }
         self.keep_limits(&mut found);
         self.comfortable = false;
-        self.friction_share = ALL_FRICTION;
+        self.friction_use = FrictionUse::Full;
         self.limited = was_limited;
         (found.residual <= BALANCE_TOLERANCE).then_some(found)
     }
@@ -258,6 +277,7 @@ impl<'a> Problem<'a> {
         }
         solver.reset(entries);
         let strength = (self.limit() + 1.0) * self.contacts.len() as f64;
+        let share = share(self.friction_use);
         for contact in 0..self.limit_rows() {
             entries.fill(0.0);
             entries[WRENCH_ROWS + contact] = LIMIT_WEIGHT;
@@ -270,27 +290,27 @@ impl<'a> Problem<'a> {
             if !self.comfortable && length < FOUND * f64::from(BALANCE_TOLERANCE) {
                 return;
             }
-            let mut best = (
-                if self.comfortable {
-                    NEGLIGIBLE_COMFORT * self.firmness_weight.powi(2) * self.firm_sum.max(1.0)
-                } else {
-                    NEGLIGIBLE_GAIN
-                },
-                None,
-            );
+            let mut most = if self.comfortable {
+                NEGLIGIBLE_COMFORT * self.firmness_weight.powi(2) * self.firm_sum.max(1.0)
+            } else {
+                NEGLIGIBLE_GAIN
+            };
+            let mut best = None;
             let of_comfort = self.comfort_gains(solver.residual());
             for (contact, cone) in self.cones.iter().enumerate() {
-                // The residual times the push's column, without writing that.
-                let mut gain = if self.limited {
-                    self.worthiest_push(contact, solver.residual()).0
+                // The residual times the push's column, without writing that; without limits, without the push either.
+                let (mut gain, push) = if self.limited {
+                    let (gain, push) = self.worthiest_push(contact, solver.residual());
+                    (gain, Some(push))
                 } else {
-                    cone.reach(&unbalanced, self.friction_share)
+                    (cone.reach(&unbalanced, share), None)
                 };
                 if let Some(digit) = self.contacts[contact].digit {
                     gain += of_comfort[digit.index()];
                 }
-                if gain > best.0 {
-                    best = (gain, Some(contact));
+                if gain > most {
+                    most = gain;
+                    best = Some((contact, push));
                 }
             }
             let slack = (0..self.limit_rows())
@@ -298,27 +318,21 @@ impl<'a> Problem<'a> {
                 .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
             // What is left is perpendicular to what is balanced, so that pushes and slacks, together at most `strength`,
             // can shorten it by no more than they gain along it.
-            let gained = strength * best.0.max(slack.0);
+            let gained = strength * most.max(slack.0);
             if !self.comfortable && length - gained / length > f64::from(BALANCE_TOLERANCE) {
                 return;
             }
-            if slack.0 > best.0 {
+            if slack.0 > most {
                 entries.fill(0.0);
                 entries[WRENCH_ROWS + slack.1] = LIMIT_WEIGHT;
                 if solver.add(entries, Column::Slack) {
                     continue;
                 }
             }
-            let Some(contact) = best.1 else {
+            let Some((contact, push)) = best else {
                 return;
             };
-            let push = if self.limited {
-                self.worthiest_push(contact, solver.residual()).1
-            } else {
-                self.cones[contact]
-                    .farthest_push(&unbalanced, self.friction_share)
-                    .1
-            };
+            let push = push.unwrap_or_else(|| self.cones[contact].farthest_push(&unbalanced, share).1);
             self.write_entries(contact, &push, entries);
             if !solver.add(entries, Column::Push { contact, push }) {
                 return;
@@ -331,7 +345,7 @@ impl<'a> Problem<'a> {
         let unbalanced: ScaledWrench = std::array::from_fn(|k| residual[k]);
         // Once a contact's forces are over its limit, each newton more is to be paid for.
         let price = (-residual[WRENCH_ROWS + contact] * LIMIT_WEIGHT / self.limit()).max(0.0);
-        self.cones[contact].worthiest_push(&unbalanced, self.friction_share, price)
+        self.cones[contact].worthiest_push(&unbalanced, share(self.friction_use), price)
     }
 
     /// What a push takes of its contact's limit.
@@ -387,6 +401,7 @@ impl<'a> Problem<'a> {
                 .iter()
                 .map(|push| (push.torsion * self.weight * self.length) as f32)
                 .collect(),
+            friction_use: self.friction_use,
         }
     }
 
@@ -424,6 +439,15 @@ impl<'a> Problem<'a> {
             })
             .collect();
         balance.residual = self.residual(&pushes);
+    }
+}
+
+/// Of friction and torsion, how much may be used.
+fn share(friction_use: FrictionUse) -> f64 {
+    match friction_use {
+        FrictionUse::Sparing => SPARING_SHARE,
+        FrictionUse::Moderate => MODERATE_SHARE,
+        FrictionUse::Full => FULL_SHARE,
     }
 }
 
