@@ -87,7 +87,7 @@ impl Atlas {
     }
 
     /// The grips that certainly come too near to a giver's hand, or to its forearm; others may, too.
-    pub fn excluded_by(&self, giver: &PreparedHand) -> Excluded {
+    pub fn excluded_by(&self, giver: &PreparedHand) -> Excluded<'_> {
         self.occupancy.excluded_by(giver)
     }
 

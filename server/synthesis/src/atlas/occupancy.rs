@@ -3,6 +3,11 @@
 //! Most known grips meet the giver's hand. Instead of comparing hands one by one, space around the object is cut into
 //! cells, and each cell knows, a bit a grip, which hands fill it. The balls that a giver's hand is made of then look up
 //! their cells, and what these say together is out of the question.
+//!
+//! The bits lie far apart in memory, and most searches end with one of the first grips. So they are kept for a line of the
+//! cache's grips at a time, and looked at when one of those is asked for.
+
+use std::sync::OnceLock;
 
 use glam::{IVec3, Vec3};
 
@@ -49,8 +54,14 @@ const USUAL_ROWS: usize = 128;
 /// Grips that share a word.
 const WORD: usize = u64::BITS as usize;
 
+/// Grips whose bits are looked at together: those that a line of the cache has room for.
+const BLOCK: usize = 8 * WORD;
+
+/// A bit for each grip of a block.
+type Line = [u64; BLOCK / WORD];
+
 /// The row of cells that nothing fills.
-const EMPTY: u32 = 0;
+const EMPTY: u16 = 0;
 
 /// For each cell around an object, the grips whose hands fill it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,23 +70,42 @@ pub(super) struct Occupancy {
     /// Edge of a cell in metres.
     edge: f32,
     counts: IVec3,
-    /// Words of a row.
-    words: usize,
     /// The row of each cell.
-    rows: Vec<u32>,
-    bits: Vec<u64>,
+    rows: Vec<u16>,
+    /// For each block of grips, what each row says of them.
+    blocks: Vec<Vec<Line>>,
 }
 
-/// Grips that a giver is certainly met by, a bit each.
-#[derive(Clone, Debug, Default)]
-pub struct Excluded(Vec<u64>);
+/// Grips that a giver is certainly met by.
+#[derive(Clone, Debug)]
+pub struct Excluded<'a> {
+    occupancy: &'a Occupancy,
+    /// The rows of the cells that the giver fills.
+    filled: Vec<u16>,
+    /// What they say together of each block, once it was asked for.
+    blocks: Vec<OnceLock<Line>>,
+}
 
-impl Excluded {
+impl Excluded<'_> {
     /// True if a grip is out of the question.
     pub fn contains(&self, entry: u16) -> bool {
-        let entry = usize::from(entry);
-        let word = self.0.get(entry / WORD);
-        word.is_some_and(|word| word >> (entry % WORD) & 1 == 1)
+        let (block, bit) = (usize::from(entry) / BLOCK, usize::from(entry) % BLOCK);
+        let Some(line) = self.blocks.get(block) else {
+            return false;
+        };
+        let line = line.get_or_init(|| self.together(block));
+        line[bit / WORD] >> (bit % WORD) & 1 == 1
+    }
+
+    fn together(&self, block: usize) -> Line {
+        let rows = &self.occupancy.blocks[block];
+        let mut together = Line::default();
+        for &row in &self.filled {
+            for (word, more) in together.iter_mut().zip(rows[usize::from(row)]) {
+                *word |= more;
+            }
+        }
+        together
     }
 }
 
@@ -87,14 +117,13 @@ impl Occupancy {
         let extents = surface.max + MARGIN - low;
         let edge = CELL.max((extents.element_product() / MOST_CELLS).cbrt());
         let counts = (extents / edge).ceil().as_ivec3();
-        let words = entries.len().div_ceil(WORD);
         let mut occupancy = Self {
             low,
             edge,
             counts,
-            words,
             rows: vec![EMPTY; counts.element_product() as usize],
-            bits: vec![0; words],
+            // The first row is the one of cells that nothing fills.
+            blocks: vec![vec![Line::default()]; entries.len().div_ceil(BLOCK)],
         };
         for (index, entry) in entries.iter().enumerate() {
             for solid in entry.solids(rig).iter() {
@@ -107,36 +136,43 @@ impl Occupancy {
 
     /// Empties the cells that fewest hands fill, if there are more than [`MOST_ROWS`].
     fn keep_fullest(&mut self) {
-        let count = self.bits.len() / self.words.max(1);
+        let count = self.row_count();
         if count <= MOST_ROWS {
             return;
         }
         let filled = |row: &usize| -> u32 {
-            let words = &self.bits[row * self.words..(row + 1) * self.words];
-            words.iter().map(|word| word.count_ones()).sum()
+            let words = self.blocks.iter().flat_map(|rows| rows[*row]);
+            words.map(u64::count_ones).sum()
         };
-        // The first one is the row that nothing fills; of equally full ones, those that were filled first stay.
+        // The first row stays where it is; of equally full ones, those that were filled first stay.
         let mut kept: Vec<usize> = (1..count).collect();
         kept.sort_by_cached_key(|row| std::cmp::Reverse(filled(row)));
         kept.truncate(MOST_ROWS - 1);
         kept.sort_unstable();
         let mut new_rows = vec![EMPTY; count];
-        let mut bits = vec![0; self.words];
-        for row in kept {
-            new_rows[row] = (bits.len() / self.words) as u32;
-            bits.extend_from_slice(&self.bits[row * self.words..(row + 1) * self.words]);
+        for (new, &old) in (1..).zip(&kept) {
+            new_rows[old] = new;
         }
         for row in &mut self.rows {
-            *row = new_rows[*row as usize];
+            *row = new_rows[usize::from(*row)];
         }
-        self.bits = bits;
+        for rows in &mut self.blocks {
+            for (new, &old) in (1..).zip(&kept) {
+                rows[new] = rows[old];
+            }
+            rows.truncate(kept.len() + 1);
+            rows.shrink_to_fit();
+        }
+    }
+
+    fn row_count(&self) -> usize {
+        self.blocks.first().map_or(1, Vec::len)
     }
 
     /// The grips whose hands a giver's certainly comes too near to.
-    pub(super) fn excluded_by(&self, giver: &PreparedHand) -> Excluded {
-        let mut excluded = vec![0; self.words];
+    pub(super) fn excluded_by(&self, giver: &PreparedHand) -> Excluded<'_> {
         // Solids of a hand overlap, so that half of the balls lie in a cell that was looked up before.
-        let mut is_done = vec![false; self.bits.len() / self.words.max(1)];
+        let mut is_done = vec![false; self.row_count()];
         let mut filled = Vec::with_capacity(USUAL_ROWS);
         for solid in giver.iter().take(SOLIDS) {
             let steps = (solid.length() / SPACING) as u32 + 1;
@@ -151,23 +187,22 @@ impl Occupancy {
                     continue;
                 };
                 let row = self.rows[cell];
-                if row != EMPTY && !std::mem::replace(&mut is_done[row as usize], true) {
-                    filled.push(row as usize * self.words);
+                if row != EMPTY && !std::mem::replace(&mut is_done[usize::from(row)], true) {
+                    filled.push(row);
                 }
             }
         }
-        // Now that nothing else is done between, the rows' words are fetched ahead.
-        for from in filled {
-            for (word, filled) in excluded.iter_mut().zip(&self.bits[from..from + self.words]) {
-                *word |= filled;
-            }
+        Excluded {
+            occupancy: self,
+            filled,
+            blocks: vec![OnceLock::new(); self.blocks.len()],
         }
-        Excluded(excluded)
     }
 
     /// Bytes that it takes in memory.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.rows.as_slice()) + size_of_val(self.bits.as_slice())
+        let blocks = self.blocks.iter().map(|rows| size_of_val(rows.as_slice()));
+        size_of_val(self.rows.as_slice()) + blocks.sum::<usize>()
     }
 
     /// Notes that a hand's solid fills cells: every ball of a giver that has its middle there comes too near.
@@ -201,10 +236,18 @@ impl Occupancy {
     fn set(&mut self, place: IVec3, entry: usize) {
         let Some(cell) = self.cell(place) else { return };
         if self.rows[cell] == EMPTY {
-            self.rows[cell] = (self.bits.len() / self.words) as u32;
-            self.bits.resize(self.bits.len() + self.words, 0);
+            // Only boxes of kilometres have more cells than can be told apart: what is left out excludes nothing.
+            let Ok(row) = u16::try_from(self.row_count()) else {
+                return;
+            };
+            self.rows[cell] = row;
+            for rows in &mut self.blocks {
+                rows.push(Line::default());
+            }
         }
-        self.bits[self.rows[cell] as usize * self.words + entry / WORD] |= 1 << (entry % WORD);
+        let row = usize::from(self.rows[cell]);
+        let (block, bit) = (entry / BLOCK, entry % BLOCK);
+        self.blocks[block][row][bit / WORD] |= 1 << (bit % WORD);
     }
 
     /// Which cell along each axis a point is in; before the first, -1.

@@ -36,7 +36,7 @@ pub(super) struct KnownGrips<'a> {
     presented: &'a Presented,
     rig: &'a Rig,
     /// Those that certainly meet the giver, once somebody asks.
-    excluded: OnceLock<Excluded>,
+    excluded: OnceLock<Option<Excluded<'a>>>,
     /// Is the search's friction another than the one that the atlas was made under?
     friction_differs: bool,
     /// The next place in the order that nobody has taken.
@@ -91,11 +91,13 @@ impl<'a> KnownGrips<'a> {
         })
     }
 
-    fn excluded(&self) -> &Excluded {
-        self.excluded.get_or_init(|| {
+    /// Those that certainly meet the giver, if there is one.
+    fn excluded(&self) -> Option<&Excluded<'a>> {
+        let excluded = self.excluded.get_or_init(|| {
             let giver = self.presented.giver.as_ref();
-            giver.map_or_else(Excluded::default, |giver| self.atlas.excluded_by(giver))
-        })
+            giver.map(|giver| self.atlas.excluded_by(giver))
+        });
+        excluded.as_ref()
     }
 
     /// How many there are.
@@ -111,7 +113,11 @@ impl<'a> KnownGrips<'a> {
             let Some(left) = self.order.get(from..).filter(|left| !left.is_empty()) else {
                 return Taken::NoneLeft;
             };
-            let excluded = (from >= TRIED_ONE_BY_ONE).then(|| self.excluded());
+            let excluded = if from < TRIED_ONE_BY_ONE {
+                None
+            } else {
+                self.excluded()
+            };
             let is_open = |entry: u16| {
                 excluded.is_none_or(|excluded| !excluded.contains(entry))
                     && giver.is_none_or(|giver| {
