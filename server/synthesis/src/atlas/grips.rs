@@ -1,7 +1,7 @@
 //! Known grips, each with what tells soonest that it is in a giver's way.
 
 use super::{
-    cores::{first_balls, of_digits, second_balls},
+    cores::{first_balls, first_of_digits, second_balls},
     entry::Entry,
 };
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
     },
 };
 
-/// Grips in the order in which they were found. Whoever asks hands in the rig that they were made for.
+/// Grips, in the order of [`super::Atlas::entries`]. Whoever asks hands in the rig that they were made for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grips {
     entries: Vec<Entry>,
@@ -60,7 +60,7 @@ impl Grips {
     /// metres by the first balls inside alone; not always then.
     pub(super) fn surely_nears(&self, entry: usize, giver: &PreparedHand, distance: f32) -> bool {
         let holding = self.entries[entry].holding_digits();
-        giver.surely_nears_any(&of_digits(&self.cores[entry], holding), distance)
+        giver.surely_nears_any(&first_of_digits(self.cores[entry], holding), distance)
     }
 
     /// Bytes that they take in memory.

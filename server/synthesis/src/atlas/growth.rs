@@ -7,7 +7,7 @@
 //! A round's proposals depend on the rounds before and on nothing else, and what comes of them is taken over in their
 //! order, so that an atlas is the same however many threads make it and whenever they are interrupted.
 
-use std::sync::Arc;
+use std::{cmp::Reverse, sync::Arc};
 
 use glam::Vec3;
 
@@ -138,7 +138,8 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Goes on from what grew for the same object and rig: what comes of it is the same as without an interruption.
+    /// Goes on from what grew for the same object and rig, if it is not complete: what comes of it is the same as without an
+    /// interruption.
     pub fn resume(object: &'a GraspObject, rig: &'a Rig, grown: &Grown) -> Self {
         let mut growth = Self::new(object, rig);
         growth.proposed = grown.proposed;
@@ -171,18 +172,38 @@ impl<'a> Growth<'a> {
 
     /// The atlas as it stands.
     pub fn atlas(&self) -> Atlas {
-        let grips = self.grips.clone();
-        Atlas::new(self.scene.object, self.rig, grips, self.is_complete())
+        Arc::unwrap_or_clone(self.grown().atlas)
     }
 
-    /// What has grown so far.
+    /// What has grown so far. When nothing more is going to, grips that score most come first: then those that are tried
+    /// first, whatever gravity's direction, lie side by side in memory.
     pub fn grown(&self) -> Grown {
+        let is_complete = self.is_complete();
+        let (grips, shapes) = if is_complete {
+            self.by_score()
+        } else {
+            (self.grips.clone(), self.shapes.clone())
+        };
         Grown {
-            atlas: Arc::new(self.atlas()),
-            shapes: self.shapes.clone(),
+            atlas: Arc::new(Atlas::new(self.scene.object, self.rig, grips, is_complete)),
+            shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
         }
+    }
+
+    /// Grips and shapes by falling sum of the grips' scores under all directions of gravity; of equal ones, what was found
+    /// first.
+    fn by_score(&self) -> (Grips, Vec<HandShape>) {
+        let entries = self.grips.entries();
+        let mut order: Vec<usize> = (0..entries.len()).collect();
+        order.sort_by_key(|&index| {
+            let scores = entries[index].scores.iter();
+            Reverse(scores.map(|&score| u32::from(score)).sum::<u32>())
+        });
+        let entries = order.iter().map(|&index| entries[index].clone()).collect();
+        let shapes = order.iter().map(|&index| self.shapes[index]).collect();
+        (Grips::new(self.rig, entries), shapes)
     }
 
     /// One round: some milliseconds.

@@ -52,7 +52,7 @@ impl Atlas {
         }
     }
 
-    /// The grips, in the order in which they were found.
+    /// The grips: in the order in which they were found, or by falling score once they are complete.
     pub fn entries(&self) -> &[Entry] {
         self.grips.entries()
     }

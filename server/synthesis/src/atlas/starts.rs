@@ -5,7 +5,11 @@
 
 use glam::Vec3;
 
-use super::{cores::inner_balls, entry::Entry, grips::Grips};
+use super::{
+    cores::{first_balls, first_of_digits, second_balls, second_of_digits},
+    entry::Entry,
+    grips::Grips,
+};
 use crate::{
     grasp::Contact,
     guided::proposal::Place,
@@ -75,7 +79,7 @@ impl Starts {
             }
             let entry = &known.entries()[usize::from(index)];
             let solids = entry.solids(rig);
-            let [_, second] = inner_balls(&solids, entry.holding_digits());
+            let second = second_of_digits(second_balls(&solids), entry.holding_digits());
             if giver.surely_nears_any(&second, least) {
                 continue;
             }
@@ -117,7 +121,11 @@ impl Starts {
             advance: 0.0,
         };
         let solids = entry.solids(place.rig);
-        let inside = inner_balls(&solids, entry.holding_digits());
+        let holding = entry.holding_digits();
+        let inside = [
+            first_of_digits(first_balls(&solids), holding),
+            second_of_digits(second_balls(&solids), holding),
+        ];
         let pivot = middle_of_contacts(entry);
         (0..DRAWS).find_map(|_| {
             let beside = known.beside_about(pivot, [SHIFT, TURN], stream);
