@@ -8,7 +8,7 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, holdouts},
 };
 use grasp_synthesis::{
-    atlas::growth::Growth,
+    atlas::{asked::Asked, growth::Growth},
     constraints::ApproachCone,
     geometry::mesh::TriangleMesh,
     grasp::Grasp,
@@ -59,10 +59,11 @@ fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Pla
     let presented = Presented::of(holdout);
     let mut gripper = Gripper::default();
     let atlas = grips.atlas();
+    let asked = Asked::new(&scene, rig, &presented);
     let grasps = atlas
         .entries()
         .iter()
-        .filter_map(|entry| entry.hold(&scene, rig, &presented, false, &mut gripper));
+        .filter_map(|entry| asked.hold(entry, &entry.solids(rig), &mut gripper));
     grasps
         .map(|grasp| Planned {
             name: name.to_owned(),

@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
-    atlas::{Atlas, entry::Entry, growth::Growth},
+    atlas::{Atlas, asked::Asked, entry::Entry, growth::Growth},
     guided::proposal::{Place, propose},
     hand::{Handedness, rig::Rig},
     object::GraspObject,
@@ -67,8 +67,8 @@ fn holds(criterion: &mut Criterion) {
     for name in OBJECTS {
         let (scene, atlas, presented) = (scene(object(name)), grown(object(name), ENTRIES), presented(name));
         let mut holds = |entry: &Entry, presented: &Presented| {
-            entry
-                .hold(&scene, rig(), presented, false, &mut gripper)
+            Asked::new(&scene, rig(), presented)
+                .hold(entry, &entry.solids(rig()), &mut gripper)
                 .is_some()
         };
         let pairs = presented

@@ -14,6 +14,7 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, HoldoutError, holdouts},
 };
 use grasp_synthesis::{
+    atlas::asked::Asked,
     clock::Clock,
     constraints::Constraints,
     grasp::Grasp,
@@ -256,8 +257,9 @@ impl Maker {
         let scene = self.scene(cell);
         let (object, presented) = scene.physical()?;
         let entry = self.atlases.of(cell)?.entries().get(usize::from(entry))?;
-        // The friction is the object's own, as the atlas'.
-        let grasp = entry.hold(object, scene.rig(), presented, false, &mut Gripper::default())?;
+        let solids = entry.solids(scene.rig());
+        let asked = Asked::new(object, scene.rig(), presented);
+        let grasp = asked.hold(entry, &solids, &mut Gripper::default())?;
         Some(Box::new(grasp))
     }
 

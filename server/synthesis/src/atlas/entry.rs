@@ -1,22 +1,21 @@
-//! A grip of the atlas, and what is left to check when an object is held out.
+//! A grip of the atlas.
 
 use super::{
     friction_uses::FrictionUses,
-    gravity::{DIRECTIONS, direction, nearest},
+    gravity::{DIRECTIONS, direction},
 };
 use crate::{
     constraints::Constraints,
-    grasp::{Contact, Grasp},
+    grasp::Contact,
     hand::rig::Rig,
     physical::{
-        attempt::grasp,
         contacts::soften,
-        grip::{Grip, Gripper, clear_of_giver},
-        immobility::{FrictionUse, balance, balance_with},
-        scene::{ObjectScene, Presented},
+        grip::{Grip, Gripper},
+        immobility::{FrictionUse, balance},
+        scene::ObjectScene,
         solids::HandSolids,
     },
-    score::{Score, Values, force_values, grip_values, score},
+    score::{Score, Values, force_values, grip_values},
     taxonomy::{Classification, classify},
 };
 
@@ -112,43 +111,6 @@ impl Entry {
         constraints.admits_wrist(self.grip.pose.frame_from_wrist)
             && constraints.admits_contacts(&self.contacts)
             && constraints.admits_type(self.classification.grasp_type)
-    }
-
-    /// The grasp that this grip is for what is presented, with its score; none if it comes too near to the giver or the
-    /// object slips. `friction_differs` if the scene's friction is not the one that the atlas was made under.
-    pub fn hold(
-        &self,
-        scene: &ObjectScene<'_>,
-        rig: &Rig,
-        presented: &Presented,
-        friction_differs: bool,
-        gripper: &mut Gripper,
-    ) -> Option<Grasp> {
-        let giver_clearance = clear_of_giver(&self.solids(rig), presented.giver.as_ref())?;
-        soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
-        let load = scene.load(presented.up);
-        let least_use = if friction_differs {
-            FrictionUse::default()
-        } else {
-            self.friction_uses.get(nearest(presented.up))
-        };
-        let balance = balance_with(&gripper.soft_contacts, &load, least_use, &mut gripper.buffers)?;
-        let epsilon = if friction_differs {
-            gripper.closure(scene)?
-        } else {
-            self.grip.epsilon
-        };
-        let mut grasp = grasp(
-            &self.grip,
-            &self.contacts,
-            self.classification,
-            epsilon,
-            &balance,
-            presented,
-            giver_clearance,
-        );
-        grasp.score = Some(score(self.grip_values, &grasp, scene, rig, presented));
-        Some(grasp)
     }
 
     /// Bytes that the entry takes.

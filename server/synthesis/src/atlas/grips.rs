@@ -8,7 +8,7 @@ use crate::{
     hand::rig::Rig,
     physical::{
         grip::GIVER_CLEARANCE,
-        solids::{Balls, PreparedHand},
+        solids::{Balls, HandSolids, PreparedHand},
     },
 };
 
@@ -47,13 +47,22 @@ impl Grips {
         self.entries[index] = entry;
     }
 
-    /// True only if a grip, an index of [`Grips::entries`], comes too near to a giver's hand; not always then. Sooner told
-    /// than exactly: mostly by some 20 ns of work.
+    /// The solids of a grip, an index of [`Grips::entries`]; none only if it comes too near to a giver's hand, and not
+    /// always then. Sooner told than exactly: mostly by some 20 ns of work.
     #[inline]
-    pub fn surely_meets(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> bool {
-        // One in fifty that meet gets as far as the second ones, which are not kept for that.
-        giver.surely_nears_any(&self.cores[entry], GIVER_CLEARANCE)
-            || giver.surely_nears_any(&second_balls(&self.entries[entry].solids(rig)), GIVER_CLEARANCE)
+    pub fn unless_met(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<HandSolids>> {
+        if giver.surely_nears_any(&self.cores[entry], GIVER_CLEARANCE) {
+            return None;
+        }
+        self.unless_met_by_second(entry, rig, giver)
+    }
+
+    /// One in fifty that meet gets as far as the second balls, which are not kept for that.
+    #[inline(never)]
+    fn unless_met_by_second(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<HandSolids>> {
+        let solids = self.entries[entry].solids(rig);
+        let is_met = giver.surely_nears_any(&second_balls(&solids), GIVER_CLEARANCE);
+        (!is_met).then(|| Box::new(solids))
     }
 
     /// True only if one of the digits that hold, palm or forearm of a grip comes nearer to the giver's hand than `distance`

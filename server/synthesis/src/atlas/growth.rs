@@ -251,10 +251,8 @@ impl<'a> Growth<'a> {
     /// How many grips keep clear of a giver's hand, up to enough.
     fn count_free(&self, giver: &PreparedHand) -> usize {
         let is_free = |&entry: &usize| {
-            !self.grips.surely_meets(entry, self.rig, giver) && {
-                let solids = self.grips.entries()[entry].solids(self.rig);
-                !giver.is_neared_by(solids.iter(), GIVER_CLEARANCE)
-            }
+            let solids = self.grips.unless_met(entry, self.rig, giver);
+            solids.is_some_and(|solids| !giver.is_neared_by(solids.iter(), GIVER_CLEARANCE))
         };
         (0..self.len()).filter(is_free).take(ENOUGH_FREE).count()
     }

@@ -3,9 +3,10 @@
 //! A grip that passes every check on object and hand alone fits every holdout whose giver and gravity let it. So grips are
 //! collected once per object and rig ([`growth`]), spread over all sides of the object; for a request they are tried in
 //! the order of their score under its gravity ([`gravity`]), and what is left to check is the giver's hand and the forces
-//! ([`entry`]). The thesis rejects precomputed grasps because a giver may spoil all of them (thesis 1): hence the atlas
+//! ([`asked`]). The thesis rejects precomputed grasps because a giver may spoil all of them (thesis 1): hence the atlas
 //! never answers alone, a fresh search runs beside it.
 
+pub mod asked;
 pub mod codec;
 mod cores;
 pub mod entry;

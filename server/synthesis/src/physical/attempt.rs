@@ -128,7 +128,7 @@ impl PhysicalAttempt {
             &self.gripper.contacts,
             classification,
             grip.epsilon,
-            &balance,
+            balance,
             presented,
             giver_clearance,
         );
@@ -156,19 +156,20 @@ pub(crate) fn grasp(
     contacts: &[Contact],
     classification: Classification,
     epsilon: f32,
-    balance: &Balance,
+    balance: Balance,
     presented: &Presented,
     giver_clearance: Option<f32>,
 ) -> Grasp {
     let sum: glam::Vec3 = balance.forces.iter().sum();
+    let comfort = comfort(digit_totals(contacts, &balance.forces));
     Grasp {
         pose: grip.pose,
         bend_ratios: grip.bend_ratios,
         contacts: contacts.to_vec(),
-        forces: balance.forces.clone(),
-        torsions: balance.torsions.clone(),
+        forces: balance.forces,
+        torsions: balance.torsions,
         wrench_angle: sum.angle_between(presented.up),
-        comfort: comfort(digit_totals(contacts, &balance.forces)),
+        comfort,
         margins: Some(PhysicalMargins {
             residual: balance.residual,
             epsilon,

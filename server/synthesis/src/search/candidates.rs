@@ -7,15 +7,11 @@ use std::sync::{
 
 use super::SearchSettings;
 use crate::{
-    atlas::{Atlas, Excluded},
+    atlas::{Atlas, Excluded, asked::Asked},
     grasp::Grasp,
     hand::rig::Rig,
-    physical::{
-        grip::Gripper,
-        scene::{ObjectScene, Presented},
-    },
+    physical::{grip::Gripper, scene::Presented, solids::HandSolids},
     score::{Score, comfort_value},
-    strategy::Validity,
     synthesis::scene::Scene,
 };
 
@@ -32,13 +28,11 @@ pub(super) struct KnownGrips<'a> {
     atlas: &'a Atlas,
     order: &'a [u16],
     scene: &'a Scene<'a>,
-    object: &'a ObjectScene<'a>,
+    asked: Asked<'a>,
     presented: &'a Presented,
     rig: &'a Rig,
     /// Those that certainly meet the giver, once somebody asks.
     excluded: OnceLock<Option<Excluded<'a>>>,
-    /// Is the search's friction another than the one that the atlas was made under?
-    friction_differs: bool,
     /// The next place in the order that nobody has taken.
     next: AtomicUsize,
 }
@@ -49,8 +43,8 @@ enum Taken {
     NoneLeft,
     /// Some that certainly meet the giver.
     NoneOpen,
-    /// One that may not, an index of the atlas, and those before it.
-    Open(u16),
+    /// One that may not, an index of the atlas with its solids, and those before it.
+    Open(u16, Box<HandSolids>),
 }
 
 /// What became of a known grip.
@@ -82,11 +76,10 @@ impl<'a> KnownGrips<'a> {
             atlas,
             order: atlas.by_score(presented.up),
             scene,
-            object,
+            asked: Asked::new(object, scene.rig(), presented),
             presented,
             rig: scene.rig(),
             excluded: OnceLock::new(),
-            friction_differs: settings.friction != object.object.friction_under(Validity::Physical),
             next: AtomicUsize::new(0),
         })
     }
@@ -107,7 +100,6 @@ impl<'a> KnownGrips<'a> {
 
     /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such.
     fn take(&self) -> Taken {
-        let giver = self.presented.giver.as_ref();
         loop {
             let from = self.next.load(Ordering::Relaxed);
             let Some(left) = self.order.get(from..).filter(|left| !left.is_empty()) else {
@@ -118,47 +110,47 @@ impl<'a> KnownGrips<'a> {
             } else {
                 self.excluded()
             };
-            let is_open = |entry: u16| {
-                excluded.is_none_or(|excluded| !excluded.contains(entry))
-                    && giver.is_none_or(|giver| {
-                        !self
-                            .atlas
-                            .grips()
-                            .surely_meets(usize::from(entry), self.rig, giver)
-                    })
-            };
             let next = &left[..left.len().min(PASSED_AT_ONCE)];
-            let place = next.iter().position(|&entry| is_open(entry));
-            let to = from + place.map_or(next.len(), |place| place + 1);
+            let open = next.iter().enumerate().find_map(|(place, &entry)| {
+                let is_excluded = excluded.is_some_and(|excluded| excluded.contains(entry));
+                let solids = if is_excluded { None } else { self.unless_met(entry) };
+                Some((place, solids?))
+            });
+            let to = from + open.as_ref().map_or(next.len(), |(place, _)| place + 1);
             // Another worker may have taken the same meanwhile; then they are looked at in vain.
             let taken = self
                 .next
                 .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
             if taken.is_ok() {
-                return place.map_or(Taken::NoneOpen, |place| Taken::Open(next[place]));
+                return open.map_or(Taken::NoneOpen, |(place, solids)| {
+                    Taken::Open(next[place], solids)
+                });
             }
+        }
+    }
+
+    /// The solids of a grip that does not certainly meet the giver.
+    fn unless_met(&self, entry: u16) -> Option<Box<HandSolids>> {
+        let entry = usize::from(entry);
+        match &self.presented.giver {
+            None => Some(Box::new(self.atlas.entries()[entry].solids(self.rig))),
+            Some(giver) => self.atlas.grips().unless_met(entry, self.rig, giver),
         }
     }
 
     /// Tries the next one.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
-        let entry = match self.take() {
+        let (entry, solids) = match self.take() {
             Taken::NoneLeft => return Tried::NoneLeft,
             Taken::NoneOpen => return Tried::Refused,
-            Taken::Open(entry) => entry,
+            Taken::Open(entry, solids) => (entry, solids),
         };
         let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();
         if !grip.is_wanted(constraints) {
             return Tried::Refused;
         }
-        match grip.hold(
-            self.object,
-            self.rig,
-            self.presented,
-            self.friction_differs,
-            gripper,
-        ) {
+        match self.asked.hold(grip, &solids, gripper) {
             Some(grasp) if constraints.admits(&grasp) => Tried::Valid {
                 entry,
                 value: value(&grasp),

@@ -22,6 +22,7 @@ use grasp_experiment::{
 use grasp_synthesis::{
     atlas::{
         Atlas,
+        asked::Asked,
         codec::{AtlasError, encode},
         growth::Growth,
     },
@@ -99,7 +100,8 @@ fn an_atlas_answers_with_its_first_grip_that_holds() {
         let presented = Presented::of(&holdout);
         let held = |entry: u16| {
             let entry = &SMALL_ATLAS.0.entries()[usize::from(entry)];
-            entry.hold(&object, adult(), &presented, false, &mut Gripper::default())
+            let asked = Asked::new(&object, adult(), &presented);
+            asked.hold(entry, &entry.solids(adult()), &mut Gripper::default())
         };
         let mut order = SMALL_ATLAS.0.by_score(presented.up).iter();
         let (entry, grasp) = order
