@@ -157,7 +157,10 @@ fn path(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use grasp_synthesis::atlas::{entry::Entry, grips::Grips};
+    use grasp_synthesis::{
+        atlas::{entry::Entry, grips::Grips},
+        physical::immobility::FrictionUse,
+    };
 
     use super::*;
 
@@ -206,6 +209,14 @@ mod tests {
         };
         assert_eq!(changed(|entry| entry.grip.epsilon *= 1.5), Some(7));
         assert_eq!(changed(|entry| entry.scores[3] ^= 1), Some(7));
+        let use_more = |entry: &mut Entry| {
+            let more = match entry.friction_uses.get(3) {
+                FrictionUse::Full => FrictionUse::Sparing,
+                _ => FrictionUse::Full,
+            };
+            entry.friction_uses.set(3, more);
+        };
+        assert_eq!(changed(use_more), Some(7));
         assert_eq!(changed(|entry| entry.contacts.truncate(1)), Some(7));
     }
 

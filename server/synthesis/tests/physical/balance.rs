@@ -4,7 +4,8 @@ use glam::Vec3;
 use grasp_synthesis::{
     hand::Digit,
     physical::immobility::{
-        BALANCE_TOLERANCE, Balance, Buffers, Load, MAX_CONTACT_FORCE, SoftContact, balance,
+        BALANCE_TOLERANCE, Balance, Buffers, FrictionUse, Load, MAX_CONTACT_FORCE, SoftContact, balance,
+        balance_with,
     },
     synthesis::comfort::comfort,
 };
@@ -262,6 +263,37 @@ fn random_grasps_keep_every_limit() {
     }
     assert!(held > 800, "only {held} grasps hold");
     assert!(limited > 20, "only {limited} grasps come to a limit");
+}
+
+/// Who knows how much friction the forces use finds the same ones without trying less; who asks for more gets sound forces,
+/// too, if any hold.
+#[test]
+fn what_is_known_of_friction_changes_no_forces() {
+    let mut random = Random::new(12);
+    let mut buffers = Buffers::default();
+    let mut counts = [0; 3];
+    for case in 0..3000 {
+        let contacts = random.contacts(2 + case % 9);
+        let load = load(random.between(0.02, 2.0), random.direction(), 0.04);
+        let found = balance(&contacts, &load, &mut buffers);
+        for least_use in FrictionUse::ALL {
+            let again = balance_with(&contacts, &load, least_use, &mut buffers);
+            assert_eq!(again.is_some(), found.is_some(), "case {case}, {least_use:?}");
+            let (Some(found), Some(again)) = (&found, again) else {
+                continue;
+            };
+            if least_use <= found.friction_use {
+                assert_eq!(&again, found, "case {case}, {least_use:?}");
+            } else {
+                assert!(again.friction_use >= least_use, "case {case}, {least_use:?}");
+                assert_sound(&contacts, &load, &again, &format!("case {case}, {least_use:?}"));
+            }
+        }
+        if let Some(found) = found {
+            counts[found.friction_use as usize] += 1;
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 30), "{counts:?}");
 }
 
 /// Forces of a known balance exist, so they are found: contacts push at random inside their limits, and gravity is what
