@@ -2,7 +2,7 @@
 //!
 //! A grip that passes every check on object and hand alone fits every holdout whose giver and gravity let it. So grips are
 //! collected once per object and rig ([`growth`]), spread over all sides of the object; for a request they are tried in
-//! the order of their score under its gravity ([`gravity`]), and what is left to check is the giver's hand and the forces
+//! the order of their score under its gravity (`order.rs`), and what is left to check is the giver's hand and the forces
 //! ([`asked`]). The thesis rejects precomputed grasps because a giver may spoil all of them (thesis 1): hence the atlas
 //! never answers alone, a fresh search runs beside it.
 
@@ -16,6 +16,7 @@ pub mod grips;
 pub mod growth;
 pub mod key;
 mod occupancy;
+mod order;
 mod spread;
 pub mod starts;
 
@@ -25,10 +26,10 @@ use sha2::{Digest as _, Sha256};
 use crate::{hand::rig::Rig, object::GraspObject, physical::solids::PreparedHand};
 
 use entry::{Entry, SLIPS};
-use gravity::GravityOrder;
 use grips::Grips;
 pub use occupancy::Excluded;
 use occupancy::Occupancy;
+use order::GravityOrder;
 
 /// What is known of how a hand holds an object.
 #[derive(Clone, Debug, Default, PartialEq)]
