@@ -3,11 +3,20 @@
 //! The columns are not a matrix that is there from the start: whoever asks looks at the residual, finds the column of a
 //! cone that goes with it best, and adds it. What is kept is the passive set, the columns with a positive weight; the
 //! weights always solve the least-squares problem over it.
+//!
+//! For the columns A of the passive set, a T is kept with which A T has columns of length one that are perpendicular to
+//! each other, the directions. A column more is split, by Gram and Schmidt, into what the directions say already and one of
+//! its own; for one that leaves, a reflection turns all directions but one away from it, and that one leaves with it. Each
+//! moves the solution along one direction alone, and hardly a number waits for another one to be found.
 
 use super::contact_model::UnitPush;
 
-/// A pivot of the Cholesky factorisation below this share of its diagonal means that a column depends on the others.
-const DEPENDENT_PIVOT: f64 = 1e-11;
+/// A column whose own part has less than this share of its squared length depends on the others.
+const DEPENDENT_SHARE: f64 = 1e-11;
+
+/// Below this share, rounding leaves so much of the others in a column's own part that what is left of them is taken off
+/// once more ("twice is enough": Parlett 1980, section 6-9, after Kahan). A larger one repeats in vain.
+const REPEATED_SHARE: f64 = 1e-4;
 
 /// What a column stands for.
 #[derive(Clone, Copy, Debug)]
@@ -26,58 +35,48 @@ pub(super) enum Column {
 /// Numbers that are worked on side by side; what there are fewer of is filled up with zeros.
 type Four = [f64; 4];
 
+/// A number a row, or a column: there are never more columns than rows, as they are independent.
+type Fours<const FOURS: usize> = [Four; FOURS];
+
 /// The smallest |A x − b| over x ≥ 0, for the columns added so far, which have at most four times `FOURS` rows.
 #[derive(Clone, Debug)]
 pub(super) struct ConicLeastSquares<const FOURS: usize> {
     rows: usize,
-    /// b.
-    target: [Four; FOURS],
-    /// A by columns.
-    entries: Vec<[Four; FOURS]>,
+    /// The passive set.
     columns: Vec<Column>,
-    /// x.
-    weights: Vec<f64>,
-    /// b − A x.
-    residual: [Four; FOURS],
-    factor: Factor<FOURS>,
-    /// The solution without regard to signs.
-    free: [Four; FOURS],
+    /// As many as there are columns, in an order of their own.
+    directions: Vec<Direction<FOURS>>,
+    solution: Solution<FOURS>,
 }
 
-/// The Cholesky factor L of `AᵀA`, and what is solved with it. Each number that is found is at once taken off all that wait
-/// for it: to sum up what one number waits for would take as long for each as for all.
-#[derive(Clone, Debug)]
-struct Factor<const FOURS: usize> {
-    /// How many rows of it belong to the columns that are there now.
-    count: usize,
-    /// L by rows, without its diagonal: zeros from there on.
-    by_rows: Vec<[Four; FOURS]>,
-    /// L by columns; above the diagonal, anything.
-    by_columns: Vec<[Four; FOURS]>,
-    /// One over its diagonal: a division takes as long as multiplying four columns.
-    inverse_diagonal: Vec<f64>,
-    /// The solution of L y = Aᵀb.
-    forward: [Four; FOURS],
+/// A combination of the columns that has length one and is perpendicular to the others.
+#[derive(Clone, Copy, Debug)]
+struct Direction<const FOURS: usize> {
+    /// A number a row: a column of A T.
+    unit: Fours<FOURS>,
+    /// How much of each column there is in it: a column of T.
+    weights: Fours<FOURS>,
+}
+
+/// What weights leave of the target.
+#[derive(Clone, Copy, Debug)]
+struct Solution<const FOURS: usize> {
+    /// x.
+    weights: Fours<FOURS>,
+    /// b − A x.
+    residual: Fours<FOURS>,
 }
 
 impl<const FOURS: usize> Default for ConicLeastSquares<FOURS> {
     fn default() -> Self {
-        let none = [[0.0; 4]; FOURS];
         Self {
             rows: 0,
-            target: none,
-            entries: Vec::new(),
             columns: Vec::new(),
-            weights: Vec::new(),
-            residual: none,
-            factor: Factor {
-                count: 0,
-                by_rows: Vec::new(),
-                by_columns: Vec::new(),
-                inverse_diagonal: Vec::new(),
-                forward: none,
+            directions: Vec::new(),
+            solution: Solution {
+                weights: none(),
+                residual: none(),
             },
-            free: none,
         }
     }
 }
@@ -89,27 +88,25 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
     /// There are more rows than there is room for.
     pub(super) fn reset(&mut self, target: &[f64]) {
         self.rows = target.len();
-        self.target = filled_up(target);
-        self.residual = self.target;
-        self.entries.clear();
         self.columns.clear();
-        self.weights.clear();
-        self.factor.count = 0;
-        // There are never more columns than rows, as columns are independent.
-        self.entries.reserve(self.rows);
         self.columns.reserve(self.rows);
-        self.weights.reserve(self.rows);
-        self.factor.reserve(self.rows);
+        self.directions.clear();
+        self.directions.reserve(self.rows);
+        self.solution = Solution {
+            weights: none(),
+            residual: filled_up(target),
+        };
     }
 
     /// b − A x.
     pub(super) fn residual(&self) -> &[f64] {
-        &self.residual.as_flattened()[..self.rows]
+        &self.solution.residual.as_flattened()[..self.rows]
     }
 
     /// The passive columns and their weights.
     pub(super) fn weighted_columns(&self) -> impl Iterator<Item = (f64, &Column)> {
-        self.weights.iter().copied().zip(&self.columns)
+        let weights = self.solution.weights.as_flattened();
+        weights.iter().copied().zip(&self.columns)
     }
 
     /// Adds a column and solves again. False, and nothing is changed, if it depends on those that are there or would
@@ -120,160 +117,162 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         if newest == self.rows {
             return false;
         }
-        self.entries.push(filled_up(entries));
-        self.columns.push(column);
-        self.weights.push(0.0);
-        if !self.solve_freely() || self.free()[newest] <= 0.0 {
-            self.remove(newest);
+        let Some(direction) = own_direction(&self.directions, filled_up(entries)) else {
+            return false;
+        };
+        // The solution without regard to signs. What was left is perpendicular to all directions but the new one.
+        let mut free = self.solution;
+        free.step(dot(&direction.unit, &free.residual), &direction);
+        if free.weights.as_flattened()[newest] <= 0.0 {
             return false;
         }
-        // Lawson and Hanson's inner loop: as far toward the free solution as no weight becomes negative; the columns
-        // whose weight vanishes leave the passive set.
-        while self.free().iter().any(|&weight| weight <= 0.0) {
-            let mut step = 1.0_f64;
-            let mut blocking = 0;
-            for (k, (&weight, &free)) in self.weights.iter().zip(self.free()).enumerate() {
-                if free <= 0.0 && weight < step * (weight - free) {
-                    step = weight / (weight - free);
-                    blocking = k;
-                }
+        self.columns.push(column);
+        self.directions.push(direction);
+        // Lawson and Hanson's inner loop: as far toward the free solution as no weight becomes negative; a column whose
+        // weight vanishes leaves the passive set.
+        while let Some((vanishing, share)) = self.first_to_vanish(&free) {
+            let weights = self.solution.weights.as_flattened_mut().iter_mut();
+            for (weight, free) in weights.zip(free.weights.as_flattened()) {
+                *weight += share * (free - *weight);
             }
-            for (weight, &free) in self.weights.iter_mut().zip(self.free.as_flattened()) {
-                *weight += step * (free - *weight);
-            }
-            self.weights[blocking] = 0.0;
-            for k in (0..self.weights.len()).rev() {
-                if self.weights[k] <= 0.0 {
-                    self.remove(k);
-                }
-            }
-            if !self.solve_freely() {
-                // Columns of an independent set are independent; only rounding comes here. The weights stand.
-                self.free = filled_up(&self.weights);
-            }
+            self.remove(vanishing, &mut free);
         }
-        let free = self.free.as_flattened();
-        for (weight, &free) in self.weights.iter_mut().zip(free) {
-            *weight = free;
-        }
-        self.update_residual();
+        self.solution = free;
         true
     }
 
-    /// The free solution's weights of the columns that are there.
-    fn free(&self) -> &[f64] {
-        &self.free.as_flattened()[..self.columns.len()]
+    /// The column whose weight vanishes first on the way to another solution, and after which share of it; none if all stay
+    /// positive.
+    fn first_to_vanish(&self, free: &Solution<FOURS>) -> Option<(usize, f64)> {
+        let weights = self.solution.weights.as_flattened().iter();
+        let pairs = weights.zip(free.weights.as_flattened());
+        let mut first = None;
+        for (k, (&weight, &free)) in pairs.take(self.columns.len()).enumerate() {
+            if free <= 0.0 {
+                let share = if weight > 0.0 { weight / (weight - free) } else { 0.0 };
+                if first.is_none_or(|(_, least)| share < least) {
+                    first = Some((k, share));
+                }
+            }
+        }
+        first
     }
 
-    fn remove(&mut self, column: usize) {
-        self.factor.count = self.factor.count.min(column);
+    /// Removes a column. `free` is the solution without regard to signs before, and after.
+    fn remove(&mut self, column: usize, free: &mut Solution<FOURS>) {
+        let along = |direction: &Direction<FOURS>| direction.weights.as_flattened()[column];
+        // The reflection that swaps the row of T that belongs to the column, and as much in its last place alone. The sign is
+        // the one with which nothing cancels out.
+        let mut normal = none::<FOURS>();
+        for (place, direction) in normal.as_flattened_mut().iter_mut().zip(&self.directions) {
+            *place = along(direction);
+        }
+        let last = self.directions.len() - 1;
+        let length = dot(&normal, &normal).sqrt();
+        let pivot = normal.as_flattened()[last];
+        let swapped = -length.copysign(pivot);
+        normal.as_flattened_mut()[last] = pivot - swapped;
+        let scale = (length * (length + pivot.abs())).recip();
+        let mut sum = Direction {
+            unit: none(),
+            weights: none(),
+        };
+        for (part, direction) in normal.as_flattened().iter().zip(&self.directions) {
+            add_multiple(&mut sum.unit, part * scale, &direction.unit);
+            add_multiple(&mut sum.weights, part * scale, &direction.weights);
+        }
+        for (part, direction) in normal.as_flattened().iter().zip(&mut self.directions) {
+            add_multiple(&mut direction.unit, -part, &sum.unit);
+            add_multiple(&mut direction.weights, -part, &sum.weights);
+        }
+        // The last direction is the only one with something of the column.
+        let Some(leaving) = self.directions.pop() else { return };
+        let weight = free.weights.as_flattened()[column];
+        free.step(-weight / swapped, &leaving);
+
         self.columns.swap_remove(column);
-        self.weights.swap_remove(column);
-        self.entries.swap_remove(column);
-    }
-
-    fn update_residual(&mut self) {
-        let mut residual = self.target;
-        for (column, &weight) in self.entries.iter().zip(&self.weights) {
-            subtract(&mut residual, weight, column);
+        let of_weights = self.directions.iter_mut().map(|direction| &mut direction.weights);
+        for weights in of_weights.chain([&mut free.weights, &mut self.solution.weights]) {
+            let weights = weights.as_flattened_mut();
+            weights[column] = weights[last];
+            weights[last] = 0.0;
         }
-        self.residual = residual;
-    }
-
-    /// Solves `AᵀA x = Aᵀb` by Cholesky into `free`, from the first row on that has changed. False if columns are
-    /// dependent.
-    fn solve_freely(&mut self) -> bool {
-        while self.factor.count < self.columns.len() {
-            if !self.factor.add_row(&self.entries, &self.target) {
-                return false;
-            }
-        }
-        self.free = self.factor.solution();
-        true
     }
 }
 
-impl<const FOURS: usize> Factor<FOURS> {
-    /// Makes room for so many rows.
-    fn reserve(&mut self, rows: usize) {
-        let more = rows.saturating_sub(self.by_rows.len());
-        self.by_rows.reserve(more);
-        self.by_columns.reserve(more);
-        self.inverse_diagonal.reserve(more);
+impl<const FOURS: usize> Solution<FOURS> {
+    /// Takes so much of a direction from the residual into the weights.
+    #[inline]
+    fn step(&mut self, length: f64, direction: &Direction<FOURS>) {
+        add_multiple(&mut self.weights, length, &direction.weights);
+        add_multiple(&mut self.residual, -length, &direction.unit);
     }
+}
 
-    /// Factors the next row of `AᵀA`. False if its column depends on those before it.
-    fn add_row(&mut self, columns: &[[Four; FOURS]], target: &[Four; FOURS]) -> bool {
-        let i = self.count;
-        // What was there was of a column that has left.
-        self.by_rows.truncate(i);
-        self.by_columns.truncate(i);
-        self.inverse_diagonal.truncate(i);
-
-        let (before, newest) = (&columns[..i], &columns[i]);
-        let mut waiting = [[0.0; 4]; FOURS];
-        for (product, column) in waiting.as_flattened_mut().iter_mut().zip(before) {
-            *product = dot(newest, column);
+/// The direction that a column adds to others, in which all of them have their weights. None if it depends on them.
+#[inline]
+fn own_direction<const FOURS: usize>(
+    directions: &[Direction<FOURS>],
+    entries: Fours<FOURS>,
+) -> Option<Direction<FOURS>> {
+    let square = dot(&entries, &entries);
+    let mut own = Direction {
+        unit: entries,
+        weights: none(),
+    };
+    own.weights.as_flattened_mut()[directions.len()] = 1.0;
+    let mut own_square = square;
+    for _ in 0..2 {
+        let mut reaches = none::<FOURS>();
+        for (reach, direction) in reaches.as_flattened_mut().iter_mut().zip(directions) {
+            *reach = dot(&direction.unit, &own.unit);
         }
-        let square = dot(newest, newest);
-        let mut rest = square;
-        let mut answer = dot(newest, target);
-        let mut row = [[0.0; 4]; FOURS];
-        let found = row.as_flattened_mut().iter_mut();
-        let columns = self.by_columns.iter_mut().zip(&self.inverse_diagonal);
-        for (j, (value, (of_j, inverse))) in found.zip(columns).enumerate() {
-            *value = waiting.as_flattened()[j] * inverse;
-            rest -= *value * *value;
-            answer -= *value * self.forward.as_flattened()[j];
-            subtract(&mut waiting, *value, of_j);
-            of_j.as_flattened_mut()[i] = *value;
+        for (reach, direction) in reaches.as_flattened().iter().zip(directions) {
+            add_multiple(&mut own.unit, -reach, &direction.unit);
+            add_multiple(&mut own.weights, -reach, &direction.weights);
         }
-        if rest <= DEPENDENT_PIVOT * square {
-            return false;
+        own_square = dot(&own.unit, &own.unit);
+        if own_square > REPEATED_SHARE * square {
+            break;
         }
-        let inverse = rest.sqrt().recip();
-        self.by_rows.push(row);
-        self.by_columns.push([[0.0; 4]; FOURS]);
-        self.inverse_diagonal.push(inverse);
-        self.forward.as_flattened_mut()[i] = answer * inverse;
-        self.count = i + 1;
-        true
     }
-
-    /// Solves Lᵀ x = y.
-    fn solution(&self) -> [Four; FOURS] {
-        let mut waiting = self.forward;
-        let mut solution = [[0.0; 4]; FOURS];
-        let places = solution.as_flattened_mut()[..self.count].iter_mut().enumerate();
-        let rows = self.by_rows.iter().zip(&self.inverse_diagonal);
-        for ((i, place), (row, inverse)) in places.zip(rows).rev() {
-            *place = waiting.as_flattened()[i] * inverse;
-            subtract(&mut waiting, *place, row);
-        }
-        solution
+    if own_square <= DEPENDENT_SHARE * square {
+        return None;
     }
+    let inverse = own_square.sqrt().recip();
+    for numbers in [&mut own.unit, &mut own.weights] {
+        for number in numbers.as_flattened_mut() {
+            *number *= inverse;
+        }
+    }
+    Some(own)
+}
+
+#[inline]
+fn none<const FOURS: usize>() -> Fours<FOURS> {
+    [[0.0; 4]; FOURS]
 }
 
 /// Numbers with zeros behind them.
-fn filled_up<const FOURS: usize>(numbers: &[f64]) -> [Four; FOURS] {
-    let mut filled = [[0.0; 4]; FOURS];
+fn filled_up<const FOURS: usize>(numbers: &[f64]) -> Fours<FOURS> {
+    let mut filled = none();
     filled.as_flattened_mut()[..numbers.len()].copy_from_slice(numbers);
     filled
 }
 
-/// Takes a multiple of some numbers off others.
+/// Adds a multiple of some numbers to others.
 #[inline]
-fn subtract<const FOURS: usize>(from: &mut [Four; FOURS], factor: f64, numbers: &[Four; FOURS]) {
+fn add_multiple<const FOURS: usize>(to: &mut Fours<FOURS>, factor: f64, numbers: &Fours<FOURS>) {
     for i in 0..FOURS {
         for k in 0..4 {
-            from[i][k] -= factor * numbers[i][k];
+            to[i][k] += factor * numbers[i][k];
         }
     }
 }
 
 /// Product of two columns.
 #[inline]
-fn dot<const FOURS: usize>(a: &[Four; FOURS], b: &[Four; FOURS]) -> f64 {
+fn dot<const FOURS: usize>(a: &Fours<FOURS>, b: &Fours<FOURS>) -> f64 {
     let mut sums = [0.0; 4];
     for i in 0..FOURS {
         for k in 0..4 {
