@@ -149,7 +149,11 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         let mut first = None;
         for (k, (&weight, &free)) in pairs.take(self.columns.len()).enumerate() {
             if free <= 0.0 {
-                let share = if weight > 0.0 { weight / (weight - free) } else { 0.0 };
+                let share = if weight > 0.0 {
+                    weight / (weight - free)
+                } else {
+                    0.0
+                };
                 if first.is_none_or(|(_, least)| share < least) {
                     first = Some((k, share));
                 }
@@ -186,7 +190,9 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
             add_multiple(&mut direction.weights, -part, &sum.weights);
         }
         // The last direction is the only one with something of the column.
-        let Some(leaving) = self.directions.pop() else { return };
+        let Some(leaving) = self.directions.pop() else {
+            return;
+        };
         let weight = free.weights.as_flattened()[column];
         free.step(-weight / swapped, &leaving);
 
@@ -386,5 +392,65 @@ mod tests {
             if least < 1e-7 { exact += 1 } else { inexact += 1 }
         }
         assert!(exact > 50 && inexact > 50, "{exact} exact, {inexact} not");
+    }
+
+    #[test]
+    fn hundreds_of_columns_may_come_and_go() {
+        const MANY: usize = 37;
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(12);
+        let mut solver = ConicLeastSquares::<10>::default();
+        let mut left = 0;
+        for case in 0..40 {
+            // Columns about one direction, as pushes of a contact are, so that most depend on each other nearly.
+            let mut vector = |around: f64| -> [f64; MANY] {
+                std::array::from_fn(|k| {
+                    around * (k as f64).cos() + 10_f64.powi(-(case % 4)) * random.random_range(-1.0..1.0)
+                })
+            };
+            let (target, columns): (_, [_; 300]) = (vector(1.0), std::array::from_fn(|_| vector(1.0)));
+            solver.reset(&target);
+            let mut added = 0;
+            for _ in 0..2_000 {
+                // Any that helps, not the best: so more of them leave.
+                let first = random.random_range(0..columns.len());
+                let helps = |k: &usize| dot(&columns[*k], solver.residual()) > 1e-9;
+                let Some(next) = (first..columns.len()).chain(0..first).find(helps) else {
+                    break;
+                };
+                let named = Column::Push {
+                    contact: next,
+                    push: UnitPush::default(),
+                };
+                if !solver.add(&columns[next], named) {
+                    break;
+                }
+                added += 1;
+            }
+            // Karush, Kuhn and Tucker: the residual is the target's, no column goes with it, and those with weight are
+            // perpendicular to it.
+            let mut residual = target;
+            let mut passive = 0;
+            for (weight, column) in solver.weighted_columns() {
+                let Column::Push { contact, .. } = *column else {
+                    panic!("all columns are pushes")
+                };
+                assert!(weight > 0.0, "case {case}: {weight}");
+                let along = dot(&columns[contact], solver.residual());
+                assert!(along.abs() < 1e-9, "case {case}: {along} along a passive column");
+                for (left, entry) in residual.iter_mut().zip(&columns[contact]) {
+                    *left -= weight * entry;
+                }
+                passive += 1;
+            }
+            for (&ours, &told) in residual.iter().zip(solver.residual()) {
+                assert!((ours - told).abs() < 1e-9, "case {case}: {told}, not {ours}");
+            }
+            for column in &columns {
+                let gain = dot(column, &residual);
+                assert!(gain < 2e-9, "case {case}: {gain} is left to gain");
+            }
+            left += added - passive;
+        }
+        assert!(left > 300, "{left} columns left the passive set");
     }
 }
