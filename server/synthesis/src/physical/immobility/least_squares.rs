@@ -164,19 +164,36 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
 
     /// Removes a column. `free` is the solution without regard to signs before, and after.
     fn remove(&mut self, column: usize, free: &mut Solution<FOURS>) {
-        let along = |direction: &Direction<FOURS>| direction.weights.as_flattened()[column];
-        // The reflection that swaps the row of T that belongs to the column, and as much in its last place alone. The sign is
+        let Some((share, leaving)) = self.part_direction(column) else {
+            return;
+        };
+        // As far along it as takes the column's weight away.
+        free.step(-free.weights.as_flattened()[column] / share, &leaving);
+
+        self.columns.swap_remove(column);
+        let last = self.columns.len();
+        let of_directions = self.directions.iter_mut().map(|direction| &mut direction.weights);
+        for weights in of_directions.chain([&mut free.weights, &mut self.solution.weights]) {
+            let weights = weights.as_flattened_mut();
+            weights[column] = weights[last];
+            weights[last] = 0.0;
+        }
+    }
+
+    /// Turns the directions so that only one has anything of a column, and takes that one out: how much it has, and the
+    /// direction; none if there are none.
+    fn part_direction(&mut self, column: usize) -> Option<(f64, Direction<FOURS>)> {
+        // Householder's reflection after which the column's row of T has everything in its last place. Of the two that do,
         // the one with which nothing cancels out.
         let mut normal = none::<FOURS>();
         for (place, direction) in normal.as_flattened_mut().iter_mut().zip(&self.directions) {
-            *place = along(direction);
+            *place = direction.weights.as_flattened()[column];
         }
-        let last = self.directions.len() - 1;
         let length = dot(&normal, &normal).sqrt();
-        let pivot = normal.as_flattened()[last];
-        let swapped = -length.copysign(pivot);
-        normal.as_flattened_mut()[last] = pivot - swapped;
-        let scale = (length * (length + pivot.abs())).recip();
+        let last = &mut normal.as_flattened_mut()[self.directions.len().checked_sub(1)?];
+        let scale = (length * (length + last.abs())).recip();
+        let share = -length.copysign(*last);
+        *last -= share;
         let mut sum = Direction {
             unit: none(),
             weights: none(),
@@ -189,20 +206,8 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
             add_multiple(&mut direction.unit, -part, &sum.unit);
             add_multiple(&mut direction.weights, -part, &sum.weights);
         }
-        // The last direction is the only one with something of the column.
-        let Some(leaving) = self.directions.pop() else {
-            return;
-        };
-        let weight = free.weights.as_flattened()[column];
-        free.step(-weight / swapped, &leaving);
-
-        self.columns.swap_remove(column);
-        let of_weights = self.directions.iter_mut().map(|direction| &mut direction.weights);
-        for weights in of_weights.chain([&mut free.weights, &mut self.solution.weights]) {
-            let weights = weights.as_flattened_mut();
-            weights[column] = weights[last];
-            weights[last] = 0.0;
-        }
+        let leaving = self.directions.pop()?;
+        Some((share, leaving))
     }
 }
 
