@@ -15,8 +15,9 @@ use crate::{
 const CELL: f32 = 0.02;
 
 /// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes, few fingers and many apart. With
-/// fewer, an atlas of a thin object is not filled by as many proposals as there are; more are alike.
-const MOST_IN_CELL: usize = 8;
+/// fewer, an atlas of a thin object is not filled by as many proposals as there are; more are alike, and leave less to
+/// givers who are in the way of all of them.
+const MOST_IN_CELL: usize = 4;
 
 /// Fingers from which a hand takes much room: two keep clear of givers that more do not.
 const MANY_FINGERS: usize = 3;
@@ -73,6 +74,11 @@ impl Spread {
             Some(&(entry, least)) if worth > least => Room::InsteadOf(entry),
             _ => Room::Crowded,
         }
+    }
+
+    /// How many grips of a cell are known.
+    pub(super) fn alike(&self, cell: Cell) -> usize {
+        self.cells.get(&cell).map_or(0, Vec::len)
     }
 
     /// Notes the grip that is at an index of the entries from now on.
