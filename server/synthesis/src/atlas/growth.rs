@@ -313,8 +313,8 @@ impl<'a> Growth<'a> {
 
     /// One of the grips, those of crowded cells no more likely than others: givers and hands like what is known in plenty
     /// find nothing new. Of 1,600 holdouts of the built-in scalpel with 400 recorded givers, atlases that were grown so
-    /// leave 4.7 to 5.6 % late (four seeds), and 4.7 to 7.4 % with half the proposals (six of eight settings below 6);
-    /// without, 5.6 to 6.4 % with three grips a cell, and 6.8 to 8.1 % with eight.
+    /// left 4.3 to 5.6 % without an answer in 50 ms (five), and 4.7 to 7.4 % with half the proposals (nine, of three to eight
+    /// grips a cell); without, 5.6 to 6.4 % with three a cell (four), and 6.8 to 8.1 % with eight (three).
     fn draw(&self, stream: &mut AttemptStream) -> usize {
         let mut index = stream.below(self.len());
         for _ in 0..REDRAWS {
