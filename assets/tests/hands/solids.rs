@@ -5,10 +5,11 @@ use grasp_assets::hands::Hand;
 use grasp_synthesis::{
     hand::{
         DigitAngles, HandPose, Handedness,
-        joints::{HandJoints, index},
+        joints::{HandJoints, Joint, index},
     },
+    physical::grip::GIVER_CLEARANCE,
     physical::solids::{
-        HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, off_told_palm, self_clearance,
+        GiverSolids, HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, off_told_palm, self_clearance,
     },
     pose::Pose,
 };
@@ -33,6 +34,17 @@ fn relaxed() -> [DigitAngles; 5] {
         } else {
             DigitAngles::coupled(0.0, bend.to_radians(), bend.to_radians())
         }
+    })
+}
+
+/// Directions all around, spread as evenly as a sunflower's seeds.
+fn directions() -> impl Iterator<Item = Vec3> {
+    const COUNT: usize = 300;
+    const GOLDEN_ANGLE: f32 = 2.399_963;
+    (0..COUNT).map(|i| {
+        let z = 1.0 - (2 * i + 1) as f32 / COUNT as f32;
+        let (sine, cosine) = (GOLDEN_ANGLE * i as f32).sin_cos();
+        (1.0 - z * z).sqrt() * Vec3::new(cosine, sine, 0.0) + Vec3::Z * z
     })
 }
 
@@ -109,8 +121,8 @@ fn solids_of_tracked_joints_are_those_of_the_pose() {
     }
 }
 
-/// A giver whose joints tell of a thicker palm than the fitted one is as thick as told along the metacarpals, nearly so
-/// between them, and nowhere thinner than fitted.
+/// A giver whose joints tell of a thicker hand than the fitted one is as thick as told, save for a dip between the bases of
+/// neighbouring metacarpals that is shallower than the room kept to a giver, and nowhere thinner than fitted.
 #[test]
 fn a_giver_is_as_thick_as_told() {
     let hand = built_in("adult", Handedness::Right);
@@ -120,47 +132,53 @@ fn a_giver_is_as_thick_as_told() {
             joint.radius += more;
         }
         let fitted = HandSolids::of_joints(&joints);
-        let giver = HandSolids::of_giver(&joints);
-        let depth = |point: Vec3| {
-            let depths = giver.palm.iter().map(|solid| -solid.signed_distance(point));
-            depths.fold(f32::NEG_INFINITY, f32::max)
-        };
-        let inside = |ball: Vec3, radius: f32| depth(ball) >= radius - 1e-6;
-        // OpenXR's metacarpals of the four fingers, and the knuckles at their ends.
-        for [base, knuckle] in [[6, 7], [11, 12], [16, 17], [21, 22]] {
-            let [base, knuckle] = [base, knuckle].map(|joint| joints.joints[joint]);
-            for step in 0..=10 {
-                let along = step as f32 / 10.0;
-                let place = base.pose.position.lerp(knuckle.pose.position, along);
-                let radius = base.radius + (knuckle.radius - base.radius) * along;
-                assert!(inside(place, radius), "{more} more, {along} along");
-            }
-        }
-        // Across the knuckles and the metacarpals' bases, the solids are balls half a finger's breadth apart: skin above and
-        // below dips between them.
-        for neighbours in [[7, 12], [12, 17], [17, 22], [6, 11], [11, 16], [16, 21]] {
-            let [a, b] = neighbours.map(|joint| joints.joints[joint]);
-            let axis = (b.pose.position - a.pose.position).normalize_or_zero();
+        let giver = GiverSolids::of_joints(&joints);
+        let solids: Vec<TaperedCapsule> = giver.iter().copied().collect();
+        // The deepest dip below the balls that a told part is made of.
+        let dip = |[a, b]: [Joint; 2]| {
+            let mut deepest = f32::NEG_INFINITY;
             for step in 0..=10 {
                 let along = step as f32 / 10.0;
                 let place = a.pose.position.lerp(b.pose.position, along);
                 let radius = a.radius + (b.radius - a.radius) * along;
-                for out in
-                    [Vec3::Z, Vec3::NEG_Z].map(|out| out.reject_from_normalized(axis).normalize_or_zero())
-                {
-                    let dip = -depth(place + out * radius);
-                    assert!(dip < 0.0015, "{more} more, {neighbours:?}, {along} along: {dip}");
+                for out in directions() {
+                    let skin = place + out * radius;
+                    let distances = solids.iter().map(|solid| solid.signed_distance(skin));
+                    deepest = deepest.max(distances.fold(f32::INFINITY, f32::min));
                 }
             }
+            deepest
+        };
+        let told = |pair: [usize; 2]| pair.map(|joint| joints.joints[joint]);
+        // OpenXR's metacarpals of the four fingers; from knuckle to knuckle; from the wrist to the metacarpals' bases.
+        let along = [[6, 7], [11, 12], [16, 17], [21, 22]];
+        let knuckles = [[7, 12], [12, 17], [17, 22]];
+        let from_wrist = [[1, 2], [1, 6], [1, 11], [1, 16], [1, 21]];
+        for pair in along.into_iter().chain(knuckles).chain(from_wrist) {
+            let dip = dip(told(pair));
+            assert!(dip < 1e-5, "{more} more, {pair:?}: {dip}");
         }
+        for pair in [[6, 11], [11, 16], [16, 21]] {
+            let dip = dip(told(pair));
+            assert!(dip < 0.8 * GIVER_CLEARANCE, "{more} more, {pair:?}: {dip}");
+        }
+        // Behind the wrist, which OpenXR's z points away from the fingers.
+        let wrist = joints.joints[index::WRIST];
+        let mut behind = wrist;
+        behind.pose.position += wrist.pose.orientation * Vec3::Z * 0.25;
+        let dip = dip([wrist, behind]);
+        assert!(dip < 1e-5, "{more} more, forearm: {dip}");
+
         for solid in &fitted.palm {
             for along in [0.0, 0.3, 1.0] {
-                assert!(inside(solid.at(along), solid.radius_at(along)));
+                let (middle, radius) = (solid.at(along), solid.radius_at(along));
+                let depths = giver.hand.palm.iter().map(|solid| -solid.signed_distance(middle));
+                assert!(depths.fold(f32::NEG_INFINITY, f32::max) >= radius - 1e-6);
             }
         }
-        assert_eq!(giver.phalanges, fitted.phalanges);
-        assert_eq!(giver.thenar, fitted.thenar);
-        assert_eq!(giver.forearm, fitted.forearm);
+        assert_eq!(giver.hand.phalanges, fitted.phalanges);
+        assert_eq!(giver.hand.thenar, fitted.thenar);
+        assert_eq!(giver.hand.forearm, fitted.forearm);
     }
 }
 
@@ -265,45 +283,41 @@ fn fingers_through_fingers_and_palm_are_found() {
 
 #[test]
 fn distances_between_hands_are_those_of_all_pairs() {
-    let (receiver, giver) = (
-        built_in("adult", Handedness::Right),
-        built_in("thesis", Handedness::Left),
+    let (adult, thesis) = (
+        &built_in("adult", Handedness::Right).rig,
+        &built_in("thesis", Handedness::Left).rig,
     );
     let mut numbers = Numbers(9);
     for i in 0..300 {
-        let ours = HandSolids::of_pose(&receiver.rig, &posed(numbers.angles(&receiver.rig)));
+        let ours = posed(numbers.angles(adult));
         let mut between = |low: f32, high: f32| low + (high - low) * numbers.next();
         let axis = Vec3::from_array(std::array::from_fn(|_| between(-1.0, 1.0))).normalize_or(Vec3::X);
         let place = Vec3::from_array(std::array::from_fn(|_| between(-0.25, 0.25)));
         let turn = Quat::from_axis_angle(axis, between(0.0, 3.0));
-        let pose = HandPose {
+        let theirs = HandPose {
             frame_from_wrist: Pose::new(place, turn),
-            digits: numbers.angles(&giver.rig),
+            digits: numbers.angles(thesis),
         };
-        let theirs = HandSolids::of_pose(&giver.rig, &pose);
-        let brute = ours
-            .iter()
-            .flat_map(|a| theirs.iter().map(|b| a.distance(b)))
-            .fold(f32::INFINITY, f32::min);
-        let clearance = |ours: &HandSolids, theirs: &HandSolids| {
-            PreparedHand::new(theirs)
-                .clearance(ours, f32::NEG_INFINITY)
-                .expect("nothing is required")
-        };
-        for (found, expected) in [
-            (clearance(&ours, &theirs), brute),
-            (clearance(&theirs, &ours), brute),
-            (
-                PreparedHand::new(&theirs)
-                    .least_distance(ours.iter(), 0.001, f32::NEG_INFINITY)
-                    .expect("nothing is required"),
-                brute.min(0.001),
-            ),
+        for [(rig, pose), (giver_rig, giver_pose)] in [
+            [(adult, &ours), (thesis, &theirs)],
+            [(thesis, &theirs), (adult, &ours)],
         ] {
-            assert!(
-                (found - expected).abs() < 1e-6,
-                "{i}: {found} instead of {expected}"
-            );
+            let receiver = HandSolids::of_pose(rig, pose);
+            let giver = GiverSolids::of_joints(&HandJoints::of_pose(giver_rig, giver_pose));
+            let brute = receiver
+                .iter()
+                .flat_map(|a| giver.iter().map(|b| a.distance(b)))
+                .fold(f32::INFINITY, f32::min);
+            let giver = PreparedHand::new(&giver);
+            let clearance = giver.clearance(&receiver, f32::NEG_INFINITY);
+            let least = giver.least_distance(receiver.iter(), 0.001, f32::NEG_INFINITY);
+            for (found, expected) in [(clearance, brute), (least, brute.min(0.001))] {
+                let found = found.expect("nothing is required");
+                assert!(
+                    (found - expected).abs() < 1e-6,
+                    "{i}: {found} instead of {expected}"
+                );
+            }
         }
     }
 }

@@ -30,7 +30,7 @@ use crate::{
         grip::{GIVER_CLEARANCE, Gripper},
         scene::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
-        solids::{HandSolids, PreparedHand},
+        solids::{GiverSolids, PreparedHand},
     },
     score::{Score, grip_values},
     strategy::Validity,
@@ -233,7 +233,7 @@ impl<'a> Growth<'a> {
         }
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
         let pose = &self.grips.entries()[self.draw(&mut stream)].grip.pose;
-        let hand = PreparedHand::new(&HandSolids::of_giver(&HandJoints::of_pose(self.rig, pose)));
+        let hand = PreparedHand::new(&GiverSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
         let all = 0..self.len() as u16;
         let starts = if self.count_free(&hand) < ENOUGH_FREE {
             Starts::of(&self.grips, self.rig, all, Some(&hand), || false)

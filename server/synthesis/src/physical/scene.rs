@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{
     immobility::Load,
-    solids::{HandSolids, PreparedHand},
+    solids::{GiverSolids, PreparedHand},
 };
 use crate::{holdout::Holdout, object::GraspObject};
 
@@ -73,7 +73,7 @@ impl Presented {
     pub fn of(holdout: &Holdout) -> Self {
         let giver = holdout.presenting_hand.as_ref();
         Self {
-            giver: giver.map(|hand| PreparedHand::new(&HandSolids::of_giver(&hand.joints))),
+            giver: giver.map(|hand| PreparedHand::new(&GiverSolids::of_joints(&hand.joints))),
             giver_palm: giver.map(|hand| hand.palm),
             up: holdout.up,
         }

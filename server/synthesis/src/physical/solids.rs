@@ -1,22 +1,26 @@
 //! Hands as solids: what they leave free of objects and of each other.
 //!
-//! A hand is a union of tapered capsules ([`HandSolids`]). How far it is from an object's surface, and how deep in it,
+//! A hand is a union of tapered capsules ([`HandSolids`]; a giver's, [`GiverSolids`]). How far it is from an object's surface, and how deep in it,
 //! is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far from other parts of itself
-//! by [`self_clearance`], and how far from another hand, of that hand when it is a [`PreparedHand`].
+//! by [`self_clearance`], and how far from another hand, of that giver when it is a [`PreparedHand`].
 
 mod balls;
 mod flesh;
+mod giver_solids;
 mod hand_clearance;
 mod hand_solids;
 mod mesh_clearance;
 mod prepared_hand;
+mod told;
 
 pub use balls::{BALLS, Balls};
-pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS, off_told_palm};
+pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
+pub use giver_solids::{GiverSolids, TOLD_SOLIDS};
 pub(super) use hand_clearance::Bounded;
 pub use hand_clearance::{SOFT_CONTACT, self_clearance};
 pub use hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
 pub use mesh_clearance::{Touch, clearance, closest, comes_within};
 pub use prepared_hand::PreparedHand;
+pub use told::off_told_palm;
 
 pub use crate::geometry::tapered_capsule::TaperedCapsule;

@@ -2,20 +2,31 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    physical::solids::{BALLS, Balls, HandSolids, PreparedHand, TaperedCapsule},
+    physical::solids::{BALLS, Balls, GiverSolids, HandSolids, PreparedHand, TOLD_SOLIDS, TaperedCapsule},
     pose::Pose,
 };
 
 use crate::support::Random;
 
+/// A solid at most as long and as thick as asked for, around `middle`.
+fn solid(random: &mut Random, middle: Vec3, length: f32, thick: f32) -> TaperedCapsule {
+    let start = middle + random.direction() * random.between(0.0, 0.1);
+    let way = random.direction() * random.between(0.0, length);
+    let radii = [0.3 * thick, thick].map(|least| random.between(least, thick));
+    TaperedCapsule::new(start, start + way, radii[0], radii[1])
+}
+
+/// A giver that no person is, as [`hand`].
+fn giver(random: &mut Random) -> GiverSolids {
+    GiverSolids {
+        hand: hand(random, Vec3::ZERO),
+        told: [(); TOLD_SOLIDS].map(|()| solid(random, Vec3::ZERO, 0.07, 0.017)),
+    }
+}
+
 /// A hand that no person has, but with solids as long and as thick as a person's, around `middle`.
 fn hand(random: &mut Random, middle: Vec3) -> HandSolids {
-    let mut solid = |length: f32, thick: f32| {
-        let start = middle + random.direction() * random.between(0.0, 0.1);
-        let way = random.direction() * random.between(0.0, length);
-        let radii = [0.3 * thick, thick].map(|least| random.between(least, thick));
-        TaperedCapsule::new(start, start + way, radii[0], radii[1])
-    };
+    let mut solid = |length: f32, thick: f32| solid(random, middle, length, thick);
     HandSolids {
         phalanges: [[(); 3]; 5].map(|links| links.map(|()| solid(0.05, 0.01))),
         palm: [(); 10].map(|()| solid(0.07, 0.017)),
@@ -24,7 +35,7 @@ fn hand(random: &mut Random, middle: Vec3) -> HandSolids {
     }
 }
 
-fn least_of_all_pairs<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, theirs: &HandSolids) -> f32 {
+fn least_of_all_pairs<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, theirs: &GiverSolids) -> f32 {
     ours.map(|our| {
         let distances = theirs.iter().map(|their| our.distance(their));
         distances.fold(f32::INFINITY, f32::min)
@@ -37,7 +48,7 @@ fn distances_and_verdicts_are_those_of_all_pairs() {
     let mut random = Random::new(31);
     let (mut near, mut far, mut sure) = (0, 0, 0);
     for case in 0..3000 {
-        let giver = hand(&mut random, Vec3::ZERO);
+        let giver = giver(&mut random);
         let middle = random.direction() * random.between(0.0, 0.7);
         let receiver = hand(&mut random, middle);
         let prepared = PreparedHand::new(&giver);
@@ -87,7 +98,7 @@ fn moved_balls_are_near_where_one_of_them_is() {
     let mut random = Random::new(32);
     let (mut near, mut far) = (0, 0);
     for case in 0..2000 {
-        let giver = PreparedHand::new(&hand(&mut random, Vec3::ZERO));
+        let giver = PreparedHand::new(&giver(&mut random));
         let middles: [Vec3; BALLS] =
             std::array::from_fn(|_| random.direction() * random.between(0.1, 0.2) + Vec3::X * 0.1);
         let radii: [f32; BALLS] = std::array::from_fn(|_| random.between(0.004, 0.012));

@@ -302,22 +302,3 @@ impl Skeleton {
         }
     }
 }
-
-/// How far a point is from the skin of the palm that the joints' radii tell, in metres, from outside or inside: around the
-/// four metacarpals, from one to the next across knuckles and bases, and from the wrist to the bases and the thumb's.
-pub fn off_told_palm(joints: &HandJoints, point: Vec3) -> f32 {
-    let bases = [1, 2, 3, 4].map(|finger| index::FIRST_OF_DIGIT[finger]);
-    let knuckles = bases.map(|base| base + 1);
-    let along = (0..4).map(|k| (bases[k], knuckles[k]));
-    let across = (1..4).flat_map(|k| [(bases[k - 1], bases[k]), (knuckles[k - 1], knuckles[k])]);
-    let from_wrist = [0, 1, 2, 3, 4].map(|digit| (index::WRIST, index::FIRST_OF_DIGIT[digit]));
-    along
-        .chain(across)
-        .chain(from_wrist)
-        .map(|(a, b)| {
-            let [a, b] = [a, b].map(|joint| joints.joints[joint]);
-            TaperedCapsule::new(a.pose.position, b.pose.position, a.radius, b.radius).signed_distance(point)
-        })
-        .fold(f32::INFINITY, f32::min)
-        .abs()
-}

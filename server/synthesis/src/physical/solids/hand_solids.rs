@@ -74,9 +74,8 @@ impl HandSolids {
         Self::around(joints, &skeleton, &skeleton.palm())
     }
 
-    /// The solids of a giver's tracked joints, which are not to be touched: nowhere along the metacarpals thinner than the
-    /// joints' radii say.
-    pub fn of_giver(joints: &HandJoints) -> Self {
+    /// The same, along the metacarpals at least as thick as the joints' radii say.
+    pub(super) fn of_giver(joints: &HandJoints) -> Self {
         let skeleton = Skeleton::new(Bones::of_joints(joints));
         Self::around(joints, &skeleton, &skeleton.palm_as_told())
     }
@@ -130,15 +129,6 @@ impl HandSolids {
             solid.end = place(solid.end);
         }
         placed
-    }
-
-    /// All solids in the order of [`HandSolids::iter`], side by side.
-    pub(crate) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
-        let mut all = [self.palm[0]; Self::COUNT];
-        for (place, solid) in all.iter_mut().zip(self.iter()) {
-            *place = *solid;
-        }
-        all
     }
 
     /// The solid that [`HandSolids::iter`] gives at an index, at once.
@@ -205,4 +195,17 @@ fn forearm(frame_from_wrist: Pose, radius: f32) -> [TaperedCapsule; FOREARM_SOLI
             far_radius,
         )
     })
+}
+
+/// The forearm's middle behind tracked joints, from the ball of the wrist: as thick as told there, where the two solids
+/// side by side leave a dip.
+pub(super) fn middle_of_forearm(joints: &HandJoints) -> TaperedCapsule {
+    let wrist = joints.joints[index::WRIST];
+    let end = thesis_from_openxr_frame(wrist.pose).transform_point(Vec3::new(0.0, -FOREARM_LENGTH, 0.0));
+    TaperedCapsule::new(
+        wrist.pose.position,
+        end,
+        wrist.radius,
+        FOREARM_RADII[1] * wrist.radius,
+    )
 }
