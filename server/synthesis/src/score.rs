@@ -209,6 +209,22 @@ pub fn comfort_value(comfort: f32) -> f32 {
     (-comfort / UNCOMFORTABLE).exp()
 }
 
+/// The values of the terms that follow from where a hand touches, without further ado; the others are 0.
+pub fn posture_values(
+    object: &GraspObject,
+    rig: &Rig,
+    pose: &HandPose,
+    contacts: &[Contact],
+    classification: Classification,
+) -> Values {
+    let mut values = [0.0; TERMS];
+    values[Term::SharedFlexion as usize] = shared_flexion(pose);
+    values[Term::EnoughDigits as usize] = enough_digits(object, contacts);
+    values[Term::Pads as usize] = pads(rig, pose, contacts);
+    values[Term::NaturalType as usize] = natural_type(classification);
+    values
+}
+
 /// The values of the terms that depend on hand and object alone; the others are 0.
 pub fn grip_values(
     scene: &ObjectScene<'_>,
@@ -219,11 +235,7 @@ pub fn grip_values(
     epsilon: f32,
     solids: &HandSolids,
 ) -> Values {
-    let mut values = [0.0; TERMS];
-    values[Term::SharedFlexion as usize] = shared_flexion(pose);
-    values[Term::EnoughDigits as usize] = enough_digits(scene.object, contacts);
-    values[Term::Pads as usize] = pads(rig, pose, contacts);
-    values[Term::NaturalType as usize] = natural_type(classification);
+    let mut values = posture_values(scene.object, rig, pose, contacts, classification);
     values[Term::Closure as usize] = (epsilon / (SAFE_CLOSURE * scene.least_epsilon)).min(1.0);
     values[Term::Steadiness as usize] = steadiness(scene.object, rig, pose, contacts);
     values[Term::SterileDistance as usize] = sterile_distance(scene.object, solids);

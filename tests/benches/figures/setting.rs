@@ -27,12 +27,6 @@ use tokio::runtime::{Builder, Runtime};
 
 use crate::asking::{Answer, ask, wire_duration};
 
-/// Givers that are placed on an object. More vary the holdouts more and take half a second each, the first time.
-const GIVERS: usize = 48;
-
-/// The same for a quick run.
-const QUICK_GIVERS: usize = 2;
-
 /// The seed of givers and holdouts: another one, and they are all others.
 const SEED: u64 = 20_180_612;
 
@@ -51,6 +45,8 @@ pub(crate) struct Setting {
     pub(crate) quick: bool,
     /// Random holdouts an object.
     pub(crate) holdouts: usize,
+    /// Givers that are placed on an object.
+    givers: usize,
     /// Where servers run.
     pub(crate) serving: Runtime,
     /// Where clients run: one thread, as in a game.
@@ -89,13 +85,14 @@ impl Thing {
 
 impl Setting {
     /// Starts the runtimes and finds the folder.
-    pub(crate) fn new(quick: bool, holdouts: usize) -> Self {
+    pub(crate) fn new(quick: bool, holdouts: usize, givers: usize) -> Self {
         let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
         let folder = target.expect("cargo's folder lies in another").join("figures");
         fs::create_dir_all(&folder).expect("cargo's target folder can be written");
         Self {
             quick,
             holdouts,
+            givers,
             serving: Builder::new_multi_thread()
                 .worker_threads(SERVING_THREADS)
                 .thread_name("serving")
@@ -167,7 +164,6 @@ impl Setting {
 
     /// The givers of an object, from a file where they were placed before.
     fn givers(&self, id: &str, object: &GraspObject) -> Givers {
-        let count = if self.quick { QUICK_GIVERS } else { GIVERS };
         let rig = &default_hand(Handedness::Right).rig;
         let made_of = key(object, rig);
         let (made_of, _) = made_of.split_first_chunk().expect("a key has as many bytes");
@@ -186,9 +182,9 @@ impl Setting {
         if Givers::new(&self.hands, &placed).is_none() {
             placed.clear();
         }
-        if placed.len() < count {
-            let bar = bar(count - placed.len(), format!("placing givers on {id}"));
-            let more: Vec<_> = (placed.len()..count)
+        if placed.len() < self.givers {
+            let bar = bar(self.givers - placed.len(), format!("placing givers on {id}"));
+            let more: Vec<_> = (placed.len()..self.givers)
                 .into_par_iter()
                 .map(|number| {
                     let giver = place(object, &self.hands, SEED + number as u64);
@@ -200,7 +196,7 @@ impl Setting {
             let text = serde_json::to_vec(&placed).expect("a placement is plain data");
             fs::write(&file, text).expect("cargo's target folder can be written");
         }
-        placed.truncate(count);
+        placed.truncate(self.givers);
         Givers::new(&self.hands, &placed).expect("the hands are those that were placed")
     }
 

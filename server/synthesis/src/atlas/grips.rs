@@ -18,6 +18,8 @@ pub struct Grips {
     entries: Vec<Entry>,
     /// The first balls inside each hand, side by side, so that looking at one mostly takes two lines of the cache.
     cores: Vec<Balls>,
+    /// Which digits hold, thumb first.
+    holding: Vec<[bool; 5]>,
 }
 
 impl Grips {
@@ -26,6 +28,7 @@ impl Grips {
         let core = |entry: &Entry| first_balls(&entry.solids(rig));
         Self {
             cores: entries.iter().map(core).collect(),
+            holding: entries.iter().map(Entry::holding_digits).collect(),
             entries,
         }
     }
@@ -38,12 +41,14 @@ impl Grips {
     /// Adds a grip.
     pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
         self.cores.push(first_balls(&entry.solids(rig)));
+        self.holding.push(entry.holding_digits());
         self.entries.push(entry);
     }
 
     /// Puts a grip in the place of another one.
     pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
         self.cores[index] = first_balls(&entry.solids(rig));
+        self.holding[index] = entry.holding_digits();
         self.entries[index] = entry;
     }
 
@@ -65,15 +70,16 @@ impl Grips {
         (!is_met).then(|| Box::new(solids))
     }
 
-    /// True only if one of the digits that hold, palm or forearm of a grip comes nearer to the giver's hand than `distance`
-    /// metres by the first balls inside alone; not always then.
-    pub(super) fn surely_nears(&self, entry: usize, giver: &PreparedHand, distance: f32) -> bool {
-        let holding = self.entries[entry].holding_digits();
-        giver.surely_nears_any(&first_of_digits(self.cores[entry], holding), distance)
+    /// What the digits that hold, palm and forearm of a grip are from the giver's hand at most, in metres, by the first balls
+    /// inside alone.
+    pub(super) fn clearance_at_most(&self, entry: usize, giver: &PreparedHand) -> f32 {
+        giver.distance_at_most(&first_of_digits(self.cores[entry], self.holding[entry]))
     }
 
     /// Bytes that they take in memory.
     pub(super) fn bytes(&self) -> usize {
-        self.entries.iter().map(Entry::bytes).sum::<usize>() + size_of_val(self.cores.as_slice())
+        self.entries.iter().map(Entry::bytes).sum::<usize>()
+            + size_of_val(self.cores.as_slice())
+            + size_of_val(self.holding.as_slice())
     }
 }

@@ -47,6 +47,9 @@ const TOUCHING: f32 = 0.003;
 /// Grips that are compared with the giver between two looks at the clock: at most some forty microseconds' worth.
 const AT_ONCE: usize = 4;
 
+/// The same where they are compared by balls alone.
+const BOUNDED_AT_ONCE: usize = 64;
+
 /// The known grips that are least in a giver's way, by its clearance of the digits that hold, of palm and forearm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Starts(Vec<u16>);
@@ -63,19 +66,28 @@ impl Starts {
         let Some(giver) = giver else {
             return Some(Self(candidates.take(STARTS).collect()));
         };
+        // What is found by balls alone is never too little: those for which it is most are looked at first, until no other can
+        // have more.
+        let mut at_most: Vec<(f32, u16)> = Vec::new();
+        for (count, index) in candidates.enumerate() {
+            if count.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
+                return None;
+            }
+            let clearance = known.clearance_at_most(usize::from(index), giver);
+            at_most.push((clearance.min(GIVER_CLEARANCE), index));
+        }
+        at_most.sort_by(|(a, _), (b, _)| b.total_cmp(a));
         // By falling clearance.
         let mut nearest: Vec<(f32, u16)> = Vec::with_capacity(STARTS + 1);
-        for (count, index) in candidates.enumerate() {
+        for (count, (most, index)) in at_most.into_iter().enumerate() {
             if count.is_multiple_of(AT_ONCE) && interrupted() {
                 return None;
             }
-            let least = if nearest.len() < STARTS {
-                f32::NEG_INFINITY
-            } else {
-                nearest[STARTS - 1].0
-            };
-            if known.surely_nears(usize::from(index), giver, least) {
-                continue;
+            let least = nearest
+                .get(STARTS - 1)
+                .map_or(f32::NEG_INFINITY, |(least, _)| *least);
+            if most <= least {
+                break;
             }
             let entry = &known.entries()[usize::from(index)];
             let solids = entry.solids(rig);

@@ -20,12 +20,16 @@ use crate::{
         contacts::contact_normal, grip::Grip, immobility::MOST_CONTACTS, shape::HandShape, solids::HandSolids,
     },
     pose::Pose,
-    score::{TERMS, Term},
+    score::{Term, posture_values},
     taxonomy::classify,
 };
 
-/// Bytes of a grip at least: without contacts, and with the same score everywhere. It bounds what a count can ask for.
-pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 1 + 17 + 60 + 8 + 20 + 10 + 1 + 1;
+/// Bytes of a grip at least: the wrist, the shape, the digits, how deep and how safe, terms, and scores, uses of friction and
+/// contacts of which there are none. It bounds what a count can ask for.
+pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 25 + 61 + 8 + 4 * WRITTEN_TERMS.len() + 2 + 1 + 1;
+
+/// Terms of a grip's score that are written out; the others follow.
+const WRITTEN_TERMS: [Term; 3] = [Term::Closure, Term::Steadiness, Term::SterileDistance];
 
 /// By how much the square of a quaternion's length may differ from 1: what rounding leaves is a thousandth of it.
 const QUATERNION_SLACK: f32 = 1e-3;
@@ -65,9 +69,7 @@ pub(super) fn write_entry(
     write_shape(writer, shape);
     write_digits(writer, pose, bend_ratios, shape, rig);
     writer.floats(&[*penetration, *epsilon]);
-    for term in grip_terms() {
-        writer.floats(&[entry.grip_values[term as usize]]);
-    }
+    writer.floats(&WRITTEN_TERMS.map(|term| entry.grip_values[term as usize]));
     write_scores(writer, &entry.scores);
     write_friction_uses(writer, entry.friction_uses);
     writer.u8(entry.contacts.len() as u8);
@@ -96,10 +98,7 @@ pub(super) fn read_entry(
         digits,
     };
     let [penetration, epsilon] = reader.floats()?;
-    let mut grip_values = [0.0; TERMS];
-    for term in grip_terms() {
-        grip_values[term as usize] = reader.float()?;
-    }
+    let written: [f32; WRITTEN_TERMS.len()] = reader.floats()?;
     let scores = read_scores(reader)?;
     let friction_uses = read_friction_uses(reader)?;
     let count = usize::from(reader.u8()?);
@@ -118,6 +117,10 @@ pub(super) fn read_entry(
         epsilon,
     };
     let classification = classify(rig, &pose, &contacts);
+    let mut grip_values = posture_values(object, rig, &pose, &contacts, classification);
+    for (term, value) in WRITTEN_TERMS.into_iter().zip(written) {
+        grip_values[term as usize] = value;
+    }
     let entry = Entry {
         grip,
         contacts,
@@ -127,11 +130,6 @@ pub(super) fn read_entry(
         friction_uses,
     };
     Ok((entry, shape))
-}
-
-/// The terms of the score that a grip has; the others are 0.
-fn grip_terms() -> impl Iterator<Item = Term> {
-    Term::ALL.into_iter().filter(|term| term.is_of_grip())
 }
 
 /// The bit after those of the five digits that close.

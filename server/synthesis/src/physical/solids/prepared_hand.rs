@@ -28,6 +28,10 @@ const GROUP: usize = 8;
 /// compare in vain.
 const SOLIDS_AT_ONCE: usize = 4;
 
+/// Solids that tell how far a hand is at most. With eight, more hands have to be compared exactly, and finding those that are
+/// least in a giver's way takes a quarter longer; with 24, it takes as long.
+const SETTLING: usize = 16;
+
 /// More than what single precision makes of distances within reach of an arm, in metres: what is decided at once is right
 /// by that much, and the rest is left to exact distances.
 const ROUNDING: f32 = 2e-6;
@@ -55,6 +59,13 @@ struct ToAxes {
     squares: Lanes,
     /// The feet, from 0 at the start to 1 at the end.
     along: Lanes,
+}
+
+/// What some balls' middles are from the axis of one solid, as [`ToAxes`].
+struct ToAxis {
+    squares: [f32; BALLS],
+    /// The solid's radii at the feet.
+    radii: [f32; BALLS],
 }
 
 impl PreparedHand {
@@ -112,8 +123,6 @@ impl PreparedHand {
     /// the first solids settle it.
     #[inline]
     pub fn surely_nears_any(&self, balls: &Balls, distance: f32) -> bool {
-        let [xs, ys, zs] = &balls.middles;
-        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
         let mut reaches = balls.radii;
         for reach in &mut reaches {
             *reach += distance - ROUNDING;
@@ -121,18 +130,29 @@ impl PreparedHand {
         (0..LANES).step_by(SOLIDS_AT_ONCE).any(|first| {
             let mut nears = [0_u32; BALLS];
             for k in first..first + SOLIDS_AT_ONCE {
+                let ToAxis { squares, radii } = self.to_axis(k, balls);
                 for i in 0..BALLS {
-                    // As in `to_axes` and `surely_nears`.
-                    let (x, y, z) = (xs[i] - sx[k], ys[i] - sy[k], zs[i] - sz[k]);
-                    let t = (x * ax[k] + y * ay[k] + z * az[k]) * self.inverse_squares[k];
-                    let t = t.clamp(0.0, 1.0);
-                    let (x, y, z) = (x - ax[k] * t, y - ay[k] * t, z - az[k] * t);
-                    let reach = (reaches[i] + self.start_radii[k] + self.rises[k] * t).max(0.0);
-                    nears[i] |= u32::from(x * x + y * y + z * z < reach * reach);
+                    // As in `surely_nears`.
+                    let reach = (reaches[i] + radii[i]).max(0.0);
+                    nears[i] |= u32::from(squares[i] < reach * reach);
                 }
             }
             nears.iter().fold(0, |any, near| any | near) != 0
         })
+    }
+
+    /// Metres that some balls are at most from the hand.
+    #[inline]
+    pub fn distance_at_most(&self, balls: &Balls) -> f32 {
+        let mut least = [f32::INFINITY; BALLS];
+        for k in 0..SETTLING {
+            let ToAxis { squares, radii } = self.to_axis(k, balls);
+            for i in 0..BALLS {
+                let distance = squares[i].sqrt() - (balls.radii[i] + radii[i]);
+                least[i] = if distance < least[i] { distance } else { least[i] };
+            }
+        }
+        least.into_iter().fold(f32::INFINITY, f32::min) + ROUNDING
     }
 
     /// True if any of some solids comes nearer to the hand than `distance` metres.
@@ -269,5 +289,21 @@ impl PreparedHand {
             along[i] = t;
         }
         ToAxes { squares, along }
+    }
+
+    #[inline]
+    fn to_axis(&self, k: usize, balls: &Balls) -> ToAxis {
+        let [xs, ys, zs] = &balls.middles;
+        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
+        let (mut squares, mut radii) = ([0.0; BALLS], [0.0; BALLS]);
+        for i in 0..BALLS {
+            let (x, y, z) = (xs[i] - sx[k], ys[i] - sy[k], zs[i] - sz[k]);
+            let t = (x * ax[k] + y * ay[k] + z * az[k]) * self.inverse_squares[k];
+            let t = t.clamp(0.0, 1.0);
+            let (x, y, z) = (x - ax[k] * t, y - ay[k] * t, z - az[k] * t);
+            squares[i] = x * x + y * y + z * z;
+            radii[i] = self.start_radii[k] + self.rises[k] * t;
+        }
+        ToAxis { squares, radii }
     }
 }
