@@ -3,6 +3,8 @@
 //! A grip that a giver is in the way of by some millimetres holds the object; what is to be found is one like it that is
 //! turned out of the giver's way about what it touches.
 
+use std::{cmp::Reverse, collections::BinaryHeap};
+
 use glam::Vec3;
 
 use super::{
@@ -68,25 +70,28 @@ impl Starts {
         };
         // What is found by balls alone is never too little: those for which it is most are looked at first, until no other can
         // have more.
-        let mut at_most: Vec<(f32, u16)> = Vec::new();
+        let mut at_most = Vec::new();
         for (count, index) in candidates.enumerate() {
             if count.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
                 return None;
             }
             let clearance = known.clearance_at_most(usize::from(index), giver);
-            at_most.push((clearance.min(GIVER_CLEARANCE), index));
+            at_most.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
-        at_most.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        // Not sorted, as that would take longer than between two looks at the clock.
+        let mut at_most = BinaryHeap::from(at_most);
         // By falling clearance.
         let mut nearest: Vec<(f32, u16)> = Vec::with_capacity(STARTS + 1);
-        for (count, (most, index)) in at_most.into_iter().enumerate() {
+        let mut count = 0_usize;
+        while let Some((most, _, index)) = at_most.pop() {
             if count.is_multiple_of(AT_ONCE) && interrupted() {
                 return None;
             }
+            count += 1;
             let least = nearest
                 .get(STARTS - 1)
                 .map_or(f32::NEG_INFINITY, |(least, _)| *least);
-            if most <= least {
+            if most <= nanometres(least) {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
@@ -159,6 +164,11 @@ impl Starts {
             is_likely.then_some(beside)
         })
     }
+}
+
+/// A distance in metres as a number that can be ordered.
+fn nanometres(distance: f32) -> i32 {
+    (distance * 1e9) as i32
 }
 
 /// What a grip is turned about: the thumb and what is opposed to it stay where the object is, while palm and arm swing out of

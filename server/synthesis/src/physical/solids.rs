@@ -1,8 +1,9 @@
 //! Hands as solids: what they leave free of objects and of each other.
 //!
-//! A hand is a union of tapered capsules ([`HandSolids`]; a giver's, [`GiverSolids`]). How far it is from an object's surface, and how deep in it,
-//! is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far from other parts of itself
-//! by [`self_clearance`], and how far from another hand, of that giver when it is a [`PreparedHand`].
+//! A hand is a union of tapered capsules ([`HandSolids`]; a giver's, [`GiverSolids`]). How far it is from an object's
+//! surface, and how deep in it, is asked capsule by capsule ([`clearance()`], [`closest()`], [`comes_within()`]); how far
+//! from other parts of itself by [`self_clearance`], and how far from a giver's hand, of that hand when it is a
+//! [`PreparedHand`].
 
 mod balls;
 mod flesh;

@@ -1,5 +1,5 @@
-//! A giver's hand prepared for being compared with many others, coordinate by coordinate: one ball is compared with all of its
-//! solids at once.
+//! A giver's hand prepared for being compared with many others, coordinate by coordinate: one ball is compared with all of
+//! its solids at once.
 
 use glam::Vec3;
 
