@@ -14,7 +14,8 @@ pub const TOLD_SOLIDS: usize = AROUND_METACARPALS + 1;
 /// more than a millimetre thinner than its joints' radii say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GiverSolids {
-    /// As every hand, but along the metacarpals at least as thick as told.
+    /// As every hand, but along the metacarpals at least as thick as told: four solids more instead would no longer fit into as
+    /// many registers.
     pub hand: HandSolids,
     /// What is told of the rest: across the knuckles, from the wrist to the metacarpals' bases and the thumb's, and the
     /// middle of the forearm.

@@ -9,7 +9,7 @@ use super::{
     hand_clearance::Bounded,
 };
 
-/// Solids that are compared at once: those of a hand, filled up to whole registers.
+/// Solids that are compared at once: those of a giver, filled up to whole registers.
 const LANES: usize = GiverSolids::COUNT.next_multiple_of(8);
 
 /// The solids of a giver, indices of [`GiverSolids::iter`], in the order in which they settle most: each is the one that
