@@ -19,7 +19,7 @@ use grasp_synthesis::{
     physical::{
         grip::{DEEPEST, GIVER_CLEARANCE, Gripper},
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, clearance, self_clearance},
+        solids::{HandSolids, ToldSolids, clearance, self_clearance},
     },
     pose::Pose,
     strategy::Validity,
@@ -123,16 +123,19 @@ fn followed() -> impl Iterator<Item = (&'static Planned, &'static [KeyFrame; 3])
 }
 
 /// How deep the hand is in the object at its deepest, or how far from it; and how far from the giver.
-fn gaps(planned: &Planned, solids: &HandSolids) -> (f32, f32) {
+fn gaps(planned: &Planned, pose: &HandPose) -> (f32, f32) {
+    let rig = rig(Handedness::Right);
+    let solids = HandSolids::of_pose(rig, pose);
+    let told = ToldSolids::of_rig(rig, pose.frame_from_wrist, &solids);
     let surface = &planned.holdout.object.surface;
     let object = solids
         .iter()
         .map(|solid| clearance(solid, surface, 0.01))
         .fold(f32::INFINITY, f32::min);
     let giver = planned.holdout.presenting_hand.as_ref();
-    let theirs = giver.map(|giver| HandSolids::of_joints(&giver.joints));
-    let giver = theirs.iter().flat_map(HandSolids::iter).flat_map(|their| {
-        let distances = solids.iter().map(|our| our.distance(their));
+    let theirs = giver.map(|giver| ToldSolids::of_joints(&giver.joints));
+    let giver = theirs.iter().flat_map(ToldSolids::iter).flat_map(|their| {
+        let distances = told.iter().map(|our| our.distance(their));
         distances.collect::<Vec<_>>()
     });
     (object, giver.fold(f32::INFINITY, f32::min))
@@ -158,11 +161,8 @@ fn at(from: &HandPose, to: &HandPose, share: f32) -> HandPose {
     }
 }
 
-fn moments(from: &KeyFrame, to: &KeyFrame) -> impl Iterator<Item = HandSolids> {
-    (0..=MOMENTS).map(|moment| {
-        let pose = at(&from.pose, &to.pose, moment as f32 / MOMENTS as f32);
-        HandSolids::of_pose(rig(Handedness::Right), &pose)
-    })
+fn moments(from: &KeyFrame, to: &KeyFrame) -> impl Iterator<Item = HandPose> {
+    (0..=MOMENTS).map(|moment| at(&from.pose, &to.pose, moment as f32 / MOMENTS as f32))
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn the_open_hand_is_off_everything() {
     for (planned, [approach, pre_grasp, _]) in followed() {
         for frame in [approach, pre_grasp] {
             let solids = HandSolids::of_pose(rig(Handedness::Right), &frame.pose);
-            let (object, giver) = gaps(planned, &solids);
+            let (object, giver) = gaps(planned, &frame.pose);
             assert!(
                 object >= OPEN_CLEARANCE - TOLERANCE,
                 "{}: {object} m",
@@ -256,8 +256,8 @@ fn the_open_hand_is_off_everything() {
 #[test]
 fn nothing_is_touched_on_the_way_in() {
     for (planned, [approach, pre_grasp, _]) in followed() {
-        for (moment, solids) in moments(approach, pre_grasp).enumerate() {
-            let (object, giver) = gaps(planned, &solids);
+        for (moment, pose) in moments(approach, pre_grasp).enumerate() {
+            let (object, giver) = gaps(planned, &pose);
             assert!(
                 object > 0.0 && giver > 0.0,
                 "{} at {moment}: {object} m, {giver} m",
@@ -271,13 +271,14 @@ fn nothing_is_touched_on_the_way_in() {
 fn closing_sinks_no_deeper_than_a_grasp_and_touches_nothing_forbidden() {
     for (planned, [_, pre_grasp, close]) in followed() {
         let object = &planned.holdout.object;
-        for (moment, solids) in moments(pre_grasp, close).enumerate() {
-            let (depth, giver) = gaps(planned, &solids);
+        for (moment, pose) in moments(pre_grasp, close).enumerate() {
+            let (depth, giver) = gaps(planned, &pose);
             assert!(
                 depth >= -DEEPEST - TOLERANCE && giver > 0.0,
                 "{} at {moment}: {depth} m, {giver} m",
                 planned.name
             );
+            let solids = HandSolids::of_pose(rig(Handedness::Right), &pose);
             let touches = solids.iter().any(|solid| object.is_forbidden_within(solid, 0.0));
             assert!(!touches, "{} at {moment}", planned.name);
         }

@@ -9,7 +9,7 @@ use grasp_synthesis::{
     object::GraspObject,
     physical::{
         grip::GIVER_CLEARANCE,
-        solids::{GiverSolids, HandSolids, PreparedHand},
+        solids::{HandSolids, PreparedHand, ToldSolids},
     },
     pose::Pose,
 };
@@ -26,7 +26,7 @@ fn scaled(object: &GraspObject, scale: f32) -> GraspObject {
 
 /// A posed hand as a giver's.
 fn giver_of(rig: &Rig, pose: &HandPose) -> PreparedHand {
-    PreparedHand::new(&GiverSolids::of_joints(&HandJoints::of_pose(rig, pose)))
+    PreparedHand::new(&ToldSolids::of_joints(&HandJoints::of_pose(rig, pose)))
 }
 
 #[test]

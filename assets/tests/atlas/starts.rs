@@ -20,7 +20,7 @@ use grasp_synthesis::{
         grip::GIVER_CLEARANCE,
         scene::{ObjectScene, Presented},
         shape::Proposal,
-        solids::{GiverSolids, HandSolids},
+        solids::{HandSolids, ToldSolids},
     },
     search::{SearchOutcome, SearchSettings, find_grasp},
     strategy::{BendRatioChoice, Choice, Strategy, Validity},
@@ -48,7 +48,7 @@ fn held_out(known: &Atlas, grip: usize) -> Holdout {
 }
 
 /// How far the digits that hold, palm and forearm are from the giver's, pair by pair.
-fn clearance(entry: &Entry, giver: &GiverSolids) -> f32 {
+fn clearance(entry: &Entry, giver: &ToldSolids) -> f32 {
     let solids = HandSolids::of_pose(adult(Handedness::Right), &entry.grip.pose);
     let touches = |digit: usize| {
         let of_digit = |part: HandPart| part.digit().map(Digit::index) == Some(digit);
@@ -70,7 +70,7 @@ fn starts_are_what_is_least_in_the_givers_way() {
     for grip in [0, 700, 1400] {
         let holdout = held_out(&known, grip);
         let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
-        let giver = GiverSolids::of_joints(&hand.joints);
+        let giver = ToldSolids::of_joints(&hand.joints);
         let presented = Presented::of(&holdout);
         let holding = known.holding_under(UP);
         let of = |order: &[u16]| {
@@ -121,8 +121,10 @@ fn tight_givers(known: &Atlas, most: usize) -> Vec<usize> {
         let entries = known.entries().iter();
         entries
             .filter(|entry| {
-                let solids = HandSolids::of_pose(adult(Handedness::Right), &entry.grip.pose);
-                giver.clearance(&solids, GIVER_CLEARANCE).is_some()
+                let (rig, pose) = (adult(Handedness::Right), &entry.grip.pose);
+                let solids = HandSolids::of_pose(rig, pose);
+                let told = ToldSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+                giver.clearance(&told, GIVER_CLEARANCE).is_some()
             })
             .take(most + 1)
             .count()

@@ -9,7 +9,7 @@ use grasp_synthesis::{
     },
     physical::grip::GIVER_CLEARANCE,
     physical::solids::{
-        GiverSolids, HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, off_told_palm, self_clearance,
+        HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, ToldPalm, ToldSolids, self_clearance,
     },
     pose::Pose,
 };
@@ -121,10 +121,10 @@ fn solids_of_tracked_joints_are_those_of_the_pose() {
     }
 }
 
-/// A giver whose joints tell of a thicker hand than the fitted one is as thick as told, save for a dip between the bases of
+/// Beside another hand, one whose joints tell of a thicker hand than the fitted one is as thick as told, save for a dip between the bases of
 /// neighbouring metacarpals that is shallower than the room kept to a giver, and nowhere thinner than fitted.
 #[test]
-fn a_giver_is_as_thick_as_told() {
+fn a_hand_beside_another_is_as_thick_as_told() {
     let hand = built_in("adult", Handedness::Right);
     for more in [0.0, 0.004, 0.02] {
         let mut joints = HandJoints::of_pose(&hand.rig, &posed(relaxed()));
@@ -132,8 +132,8 @@ fn a_giver_is_as_thick_as_told() {
             joint.radius += more;
         }
         let fitted = HandSolids::of_joints(&joints);
-        let giver = GiverSolids::of_joints(&joints);
-        let solids: Vec<TaperedCapsule> = giver.iter().copied().collect();
+        let told = ToldSolids::of_joints(&joints);
+        let solids: Vec<TaperedCapsule> = told.iter().copied().collect();
         // The deepest dip below the balls that a told part is made of.
         let dip = |[a, b]: [Joint; 2]| {
             let mut deepest = f32::NEG_INFINITY;
@@ -149,17 +149,17 @@ fn a_giver_is_as_thick_as_told() {
             }
             deepest
         };
-        let told = |pair: [usize; 2]| pair.map(|joint| joints.joints[joint]);
+        let bone = |pair: [usize; 2]| pair.map(|joint| joints.joints[joint]);
         // OpenXR's metacarpals of the four fingers; from knuckle to knuckle; from the wrist to the metacarpals' bases.
         let along = [[6, 7], [11, 12], [16, 17], [21, 22]];
         let knuckles = [[7, 12], [12, 17], [17, 22]];
         let from_wrist = [[1, 2], [1, 6], [1, 11], [1, 16], [1, 21]];
         for pair in along.into_iter().chain(knuckles).chain(from_wrist) {
-            let dip = dip(told(pair));
+            let dip = dip(bone(pair));
             assert!(dip < 1e-5, "{more} more, {pair:?}: {dip}");
         }
         for pair in [[6, 11], [11, 16], [16, 21]] {
-            let dip = dip(told(pair));
+            let dip = dip(bone(pair));
             assert!(dip < 0.8 * GIVER_CLEARANCE, "{more} more, {pair:?}: {dip}");
         }
         // Behind the wrist, which OpenXR's z points away from the fingers.
@@ -172,13 +172,41 @@ fn a_giver_is_as_thick_as_told() {
         for solid in &fitted.palm {
             for along in [0.0, 0.3, 1.0] {
                 let (middle, radius) = (solid.at(along), solid.radius_at(along));
-                let depths = giver.hand.palm.iter().map(|solid| -solid.signed_distance(middle));
+                let depths = told.palm.iter().map(|solid| -solid.signed_distance(middle));
                 assert!(depths.fold(f32::NEG_INFINITY, f32::max) >= radius - 1e-6);
             }
         }
-        assert_eq!(giver.hand.phalanges, fitted.phalanges);
-        assert_eq!(giver.hand.thenar, fitted.thenar);
-        assert_eq!(giver.hand.forearm, fitted.forearm);
+        assert_eq!(told.hand, fitted);
+    }
+}
+
+/// Whoever receives is as thick as whoever gives with the same joints.
+#[test]
+fn a_rigs_hand_beside_another_is_that_of_its_joints() {
+    for hand in all() {
+        let pose = HandPose {
+            frame_from_wrist: Pose::new(Vec3::new(0.1, 0.2, -0.3), Quat::from_rotation_x(1.0)),
+            digits: relaxed(),
+        };
+        let fitted = HandSolids::of_pose(&hand.rig, &pose);
+        let way = Vec3::new(0.01, -0.02, 0.03);
+        let of_rig = ToldSolids::of_rig(&hand.rig, pose.frame_from_wrist, &fitted).moved(way);
+        let elsewhere = HandPose {
+            frame_from_wrist: Pose::new(
+                pose.frame_from_wrist.position + way,
+                pose.frame_from_wrist.orientation,
+            ),
+            ..pose
+        };
+        let of_joints = ToldSolids::of_joints(&HandJoints::of_pose(&hand.rig, &elsewhere));
+        assert_eq!(of_rig.iter().count(), of_joints.iter().count());
+        for (ours, theirs) in of_rig.iter().zip(of_joints.iter()) {
+            assert!(ours.start.distance(theirs.start) < 1e-6, "{ours:?} {theirs:?}");
+            assert!(ours.end.distance(theirs.end) < 1e-6, "{ours:?} {theirs:?}");
+            let off =
+                (ours.start_radius - theirs.start_radius).abs() + (ours.end_radius - theirs.end_radius).abs();
+            assert!(off < 1e-6, "{ours:?} {theirs:?}");
+        }
     }
 }
 
@@ -213,7 +241,7 @@ fn a_point_is_as_far_off_the_told_palm_as_off_its_balls() {
             .iter()
             .map(|(ball, radius)| ball.distance(point) - radius)
             .fold(f32::INFINITY, f32::min);
-        let found = off_told_palm(&joints, point);
+        let found = ToldPalm::of_joints(&joints).distance_of_skin(point);
         assert!(
             (found - expected.abs()).abs() < 3e-4,
             "{point}: {found}, not {expected}"
@@ -303,7 +331,8 @@ fn distances_between_hands_are_those_of_all_pairs() {
             [(thesis, &theirs), (adult, &ours)],
         ] {
             let receiver = HandSolids::of_pose(rig, pose);
-            let giver = GiverSolids::of_joints(&HandJoints::of_pose(giver_rig, giver_pose));
+            let receiver = ToldSolids::of_rig(rig, pose.frame_from_wrist, &receiver);
+            let giver = ToldSolids::of_joints(&HandJoints::of_pose(giver_rig, giver_pose));
             let brute = receiver
                 .iter()
                 .flat_map(|a| giver.iter().map(|b| a.distance(b)))

@@ -21,7 +21,7 @@ use crate::{
         flexing::Flexing,
         grip::{DEEPEST, GIVER_CLEARANCE},
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, comes_within, self_clearance},
+        solids::{HandSolids, TOLD_SOLIDS, ToldSolids, comes_within, self_clearance},
     },
     pose::Pose,
 };
@@ -171,7 +171,7 @@ impl Planner<'_> {
         };
         let opened: [_; 2 * OPENINGS.len()] = std::array::from_fn(|i| {
             let pose = self.opened(OPENINGS[i % OPENINGS.len()], opens_of(i));
-            (pose, HandSolids::of_pose(self.rig, &pose))
+            (pose, self.solids(&pose))
         });
         // Where the hand opens in its place, that does not depend on the direction.
         let in_place: [OnceCell<bool>; 2 * OPENINGS.len()] = Default::default();
@@ -245,7 +245,7 @@ impl Planner<'_> {
             for &opening in narrower {
                 let mut tried = pose;
                 tried.digits[digit.index()] = self.opened_digit(digit, opening);
-                let solids = HandSolids::of_pose(self.rig, &tried);
+                let solids = self.solids(&tried);
                 if self.is_clear(&solids) && self.comes(&solids, direction) && self.closes_from(&tried, back)
                 {
                     pose = tried;
@@ -279,19 +279,29 @@ impl Planner<'_> {
             .filter(|&direction| self.approach.is_none_or(|cone| cone.contains(direction)))
     }
 
+    /// A hand as it is beside the object, and beside the giver's.
+    fn solids(&self, pose: &HandPose) -> ToldSolids {
+        ToldSolids::of_rig(
+            self.rig,
+            pose.frame_from_wrist,
+            &HandSolids::of_pose(self.rig, pose),
+        )
+    }
+
     /// True if an open hand is off the object and the giver's hand, and not through itself.
-    fn is_clear(&self, solids: &HandSolids) -> bool {
+    fn is_clear(&self, solids: &ToldSolids) -> bool {
         let surface = &self.obstacles.object.surface;
         let giver = self.obstacles.giver;
         !solids
+            .hand
             .iter()
             .any(|solid| comes_within(solid, surface, OPEN_CLEARANCE))
             && giver.is_none_or(|giver| !giver.is_neared_by(solids.iter(), GIVER_CLEARANCE))
-            && self_clearance(solids) >= 0.0
+            && self_clearance(&solids.hand) >= 0.0
     }
 
     /// True if the straight way to an open hand is free.
-    fn comes(&self, pre_grasp: &HandSolids, direction: Vec3) -> bool {
+    fn comes(&self, pre_grasp: &ToldSolids, direction: Vec3) -> bool {
         let motion = Motion {
             solids_at: |share: f32| pre_grasp.moved(direction * (APPROACH_DISTANCE * (share - 1.0))),
             travels: pre_grasp.iter().map(|_| APPROACH_DISTANCE).collect(),
@@ -314,7 +324,7 @@ impl Planner<'_> {
                         between(&open.digits[digit], &self.close.digits[digit], share)
                     }),
                 };
-                HandSolids::of_pose(self.rig, &pose)
+                self.solids(&pose)
             },
             travels: self.closing_travels(open, back),
         };
@@ -358,6 +368,7 @@ impl Planner<'_> {
             back + turn * reach
         }));
         travels.extend(solids.forearm.iter().map(|_| back));
+        travels.extend([back; TOLD_SOLIDS]);
         travels
     }
 }

@@ -43,8 +43,14 @@ impl<'a> Asked<'a> {
     /// The grasp that a grip is for what is presented, with its score; none if it comes too near to the giver or the object
     /// slips. `solids` are the grip's.
     pub fn hold(&self, entry: &Entry, solids: &HandSolids, gripper: &mut Gripper) -> Option<Grasp> {
-        let Self { scene, presented, .. } = *self;
-        let giver_clearance = clear_of_giver(solids, presented.giver.as_ref())?;
+        let Self {
+            scene,
+            rig,
+            presented,
+            ..
+        } = *self;
+        let wrist = entry.grip.pose.frame_from_wrist;
+        let giver_clearance = clear_of_giver(rig, wrist, solids, presented.giver.as_ref())?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
         let least_use = if self.friction_differs {
@@ -67,7 +73,7 @@ impl<'a> Asked<'a> {
             presented,
             giver_clearance,
         );
-        grasp.score = Some(score(entry.grip_values, &grasp, scene, self.rig, presented));
+        grasp.score = Some(score(entry.grip_values, &grasp, scene, rig, presented));
         Some(grasp)
     }
 }

@@ -8,7 +8,7 @@ use std::cell::Cell;
 
 use crate::{
     object::GraspObject,
-    physical::solids::{HandSolids, PreparedHand, TaperedCapsule},
+    physical::solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids},
 };
 
 /// A part of a motion is not halved when nothing travels farther than this in half of it, in metres: what is found free
@@ -44,7 +44,7 @@ pub(super) struct Keep {
 pub(super) struct Motion<F> {
     /// The hand at a share of the motion, from 0 to 1.
     pub solids_at: F,
-    /// Metres that any point of each solid travels at most, in the order of [`HandSolids::iter`].
+    /// Metres that any point of each solid travels at most, in the order of [`ToldSolids::iter`].
     pub travels: Vec<f32>,
 }
 
@@ -57,7 +57,7 @@ enum Part {
     Open,
 }
 
-impl<F: Fn(f32) -> HandSolids> Motion<F> {
+impl<F: Fn(f32) -> ToldSolids> Motion<F> {
     /// True if the motion keeps to what it should.
     pub(super) fn is_free(&self, obstacles: &Obstacles<'_>, keep: Keep) -> bool {
         // What does not move is where it is in the grasp.
@@ -67,8 +67,10 @@ impl<F: Fn(f32) -> HandSolids> Motion<F> {
             .enumerate()
             .filter(|(_, travel)| **travel > 0.0);
         let open = moving.fold(0, |open, (place, _)| open | 1 << place);
+        // Beside the object, the hand is what comes first of its solids.
+        let beside_object = open & ((1 << HandSolids::COUNT) - 1);
         let beside_giver = if obstacles.giver.is_some() { open } else { 0 };
-        self.is_part_free(obstacles, keep, [0.0, 1.0], [open, beside_giver])
+        self.is_part_free(obstacles, keep, [0.0, 1.0], [beside_object, beside_giver])
     }
 
     /// The same for a part. `open` has a bit for each solid that may meet the object in it, and for each that may meet the
@@ -87,7 +89,8 @@ impl<F: Fn(f32) -> HandSolids> Motion<F> {
         let middle = 0.5 * (from + to);
         let half = 0.5 * (to - from);
         let mut still_open = [0; 2];
-        for (place, (solid, travel)) in (self.solids_at)(middle).iter().zip(&self.travels).enumerate() {
+        let solids = (self.solids_at)(middle);
+        for (place, (solid, travel)) in solids.iter().zip(&self.travels).enumerate() {
             let travel = half * travel;
             for against in 0..2 {
                 if open[against] >> place & 1 == 0 {
@@ -95,7 +98,7 @@ impl<F: Fn(f32) -> HandSolids> Motion<F> {
                 }
                 let part = match (obstacles.giver, against) {
                     (Some(giver), 1) => beside_giver(giver, solid, keep.giver, travel),
-                    _ => beside_object(obstacles, solid, keep.object, travel),
+                    _ => beside_object(obstacles, solids.hand.solid(place), keep.object, travel),
                 };
                 match part {
                     Part::Free => {}

@@ -121,8 +121,9 @@ impl PhysicalAttempt {
         let held = balance(&self.gripper.soft_contacts, &load, &mut self.gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        let giver_clearance = clear_of_giver(&solids, presented.giver.as_ref())
-            .ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        let giver_clearance =
+            clear_of_giver(rig, grip.pose.frame_from_wrist, &solids, presented.giver.as_ref());
+        let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         let mut grasp = grasp(
             &grip,
             &self.gripper.contacts,

@@ -5,11 +5,11 @@ use glam::Vec3;
 use super::{
     closing::{ClosedDigit, TOUCHING},
     immobility::SoftContact,
-    solids::{HandSolids, Touch, closest, off_told_palm},
+    solids::{HandSolids, ToldPalm, Touch, closest},
 };
 use crate::{
     grasp::Contact,
-    hand::{Digit, HandPart, HandPose, Phalanx, joints::HandJoints, rig::Rig},
+    hand::{Digit, HandPart, HandPose, Phalanx, rig::Rig},
     object::GraspObject,
 };
 
@@ -34,6 +34,11 @@ const PALM_SPACING: f32 = 0.015;
 /// the air there.
 const PALM_SLACK: f32 = 0.0015;
 
+/// Cosine of the angle up to which the palm's bone may lie off the way that a solid of it presses. The solids overlap: skin
+/// that lies deeper in another one belongs to that one, which touches in a place of its own. A larger angle lets normals
+/// leave those of the surface, a smaller one drops contacts where solids blend.
+const OWN_COS: f32 = 0.985;
+
 /// Puts the contacts of the digits that touch and of the palm into `contacts`, thumb first and the palm last. The pose is
 /// that of the digits.
 pub(super) fn collect_contacts(
@@ -56,14 +61,19 @@ pub(super) fn collect_contacts(
         }
     }
     let first_of_palm = contacts.len();
+    let told = ToldPalm::of_rig(rig, pose.frame_from_wrist);
     // The ball of the thumb gives way with its metacarpal, and the web is a fold of skin: neither bears anything.
     for solid in &solids.palm {
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
             continue;
         };
         let is_new = |other: &Contact| other.position.distance(touch.point) >= PALM_SPACING;
-        let is_told = || off_told_palm(&HandJoints::of_pose(rig, pose), touch.point) <= PALM_SLACK;
-        if contacts[first_of_palm..].iter().all(is_new) && is_told() {
+        let is_own = || {
+            let pressing = (solid.at(touch.along) - touch.point).normalize_or_zero();
+            way_to_bone(solids, HandPart::Palm, touch.point).dot(pressing) >= OWN_COS
+        };
+        let is_told = || told.distance_of_skin(touch.point) <= PALM_SLACK;
+        if contacts[first_of_palm..].iter().all(is_new) && is_own() && is_told() {
             contacts.extend(contact(solids, &touch, HandPart::Palm));
         }
     }

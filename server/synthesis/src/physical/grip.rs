@@ -14,7 +14,10 @@ use super::{
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::{HandShape, Proposal, TUCKED_FLEXION},
-    solids::{HandSolids, PreparedHand, TaperedCapsule, clearance, comes_within, link_radii, self_clearance},
+    solids::{
+        HandSolids, PreparedHand, TaperedCapsule, ToldSolids, clearance, comes_within, link_radii,
+        self_clearance,
+    },
 };
 use crate::{
     grasp::Contact,
@@ -119,7 +122,8 @@ impl Gripper {
             object_from_wrist.position += way;
             still = still.moved(way);
         }
-        let collides = collides_without_digits(scene, giver, &still);
+        let collides =
+            collides_without_digits(scene, giver, &ToldSolids::of_rig(rig, object_from_wrist, &still));
         stopwatch.lap(Step::CollisionValidation);
         if collides {
             return Err(NoGrip::Rejected(Rejection::PalmCollision));
@@ -223,12 +227,19 @@ impl Gripper {
     }
 }
 
-/// The distance of a hand from the giver's, if it is enough: `Some(None)` without a giver.
-pub fn clear_of_giver(solids: &HandSolids, giver: Option<&PreparedHand>) -> Option<Option<f32>> {
-    match giver {
-        None => Some(None),
-        Some(giver) => giver.clearance(solids, GIVER_CLEARANCE).map(Some),
-    }
+/// The distance of a rig's hand, whose wrist and solids are there, from the giver's, if it is enough: `Some(None)` without
+/// a giver.
+pub fn clear_of_giver(
+    rig: &Rig,
+    object_from_wrist: Pose,
+    solids: &HandSolids,
+    giver: Option<&PreparedHand>,
+) -> Option<Option<f32>> {
+    let Some(giver) = giver else {
+        return Some(None);
+    };
+    let solids = ToldSolids::of_rig(rig, object_from_wrist, solids);
+    giver.clearance(&solids, GIVER_CLEARANCE).map(Some)
 }
 
 /// Where the wrist of a proposed hand is when its palm is laid on, if that is how it is to be; none if the palm does not
@@ -384,12 +395,14 @@ impl Closer<'_> {
 fn collides_without_digits(
     scene: &ObjectScene<'_>,
     giver: Option<&PreparedHand>,
-    still: &HandSolids,
+    still: &ToldSolids,
 ) -> bool {
-    let parts = || still.palm.iter().chain(&still.forearm);
+    let HandSolids { palm, forearm, .. } = &still.hand;
     let surface = &scene.object.surface;
-    parts().any(|part| comes_within(part, surface, -DEEPEST))
-        || giver.is_some_and(|giver| giver.is_neared_by(parts(), GIVER_CLEARANCE))
+    palm.iter()
+        .chain(forearm)
+        .any(|part| comes_within(part, surface, -DEEPEST))
+        || giver.is_some_and(|giver| giver.is_neared_by(still.still(), GIVER_CLEARANCE))
 }
 
 /// How deep the hand is in the object, if that, its distance from the giver's, and its parts' distances from each other
@@ -398,7 +411,9 @@ fn penetration(scene: &ObjectScene<'_>, giver: Option<&PreparedHand>, solids: &H
     if self_clearance(solids) < 0.0 {
         return None;
     }
-    if giver.is_some_and(|giver| giver.is_neared_by(solids.iter(), GIVER_CLEARANCE)) {
+    // Palm and forearm were compared before the digits closed.
+    let moving = solids.phalanges.as_flattened().iter().chain(&solids.thenar);
+    if giver.is_some_and(|giver| giver.is_neared_by(moving, GIVER_CLEARANCE)) {
         return None;
     }
     let surface = &scene.object.surface;

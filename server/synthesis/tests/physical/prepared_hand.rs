@@ -2,7 +2,9 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    physical::solids::{BALLS, Balls, GiverSolids, HandSolids, PreparedHand, TOLD_SOLIDS, TaperedCapsule},
+    physical::solids::{
+        BALLS, Balls, HandSolids, PALM_SOLIDS, PreparedHand, TOLD_SOLIDS, TaperedCapsule, ToldSolids,
+    },
     pose::Pose,
 };
 
@@ -16,11 +18,12 @@ fn solid(random: &mut Random, middle: Vec3, length: f32, thick: f32) -> TaperedC
     TaperedCapsule::new(start, start + way, radii[0], radii[1])
 }
 
-/// A giver that no person is, as [`hand`].
-fn giver(random: &mut Random) -> GiverSolids {
-    GiverSolids {
-        hand: hand(random, Vec3::ZERO),
-        told: [(); TOLD_SOLIDS].map(|()| solid(random, Vec3::ZERO, 0.07, 0.017)),
+/// A hand as [`hand`], thicker than beside an object.
+fn told_hand(random: &mut Random, middle: Vec3) -> ToldSolids {
+    ToldSolids {
+        hand: hand(random, middle),
+        palm: [(); PALM_SOLIDS].map(|()| solid(random, middle, 0.07, 0.019)),
+        told: [(); TOLD_SOLIDS].map(|()| solid(random, middle, 0.07, 0.017)),
     }
 }
 
@@ -29,13 +32,13 @@ fn hand(random: &mut Random, middle: Vec3) -> HandSolids {
     let mut solid = |length: f32, thick: f32| solid(random, middle, length, thick);
     HandSolids {
         phalanges: [[(); 3]; 5].map(|links| links.map(|()| solid(0.05, 0.01))),
-        palm: [(); 10].map(|()| solid(0.07, 0.017)),
+        palm: [(); PALM_SOLIDS].map(|()| solid(0.07, 0.017)),
         thenar: [(); 4].map(|()| solid(0.05, 0.017)),
         forearm: [(); 2].map(|()| solid(0.3, 0.06)),
     }
 }
 
-fn least_of_all_pairs<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, theirs: &GiverSolids) -> f32 {
+fn least_of_all_pairs<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, theirs: &ToldSolids) -> f32 {
     ours.map(|our| {
         let distances = theirs.iter().map(|their| our.distance(their));
         distances.fold(f32::INFINITY, f32::min)
@@ -48,9 +51,9 @@ fn distances_and_verdicts_are_those_of_all_pairs() {
     let mut random = Random::new(31);
     let (mut near, mut far, mut sure) = (0, 0, 0);
     for case in 0..3000 {
-        let giver = giver(&mut random);
+        let giver = told_hand(&mut random, Vec3::ZERO);
         let middle = random.direction() * random.between(0.0, 0.7);
-        let receiver = hand(&mut random, middle);
+        let receiver = told_hand(&mut random, middle);
         let prepared = PreparedHand::new(&giver);
         let required = random.between(-0.002, 0.01);
 
@@ -98,7 +101,7 @@ fn moved_balls_are_near_where_one_of_them_is() {
     let mut random = Random::new(32);
     let (mut near, mut far, mut close) = (0, 0, 0);
     for case in 0..2000 {
-        let solids = giver(&mut random);
+        let solids = told_hand(&mut random, Vec3::ZERO);
         let giver = PreparedHand::new(&solids);
         let middles: [Vec3; BALLS] =
             std::array::from_fn(|_| random.direction() * random.between(0.1, 0.2) + Vec3::X * 0.1);

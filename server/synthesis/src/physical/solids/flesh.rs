@@ -7,7 +7,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::TaperedCapsule;
+use super::{TaperedCapsule, ToldPalm};
 use crate::{
     hand::{
         Handedness,
@@ -32,7 +32,7 @@ const FITTED_SIZE: f32 = 0.097_674;
 const MILLIMETRE: f32 = 1e-3;
 
 /// The ends of the fingers' metacarpals, numbered.
-const METACARPAL_ENDS: usize = 8;
+pub(super) const METACARPAL_ENDS: usize = 8;
 const INDEX_BASE: usize = 0;
 const INDEX_KNUCKLE: usize = 1;
 const MIDDLE_BASE: usize = 2;
@@ -140,8 +140,6 @@ pub(super) struct Bones {
     handedness: Handedness,
     wrist: Vec3,
     metacarpal_ends: [Vec3; METACARPAL_ENDS],
-    /// From there to the skin, in metres.
-    radii: [f32; METACARPAL_ENDS],
     /// The thumb's base and second joint.
     thumb: [Vec3; 2],
     /// The direction that the pad of the thumb's metacarpal faces.
@@ -158,7 +156,6 @@ impl Bones {
             handedness: joints.handedness,
             wrist: at(index::WRIST),
             metacarpal_ends: std::array::from_fn(|end| at(joint_of_end(end))),
-            radii: std::array::from_fn(|end| joints.joints[joint_of_end(end)].radius),
             thumb: [at(thumb), at(thumb + 1)],
             thumb_pad: thumb_frame.transform_vector(Vec3::Z),
         }
@@ -182,7 +179,6 @@ impl Bones {
                     digits[finger + 1][0]
                 }
             }),
-            radii: std::array::from_fn(|end| rig.joint_radii[joint_of_end(end)]),
             thumb: [digits[0][0], digits[0][1]],
             thumb_pad,
         }
@@ -190,7 +186,7 @@ impl Bones {
 }
 
 /// The `OpenXR` joint at the end of a metacarpal.
-fn joint_of_end(end: usize) -> usize {
+pub(super) fn joint_of_end(end: usize) -> usize {
     index::FIRST_OF_DIGIT[end / 2 + 1] + end % 2
 }
 
@@ -237,34 +233,6 @@ impl Skeleton {
         self.solids(&PALM)
     }
 
-    /// The palm's solids, those along the metacarpals and between them at least as thick as the joints' radii say: what a
-    /// hand's owner tells of its thickness may be more than what was fitted to another hand's skin.
-    pub(super) fn palm_as_told(&self) -> [TaperedCapsule; PALM_SOLIDS] {
-        let mut solids = self.palm();
-        for (solid, ends) in solids.iter_mut().zip(&PALM) {
-            let (start, start_radius) = self.as_told(ends[0].0, solid.start, solid.start_radius);
-            let (end, end_radius) = self.as_told(ends[1].0, solid.end, solid.end_radius);
-            *solid = TaperedCapsule::new(start, end, start_radius, end_radius);
-        }
-        solids
-    }
-
-    /// The smallest ball around a fitted one that is as thick as the joints' radii say where it hangs.
-    #[inline]
-    fn as_told(&self, anchor: Anchor, place: Vec3, radius: f32) -> (Vec3, f32) {
-        let Between(a, b, share) = anchor else {
-            return (place, radius);
-        };
-        let Bones {
-            metacarpal_ends: ends,
-            radii,
-            ..
-        } = &self.bones;
-        let told = ends[a].lerp(ends[b], share);
-        let told_radius = radii[a] + (radii[b] - radii[a]) * share;
-        TaperedCapsule::new(place, told, radius, told_radius).bounding_ball()
-    }
-
     /// The solids that move with the thumb.
     pub(super) fn thenar(&self) -> [TaperedCapsule; THENAR_SOLIDS] {
         self.solids(&THENAR)
@@ -301,4 +269,29 @@ impl Skeleton {
             Thumb => thumb[0] + self.frame_from_thumb * offset,
         }
     }
+}
+
+/// The palm's fitted solids, those along the metacarpals and between them at least as thick as the joints' radii say: what
+/// a hand's owner tells of its thickness may be more than what was fitted to another hand's skin.
+pub(super) fn palm_as_told(
+    palm: &[TaperedCapsule; PALM_SOLIDS],
+    told: &ToldPalm,
+) -> [TaperedCapsule; PALM_SOLIDS] {
+    let mut solids = *palm;
+    for (solid, ends) in solids.iter_mut().zip(&PALM) {
+        let (start, start_radius) = as_told(ends[0].0, solid.start, solid.start_radius, told);
+        let (end, end_radius) = as_told(ends[1].0, solid.end, solid.end_radius, told);
+        *solid = TaperedCapsule::new(start, end, start_radius, end_radius);
+    }
+    solids
+}
+
+/// The smallest ball around a fitted one that is as thick as the joints' radii say where it hangs.
+#[inline]
+fn as_told(anchor: Anchor, place: Vec3, radius: f32, told: &ToldPalm) -> (Vec3, f32) {
+    let Between(a, b, share) = anchor else {
+        return (place, radius);
+    };
+    let (told_place, told_radius) = told.between(a, b, share);
+    TaperedCapsule::new(place, told_place, radius, told_radius).bounding_ball()
 }

@@ -71,16 +71,6 @@ impl HandSolids {
     /// The solids of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
         let skeleton = Skeleton::new(Bones::of_joints(joints));
-        Self::around(joints, &skeleton, &skeleton.palm())
-    }
-
-    /// The same, along the metacarpals at least as thick as the joints' radii say.
-    pub(super) fn of_giver(joints: &HandJoints) -> Self {
-        let skeleton = Skeleton::new(Bones::of_joints(joints));
-        Self::around(joints, &skeleton, &skeleton.palm_as_told())
-    }
-
-    fn around(joints: &HandJoints, skeleton: &Skeleton, palm: &[TaperedCapsule; PALM_SOLIDS]) -> Self {
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
         let mut phalanges = [[TaperedCapsule::default(); 3]; 5];
@@ -93,7 +83,7 @@ impl HandSolids {
         }
         Self {
             phalanges,
-            palm: *palm,
+            palm: skeleton.palm(),
             thenar: skeleton.thenar(),
             forearm: forearm(
                 thesis_from_openxr_frame(joints.joints[index::WRIST].pose),
@@ -197,15 +187,9 @@ fn forearm(frame_from_wrist: Pose, radius: f32) -> [TaperedCapsule; FOREARM_SOLI
     })
 }
 
-/// The forearm's middle behind tracked joints, from the ball of the wrist: as thick as told there, where the two solids
-/// side by side leave a dip.
-pub(super) fn middle_of_forearm(joints: &HandJoints) -> TaperedCapsule {
-    let wrist = joints.joints[index::WRIST];
-    let end = thesis_from_openxr_frame(wrist.pose).transform_point(Vec3::new(0.0, -FOREARM_LENGTH, 0.0));
-    TaperedCapsule::new(
-        wrist.pose.position,
-        end,
-        wrist.radius,
-        FOREARM_RADII[1] * wrist.radius,
-    )
+/// The forearm's middle behind a wrist of `radius` metres, from the ball of the wrist: as thick as told there, where the two
+/// solids side by side leave a dip.
+pub(super) fn middle_of_forearm(frame_from_wrist: Pose, radius: f32) -> TaperedCapsule {
+    let end = frame_from_wrist.transform_point(Vec3::new(0.0, -FOREARM_LENGTH, 0.0));
+    TaperedCapsule::new(frame_from_wrist.position, end, radius, FOREARM_RADII[1] * radius)
 }

@@ -4,19 +4,19 @@
 use glam::Vec3;
 
 use super::{
-    GiverSolids, HandSolids, TaperedCapsule,
+    TaperedCapsule, ToldSolids,
     balls::{BALLS, Balls},
     hand_clearance::Bounded,
 };
 
 /// Solids that are compared at once: those of a giver, filled up to whole registers.
-const LANES: usize = GiverSolids::COUNT.next_multiple_of(8);
+const LANES: usize = ToldSolids::COUNT.next_multiple_of(8);
 
-/// The solids of a giver, indices of [`GiverSolids::iter`], in the order in which they settle most: each is the one that
+/// The solids of a giver, indices of [`ToldSolids::iter`], in the order in which they settle most: each is the one that
 /// met most of the receiving hands that those before it did not, of 933,479 known grips of the built-in objects that meet
 /// a recorded giver and are not [excluded](crate::atlas::Atlas::excluded_by) before. The first four meet 79 % of them,
 /// eight 95 %.
-const MET_FIRST: [usize; GiverSolids::COUNT] = [
+const MET_FIRST: [usize; ToldSolids::COUNT] = [
     8, 2, 18, 5, 15, 11, 29, 6, 13, 25, 17, 30, 3, 14, 12, 1, 16, 22, 7, 26, 4, 9, 39, 21, 20, 10, 24, 19,
     23, 37, 34, 31, 38, 36, 33, 32, 27, 0, 28, 35,
 ];
@@ -42,7 +42,7 @@ type Lanes = [f32; LANES];
 /// The solids of a giver's hand, which stays where it is while others are compared with it.
 #[derive(Clone, Debug)]
 pub struct PreparedHand {
-    solids: [Bounded; GiverSolids::COUNT],
+    solids: [Bounded; ToldSolids::COUNT],
     /// Starts of the axes, in metres.
     starts: [Lanes; 3],
     /// From there to their ends.
@@ -70,9 +70,9 @@ struct ToAxis {
 
 impl PreparedHand {
     /// Prepares a hand: below a microsecond.
-    pub fn new(giver: &GiverSolids) -> Self {
+    pub fn new(giver: &ToldSolids) -> Self {
         let all = giver.to_array();
-        let mut solids = [Bounded::new(all[0]); GiverSolids::COUNT];
+        let mut solids = [Bounded::new(all[0]); ToldSolids::COUNT];
         for (place, solid) in solids.iter_mut().zip(MET_FIRST) {
             *place = Bounded::new(all[solid]);
         }
@@ -86,7 +86,7 @@ impl PreparedHand {
         };
         for i in 0..LANES {
             // The rest repeats the last solid, which changes nothing.
-            let solid = &solids[i.min(GiverSolids::COUNT - 1)].solid;
+            let solid = &solids[i.min(ToldSolids::COUNT - 1)].solid;
             let way = solid.end - solid.start;
             for axis in 0..3 {
                 prepared.starts[axis][i] = solid.start[axis];
@@ -167,10 +167,10 @@ impl PreparedHand {
     }
 
     /// The smallest distance of another hand in metres, if it is at least `required`.
-    pub fn clearance(&self, other: &HandSolids, required: f32) -> Option<f32> {
+    pub fn clearance(&self, other: &ToldSolids, required: f32) -> Option<f32> {
         // Middle by middle, a distance that the smallest does not exceed, and for each pair one that it surely keeps.
         let mut bounds = [f32::INFINITY; LANES];
-        let mut sure = [[0.0; LANES]; HandSolids::COUNT];
+        let mut sure = [[0.0; LANES]; ToldSolids::COUNT];
         for (our, sure) in other.iter().zip(&mut sure) {
             let ToAxes { squares, along } = self.to_axes(our.at(0.5));
             let radius = our.radius_at(0.5);
