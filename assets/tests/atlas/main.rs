@@ -2,5 +2,6 @@
 
 mod codec;
 mod exclusion;
+mod palm;
 mod starts;
 mod support;
