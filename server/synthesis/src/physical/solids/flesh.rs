@@ -7,7 +7,10 @@
 
 use glam::{Mat3, Vec3};
 
-use super::{TaperedCapsule, ToldPalm};
+use super::{
+    TaperedCapsule,
+    told_palm::{METACARPAL_ENDS, ToldPalm, joint_of_end},
+};
 use crate::{
     hand::{
         Handedness,
@@ -31,8 +34,7 @@ const FITTED_SIZE: f32 = 0.097_674;
 /// Metres in a millimetre.
 const MILLIMETRE: f32 = 1e-3;
 
-/// The ends of the fingers' metacarpals, numbered.
-pub(super) const METACARPAL_ENDS: usize = 8;
+/// The ends of the fingers' metacarpals by their numbers, in the order of [`joint_of_end`].
 const INDEX_BASE: usize = 0;
 const INDEX_KNUCKLE: usize = 1;
 const MIDDLE_BASE: usize = 2;
@@ -183,11 +185,6 @@ impl Bones {
             thumb_pad,
         }
     }
-}
-
-/// The `OpenXR` joint at the end of a metacarpal.
-pub(super) fn joint_of_end(end: usize) -> usize {
-    index::FIRST_OF_DIGIT[end / 2 + 1] + end % 2
 }
 
 /// A skeleton to hang flesh on.

@@ -5,10 +5,7 @@ use std::array::from_fn;
 
 use glam::Vec3;
 
-use super::{
-    TaperedCapsule,
-    flesh::{METACARPAL_ENDS, joint_of_end},
-};
+use super::TaperedCapsule;
 use crate::{
     hand::{
         joints::{HandJoints, index},
@@ -19,6 +16,9 @@ use crate::{
 
 /// Two joints, indices of [`ToldPalm::joints`].
 type Bone = [usize; 2];
+
+/// The ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
+pub(super) const METACARPAL_ENDS: usize = 8;
 
 /// The wrist, and …
 const WRIST: usize = METACARPAL_ENDS;
@@ -129,6 +129,11 @@ impl ToldPalm {
         let [(start, start_radius), (end, end_radius)] = [self.joints[a], self.joints[b]];
         TaperedCapsule::new(start, end, start_radius, end_radius)
     }
+}
+
+/// The `OpenXR` joint at the end of a metacarpal.
+pub(super) fn joint_of_end(end: usize) -> usize {
+    index::FIRST_OF_DIGIT[end / 2 + 1] + end % 2
 }
 
 /// The `OpenXR` joint of one of [`ToldPalm::joints`].
