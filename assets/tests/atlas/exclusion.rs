@@ -32,7 +32,8 @@ fn giver_of(rig: &Rig, pose: &HandPose) -> PreparedHand {
 #[test]
 fn what_is_excluded_meets_the_giver() {
     let rig = adult(Handedness::Right);
-    for name in ["remote", "scissors"] {
+    let (mut all_meeting, mut all_excluded) = (0, 0);
+    for name in ["remote", "scissors", "scalpel"] {
         let object = object(name);
         let atlas = grown(Growth::new(object, rig), 60).atlas;
         let (mut meeting, mut excluded, mut free) = (0, 0, 0);
@@ -61,12 +62,19 @@ fn what_is_excluded_meets_the_giver() {
             }
         }
         assert!(free > 50, "{name}: only {free} keep clear of anybody");
-        // It is worth asking only if it settles many.
+        // How many it settles hangs on which grips are found: for the remote's first hundreds, 37 to 43 %.
         assert!(
-            5 * excluded > 2 * meeting,
+            3 * excluded > meeting,
             "{name}: {excluded} of {meeting} are excluded"
         );
+        all_meeting += meeting;
+        all_excluded += excluded;
     }
+    // It is worth asking only if it settles many.
+    assert!(
+        20 * all_excluded > 9 * all_meeting,
+        "{all_excluded} of {all_meeting} are excluded"
+    );
 }
 
 #[test]
