@@ -32,14 +32,13 @@ fn giver_of(rig: &Rig, pose: &HandPose) -> PreparedHand {
 #[test]
 fn what_is_excluded_meets_the_giver() {
     let rig = adult(Handedness::Right);
-    let (mut all_meeting, mut all_excluded) = (0, 0);
     for name in ["remote", "scissors", "scalpel"] {
         let object = object(name);
-        let atlas = grown(Growth::new(object, rig), 60).atlas;
+        let atlas = grown(Growth::new(object, rig), 120).atlas;
         let (mut meeting, mut excluded, mut free) = (0, 0, 0);
-        // Known grips as givers, where they are and some way off; then the object lies between two hands. Hundreds of them,
-        // as a hundred are no measure of how many hands are settled.
-        for (turn, giver) in atlas.entries().iter().step_by(2).enumerate() {
+        // Known grips as givers, where they are and some way off; then the object lies between two hands. Hundreds of them
+        // among a thousand grips, as fewer are no measure of how many hands are settled.
+        for (turn, giver) in atlas.entries().iter().step_by(4).enumerate() {
             let mut pose = giver.grip.pose;
             let off = 0.01 * (turn % 6) as f32;
             pose.frame_from_wrist = Pose::new(
@@ -62,19 +61,12 @@ fn what_is_excluded_meets_the_giver() {
             }
         }
         assert!(free > 50, "{name}: only {free} keep clear of anybody");
-        // How many it settles hangs on which grips are found: for the remote's first hundreds, 37 to 43 %.
+        // It is worth asking only if it settles many.
         assert!(
-            3 * excluded > meeting,
+            5 * excluded > 2 * meeting,
             "{name}: {excluded} of {meeting} are excluded"
         );
-        all_meeting += meeting;
-        all_excluded += excluded;
     }
-    // It is worth asking only if it settles many.
-    assert!(
-        20 * all_excluded > 9 * all_meeting,
-        "{all_excluded} of {all_meeting} are excluded"
-    );
 }
 
 #[test]
