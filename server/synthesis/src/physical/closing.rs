@@ -11,7 +11,7 @@ use std::f32::consts::PI;
 use super::{
     flexing::{Flexing, Sweep},
     obstacle::Obstacle,
-    solids::{Bounded, TaperedCapsule, clearance, link_solids},
+    solids::{Bounded, TaperedCapsule, comes_within, link_solids},
 };
 use crate::{
     geometry::mesh_bvh::MeshBvh,
@@ -215,7 +215,9 @@ impl Closing<'_> {
         let links = self.links(angles);
         let is_free = |(index, link): (usize, _)| self.gap_to_obstacles(index, link, 0.0) >= -INSIDE_DEPTH;
         links.iter().enumerate().all(is_free)
-            && self.smallest_clearance(&links, INSIDE_DEPTH) >= -INSIDE_DEPTH
+            && !links
+                .iter()
+                .any(|link| comes_within(link, self.surface, -INSIDE_DEPTH))
     }
 
     fn is_obstructed(&self, index: usize, link: &TaperedCapsule) -> bool {
@@ -260,13 +262,7 @@ impl Closing<'_> {
         link_solids(self.plane.joints(angles), self.radii)
     }
 
-    /// The smallest clearance of some links, up to `enough`.
-    fn smallest_clearance(&self, links: &[TaperedCapsule], enough: f32) -> f32 {
-        let smallest = |least: f32, link| clearance(link, self.surface, least).min(least);
-        links.iter().fold(enough, smallest)
-    }
-
     fn link_touches(&self, link: &TaperedCapsule) -> bool {
-        clearance(link, self.surface, TOUCHING) < TOUCHING
+        comes_within(link, self.surface, TOUCHING)
     }
 }

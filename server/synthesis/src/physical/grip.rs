@@ -417,10 +417,11 @@ fn penetration(scene: &ObjectScene<'_>, giver: Option<&PreparedHand>, solids: &H
         return None;
     }
     let surface = &scene.object.surface;
-    let least = solids
-        .iter()
-        .fold(0.0, |least: f32, part| clearance(part, surface, least).min(least));
-    (least >= -DEEPEST).then_some(-least)
+    let deepest = solids.iter().try_fold(0.0, |least: f32, part| {
+        let least = clearance(part, surface, least).min(least);
+        (least >= -DEEPEST).then_some(least)
+    });
+    deepest.map(|least| -least)
 }
 
 fn nears_forbidden_surface<'a>(
