@@ -121,8 +121,8 @@ fn solids_of_tracked_joints_are_those_of_the_pose() {
     }
 }
 
-/// Beside another hand, one whose joints tell of a thicker hand than the fitted one is as thick as told, save for a dip between the bases of
-/// neighbouring metacarpals that is shallower than the room kept to a giver, and nowhere thinner than fitted.
+/// Beside another hand, one whose joints tell of a thicker hand than the fitted one is as thick as told, save for a dip between
+/// the bases of neighbouring metacarpals that is shallower than the room kept to a giver, and nowhere thinner than fitted.
 #[test]
 fn a_hand_beside_another_is_as_thick_as_told() {
     let hand = built_in("adult", Handedness::Right);
