@@ -11,7 +11,7 @@ use std::f32::consts::PI;
 use super::{
     flexing::{Flexing, Sweep},
     obstacle::Obstacle,
-    solids::{Bounded, TaperedCapsule, comes_within, link_solids},
+    solids::{Bounded, TaperedCapsule, clearance, comes_within, link_solids},
 };
 use crate::{
     geometry::mesh_bvh::MeshBvh,
@@ -30,6 +30,10 @@ pub(super) const TOUCHING: f32 = -TOUCH_DEPTH + 2.0 * TOUCH_TOLERANCE;
 
 /// A link that starts deeper than this in a surface is inside from the start, in metres.
 const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
+
+/// The clearance below which a link is surely that deep, in metres, however it is rounded: most of those that are inside are
+/// known by it, which takes a tenth of the time that it takes to say how deep they are.
+const SURELY_INSIDE: f32 = -INSIDE_DEPTH - TOUCH_TOLERANCE;
 
 /// Room that a relaxed digit leaves between itself and the object, in metres: enough to be seen.
 const RELAXED_CLEARANCE: f32 = 0.001;
@@ -217,7 +221,8 @@ impl Closing<'_> {
         links.iter().enumerate().all(is_free)
             && !links
                 .iter()
-                .any(|link| comes_within(link, self.surface, -INSIDE_DEPTH))
+                .any(|link| comes_within(link, self.surface, SURELY_INSIDE))
+            && self.smallest_clearance(&links, INSIDE_DEPTH) >= -INSIDE_DEPTH
     }
 
     fn is_obstructed(&self, index: usize, link: &TaperedCapsule) -> bool {
@@ -262,7 +267,13 @@ impl Closing<'_> {
         link_solids(self.plane.joints(angles), self.radii)
     }
 
+    /// The smallest clearance of some links, up to `enough`.
+    fn smallest_clearance(&self, links: &[TaperedCapsule], enough: f32) -> f32 {
+        let smallest = |least: f32, link| clearance(link, self.surface, least).min(least);
+        links.iter().fold(enough, smallest)
+    }
+
     fn link_touches(&self, link: &TaperedCapsule) -> bool {
-        comes_within(link, self.surface, TOUCHING)
+        clearance(link, self.surface, TOUCHING) < TOUCHING
     }
 }
