@@ -31,8 +31,9 @@ pub(super) const TOUCHING: f32 = -TOUCH_DEPTH + 2.0 * TOUCH_TOLERANCE;
 /// A link that starts deeper than this in a surface is inside from the start, in metres.
 const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
 
-/// The clearance below which a link is surely that deep, in metres, however it is rounded: most of those that are inside are
-/// known by it, which takes a tenth of the time that it takes to say how deep they are.
+/// The clearance below which a link is surely that deep, in metres, however it is rounded. Most of those that are inside are
+/// known by it, without a look at how deep they are: that saves a fifth of the time of an attempt on a mug, a tenth on a
+/// wineglass and nothing on scissors. A lower one leaves more to be looked at.
 const SURELY_INSIDE: f32 = -INSIDE_DEPTH - TOUCH_TOLERANCE;
 
 /// Room that a relaxed digit leaves between itself and the object, in metres: enough to be seen.
