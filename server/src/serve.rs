@@ -5,6 +5,7 @@ use std::{
     num::NonZeroUsize,
     path::{Path, PathBuf},
     sync::Arc,
+    thread,
     time::Duration,
 };
 
@@ -304,13 +305,16 @@ fn tell(path: &Path, objects: Vec<StoredObject>) -> Vec<StoredObject> {
     objects
 }
 
-/// Has the built-in hands read now, which takes milliseconds, instead of by the first call that names them.
+/// Has the built-in hands read now, and what search derives of them, instead of by the first call that needs them: it
+/// takes tenths of a second, which no budget would end.
 fn read_hands() {
-    for rig in RIG_NAMES {
-        for handedness in [Handedness::Left, Handedness::Right] {
-            hands::hand(rig, handedness);
+    thread::scope(|scope| {
+        for rig in RIG_NAMES {
+            for handedness in [Handedness::Left, Handedness::Right] {
+                scope.spawn(move || hands::hand(rig, handedness).map(|hand| hand.rig.oppositions()));
+            }
         }
-    }
+    });
 }
 
 /// Reflection for the contract and for health.

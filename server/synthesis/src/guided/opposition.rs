@@ -210,7 +210,11 @@ struct Meeting {
     index_alone: bool,
 }
 
+/// Which of the shares that steps change move the thumb's pad; the others move the fingers'.
+const OF_THUMB: [bool; 5] = [true, true, false, true, false];
+
 /// Pads of a hand.
+#[derive(Clone, Copy, Debug)]
 struct Pads {
     /// Thumb and fingers: a point on the skin in the wrist's frame, in metres, and the direction that it faces.
     thumb: (Vec3, Vec3),
@@ -241,26 +245,40 @@ impl Meeting {
                 (meeting, miss) = (start, its_miss);
             }
         }
+        let mut pads = meeting.pads(rig);
         for step in 0..STEPS {
             let size = FIRST_STEP * (1.0 - step as f32 / STEPS as f32);
-            let stepped = meeting.stepped(size, stream);
-            let its_miss = stepped.pads(rig).miss(width);
+            let (stepped, its_pads) = meeting.stepped(rig, &pads, size, stream);
+            let its_miss = its_pads.miss(width);
             if its_miss < miss {
-                (meeting, miss) = (stepped, its_miss);
+                (meeting, pads, miss) = (stepped, its_pads, its_miss);
             }
         }
-        meeting.opposition(rig, width)
+        meeting.opposition(&pads, width)
     }
 
-    /// A hand that is a little different.
-    fn stepped(&self, size: f32, stream: &mut AttemptStream) -> Self {
+    /// A hand that is a little different, and its pads: what is not of the digits that move stays where it is.
+    fn stepped(&self, rig: &Rig, pads: &Pads, size: f32, stream: &mut AttemptStream) -> (Self, Pads) {
         let mut moved = self.shares();
         let which = stream.below(moved.len());
         moved[which] = (moved[which] + stream.between(-size, size)).clamp(0.0, 1.0);
-        self.with_shares(moved)
+        let stepped = self.with_shares(moved);
+        let pads = if OF_THUMB[which] {
+            Pads {
+                thumb: stepped.thumb_pad(rig),
+                ..*pads
+            }
+        } else {
+            Pads {
+                fingers: stepped.fingers_pad(rig),
+                ..*pads
+            }
+        };
+        (stepped, pads)
     }
 
     /// What the steps change, each from 0 to 1: the thumb's yaw, how far thumb and fingers are closed, and how they bend.
+    /// Which are the thumb's is said by [`OF_THUMB`].
     fn shares(&self) -> [f32; 5] {
         let [least, most] = BEND_RATIO;
         let [thumb, fingers] = self
@@ -290,12 +308,30 @@ impl Meeting {
     }
 
     fn pads(&self, rig: &Rig) -> Pads {
-        let pad = |digit, link, closed, spot| pad(rig, digit, &self.shape, link, closed, spot);
-        let [thumb_closed, fingers_closed] = self.closed;
-        let finger = |digit| pad(digit, self.finger_link, fingers_closed, self.spots[1]);
+        Pads {
+            thumb: self.thumb_pad(rig),
+            fingers: self.fingers_pad(rig),
+        }
+    }
+
+    fn thumb_pad(&self, rig: &Rig) -> (Vec3, Vec3) {
+        pad(rig, Digit::Thumb, &self.shape, 2, self.closed[0], self.spots[0])
+    }
+
+    fn fingers_pad(&self, rig: &Rig) -> (Vec3, Vec3) {
+        let finger = |digit| {
+            pad(
+                rig,
+                digit,
+                &self.shape,
+                self.finger_link,
+                self.closed[1],
+                self.spots[1],
+            )
+        };
         let index = finger(Digit::Index);
         // The two fingers next to the thumb decide: the others follow.
-        let fingers = if self.shape.closing[Digit::Middle.index()] && !self.index_alone {
+        if self.shape.closing[Digit::Middle.index()] && !self.index_alone {
             let middle = finger(Digit::Middle);
             (
                 (index.0 + middle.0) * 0.5,
@@ -303,15 +339,10 @@ impl Meeting {
             )
         } else {
             index
-        };
-        Pads {
-            thumb: pad(Digit::Thumb, 2, thumb_closed, self.spots[0]),
-            fingers,
         }
     }
 
-    fn opposition(&self, rig: &Rig, width: f32) -> Option<Opposition> {
-        let pads = self.pads(rig);
+    fn opposition(&self, pads: &Pads, width: f32) -> Option<Opposition> {
         let [thumb_cos, fingers_cos] = pads.facing();
         let fits = (pads.width() - width).abs() <= WIDTH_ROOM;
         (fits && thumb_cos.min(fingers_cos) >= least_cos(width)).then(|| Opposition {
