@@ -143,3 +143,25 @@ fn moved_balls_are_near_where_one_of_them_is() {
     assert!(near > 300 && far > 300, "{near} near, {far} far");
     assert!(close > 500, "{close} told to the millimetre");
 }
+
+#[test]
+fn points_are_as_far_as_from_the_nearest_solid() {
+    let mut random = Random::new(37);
+    let mut off = Vec::new();
+    for _ in 0..2000 {
+        let giver = told_hand(&mut random, Vec3::ZERO);
+        let point = random.direction() * random.between(0.0, 0.3);
+        let told = PreparedHand::new(&giver).point_distance_at_most(point);
+        let least = giver.iter().map(|solid| solid.signed_distance(point));
+        let least = least.fold(f32::INFINITY, f32::min);
+        assert!(told >= least - 1e-5, "{told} is less than {least}");
+        off.push(told - least);
+    }
+    off.sort_by(f32::total_cmp);
+    assert!(
+        off[1000] < 1e-4 && off[1800] < 2e-3,
+        "{} and {}",
+        off[1000],
+        off[1800]
+    );
+}

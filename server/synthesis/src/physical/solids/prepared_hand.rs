@@ -119,6 +119,19 @@ impl PreparedHand {
         nears != 0
     }
 
+    /// Metres that a point is at most from the hand's skin, and hardly less where solids taper as a hand's do; below 0
+    /// inside.
+    #[inline]
+    pub fn point_distance_at_most(&self, point: Vec3) -> f32 {
+        let ToAxes { squares, along } = self.to_axes(point);
+        let mut least = f32::INFINITY;
+        for i in 0..LANES {
+            let distance = squares[i].sqrt() - (self.start_radii[i] + self.rises[i] * along[i]);
+            least = if distance < least { distance } else { least };
+        }
+        least
+    }
+
     /// True only if one of some balls comes nearer to the hand than `distance` metres; not always then. Some 20 ns where
     /// the first solids settle it.
     #[inline]
