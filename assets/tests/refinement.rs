@@ -40,7 +40,7 @@ fn what_holds_stays_and_more_holds_beside_near_misses() {
     let (mut held, mut refined) = (0, 0);
     for index in 0..PROPOSALS {
         let mut stream = AttemptStream::new(17, index);
-        let Some(proposal) = propose(&place, &mut stream) else {
+        let Some(proposal) = propose(&place, &mut stream, &|| false) else {
             continue;
         };
         let first = plain.hold(&around, &proposal, &mut NoStopwatch, &|| false);

@@ -4,6 +4,7 @@ mod atlases;
 mod hands;
 mod holdouts;
 mod objects;
+mod prospects;
 
 use std::{
     fs, io,
@@ -67,6 +68,9 @@ enum Section {
     /// Atlases of the objects for both hands of the rig adult; minutes of work. With --check, they are read and some of
     /// their grips found again.
     Atlases,
+    /// The numbers by which GUIDED search prefers hands that are likely to hold, which are part of `grasp-synthesis`;
+    /// minutes of work.
+    Prospects,
     /// Objects, hands and holdouts; with --check, the atlases too.
     All,
 }
@@ -79,6 +83,7 @@ impl Section {
             Self::Hands => hands::generate(),
             Self::Holdouts => holdouts::generate(),
             Self::Atlases => atlases::generate(),
+            Self::Prospects => prospects::generate(),
             Self::All => [Self::Objects, Self::Hands, Self::Holdouts]
                 .into_iter()
                 .flat_map(Self::generate)

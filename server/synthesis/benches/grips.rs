@@ -113,7 +113,7 @@ fn proposals(criterion: &mut Criterion) {
             rig: rig(),
         };
         let proposals: Vec<_> = (0..PROPOSALS)
-            .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index)))
+            .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index), &|| false))
             .collect();
         group.bench_function(name, |bencher| {
             bencher.iter(|| {

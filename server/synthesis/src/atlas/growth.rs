@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     guided::{
-        proposal::{Place, propose},
+        proposal::{Place, propose_evenly},
         surface_pairs::SurfacePairs,
     },
     hand::{joints::HandJoints, rig::Rig},
@@ -308,7 +308,7 @@ impl<'a> Growth<'a> {
             Some(Some(starts)) if is_beside => starts.propose(self.grips.entries(), &place, stream),
             None if is_beside => Some(self.beside_known(stream)),
             // Beside a giver who leaves enough, most known grips are of no use.
-            _ => propose(&place, stream),
+            _ => propose_evenly(&place, stream, &|| false),
         }
     }
 

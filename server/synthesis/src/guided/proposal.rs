@@ -4,7 +4,11 @@ use std::f32::consts::TAU;
 
 use glam::{Mat3, Quat, Vec3};
 
-use super::{opposition::draw_shape, surface_pairs::SurfacePairs};
+use super::{
+    opposition::{Opposition, draw_shape},
+    prospects::{Bulk, TAUGHT},
+    surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
+};
 use crate::{
     hand::rig::Rig,
     object::GraspObject,
@@ -33,6 +37,20 @@ const MOST_PLACES: usize = 12;
 /// … turns of a hand at a place.
 const MOST_TURNS: usize = 10;
 
+/// Places of which those come first where a hand is likely to hold. More make unlikely ones rarer, and take more time, a
+/// half of a microsecond each.
+const COMPARED: usize = 64;
+
+/// How much what is likely to hold is preferred: the power of that likelihood by which it comes first. Higher ones find
+/// grasps sooner where the network is right, and more alike.
+const PREFERENCE: f32 = 2.0;
+
+/// Share of proposals for which nothing is preferred: what the network is wrong about must be found, too.
+const EVEN_SHARE: f32 = 0.2;
+
+/// Pairs and points that are drawn until one is off the giver's hand.
+const MOST_DRAWS: usize = 64;
+
 /// How deep in the object digits may be where they are expected to end, in metres: they stop before. Where the object is
 /// thin, as thick as a finger ([`THIN`]), a digit is deep in it wherever it touches. Less refuses hands that would do.
 const PAD_DEPTHS: [f32; 2] = [0.0075, 0.005];
@@ -51,7 +69,7 @@ const PALM_START: f32 = 0.03;
 pub struct Place<'a> {
     /// What is to be held.
     pub object: &'a GraspObject,
-    /// Where it may be held: what the giver's hand leaves of the object's.
+    /// Where it may be held: the object's, or what the giver's hand leaves of them.
     pub surface: &'a SurfacePairs,
     /// The giver's hand, if it is there already.
     pub giver: Option<&'a PreparedHand>,
@@ -59,56 +77,187 @@ pub struct Place<'a> {
     pub rig: &'a Rig,
 }
 
-/// Draws a proposal; none where there was no room for the hands that were drawn.
-pub fn propose(place: &Place<'_>, stream: &mut AttemptStream) -> Option<Proposal> {
-    let from_palm = stream.unit() < PALM_SHARE;
-    (0..MOST_PLACES).find_map(|_| {
-        if from_palm {
-            place.palm_on_surface(stream)
-        } else {
-            place.pads_on_pair(stream)
-        }
-    })
+/// A hand whose opposed pads are at opposed points of the surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate<'a> {
+    /// How the pads oppose each other.
+    pub opposition: &'a Opposition,
+    /// The points.
+    pub pair: SurfacePair,
+    /// The wrist frame in the object's.
+    pub object_from_wrist: Pose,
 }
 
-impl Place<'_> {
-    /// Brings opposed pads to opposed points of the surface, and turns the hand about the line between them until palm
-    /// and forearm have room.
-    fn pads_on_pair(&self, stream: &mut AttemptStream) -> Option<Proposal> {
-        let pair = self.surface.pair(stream)?;
+impl<'a> Candidate<'a> {
+    /// The hand turned anyhow about the line between the points.
+    fn drawn(opposition: &'a Opposition, pair: SurfacePair, stream: &mut AttemptStream) -> Self {
+        let across = opposition.fingers - opposition.thumb;
+        let target = (pair.end - pair.start).normalize_or(Vec3::X);
+        let arc = Quat::from_rotation_arc(across.normalize_or(Vec3::X), target);
+        let turn = Quat::from_axis_angle(target, stream.between(0.0, TAU));
+        let orientation = (turn * arc).normalize();
+        let middle = (pair.start + pair.end) * 0.5;
+        let position = middle - orientation * ((opposition.thumb + opposition.fingers) * 0.5);
+        Self {
+            opposition,
+            pair,
+            object_from_wrist: Pose::new(position, orientation),
+        }
+    }
+
+    /// The hand to be closed.
+    pub fn proposal(&self) -> Proposal {
+        Proposal {
+            object_from_wrist: self.object_from_wrist,
+            shape: self.opposition.shape,
+            advance: 0.0,
+        }
+    }
+}
+
+/// Draws a proposal, of which likely ones are preferred; none where there was no room for the hands that were drawn, or if
+/// interrupted.
+pub fn propose(
+    place: &Place<'_>,
+    stream: &mut AttemptStream,
+    interrupted: &impl Fn() -> bool,
+) -> Option<Proposal> {
+    if stream.unit() < EVEN_SHARE {
+        propose_evenly(place, stream, interrupted)
+    } else if stream.unit() < PALM_SHARE {
+        place.palm_on_surface(stream, interrupted)
+    } else {
+        place.likely_pads_on_pair(stream, interrupted)
+    }
+}
+
+/// Draws a proposal, none preferred: an atlas is to know of all.
+pub fn propose_evenly(
+    place: &Place<'_>,
+    stream: &mut AttemptStream,
+    interrupted: &impl Fn() -> bool,
+) -> Option<Proposal> {
+    if stream.unit() < PALM_SHARE {
+        return place.palm_on_surface(stream, interrupted);
+    }
+    (0..MOST_PLACES)
+        .take_while(|_| !interrupted())
+        .find_map(|_| Some(place.pads_on_pair(stream)?.proposal()))
+}
+
+impl<'a> Place<'a> {
+    /// Brings opposed pads to opposed points of the surface, and turns the hand about the line between them until palm,
+    /// forearm and digits have room.
+    pub fn pads_on_pair(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
+        let pair = self.free_pair(stream)?;
+        let opposition = self.opposing(&pair, stream)?;
+        let links = opposition.link_balls(self.rig);
+        (0..MOST_TURNS)
+            .map(|_| Candidate::drawn(opposition, pair, stream))
+            .find(|candidate| self.fits(candidate, &links))
+    }
+
+    /// The same where hands are likely to hold, turned so that they are.
+    fn likely_pads_on_pair(
+        &self,
+        stream: &mut AttemptStream,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<Proposal> {
+        let bulk = Bulk::of(self.object);
+        let mut places = Vec::with_capacity(COMPARED);
+        for _ in 0..COMPARED {
+            let Some(pair) = self.free_pair(stream) else { break };
+            if let Some(opposition) = self.opposing(&pair, stream) {
+                places.push(Candidate::drawn(opposition, pair, stream));
+            }
+        }
+        self.by_prospect(&bulk, places, stream)
+            .iter()
+            .take(MOST_PLACES)
+            .take_while(|_| !interrupted())
+            .find_map(|place| {
+                let turned = (0..MOST_TURNS).map(|_| Candidate::drawn(place.opposition, place.pair, stream));
+                let turned = self.by_prospect(&bulk, turned.collect(), stream);
+                let links = place.opposition.link_balls(self.rig);
+                let fitting = turned.iter().find(|candidate| self.fits(candidate, &links))?;
+                Some(fitting.proposal())
+            })
+    }
+
+    /// In an order by chance, in which those come early that are likely to hold.
+    fn by_prospect(
+        &self,
+        bulk: &Bulk,
+        candidates: Vec<Candidate<'a>>,
+        stream: &mut AttemptStream,
+    ) -> Vec<Candidate<'a>> {
+        let mut keyed: Vec<(f32, Candidate<'_>)> = candidates
+            .into_iter()
+            .map(|candidate| {
+                let Candidate {
+                    opposition,
+                    object_from_wrist,
+                    ..
+                } = candidate;
+                let told = bulk.told(self.rig, opposition, object_from_wrist, self.giver);
+                let log_prospect = -(-TAUGHT.log_odds(&told)).exp().ln_1p();
+                // Gumbel's trick: by these keys, they are drawn without replacement by their weights.
+                let chance = -(-stream.unit().max(f32::MIN_POSITIVE).ln()).ln();
+                (PREFERENCE * log_prospect + chance, candidate)
+            })
+            .collect();
+        keyed.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        keyed.into_iter().map(|(_, candidate)| candidate).collect()
+    }
+
+    /// How a hand can oppose its pads at the pair's ends; none if it cannot.
+    fn opposing(&self, pair: &SurfacePair, stream: &mut AttemptStream) -> Option<&'a Opposition> {
         let room = [
             pair.thickness - THICKNESS_ROOM[0],
             pair.thickness + THICKNESS_ROOM[1],
         ];
-        let opposition = self.rig.oppositions().draw(room, stream)?;
-        let across = opposition.fingers - opposition.thumb;
-        let target = (pair.end - pair.start).normalize_or(Vec3::X);
-        let arc = Quat::from_rotation_arc(across.normalize_or(Vec3::X), target);
-        let middle = (pair.start + pair.end) * 0.5;
-        let links = opposition.link_balls(self.rig);
-        let pad_depth = PAD_DEPTHS[usize::from(pair.thickness > THIN)];
-        (0..MOST_TURNS).find_map(|_| {
-            let turn = Quat::from_axis_angle(target, stream.between(0.0, TAU));
-            let orientation = (turn * arc).normalize();
-            let position = middle - orientation * ((opposition.thumb + opposition.fingers) * 0.5);
-            let object_from_wrist = Pose::new(position, orientation);
-            let has_room =
-                self.has_room(object_from_wrist) && self.have_room(object_from_wrist, &links, pad_depth);
-            has_room.then_some(Proposal {
-                object_from_wrist,
-                shape: opposition.shape,
-                advance: 0.0,
-            })
-        })
+        self.rig.oppositions().draw(room, stream)
+    }
+
+    /// A pair off the giver's hand; none if that is everywhere.
+    fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
+        (0..MOST_DRAWS)
+            .map_while(|_| self.surface.pair(stream))
+            .find(|pair| self.giver.is_none_or(|giver| pair.is_free_of(giver)))
+    }
+
+    /// A point off the giver's hand; none if that is everywhere.
+    fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
+        (0..MOST_DRAWS)
+            .map_while(|_| self.surface.point(stream))
+            .find(|point| self.giver.is_none_or(|giver| point.is_free_of(giver)))
+    }
+
+    /// True if palm, forearm and digits, whose balls are `links`, have room there.
+    fn fits(&self, candidate: &Candidate<'_>, links: &[(Vec3, f32)]) -> bool {
+        let pad_depth = PAD_DEPTHS[usize::from(candidate.pair.thickness > THIN)];
+        self.has_room(candidate.object_from_wrist)
+            && self.have_room(candidate.object_from_wrist, links, pad_depth)
+    }
+
+    /// Lays the palm on the surface where there is room.
+    fn palm_on_surface(
+        &self,
+        stream: &mut AttemptStream,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<Proposal> {
+        (0..MOST_PLACES)
+            .take_while(|_| !interrupted())
+            .find_map(|_| self.palm_on_point(stream))
     }
 
     /// Holds the palm over a point of the surface, facing it, turned until the forearm has room.
-    fn palm_on_surface(&self, stream: &mut AttemptStream) -> Option<Proposal> {
+    fn palm_on_point(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let shape = HandShape {
             closing: [true; 5],
             ..draw_shape(f32::INFINITY, stream)
         };
-        let point = self.surface.point(stream)?;
+        let point = self.free_point(stream)?;
         let (a, b) = point.normal.any_orthonormal_pair();
         let tilted = point.normal
             + a * stream.between(-PALM_TILT, PALM_TILT)

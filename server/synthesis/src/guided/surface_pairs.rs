@@ -42,6 +42,13 @@ pub struct SurfacePoint {
     pub normal: Vec3,
 }
 
+impl SurfacePoint {
+    /// True if a palm has room there beside a giver's hand.
+    pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
+        !giver.surely_nears(self.position, 0.0, PALM_ROOM)
+    }
+}
+
 /// Two points of the surface that opposed digits may press together, straight through the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePair {
@@ -51,6 +58,15 @@ pub struct SurfacePair {
     pub end: Vec3,
     /// Distance between them.
     pub thickness: f32,
+}
+
+impl SurfacePair {
+    /// True if fingers have room at both ends beside a giver's hand.
+    pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
+        [self.start, self.end]
+            .iter()
+            .all(|&end| !giver.surely_nears(end, 0.0, FINGER_ROOM))
+    }
 }
 
 /// What GUIDED search knows of an object's surface. In the object's frame.
@@ -120,22 +136,21 @@ impl SurfacePairs {
         found
     }
 
-    /// The pairs and points that a giver's hand leaves free: those that a finger, and a palm, has room at. Where a giver
-    /// covers most of an object, most draws would be in vain otherwise.
+    /// The pairs and points that a giver's hand leaves free: those that a finger, and a palm, has room at. Worth its time
+    /// where much is drawn from them.
     #[must_use]
     pub fn free_of(&self, giver: &PreparedHand) -> Self {
-        let is_free = |point: Vec3, room: f32| !giver.surely_nears(point, 0.0, room);
         Self {
             pairs: self
                 .pairs
                 .iter()
-                .filter(|pair| is_free(pair.start, FINGER_ROOM) && is_free(pair.end, FINGER_ROOM))
+                .filter(|pair| pair.is_free_of(giver))
                 .copied()
                 .collect(),
             points: self
                 .points
                 .iter()
-                .filter(|point| is_free(point.position, PALM_ROOM))
+                .filter(|point| point.is_free_of(giver))
                 .copied()
                 .collect(),
         }

@@ -149,7 +149,7 @@ impl Attempt {
         };
         let starts = scene.starts(known, around.presented, interrupted);
         let starts = starts.ok_or(Interrupted)?;
-        let place = scene.place();
+        let place = scene.place(stream.attempt());
         for _ in 0..BESIDE_KNOWN {
             if interrupted() {
                 return Err(Interrupted);
@@ -186,10 +186,14 @@ impl Attempt {
 
         // Step 1, Wrist Placement.
         let proposal = if scene.strategy == Strategy::Guided {
-            let proposal = scene.guided_proposal(stream);
+            let proposal = scene.guided_proposal(stream, interrupted);
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else {
-                return reject(Rejection::NoContacts);
+                return if interrupted() {
+                    AttemptEnd::Interrupted
+                } else {
+                    reject(Rejection::NoContacts)
+                };
             };
             self.wrist = WristFrame::new(proposal.object_from_wrist);
             Some(proposal)

@@ -17,6 +17,7 @@ const SIGNED_21: f32 = 1.0 / (1 << 20) as f32;
 /// workers, attempt i of a seed draws the same numbers.
 #[derive(Clone, Debug)]
 pub struct AttemptStream {
+    attempt: u64,
     generator: Xoshiro256PlusPlus,
 }
 
@@ -27,8 +28,14 @@ impl AttemptStream {
         // mixed first, so that seed 1 is not seed 0 shifted by an index.
         let state = mix(mix(seed).wrapping_add(attempt));
         Self {
+            attempt,
             generator: Xoshiro256PlusPlus::seed_from_u64(state),
         }
+    }
+
+    /// The attempt's index.
+    pub fn attempt(&self) -> u64 {
+        self.attempt
     }
 
     /// A number in [0, 1).

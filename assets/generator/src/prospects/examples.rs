@@ -1,0 +1,111 @@
+//! Hands that were closed on a shape, and whether they held.
+
+use glam::Vec3;
+use grasp_synthesis::{
+    constraints::Constraints,
+    guided::{
+        proposal::Place,
+        prospects::{Bulk, TOLD},
+    },
+    hand::{HandPose, joints::HandJoints, rig::Rig},
+    physical::{
+        attempt::{PhysicalAttempt, Surroundings},
+        scene::{ObjectScene, Presented},
+        solids::{PreparedHand, ToldSolids},
+    },
+    strategy::Validity,
+    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+};
+
+use super::shapes;
+
+/// Hands that are drawn for a shape; those that have no room are no examples.
+const DRAWN: u64 = 6000;
+
+/// Hands of a shape that are closed at most.
+const CLOSED: usize = 1500;
+
+/// Hands that are drawn for one gravity and giver.
+const ROUND: u64 = 64;
+
+/// Grips from which on some are taken for a giver's.
+const ENOUGH_FOR_GIVERS: usize = 20;
+
+/// Seeds of the hands, and of gravity and givers: any will do.
+const SEEDS: [u64; 2] = [0x4558_414d, 0x5052_4553];
+
+/// A hand that was closed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Example {
+    /// What the network is told of it.
+    pub(super) told: [f32; TOLD],
+    /// Did it hold?
+    pub(super) holds: bool,
+}
+
+/// The hands of a shape, none preferred; every other round has a giver, whose hand is one that held before.
+pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
+    let object = shapes::draw(number);
+    let scene = ObjectScene::new(&object, object.friction_under(Validity::Physical));
+    let bulk = Bulk::of(&object);
+    let constraints = Constraints::default();
+    let mut attempt = PhysicalAttempt::default();
+    let mut holding: Vec<HandPose> = Vec::new();
+    let mut examples = Vec::with_capacity(CLOSED);
+    let [hands, presenting] = SEEDS.map(|seed| seed.wrapping_add(number << 32));
+    for round in 0..DRAWN / ROUND {
+        let presented = present(
+            &holding,
+            rig,
+            &mut AttemptStream::new(presenting, round),
+            round % 2 == 1,
+        );
+        let place = Place {
+            object: &object,
+            surface: &object.surface_pairs,
+            giver: presented.giver.as_ref(),
+            rig,
+        };
+        let around = Surroundings {
+            object: scene,
+            presented: &presented,
+            rig,
+            constraints: &constraints,
+        };
+        for index in round * ROUND..(round + 1) * ROUND {
+            if examples.len() >= CLOSED {
+                return examples;
+            }
+            let Some(candidate) = place.pads_on_pair(&mut AttemptStream::new(hands, index)) else {
+                continue;
+            };
+            let held = attempt.hold(&around, &candidate.proposal(), &mut NoStopwatch, &|| false);
+            examples.push(Example {
+                told: bulk.told(
+                    rig,
+                    candidate.opposition,
+                    candidate.object_from_wrist,
+                    place.giver,
+                ),
+                holds: held.is_ok(),
+            });
+            if let Ok(grasp) = held {
+                holding.push(grasp.pose);
+            }
+        }
+    }
+    examples
+}
+
+fn present(holding: &[HandPose], rig: &Rig, stream: &mut AttemptStream, by_giver: bool) -> Presented {
+    let up = stream.rotation() * Vec3::Y;
+    let giver = (by_giver && holding.len() >= ENOUGH_FOR_GIVERS).then(|| {
+        let pose = &holding[stream.below(holding.len())];
+        PreparedHand::new(&ToldSolids::of_joints(&HandJoints::of_pose(rig, pose)))
+    });
+    Presented {
+        giver,
+        giver_palm: None,
+        up,
+    }
+}

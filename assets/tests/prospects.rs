@@ -1,0 +1,219 @@
+//! The network by which GUIDED search prefers hands, on objects that it was not taught on.
+
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use grasp_assets::{hands::hand, objects::object};
+use grasp_synthesis::{
+    constraints::Constraints,
+    geometry::mesh::TriangleMesh,
+    guided::{
+        opposition::Opposition,
+        proposal::{Candidate, Place, propose, propose_evenly},
+        prospects::{Bulk, FARTHEST, TAUGHT, TOLD, UNITS},
+    },
+    hand::{HandPose, Handedness, joints::HandJoints, rig::Rig},
+    object::GraspObject,
+    physical::{
+        attempt::{PhysicalAttempt, Surroundings},
+        scene::{ObjectScene, Presented},
+        shape::Proposal,
+        solids::{PreparedHand, ToldSolids},
+    },
+    pose::Pose,
+    strategy::Validity,
+    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+};
+
+const PRESENTED: Presented = Presented {
+    giver: None,
+    giver_palm: None,
+    up: Vec3::Y,
+};
+
+fn rig(side: Handedness) -> &'static Rig {
+    &hand("adult", side).expect("the rig is built in").rig
+}
+
+fn built_in(name: &str) -> Arc<GraspObject> {
+    Arc::clone(&object(name).expect("it is built in").object)
+}
+
+fn place(object: &GraspObject) -> Place<'_> {
+    Place {
+        object,
+        surface: &object.surface_pairs,
+        giver: None,
+        rig: rig(Handedness::Right),
+    }
+}
+
+/// Does the hand hold, when it is closed?
+fn holds(object: &GraspObject, proposal: &Proposal, attempt: &mut PhysicalAttempt) -> bool {
+    let around = Surroundings {
+        object: ObjectScene::new(object, object.friction_under(Validity::Physical)),
+        presented: &PRESENTED,
+        rig: rig(Handedness::Right),
+        constraints: &Constraints::default(),
+    };
+    attempt
+        .hold(&around, proposal, &mut NoStopwatch, &|| false)
+        .is_ok()
+}
+
+#[test]
+fn hands_that_are_rated_better_hold_more_often() {
+    for name in ["remote", "scalpel", "scissors"] {
+        let object = built_in(name);
+        let bulk = Bulk::of(&object);
+        let mut attempt = PhysicalAttempt::default();
+        let mut rated: Vec<(f32, bool)> = (0..6000)
+            .filter_map(|index| {
+                let candidate = place(&object).pads_on_pair(&mut AttemptStream::new(41, index))?;
+                let told = bulk.told(
+                    rig(Handedness::Right),
+                    candidate.opposition,
+                    candidate.object_from_wrist,
+                    None,
+                );
+                let holds = holds(&object, &candidate.proposal(), &mut attempt);
+                Some((TAUGHT.log_odds(&told), holds))
+            })
+            .collect();
+        rated.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let held = |rated: &[(f32, bool)]| rated.iter().filter(|(_, holds)| *holds).count();
+        let (better, worse) = rated.split_at(rated.len() / 2);
+        assert!(
+            held(better) >= 2 * held(worse) && held(better) >= 20,
+            "{name}: of {} {} hold of the half rated better, {} of the other",
+            rated.len(),
+            held(better),
+            held(worse)
+        );
+    }
+}
+
+#[test]
+fn hands_that_are_preferred_hold_more_often() {
+    let remote = built_in("remote");
+    let count = |draw: &dyn Fn(&Place<'_>, &mut AttemptStream) -> Option<Proposal>| {
+        let mut attempt = PhysicalAttempt::default();
+        (0..1500)
+            .filter(|&index| {
+                let proposal = draw(&place(&remote), &mut AttemptStream::new(43, index));
+                proposal.is_some_and(|proposal| holds(&remote, &proposal, &mut attempt))
+            })
+            .count()
+    };
+    let (preferred, even) = (
+        count(&|place, stream| propose(place, stream, &|| false)),
+        count(&|place, stream| propose_evenly(place, stream, &|| false)),
+    );
+    assert!(2 * preferred > 3 * even, "{preferred} and {even} of 1500 hold");
+    assert!(even > 50, "only {even} of 1500 hold");
+}
+
+#[test]
+fn a_network_is_its_formula() {
+    let mut stream = AttemptStream::new(47, 0);
+    for _ in 0..100 {
+        let told: [f32; TOLD] =
+            std::array::from_fn(|i| TAUGHT.means[i] + stream.between(-6.0, 6.0) / TAUGHT.scales[i]);
+        let mut answer = f64::from(TAUGHT.output_bias);
+        for unit in 0..UNITS {
+            let mut sum = f64::from(TAUGHT.biases[unit]);
+            for i in 0..TOLD {
+                let scaled = (f64::from(told[i]) - f64::from(TAUGHT.means[i])) * f64::from(TAUGHT.scales[i]);
+                let scaled = scaled.clamp(-f64::from(FARTHEST), f64::from(FARTHEST));
+                sum += scaled * f64::from(TAUGHT.weights[i][unit]);
+            }
+            answer += sum.max(0.0) * f64::from(TAUGHT.outputs[unit]);
+        }
+        let off = (f64::from(TAUGHT.log_odds(&told)) - answer).abs();
+        assert!(off < 1e-4, "{off} off {answer}");
+    }
+}
+
+/// A wedge that is unlike its mirror image.
+fn wedge(mirrored: bool) -> GraspObject {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [0.03, 0.0, 0.0],
+        [0.0, 0.12, 0.0],
+        [0.01, 0.02, 0.05],
+    ];
+    let flip = if mirrored { -1.0 } else { 1.0 };
+    let positions = corners.map(|[x, y, z]| Vec3::new(flip * x, y, z));
+    let mut triangles = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    if mirrored {
+        triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    }
+    let mesh = TriangleMesh::new(positions.to_vec(), triangles.to_vec()).expect("it is a mesh");
+    let centre = Vec3::new(flip * 0.008, 0.03, 0.01);
+    GraspObject::new(mesh, 0.1, centre, None, &[]).expect("it is sound")
+}
+
+#[test]
+fn a_mirrored_hand_is_told_the_same() {
+    let right = rig(Handedness::Right);
+    let left = right.mirrored();
+    let [bulk, mirrored_bulk] = [false, true].map(|mirrored| Bulk::of(&wedge(mirrored)));
+    let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);
+    let [giver, mirrored_giver] = [right, &left].map(|rig| {
+        let pose = HandPose {
+            frame_from_wrist: Pose::from_position(Vec3::new(0.0, -0.1, 0.03)),
+            digits: rig.stretched(),
+        };
+        PreparedHand::new(&ToldSolids::of_joints(&HandJoints::of_pose(rig, &pose)))
+    });
+    for index in 0..50 {
+        let mut stream = AttemptStream::new(53, index);
+        let opposition = right
+            .oppositions()
+            .draw([0.0, 0.2], &mut stream)
+            .expect("there are some");
+        let mirrored = Opposition {
+            thumb: flip(opposition.thumb),
+            fingers: flip(opposition.fingers),
+            ..*opposition
+        };
+        let turn = stream.rotation();
+        let place = Pose::new(0.1 * stream.in_cube(), turn);
+        let mirrored_place = Pose::new(
+            flip(place.position),
+            Quat::from_xyzw(turn.x, -turn.y, -turn.z, turn.w),
+        );
+        let told = bulk.told(right, opposition, place, Some(&giver));
+        let mirrored_told = mirrored_bulk.told(&left, &mirrored, mirrored_place, Some(&mirrored_giver));
+        for (i, (told, mirrored)) in told.iter().zip(mirrored_told).enumerate() {
+            // The box around a mirrored mesh is not to the last bit a mirrored box.
+            assert!((told - mirrored).abs() < 5e-3, "{i}: {told} and {mirrored}");
+        }
+    }
+}
+
+#[test]
+fn pads_of_candidates_are_on_the_line_of_their_points() {
+    let remote = built_in("remote");
+    let mut found = 0;
+    for index in 0..1000 {
+        let Some(Candidate {
+            opposition,
+            pair,
+            object_from_wrist,
+        }) = place(&remote).pads_on_pair(&mut AttemptStream::new(59, index))
+        else {
+            continue;
+        };
+        found += 1;
+        let [thumb, fingers] =
+            [opposition.thumb, opposition.fingers].map(|pad| object_from_wrist.transform_point(pad));
+        let middle = (pair.start + pair.end) * 0.5;
+        let across = (pair.end - pair.start).normalize();
+        assert!(((thumb + fingers) * 0.5).distance(middle) < 1e-5);
+        assert!((fingers - thumb).normalize().dot(across) > 0.9999);
+        let room = opposition.width() - pair.thickness;
+        assert!((-0.0061..=0.0121).contains(&room), "{room}");
+    }
+    assert!(found > 50, "only {found}");
+}
