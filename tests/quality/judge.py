@@ -38,6 +38,7 @@ def arguments():
     parser.add_argument("--validity", help="what the requests ask for, such as thesis (default: the server's)")
     parser.add_argument("--strategy", help="how to search, such as F (default: the server's)")
     parser.add_argument("--choice", help="which grasp to take, such as best (default: the server's)")
+    parser.add_argument("--no-atlas", action="store_true", help="ask for grasps that are found afresh")
     parser.add_argument("--rig", help="rig of the receiving hand (default: the server's)")
     parser.add_argument("--seed", type=int, default=1, help="start of the random holdouts and searches")
     parser.add_argument("--workers", type=int, help="threads of the server (default: the server's)")
@@ -121,14 +122,15 @@ def friction_in_force(request, told, validity):
     return PHYSICAL_FRICTION if validity == "physical" and abs(told - THESIS_FRICTION) < 1e-6 else told
 
 
-def ask(service, request, choice, **picture):
+def ask(service, request, options, **picture):
     """The answer within the usual budget, or else within a long one, and whether it was the usual one."""
     # The best grasp is looked for until the budget is over: there the server's own short one counts.
-    usual = None if choice == "best" else BUDGET_SECONDS
-    answer = service.find({**request, "budget_seconds": usual}, choice, **picture)
+    usual = None if options.choice == "best" else BUDGET_SECONDS
+    how = {"choice": options.choice, "no_atlas": options.no_atlas, **picture}
+    answer = service.find({**request, "budget_seconds": usual}, **how)
     in_time = answer["outcome"] == "found"
     if not in_time:
-        answer = service.find({**request, "budget_seconds": EXHAUSTIVE_SECONDS}, choice, **picture)
+        answer = service.find({**request, "budget_seconds": EXHAUSTIVE_SECONDS}, **how)
     return answer, in_time
 
 
@@ -147,7 +149,7 @@ def collect(names, options):
             for label, request, scene in cases(name, service, options, givers):
                 picture = pictures / f"{name}-{drawn[name]:02}.png"
                 wanted = {"picture": picture, "mesh": mesh_file} if drawn[name] < share else {}
-                answer, in_time = ask(service, request, options.choice, **wanted)
+                answer, in_time = ask(service, request, options, **wanted)
                 row = {"object": name, "holdout": label, "seed": request["seed"], "found": answer["grasp"] is not None}
                 row["search_ms"] = 1000 * answer["report"]["search_time_seconds"]
                 row["round_trip_ms"] = 1000 * answer["round_trip_seconds"]

@@ -63,9 +63,10 @@ class Service:
         """What the server tells about an object."""
         return self._client("objects", "get", name)
 
-    def find(self, request, choice=None, picture=None, mesh=None):
+    def find(self, request, choice=None, no_atlas=False, picture=None, mesh=None):
         """The answer to a request in the form of `grasp find --request`."""
         extra = ["--choice", choice] if choice else []
+        extra += ["--no-atlas"] if no_atlas else []
         extra += ["--png", picture, "--view-size", "480x400"] if picture else []
         if picture and mesh:
             extra += ["--mesh", mesh]

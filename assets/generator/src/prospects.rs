@@ -20,7 +20,7 @@ use examples::Example;
 /// The file, below the assets' folder.
 const PATH: &str = "../server/synthesis/src/guided/prospects/taught.rs";
 
-/// Shapes that the network is taught on. With a quarter as many, it rates shapes that it has not seen a little worse.
+/// Shapes that the network is taught on. More take longer, a fifth of a second each.
 const SHAPES: u64 = 480;
 
 /// Further shapes that it is examined on.
@@ -32,7 +32,7 @@ const BEST_SHARE: f64 = 0.1;
 /// Numbers on a line.
 const NUMBERS_PER_LINE: usize = 8;
 
-/// Makes the file: a minute or two.
+/// Makes the file: a minute or two on two cores.
 pub(crate) fn generate() -> Vec<AssetFile> {
     let rig = &hand("adult", Handedness::Right).expect("the rig is built in").rig;
     // Otherwise, every thread would make them.

@@ -46,15 +46,7 @@ struct Lesson {
 
 /// A network that rates hands of these shapes.
 pub(super) fn teach(by_shape: &[Vec<Example>]) -> Network {
-    let (means, scales) = spread(by_shape);
-    let mut network = Network {
-        means,
-        scales,
-        weights: [[0.0; UNITS]; TOLD],
-        biases: [0.0; UNITS],
-        outputs: [0.0; UNITS],
-        output_bias: 0.0,
-    };
+    let mut network = untaught(by_shape);
     let mut lessons = lessons(by_shape, &network);
     let mut numbers = first_numbers();
     let mut memory = [vec![0.0_f32; NUMBERS], vec![0.0_f32; NUMBERS]];
@@ -78,6 +70,19 @@ pub(super) fn teach(by_shape: &[Vec<Example>]) -> Network {
     }
     write(&numbers, &mut network);
     network
+}
+
+/// A network that only knows what is usual of what it is told.
+fn untaught(by_shape: &[Vec<Example>]) -> Network {
+    let (means, scales) = spread(by_shape);
+    Network {
+        means,
+        scales,
+        weights: [[0.0; UNITS]; TOLD],
+        biases: [0.0; UNITS],
+        outputs: [0.0; UNITS],
+        output_bias: 0.0,
+    }
 }
 
 /// Mean and inverse standard deviation of all that is told.
@@ -211,15 +216,7 @@ mod tests {
     #[test]
     fn the_gradient_is_that_of_differences() {
         let by_shape = [examples(1, 40), examples(2, 40)];
-        let (means, scales) = spread(&by_shape);
-        let mut network = Network {
-            means,
-            scales,
-            weights: [[0.0; UNITS]; TOLD],
-            biases: [0.0; UNITS],
-            outputs: [0.0; UNITS],
-            output_bias: 0.0,
-        };
+        let mut network = untaught(&by_shape);
         let batch = lessons(&by_shape, &network);
         let numbers = first_numbers();
         write(&numbers, &mut network);

@@ -3,8 +3,8 @@
 //!
 //! What a hand meets when it is closed decides in the end, and takes a hundred times longer. The network knows of the
 //! object's box and weight only how they lie in the hand, of its surface how thick it is between the pads, and of the
-//! giver how near pads and palm are; that is enough to see that fingers hold a mug by its body or handle, and not by the rim that most pairs of
-//! points lie on. The taught numbers (`taught.rs`) and the teacher's figures come from the assets' generator.
+//! giver how near pads and palm are. That is enough to see that fingers hold a mug by its body or handle, and not by the
+//! rim that most pairs of points lie on. What it was taught (`taught.rs`) comes from the assets' generator.
 
 mod taught;
 
