@@ -122,8 +122,8 @@ fn a_network_is_its_formula() {
         let mut answer = f64::from(TAUGHT.output_bias);
         for unit in 0..UNITS {
             let mut sum = f64::from(TAUGHT.biases[unit]);
-            for i in 0..TOLD {
-                let scaled = (f64::from(told[i]) - f64::from(TAUGHT.means[i])) * f64::from(TAUGHT.scales[i]);
+            for (i, told) in told.iter().enumerate() {
+                let scaled = (f64::from(*told) - f64::from(TAUGHT.means[i])) * f64::from(TAUGHT.scales[i]);
                 let scaled = scaled.clamp(-f64::from(FARTHEST), f64::from(FARTHEST));
                 sum += scaled * f64::from(TAUGHT.weights[i][unit]);
             }
@@ -146,7 +146,9 @@ fn wedge(mirrored: bool) -> GraspObject {
     let positions = corners.map(|[x, y, z]| Vec3::new(flip * x, y, z));
     let mut triangles = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
     if mirrored {
-        triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        for corners in &mut triangles {
+            corners.swap(1, 2);
+        }
     }
     let mesh = TriangleMesh::new(positions.to_vec(), triangles.to_vec()).expect("it is a mesh");
     let centre = Vec3::new(flip * 0.008, 0.03, 0.01);
@@ -209,9 +211,9 @@ fn pads_of_candidates_are_on_the_line_of_their_points() {
         let [thumb, fingers] =
             [opposition.thumb, opposition.fingers].map(|pad| object_from_wrist.transform_point(pad));
         let middle = (pair.start + pair.end) * 0.5;
-        let across = (pair.end - pair.start).normalize();
+        let across = (pair.end - pair.start).normalize_or_zero();
         assert!(((thumb + fingers) * 0.5).distance(middle) < 1e-5);
-        assert!((fingers - thumb).normalize().dot(across) > 0.9999);
+        assert!((fingers - thumb).normalize_or_zero().dot(across) > 0.9999);
         let room = opposition.width() - pair.thickness;
         assert!((-0.0061..=0.0121).contains(&room), "{room}");
     }
