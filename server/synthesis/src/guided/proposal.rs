@@ -219,14 +219,14 @@ impl<'a> Place<'a> {
         self.rig.oppositions().draw(room, stream)
     }
 
-    /// A pair off the giver's hand; none if that is everywhere.
+    /// A pair off the giver's hand; none if none of [`MOST_DRAWS`] is.
     fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
         (0..MOST_DRAWS)
             .map_while(|_| self.surface.pair(stream))
             .find(|pair| self.giver.is_none_or(|giver| pair.is_free_of(giver)))
     }
 
-    /// A point off the giver's hand; none if that is everywhere.
+    /// A point off the giver's hand; none if none of [`MOST_DRAWS`] is.
     fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
         (0..MOST_DRAWS)
             .map_while(|_| self.surface.point(stream))

@@ -27,7 +27,7 @@ pub const UNITS: usize = 32;
 /// How far from what it was taught, in standard deviations, a number may be told: further out, nothing was learned.
 pub const FARTHEST: f32 = 3.0;
 
-/// Pads and weights nearer than this are told as this near, in metres: logarithms have no zero.
+/// What is thinner or smaller than this is told as if it were this, in metres: logarithms have no zero.
 const LEAST_SIZE: f32 = 0.001;
 
 /// Farther than this, in metres, a giver's hand is as if it were not there.

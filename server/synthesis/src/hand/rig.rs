@@ -99,7 +99,8 @@ impl PartialEq for RigGuide {
 }
 
 impl Rig {
-    /// How thumb and fingers can oppose each other. Some 100 ms of work when it is first asked for.
+    /// How thumb and fingers can oppose each other. A tenth or two of a second of work when it is first
+    /// asked for.
     pub fn oppositions(&self) -> &Oppositions {
         self.guide.0.get_or_init(|| Oppositions::of(self))
     }
