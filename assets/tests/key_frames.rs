@@ -63,7 +63,7 @@ fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Pla
     let grasps = atlas
         .entries()
         .iter()
-        .filter_map(|entry| asked.hold(entry, &entry.solids(rig), &mut gripper));
+        .filter_map(|entry| asked.hold(entry, &entry.told_solids(rig), &mut gripper));
     grasps
         .map(|grasp| Planned {
             name: name.to_owned(),

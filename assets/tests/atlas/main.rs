@@ -3,5 +3,6 @@
 mod codec;
 mod exclusion;
 mod palm;
+mod shortlist;
 mod starts;
 mod support;

@@ -257,7 +257,7 @@ impl Maker {
         let scene = self.scene(cell);
         let (object, presented) = scene.physical()?;
         let entry = self.atlases.of(cell)?.entries().get(usize::from(entry))?;
-        let solids = entry.solids(scene.rig());
+        let solids = entry.told_solids(scene.rig());
         let asked = Asked::new(object, scene.rig(), presented);
         let grasp = asked.hold(entry, &solids, &mut Gripper::default())?;
         Some(Box::new(grasp))

@@ -10,7 +10,7 @@ use crate::{
         grip::{Gripper, clear_of_giver},
         immobility::{FrictionUse, balance_with},
         scene::{ObjectScene, Presented},
-        solids::HandSolids,
+        solids::ToldSolids,
     },
     score::score,
     strategy::Validity,
@@ -41,16 +41,15 @@ impl<'a> Asked<'a> {
     }
 
     /// The grasp that a grip is for what is presented, with its score; none if it comes too near to the giver or the object
-    /// slips. `solids` are the grip's.
-    pub fn hold(&self, entry: &Entry, solids: &HandSolids, gripper: &mut Gripper) -> Option<Grasp> {
+    /// slips. `solids` are the grip's, as [`Entry::told_solids`] gives them.
+    pub fn hold(&self, entry: &Entry, solids: &ToldSolids, gripper: &mut Gripper) -> Option<Grasp> {
         let Self {
             scene,
             rig,
             presented,
             ..
         } = *self;
-        let wrist = entry.grip.pose.frame_from_wrist;
-        let giver_clearance = clear_of_giver(rig, wrist, solids, presented.giver.as_ref())?;
+        let giver_clearance = clear_of_giver(solids, presented.giver.as_ref())?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
         let least_use = if self.friction_differs {

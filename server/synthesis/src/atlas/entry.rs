@@ -13,7 +13,7 @@ use crate::{
         grip::{Grip, Gripper},
         immobility::{FrictionUse, balance},
         scene::ObjectScene,
-        solids::HandSolids,
+        solids::{HandSolids, ToldSolids},
     },
     score::{Score, Values, force_values, grip_values},
     taxonomy::{Classification, classify},
@@ -99,6 +99,11 @@ impl Entry {
     /// The hand as solids, in the object's frame. They are not kept, as they would take twice as much memory as the rest.
     pub fn solids(&self, rig: &Rig) -> HandSolids {
         HandSolids::of_pose(rig, &self.grip.pose)
+    }
+
+    /// The same for where it is beside a giver's.
+    pub fn told_solids(&self, rig: &Rig) -> ToldSolids {
+        ToldSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids(rig))
     }
 
     /// Which digits hold, thumb first.

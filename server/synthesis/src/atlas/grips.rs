@@ -8,7 +8,7 @@ use crate::{
     hand::rig::Rig,
     physical::{
         grip::GIVER_CLEARANCE,
-        solids::{Balls, HandSolids, PreparedHand},
+        solids::{Balls, PreparedHand, ToldSolids},
     },
 };
 
@@ -55,7 +55,7 @@ impl Grips {
     /// The solids of a grip, an index of [`Grips::entries`]; none only if it comes too near to a giver's hand, and not
     /// always then. Sooner told than exactly: mostly by some 20 ns of work.
     #[inline]
-    pub fn unless_met(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<HandSolids>> {
+    pub fn unless_met(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<ToldSolids>> {
         if giver.surely_nears_any(&self.cores[entry], GIVER_CLEARANCE) {
             return None;
         }
@@ -64,9 +64,9 @@ impl Grips {
 
     /// One in fifty that meet gets as far as the second balls, which are not kept for that.
     #[inline(never)]
-    fn unless_met_by_second(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<HandSolids>> {
-        let solids = self.entries[entry].solids(rig);
-        let is_met = giver.surely_nears_any(&second_balls(&solids), GIVER_CLEARANCE);
+    fn unless_met_by_second(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<ToldSolids>> {
+        let solids = self.entries[entry].told_solids(rig);
+        let is_met = giver.surely_nears_any(&second_balls(&solids.hand), GIVER_CLEARANCE);
         (!is_met).then(|| Box::new(solids))
     }
 

@@ -254,9 +254,8 @@ impl<'a> Growth<'a> {
     /// How many grips keep clear of a giver's hand, up to enough.
     fn count_free(&self, giver: &PreparedHand) -> usize {
         let is_free = |&entry: &usize| {
-            let wrist = self.grips.entries()[entry].grip.pose.frame_from_wrist;
             let solids = self.grips.unless_met(entry, self.rig, giver);
-            solids.is_some_and(|solids| clear_of_giver(self.rig, wrist, &solids, Some(giver)).is_some())
+            solids.is_some_and(|solids| clear_of_giver(&solids, Some(giver)).is_some())
         };
         (0..self.len()).filter(is_free).take(ENOUGH_FREE).count()
     }

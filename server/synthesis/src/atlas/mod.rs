@@ -2,9 +2,10 @@
 //!
 //! A grip that passes every check on object and hand alone fits every holdout whose giver and gravity let it. So grips are
 //! collected once per object and rig ([`growth`]), spread over all sides of the object; for a request they are tried in
-//! the order of their score under its gravity (`order.rs`), and what is left to check is the giver's hand and the forces
-//! ([`asked`]). The thesis rejects precomputed grasps because a giver may spoil all of them (thesis 1): hence the atlas
-//! never answers alone, a fresh search runs beside it.
+//! the order of their score under its gravity (`order.rs`), beside a giver first some that complement one another
+//! (`shortlist.rs`), and what is left to check is the giver's hand and the forces ([`asked`]). The thesis rejects
+//! precomputed grasps because a giver may spoil all of them (thesis 1): hence the atlas never answers alone, a fresh
+//! search runs beside it.
 
 pub mod asked;
 pub mod codec;
@@ -17,6 +18,7 @@ pub mod growth;
 pub mod key;
 mod occupancy;
 mod order;
+mod shortlist;
 mod spread;
 pub mod starts;
 
@@ -30,12 +32,15 @@ use grips::Grips;
 pub use occupancy::Excluded;
 use occupancy::Occupancy;
 use order::GravityOrder;
+use shortlist::Shortlists;
+pub use shortlist::{Listed, Shortlist};
 
 /// What is known of how a hand holds an object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Atlas {
     grips: Grips,
     order: GravityOrder,
+    shortlists: Shortlists,
     occupancy: Occupancy,
     complete: bool,
     stamp: u64,
@@ -45,9 +50,11 @@ impl Atlas {
     /// An atlas of what is known of an object and a rig; `complete` if it is not going to grow.
     pub fn new(object: &GraspObject, rig: &Rig, grips: Grips, complete: bool) -> Self {
         let entries = grips.entries();
+        let occupancy = Occupancy::of(object, rig, entries);
         Self {
             order: GravityOrder::of(entries),
-            occupancy: Occupancy::of(object, rig, entries),
+            shortlists: Shortlists::of(rig, entries, &occupancy),
+            occupancy,
             stamp: stamp(entries),
             grips,
             complete,
@@ -80,6 +87,12 @@ impl Atlas {
         self.order.under(up)
     }
 
+    /// Some of the grips that the object does not slip out of, by falling score, of which nearly every giver leaves one:
+    /// those to be tried first where there is a giver and any valid one will do.
+    pub fn shortlist(&self, up: Vec3) -> Shortlist<'_> {
+        self.shortlists.under(up)
+    }
+
     /// Those of [`Atlas::by_score`] that the object does not slip out of.
     pub fn holding_under(&self, up: Vec3) -> &[u16] {
         let order = self.by_score(up);
@@ -95,7 +108,7 @@ impl Atlas {
 
     /// Bytes that it takes in memory.
     pub fn bytes(&self) -> usize {
-        self.grips.bytes() + self.order.bytes() + self.occupancy.bytes()
+        self.grips.bytes() + self.order.bytes() + self.shortlists.bytes() + self.occupancy.bytes()
     }
 }
 

@@ -27,8 +27,9 @@ const CELL: f32 = 0.0125;
 /// Cells at most: those around large objects are larger, and tell fewer hands apart.
 const MOST_CELLS: f32 = 10_000.0;
 
-/// Cells that are kept at most, each a kilobyte for 8,192 grips: those that most hands fill. Fewer exclude fewer hands.
-const MOST_ROWS: usize = 3_500;
+/// Cells that are kept at most, each a kilobyte for 8,192 grips: those that most hands fill. Fewer exclude fewer hands; with
+/// 3,500 instead of 2,800, look-ups take as long.
+const MOST_ROWS: usize = 2_800;
 
 /// From a cell's middle to its corners, as a multiple of its edge.
 const HALF_DIAGONAL: f32 = 0.866_026;
@@ -93,20 +94,27 @@ impl Excluded<'_> {
         let Some(line) = self.blocks.get(block) else {
             return false;
         };
-        let line = line.get_or_init(|| self.together(block));
-        line[bit / WORD] >> (bit % WORD) & 1 == 1
+        let line = line.get_or_init(|| self.occupancy.together(block, &self.filled));
+        has(line, bit)
     }
+}
 
-    fn together(&self, block: usize) -> Line {
-        let rows = &self.occupancy.blocks[block];
-        let mut together = Line::default();
-        for &row in &self.filled {
-            for (word, more) in together.iter_mut().zip(rows[usize::from(row)]) {
-                *word |= more;
-            }
-        }
-        together
+/// Grips whose hands share a cell with another one: nearly all that meet it, and few others.
+#[derive(Clone, Debug)]
+pub(super) struct Met {
+    lines: Vec<Line>,
+}
+
+impl Met {
+    /// True if a grip is one of them.
+    pub(super) fn contains(&self, entry: usize) -> bool {
+        has(&self.lines[entry / BLOCK], entry % BLOCK)
     }
+}
+
+/// True if a grip of a block is one of those that a line says.
+fn has(line: &Line, bit: usize) -> bool {
+    line[bit / WORD] >> (bit % WORD) & 1 == 1
 }
 
 impl Occupancy {
@@ -197,6 +205,31 @@ impl Occupancy {
             filled,
             blocks: vec![OnceLock::new(); self.blocks.len()],
         }
+    }
+
+    /// The grips that fill a cell together with one of them, and that one.
+    pub(super) fn met_by(&self, entry: usize) -> Met {
+        let (block, bit) = (entry / BLOCK, entry % BLOCK);
+        let rows = self.blocks[block].iter().enumerate();
+        let filled = rows.filter(|(_, line)| has(line, bit)).map(|(row, _)| row as u16);
+        let filled: Vec<u16> = filled.collect();
+        Met {
+            lines: (0..self.blocks.len())
+                .map(|block| self.together(block, &filled))
+                .collect(),
+        }
+    }
+
+    /// What some rows say together of a block.
+    fn together(&self, block: usize, rows: &[u16]) -> Line {
+        let lines = &self.blocks[block];
+        let mut together = Line::default();
+        for &row in rows {
+            for (word, more) in together.iter_mut().zip(lines[usize::from(row)]) {
+                *word |= more;
+            }
+        }
+        together
     }
 
     /// Bytes that it takes in memory.

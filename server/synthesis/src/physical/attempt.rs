@@ -5,6 +5,7 @@ use super::{
     immobility::{Balance, balance},
     scene::{ObjectScene, Presented},
     shape::Proposal,
+    solids::ToldSolids,
 };
 use crate::{
     constraints::Constraints,
@@ -121,8 +122,8 @@ impl PhysicalAttempt {
         let held = balance(&self.gripper.soft_contacts, &load, &mut self.gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        let giver_clearance =
-            clear_of_giver(rig, grip.pose.frame_from_wrist, &solids, presented.giver.as_ref());
+        let told = ToldSolids::of_rig(rig, grip.pose.frame_from_wrist, &solids);
+        let giver_clearance = clear_of_giver(&told, presented.giver.as_ref());
         let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         let mut grasp = grasp(
             &grip,

@@ -227,19 +227,12 @@ impl Gripper {
     }
 }
 
-/// The distance of a rig's hand, whose wrist and solids are there, from the giver's, if it is enough: `Some(None)` without
-/// a giver.
-pub fn clear_of_giver(
-    rig: &Rig,
-    object_from_wrist: Pose,
-    solids: &HandSolids,
-    giver: Option<&PreparedHand>,
-) -> Option<Option<f32>> {
-    let Some(giver) = giver else {
-        return Some(None);
-    };
-    let solids = ToldSolids::of_rig(rig, object_from_wrist, solids);
-    giver.clearance(&solids, GIVER_CLEARANCE).map(Some)
+/// The distance of a hand from the giver's, if it is enough: `Some(None)` without a giver.
+pub fn clear_of_giver(hand: &ToldSolids, giver: Option<&PreparedHand>) -> Option<Option<f32>> {
+    match giver {
+        None => Some(None),
+        Some(giver) => giver.clearance(hand, GIVER_CLEARANCE).map(Some),
+    }
 }
 
 /// Where the wrist of a proposed hand is when its palm is laid on, if that is how it is to be; none if the palm does not

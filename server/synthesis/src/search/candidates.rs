@@ -1,23 +1,26 @@
 //! The grips of an atlas as candidates of a race.
 
-use std::sync::{
-    OnceLock,
-    atomic::{AtomicUsize, Ordering},
+use std::{
+    ops::Deref,
+    sync::{
+        OnceLock,
+        atomic::{AtomicUsize, Ordering},
+    },
 };
 
 use super::SearchSettings;
 use crate::{
-    atlas::{Atlas, Excluded, asked::Asked},
+    atlas::{Atlas, Excluded, Shortlist, asked::Asked},
     grasp::Grasp,
     hand::rig::Rig,
-    physical::{grip::Gripper, scene::Presented, solids::HandSolids},
+    physical::{
+        grip::Gripper,
+        solids::{PreparedHand, ToldSolids},
+    },
     score::{Score, comfort_value},
+    strategy::Choice,
     synthesis::scene::Scene,
 };
-
-/// Grips that are tried before it is asked which are out of the question: asking takes as long as looking at some fifty one
-/// by one, and one of the first is often the answer.
-const TRIED_ONE_BY_ONE: usize = 48;
 
 /// Grips that are passed over at most before somebody looks at the clock: one or two microseconds' worth.
 const PASSED_AT_ONCE: usize = 64;
@@ -26,25 +29,47 @@ const PASSED_AT_ONCE: usize = 64;
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
     atlas: &'a Atlas,
+    /// Those that are tried first, one by one, beside a giver: it takes as long to ask which of all are out of the question.
+    shortlist: Shortlist<'a>,
+    /// All of them.
     order: &'a [u16],
     scene: &'a Scene<'a>,
     asked: Asked<'a>,
-    presented: &'a Presented,
+    giver: Option<&'a PreparedHand>,
     rig: &'a Rig,
     /// Those that certainly meet the giver, once somebody asks.
-    excluded: OnceLock<Option<Excluded<'a>>>,
-    /// The next place in the order that nobody has taken.
+    excluded: OnceLock<Excluded<'a>>,
+    /// The next place that nobody has taken, in the shortlist or, counted on, in the order.
     next: AtomicUsize,
 }
 
+/// The solids of a known grip's hand.
+enum Solids<'a> {
+    /// Those that the atlas keeps.
+    Kept(&'a ToldSolids),
+    /// Made for this look.
+    Made(Box<ToldSolids>),
+}
+
+impl Deref for Solids<'_> {
+    type Target = ToldSolids;
+
+    fn deref(&self) -> &ToldSolids {
+        match self {
+            Self::Kept(solids) => solids,
+            Self::Made(solids) => solids,
+        }
+    }
+}
+
 /// What was taken of the known grips.
-enum Taken {
+enum Taken<'a> {
     /// There are no more.
     NoneLeft,
     /// Some that certainly meet the giver.
     NoneOpen,
     /// One that may not, an index of the atlas with its solids, and those before it.
-    Open(u16, Box<HandSolids>),
+    Open(u16, Solids<'a>),
 }
 
 /// What became of a known grip.
@@ -72,25 +97,21 @@ impl<'a> KnownGrips<'a> {
         if !super::uses_atlas(settings.strategy, settings.validity) {
             return None;
         }
+        // The shortlist is for givers that are in the way, and the best is not wanted for being on it.
+        let is_first_wanted = settings.choice == Choice::FirstValid && presented.giver.is_some();
         Some(Self {
             atlas,
+            shortlist: is_first_wanted
+                .then(|| atlas.shortlist(presented.up))
+                .unwrap_or_default(),
             order: atlas.by_score(presented.up),
             scene,
             asked: Asked::new(object, scene.rig(), presented),
-            presented,
+            giver: presented.giver.as_ref(),
             rig: scene.rig(),
             excluded: OnceLock::new(),
             next: AtomicUsize::new(0),
         })
-    }
-
-    /// Those that certainly meet the giver, if there is one.
-    fn excluded(&self) -> Option<&Excluded<'a>> {
-        let excluded = self.excluded.get_or_init(|| {
-            let giver = self.presented.giver.as_ref();
-            giver.map(|giver| self.atlas.excluded_by(giver))
-        });
-        excluded.as_ref()
     }
 
     /// How many there are.
@@ -99,43 +120,50 @@ impl<'a> KnownGrips<'a> {
     }
 
     /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such.
-    fn take(&self) -> Taken {
+    fn take(&self) -> Taken<'a> {
+        let end = self.shortlist.len() + self.order.len();
         loop {
             let from = self.next.load(Ordering::Relaxed);
-            let Some(left) = self.order.get(from..).filter(|left| !left.is_empty()) else {
+            if from >= end {
                 return Taken::NoneLeft;
-            };
-            let excluded = if from < TRIED_ONE_BY_ONE {
-                None
-            } else {
-                self.excluded()
-            };
-            let next = &left[..left.len().min(PASSED_AT_ONCE)];
-            let open = next.iter().enumerate().find_map(|(place, &entry)| {
-                let is_excluded = excluded.is_some_and(|excluded| excluded.contains(entry));
-                let solids = if is_excluded { None } else { self.unless_met(entry) };
-                Some((place, solids?))
-            });
-            let to = from + open.as_ref().map_or(next.len(), |(place, _)| place + 1);
+            }
+            let mut to = end.min(from + PASSED_AT_ONCE);
+            let mut taken = Taken::NoneOpen;
+            if let Some((place, entry, solids)) = (from..to).find_map(|place| self.unless_met(place)) {
+                to = place + 1;
+                taken = Taken::Open(entry, solids);
+            }
             // Another worker may have taken the same meanwhile; then they are looked at in vain.
-            let taken = self
+            let exchanged = self
                 .next
                 .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
-            if taken.is_ok() {
-                return open.map_or(Taken::NoneOpen, |(place, solids)| {
-                    Taken::Open(next[place], solids)
-                });
+            if exchanged.is_ok() {
+                return taken;
             }
         }
     }
 
-    /// The solids of a grip that does not certainly meet the giver.
-    fn unless_met(&self, entry: u16) -> Option<Box<HandSolids>> {
-        let entry = usize::from(entry);
-        match &self.presented.giver {
-            None => Some(Box::new(self.atlas.entries()[entry].solids(self.rig))),
-            Some(giver) => self.atlas.grips().unless_met(entry, self.rig, giver),
+    /// A place with the grip there and its solids, unless it certainly meets the giver.
+    fn unless_met(&self, place: usize) -> Option<(usize, u16, Solids<'a>)> {
+        let Some(giver) = self.giver else {
+            let entry = self.order[place];
+            let solids = self.atlas.entries()[usize::from(entry)].told_solids(self.rig);
+            return Some((place, entry, Solids::Made(Box::new(solids))));
+        };
+        let Some(in_order) = place.checked_sub(self.shortlist.len()) else {
+            let (entry, solids) = self.shortlist.unless_met(place, giver)?;
+            return Some((place, entry, Solids::Kept(solids)));
+        };
+        let entry = self.order[in_order];
+        let excluded = self.excluded.get_or_init(|| self.atlas.excluded_by(giver));
+        if excluded.contains(entry) {
+            return None;
         }
+        let solids = self
+            .atlas
+            .grips()
+            .unless_met(usize::from(entry), self.rig, giver)?;
+        Some((place, entry, Solids::Made(solids)))
     }
 
     /// Tries the next one.

@@ -101,11 +101,12 @@ fn an_atlas_answers_with_its_first_grip_that_holds() {
         let held = |entry: u16| {
             let entry = &SMALL_ATLAS.0.entries()[usize::from(entry)];
             let asked = Asked::new(&object, adult(), &presented);
-            asked.hold(entry, &entry.solids(adult()), &mut Gripper::default())
+            asked.hold(entry, &entry.told_solids(adult()), &mut Gripper::default())
         };
-        let mut order = SMALL_ATLAS.0.by_score(presented.up).iter();
-        let (entry, grasp) = order
-            .find_map(|&entry| Some((entry, held(entry)?)))
+        let (atlas, up) = (&SMALL_ATLAS.0, presented.up);
+        let listed = atlas.shortlist(up).iter().map(|listed| listed.entry);
+        let (entry, grasp) = (listed.chain(atlas.by_score(up).iter().copied()))
+            .find_map(|entry| Some((entry, held(entry)?)))
             .expect("a grip of the atlas holds");
         assert_eq!(record.source, Source::AtlasEntry(entry));
         let search = record.search.expect("a search");
