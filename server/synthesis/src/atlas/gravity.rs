@@ -17,13 +17,17 @@ pub fn direction(index: usize) -> Vec3 {
     Vec3::new(radius * cos, radius * sin, z)
 }
 
-/// All of them: a look-up asks for them, and their sines take as long as trying a grip.
-static ALL: LazyLock<[Vec3; DIRECTIONS]> = LazyLock::new(|| std::array::from_fn(direction));
+/// All of them, coordinate by coordinate: a look-up asks for them, and their sines take as long as trying a grip.
+static ALL: LazyLock<[[f32; DIRECTIONS]; 3]> =
+    LazyLock::new(|| std::array::from_fn(|axis| std::array::from_fn(|index| direction(index)[axis])));
 
 /// The nearest direction to a unit vector.
 pub fn nearest(up: Vec3) -> usize {
-    let of = |index: usize| ALL[index].dot(up);
-    (0..DIRECTIONS)
-        .max_by(|&a, &b| of(a).total_cmp(&of(b)))
-        .unwrap_or(0)
+    let [xs, ys, zs] = &*ALL;
+    let mut cosines = [0.0; DIRECTIONS];
+    for i in 0..DIRECTIONS {
+        cosines[i] = xs[i] * up.x + ys[i] * up.y + zs[i] * up.z;
+    }
+    let most = cosines.iter().fold(f32::MIN, |a, &b| if b > a { b } else { a });
+    cosines.iter().position(|&cosine| cosine == most).unwrap_or(0)
 }

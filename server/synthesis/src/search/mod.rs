@@ -178,16 +178,17 @@ pub fn find_grasp_in(
 
 /// What the attempts of a search share.
 pub fn prepare<'a>(holdout: &'a Holdout, rig: &'a Rig, settings: &SearchSettings) -> Scene<'a> {
-    let scene = Scene::new(
+    let starts = settings.starts.as_ref();
+    let starts = starts.filter(|_| uses_atlas(settings.strategy, settings.validity));
+    // The validity comes last: it brings kilobytes, which each step after it would move.
+    Scene::new(
         holdout,
         rig,
         settings.strategy,
         settings.bend_ratios,
         settings.friction,
     )
+    .with_constraints(settings.constraints)
+    .starting_from(starts.cloned())
     .with_validity(settings.validity)
-    .with_constraints(settings.constraints);
-    let starts = settings.starts.as_ref();
-    let starts = starts.filter(|_| uses_atlas(settings.strategy, settings.validity));
-    scene.starting_from(starts.cloned())
 }

@@ -26,7 +26,7 @@ const GROUP: usize = 8;
 
 /// Solids that some balls are compared with before it is asked whether that settled it. Fewer ask more often, more
 /// compare in vain.
-const SOLIDS_AT_ONCE: usize = 4;
+const SOLIDS_AT_ONCE: usize = 8;
 
 /// Solids that tell how far a hand is at most. With eight, more hands have to be compared exactly, and finding those that are
 /// least in a giver's way takes a quarter longer; with 24, it takes as long.
