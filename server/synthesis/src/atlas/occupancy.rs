@@ -27,9 +27,9 @@ const CELL: f32 = 0.0125;
 /// Cells at most: those around large objects are larger, and tell fewer hands apart.
 const MOST_CELLS: f32 = 10_000.0;
 
-/// Cells that are kept at most, each a kilobyte for 8,192 grips: those that most hands fill. Fewer exclude fewer hands; with
-/// 3,500 instead of 2,800, look-ups take as long.
-const MOST_ROWS: usize = 2_800;
+/// Lines of cells that are kept at most, each 64 bytes for 512 grips: those of the cells that most hands fill, 2,600 cells of
+/// 8,192 grips. Fewer exclude fewer hands; with a third more, look-ups take as long.
+const MOST_LINES: usize = 41_600;
 
 /// From a cell's middle to its corners, as a multiple of its edge.
 const HALF_DIAGONAL: f32 = 0.866_026;
@@ -142,10 +142,11 @@ impl Occupancy {
         occupancy
     }
 
-    /// Empties the cells that fewest hands fill, if there are more than [`MOST_ROWS`].
+    /// Empties the cells that fewest hands fill, if all have more than [`MOST_LINES`].
     fn keep_fullest(&mut self) {
         let count = self.row_count();
-        if count <= MOST_ROWS {
+        let most = MOST_LINES / self.blocks.len().max(1);
+        if count <= most {
             return;
         }
         let filled = |row: &usize| -> u32 {
@@ -155,7 +156,7 @@ impl Occupancy {
         // The first row stays where it is; of equally full ones, those that were filled first stay.
         let mut kept: Vec<usize> = (1..count).collect();
         kept.sort_by_cached_key(|row| std::cmp::Reverse(filled(row)));
-        kept.truncate(MOST_ROWS - 1);
+        kept.truncate(most - 1);
         kept.sort_unstable();
         let mut new_rows = vec![EMPTY; count];
         for (new, &old) in (1..).zip(&kept) {

@@ -76,7 +76,7 @@ pub struct Shortlist<'a> {
 
 impl<'a> Shortlist<'a> {
     /// The grips on it, by falling score.
-    pub fn iter(&self) -> impl Iterator<Item = &'a Listed> {
+    pub fn iter(self) -> impl Iterator<Item = &'a Listed> {
         let grips = self.grips;
         self.places.iter().map(|&place| &grips[usize::from(place)])
     }

@@ -97,17 +97,19 @@ impl<'a> KnownGrips<'a> {
         if !super::uses_atlas(settings.strategy, settings.validity) {
             return None;
         }
+        let giver = presented.giver.as_ref();
         // The shortlist is for givers that are in the way, and the best is not wanted for being on it.
-        let is_first_wanted = settings.choice == Choice::FirstValid && presented.giver.is_some();
+        let shortlist = match settings.choice {
+            Choice::FirstValid if giver.is_some() => atlas.shortlist(presented.up),
+            _ => Shortlist::default(),
+        };
         Some(Self {
             atlas,
-            shortlist: is_first_wanted
-                .then(|| atlas.shortlist(presented.up))
-                .unwrap_or_default(),
+            shortlist,
             order: atlas.by_score(presented.up),
             scene,
             asked: Asked::new(object, scene.rig(), presented),
-            giver: presented.giver.as_ref(),
+            giver,
             rig: scene.rig(),
             excluded: OnceLock::new(),
             next: AtomicUsize::new(0),
