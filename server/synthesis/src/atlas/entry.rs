@@ -101,7 +101,7 @@ impl Entry {
         HandSolids::of_pose(rig, &self.grip.pose)
     }
 
-    /// The same for where it is beside a giver's.
+    /// The hand as solids for where it is beside a giver's, in the object's frame.
     pub fn told_solids(&self, rig: &Rig) -> ToldSolids {
         ToldSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids(rig))
     }

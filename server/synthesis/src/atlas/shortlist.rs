@@ -32,10 +32,14 @@ use crate::{
 };
 
 /// Grips that are on a list. With fewer, more givers are left without one, and those that are served get less of a grasp;
-/// with more, the first valid one comes later.
+/// with more, the first valid one comes later. Of 400 holdouts of the built-in remote, scalpel and scissors with recorded
+/// givers, about 90, 92 and 67 % leave one that holds, at the median the 25th, the 41st and the 86th, whose scores are 1 % below
+/// those of the best that they leave by the grips' own order; with 64, 90, 91 and 64 %, and 1 to 2 %; with 128, 90, 92 and
+/// 70 %. The first 48 by score alone: 53, 19 and 6 %.
 const LISTED: usize = 96;
 
-/// Givers that are asked. More are spread more evenly, and take time in proportion.
+/// Givers that are asked. With half as many, of the same holdouts 89, 91 and 63 % leave a listed grip; with twice as many 91, 92
+/// and 73 %. They take time in proportion: a tenth of a second when an atlas is read.
 const GIVERS: usize = 512;
 
 /// Givers whose gains are added up at once: a register's worth of bytes.
@@ -205,13 +209,10 @@ fn shortlist(score: impl Fn(usize) -> u8, left_by: &[LeftBy]) -> Vec<u16> {
 
 /// By how much a grip of a score serves the givers that leave it better than they are served.
 fn gain(score: u8, left_by: &LeftBy, served: &[u8; GIVERS]) -> u32 {
+    const { assert!(GIVERS / LANES * u8::MAX as usize <= u16::MAX as usize) };
+    let (left_by, served) = (left_by.as_chunks::<LANES>().0, served.as_chunks::<LANES>().0);
     let mut gains = [0_u16; LANES];
-    for (left_by, served) in left_by
-        .as_chunks::<LANES>()
-        .0
-        .iter()
-        .zip(served.as_chunks::<LANES>().0)
-    {
+    for (left_by, served) in left_by.iter().zip(served) {
         for lane in 0..LANES {
             gains[lane] += u16::from(score.saturating_sub(served[lane]) & left_by[lane]);
         }

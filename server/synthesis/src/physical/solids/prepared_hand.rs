@@ -25,7 +25,7 @@ const MET_FIRST: [usize; ToldSolids::COUNT] = [
 const GROUP: usize = 8;
 
 /// Solids that some balls are compared with before it is asked whether that settled it. Fewer ask more often, more
-/// compare in vain.
+/// compare in vain: a look-up takes a tenth longer with four, and a fifth to a half with twenty.
 const SOLIDS_AT_ONCE: usize = 8;
 
 /// Solids that tell how far a hand is at most. With eight, more hands have to be compared exactly, and finding those that are
