@@ -1,16 +1,22 @@
 //! The grips that are tried first, against comparing hands one by one.
 
+use std::sync::{Arc, atomic::AtomicBool};
+
 use grasp_assets::atlases::atlas as built_in_atlas;
 use grasp_synthesis::{
-    atlas::{Atlas, Listed, codec::decode, gravity::direction, grips::Grips, growth::Growth},
+    atlas::{Atlas, Listed, asked::Asked, codec::decode, gravity::direction, grips::Grips, growth::Growth},
     hand::{Handedness, joints::HandJoints},
+    holdout::Holdout,
     physical::{
-        grip::GIVER_CLEARANCE,
+        grip::{GIVER_CLEARANCE, Gripper},
+        scene::{ObjectScene, Presented},
         solids::{PreparedHand, ToldSolids},
     },
+    search::{GraspSource, SearchOutcome, SearchSettings, find_grasp},
+    strategy::{Choice, Validity},
 };
 
-use crate::support::{adult, grown, object};
+use crate::support::{NoClock, UP, adult, grown, held_out, known, object, reproducible, scissors};
 
 /// Givers of an object that are asked.
 const GIVERS: usize = 40;
@@ -86,4 +92,87 @@ fn a_growing_atlas_has_a_shortlist_of_its_own() {
     for atlas in [empty, Atlas::default()] {
         assert!(atlas.shortlist(up).is_empty());
     }
+}
+
+/// What comes of trying the known grips alone.
+fn of_known_grips(holdout: &Holdout, known: &Arc<Atlas>, choice: Choice) -> SearchOutcome {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let settings = SearchSettings {
+        choice,
+        atlas: Some(Arc::clone(known)),
+        reproducible: choice == Choice::FirstValid,
+        ..reproducible(holdout)
+    };
+    let rig = adult(Handedness::Right);
+    find_grasp(
+        &pool.expect("a thread"),
+        holdout,
+        rig,
+        &settings,
+        &NoClock,
+        &AtomicBool::new(false),
+    )
+}
+
+/// For each known grip, whether it holds what is held out.
+fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<bool> {
+    let rig = adult(Handedness::Right);
+    let scene = ObjectScene::new(&holdout.object, holdout.object.friction_under(Validity::Physical));
+    let presented = Presented::of(holdout);
+    let asked = Asked::new(&scene, rig, &presented);
+    let mut gripper = Gripper::default();
+    let entries = known.entries().iter();
+    entries
+        .map(|entry| asked.hold(entry, &entry.told_solids(rig), &mut gripper).is_some())
+        .collect()
+}
+
+#[test]
+fn the_first_answer_beside_a_giver_is_the_first_of_the_shortlist_that_holds() {
+    let known = known();
+    let by_score = known.by_score(UP);
+    let listed: Vec<u16> = known.shortlist(UP).iter().map(|listed| listed.entry).collect();
+    let (mut on_list, mut beyond) = (0, 0);
+    for giver in (0..known.entries().len()).step_by(450) {
+        let holdout = held_out(&known, giver);
+        let holds = which_hold(&holdout, &known);
+        let holds = |entry: &&u16| holds[usize::from(**entry)];
+        let first = listed.iter().chain(by_score).find(holds).copied();
+        let found = of_known_grips(&holdout, &known, Choice::FirstValid);
+        assert_eq!(
+            found.report.source,
+            first.map(GraspSource::Atlas),
+            "giver {giver}"
+        );
+        // Where both orders begin alike, nothing is told of which it was.
+        if first != by_score.iter().find(holds).copied() {
+            on_list += 1;
+        }
+        beyond += usize::from(first.is_some_and(|first| !listed.contains(&first)));
+    }
+    assert!(on_list >= 3, "{on_list} differ from the first by score");
+    assert!(beyond >= 1, "none needs more than the list");
+}
+
+#[test]
+fn without_a_giver_and_for_the_best_grips_are_tried_by_score_and_once() {
+    let known = known();
+    let afloat = scissors(None);
+    let holds = which_hold(&afloat, &known);
+    let first = known
+        .by_score(UP)
+        .iter()
+        .find(|&&entry| holds[usize::from(entry)]);
+    let found = of_known_grips(&afloat, &known, Choice::FirstValid);
+    assert_eq!(found.report.source, first.copied().map(GraspSource::Atlas));
+
+    let holdout = held_out(&known, 450);
+    let holds = which_hold(&holdout, &known);
+    let best = of_known_grips(&holdout, &known, Choice::BestWithinBudget);
+    let valid = holds.iter().filter(|holds| **holds).count();
+    assert!(valid > 0, "the giver leaves nothing");
+    assert_eq!(
+        best.report.candidates, valid as u64,
+        "each valid grip counts once"
+    );
 }

@@ -3,18 +3,14 @@
 use std::{
     collections::HashSet,
     sync::{Arc, atomic::AtomicBool},
-    time::Duration,
 };
 
-use glam::Vec3;
-use grasp_assets::{atlases::atlas, objects::object as built_in};
 use grasp_synthesis::{
-    atlas::{Atlas, codec::decode, entry::Entry, starts::Starts},
-    clock::Clock,
+    atlas::{Atlas, entry::Entry, starts::Starts},
     constraints::Constraints,
     guided::proposal::{Place, propose},
-    hand::{Digit, HandPart, Handedness, joints::HandJoints},
-    holdout::{Holdout, PresentingHand},
+    hand::{Digit, HandPart, Handedness},
+    holdout::Holdout,
     physical::{
         attempt::{PhysicalAttempt, Surroundings},
         grip::GIVER_CLEARANCE,
@@ -23,29 +19,11 @@ use grasp_synthesis::{
         solids::{HandSolids, ToldSolids},
     },
     search::{SearchOutcome, SearchSettings, find_grasp},
-    strategy::{BendRatioChoice, Choice, Strategy, Validity},
+    strategy::Validity,
     synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
 };
 
-use crate::support::adult;
-
-/// Where the grips of the built-in scissors are asked about as if they were givers'.
-const UP: Vec3 = Vec3::Y;
-
-fn known() -> Arc<Atlas> {
-    let rig = adult(Handedness::Right);
-    let bytes = atlas("scissors", rig).expect("it is shipped");
-    let scissors = &built_in("scissors").expect("they are built in").object;
-    decode(bytes, scissors, rig).expect("it is today's").atlas
-}
-
-/// The scissors in the hand of a known grip.
-fn held_out(known: &Atlas, grip: usize) -> Holdout {
-    let pose = &known.entries()[grip].grip.pose;
-    let giver = HandJoints::of_pose(adult(Handedness::Right), pose);
-    let scissors = Arc::clone(&built_in("scissors").expect("they are built in").object);
-    Holdout::new(scissors, Some(PresentingHand::of_joints(giver)), UP).expect("up is a unit vector")
-}
+use crate::support::{NoClock, UP, adult, held_out, known, reproducible};
 
 /// How far the digits that hold, palm and forearm are from the giver's, pair by pair.
 fn clearance(entry: &Entry, giver: &ToldSolids) -> f32 {
@@ -189,15 +167,6 @@ fn hands_beside_known_grips_hold_more_often_where_a_giver_leaves_little() {
     );
 }
 
-/// Searches without a deadline ask for no time.
-struct NoClock;
-
-impl Clock for NoClock {
-    fn now(&self) -> Duration {
-        Duration::ZERO
-    }
-}
-
 fn search(
     holdout: &Holdout,
     starts: Option<&Arc<Atlas>>,
@@ -209,21 +178,11 @@ fn search(
         .build()
         .expect("threads");
     let settings = SearchSettings {
-        seed: 5,
-        strategy: Strategy::Guided,
-        validity: Validity::Physical,
-        bend_ratios: BendRatioChoice::OneRandom,
-        friction: holdout.object.friction_under(Validity::Physical),
-        constraints: Constraints::default(),
-        choice: Choice::FirstValid,
-        atlas: None,
         starts: starts.cloned(),
-        reproducible: true,
         first_attempt: attempts.start,
         max_attempts: attempts.end - attempts.start,
-        deadline: None,
         workers,
-        record_step_times: false,
+        ..reproducible(holdout)
     };
     let rig = adult(Handedness::Right);
     find_grasp(&pool, holdout, rig, &settings, &NoClock, &AtomicBool::new(false))

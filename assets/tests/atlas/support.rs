@@ -1,12 +1,79 @@
 //! Atlases that several tests use.
 
-use grasp_assets::{hands, objects};
+use std::{sync::Arc, time::Duration};
+
+use glam::Vec3;
+use grasp_assets::{atlases, hands, objects};
 use grasp_synthesis::{
-    atlas::growth::{Grown, Growth},
-    hand::{Handedness, rig::Rig},
+    atlas::{
+        Atlas,
+        codec::decode,
+        growth::{Grown, Growth},
+    },
+    clock::Clock,
+    constraints::Constraints,
+    hand::{Handedness, joints::HandJoints, rig::Rig},
+    holdout::{Holdout, PresentingHand},
     object::GraspObject,
     physical::grip::Gripper,
+    search::SearchSettings,
+    strategy::{BendRatioChoice, Choice, Strategy, Validity},
 };
+
+/// Where the grips of the built-in scissors are asked about as if they were givers'.
+pub(crate) const UP: Vec3 = Vec3::Y;
+
+/// What comes with the server for the built-in scissors.
+pub(crate) fn known() -> Arc<Atlas> {
+    let rig = adult(Handedness::Right);
+    let bytes = atlases::atlas("scissors", rig).expect("it is shipped");
+    decode(bytes, object("scissors"), rig)
+        .expect("it is today's")
+        .atlas
+}
+
+/// The scissors in the hand of a known grip.
+pub(crate) fn held_out(known: &Atlas, grip: usize) -> Holdout {
+    let pose = &known.entries()[grip].grip.pose;
+    let giver = HandJoints::of_pose(adult(Handedness::Right), pose);
+    scissors(Some(PresentingHand::of_joints(giver)))
+}
+
+/// The scissors, in a hand or afloat.
+pub(crate) fn scissors(giver: Option<PresentingHand>) -> Holdout {
+    let scissors = Arc::clone(&objects::object("scissors").expect("they are built in").object);
+    Holdout::new(scissors, giver, UP).expect("up is a unit vector")
+}
+
+/// Searches without a deadline ask for no time.
+pub(crate) struct NoClock;
+
+impl Clock for NoClock {
+    fn now(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+/// A search that comes to the same whenever it is run, of one worker, without known grips and without attempts.
+pub(crate) fn reproducible(holdout: &Holdout) -> SearchSettings {
+    SearchSettings {
+        seed: 5,
+        strategy: Strategy::Guided,
+        validity: Validity::Physical,
+        bend_ratios: BendRatioChoice::OneRandom,
+        friction: holdout.object.friction_under(Validity::Physical),
+        constraints: Constraints::default(),
+        choice: Choice::FirstValid,
+        atlas: None,
+        starts: None,
+        reproducible: true,
+        first_attempt: 0,
+        max_attempts: 0,
+        deadline: None,
+        workers: 1,
+        record_step_times: false,
+    }
+}
 
 pub(crate) fn object(name: &str) -> &'static GraspObject {
     &objects::object(name).expect("it is built in").object
