@@ -37,8 +37,8 @@ use crate::{
 /// alone: 53, 19 and 6 %.
 const LISTED: usize = 96;
 
-/// Givers that are asked. With half as many, some 1 to 4 of a hundred holdouts fewer leave a listed grip; with twice as many, 1
-/// to 6 more. They take time in proportion: a tenth of a second when an atlas is read.
+/// Givers that are asked. With half as many, up to 4 of a hundred holdouts fewer leave a listed grip, with twice as many 1 to 6
+/// more (where any grip serves). They take time in proportion: a tenth of a second when an atlas is read.
 const GIVERS: usize = 512;
 
 /// How much worse than the best grip that a giver leaves one may be to serve it, in steps of 1/254 of a score. With more, more
