@@ -58,6 +58,9 @@ const WORD: usize = u64::BITS as usize;
 /// Grips whose bits are looked at together: those that a line of the cache has room for.
 const BLOCK: usize = 8 * WORD;
 
+/// Cells side by side of which it is found out at once whether a solid fills them: more than most solids reach over.
+const LANES: usize = 8;
+
 /// A bit for each grip of a block.
 type Line = [u64; BLOCK / WORD];
 
@@ -249,22 +252,39 @@ impl Occupancy {
         let last = self
             .place_of(solid.start.max(solid.end) + thickest)
             .min(self.counts - 1);
-        let axis = solid.end - solid.start;
-        let inverse_square = axis.length_squared().max(f32::MIN_POSITIVE).recip();
         for z in first.z..=last.z {
             for y in first.y..=last.y {
-                for x in first.x..=last.x {
-                    let place = IVec3::new(x, y, z);
-                    let middle = self.low + (place.as_vec3() + 0.5) * self.edge;
-                    let along = ((middle - solid.start).dot(axis) * inverse_square).clamp(0.0, 1.0);
-                    // The ball around the foot is one of those that the solid is made of.
-                    let within = solid.radius_at(along) + reach;
-                    if within > 0.0 && middle.distance_squared(solid.at(along)) < within * within {
-                        self.set(place, entry);
+                for x in (first.x..=last.x).step_by(LANES) {
+                    let insides = self.insides(solid, reach, IVec3::new(x, y, z));
+                    for (x, inside) in (x..=last.x).zip(insides) {
+                        if inside > 0.0 {
+                            self.set(IVec3::new(x, y, z), entry);
+                        }
                     }
                 }
             }
         }
+    }
+
+    /// For a cell and those beside it along x: more than 0 if its middle is less than `reach` metres off a solid.
+    #[inline]
+    fn insides(&self, solid: &TaperedCapsule, reach: f32, first: IVec3) -> [f32; LANES] {
+        let middle = self.low + (first.as_vec3() + 0.5) * self.edge;
+        let axis = solid.end - solid.start;
+        let inverse_square = axis.length_squared().max(f32::MIN_POSITIVE).recip();
+        let rise = solid.end_radius - solid.start_radius;
+        let way = middle - solid.start;
+        let mut insides = [0.0; LANES];
+        for (lane, inside) in insides.iter_mut().enumerate() {
+            let x = way.x + lane as f32 * self.edge;
+            let t = (x * axis.x + way.y * axis.y + way.z * axis.z) * inverse_square;
+            let t = t.clamp(0.0, 1.0);
+            let (x, y, z) = (x - axis.x * t, way.y - axis.y * t, way.z - axis.z * t);
+            // The ball around the foot is one of those that the solid is made of.
+            let within = (solid.start_radius + rise * t + reach).max(0.0);
+            *inside = within * within - (x * x + y * y + z * z);
+        }
+        insides
     }
 
     fn set(&mut self, place: IVec3, entry: usize) {
