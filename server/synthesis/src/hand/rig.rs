@@ -91,6 +91,13 @@ pub struct Rig {
 #[derive(Clone, Debug, Default)]
 pub struct RigGuide(Arc<OnceLock<Oppositions>>);
 
+impl RigGuide {
+    /// True once it was asked for: from then on it takes no time.
+    pub fn is_derived(&self) -> bool {
+        self.0.get().is_some()
+    }
+}
+
 impl PartialEq for RigGuide {
     /// It is derived, so that rigs do not differ by it.
     fn eq(&self, _: &Self) -> bool {
