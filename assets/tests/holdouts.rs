@@ -10,6 +10,7 @@ use grasp_assets::{
     objects::object,
 };
 use grasp_synthesis::{
+    atlas::recent::RecentGrips,
     clock::Clock,
     constraints::Constraints,
     geometry::{Segment, mesh_bvh::MeshBvh},
@@ -321,6 +322,7 @@ fn synthesized_grasps_are_found_again() {
             choice: Choice::FirstValid,
             atlas: None,
             starts: None,
+            recent: RecentGrips::default(),
         };
         let grasp = search(&free, &settings)
             .grasp
@@ -359,6 +361,7 @@ fn a_receiver_finds_a_grasp_on_each() {
             choice: Choice::FirstValid,
             atlas: None,
             starts: None,
+            recent: RecentGrips::default(),
         };
         let outcome = search(&held, &settings);
         assert!(outcome.grasp.is_some(), "{}: {:?}", built_in.name, outcome.report);

@@ -368,6 +368,8 @@ pub enum GraspSource {
     Search,
     /// The object's atlas.
     Atlas,
+    /// The search of an earlier request: its grasp also holds what is held out now.
+    Recent,
 }
 
 /// What a search did.

@@ -253,6 +253,7 @@ fn report(
         source: match report.source {
             Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
             Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
+            Some(GraspSource::Recent) => v1::GraspSource::Recent,
             None => v1::GraspSource::Unspecified,
         }
         .into(),

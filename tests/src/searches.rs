@@ -10,6 +10,7 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, holdouts},
 };
 use grasp_synthesis::{
+    atlas::recent::RecentGrips,
     clock::Clock,
     constraints::Constraints,
     hand::{Handedness, rig::Rig},
@@ -112,6 +113,7 @@ impl Bench {
             choice: Choice::FirstValid,
             atlas: None,
             starts: None,
+            recent: RecentGrips::default(),
         };
         let clock = MonotonicClock::default();
         find_grasp(

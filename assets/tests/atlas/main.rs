@@ -3,6 +3,7 @@
 mod codec;
 mod exclusion;
 mod palm;
+mod recent;
 mod shortlist;
 mod starts;
 mod support;

@@ -134,6 +134,7 @@ fn source_from_wire(value: i32) -> Option<GraspSource> {
         v1::GraspSource::Unspecified => None,
         v1::GraspSource::Search => Some(GraspSource::Search),
         v1::GraspSource::Atlas => Some(GraspSource::Atlas),
+        v1::GraspSource::Recent => Some(GraspSource::Recent),
     }
 }
 

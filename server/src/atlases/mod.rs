@@ -7,9 +7,13 @@
 //!
 //! Atlases take what created objects leave of `cache_bytes`, and give way to them: those that were not used for longest
 //! are dropped, and are built or read again when they are asked for.
+//!
+//! What a search found because no atlas had it is kept by [`recents`], as it is mostly asked for again: the giver's hand
+//! moves less from one request to the next than from one person to another.
 
 mod builder;
 pub(crate) mod files;
+mod recents;
 pub(crate) mod shelf;
 #[cfg(test)]
 mod tests;
@@ -26,11 +30,11 @@ use std::{
 use grasp_assets::hands::{Hand, hand};
 use grasp_proto::v1;
 use grasp_synthesis::{
-    atlas::{Atlas, growth::Grown},
+    atlas::{Atlas, entry::Entry, growth::Grown, recent::RecentGrips},
     hand::Handedness,
 };
 
-use self::files::AtlasFiles;
+use self::{files::AtlasFiles, recents::Recents};
 use crate::{
     objects::{StoredObject, store::ObjectStore},
     search::executor::SearchExecutor,
@@ -48,6 +52,15 @@ struct Job {
     worked: Duration,
 }
 
+/// What is known of how a hand holds an object.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Known {
+    /// The atlas, if it has anything yet.
+    pub atlas: Option<Arc<Atlas>>,
+    /// What searches found lately.
+    pub recent: RecentGrips,
+}
+
 /// All atlases and the threads that build them; dropped, the threads end.
 #[derive(Debug)]
 pub(crate) struct Atlases {
@@ -61,6 +74,7 @@ struct Workshop {
     executor: SearchExecutor,
     files: Option<AtlasFiles>,
     default_rig: String,
+    recents: Recents,
     jobs: Mutex<VecDeque<Job>>,
     has_jobs: Condvar,
     stop: AtomicBool,
@@ -98,6 +112,7 @@ impl Atlases {
             executor,
             files,
             default_rig,
+            recents: Recents::default(),
             jobs: Mutex::default(),
             has_jobs: Condvar::new(),
             stop: AtomicBool::new(false),
@@ -126,14 +141,25 @@ impl Atlases {
         }
     }
 
-    /// What is known of how a hand holds an object, if it is anything yet; it is built from now on.
-    pub(crate) fn get(&self, object: &Arc<StoredObject>, hand: &'static Hand) -> Option<Arc<Atlas>> {
+    /// What is known of how a hand holds an object; its atlas is built from now on.
+    pub(crate) fn get(&self, object: &Arc<StoredObject>, hand: &'static Hand) -> Known {
         if !self.workshop.is_open() {
-            return None;
+            return Known::default();
         }
         self.workshop.ask(object, Some(hand));
-        let grown = object.shelf.slot(hand)?.grown?;
-        (!grown.atlas.entries().is_empty()).then(|| Arc::clone(&grown.atlas))
+        let slot = object.shelf.slot(hand).unwrap_or_default();
+        let atlas = slot.grown.filter(|grown| !grown.atlas.entries().is_empty());
+        Known {
+            atlas: atlas.map(|grown| Arc::clone(&grown.atlas)),
+            recent: slot.recent,
+        }
+    }
+
+    /// Keeps a grip that a search found, under the object's own friction, for the requests that follow.
+    pub(crate) fn remember(&self, object: &Arc<StoredObject>, hand: &'static Hand, grip: Entry) {
+        if self.workshop.is_open() {
+            self.workshop.recents.keep(object, hand, grip);
+        }
     }
 
     /// The state of an object's atlas for the default rig's right hand; none if no atlases are kept.

@@ -6,7 +6,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::atlas::growth::Grown;
+use grasp_synthesis::atlas::{entry::Entry, growth::Grown, recent::RecentGrips};
 
 /// What is being done about an atlas.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,6 +27,8 @@ pub(crate) struct Slot {
     pub standing: Standing,
     /// What has been found.
     pub grown: Option<Arc<Grown>>,
+    /// What searches found lately.
+    pub recent: RecentGrips,
     /// Bytes that it takes.
     pub bytes: usize,
     /// How long this process has worked on it.
@@ -73,6 +75,16 @@ impl Shelf {
         self.with(hand, |slot| slot.standing = Standing::Finished);
     }
 
+    /// Keeps a grip that a search found.
+    pub(super) fn remember(&self, hand: &'static Hand, grip: Entry) {
+        self.with(hand, |slot| slot.recent = slot.recent.with(grip));
+    }
+
+    /// Forgets the grip that is kept for longest.
+    pub(super) fn forget_oldest(&self, hand: &'static Hand) {
+        self.with(hand, |slot| slot.recent = slot.recent.without_oldest());
+    }
+
     /// Takes an atlas away. One that waits to grow still waits.
     pub(super) fn drop_grown(&self, hand: &'static Hand) {
         self.with(hand, |slot| {
@@ -82,6 +94,7 @@ impl Shelf {
                     Standing::Absent | Standing::Finished => Standing::Absent,
                 },
                 last_used: slot.last_used,
+                recent: std::mem::take(&mut slot.recent),
                 ..Slot::default()
             };
         });

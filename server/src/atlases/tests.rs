@@ -101,12 +101,51 @@ fn what_was_not_used_for_longest_gives_way() {
 }
 
 #[test]
+fn of_what_was_found_the_latest_thousand_are_kept() {
+    const OBJECTS: usize = 40;
+    const EACH: usize = 30;
+    let objects: Vec<_> = (0..OBJECTS).map(|id| Arc::new(small(&id.to_string()))).collect();
+    let grip = grown(&objects[0]).atlas.entries()[0].clone();
+    let atlases = start(1, &store(10, 0));
+    for object in &objects {
+        for _ in 0..EACH {
+            atlases.remember(object, adult(), grip.clone());
+        }
+    }
+    let kept = |object: &Arc<StoredObject>| atlases.get(object, adult()).recent.entries().len();
+    let forgotten = OBJECTS * EACH - recents::MOST;
+    for (place, object) in objects.iter().enumerate() {
+        let left = EACH - forgotten.saturating_sub(place * EACH).min(EACH);
+        assert_eq!(kept(object), left, "{place}");
+    }
+    // They stay where an atlas gives way, and end with their object.
+    let last = objects.last().expect("there are some");
+    last.shelf.drop_grown(adult());
+    assert_eq!(kept(last), EACH);
+    let left = hand("adult", Handedness::Left).unwrap();
+    assert!(atlases.get(last, left).recent.is_empty());
+    drop(objects);
+    let another = Arc::new(small("another"));
+    atlases.remember(&another, adult(), grip);
+    assert_eq!(kept(&another), 1);
+}
+
+#[test]
+fn without_builders_nothing_is_kept() {
+    let object = Arc::new(small("a"));
+    let grip = grown(&object).atlas.entries()[0].clone();
+    let atlases = start(0, &store(10, 1 << 30));
+    atlases.remember(&object, adult(), grip);
+    assert!(object.shelf.slot(adult()).is_none());
+}
+
+#[test]
 fn what_gave_way_is_built_again_when_it_is_asked_for() {
     let object = Arc::new(small("a"));
     let store = store(10, 1 << 30);
     let atlases = start(1, &store);
-    assert!(atlases.get(&object, adult()).is_none());
-    let is_there = || atlases.get(&object, adult()).is_some();
+    assert!(atlases.get(&object, adult()).atlas.is_none());
+    let is_there = || atlases.get(&object, adult()).atlas.is_some();
     until("the first atlas", is_there);
     object.shelf.finish(adult());
     atlases.workshop.fit(0);

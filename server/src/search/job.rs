@@ -7,12 +7,12 @@ use std::{
 
 use grasp_proto::v1;
 use grasp_synthesis::{
-    atlas::Atlas,
+    atlas::{entry::Entry, recent::RecentGrips},
     clock::Clock,
     holdout::{Holdout, PresentingHand},
     key_frames::plan_way,
     object::GraspObject,
-    search::{SearchOutcome, SearchSettings, find_known_grasp},
+    search::{GraspSource, SearchOutcome, SearchSettings, find_known_grasp},
     strategy::{Choice, Validity},
 };
 use rayon::ThreadPool;
@@ -20,6 +20,7 @@ use rayon::ThreadPool;
 use super::race::race;
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
+    atlases::Known,
     error::ServiceError,
     validate::FindQuery,
 };
@@ -40,7 +41,16 @@ pub(crate) struct FindJob {
     /// Workers that race.
     pub workers: usize,
     /// Grips that are known for the object and the hand.
-    pub atlas: Option<Arc<Atlas>>,
+    pub known: Known,
+}
+
+/// What a search came to.
+#[derive(Debug)]
+pub(crate) struct Answered {
+    /// What the call is answered with.
+    pub response: v1::FindGraspResponse,
+    /// A grip that was not known before, to be known from now on.
+    pub newly_known: Option<Entry>,
 }
 
 /// A job that has everything computed that its search works on.
@@ -71,7 +81,7 @@ impl Clock for SinceArrival {
 impl FindJob {
     /// True if preparing, a look-up and the answer are quick enough for a call's own thread: planning a way is not.
     pub(crate) fn may_be_known(&self) -> bool {
-        self.atlas.is_some()
+        (self.known.atlas.is_some() || !self.known.recent.is_empty())
             && !self.query.is_replay
             && self.query.choice == Choice::FirstValid
             && !self.query.reproducible
@@ -111,9 +121,14 @@ impl FindJob {
                 .unwrap_or_else(|| holdout.object.friction_under(query.validity)),
             constraints: query.constraints.transformed(object_from_client),
             choice: query.choice,
-            // A replay runs one attempt, which the atlas' own grips would come before.
-            atlas: self.atlas.clone().filter(|_| !query.is_replay),
-            starts: self.atlas,
+            // A replay runs one attempt, which known grips would come before.
+            atlas: self.known.atlas.clone().filter(|_| !query.is_replay),
+            starts: self.known.atlas,
+            recent: if query.is_replay {
+                RecentGrips::default()
+            } else {
+                self.known.recent
+            },
             reproducible: query.reproducible,
             first_attempt: query.first_attempt,
             max_attempts: query.max_attempts,
@@ -137,7 +152,7 @@ impl PreparedJob {
     ///
     /// # Errors
     /// None that a known grip can have; those of [`PreparedJob::run`].
-    pub(crate) fn look_up(&self) -> Option<Result<v1::FindGraspResponse, ServiceError>> {
+    pub(crate) fn look_up(&self) -> Option<Result<Answered, ServiceError>> {
         let rig = &self.query.receiving_hand.rig;
         let outcome = find_known_grasp(&self.holdout, rig, &self.settings, &self.clock, LOOK_UP_TIME)?;
         Some(self.answer(outcome))
@@ -147,17 +162,13 @@ impl PreparedJob {
     ///
     /// # Errors
     /// The search was told to stop.
-    pub(crate) fn run(
-        &self,
-        pool: &ThreadPool,
-        stop: &AtomicBool,
-    ) -> Result<v1::FindGraspResponse, ServiceError> {
+    pub(crate) fn run(&self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
         let outcome = race(pool, &self.holdout, rig, &self.settings, &self.clock, stop);
         self.answer(outcome)
     }
 
-    fn answer(&self, mut outcome: SearchOutcome) -> Result<v1::FindGraspResponse, ServiceError> {
+    fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
         let search_time = self.start.elapsed();
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
@@ -172,7 +183,20 @@ impl PreparedJob {
             search_time,
             budget: self.budget,
         };
-        find_response(&outcome, rig, frame, &self.settings, circumstances)
+        Ok(Answered {
+            response: find_response(&outcome, rig, frame, &self.settings, circumstances)?,
+            newly_known: self.newly_known(&outcome),
+        })
+    }
+
+    /// What was found afresh, if it is known like the grips of an atlas are: under the object's own friction.
+    fn newly_known(&self, outcome: &SearchOutcome) -> Option<Entry> {
+        let own_friction = self.holdout.object.friction_under(Validity::Physical);
+        let is_fresh = matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
+        let grasp = outcome.grasp.as_ref()?;
+        (is_fresh && self.settings.friction == own_friction)
+            .then(|| Entry::of_grasp(grasp))
+            .flatten()
     }
 }
 
@@ -365,13 +389,13 @@ mod tests {
                 seed: 3,
                 arrived,
                 workers: 1,
-                atlas: None,
+                known: Known::default(),
             };
             match job
                 .prepare()
                 .and_then(|job| job.run(&pool, &AtomicBool::new(false)))
             {
-                Ok(answer) => {
+                Ok(Answered { response: answer, .. }) => {
                     let report = answer.report.expect("every answer has a report");
                     prop_assert!(report.attempts <= 2);
                     prop_assert_eq!(

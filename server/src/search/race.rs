@@ -10,6 +10,7 @@ use std::{
 };
 
 use grasp_synthesis::{
+    atlas::recent::RecentGrips,
     clock::Clock,
     grasp::Grasp,
     hand::rig::Rig,
@@ -54,6 +55,7 @@ pub(super) fn race(
         let outcome = find_grasp_in(pool, &scene, &slice, clock, stop);
         // Known grips are all tried in the first slice.
         slice.atlas = None;
+        slice.recent = RecentGrips::default();
         left -= slice.max_attempts;
         let is_better =
             outcome.grasp.is_some() && best.as_ref().is_none_or(|(_, value)| outcome.value > *value);

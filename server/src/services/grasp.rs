@@ -12,6 +12,7 @@ use tonic::{Request, Response, Status};
 
 use super::Shared;
 use crate::{
+    atlases::Known,
     budget::effective_budget,
     call::{CallContext, SearchSummary},
     error::ServiceError,
@@ -47,11 +48,16 @@ impl GraspHandler {
         }
         let admission = shared.executor.admit()?;
         let may_use_atlas = query.may_use_atlas && uses_atlas(query.strategy, query.validity);
-        let atlas = may_use_atlas
-            .then(|| shared.atlases.get(&stored, query.receiving_hand))
-            .flatten()
+        let hand = query.receiving_hand;
+        let mut known = if may_use_atlas {
+            shared.atlases.get(&stored, hand)
+        } else {
+            Known::default()
+        };
+        if query.reproducible {
             // One that still grows would answer otherwise a moment later.
-            .filter(|atlas| !query.reproducible || atlas.is_complete());
+            known.atlas = known.atlas.filter(|atlas| atlas.is_complete());
+        }
         let job = FindJob {
             seed: query.seed.unwrap_or_else(drawn_seed),
             query,
@@ -59,12 +65,12 @@ impl GraspHandler {
             arrived: call.arrived,
             budget,
             workers: shared.executor.workers(),
-            atlas,
+            known,
         };
-        let answer = if job.may_be_known() {
+        let answered = if job.may_be_known() {
             let job = job.prepare()?;
-            if let Some(answer) = job.look_up() {
-                answer?
+            if let Some(answered) = job.look_up() {
+                answered?
             } else {
                 let run = shared
                     .executor
@@ -77,6 +83,10 @@ impl GraspHandler {
                 .run(admission, move |pool, stop| job.prepare()?.run(pool, stop));
             run.await??
         };
+        if let Some(grip) = answered.newly_known.filter(|_| may_use_atlas) {
+            shared.atlases.remember(&stored, hand, grip);
+        }
+        let answer = answered.response;
         call.tell_search(summary(&answer));
         Ok(answer)
     }

@@ -8,7 +8,7 @@ use tonic::transport::Channel;
 
 use crate::table::Spread;
 
-/// How soon an answer must be there to count as answered: the "unanswered in 50 ms".
+/// How soon an answer must be there to count as answered: two or three frames, which the start of a handover hides.
 pub(crate) const ANSWERED_WITHIN: Duration = Duration::from_millis(50);
 
 /// An answer, in figures.
@@ -18,6 +18,8 @@ pub(crate) struct Answer {
     pub(crate) found: bool,
     /// Was it one of the atlas?
     pub(crate) from_atlas: bool,
+    /// Was it what an earlier request's search had found?
+    pub(crate) from_recent: bool,
     /// Valid grasps that were ranked.
     pub(crate) candidates: u64,
     /// What the server says that the search took; reading the request, planning key frames and wording the answer come
@@ -55,6 +57,7 @@ pub(crate) async fn ask(client: &mut GraspServiceClient<Channel>, request: v1::F
     Answer {
         found: answer.outcome() == v1::Outcome::Found,
         from_atlas: report.source() == v1::GraspSource::Atlas,
+        from_recent: report.source() == v1::GraspSource::Recent,
         candidates: report.candidates,
         search_time: time(&report.search_time),
         budget: time(&report.budget),

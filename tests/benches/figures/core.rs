@@ -9,7 +9,7 @@ use std::{
 
 use grasp_assets::atlases::atlas;
 use grasp_synthesis::{
-    atlas::{Atlas, codec::decode},
+    atlas::{Atlas, codec::decode, recent::RecentGrips},
     constraints::Constraints,
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
@@ -109,6 +109,7 @@ fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings 
         choice: Choice::FirstValid,
         atlas: Some(Arc::clone(atlas)),
         starts: Some(Arc::clone(atlas)),
+        recent: RecentGrips::default(),
         reproducible: false,
         first_attempt: 0,
         max_attempts: u64::MAX,

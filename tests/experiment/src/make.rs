@@ -14,7 +14,7 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, HoldoutError, holdouts},
 };
 use grasp_synthesis::{
-    atlas::asked::Asked,
+    atlas::{asked::Asked, recent::RecentGrips},
     clock::Clock,
     constraints::Constraints,
     grasp::Grasp,
@@ -135,6 +135,7 @@ impl Maker {
             choice: Choice::FirstValid,
             atlas: self.atlases.of(cell).cloned(),
             starts: self.atlases.of(cell).cloned(),
+            recent: RecentGrips::default(),
             reproducible: false,
             first_attempt: 0,
             max_attempts: cell.set.most_attempts(),
@@ -151,7 +152,7 @@ impl Maker {
         });
         let report = outcome.report;
         let source = match outcome.end {
-            SearchEnd::Found => Source::from(report.source?),
+            SearchEnd::Found => Source::of(report.source?)?,
             SearchEnd::AttemptsExhausted => Source::Nowhere,
             SearchEnd::DeadlinePassed | SearchEnd::Stopped => return None,
         };

@@ -48,6 +48,15 @@ pub enum Source {
 }
 
 impl Source {
+    /// Where a grasp came from; none if it was known from an earlier search, which experiments do not let happen.
+    pub fn of(source: GraspSource) -> Option<Self> {
+        match source {
+            GraspSource::Attempt(index) => Some(Self::Attempt(index)),
+            GraspSource::Atlas(entry) => Some(Self::AtlasEntry(entry)),
+            GraspSource::Recent => None,
+        }
+    }
+
     /// The index of an attempt.
     pub fn attempt(self) -> Option<u64> {
         match self {
@@ -63,15 +72,6 @@ impl fmt::Display for Source {
             Self::Attempt(index) => write!(f, "attempt {index}"),
             Self::AtlasEntry(entry) => write!(f, "grip {entry} of the atlas"),
             Self::Nowhere => f.write_str("no hand"),
-        }
-    }
-}
-
-impl From<GraspSource> for Source {
-    fn from(source: GraspSource) -> Self {
-        match source {
-            GraspSource::Attempt(index) => Self::Attempt(index),
-            GraspSource::Atlas(entry) => Self::AtlasEntry(entry),
         }
     }
 }

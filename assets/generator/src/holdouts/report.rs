@@ -7,6 +7,7 @@ use grasp_assets::{
     holdouts::BuiltInHoldout,
 };
 use grasp_synthesis::{
+    atlas::recent::RecentGrips,
     constraints::Constraints,
     hand::{Digit, HandPose, Handedness, Phalanx},
     holdout::Holdout,
@@ -115,6 +116,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
             choice: Choice::FirstValid,
             atlas: None,
             starts: None,
+            recent: RecentGrips::default(),
         };
         let outcome = find_grasp(
             &pool,

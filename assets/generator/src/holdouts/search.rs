@@ -13,6 +13,7 @@ use std::{
 use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
+    atlas::recent::RecentGrips,
     clock::Clock,
     constraints::Constraints,
     geometry::mesh_bvh::MeshBvh,
@@ -101,6 +102,7 @@ fn next_grasp(
         choice: Choice::FirstValid,
         atlas: None,
         starts: None,
+        recent: RecentGrips::default(),
     };
     let outcome = find_grasp(pool, holdout, rig, &settings, &NoClock, &AtomicBool::new(false));
     outcome.report.attempt.zip(outcome.grasp)

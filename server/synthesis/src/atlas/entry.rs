@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     constraints::Constraints,
-    grasp::Contact,
+    grasp::{Contact, Grasp},
     hand::rig::Rig,
     physical::{
         contacts::soften,
@@ -15,7 +15,7 @@ use crate::{
         scene::ObjectScene,
         solids::{HandSolids, ToldSolids},
     },
-    score::{Score, Values, force_values, grip_values},
+    score::{Score, Term, Values, force_values, grip_values},
     taxonomy::{Classification, classify},
 };
 
@@ -82,6 +82,31 @@ impl Entry {
             scores,
             friction_uses,
         }
+    }
+
+    /// What a grasp is known as for other holdouts of its object. How it fares under which gravity is not known. None if it
+    /// is not valid under `PHYSICAL`, and only right under the friction that it was found under.
+    pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
+        let margins = grasp.margins?;
+        let Score { mut values } = grasp.score?;
+        for (term, value) in Term::ALL.into_iter().zip(&mut values) {
+            if !term.is_of_grip() {
+                *value = 0.0;
+            }
+        }
+        Some(Self {
+            grip: Grip {
+                pose: grasp.pose,
+                bend_ratios: grasp.bend_ratios,
+                penetration: margins.penetration,
+                epsilon: margins.epsilon,
+            },
+            contacts: grasp.contacts.clone(),
+            classification: grasp.classification,
+            grip_values: values,
+            scores: [SLIPS; DIRECTIONS],
+            friction_uses: FrictionUses::default(),
+        })
     }
 
     /// What a grip of the same hand and contacts is worth now; none if its closure is not enough.

@@ -18,6 +18,7 @@ pub mod growth;
 pub mod key;
 mod occupancy;
 mod order;
+pub mod recent;
 mod shortlist;
 mod spread;
 pub mod starts;

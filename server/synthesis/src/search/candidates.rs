@@ -1,16 +1,16 @@
-//! The grips of an atlas as candidates of a race.
+//! Known grips as candidates of a race: those of an atlas, then those that were found lately.
 
 use std::{
     ops::Deref,
     sync::{
-        OnceLock,
+        Arc, OnceLock,
         atomic::{AtomicUsize, Ordering},
     },
 };
 
-use super::SearchSettings;
+use super::{GraspSource, SearchSettings};
 use crate::{
-    atlas::{Atlas, Excluded, Shortlist, asked::Asked},
+    atlas::{Atlas, Excluded, Shortlist, asked::Asked, entry::Entry},
     grasp::Grasp,
     hand::rig::Rig,
     physical::{
@@ -25,21 +25,24 @@ use crate::{
 /// Grips that are passed over at most before somebody looks at the clock: one or two microseconds' worth.
 const PASSED_AT_ONCE: usize = 64;
 
-/// The grips of an atlas in the order in which they are tried.
+/// Known grips in the order in which they are tried.
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
-    atlas: &'a Atlas,
-    /// Those that are tried first, one by one, beside a giver: it takes as long to ask which of all are out of the question.
+    atlas: Option<&'a Atlas>,
+    /// Those of the atlas that are tried first, one by one, beside a giver: it takes as long to ask which of all are out of
+    /// the question.
     shortlist: Shortlist<'a>,
-    /// All of them.
+    /// All of the atlas.
     order: &'a [u16],
+    /// Those that were found lately. Mostly they are worse than the atlas' own, which were chosen from.
+    recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
     asked: Asked<'a>,
     giver: Option<&'a PreparedHand>,
     rig: &'a Rig,
     /// Those that certainly meet the giver, once somebody asks.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place that nobody has taken, in the shortlist or, counted on, in the order.
+    /// The next place that nobody has taken, in the shortlist or, counted on, in the order or among the recent ones.
     next: AtomicUsize,
 }
 
@@ -62,14 +65,21 @@ impl Deref for Solids<'_> {
     }
 }
 
+/// A known grip that may keep clear of the giver.
+struct Open<'a> {
+    source: GraspSource,
+    entry: &'a Entry,
+    solids: Solids<'a>,
+}
+
 /// What was taken of the known grips.
 enum Taken<'a> {
     /// There are no more.
     NoneLeft,
     /// Some that certainly meet the giver.
     NoneOpen,
-    /// One that may not, an index of the atlas with its solids, and those before it.
-    Open(u16, Solids<'a>),
+    /// One that may not, and those before it.
+    Open(Open<'a>),
 }
 
 /// What became of a known grip.
@@ -80,8 +90,8 @@ pub(super) enum Tried {
     Refused,
     /// It is a valid grasp.
     Valid {
-        /// The grip's index in the atlas.
-        entry: u16,
+        /// Where the grip is known from.
+        source: GraspSource,
         /// The grasp.
         grasp: Box<Grasp>,
         /// How good it is: more is better.
@@ -92,21 +102,28 @@ pub(super) enum Tried {
 impl<'a> KnownGrips<'a> {
     /// The grips that a search may use, if any.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
-        let atlas = settings.atlas.as_deref()?;
         let (object, presented) = scene.physical()?;
-        if !super::uses_atlas(settings.strategy, settings.validity) {
+        let atlas = settings.atlas.as_deref();
+        let recent = if settings.reproducible {
+            &[]
+        } else {
+            settings.recent.entries()
+        };
+        let is_any = atlas.is_some() || !recent.is_empty();
+        if !is_any || !super::uses_atlas(settings.strategy, settings.validity) {
             return None;
         }
         let giver = presented.giver.as_ref();
         // The shortlist is for givers that are in the way, and the best is not wanted for being on it.
-        let shortlist = match settings.choice {
-            Choice::FirstValid if giver.is_some() => atlas.shortlist(presented.up),
+        let shortlist = match (atlas, settings.choice) {
+            (Some(atlas), Choice::FirstValid) if giver.is_some() => atlas.shortlist(presented.up),
             _ => Shortlist::default(),
         };
         Some(Self {
             atlas,
             shortlist,
-            order: atlas.by_score(presented.up),
+            order: atlas.map_or(&[], |atlas| atlas.by_score(presented.up)),
+            recent,
             scene,
             asked: Asked::new(object, scene.rig(), presented),
             giver,
@@ -116,14 +133,14 @@ impl<'a> KnownGrips<'a> {
         })
     }
 
-    /// How many there are.
-    pub(super) fn len(&self) -> usize {
+    /// How many of the atlas there are.
+    pub(super) fn of_atlas(&self) -> usize {
         self.order.len()
     }
 
     /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such.
     fn take(&self) -> Taken<'a> {
-        let end = self.shortlist.len() + self.order.len();
+        let end = self.shortlist.len() + self.order.len() + self.recent.len();
         loop {
             let from = self.next.load(Ordering::Relaxed);
             if from >= end {
@@ -131,9 +148,10 @@ impl<'a> KnownGrips<'a> {
             }
             let mut to = end.min(from + PASSED_AT_ONCE);
             let mut taken = Taken::NoneOpen;
-            if let Some((place, entry, solids)) = (from..to).find_map(|place| self.unless_met(place)) {
+            let open = (from..to).find_map(|place| Some((place, self.unless_met(place)?)));
+            if let Some((place, open)) = open {
                 to = place + 1;
-                taken = Taken::Open(entry, solids);
+                taken = Taken::Open(open);
             }
             // Another worker may have taken the same meanwhile; then they are looked at in vain.
             let exchanged = self
@@ -145,44 +163,60 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// A place with the grip there and its solids, unless it certainly meets the giver.
-    fn unless_met(&self, place: usize) -> Option<(usize, u16, Solids<'a>)> {
+    /// The grip at a place, unless it certainly meets the giver.
+    fn unless_met(&self, place: usize) -> Option<Open<'a>> {
+        let Some(place) = place.checked_sub(self.shortlist.len()) else {
+            let (index, solids) = self.shortlist.unless_met(place, self.giver?)?;
+            return self.open(index, Solids::Kept(solids));
+        };
+        let Some(&index) = self.order.get(place) else {
+            let entry = &self.recent[place - self.order.len()];
+            return Some(Open {
+                source: GraspSource::Recent,
+                entry,
+                solids: Solids::Made(Box::new(entry.told_solids(self.rig))),
+            });
+        };
+        let atlas = self.atlas?;
         let Some(giver) = self.giver else {
-            let entry = self.order[place];
-            let solids = self.atlas.entries()[usize::from(entry)].told_solids(self.rig);
-            return Some((place, entry, Solids::Made(Box::new(solids))));
+            let solids = atlas.entries()[usize::from(index)].told_solids(self.rig);
+            return self.open(index, Solids::Made(Box::new(solids)));
         };
-        let Some(in_order) = place.checked_sub(self.shortlist.len()) else {
-            let (entry, solids) = self.shortlist.unless_met(place, giver)?;
-            return Some((place, entry, Solids::Kept(solids)));
-        };
-        let entry = self.order[in_order];
-        let excluded = self.excluded.get_or_init(|| self.atlas.excluded_by(giver));
-        if excluded.contains(entry) {
+        let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
+        if excluded.contains(index) {
             return None;
         }
-        let solids = self
-            .atlas
-            .grips()
-            .unless_met(usize::from(entry), self.rig, giver)?;
-        Some((place, entry, Solids::Made(solids)))
+        let solids = atlas.grips().unless_met(usize::from(index), self.rig, giver)?;
+        self.open(index, Solids::Made(solids))
+    }
+
+    /// A grip of the atlas.
+    fn open(&self, index: u16, solids: Solids<'a>) -> Option<Open<'a>> {
+        Some(Open {
+            source: GraspSource::Atlas(index),
+            entry: &self.atlas?.entries()[usize::from(index)],
+            solids,
+        })
     }
 
     /// Tries the next one.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
-        let (entry, solids) = match self.take() {
+        let Open {
+            source,
+            entry,
+            solids,
+        } = match self.take() {
             Taken::NoneLeft => return Tried::NoneLeft,
             Taken::NoneOpen => return Tried::Refused,
-            Taken::Open(entry, solids) => (entry, solids),
+            Taken::Open(open) => open,
         };
-        let grip = &self.atlas.entries()[usize::from(entry)];
         let constraints = self.scene.constraints();
-        if !grip.is_wanted(constraints) {
+        if !entry.is_wanted(constraints) {
             return Tried::Refused;
         }
-        match self.asked.hold(grip, &solids, gripper) {
+        match self.asked.hold(entry, &solids, gripper) {
             Some(grasp) if constraints.admits(&grasp) => Tried::Valid {
-                entry,
+                source,
                 value: value(&grasp),
                 grasp: Box::new(grasp),
             },

@@ -11,7 +11,7 @@ use std::{
 };
 
 use crate::{
-    atlas::Atlas,
+    atlas::{Atlas, recent::RecentGrips},
     clock::Clock,
     constraints::Constraints,
     grasp::Grasp,
@@ -50,6 +50,9 @@ pub struct SearchSettings {
     pub atlas: Option<Arc<Atlas>>,
     /// Grips that are known, for attempts to start from where the giver is in their way; likewise.
     pub starts: Option<Arc<Atlas>>,
+    /// Grips that earlier searches found for this object and rig, under the object's own friction: tried after those of the
+    /// atlas, and not if the search is reproducible.
+    pub recent: RecentGrips,
     /// Answer with the valid grip of the atlas that is first in its order, or else with the valid attempt of the lowest
     /// index, instead of with the first to finish.
     pub reproducible: bool,
@@ -96,7 +99,7 @@ pub fn uses_atlas(strategy: Strategy, validity: Validity) -> bool {
     strategy == Strategy::Guided && validity == Validity::Physical
 }
 
-/// Looks for a valid grip in the atlas of `settings`, for no longer than `within` and without any other thread. None if
+/// Looks for a valid grip among those that `settings` say are known, for no longer than `within` and without any other thread. None if
 /// none was found by then: [`find_grasp`] looks further. For first answers only, not for the best.
 pub fn find_known_grasp(
     holdout: &Holdout,

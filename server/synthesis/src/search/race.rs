@@ -206,8 +206,8 @@ impl<'a> Race<'a> {
             match known.try_next(&mut gripper) {
                 Tried::NoneLeft => return false,
                 Tried::Refused => {}
-                Tried::Valid { entry, grasp, value } => {
-                    self.enter_winner(GraspSource::Atlas(entry), grasp, value);
+                Tried::Valid { source, grasp, value } => {
+                    self.enter_winner(source, grasp, value);
                     return true;
                 }
             }
@@ -226,8 +226,8 @@ impl<'a> Race<'a> {
             match known.try_next(&mut gripper) {
                 Tried::NoneLeft => return,
                 Tried::Refused => {}
-                Tried::Valid { entry, grasp, value } => {
-                    self.enter_winner(GraspSource::Atlas(entry), grasp, value);
+                Tried::Valid { source, grasp, value } => {
+                    self.enter_winner(source, grasp, value);
                 }
             }
         }
@@ -289,7 +289,7 @@ impl<'a> Race<'a> {
             // Reproducible: an attempt of a lower index that was cut short might have won.
             .filter(|winner| match winner.source {
                 GraspSource::Attempt(index) => !self.settings.reproducible || index < interrupted,
-                GraspSource::Atlas(_) => true,
+                GraspSource::Atlas(_) | GraspSource::Recent => true,
             });
         let source = winner.as_ref().map(|winner| winner.source);
         let winning_index = match source {
@@ -314,7 +314,7 @@ impl<'a> Race<'a> {
             } else {
                 self.candidates.into_inner()
             },
-            known_grips: self.known.map_or(0, KnownGrips::len),
+            known_grips: self.known.map_or(0, KnownGrips::of_atlas),
             ..SearchReport::default()
         };
         let lowest_winner = winning_index.filter(|_| self.settings.reproducible);

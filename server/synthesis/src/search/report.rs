@@ -63,4 +63,6 @@ pub enum GraspSource {
     Attempt(u64),
     /// The atlas' grip of this index.
     Atlas(u16),
+    /// A grip that an earlier search found.
+    Recent,
 }

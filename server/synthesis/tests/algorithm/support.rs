@@ -10,6 +10,7 @@ use std::{
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
+    atlas::recent::RecentGrips,
     clock::Clock,
     constraints::Constraints,
     geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh},
@@ -256,6 +257,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
         choice: Choice::FirstValid,
         atlas: None,
         starts: None,
+        recent: RecentGrips::default(),
     }
 }
 

@@ -5,6 +5,7 @@ use std::{sync::atomic::AtomicBool, time::Duration};
 use grasp_assets::hands::hand;
 use grasp_experiment::{plan::Settings, record::Record};
 use grasp_synthesis::{
+    atlas::recent::RecentGrips,
     clock::Clock,
     constraints::Constraints,
     hand::Handedness,
@@ -51,6 +52,7 @@ fn search(record: &Record, first_attempt: u64, max_attempts: u64) -> SearchOutco
         choice: Choice::FirstValid,
         atlas: None,
         starts: None,
+        recent: RecentGrips::default(),
     };
     find_grasp(&pool, &holdout, rig, &settings, &NoClock, &AtomicBool::new(false))
 }
