@@ -6,7 +6,7 @@ use crate::{
     hand::{Digit, HandPose, kinematics::digit_frames, rig::Rig},
     physical::{
         shape::HandShape,
-        solids::{HandSolids, TaperedCapsule, link_radii},
+        solids::{Balls, HandSolids, TaperedCapsule, link_radii},
     },
     pose::Pose,
     synthesis::random::AttemptStream,
@@ -125,8 +125,10 @@ fn least_cos(width: f32) -> f32 {
 pub struct Oppositions {
     /// By width, ascending.
     known: Vec<Opposition>,
-    /// Balls inside palm and forearm, in the wrist's frame: middles and radii in metres.
-    cores: Vec<(Vec3, f32)>,
+    /// Their widths in metres, side by side.
+    widths: Vec<f32>,
+    /// Balls inside palm and forearm, in the wrist's frame.
+    cores: Vec<Balls>,
 }
 
 impl Oppositions {
@@ -146,31 +148,30 @@ impl Oppositions {
         // Those that meet something most often come first.
         let of_forearm = [0.2, 0.6, 1.0].map(|along| solids.forearm.map(|solid| inside(&solid, along)));
         let of_palm = [0.6, 0.95, 0.2].map(|along| solids.palm.map(|solid| inside(&solid, along)));
-        let cores = of_palm.as_flattened().iter().chain(of_forearm.as_flattened());
         Self {
+            widths: known.iter().map(Opposition::width).collect(),
             known,
-            cores: cores.copied().collect(),
+            cores: Balls::of_all(&[of_palm.as_flattened(), of_forearm.as_flattened()].concat()),
         }
     }
 
-    /// Balls inside palm and forearm, in the wrist's frame: middles and radii in metres.
-    pub fn cores(&self) -> &[(Vec3, f32)] {
+    /// Balls inside palm and forearm, in the wrist's frame.
+    pub fn cores(&self) -> &[Balls] {
         &self.cores
     }
 
     /// One whose pads are between `least` and `most` metres apart; none if there is none.
     pub fn draw(&self, [least, most]: [f32; 2], stream: &mut AttemptStream) -> Option<&Opposition> {
-        let first = self.known.partition_point(|known| known.width() < least);
-        let end = self.known.partition_point(|known| known.width() <= most);
+        let first = self.widths.partition_point(|&width| width < least);
+        let end = self.widths.partition_point(|&width| width <= most);
         (first < end).then(|| &self.known[first + stream.below(end - first)])
     }
 }
 
 impl Opposition {
     /// Balls inside the links of the digits where they are when the pads meet what is between them, fingers that do not
-    /// close left out: middles and radii in metres, in the wrist's frame. The first of the links are within the palm's
-    /// reach and left out too.
-    pub fn link_balls(&self, rig: &Rig) -> [(Vec3, f32); 15] {
+    /// close left out, in the wrist's frame. The first of the links are within the palm's reach and left out too.
+    pub fn link_balls(&self, rig: &Rig) -> Vec<Balls> {
         let pose = HandPose {
             frame_from_wrist: Pose::IDENTITY,
             digits: Digit::ALL.map(|digit| {
@@ -179,15 +180,14 @@ impl Opposition {
             }),
         };
         let links = HandSolids::of_pose(rig, &pose).phalanges;
-        std::array::from_fn(|i| {
-            let (digit, (link, along)) = (i / 3, [(1, 0.5), (2, 0.2), (2, 1.0)][i % 3]);
-            // A finger that rests may be anywhere: its neighbour's ball stands for it.
-            let digit = (0..=digit)
-                .rfind(|&digit| self.shape.closing[digit])
-                .unwrap_or_default();
-            let solid = links[digit][link];
-            (solid.at(along), solid.radius_at(along))
-        })
+        let closing = (0..5).filter(|&digit| self.shape.closing[digit]);
+        let of_digit = closing.map(|digit| {
+            [(1, 0.5), (2, 0.2), (2, 1.0)].map(|(link, along)| {
+                let solid = links[digit][link];
+                (solid.at(along), solid.radius_at(along))
+            })
+        });
+        Balls::of_all(of_digit.collect::<Vec<_>>().as_flattened())
     }
 
     /// Distance between the pads in metres.

@@ -15,7 +15,7 @@ use crate::{
     physical::{
         grip::DEEPEST,
         shape::{HandShape, Proposal},
-        solids::PreparedHand,
+        solids::{Balls, PreparedHand},
     },
     pose::Pose,
     synthesis::random::AttemptStream,
@@ -234,7 +234,7 @@ impl<'a> Place<'a> {
     }
 
     /// True if palm, forearm and digits, whose balls are `links`, have room there.
-    fn fits(&self, candidate: &Candidate<'_>, links: &[(Vec3, f32)]) -> bool {
+    fn fits(&self, candidate: &Candidate<'_>, links: &[Balls]) -> bool {
         let pad_depth = PAD_DEPTHS[usize::from(candidate.pair.thickness > THIN)];
         self.has_room(candidate.object_from_wrist)
             && self.have_room(candidate.object_from_wrist, links, pad_depth)
@@ -282,11 +282,6 @@ impl<'a> Place<'a> {
         })
     }
 
-    fn is_free_of_giver(&self, point: Vec3, room: f32) -> bool {
-        self.giver
-            .is_none_or(|giver| !giver.surely_nears(point, 0.0, room))
-    }
-
     /// True if balls inside palm and forearm are off the object and the giver's hand: a hundred times sooner known than
     /// the whole hand's clearance, which decides in the end.
     fn has_room(&self, object_from_wrist: Pose) -> bool {
@@ -294,16 +289,18 @@ impl<'a> Place<'a> {
     }
 
     /// True if balls, in the wrist's frame, are off the giver's hand and at most `depth` metres in the object.
-    fn have_room(&self, object_from_wrist: Pose, balls: &[(Vec3, f32)], depth: f32) -> bool {
-        balls.iter().all(|&(middle, radius)| {
-            let middle = object_from_wrist.transform_point(middle);
-            self.is_free_of_giver(middle, radius)
-                && (radius <= depth
-                    || self
-                        .object
-                        .surface
-                        .closest_point_within(middle, radius - depth)
-                        .is_none())
-        })
+    fn have_room(&self, object_from_wrist: Pose, balls: &[Balls], depth: f32) -> bool {
+        let moved = balls.iter().map(|balls| balls.transformed(object_from_wrist));
+        let meets = |giver: &PreparedHand| {
+            let mut moved = moved.clone();
+            moved.any(|balls| giver.surely_nears_any(&balls, 0.0))
+        };
+        !self.giver.is_some_and(meets)
+            && moved.clone().all(|balls| {
+                balls.iter().all(|(middle, radius)| {
+                    let surface = &self.object.surface;
+                    radius <= depth || surface.closest_point_within(middle, radius - depth).is_none()
+                })
+            })
     }
 }

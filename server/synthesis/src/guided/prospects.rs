@@ -62,12 +62,16 @@ impl Network {
     /// The hidden units, told what is scaled already.
     pub fn units(&self, scaled: &[f32; TOLD]) -> [f32; UNITS] {
         let mut units = self.biases;
+        // Loops over indices, as zipped and mapped arrays stay calls.
         for (told, weights) in scaled.iter().zip(&self.weights) {
-            for (unit, weight) in units.iter_mut().zip(weights) {
-                *unit += told * weight;
+            for k in 0..UNITS {
+                units[k] += told * weights[k];
             }
         }
-        units.map(|unit| unit.max(0.0))
+        for unit in &mut units {
+            *unit = unit.max(0.0);
+        }
+        units
     }
 
     /// The log odds that the hand holds.

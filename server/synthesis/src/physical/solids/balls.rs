@@ -33,6 +33,21 @@ impl Balls {
         balls
     }
 
+    /// All of some balls, by eights; where that leaves room, nothing that is near to anything.
+    pub fn of_all(balls: &[(Vec3, f32)]) -> Vec<Self> {
+        let nothing = (Vec3::ZERO, f32::NEG_INFINITY);
+        let groups = balls.chunks(BALLS);
+        groups
+            .map(|group| Self::new(|i| group.get(i).copied().unwrap_or(nothing)))
+            .collect()
+    }
+
+    /// Their middles and radii in metres.
+    pub fn iter(&self) -> impl Iterator<Item = (Vec3, f32)> {
+        let [xs, ys, zs] = &self.middles;
+        (0..BALLS).map(|i| (Vec3::new(xs[i], ys[i], zs[i]), self.radii[i]))
+    }
+
     /// The balls that are to be kept; in place of the others nothing that is near to anything.
     #[must_use]
     pub fn kept(mut self, is_kept: impl Fn(usize) -> bool) -> Self {
