@@ -23,8 +23,8 @@ const P999: f64 = 2e-3;
 const ASKED_AGAIN: usize = 20;
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Requests before those that are measured, to fill caches: others than those, as what their searches find is known from
-/// then on. Of few requests, half.
+/// Requests before those that are measured, to fill caches: of random holdouts others than those, as what their searches
+/// find is known from then on. Of few requests, half.
 const UNMEASURED: usize = 30;
 
 pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Line> {

@@ -99,8 +99,8 @@ pub fn uses_atlas(strategy: Strategy, validity: Validity) -> bool {
     strategy == Strategy::Guided && validity == Validity::Physical
 }
 
-/// Looks for a valid grip among those that `settings` say are known, for no longer than `within` and without any other thread. None if
-/// none was found by then: [`find_grasp`] looks further. For first answers only, not for the best.
+/// Looks for a valid grip among those that `settings` say are known, for no longer than `within` and without any other
+/// thread. None if none was found by then: [`find_grasp`] looks further. For first answers only, not for the best.
 pub fn find_known_grasp(
     holdout: &Holdout,
     rig: &Rig,
