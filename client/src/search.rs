@@ -85,7 +85,8 @@ pub enum BendRatios {
 pub enum Choice {
     /// The first that is found.
     FirstValid,
-    /// The one of the highest score among all that are found until the budget ends.
+    /// The one of the highest score among all that are found until the budget ends. Where none is named and nothing is found
+    /// in the 5 ms that it is then, the first that is found within the server's default budget.
     BestWithinBudget,
 }
 

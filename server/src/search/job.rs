@@ -38,6 +38,8 @@ pub(crate) struct FindJob {
     pub arrived: Instant,
     /// The budget that is in force.
     pub budget: Duration,
+    /// How long the first grasp is looked for if none is found within the budget: at least as long.
+    pub patience: Duration,
     /// Workers that race.
     pub workers: usize,
     /// Grips that are known for the object and the hand.
@@ -62,6 +64,7 @@ pub(crate) struct PreparedJob {
     clock: SinceArrival,
     start: Instant,
     budget: Duration,
+    patience: Duration,
 }
 
 /// How long a call's own thread may look for a known grip: a message takes about as long to be decoded and answered.
@@ -143,6 +146,7 @@ impl FindJob {
             clock: SinceArrival(self.arrived),
             start,
             budget: self.budget,
+            patience: self.patience,
         })
     }
 }
@@ -164,7 +168,8 @@ impl PreparedJob {
     /// The search was told to stop.
     pub(crate) fn run(&self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
-        let outcome = race(pool, &self.holdout, rig, &self.settings, &self.clock, stop);
+        let (holdout, settings) = (&self.holdout, &self.settings);
+        let outcome = race(pool, holdout, rig, settings, self.patience, &self.clock, stop);
         self.answer(outcome)
     }
 
@@ -384,6 +389,7 @@ mod tests {
             let budgets = config::Config::default().budgets;
             let job = FindJob {
                 budget: effective_budget(query.budget, budgets, arrived, None),
+                patience: Duration::ZERO,
                 query,
                 object: object.object,
                 seed: 3,

@@ -33,12 +33,14 @@ const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 /// Attempts a worker in any slice at most.
 const MOST_ATTEMPTS_PER_WORKER: u64 = 8192;
 
-/// Runs a search to its end.
+/// Runs a search to its end. Where it finds nothing by its deadline, and `patience` ends later, it goes on until then, for the
+/// first valid grasp.
 pub(super) fn race(
     pool: &ThreadPool,
     holdout: &Holdout,
     rig: &Rig,
     settings: &SearchSettings,
+    patience: Duration,
     clock: &dyn Clock,
     stop: &AtomicBool,
 ) -> SearchOutcome {
@@ -64,11 +66,17 @@ pub(super) fn race(
             best = outcome.grasp.map(|grasp| (grasp, outcome.value));
         }
         // The first valid grasp ends the search; the best is looked for as long as there is time.
-        let is_enough = best.is_some() && settings.choice == Choice::FirstValid;
-        let is_over = matches!(outcome.end, SearchEnd::DeadlinePassed | SearchEnd::Stopped)
-            || clock_has_passed(settings, clock)
-            || stop.load(Ordering::Relaxed);
-        if is_enough || is_over || left == 0 {
+        let is_enough = best.is_some() && slice.choice == Choice::FirstValid;
+        let is_stopped = outcome.end == SearchEnd::Stopped || stop.load(Ordering::Relaxed);
+        let is_late = outcome.end == SearchEnd::DeadlinePassed || has_passed(slice.deadline, clock);
+        let goes_on = best.is_none() && slice.deadline < Some(patience);
+        if is_late && goes_on && !is_stopped && left > 0 {
+            slice.choice = Choice::FirstValid;
+            slice.deadline = Some(patience);
+            // A search that waited for its workers may not have come to them.
+            slice.atlas.clone_from(&settings.atlas);
+            slice.recent.clone_from(&settings.recent);
+        } else if is_enough || is_stopped || is_late || left == 0 {
             if best.is_some() {
                 // A miss is of interest only when nothing was hit.
                 total.nearest_miss = None;
@@ -99,8 +107,8 @@ fn next_size(size: u64, elapsed: Duration) -> u64 {
         .clamp(1, (2 * size).min(MOST_ATTEMPTS_PER_WORKER))
 }
 
-fn clock_has_passed(settings: &SearchSettings, clock: &dyn Clock) -> bool {
-    settings.deadline.is_some_and(|deadline| clock.now() >= deadline)
+fn has_passed(deadline: Option<Duration>, clock: &dyn Clock) -> bool {
+    deadline.is_some_and(|deadline| clock.now() >= deadline)
 }
 
 /// Adds what a slice did; its grasp `is_better` than those before.
@@ -140,13 +148,87 @@ fn closeness(miss: &NearestMiss) -> (usize, f32) {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::{Arc, atomic::AtomicU64};
+
+    use glam::Vec3;
+    use grasp_assets::{hands::hand, objects::object};
     use grasp_synthesis::{
-        hand::{DigitAngles, HandPose},
+        constraints::Constraints,
+        hand::{DigitAngles, HandPose, Handedness},
         pose::Pose,
         rejection::Rejection,
+        strategy::{BendRatioChoice, Strategy, Validity},
     };
 
     use super::*;
+
+    /// A clock that goes on by a microsecond whenever somebody looks at it.
+    #[derive(Debug, Default)]
+    struct LookedAt(AtomicU64);
+
+    impl Clock for LookedAt {
+        fn now(&self) -> Duration {
+            Duration::from_micros(self.0.fetch_add(1, Ordering::Relaxed))
+        }
+    }
+
+    /// A search by one worker, in looks at the clock.
+    fn race_within(choice: Choice, deadline: u64, patience: u64) -> (SearchOutcome, u64) {
+        let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
+        let object = &object("remote").expect("it is built in").object;
+        let holdout = Holdout::new(Arc::clone(object), None, Vec3::Y).expect("up is a unit vector");
+        let settings = SearchSettings {
+            seed: 3,
+            strategy: Strategy::Guided,
+            validity: Validity::Physical,
+            bend_ratios: BendRatioChoice::OneRandom,
+            friction: object.friction_under(Validity::Physical),
+            constraints: Constraints::default(),
+            choice,
+            atlas: None,
+            starts: None,
+            recent: RecentGrips::default(),
+            reproducible: false,
+            first_attempt: 0,
+            max_attempts: 10_000,
+            deadline: Some(Duration::from_micros(deadline)),
+            workers: 1,
+            record_step_times: false,
+        };
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .expect("a thread");
+        let clock = LookedAt::default();
+        let patience = Duration::from_micros(patience);
+        let stop = AtomicBool::new(false);
+        let outcome = race(&pool, &holdout, rig, &settings, patience, &clock, &stop);
+        (outcome, clock.0.into_inner())
+    }
+
+    #[test]
+    fn patience_is_for_the_first_grasp_alone() {
+        let (none, looks) = race_within(Choice::BestWithinBudget, 3, 3);
+        assert!(none.grasp.is_none() && none.end == SearchEnd::DeadlinePassed && looks < 20);
+        let (late, looks) = race_within(Choice::BestWithinBudget, 3, 1_000_000);
+        assert_eq!((late.end, late.report.candidates), (SearchEnd::Found, 1));
+        assert!(late.grasp.is_some() && late.report.attempts > 0 && looks < 1_000_000);
+        // Where there are grasps in time, the best of them, and no more.
+        let (best, looks) = race_within(Choice::BestWithinBudget, 10_000, 1_000_000);
+        assert!(best.report.candidates > 1 && (10_000..11_000).contains(&looks));
+        assert!(
+            best.grasp
+                .and_then(|grasp| grasp.score)
+                .map(|score| score.total())
+                > late
+                    .grasp
+                    .and_then(|grasp| grasp.score)
+                    .map(|score| score.total())
+        );
+        // Nobody waits longer than they are ready to.
+        let (never, looks) = race_within(Choice::BestWithinBudget, 3, 6);
+        assert!(never.grasp.is_none() && looks < 20);
+    }
 
     fn miss(rejection: Rejection, wrench_angle: Option<f32>, attempt: u64) -> NearestMiss {
         NearestMiss {

@@ -42,7 +42,8 @@ impl GraspHandler {
         call.tell_object(&query.object_id);
         let stored = shared.objects.get(&query.object_id)?;
         let object = Arc::clone(&stored.object);
-        let budget = effective_budget(query.budget, shared.budgets, call.arrived, call.deadline);
+        let in_force = |asked| effective_budget(asked, shared.budgets, call.arrived, call.deadline);
+        let budget = in_force(query.budget);
         if budget.is_zero() {
             return Err(ServiceError::DeadlineExceeded);
         }
@@ -60,10 +61,15 @@ impl GraspHandler {
         }
         let job = FindJob {
             seed: query.seed.unwrap_or_else(drawn_seed),
-            query,
             object,
             arrived: call.arrived,
             budget,
+            patience: if query.goes_on {
+                in_force(None).max(budget)
+            } else {
+                budget
+            },
+            query,
             workers: shared.executor.workers(),
             known,
         };

@@ -26,7 +26,8 @@ const LAST_ATTEMPT: u64 = (1 << 62) - 1;
 const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
 
 /// How long the best grasp is searched for if the request does not say: a character that turns to it within a frame of
-/// 60 Hz leaves a third of the 16 ms for it. Longer finds better grasps, later.
+/// 60 Hz leaves a third of the 16 ms for it. Longer finds better grasps, later. Where there is none by then, the first one is
+/// looked for on.
 const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
 /// A request that may be searched.
@@ -50,6 +51,9 @@ pub(crate) struct FindQuery {
     pub up: Vec3,
     /// The budget that was asked for.
     pub budget: Option<Duration>,
+    /// Is the first grasp looked for on where the budget ends without any? It is if the request leaves open how long the best
+    /// is looked for.
+    pub goes_on: bool,
     /// The first attempt to run.
     pub first_attempt: u64,
     /// How many attempts to run at most.
@@ -116,9 +120,10 @@ pub(crate) fn find_query(
     );
     let up = hand::up(Field::root("up"), request.up, convention, v);
     let choice = choice(known(Field::root("choice"), request.choice, v));
+    let goes_on = choice == Choice::BestWithinBudget && request.budget.is_none();
     let budget = match request.budget {
         Some(budget) => positive_duration(Field::root("budget"), budget, v),
-        None => (choice == Choice::BestWithinBudget).then_some(BEST_CHOICE_BUDGET),
+        None => goes_on.then_some(BEST_CHOICE_BUDGET),
     };
     let (first_attempt, max_attempts) = attempts(request.max_attempts, request.only_attempt, v);
     let strategy = strategy(known(Field::root("strategy"), request.strategy, v), validity);
@@ -154,6 +159,7 @@ pub(crate) fn find_query(
         receiving_hand,
         up,
         budget,
+        goes_on,
         first_attempt,
         max_attempts,
         strategy,

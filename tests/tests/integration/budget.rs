@@ -87,6 +87,22 @@ async fn the_servers_default_and_maximum_bound_the_budget() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_first_grasp_is_looked_for_on_where_the_best_is_not_found_and_no_budget_is_named() {
+    let server = TestServer::start_with(|config| config.budgets.default = Duration::from_millis(200)).await;
+    let request = v1::FindGraspRequest {
+        choice: v1::Choice::BestWithinBudget.into(),
+        ..impossible(&server).await
+    };
+    let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
+    let report = answer.unwrap().into_inner().report.unwrap();
+    // What the best is chosen in is told, and the default was searched.
+    assert_eq!(report.budget, Some(milliseconds(5)));
+    let took = report.search_time.expect("it is always told");
+    assert!(took.seconds > 0 || took.nanos >= 190_000_000, "{took:?}");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_calls_deadline_less_the_reserve_bounds_the_budget() {
     let server = TestServer::start_with(|config| config.budgets.reserve = Duration::from_millis(1400)).await;
     let mut request = Request::new(v1::FindGraspRequest {

@@ -1,0 +1,152 @@
+//! Step 2 under `PHYSICAL` validity for the digits of one hand: thumb, fingers, and what rests.
+
+use std::iter;
+
+use super::{
+    closing::{ClosedDigit, Closing},
+    grip::{GIVER_CLEARANCE, NoGrip, nears_forbidden_surface},
+    obstacle::Obstacle,
+    scene::ObjectScene,
+    shape::{HandShape, TUCKED_FLEXION},
+    solids::{PreparedHand, link_radii},
+};
+use crate::{
+    hand::{Digit, HandPose, kinematics::DigitPlane, rig::Rig},
+    pose::Pose,
+    rejection::Rejection,
+};
+
+/// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.
+const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
+
+/// Closes the digits of a hand whose wrist stays.
+#[derive(Debug)]
+pub(super) struct Closer<'a> {
+    /// The object.
+    pub scene: &'a ObjectScene<'a>,
+    /// The giver's hand.
+    pub giver: Option<&'a PreparedHand>,
+    /// The hand that closes.
+    pub rig: &'a Rig,
+    /// How it is held.
+    pub shape: &'a HandShape,
+    /// Where its wrist is.
+    pub object_from_wrist: Pose,
+}
+
+impl Closer<'_> {
+    /// The hand with its digits posed.
+    pub(super) fn pose(&self, digits: &[ClosedDigit; 5]) -> HandPose {
+        HandPose {
+            frame_from_wrist: self.object_from_wrist,
+            digits: digits.map(|digit| digit.angles),
+        }
+    }
+
+    fn closing<'a>(&'a self, digit: Digit, obstacles: &'a [Obstacle]) -> Closing<'a> {
+        let flexing = self.shape.flexing(self.rig, digit);
+        Closing {
+            surface: &self.scene.object.surface,
+            flexing,
+            radii: link_radii(self.rig, digit),
+            plane: DigitPlane::new(flexing.digit, self.object_from_wrist, flexing.base_yaw),
+            preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
+            obstacles,
+        }
+    }
+
+    /// A digit closed as far as it goes, if nothing is in its way before.
+    fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
+        let closed = self.closing(digit, obstacles).close()?;
+        self.is_clear_of_giver(&closed).then_some(closed)
+    }
+
+    fn nears_forbidden(&self, digit: &ClosedDigit) -> bool {
+        nears_forbidden_surface(self.scene, digit.links.iter())
+    }
+
+    /// True if a digit keeps off the giver's hand.
+    pub(super) fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
+        self.giver
+            .is_none_or(|giver| !giver.is_neared_by(digit.links.iter(), GIVER_CLEARANCE))
+    }
+
+    /// Closes the thumb, which must touch.
+    pub(super) fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, NoGrip> {
+        let thumb = self.close(Digit::Thumb, obstacles);
+        let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        if !thumb.touches_object() {
+            Err(NoGrip::Rejected(Rejection::NoThumbEarlyStop))
+        } else if self.nears_forbidden(&thumb) {
+            Err(NoGrip::Rejected(Rejection::UnwantedContact))
+        } else {
+            Ok(thumb)
+        }
+    }
+
+    /// Closes the fingers; those that have something in their way, come near to what is not to be touched or are not to
+    /// close hold nothing.
+    pub(super) fn close_fingers(
+        &self,
+        thumb: ClosedDigit,
+        obstacles: &[Obstacle],
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<[ClosedDigit; 5], NoGrip> {
+        let mut closed = [ClosedDigit::default(); 5];
+        closed[Digit::Thumb.index()] = thumb;
+        let fingers = &Digit::ALL[1..];
+        for &finger in fingers.iter().filter(|finger| self.shape.closing[finger.index()]) {
+            if interrupted() {
+                return Err(NoGrip::Interrupted);
+            }
+            let free = self.close(finger, obstacles);
+            let free = free.filter(|closed| !self.nears_forbidden(closed));
+            closed[finger.index()] = free.unwrap_or_default();
+        }
+        if !closed[1..].iter().any(ClosedDigit::touches_object) {
+            return Err(NoGrip::Rejected(Rejection::NoFingers));
+        }
+        Ok(closed)
+    }
+
+    /// The digits with those at rest that hold nothing.
+    pub(super) fn rest_idle(&self, closed: &[ClosedDigit; 5], obstacles: &[Obstacle]) -> [ClosedDigit; 5] {
+        let mut rested = *closed;
+        for &finger in &Digit::ALL[1..] {
+            let place = finger.index();
+            if !closed[place].touches_object() {
+                let flexion = self.shape.resting_flexion(closed, place);
+                rested[place] = self.rest(finger, obstacles, flexion);
+            }
+        }
+        rested
+    }
+
+    /// A finger that holds nothing, relaxed; tucked away or nearly stretched where it would meet the giver's hand.
+    pub(super) fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
+        let closing = self.closing(finger, obstacles);
+        let relaxed = closing.relax(flexion);
+        if self.is_clear_of_giver(&relaxed) {
+            return relaxed;
+        }
+        let others = EVASIVE_FLEXIONS.map(|flexion| closing.relax(flexion));
+        let free = others.into_iter().find(|other| self.is_clear_of_giver(other));
+        free.unwrap_or(relaxed)
+    }
+
+    /// A finger that holds nothing, clear of the giver's hand: as [`Closer::rest`], but none where that has no room, and none
+    /// of the poses in which it would meet the giver if nothing else stopped it: those take most of the time.
+    pub(super) fn rest_clear(
+        &self,
+        finger: Digit,
+        obstacles: &[Obstacle],
+        flexion: f32,
+    ) -> Option<ClosedDigit> {
+        let closing = self.closing(finger, obstacles);
+        let flexions = iter::once(flexion).chain(EVASIVE_FLEXIONS);
+        flexions
+            .filter(|&flexion| self.is_clear_of_giver(&closing.bent(flexion)))
+            .map(|flexion| closing.relax(flexion))
+            .find(|relaxed| self.is_clear_of_giver(relaxed))
+    }
+}
