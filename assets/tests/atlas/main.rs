@@ -5,5 +5,6 @@ mod exclusion;
 mod palm;
 mod recent;
 mod shortlist;
+mod sparing;
 mod starts;
 mod support;

@@ -6,10 +6,14 @@ use std::{
 };
 
 use grasp_synthesis::{
-    atlas::{Atlas, entry::Entry, starts::Starts},
+    atlas::{
+        Atlas,
+        entry::Entry,
+        starts::{Start, Starts},
+    },
     constraints::Constraints,
     guided::proposal::{Place, propose},
-    hand::{Digit, HandPart, Handedness},
+    hand::Handedness,
     holdout::Holdout,
     physical::{
         attempt::{PhysicalAttempt, Surroundings},
@@ -23,23 +27,33 @@ use grasp_synthesis::{
     synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
 };
 
-use crate::support::{NoClock, UP, adult, held_out, known, reproducible};
+use crate::support::{NoClock, UP, adult, held_out, known, reproducible, tight_givers};
 
-/// How far the digits that hold, palm and forearm are from the giver's, pair by pair.
-fn clearance(entry: &Entry, giver: &ToldSolids) -> f32 {
+/// How far palm, forearm, thumb and some fingers are from the giver's, pair by pair.
+fn clearance(entry: &Entry, kept: [bool; 5], giver: &ToldSolids) -> f32 {
     let solids = HandSolids::of_pose(adult(Handedness::Right), &entry.grip.pose);
-    let touches = |digit: usize| {
-        let of_digit = |part: HandPart| part.digit().map(Digit::index) == Some(digit);
-        entry.contacts.iter().any(|contact| of_digit(contact.part))
-    };
     let of_digits = (0..5)
-        .filter(|&digit| touches(digit))
+        .filter(|&digit| kept[digit])
         .flat_map(|digit| solids.phalanges[digit]);
     let still = solids.palm.into_iter().chain(solids.thenar).chain(solids.forearm);
     of_digits
         .chain(still)
         .flat_map(|ours| giver.iter().map(move |theirs| ours.distance(theirs)))
         .fold(f32::INFINITY, f32::min)
+        .min(GIVER_CLEARANCE)
+}
+
+/// The same of those fingers that are farthest, of all that hold without the others.
+fn farthest(entry: &Entry, giver: &ToldSolids) -> f32 {
+    (1_u8..16)
+        .map(|set| std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1))
+        .filter(|kept| entry.finger_sets.contains(*kept))
+        .map(|kept| clearance(entry, kept, giver))
+        .fold(f32::NEG_INFINITY, f32::max)
+}
+
+fn entries_of(starts: &Starts) -> Vec<u16> {
+    starts.all().iter().map(|start| start.entry).collect()
 }
 
 #[test]
@@ -63,18 +77,20 @@ fn starts_are_what_is_least_in_the_givers_way() {
         let starts = of(holding).expect("nobody interrupts");
         let mut clearances: Vec<f32> = holding
             .iter()
-            .map(|&entry| clearance(&known.entries()[usize::from(entry)], &giver).min(GIVER_CLEARANCE))
+            .map(|&entry| farthest(&known.entries()[usize::from(entry)], &giver))
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
         // Nobody in the way: the best ones, as many.
         let nobody = Starts::of(known.grips(), rig, holding.iter().copied(), None, || false);
-        let best = nobody.expect("nobody interrupts");
-        assert!(best.entries().len() >= 32 && holding.starts_with(best.entries()));
-        assert_eq!(starts.entries().len(), best.entries().len());
-        let distinct: HashSet<u16> = starts.entries().iter().copied().collect();
-        assert_eq!(distinct.len(), starts.entries().len());
-        for (&entry, expected) in starts.entries().iter().zip(clearances) {
-            let found = clearance(&known.entries()[usize::from(entry)], &giver).min(GIVER_CLEARANCE);
+        let best = entries_of(&nobody.expect("nobody interrupts"));
+        assert!(best.len() >= 32 && holding.starts_with(&best));
+        assert_eq!(starts.all().len(), best.len());
+        let distinct: HashSet<u16> = entries_of(&starts).into_iter().collect();
+        assert_eq!(distinct.len(), starts.all().len());
+        for (&Start { entry, kept }, expected) in starts.all().iter().zip(clearances) {
+            let known = &known.entries()[usize::from(entry)];
+            assert!(known.finger_sets.contains(kept), "giver {grip}, {entry}");
+            let found = clearance(known, kept, &giver);
             assert!(
                 (found - expected).abs() < 1e-6,
                 "giver {grip}, {entry}: {found}, not {expected}"
@@ -88,29 +104,8 @@ fn starts_are_what_is_least_in_the_givers_way() {
             || true,
         );
         assert_eq!(interrupted, None);
-        assert!(of(&[]).is_some_and(|none| none.entries().is_empty()));
+        assert!(of(&[]).is_some_and(|none| none.all().is_empty()));
     }
-}
-
-/// Known grips that are givers of whom at most `most` keep clear.
-fn tight_givers(known: &Atlas, most: usize) -> Vec<usize> {
-    let free_of = |grip: usize| {
-        let giver = Presented::of(&held_out(known, grip)).giver.expect("there is one");
-        let entries = known.entries().iter();
-        entries
-            .filter(|entry| {
-                let (rig, pose) = (adult(Handedness::Right), &entry.grip.pose);
-                let solids = HandSolids::of_pose(rig, pose);
-                let told = ToldSolids::of_rig(rig, pose.frame_from_wrist, &solids);
-                giver.clearance(&told, GIVER_CLEARANCE).is_some()
-            })
-            .take(most + 1)
-            .count()
-    };
-    (0..known.entries().len())
-        .step_by(40)
-        .filter(|&grip| free_of(grip) <= most)
-        .collect()
 }
 
 #[test]

@@ -16,7 +16,11 @@ use grasp_synthesis::{
     hand::{Handedness, joints::HandJoints, rig::Rig},
     holdout::{Holdout, PresentingHand},
     object::GraspObject,
-    physical::grip::Gripper,
+    physical::{
+        grip::{GIVER_CLEARANCE, Gripper},
+        scene::Presented,
+        solids::{HandSolids, ToldSolids},
+    },
     search::SearchSettings,
     strategy::{BendRatioChoice, Choice, Strategy, Validity},
 };
@@ -44,6 +48,27 @@ pub(crate) fn held_out(known: &Atlas, grip: usize) -> Holdout {
 pub(crate) fn scissors(giver: Option<PresentingHand>) -> Holdout {
     let scissors = Arc::clone(&objects::object("scissors").expect("they are built in").object);
     Holdout::new(scissors, giver, UP).expect("up is a unit vector")
+}
+
+/// Known grips that are givers of whom at most `most` keep clear.
+pub(crate) fn tight_givers(known: &Atlas, most: usize) -> Vec<usize> {
+    let free_of = |grip: usize| {
+        let giver = Presented::of(&held_out(known, grip)).giver.expect("there is one");
+        let entries = known.entries().iter();
+        entries
+            .filter(|entry| {
+                let (rig, pose) = (adult(Handedness::Right), &entry.grip.pose);
+                let solids = HandSolids::of_pose(rig, pose);
+                let told = ToldSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+                giver.clearance(&told, GIVER_CLEARANCE).is_some()
+            })
+            .take(most + 1)
+            .count()
+    };
+    (0..known.entries().len())
+        .step_by(40)
+        .filter(|&grip| free_of(grip) <= most)
+        .collect()
 }
 
 /// Searches without a deadline ask for no time.

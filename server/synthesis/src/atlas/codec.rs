@@ -28,7 +28,7 @@ use crate::{hand::rig::Rig, object::GraspObject};
 const MARK: [u8; 8] = *b"GRASPATL";
 
 /// Counts the formats.
-const FORMAT: u16 = 3;
+const FORMAT: u16 = 4;
 
 /// Bytes of the checksum.
 const CHECKSUM_BYTES: usize = 32;

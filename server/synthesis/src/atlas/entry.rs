@@ -1,6 +1,7 @@
 //! A grip of the atlas.
 
 use super::{
+    finger_sets::FingerSets,
     friction_uses::FrictionUses,
     gravity::{DIRECTIONS, direction},
 };
@@ -37,6 +38,8 @@ pub struct Entry {
     pub scores: [u8; DIRECTIONS],
     /// For each of them, how much friction the forces use; all of it where there are none.
     pub friction_uses: FrictionUses,
+    /// Which fingers hold without the others.
+    pub finger_sets: FingerSets,
 }
 
 impl Entry {
@@ -74,6 +77,11 @@ impl Entry {
                 quantised(of_grip + Score { values }.total())
             })
         });
+        let finger_sets = FingerSets::of(grip.holding_digits(), |kept| {
+            let of_kept = contacts.iter().filter(|contact| contact.part.is_among(kept));
+            soften(of_kept, scene.friction, &mut gripper.soft_contacts);
+            gripper.closure(scene).is_some()
+        });
         Self {
             grip,
             contacts,
@@ -81,11 +89,12 @@ impl Entry {
             grip_values,
             scores,
             friction_uses,
+            finger_sets,
         }
     }
 
-    /// What a grasp is known as for other holdouts of its object. How it fares under which gravity is not known. None if it
-    /// is not valid under `PHYSICAL`, and only right under the friction that it was found under.
+    /// What a grasp is known as for other holdouts of its object. How it fares under which gravity, and without some of its
+    /// fingers, is not known. None if it is not valid under `PHYSICAL`, and only right under the friction that it was found under.
     pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
         let margins = grasp.margins?;
         let Score { mut values } = grasp.score?;
@@ -94,13 +103,15 @@ impl Entry {
                 *value = 0.0;
             }
         }
+        let grip = Grip {
+            pose: grasp.pose,
+            bend_ratios: grasp.bend_ratios,
+            penetration: margins.penetration,
+            epsilon: margins.epsilon,
+        };
         Some(Self {
-            grip: Grip {
-                pose: grasp.pose,
-                bend_ratios: grasp.bend_ratios,
-                penetration: margins.penetration,
-                epsilon: margins.epsilon,
-            },
+            finger_sets: FingerSets::whole(grip.holding_digits()),
+            grip,
             contacts: grasp.contacts.clone(),
             classification: grasp.classification,
             grip_values: values,
@@ -129,11 +140,6 @@ impl Entry {
     /// The hand as solids for where it is beside a giver's, in the object's frame.
     pub fn told_solids(&self, rig: &Rig) -> ToldSolids {
         ToldSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids(rig))
-    }
-
-    /// Which digits hold, thumb first.
-    pub(super) fn holding_digits(&self) -> [bool; 5] {
-        self.grip.bend_ratios.map(|ratio| ratio.is_some())
     }
 
     /// True if wrist, contacts and type are what is demanded.

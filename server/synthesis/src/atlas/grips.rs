@@ -1,8 +1,9 @@
 //! Known grips, each with what tells soonest that it is in a giver's way.
 
 use super::{
-    cores::{first_balls, first_of_digits, second_balls},
+    cores::{farthest_by_first, first_balls, in_way_by_first, second_balls},
     entry::Entry,
+    finger_sets::FingerSets,
 };
 use crate::{
     hand::rig::Rig,
@@ -18,8 +19,8 @@ pub struct Grips {
     entries: Vec<Entry>,
     /// The first balls inside each hand, side by side, so that looking at one mostly takes two lines of the cache.
     cores: Vec<Balls>,
-    /// Which digits hold, thumb first.
-    holding: Vec<[bool; 5]>,
+    /// Which fingers hold without the others.
+    finger_sets: Vec<FingerSets>,
 }
 
 impl Grips {
@@ -28,7 +29,7 @@ impl Grips {
         let core = |entry: &Entry| first_balls(&entry.solids(rig));
         Self {
             cores: entries.iter().map(core).collect(),
-            holding: entries.iter().map(Entry::holding_digits).collect(),
+            finger_sets: entries.iter().map(|entry| entry.finger_sets).collect(),
             entries,
         }
     }
@@ -41,14 +42,14 @@ impl Grips {
     /// Adds a grip.
     pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
         self.cores.push(first_balls(&entry.solids(rig)));
-        self.holding.push(entry.holding_digits());
+        self.finger_sets.push(entry.finger_sets);
         self.entries.push(entry);
     }
 
     /// Puts a grip in the place of another one.
     pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
         self.cores[index] = first_balls(&entry.solids(rig));
-        self.holding[index] = entry.holding_digits();
+        self.finger_sets[index] = entry.finger_sets;
         self.entries[index] = entry;
     }
 
@@ -70,16 +71,29 @@ impl Grips {
         (!is_met).then(|| Box::new(solids))
     }
 
-    /// What the digits that hold, palm and forearm of a grip are from the giver's hand at most, in metres, by the first balls
-    /// inside alone.
+    /// False only if the giver's hand surely leaves too few digits of a grip to hold the object, or is too near to its palm or
+    /// forearm; not always then. Mostly by some 20 ns of work.
+    #[inline]
+    pub fn may_spare(&self, entry: usize, giver: &PreparedHand) -> bool {
+        let sets = self.finger_sets[entry];
+        let is_too_much = |near| !sets.hold_beside(in_way_by_first(near));
+        let near = giver.surely_near(&self.cores[entry], GIVER_CLEARANCE, is_too_much);
+        !is_too_much(near)
+    }
+
+    /// What thumb, palm, forearm and those fingers of a grip that hold without the others are from the giver's hand at most, in
+    /// metres, by the first balls inside alone.
     pub(super) fn clearance_at_most(&self, entry: usize, giver: &PreparedHand) -> f32 {
-        giver.distance_at_most(&first_of_digits(self.cores[entry], self.holding[entry]))
+        let distances = giver.distances_at_most(&self.cores[entry]);
+        let (fingers, others) = farthest_by_first(&distances);
+        let (_, of_fingers) = self.finger_sets[entry].farthest(fingers);
+        of_fingers.min(others)
     }
 
     /// Bytes that they take in memory.
     pub(super) fn bytes(&self) -> usize {
         self.entries.iter().map(Entry::bytes).sum::<usize>()
             + size_of_val(self.cores.as_slice())
-            + size_of_val(self.holding.as_slice())
+            + size_of_val(self.finger_sets.as_slice())
     }
 }

@@ -48,8 +48,9 @@ pub const ROUND: u64 = 64;
 /// forever. With half as many, atlases of thin objects are not filled.
 pub const MOST_PROPOSALS: u64 = 400_000;
 
-/// Proposals after which an atlas is stamped: what grows otherwise now shows there, after a second instead of minutes.
-pub const EARLY_PROPOSALS: u64 = 40 * ROUND;
+/// Proposals after which an atlas is stamped: what grows otherwise now shows there, after two seconds instead of minutes. With
+/// fewer, no round has had a giver yet.
+pub const EARLY_PROPOSALS: u64 = 96 * ROUND;
 
 /// The seed of all atlases.
 const SEED: u64 = 0x4154_4c41;

@@ -15,7 +15,7 @@ use crate::{
 
 /// Counts the algorithms that made atlases. It is raised whenever the same object and hand get other grips, contacts or
 /// scores than before, so that atlases made earlier are not taken for today's.
-pub const ALGORITHM: u32 = 15;
+pub const ALGORITHM: u32 = 16;
 
 /// Bytes of a key.
 pub const KEY_BYTES: usize = 32;

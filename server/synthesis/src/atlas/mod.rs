@@ -11,6 +11,7 @@ pub mod asked;
 pub mod codec;
 mod cores;
 pub mod entry;
+pub mod finger_sets;
 pub mod friction_uses;
 pub mod gravity;
 pub mod grips;
@@ -20,6 +21,7 @@ mod occupancy;
 mod order;
 pub mod recent;
 mod shortlist;
+pub mod spared;
 mod spread;
 pub mod starts;
 

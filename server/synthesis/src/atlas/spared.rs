@@ -9,7 +9,7 @@ use crate::{
     physical::{
         attempt::Surroundings,
         grip::{GIVER_CLEARANCE, Gripper},
-        solids::{PreparedHand, TaperedCapsule, ToldSolids},
+        solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids},
         sparing::KnownGrip,
     },
     synthesis::stopwatch::NoStopwatch,
@@ -23,28 +23,31 @@ pub fn spared(
     giver: &PreparedHand,
     gripper: &mut Gripper,
 ) -> Option<Box<Grasp>> {
-    let told = entry.told_solids(around.rig);
+    let solids = entry.solids(around.rig);
+    let kept = kept(entry, &solids, giver)?;
+    let told = ToldSolids::of_rig(around.rig, entry.grip.pose.frame_from_wrist, &solids);
+    if is_met(giver, told.still()) {
+        return None;
+    }
     let known = KnownGrip {
         grip: &entry.grip,
         contacts: &entry.contacts,
-        solids: &told.hand,
+        solids: &solids,
     };
-    let kept = kept(entry, &told, giver)?;
     let (grip, solids) = gripper
         .spare(&around.object, around.rig, &known, kept, giver)
         .ok()?;
     around.hold_with(&grip, &solids, gripper, &mut NoStopwatch).ok()
 }
 
-/// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others, if palm or
-/// forearm come too near to the giver, or if no digit does.
-pub fn kept(entry: &Entry, told: &ToldSolids, giver: &PreparedHand) -> Option<[bool; 5]> {
+/// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others, if the thumb
+/// or its ball comes too near to the giver, or if no digit does.
+fn kept(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> Option<[bool; 5]> {
     let sets = entry.finger_sets;
     let holding = sets.holding();
-    let solids = &told.hand;
     let is_too_much = |near| !sets.hold_beside(in_way_by_second(near));
     let near = giver.surely_near(&second_balls(solids), GIVER_CLEARANCE, is_too_much);
-    if is_too_much(near) || is_met(giver, told.still().chain(&solids.thenar)) {
+    if is_too_much(near) || is_met(giver, solids.thenar.iter()) {
         return None;
     }
     let is_in_way: [bool; 5] = std::array::from_fn(|digit| is_met(giver, solids.phalanges[digit].iter()));

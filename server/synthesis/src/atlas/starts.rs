@@ -8,7 +8,7 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 use glam::Vec3;
 
 use super::{
-    cores::{first_balls, first_of_digits, second_balls, second_of_digits},
+    cores::{farthest_by_second, first_balls, first_of_digits, second_balls, second_of_digits},
     entry::Entry,
     grips::Grips,
 };
@@ -52,9 +52,19 @@ const AT_ONCE: usize = 4;
 /// The same where they are compared by balls alone.
 const BOUNDED_AT_ONCE: usize = 64;
 
-/// The known grips that are least in a giver's way, by its clearance of the digits that hold, of palm and forearm.
+/// A known grip to start from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Start {
+    /// Which of the entries it is.
+    pub entry: u16,
+    /// The digits that are to hold, thumb first; others that the giver is in the way of are spared.
+    pub kept: [bool; 5],
+}
+
+/// The known grips that are least in a giver's way, by its clearance of palm, forearm, thumb and those fingers that are
+/// farthest from it of those that hold without the others.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Starts(Vec<u16>);
+pub struct Starts(Vec<Start>);
 
 impl Starts {
     /// Those of `candidates`, indices of the entries of `known`; of those that keep clear, the first. None if interrupted.
@@ -66,7 +76,11 @@ impl Starts {
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
         let Some(giver) = giver else {
-            return Some(Self(candidates.take(STARTS).collect()));
+            let whole = |entry: u16| Start {
+                entry,
+                kept: known.entries()[usize::from(entry)].grip.holding_digits(),
+            };
+            return Some(Self(candidates.take(STARTS).map(whole).collect()));
         };
         // What is found by balls alone is never too little: those for which it is most are looked at first, until no other can
         // have more.
@@ -81,7 +95,7 @@ impl Starts {
         // Not sorted, as that would take longer than between two looks at the clock.
         let mut at_most = BinaryHeap::from(at_most);
         // By falling clearance.
-        let mut nearest: Vec<(f32, u16)> = Vec::with_capacity(STARTS + 1);
+        let mut nearest: Vec<(f32, Start)> = Vec::with_capacity(STARTS + 1);
         let mut count = 0_usize;
         while let Some((most, _, index)) = at_most.pop() {
             if count.is_multiple_of(AT_ONCE) && interrupted() {
@@ -95,24 +109,18 @@ impl Starts {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
-            let solids = entry.solids(rig);
-            let second = second_of_digits(second_balls(&solids), entry.holding_digits());
-            if giver.surely_nears_any(&second, least) {
-                continue;
-            }
-            let holding = holding_solids(entry, &solids);
-            let Some(clearance) = giver.least_distance(holding, GIVER_CLEARANCE, least) else {
+            let Some((clearance, kept)) = clearance(entry, rig, giver, least) else {
                 continue;
             };
             let place = nearest.partition_point(|&(other, _)| other >= clearance);
-            nearest.insert(place, (clearance, index));
+            nearest.insert(place, (clearance, Start { entry: index, kept }));
             nearest.truncate(STARTS);
         }
-        Some(Self(nearest.into_iter().map(|(_, index)| index).collect()))
+        Some(Self(nearest.into_iter().map(|(_, start)| start).collect()))
     }
 
     /// Which they are, by falling clearance.
-    pub fn entries(&self) -> &[u16] {
+    pub fn all(&self) -> &[Start] {
         &self.0
     }
 
@@ -127,23 +135,29 @@ impl Starts {
         if self.0.is_empty() {
             return None;
         }
-        let entry = &entries[usize::from(self.0[stream.below(self.0.len())])];
+        let Start { entry, kept } = self.0[stream.below(self.0.len())];
+        let entry = &entries[usize::from(entry)];
         let known = Proposal {
             object_from_wrist: entry.grip.pose.frame_from_wrist,
             shape: HandShape {
                 // What fingers that do not hold did is of no use: they may be what is in the way.
                 tucks: stream.unit() < 0.5,
+                closing: kept,
                 ..HandShape::of_grip(place.rig, &entry.grip)
             },
             advance: 0.0,
         };
         let solids = entry.solids(place.rig);
-        let holding = entry.holding_digits();
         let inside = [
-            first_of_digits(first_balls(&solids), holding),
-            second_of_digits(second_balls(&solids), holding),
+            first_of_digits(first_balls(&solids), kept),
+            second_of_digits(second_balls(&solids), kept),
         ];
-        let pivot = middle_of_contacts(entry);
+        let contacts = entry.contacts.iter();
+        let contacts: Vec<Contact> = contacts
+            .filter(|contact| contact.part.is_among(kept))
+            .copied()
+            .collect();
+        let pivot = middle_of(&contacts);
         (0..DRAWS).find_map(|_| {
             let beside = known.beside_about(pivot, [SHIFT, TURN], stream);
             let way = beside.object_from_wrist * known.object_from_wrist.inverse();
@@ -157,10 +171,10 @@ impl Starts {
             let moved = solids.transformed(way);
             let keeps_clear = place
                 .giver
-                .is_none_or(|giver| !giver.is_neared_by(holding_solids(entry, &moved), GIVER_CLEARANCE));
+                .is_none_or(|giver| !giver.is_neared_by(solids_of(kept, &moved), GIVER_CLEARANCE));
             let is_likely = keeps_clear
-                && still_touches(entry, place.object, way)
-                && keeps_off(entry, place.object, &moved);
+                && still_touch(&contacts, place.object, way)
+                && keeps_off(kept, place.object, &moved);
             is_likely.then_some(beside)
         })
     }
@@ -173,13 +187,13 @@ fn nanometres(distance: f32) -> i32 {
 
 /// What a grip is turned about: the thumb and what is opposed to it stay where the object is, while palm and arm swing out of
 /// the giver's way.
-fn middle_of_contacts(entry: &Entry) -> Vec3 {
-    let sum: Vec3 = entry.contacts.iter().map(|contact| contact.position).sum();
-    sum / entry.contacts.len().max(1) as f32
+fn middle_of(contacts: &[Contact]) -> Vec3 {
+    let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
+    sum / contacts.len().max(1) as f32
 }
 
 /// True if thumb and a finger of a grip are still near to the object when they are moved: others do not touch it any more.
-fn still_touches(entry: &Entry, object: &GraspObject, way: Pose) -> bool {
+fn still_touch(contacts: &[Contact], object: &GraspObject, way: Pose) -> bool {
     let is_near = |contact: &Contact| {
         let place = way.transform_point(contact.position);
         object.surface.closest_point_within(place, TOUCHING).is_some()
@@ -189,28 +203,45 @@ fn still_touches(entry: &Entry, object: &GraspObject, way: Pose) -> bool {
             let digit = contact.part.digit();
             digit.is_some_and(|digit| (digit == Digit::Thumb) == is_thumb)
         };
-        entry.contacts.iter().filter(of_part).any(is_near)
+        contacts.iter().filter(of_part).any(is_near)
     };
     touches(true) && touches(false)
 }
 
 /// True if a moved hand keeps off forbidden surfaces.
-fn keeps_off(entry: &Entry, object: &GraspObject, moved: &HandSolids) -> bool {
-    holding_solids(entry, moved).all(|part| !object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
+fn keeps_off(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -> bool {
+    solids_of(kept, moved).all(|part| !object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
+}
+
+/// How far a grip is from a giver's hand without the fingers that are nearest to it and can be spared, up to
+/// [`GIVER_CLEARANCE`], and which digits hold then; none if it is less than `least`.
+fn clearance(entry: &Entry, rig: &Rig, giver: &PreparedHand, least: f32) -> Option<(f32, [bool; 5])> {
+    let solids = entry.solids(rig);
+    let sets = entry.finger_sets;
+    let (fingers, others) = farthest_by_second(&giver.distances_at_most(&second_balls(&solids)));
+    if sets.farthest(fingers).1.min(others) < least {
+        return None;
+    }
+    let no_fingers = [true, false, false, false, false];
+    let others = giver.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, least)?;
+    let distances = std::array::from_fn(|finger| {
+        let links = solids.phalanges[1 + finger].iter();
+        let distance = giver.least_distance(links, GIVER_CLEARANCE, least);
+        distance.unwrap_or(f32::NEG_INFINITY)
+    });
+    let (kept, of_fingers) = sets.farthest(distances);
+    (of_fingers >= least).then_some((of_fingers.min(others), kept))
 }
 
 /// A hand's solids but those of fingers that do not hold: they rest where there is room.
-fn holding_solids<'a>(
-    entry: &Entry,
-    solids: &'a HandSolids,
-) -> impl Iterator<Item = &'a TaperedCapsule> + Clone {
+fn solids_of(kept: [bool; 5], solids: &HandSolids) -> impl Iterator<Item = &TaperedCapsule> + Clone {
     let HandSolids {
         phalanges,
         palm,
         thenar,
         forearm,
     } = solids;
-    let digits = phalanges.iter().zip(entry.holding_digits());
+    let digits = phalanges.iter().zip(kept);
     digits
         .filter_map(|(links, holds)| holds.then_some(links))
         .flatten()

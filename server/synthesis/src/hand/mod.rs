@@ -98,6 +98,11 @@ impl HandPart {
         }
     }
 
+    /// True of the palm, and of parts of some digits, thumb first.
+    pub fn is_among(self, digits: [bool; 5]) -> bool {
+        self.digit().is_none_or(|digit| digits[digit.index()])
+    }
+
     /// The link of the digit; none for the palm.
     pub const fn phalanx(self) -> Option<Phalanx> {
         match self {

@@ -5,7 +5,7 @@ use super::{
     immobility::{Balance, balance},
     scene::{ObjectScene, Presented},
     shape::Proposal,
-    solids::ToldSolids,
+    solids::{HandSolids, ToldSolids},
 };
 use crate::{
     constraints::Constraints,
@@ -105,13 +105,34 @@ impl PhysicalAttempt {
             object,
             presented,
             rig,
-            constraints,
+            ..
         } = around;
         let (grip, solids) =
             self.gripper
                 .grip(object, rig, proposal, Some(presented), stopwatch, interrupted)?;
+        around.hold_with(&grip, &solids, &mut self.gripper, stopwatch)
+    }
+}
 
-        let contacts = &self.gripper.contacts;
+impl Surroundings<'_> {
+    /// The grasp that a grip is here which a gripper has just made.
+    ///
+    /// # Errors
+    /// The first check that fails.
+    pub(crate) fn hold_with(
+        &self,
+        grip: &Grip,
+        solids: &HandSolids,
+        gripper: &mut Gripper,
+        stopwatch: &mut impl Stopwatch,
+    ) -> Result<Box<Grasp>, NoGrip> {
+        let Self {
+            object,
+            presented,
+            rig,
+            constraints,
+        } = self;
+        let contacts = &gripper.contacts;
         let classification = classify(rig, &grip.pose, contacts);
         if !constraints.admits_contacts(contacts) || !constraints.admits_type(classification.grasp_type) {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
@@ -119,15 +140,15 @@ impl PhysicalAttempt {
 
         // Step 5, Immobility Validation, for what is held as it is held out.
         let load = object.load(presented.up);
-        let held = balance(&self.gripper.soft_contacts, &load, &mut self.gripper.buffers);
+        let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        let told = ToldSolids::of_rig(rig, grip.pose.frame_from_wrist, &solids);
+        let told = ToldSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
         let giver_clearance = clear_of_giver(&told, presented.giver.as_ref());
         let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         let mut grasp = grasp(
-            &grip,
-            &self.gripper.contacts,
+            grip,
+            &gripper.contacts,
             classification,
             grip.epsilon,
             balance,
@@ -141,7 +162,7 @@ impl PhysicalAttempt {
             &grasp.contacts,
             classification,
             grip.epsilon,
-            &solids,
+            solids,
         );
         grasp.score = Some(score(of_grip, &grasp, object, rig, presented));
         // Palm and digits may have moved the wrist since its place was admitted.

@@ -138,6 +138,17 @@ impl Closing<'_> {
         })
     }
 
+    /// The digit bent by `flexion` radians in all, whatever is in the way.
+    pub fn bent(&self, flexion: f32) -> ClosedDigit {
+        let sweep = self.flexing.sweep();
+        let angles = self.flexing.angles_at(&sweep, way_to(flexion, &sweep));
+        ClosedDigit {
+            angles,
+            links: self.links(&angles),
+            touches: [false; 3],
+        }
+    }
+
     /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in all, or less if something is in
     /// the way. Where the opened digit is inside the object, it is bent from the first of the curled poses that is not.
     pub fn relax(&self, flexion: f32) -> ClosedDigit {
@@ -149,9 +160,7 @@ impl Closing<'_> {
             .unwrap_or(opened);
         let rates = std::array::from_fn(|joint| self.flexing.rate(joint));
         let sweep = Sweep { start, rates };
-        let bent = start.base_pitch + start.second_pitch + start.third_pitch;
-        let most = (flexion - bent).max(0.0) / rates.iter().sum::<f32>();
-        let angles = self.advance(&sweep, RELAXED_CLEARANCE, most);
+        let angles = self.advance(&sweep, RELAXED_CLEARANCE, way_to(flexion, &sweep));
         ClosedDigit {
             angles,
             links: self.links(&angles),
@@ -277,4 +286,11 @@ impl Closing<'_> {
     fn link_touches(&self, link: &TaperedCapsule) -> bool {
         clearance(link, self.surface, TOUCHING) < TOUCHING
     }
+}
+
+/// The way of a sweep to a flexion in radians, if no joint comes to its limit before.
+fn way_to(flexion: f32, sweep: &Sweep) -> f32 {
+    let start = &sweep.start;
+    let bent = start.base_pitch + start.second_pitch + start.third_pitch;
+    (flexion - bent).max(0.0) / sweep.rates.iter().sum::<f32>()
 }

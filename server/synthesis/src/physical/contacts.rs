@@ -80,9 +80,13 @@ pub(super) fn collect_contacts(
 }
 
 /// The contacts as soft fingers, for objects with a friction coefficient of `friction`.
-pub(crate) fn soften(contacts: &[Contact], friction: f32, soft_contacts: &mut Vec<SoftContact>) {
+pub(crate) fn soften<'a>(
+    contacts: impl IntoIterator<Item = &'a Contact>,
+    friction: f32,
+    soft_contacts: &mut Vec<SoftContact>,
+) {
     soft_contacts.clear();
-    soft_contacts.extend(contacts.iter().map(|contact| SoftContact {
+    soft_contacts.extend(contacts.into_iter().map(|contact| SoftContact {
         position: contact.position,
         normal: contact.normal,
         digit: contact.part.digit(),

@@ -8,20 +8,18 @@
 use glam::Vec3;
 
 use super::{
-    closing::{ClosedDigit, Closing, MOST_STEPS, NEAR, SURE_GAP, TOUCH_DEPTH, TOUCH_TOLERANCE},
+    closer::Closer,
+    closing::{ClosedDigit, MOST_STEPS, NEAR, SURE_GAP, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     immobility::{Buffers, SoftContact, epsilon},
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
-    shape::{HandShape, Proposal, TUCKED_FLEXION},
-    solids::{
-        HandSolids, PreparedHand, TaperedCapsule, ToldSolids, clearance, comes_within, link_radii,
-        self_clearance,
-    },
+    shape::Proposal,
+    solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids, clearance, comes_within, self_clearance},
 };
 use crate::{
     grasp::Contact,
-    hand::{Digit, DigitAngles, HandPose, kinematics::DigitPlane, rig::Rig},
+    hand::{Digit, DigitAngles, HandPose, rig::Rig},
     pose::Pose,
     rejection::Rejection,
     synthesis::stopwatch::{Step, Stopwatch},
@@ -41,9 +39,6 @@ pub const FORBIDDEN_CLEARANCE: f32 = 0.003;
 /// The share of enough closure, by a bound from above, from which a hand is a near miss. Less closure says little of what
 /// there is beside it.
 const NEARLY: f32 = 0.3;
-
-/// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.
-const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
 
 /// Why a hand was not closed to a grip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +62,41 @@ pub struct Grip {
     pub epsilon: f32,
 }
 
+impl Grip {
+    /// Which digits hold, thumb first.
+    pub fn holding_digits(&self) -> [bool; 5] {
+        self.bend_ratios.map(|ratio| ratio.is_some())
+    }
+}
+
+/// A hand of which all is in order but that its closure is not known.
+#[derive(Clone, Debug)]
+pub(super) struct Posed {
+    pose: HandPose,
+    bend_ratios: [Option<f32>; 5],
+    penetration: f32,
+    solids: HandSolids,
+}
+
+impl Posed {
+    /// The grip that it is with an epsilon, and its solids.
+    pub(super) fn with_closure(self, epsilon: f32) -> (Grip, HandSolids) {
+        let Self {
+            pose,
+            bend_ratios,
+            penetration,
+            solids,
+        } = self;
+        let grip = Grip {
+            pose,
+            bend_ratios,
+            penetration,
+            epsilon,
+        };
+        (grip, solids)
+    }
+}
+
 /// Closes hands, and keeps its buffers from one to the next.
 #[derive(Clone, Debug, Default)]
 pub struct Gripper {
@@ -74,7 +104,7 @@ pub struct Gripper {
     pub posed: Vec<DigitAngles>,
     /// Where the hand touches.
     pub contacts: Vec<Contact>,
-    obstacles: Vec<Obstacle>,
+    pub(super) obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
     /// The closure that was found last, as a share of what is enough; a bound from above where it is not. 0 before a hand
@@ -155,17 +185,19 @@ impl Gripper {
         });
         stopwatch.lap(Step::FingerPosing);
         let closed = closed?;
-        let posed = |digits: &[ClosedDigit; 5]| HandPose {
-            frame_from_wrist: object_from_wrist,
-            digits: digits.map(|digit| digit.angles),
-        };
         self.posed.extend(closed.iter().map(|digit| digit.angles));
         if interrupted() {
             return Err(NoGrip::Interrupted);
         }
 
         // Step 4, Contact Validation, for the digits that hold.
-        collect_contacts(scene.object, rig, &posed(&closed), &closed, &mut self.contacts);
+        collect_contacts(
+            scene.object,
+            rig,
+            &closer.pose(&closed),
+            &closed,
+            &mut self.contacts,
+        );
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
         stopwatch.lap(Step::ContactValidation);
 
@@ -180,13 +212,31 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
+        let posed = self.validate(&closer, &digits, stopwatch)?;
+        Ok(posed.with_closure(epsilon))
+    }
+
+    /// The checks of a hand whose digits are all posed, but for closure.
+    pub(super) fn validate(
+        &mut self,
+        closer: &Closer<'_>,
+        digits: &[ClosedDigit; 5],
+        stopwatch: &mut impl Stopwatch,
+    ) -> Result<Posed, NoGrip> {
+        let Closer {
+            scene,
+            giver,
+            rig,
+            shape,
+            ..
+        } = closer;
         self.posed.clear();
         self.posed.extend(digits.iter().map(|digit| digit.angles));
 
         // Step 3, Collision Validation.
-        let pose = posed(&digits);
+        let pose = closer.pose(digits);
         let solids = HandSolids::of_pose(rig, &pose);
-        let penetration = penetration(scene, giver, &solids);
+        let penetration = penetration(scene, *giver, &solids);
         stopwatch.lap(Step::CollisionValidation);
         let penetration = penetration.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
 
@@ -201,13 +251,12 @@ impl Gripper {
                 .touches_object()
                 .then_some(shape.flexing(rig, Digit::ALL[digit]).bend_ratio)
         });
-        let grip = Grip {
+        Ok(Posed {
             pose,
             bend_ratios,
             penetration,
-            epsilon,
-        };
-        Ok((grip, solids))
+            solids,
+        })
     }
 
     /// The closure of the contacts, if it is enough.
@@ -283,107 +332,6 @@ fn free_way(scene: &ObjectScene<'_>, still: &HandSolids, direction: Vec3, most: 
     Some(direction * way)
 }
 
-/// Closes the digits of a hand whose wrist stays.
-struct Closer<'a> {
-    scene: &'a ObjectScene<'a>,
-    giver: Option<&'a PreparedHand>,
-    rig: &'a Rig,
-    shape: &'a HandShape,
-    object_from_wrist: Pose,
-}
-
-impl Closer<'_> {
-    fn closing<'a>(&'a self, digit: Digit, obstacles: &'a [Obstacle]) -> Closing<'a> {
-        let flexing = self.shape.flexing(self.rig, digit);
-        Closing {
-            surface: &self.scene.object.surface,
-            flexing,
-            radii: link_radii(self.rig, digit),
-            plane: DigitPlane::new(flexing.digit, self.object_from_wrist, flexing.base_yaw),
-            preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
-            obstacles,
-        }
-    }
-
-    /// A digit closed as far as it goes, if nothing is in its way before.
-    fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
-        let closed = self.closing(digit, obstacles).close()?;
-        self.is_clear_of_giver(&closed).then_some(closed)
-    }
-
-    fn nears_forbidden(&self, digit: &ClosedDigit) -> bool {
-        nears_forbidden_surface(self.scene, digit.links.iter())
-    }
-
-    fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
-        self.giver
-            .is_none_or(|giver| !giver.is_neared_by(digit.links.iter(), GIVER_CLEARANCE))
-    }
-
-    /// Closes the thumb, which must touch.
-    fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, NoGrip> {
-        let thumb = self.close(Digit::Thumb, obstacles);
-        let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
-        if !thumb.touches_object() {
-            Err(NoGrip::Rejected(Rejection::NoThumbEarlyStop))
-        } else if self.nears_forbidden(&thumb) {
-            Err(NoGrip::Rejected(Rejection::UnwantedContact))
-        } else {
-            Ok(thumb)
-        }
-    }
-
-    /// Closes the fingers; those that have something in their way, come near to what is not to be touched or are not to
-    /// close hold nothing.
-    fn close_fingers(
-        &self,
-        thumb: ClosedDigit,
-        obstacles: &[Obstacle],
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<[ClosedDigit; 5], NoGrip> {
-        let mut closed = [ClosedDigit::default(); 5];
-        closed[Digit::Thumb.index()] = thumb;
-        let fingers = &Digit::ALL[1..];
-        for &finger in fingers.iter().filter(|finger| self.shape.closing[finger.index()]) {
-            if interrupted() {
-                return Err(NoGrip::Interrupted);
-            }
-            let free = self.close(finger, obstacles);
-            let free = free.filter(|closed| !self.nears_forbidden(closed));
-            closed[finger.index()] = free.unwrap_or_default();
-        }
-        if !closed[1..].iter().any(ClosedDigit::touches_object) {
-            return Err(NoGrip::Rejected(Rejection::NoFingers));
-        }
-        Ok(closed)
-    }
-
-    /// The digits with those at rest that hold nothing.
-    fn rest_idle(&self, closed: &[ClosedDigit; 5], obstacles: &[Obstacle]) -> [ClosedDigit; 5] {
-        let mut rested = *closed;
-        for &finger in &Digit::ALL[1..] {
-            let place = finger.index();
-            if !closed[place].touches_object() {
-                let flexion = self.shape.resting_flexion(closed, place);
-                rested[place] = self.rest(finger, obstacles, flexion);
-            }
-        }
-        rested
-    }
-
-    /// A finger that holds nothing, relaxed; tucked away or nearly stretched where it would meet the giver's hand.
-    fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
-        let closing = self.closing(finger, obstacles);
-        let relaxed = closing.relax(flexion);
-        if self.is_clear_of_giver(&relaxed) {
-            return relaxed;
-        }
-        let others = EVASIVE_FLEXIONS.map(|flexion| closing.relax(flexion));
-        let free = others.into_iter().find(|other| self.is_clear_of_giver(other));
-        free.unwrap_or(relaxed)
-    }
-}
-
 /// True if palm or forearm sink into the object or come too near to the giver.
 fn collides_without_digits(
     scene: &ObjectScene<'_>,
@@ -417,7 +365,8 @@ fn penetration(scene: &ObjectScene<'_>, giver: Option<&PreparedHand>, solids: &H
     deepest.map(|least| -least)
 }
 
-fn nears_forbidden_surface<'a>(
+/// True if a part comes too near to a forbidden surface.
+pub(super) fn nears_forbidden_surface<'a>(
     scene: &ObjectScene<'_>,
     mut parts: impl Iterator<Item = &'a TaperedCapsule>,
 ) -> bool {

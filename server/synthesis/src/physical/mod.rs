@@ -6,6 +6,7 @@
 //! ([`attempt`]).
 
 pub mod attempt;
+mod closer;
 pub mod closing;
 pub(crate) mod contacts;
 pub mod flexing;
@@ -15,4 +16,5 @@ pub mod obstacle;
 pub mod scene;
 pub mod shape;
 pub mod solids;
+pub mod sparing;
 pub mod stiffness;

@@ -1,4 +1,5 @@
-//! Known grips as candidates of a race: those of an atlas, then those that were found lately.
+//! Known grips as candidates of a race: those of an atlas, those that were found lately, and then those of the atlas without
+//! the fingers that the giver is in the way of.
 
 use std::{
     ops::Deref,
@@ -10,7 +11,7 @@ use std::{
 
 use super::{GraspSource, SearchSettings};
 use crate::{
-    atlas::{Atlas, Excluded, Shortlist, asked::Asked, entry::Entry},
+    atlas::{Atlas, Excluded, Shortlist, asked::Asked, entry::Entry, spared::spared},
     grasp::Grasp,
     hand::rig::Rig,
     physical::{
@@ -39,10 +40,13 @@ pub(super) struct KnownGrips<'a> {
     scene: &'a Scene<'a>,
     asked: Asked<'a>,
     giver: Option<&'a PreparedHand>,
+    /// The front of the order again, for where a giver is in the way of fingers that can be spared.
+    sparing: &'a [u16],
     rig: &'a Rig,
     /// Those that certainly meet the giver, once somebody asks.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place that nobody has taken, in the shortlist or, counted on, in the order or among the recent ones.
+    /// The next place that nobody has taken, in the shortlist or, counted on, in the order, among the recent ones or those
+    /// that are looked at for sparing fingers.
     next: AtomicUsize,
 }
 
@@ -65,11 +69,16 @@ impl Deref for Solids<'_> {
     }
 }
 
-/// A known grip that may keep clear of the giver.
-struct Open<'a> {
-    source: GraspSource,
-    entry: &'a Entry,
-    solids: Solids<'a>,
+/// A known grip that may do.
+enum Open<'a> {
+    /// It may keep clear of the giver.
+    Whole {
+        source: GraspSource,
+        entry: &'a Entry,
+        solids: Solids<'a>,
+    },
+    /// It may hold without the fingers that the giver is in the way of: this grip of the atlas.
+    Sparing(u16),
 }
 
 /// What was taken of the known grips.
@@ -126,6 +135,10 @@ impl<'a> KnownGrips<'a> {
             recent,
             scene,
             asked: Asked::new(object, scene.rig(), presented),
+            sparing: match (atlas, giver) {
+                (Some(atlas), Some(_)) => atlas.holding_under(presented.up),
+                _ => &[],
+            },
             giver,
             rig: scene.rig(),
             excluded: OnceLock::new(),
@@ -140,7 +153,7 @@ impl<'a> KnownGrips<'a> {
 
     /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such.
     fn take(&self) -> Taken<'a> {
-        let end = self.shortlist.len() + self.order.len() + self.recent.len();
+        let end = self.shortlist.len() + self.order.len() + self.recent.len() + self.sparing.len();
         loop {
             let from = self.next.load(Ordering::Relaxed);
             if from >= end {
@@ -170,12 +183,7 @@ impl<'a> KnownGrips<'a> {
             return self.open(index, Solids::Kept(solids));
         };
         let Some(&index) = self.order.get(place) else {
-            let entry = &self.recent[place - self.order.len()];
-            return Some(Open {
-                source: GraspSource::Recent,
-                entry,
-                solids: Solids::Made(Box::new(entry.told_solids(self.rig))),
-            });
+            return self.beyond_order(place - self.order.len());
         };
         let atlas = self.atlas?;
         let Some(giver) = self.giver else {
@@ -190,9 +198,24 @@ impl<'a> KnownGrips<'a> {
         self.open(index, Solids::Made(solids))
     }
 
-    /// A grip of the atlas.
+    /// The same of places after those of the order.
+    fn beyond_order(&self, place: usize) -> Option<Open<'a>> {
+        let Some(entry) = self.recent.get(place) else {
+            let index = self.sparing[place - self.recent.len()];
+            let grips = self.atlas?.grips();
+            let is_open = grips.may_spare(usize::from(index), self.giver?);
+            return is_open.then_some(Open::Sparing(index));
+        };
+        Some(Open::Whole {
+            source: GraspSource::Recent,
+            entry,
+            solids: Solids::Made(Box::new(entry.told_solids(self.rig))),
+        })
+    }
+
+    /// A whole grip of the atlas.
     fn open(&self, index: u16, solids: Solids<'a>) -> Option<Open<'a>> {
-        Some(Open {
+        Some(Open::Whole {
             source: GraspSource::Atlas(index),
             entry: &self.atlas?.entries()[usize::from(index)],
             solids,
@@ -201,27 +224,40 @@ impl<'a> KnownGrips<'a> {
 
     /// Tries the next one.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
-        let Open {
-            source,
-            entry,
-            solids,
-        } = match self.take() {
+        let (source, grasp) = match self.take() {
             Taken::NoneLeft => return Tried::NoneLeft,
             Taken::NoneOpen => return Tried::Refused,
-            Taken::Open(open) => open,
+            Taken::Open(Open::Whole {
+                source,
+                entry,
+                solids,
+            }) => (source, self.hold(entry, &solids, gripper)),
+            Taken::Open(Open::Sparing(index)) => {
+                (GraspSource::Atlas(index), self.hold_sparing(index, gripper))
+            }
         };
-        let constraints = self.scene.constraints();
-        if !entry.is_wanted(constraints) {
-            return Tried::Refused;
-        }
-        match self.asked.hold(entry, &solids, gripper) {
-            Some(grasp) if constraints.admits(&grasp) => Tried::Valid {
+        match grasp {
+            Some(grasp) => Tried::Valid {
                 source,
                 value: value(&grasp),
-                grasp: Box::new(grasp),
+                grasp,
             },
-            _ => Tried::Refused,
+            None => Tried::Refused,
         }
+    }
+
+    fn hold(&self, entry: &Entry, solids: &ToldSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+        let constraints = self.scene.constraints();
+        if !entry.is_wanted(constraints) {
+            return None;
+        }
+        let grasp = self.asked.hold(entry, solids, gripper)?;
+        constraints.admits(&grasp).then(|| Box::new(grasp))
+    }
+
+    fn hold_sparing(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+        let entry = &self.atlas?.entries()[usize::from(index)];
+        spared(entry, &self.scene.surroundings()?, self.giver?, gripper)
     }
 }
 

@@ -113,7 +113,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Under `PHYSICAL` validity: what an attempt works with.
-    pub(super) fn surroundings(&self) -> Option<Surroundings<'_>> {
+    pub(crate) fn surroundings(&self) -> Option<Surroundings<'_>> {
         let (object, presented) = self.physical.as_ref()?;
         Some(Surroundings {
             object: *object,

@@ -124,24 +124,33 @@ fn moved_balls_are_near_where_one_of_them_is() {
             far += 1;
         }
 
-        // Ball by ball and solid by solid, the nearest is no farther than told.
-        let placed = middles
-            .map(|middle| way.transform_point(middle))
-            .into_iter()
-            .zip(radii);
-        let least = placed
-            .flat_map(|(middle, radius)| {
-                solids
-                    .iter()
-                    .map(move |solid| solid.signed_distance(middle) - radius)
-            })
-            .fold(f32::INFINITY, f32::min);
-        let told = giver.distance_at_most(&balls);
-        assert!(told >= least - 1e-6, "case {case}: {told}, though {least}");
-        close += usize::from(told < least + 1e-3);
+        // Ball by ball and solid by solid, each is no farther than told, and near as it is alone.
+        let told = giver.distances_at_most(&balls);
+        let near_ones = giver.surely_near(&balls, 0.001, |_| false);
+        for (ball, (middle, radius)) in middles.into_iter().zip(radii).enumerate() {
+            let middle = way.transform_point(middle);
+            let distances = solids.iter().map(|solid| solid.signed_distance(middle) - radius);
+            let least = distances.fold(f32::INFINITY, f32::min);
+            let told = told[ball];
+            assert!(
+                told >= least - 1e-6,
+                "case {case}, {ball}: {told}, though {least}"
+            );
+            close += usize::from(told < least + 1e-3);
+            let is_near = near_ones >> ball & 1 == 1;
+            let nears = |distance: f32| giver.surely_nears(middle, radius, distance);
+            assert!(is_near || !nears(0.001 - 1e-6), "case {case}: {ball} is near");
+            assert!(!is_near || nears(0.001 + 1e-6), "case {case}: {ball} is not near");
+        }
+        // Once one settles it, the others may be left out.
+        let settled = giver.surely_near(&balls, 0.001, |near| near != 0);
+        assert!(
+            settled & !near_ones == 0 && (settled != 0) == (near_ones != 0),
+            "case {case}"
+        );
     }
     assert!(near > 300 && far > 300, "{near} near, {far} far");
-    assert!(close > 500, "{close} told to the millimetre");
+    assert!(close > 4_000, "{close} told to the millimetre");
 }
 
 #[test]

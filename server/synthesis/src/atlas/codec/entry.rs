@@ -9,6 +9,7 @@ use super::{
 use crate::{
     atlas::{
         entry::{Entry, SLIPS},
+        finger_sets::FingerSets,
         friction_uses::FrictionUses,
         gravity::DIRECTIONS,
     },
@@ -24,9 +25,9 @@ use crate::{
     taxonomy::classify,
 };
 
-/// Bytes of a grip at least: the wrist, the shape, the digits, how deep and how safe, terms, and scores, uses of friction and
-/// contacts of which there are none. It bounds what a count can ask for.
-pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 25 + 61 + 8 + 4 * WRITTEN_TERMS.len() + 2 + 1 + 1;
+/// Bytes of a grip at least: the wrist, the shape, the digits, how deep and how safe, terms, sets of fingers, and scores, uses of
+/// friction and contacts of which there are none. It bounds what a count can ask for.
+pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 25 + 61 + 8 + 4 * WRITTEN_TERMS.len() + 2 + 2 + 1 + 1;
 
 /// Terms of a grip's score that are written out; the others follow.
 const WRITTEN_TERMS: [Term; 3] = [Term::Closure, Term::Steadiness, Term::SterileDistance];
@@ -72,6 +73,7 @@ pub(super) fn write_entry(
     writer.floats(&WRITTEN_TERMS.map(|term| entry.grip_values[term as usize]));
     write_scores(writer, &entry.scores);
     write_friction_uses(writer, entry.friction_uses);
+    writer.u16(entry.finger_sets.to_bits());
     writer.u8(entry.contacts.len() as u8);
     for contact in &entry.contacts {
         write_contact(writer, contact, object.surface.mesh());
@@ -101,6 +103,7 @@ pub(super) fn read_entry(
     let written: [f32; WRITTEN_TERMS.len()] = reader.floats()?;
     let scores = read_scores(reader)?;
     let friction_uses = read_friction_uses(reader)?;
+    let sets = reader.u16()?;
     let count = usize::from(reader.u8()?);
     if count > MOST_CONTACTS {
         return Err(AtlasError::Malformed("a grip has too many contacts"));
@@ -116,6 +119,9 @@ pub(super) fn read_entry(
         penetration,
         epsilon,
     };
+    let finger_sets = FingerSets::from_bits(sets, grip.holding_digits()).ok_or(AtlasError::Malformed(
+        "sets of fingers are not of those that hold",
+    ))?;
     let classification = classify(rig, &pose, &contacts);
     let mut grip_values = posture_values(object, rig, &pose, &contacts, classification);
     for (term, value) in WRITTEN_TERMS.into_iter().zip(written) {
@@ -128,6 +134,7 @@ pub(super) fn read_entry(
         grip_values,
         scores,
         friction_uses,
+        finger_sets,
     };
     Ok((entry, shape))
 }

@@ -140,22 +140,37 @@ impl PreparedHand {
             *reach += distance - ROUNDING;
         }
         (0..LANES).step_by(SOLIDS_AT_ONCE).any(|first| {
-            let mut nears = [0_u32; BALLS];
-            for k in first..first + SOLIDS_AT_ONCE {
-                let ToAxis { squares, radii } = self.to_axis(k, balls);
-                for i in 0..BALLS {
-                    // As in `surely_nears`.
-                    let reach = (reaches[i] + radii[i]).max(0.0);
-                    nears[i] |= u32::from(squares[i] < reach * reach);
-                }
-            }
+            let nears = self.near_some(first, balls, &reaches);
             nears.iter().fold(0, |any, near| any | near) != 0
         })
     }
 
-    /// Metres that some balls are at most from the hand.
+    /// Which of some balls surely come nearer to the hand than `distance` metres, a bit each; only some of them if those
+    /// settle it.
     #[inline]
-    pub fn distance_at_most(&self, balls: &Balls) -> f32 {
+    pub fn surely_near(&self, balls: &Balls, distance: f32, is_settled: impl Fn(u8) -> bool) -> u8 {
+        let mut reaches = balls.radii;
+        for reach in &mut reaches {
+            *reach += distance - ROUNDING;
+        }
+        let mut near = 0_u8;
+        for first in (0..LANES).step_by(SOLIDS_AT_ONCE) {
+            let nears = self.near_some(first, balls, &reaches);
+            let bits = nears
+                .iter()
+                .enumerate()
+                .map(|(ball, &nears)| (nears as u8) << ball);
+            near |= bits.fold(0, |bits, bit| bits | bit);
+            if is_settled(near) {
+                break;
+            }
+        }
+        near
+    }
+
+    /// Metres that each of some balls is at most from the hand.
+    #[inline]
+    pub fn distances_at_most(&self, balls: &Balls) -> [f32; BALLS] {
         let mut least = [f32::INFINITY; BALLS];
         for k in 0..SETTLING {
             let ToAxis { squares, radii } = self.to_axis(k, balls);
@@ -164,7 +179,10 @@ impl PreparedHand {
                 least[i] = if distance < least[i] { distance } else { least[i] };
             }
         }
-        least.into_iter().fold(f32::INFINITY, f32::min) + ROUNDING
+        for distance in &mut least {
+            *distance += ROUNDING;
+        }
+        least
     }
 
     /// True if any of some solids comes nearer to the hand than `distance` metres.
@@ -286,6 +304,22 @@ impl PreparedHand {
             }
         }
         Some(least)
+    }
+
+    /// For each of some balls, 1 if it surely comes nearer to one of the solids from `first` on, [`SOLIDS_AT_ONCE`], than how
+    /// far it reaches.
+    #[inline]
+    fn near_some(&self, first: usize, balls: &Balls, reaches: &[f32; BALLS]) -> [u32; BALLS] {
+        let mut nears = [0; BALLS];
+        for k in first..first + SOLIDS_AT_ONCE {
+            let ToAxis { squares, radii } = self.to_axis(k, balls);
+            for i in 0..BALLS {
+                // As in `surely_nears`.
+                let reach = (reaches[i] + radii[i]).max(0.0);
+                nears[i] |= u32::from(squares[i] < reach * reach);
+            }
+        }
+        nears
     }
 
     #[inline]

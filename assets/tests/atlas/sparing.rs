@@ -1,0 +1,236 @@
+//! Known grips without the fingers that a giver is in the way of, against comparing hands one by one.
+
+use std::sync::{Arc, atomic::AtomicBool};
+
+use grasp_assets::objects;
+use grasp_synthesis::{
+    atlas::{Atlas, entry::Entry, grips::Grips},
+    grasp::{Contact, Grasp},
+    hand::{Digit, DigitAngles, HandPose, Handedness},
+    holdout::Holdout,
+    physical::{
+        grip::{DEEPEST, GIVER_CLEARANCE},
+        immobility::{BALANCE_TOLERANCE, Buffers, EPSILON_TOLERANCE, SoftContact, epsilon},
+        scene::ObjectScene,
+        solids::{HandSolids, TaperedCapsule, ToldSolids, clearance, self_clearance},
+    },
+    search::{GraspSource, SearchOutcome, SearchSettings, find_grasp},
+    strategy::Validity,
+};
+
+use crate::support::{NoClock, UP, adult, held_out, known, object, reproducible, tight_givers};
+
+/// Standard gravity.
+const GRAVITY: f32 = 9.80665;
+
+/// Torsion that a fingertip bears per newton, as a share of friction, in metres.
+const TORSION_LEVER: f32 = 0.0033;
+
+fn search(holdout: &Holdout, known: &Arc<Atlas>, workers: usize) -> SearchOutcome {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build();
+    let settings = SearchSettings {
+        atlas: Some(Arc::clone(known)),
+        workers,
+        ..reproducible(holdout)
+    };
+    find_grasp(
+        &pool.expect("threads"),
+        holdout,
+        adult(Handedness::Right),
+        &settings,
+        &NoClock,
+        &AtomicBool::new(false),
+    )
+}
+
+/// The sixteen sets of fingers with the thumb, thumb first.
+fn sets() -> impl Iterator<Item = [bool; 5]> {
+    (0_u8..16).map(|set| std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1))
+}
+
+/// The epsilon of the contacts of some digits and the palm.
+fn epsilon_of(contacts: &[Contact], kept: [bool; 5], scene: &ObjectScene<'_>) -> f32 {
+    let is_kept = |contact: &&Contact| contact.part.digit().is_none_or(|digit| kept[digit.index()]);
+    let soft: Vec<SoftContact> = contacts
+        .iter()
+        .filter(is_kept)
+        .map(|contact| SoftContact {
+            position: contact.position,
+            normal: contact.normal,
+            digit: contact.part.digit(),
+            friction: scene.friction,
+            torsion_radius: scene.friction * TORSION_LEVER,
+        })
+        .collect();
+    epsilon(&soft, &scene.load(UP), 0.0, &mut Buffers::default())
+}
+
+#[test]
+fn sets_of_fingers_are_those_that_have_closure() {
+    let scissors = object("scissors");
+    let scene = ObjectScene::new(scissors, scissors.friction_under(Validity::Physical));
+    let known = known();
+    let (mut closing, mut open) = (0, 0);
+    for (place, entry) in known.entries().iter().enumerate().step_by(173) {
+        let holding = entry.grip.bend_ratios.map(|ratio| ratio.is_some());
+        for kept in sets() {
+            let is_of_holding =
+                kept[1..].contains(&true) && kept.iter().zip(holding).all(|(kept, holds)| !kept || holds);
+            let is_set = entry.finger_sets.contains(kept);
+            if !is_of_holding {
+                assert!(!is_set, "grip {place}, {kept:?}");
+                continue;
+            }
+            // Followed to its end, the bound is as near to the truth as the tolerance; between, either is right.
+            let bound = epsilon_of(&entry.contacts, kept, &scene);
+            if bound >= scene.least_epsilon {
+                closing += 1;
+                assert!(is_set, "grip {place}, {kept:?}: {bound}");
+            } else if bound < (1.0 - EPSILON_TOLERANCE) * scene.least_epsilon {
+                open += 1;
+                assert!(!is_set, "grip {place}, {kept:?}: {bound}");
+            }
+        }
+    }
+    assert!(closing >= 60 && open >= 60, "{closing} sets close, {open} do not");
+}
+
+/// The distance of some solids from a giver's, pair by pair.
+fn distance<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, giver: &ToldSolids) -> f32 {
+    ours.flat_map(|ours| giver.iter().map(move |theirs| ours.distance(theirs)))
+        .fold(f32::INFINITY, f32::min)
+}
+
+/// What a giver leaves of a known grip: the digits that hold and that it is not in the way of, and whether it is in the way
+/// of any; none if it is in the way of palm or forearm.
+fn left(entry: &Entry, giver: &ToldSolids) -> Option<([bool; 5], bool)> {
+    let rig = adult(Handedness::Right);
+    let solids = HandSolids::of_pose(rig, &entry.grip.pose);
+    let told = ToldSolids::of_rig(rig, entry.grip.pose.frame_from_wrist, &solids);
+    if distance(told.still().chain(&solids.thenar), giver) < GIVER_CLEARANCE {
+        return None;
+    }
+    let is_met = solids
+        .phalanges
+        .map(|links| distance(links.iter(), giver) < GIVER_CLEARANCE);
+    let holds = entry.grip.bend_ratios.map(|ratio| ratio.is_some());
+    let left = std::array::from_fn(|digit| holds[digit] && !is_met[digit]);
+    Some((left, is_met.contains(&true)))
+}
+
+fn pose_of_digits(pose: &HandPose, digits: [bool; 5]) -> HandPose {
+    let mut pose = *pose;
+    for (angles, keeps) in pose.digits.iter_mut().zip(digits) {
+        if !keeps {
+            *angles = DigitAngles::default();
+        }
+    }
+    pose
+}
+
+/// Every check of a grasp, by other means than the search's.
+fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &ToldSolids) {
+    let rig = adult(Handedness::Right);
+    let object = &holdout.object;
+    let solids = HandSolids::of_pose(rig, &grasp.pose);
+    let told = ToldSolids::of_rig(rig, grasp.pose.frame_from_wrist, &solids);
+    let margins = grasp.margins.expect("it is physically valid");
+    let off_giver = distance(told.iter(), giver);
+    assert!(off_giver >= GIVER_CLEARANCE);
+    assert!((margins.giver_clearance.expect("there is a giver") - off_giver).abs() < 1e-5);
+    assert!(self_clearance(&solids) >= 0.0);
+    let deepest = solids
+        .iter()
+        .map(|solid| clearance(solid, &object.surface, 0.0))
+        .fold(0.0, f32::min);
+    assert!((deepest + margins.penetration).abs() < 1e-6 && -deepest <= DEEPEST);
+
+    let weight = object.mass * GRAVITY;
+    let force: glam::Vec3 = grasp.forces.iter().sum();
+    assert!((force - UP * weight).length() <= BALANCE_TOLERANCE * weight * 1.01);
+    let scene = ObjectScene::new(object, object.friction_under(Validity::Physical));
+    let closure = epsilon_of(&grasp.contacts, [true; 5], &scene);
+    assert!(closure >= (1.0 - EPSILON_TOLERANCE) * scene.least_epsilon);
+}
+
+#[test]
+fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
+    let (known, rig) = (known(), adult(Handedness::Right));
+    let scissors = objects::object("scissors").expect("they are built in");
+    let (mut spared, mut refused, mut rested) = (0, 0, 0);
+    for index in (0..known.entries().len()).step_by(331) {
+        let entry = &known.entries()[index];
+        let alone = Grips::new(rig, vec![entry.clone()]);
+        let alone = Arc::new(Atlas::new(&scissors.object, rig, alone, true));
+        for giver in (0..known.entries().len()).step_by(61) {
+            let holdout = held_out(&known, giver);
+            let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
+            let hand = ToldSolids::of_joints(&hand.joints);
+            let found = search(&holdout, &alone, 1);
+            let Some((left, is_any_met)) = left(entry, &hand) else {
+                assert_eq!(found.grasp, None, "giver {giver}, grip {index}");
+                continue;
+            };
+            let Some(grasp) = found.grasp else {
+                // What does not hold, or has no room to rest.
+                refused += usize::from(is_any_met);
+                continue;
+            };
+            assert_eq!(found.report.source, Some(GraspSource::Atlas(0)));
+            assert_is_valid(&grasp, &holdout, &hand);
+            if !is_any_met {
+                assert_eq!(grasp.pose, entry.grip.pose);
+                continue;
+            }
+            spared += 1;
+            assert!(entry.finger_sets.contains(left), "giver {giver}, grip {index}");
+            // What holds is where it was, and holds by what it touched.
+            let touching = grasp.bend_ratios.map(|ratio| ratio.is_some());
+            let of_left = |contact: &&Contact| contact.part.digit().is_none_or(|digit| left[digit.index()]);
+            let kept: Vec<Contact> = entry.contacts.iter().filter(of_left).copied().collect();
+            assert_eq!(grasp.contacts, kept);
+            assert!(
+                Digit::ALL
+                    .iter()
+                    .all(|digit| !touching[digit.index()] || left[digit.index()])
+            );
+            assert_eq!(
+                pose_of_digits(&grasp.pose, left),
+                pose_of_digits(&entry.grip.pose, left)
+            );
+            rested += usize::from(left == entry.grip.bend_ratios.map(|ratio| ratio.is_some()));
+        }
+    }
+    assert!(
+        spared >= 20,
+        "{spared} times fingers are spared, {refused} times not"
+    );
+    assert!(
+        (1..spared).contains(&rested),
+        "of {spared}, {rested} are of idle fingers alone"
+    );
+}
+
+#[test]
+fn sparing_answers_givers_that_leave_no_whole_grip_and_is_reproducible() {
+    let known = known();
+    let mut answered = 0;
+    for giver in tight_givers(&known, 0) {
+        let holdout = held_out(&known, giver);
+        let found = search(&holdout, &known, 1);
+        let Some(grasp) = found.grasp else { continue };
+        answered += 1;
+        let Some(GraspSource::Atlas(index)) = found.report.source else {
+            panic!("no attempt was allowed");
+        };
+        assert_ne!(grasp.pose, known.entries()[usize::from(index)].grip.pose);
+        for workers in [1, 3] {
+            let again = search(&holdout, &known, workers);
+            assert_eq!(
+                (again.grasp.as_ref(), again.report.source),
+                (Some(&grasp), Some(GraspSource::Atlas(index)))
+            );
+        }
+    }
+    assert!(answered >= 1, "nobody is answered");
+}
