@@ -1,14 +1,20 @@
-//! The best grasp within the default budget of 5 ms.
+//! The best grasp within a budget of 5 ms, and what a request gets that names none.
+
+use std::time::Duration;
 
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
 use crate::{
     Row,
-    asking::{Answer, assert_some_found, share},
+    asking::{Answer, assert_some_found, search_times, share, wire_duration},
     setting::{Setting, Thing},
     table::{Line, Spread, Target, Unit, time},
 };
+
+/// The budget: what a search for the best has for choosing where the request names none. Then it looks on for the first grasp
+/// if there is none by then; where it is named, that is its end.
+const BUDGET: Duration = Duration::from_millis(5);
 
 /// How many candidates are ranked at least, at the median.
 const CANDIDATES: f64 = 500.0;
@@ -24,9 +30,18 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
         choice: v1::Choice::BestWithinBudget.into(),
         ..request
     };
-    let ask = |what: &str, requests: Vec<v1::FindGraspRequest>| {
-        let requests = requests.into_iter().take(MOST_REQUESTS).map(best);
-        setting.ask_all(server, &format!("best, {what}"), requests)
+    let within_budget = |request| v1::FindGraspRequest {
+        budget: wire_duration(BUDGET),
+        ..best(request)
+    };
+    let mut without = Vec::new();
+    let mut ask = |what: &str, mut requests: Vec<v1::FindGraspRequest>| {
+        requests.truncate(MOST_REQUESTS);
+        let asked = requests.iter().cloned().map(within_budget);
+        let answers = setting.ask_all(server, &format!("best, {what}"), asked);
+        let answered = requests.into_iter().zip(&answers);
+        without.extend(answered.filter_map(|(request, answer)| (!answer.found).then_some(request)));
+        answers
     };
     let mut all = ask("the 15 holdouts", setting.built_in_requests());
     assert_some_found(&all);
@@ -44,6 +59,24 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
         CANDIDATES,
     )));
     lines.extend(overshoot(&all));
+    if !without.is_empty() {
+        let again = setting.ask_all(server, "best, without a budget", without.into_iter().map(best));
+        let in_time = share(&again, Answer::is_in_time);
+        let found = share(&again, |answer| answer.found);
+        lines.push(
+            Line::new(
+                Row::Best,
+                "those without a grasp, no budget named",
+                Unit::Seconds,
+                search_times(&again),
+            )
+            .remark(format!(
+                "{:.0} % answered in 50 ms, {:.0} % within the server's default",
+                100.0 * in_time,
+                100.0 * found
+            )),
+        );
+    }
     lines
 }
 

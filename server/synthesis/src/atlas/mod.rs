@@ -30,7 +30,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{hand::rig::Rig, object::GraspObject, physical::solids::PreparedHand};
 
-use entry::{Entry, SLIPS};
+use entry::Entry;
 use grips::Grips;
 pub use occupancy::Excluded;
 use occupancy::Occupancy;
@@ -98,10 +98,7 @@ impl Atlas {
 
     /// Those of [`Atlas::by_score`] that the object does not slip out of.
     pub fn holding_under(&self, up: Vec3) -> &[u16] {
-        let order = self.by_score(up);
-        let direction = gravity::nearest(up);
-        let holds = |entry: &u16| self.entries()[usize::from(*entry)].scores[direction] != SLIPS;
-        &order[..order.partition_point(holds)]
+        self.order.holding_under(up)
     }
 
     /// The grips that certainly come too near to a giver's hand, or to its forearm; others may, too.

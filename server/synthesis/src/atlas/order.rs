@@ -3,23 +3,36 @@
 use glam::Vec3;
 
 use super::{
-    entry::Entry,
+    entry::{Entry, SLIPS},
     gravity::{DIRECTIONS, nearest},
 };
+
+/// The grips under one direction.
+#[derive(Clone, Debug, PartialEq)]
+struct Order {
+    /// By falling score.
+    entries: Vec<u16>,
+    /// How many of them the object does not slip out of: they come first.
+    holding: usize,
+}
 
 /// For each direction, the grips by falling score.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct GravityOrder {
-    orders: Vec<Vec<u16>>,
+    orders: Vec<Order>,
 }
 
 impl GravityOrder {
     pub(super) fn of(entries: &[Entry]) -> Self {
         let order = |direction: usize| {
+            let score = |entry: u16| entries[usize::from(entry)].scores[direction];
             let mut order: Vec<u16> = (0..entries.len() as u16).collect();
             // Stable, so that equal scores stay in the order of the entries.
-            order.sort_by_key(|&entry| std::cmp::Reverse(entries[usize::from(entry)].scores[direction]));
-            order
+            order.sort_by_key(|&entry| std::cmp::Reverse(score(entry)));
+            Order {
+                holding: order.partition_point(|&entry| score(entry) != SLIPS),
+                entries: order,
+            }
         };
         Self {
             orders: (0..DIRECTIONS).map(order).collect(),
@@ -27,13 +40,24 @@ impl GravityOrder {
     }
 
     pub(super) fn under(&self, up: Vec3) -> &[u16] {
-        self.orders.get(nearest(up)).map_or(&[], Vec::as_slice)
+        self.order(up).map_or(&[], |order| &order.entries)
+    }
+
+    /// Those that the object does not slip out of.
+    pub(super) fn holding_under(&self, up: Vec3) -> &[u16] {
+        self.order(up)
+            .map_or(&[], |order| &order.entries[..order.holding])
+    }
+
+    fn order(&self, up: Vec3) -> Option<&Order> {
+        self.orders.get(nearest(up))
     }
 
     pub(super) fn bytes(&self) -> usize {
-        self.orders
+        let entries = self
+            .orders
             .iter()
-            .map(|order| size_of_val(order.as_slice()))
-            .sum()
+            .map(|order| size_of_val(order.entries.as_slice()));
+        entries.sum::<usize>() + size_of_val(self.orders.as_slice())
     }
 }

@@ -198,7 +198,8 @@ impl<'a> KnownGrips<'a> {
         self.open(index, Solids::Made(solids))
     }
 
-    /// The same of places after those of the order.
+    /// The same of places after those of the order, which few look-ups come to.
+    #[inline(never)]
     fn beyond_order(&self, place: usize) -> Option<Open<'a>> {
         let Some(entry) = self.recent.get(place) else {
             let index = self.sparing[place - self.recent.len()];
@@ -255,6 +256,8 @@ impl<'a> KnownGrips<'a> {
         constraints.admits(&grasp).then(|| Box::new(grasp))
     }
 
+    /// Apart, as its hands would make room for themselves on the stack of every look-up.
+    #[inline(never)]
     fn hold_sparing(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let entry = &self.atlas?.entries()[usize::from(index)];
         spared(entry, &self.scene.surroundings()?, self.giver?, gripper)
