@@ -40,8 +40,8 @@ pub fn spared(
     around.hold_with(&grip, &solids, gripper, &mut NoStopwatch).ok()
 }
 
-/// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others, if the thumb
-/// or its ball comes too near to the giver, or if no digit does.
+/// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others or leave out
+/// one between them, if the thumb or its ball comes too near to the giver, or if no digit does.
 fn kept(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> Option<[bool; 5]> {
     let sets = entry.finger_sets;
     let holding = sets.holding();
@@ -52,7 +52,14 @@ fn kept(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> Option<[boo
     }
     let is_in_way: [bool; 5] = std::array::from_fn(|digit| is_met(giver, solids.phalanges[digit].iter()));
     let kept = std::array::from_fn(|digit| holding[digit] && !is_in_way[digit]);
-    (is_in_way.contains(&true) && sets.contains(kept)).then_some(kept)
+    let does = is_in_way.contains(&true) && sets.contains(kept) && (kept == holding || are_neighbours(kept));
+    does.then_some(kept)
+}
+
+/// True if the fingers among some digits, thumb first, lie side by side: nobody lifts a finger between two that hold.
+fn are_neighbours(digits: [bool; 5]) -> bool {
+    let runs = digits[1..].chunk_by(|a, b| a == b).filter(|run| run[0]);
+    runs.count() == 1
 }
 
 fn is_met<'a>(giver: &PreparedHand, solids: impl Iterator<Item = &'a TaperedCapsule> + Clone) -> bool {

@@ -1,13 +1,11 @@
 //! Step 2 under `PHYSICAL` validity for the digits of one hand: thumb, fingers, and what rests.
 
-use std::iter;
-
 use super::{
     closing::{ClosedDigit, Closing},
     grip::{GIVER_CLEARANCE, NoGrip, nears_forbidden_surface},
     obstacle::Obstacle,
     scene::ObjectScene,
-    shape::{HandShape, TUCKED_FLEXION},
+    shape::{HandShape, LEAST_RESTING_FLEXION, TUCKED_FLEXION},
     solids::{PreparedHand, link_radii},
 };
 use crate::{
@@ -134,8 +132,9 @@ impl Closer<'_> {
         free.unwrap_or(relaxed)
     }
 
-    /// A finger that holds nothing, clear of the giver's hand: as [`Closer::rest`], but none where that has no room, and none
-    /// of the poses in which it would meet the giver if nothing else stopped it: those take most of the time.
+    /// A finger that is taken off the object, clear of the giver's hand: relaxed or tucked away. None where that has no room,
+    /// as one that stands out among fingers that hold looks like a gesture, nor where it would meet the giver if nothing
+    /// else stopped it, as finding out takes most of the time.
     pub(super) fn rest_clear(
         &self,
         finger: Digit,
@@ -143,10 +142,10 @@ impl Closer<'_> {
         flexion: f32,
     ) -> Option<ClosedDigit> {
         let closing = self.closing(finger, obstacles);
-        let flexions = iter::once(flexion).chain(EVASIVE_FLEXIONS);
-        flexions
+        [flexion, TUCKED_FLEXION]
+            .into_iter()
             .filter(|&flexion| self.is_clear_of_giver(&closing.bent(flexion)))
             .map(|flexion| closing.relax(flexion))
-            .find(|relaxed| self.is_clear_of_giver(relaxed))
+            .find(|rested| rested.flexion() >= LEAST_RESTING_FLEXION && self.is_clear_of_giver(rested))
     }
 }

@@ -20,6 +20,10 @@ use crate::{
 /// first two and two thirds of it for the last.
 const RESTING_FLEXION: f32 = 1.15;
 
+/// The least and the most of it beside digits that are less or more bent.
+pub(super) const LEAST_RESTING_FLEXION: f32 = 0.5 * RESTING_FLEXION;
+const MOST_RESTING_FLEXION: f32 = 1.5 * RESTING_FLEXION;
+
 /// The same of fingers that are tucked away: about nine tenths of their way into the palm, which stops them before.
 pub(super) const TUCKED_FLEXION: f32 = 3.8;
 
@@ -114,7 +118,7 @@ impl HandShape {
         if count == 0.0 {
             RESTING_FLEXION
         } else {
-            (sum / count).clamp(0.5 * RESTING_FLEXION, 1.5 * RESTING_FLEXION)
+            (sum / count).clamp(LEAST_RESTING_FLEXION, MOST_RESTING_FLEXION)
         }
     }
 
