@@ -150,7 +150,7 @@ fn the_first_answer_beside_a_giver_is_the_first_of_the_shortlist_that_holds() {
     let known = known();
     let by_score = known.by_score(UP);
     let listed: Vec<u16> = known.shortlist(UP).iter().map(|listed| listed.entry).collect();
-    let (mut on_list, mut beyond, mut sparing) = (0, 0, 0);
+    let (mut on_list, mut beyond) = (0, 0);
     for giver in (0..known.entries().len()).step_by(450) {
         let holdout = held_out(&known, giver);
         let holds = which_hold(&holdout, &known);
@@ -166,7 +166,6 @@ fn the_first_answer_beside_a_giver_is_the_first_of_the_shortlist_that_holds() {
                 first.copied().map(GraspSource::Atlas),
                 "giver {giver}"
             );
-            sparing += usize::from(first.is_some());
             continue;
         };
         let found = of_known_grips(&holdout, &known, Choice::FirstValid);
@@ -183,7 +182,6 @@ fn the_first_answer_beside_a_giver_is_the_first_of_the_shortlist_that_holds() {
     }
     assert!(on_list >= 3, "{on_list} differ from the first by score");
     assert!(beyond >= 1, "none needs more than the list");
-    assert!(sparing >= 1, "none is answered by sparing fingers alone");
 }
 
 #[test]

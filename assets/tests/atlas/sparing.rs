@@ -18,7 +18,7 @@ use grasp_synthesis::{
     strategy::Validity,
 };
 
-use crate::support::{NoClock, UP, adult, held_out, known, object, reproducible, tight_givers};
+use crate::support::{NoClock, UP, adult, held_out, known, object, reproducible};
 
 /// Standard gravity.
 const GRAVITY: f32 = 9.80665;
@@ -158,7 +158,7 @@ fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
     let (known, rig) = (known(), adult(Handedness::Right));
     let scissors = objects::object("scissors").expect("they are built in");
     let (mut spared, mut refused, mut rested) = (0, 0, 0);
-    for index in (0..known.entries().len()).step_by(331) {
+    for index in (0..known.entries().len()).step_by(109) {
         let entry = &known.entries()[index];
         let alone = Grips::new(rig, vec![entry.clone()]);
         let alone = Arc::new(Atlas::new(&scissors.object, rig, alone, true));
@@ -183,6 +183,13 @@ fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
                 continue;
             }
             spared += 1;
+            let fingers: Vec<usize> = (1..5).filter(|&finger| left[finger]).collect();
+            let holds = entry.grip.bend_ratios.map(|ratio| ratio.is_some());
+            let leaves_a_gap = fingers.windows(2).any(|pair| pair[1] != pair[0] + 1);
+            assert!(
+                left == holds || !leaves_a_gap,
+                "giver {giver}, grip {index}: {left:?}"
+            );
             assert!(entry.finger_sets.contains(left), "giver {giver}, grip {index}");
             // What holds is where it was, and holds by what it touched.
             let touching = grasp.bend_ratios.map(|ratio| ratio.is_some());
@@ -214,23 +221,32 @@ fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
 #[test]
 fn sparing_answers_givers_that_leave_no_whole_grip_and_is_reproducible() {
     let known = known();
+    let rig = adult(Handedness::Right);
+    let scissors = objects::object("scissors").expect("they are built in");
+    // Of all grips, nearly every one of these givers leaves some whole.
+    let few = known.entries().iter().step_by(90).cloned().collect();
+    let few = Arc::new(Atlas::new(&scissors.object, rig, Grips::new(rig, few), true));
     let mut answered = 0;
-    for giver in tight_givers(&known, 0) {
+    for giver in (0..known.entries().len()).step_by(4) {
         let holdout = held_out(&known, giver);
-        let found = search(&holdout, &known, 1);
+        let found = search(&holdout, &few, 1);
         let Some(grasp) = found.grasp else { continue };
-        answered += 1;
         let Some(GraspSource::Atlas(index)) = found.report.source else {
             panic!("no attempt was allowed");
         };
-        assert_ne!(grasp.pose, known.entries()[usize::from(index)].grip.pose);
+        if grasp.pose == few.entries()[usize::from(index)].grip.pose {
+            continue;
+        }
+        answered += 1;
+        let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
+        assert_is_valid(&grasp, &holdout, &ToldSolids::of_joints(&hand.joints));
         for workers in [1, 3] {
-            let again = search(&holdout, &known, workers);
+            let again = search(&holdout, &few, workers);
             assert_eq!(
                 (again.grasp.as_ref(), again.report.source),
                 (Some(&grasp), Some(GraspSource::Atlas(index)))
             );
         }
     }
-    assert!(answered >= 1, "nobody is answered");
+    assert!(answered >= 3, "{answered} are answered by sparing alone");
 }
