@@ -121,7 +121,7 @@ impl Closer<'_> {
     }
 
     /// A finger that holds nothing, relaxed; tucked away or nearly stretched where it would meet the giver's hand.
-    pub(super) fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
+    fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
         let closing = self.closing(finger, obstacles);
         let relaxed = closing.relax(flexion);
         if self.is_clear_of_giver(&relaxed) {
