@@ -17,6 +17,9 @@ use clap::{Parser, ValueEnum};
 /// A file of the assets: its path below the assets folder, with `/` between the parts, and its bytes.
 pub(crate) type AssetFile = (String, Vec<u8>);
 
+/// Whether products of quaternions and vectors are rounded once where a build for any processor rounds twice.
+const FUSES: bool = cfg!(all(target_arch = "x86_64", target_feature = "fma"));
+
 /// The folder that the built-in assets are embedded from.
 const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
@@ -103,6 +106,19 @@ fn main() -> ExitCode {
     }
     if let Some(folder) = &arguments.pictures {
         return exit_code("the pictures", holdouts::pictures(folder, &arguments.only));
+    }
+    let atlases = match arguments.section {
+        Section::Atlases => true,
+        Section::All => arguments.check,
+        Section::Objects | Section::Hands | Section::Holdouts | Section::Prospects => false,
+    };
+    if atlases && FUSES {
+        eprintln!(
+            "atlases: this build fuses multiplications with additions, rounds otherwise and finds other grips than one \
+             for any processor of the architecture, whose grips the shipped atlases are: build without target-cpu and \
+             target-feature"
+        );
+        return ExitCode::FAILURE;
     }
     if arguments.check {
         return check(&arguments.out, arguments.section);

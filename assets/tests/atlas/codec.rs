@@ -127,7 +127,7 @@ fn a_count_beyond_the_bytes_is_refused() {
     let count = 8 + 2 + 32 + 1;
     for claimed in [u32::MAX, 4096, SCISSORS.0.atlas.entries().len() as u32 + 1] {
         let mut bytes = SCISSORS.1.clone();
-        bytes[count..count + 4].copy_from_slice(&claimed.to_le_bytes());
+        bytes[count..count + 4].copy_from_slice(&claimed.to_be_bytes());
         assert!(matches!(
             decode_scissors(&sealed(bytes)),
             Err(AtlasError::Malformed(_))

@@ -1,7 +1,7 @@
 //! Atlases as bytes.
 //!
 //! A header (a mark, the format, the key, flags and counts), the grips, and the SHA-256 of all before. Numbers are
-//! little-endian, and every one is kept bit by bit, so that an atlas that was read is the one that was written. What
+//! big-endian, and every one is kept bit by bit, so that an atlas that was read is the one that was written. What
 //! follows from other numbers is not written but computed: yaws and bend ratios from the hand's shape, a contact's
 //! third coordinate from its triangle, the normal from that and the hand.
 
@@ -28,7 +28,7 @@ use crate::{hand::rig::Rig, object::GraspObject};
 const MARK: [u8; 8] = *b"GRASPATL";
 
 /// Counts the formats.
-const FORMAT: u16 = 4;
+const FORMAT: u16 = 5;
 
 /// Bytes of the checksum.
 const CHECKSUM_BYTES: usize = 32;

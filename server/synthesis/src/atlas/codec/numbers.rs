@@ -1,4 +1,4 @@
-//! Numbers as bytes, little-endian.
+//! Numbers as bytes, big-endian.
 
 use super::AtlasError;
 
@@ -20,20 +20,20 @@ impl Writer {
     }
 
     pub(super) fn u16(&mut self, number: u16) {
-        self.bytes(&number.to_le_bytes());
+        self.bytes(&number.to_be_bytes());
     }
 
     pub(super) fn u32(&mut self, number: u32) {
-        self.bytes(&number.to_le_bytes());
+        self.bytes(&number.to_be_bytes());
     }
 
     pub(super) fn u64(&mut self, number: u64) {
-        self.bytes(&number.to_le_bytes());
+        self.bytes(&number.to_be_bytes());
     }
 
     pub(super) fn floats(&mut self, numbers: &[f32]) {
         for number in numbers {
-            self.bytes(&number.to_le_bytes());
+            self.bytes(&number.to_be_bytes());
         }
     }
 
@@ -79,19 +79,19 @@ impl<'a> Reader<'a> {
     }
 
     pub(super) fn u8(&mut self) -> Result<u8, AtlasError> {
-        self.array().map(u8::from_le_bytes)
+        self.array().map(u8::from_be_bytes)
     }
 
     pub(super) fn u16(&mut self) -> Result<u16, AtlasError> {
-        self.array().map(u16::from_le_bytes)
+        self.array().map(u16::from_be_bytes)
     }
 
     pub(super) fn u32(&mut self) -> Result<u32, AtlasError> {
-        self.array().map(u32::from_le_bytes)
+        self.array().map(u32::from_be_bytes)
     }
 
     pub(super) fn u64(&mut self) -> Result<u64, AtlasError> {
-        self.array().map(u64::from_le_bytes)
+        self.array().map(u64::from_be_bytes)
     }
 
     /// A number that is finite.
