@@ -107,7 +107,7 @@ fn bytes_that_are_no_atlas_or_of_another_format_are_told_apart() {
         AtlasError::NotAnAtlas
     );
     let mut bytes = SCISSORS.1.clone();
-    bytes[8] = 99;
+    bytes[9] = 99;
     assert_eq!(
         decode_scissors(&bytes).unwrap_err(),
         AtlasError::OtherFormat { found: 99 }
