@@ -45,6 +45,7 @@ fn place(object: &GraspObject) -> Place<'_> {
         surface: &object.surface_pairs,
         giver: None,
         rig: rig(Handedness::Right),
+        repertoire: None,
     }
 }
 

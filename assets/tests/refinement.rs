@@ -35,6 +35,7 @@ fn what_holds_stays_and_more_holds_beside_near_misses() {
         surface: &scissors.surface_pairs,
         giver: None,
         rig,
+        repertoire: None,
     };
     let (mut plain, mut refining) = (PhysicalAttempt::default(), PhysicalAttempt::default());
     let (mut held, mut refined) = (0, 0);

@@ -136,6 +136,7 @@ fn hands_beside_known_grips_hold_more_often_where_a_giver_leaves_little() {
             surface: &surface,
             giver: Some(giver),
             rig,
+            repertoire: None,
         };
         let mut attempt = PhysicalAttempt::default();
         let mut count = |propose: &dyn Fn(&mut AttemptStream) -> Option<Proposal>| {

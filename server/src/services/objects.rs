@@ -44,9 +44,12 @@ impl ObjectHandler {
                 });
             }
         }
+        let shared = Arc::clone(&self.shared);
         let object = run_blocking(move || {
             let _permit = permit;
-            build_object(fields, limits, violations)
+            let object = build_object(fields, limits, violations)?;
+            object.draw_repertoires(&shared.default_rig);
+            Ok::<_, ServiceError>(object)
         })
         .await??;
         let object = self.shared.objects.insert(object)?;

@@ -112,6 +112,7 @@ fn proposals(criterion: &mut Criterion) {
             surface: &scene.object.surface_pairs,
             giver: None,
             rig: rig(),
+            repertoire: None,
         };
         let proposals: Vec<_> = (0..PROPOSALS)
             .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index), &|| false))

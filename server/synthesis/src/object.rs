@@ -1,12 +1,18 @@
 //! Objects that can be grasped.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use crate::{
     geometry::{
         mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox, tapered_capsule::TaperedCapsule,
     },
-    guided::surface_pairs::SurfacePairs,
+    guided::{
+        repertoire::{Repertoire, Repertoires},
+        surface_pairs::SurfacePairs,
+    },
+    hand::rig::Rig,
     strategy::Validity,
 };
 
@@ -37,6 +43,8 @@ pub struct GraspObject {
     pub friction: Option<f32>,
     /// Where opposed digits and the palm may press.
     pub surface_pairs: SurfacePairs,
+    /// Where hands have room.
+    repertoires: Repertoires,
     /// One flag a triangle: may it not be touched?
     forbidden: Vec<bool>,
     /// What these triangles make, if there are any. Much smaller than the whole in most cases, and far from most hands: it
@@ -125,6 +133,7 @@ impl GraspObject {
         Ok(Self {
             bounding_box,
             surface_pairs: SurfacePairs::of(&surface, |triangle| forbidden[triangle as usize]),
+            repertoires: Repertoires::default(),
             mass,
             centre_of_mass,
             friction,
@@ -135,6 +144,12 @@ impl GraspObject {
             surface,
             forbidden,
         })
+    }
+
+    /// Where a hand has room and is likely to hold, whoever presents the object. Some five milliseconds of work when it is
+    /// first asked for.
+    pub fn repertoire(&self, rig: &Rig) -> Arc<Repertoire> {
+        self.repertoires.of(self, rig)
     }
 
     /// The coefficient of friction that grasps are judged by: the object's own, or what the notion of valid assumes.

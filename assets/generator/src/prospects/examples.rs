@@ -65,6 +65,7 @@ pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
             surface: &object.surface_pairs,
             giver: presented.giver.as_ref(),
             rig,
+            repertoire: None,
         };
         let around = Surroundings {
             object: scene,

@@ -303,6 +303,7 @@ impl<'a> Growth<'a> {
             surface: giver.map_or(&self.scene.object.surface_pairs, |giver| &giver.surface),
             giver: giver.and_then(|giver| giver.presented.giver.as_ref()),
             rig: self.rig,
+            repertoire: None,
         };
         match giver.map(|giver| &giver.starts) {
             Some(Some(starts)) if is_beside => starts.propose(self.grips.entries(), &place, stream),

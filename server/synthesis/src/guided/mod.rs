@@ -3,10 +3,12 @@
 //! A proposal starts from how hands hold: between thumb and finger pads, or in the palm. The hand's side
 //! ([`opposition`]) draws a shape and asks where its pads oppose each other and how far apart; the object's side
 //! ([`surface_pairs`]) knows where it is as thick as that; [`proposal`] puts the two together, and prefers what is likely to
-//! hold ([`prospects`]). What comes of a proposal is decided by the same checks as ever; a hand that nearly passes them is
-//! moved on a little, and a little again (`PhysicalAttempt::hold_or_refine`).
+//! hold ([`prospects`]). Where a hand has room at an object does not hang on who presents it: the first attempts choose from
+//! what was drawn once ([`repertoire`]). What comes of a proposal is decided by the same checks as ever; a hand that nearly
+//! passes them is moved on a little, and a little again (`PhysicalAttempt::hold_or_refine`).
 
 pub mod opposition;
 pub mod proposal;
 pub mod prospects;
+pub mod repertoire;
 pub mod surface_pairs;

@@ -6,7 +6,7 @@ use crate::{
     hand::{Digit, HandPose, kinematics::digit_frames, rig::Rig},
     physical::{
         shape::HandShape,
-        solids::{Balls, HandSolids, TaperedCapsule, link_radii},
+        solids::{BALLS, Balls, FOREARM_SOLIDS, HandSolids, PALM_SOLIDS, TaperedCapsule, link_radii},
     },
     pose::Pose,
     synthesis::random::AttemptStream,
@@ -61,9 +61,24 @@ const SEED: u64 = 0x4f50_504f;
 /// the hand. With 0.9, hands of a sure type are found a tenth sooner than with 0.65, on the same six objects.
 const OUTER_SHARE: f32 = 0.8;
 
+/// Where along each solid of palm and forearm balls are: those that meet something most often come first.
+const CORE_SPOTS: [[f32; 3]; 2] = [[0.6, 0.95, 0.2], [0.2, 0.6, 1.0]];
+
+/// Eights of balls that palm and forearm take.
+const CORE_BALLS: usize = (CORE_SPOTS[0].len() * (PALM_SOLIDS + FOREARM_SOLIDS)).div_ceil(BALLS);
+
+/// Where in the links of a digit that closes balls are: the link, and how far along it. The first of the links are within
+/// the palm's reach and left out.
+const LINK_SPOTS: [(usize, f32); 3] = [(1, 0.5), (2, 0.2), (2, 1.0)];
+
+/// Eights of balls that five digits' links take.
+const LINK_BALLS: usize = (5 * LINK_SPOTS.len()).div_ceil(BALLS);
+
 /// Pads that oppose each other, in the wrist's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opposition {
+    /// Which of those that the hand knows it is.
+    pub place: u16,
     /// How the hand is held.
     pub shape: HandShape,
     /// How far thumb and fingers are closed: shares of their ways.
@@ -72,6 +87,9 @@ pub struct Opposition {
     pub thumb: Vec3,
     /// The middle of the fingers' pads on the skin, in metres.
     pub fingers: Vec3,
+    /// Balls inside the links of the digits where they are when the pads meet what is between them, fingers that do not
+    /// close left out.
+    pub links: [Balls; LINK_BALLS],
 }
 
 /// Which fingers close, with the shares of hands that close them on thin and on thicker things. What is thin turns between
@@ -128,7 +146,7 @@ pub struct Oppositions {
     /// Their widths in metres, side by side.
     widths: Vec<f32>,
     /// Balls inside palm and forearm, in the wrist's frame.
-    cores: Vec<Balls>,
+    cores: [Balls; CORE_BALLS],
 }
 
 impl Oppositions {
@@ -139,15 +157,17 @@ impl Oppositions {
             .take(KNOWN)
             .collect();
         known.sort_by(|a, b| a.width().total_cmp(&b.width()));
+        for (place, opposition) in known.iter_mut().enumerate() {
+            opposition.place = place as u16;
+        }
         let stretched = HandPose {
             frame_from_wrist: Pose::IDENTITY,
             digits: rig.stretched(),
         };
         let solids = HandSolids::of_pose(rig, &stretched);
         let inside = |solid: &TaperedCapsule, along: f32| (solid.at(along), solid.radius_at(along));
-        // Those that meet something most often come first.
-        let of_forearm = [0.2, 0.6, 1.0].map(|along| solids.forearm.map(|solid| inside(&solid, along)));
-        let of_palm = [0.6, 0.95, 0.2].map(|along| solids.palm.map(|solid| inside(&solid, along)));
+        let of_forearm = CORE_SPOTS[1].map(|along| solids.forearm.map(|solid| inside(&solid, along)));
+        let of_palm = CORE_SPOTS[0].map(|along| solids.palm.map(|solid| inside(&solid, along)));
         Self {
             widths: known.iter().map(Opposition::width).collect(),
             known,
@@ -166,30 +186,14 @@ impl Oppositions {
         let end = self.widths.partition_point(|&width| width <= most);
         (first < end).then(|| &self.known[first + stream.below(end - first)])
     }
+
+    /// That of a place.
+    pub fn at(&self, place: u16) -> &Opposition {
+        &self.known[usize::from(place)]
+    }
 }
 
 impl Opposition {
-    /// Balls inside the links of the digits where they are when the pads meet what is between them, fingers that do not
-    /// close left out, in the wrist's frame. The first of the links are within the palm's reach and left out too.
-    pub fn link_balls(&self, rig: &Rig) -> Vec<Balls> {
-        let pose = HandPose {
-            frame_from_wrist: Pose::IDENTITY,
-            digits: Digit::ALL.map(|digit| {
-                let closed = self.closed[usize::from(digit != Digit::Thumb)];
-                self.shape.flexing(rig, digit).closed_by(closed)
-            }),
-        };
-        let links = HandSolids::of_pose(rig, &pose).phalanges;
-        let closing = (0..5).filter(|&digit| self.shape.closing[digit]);
-        let of_digit = closing.map(|digit| {
-            [(1, 0.5), (2, 0.2), (2, 1.0)].map(|(link, along)| {
-                let solid = links[digit][link];
-                (solid.at(along), solid.radius_at(along))
-            })
-        });
-        Balls::of_all(of_digit.collect::<Vec<_>>().as_flattened())
-    }
-
     /// Distance between the pads in metres.
     pub fn width(&self) -> f32 {
         self.fingers.distance(self.thumb)
@@ -254,7 +258,7 @@ impl Meeting {
                 (meeting, pads, miss) = (stepped, its_pads, its_miss);
             }
         }
-        meeting.opposition(&pads, width)
+        meeting.opposition(rig, &pads, width)
     }
 
     /// A hand that is a little different, and its pads: what is not of the digits that move stays where it is.
@@ -342,10 +346,11 @@ impl Meeting {
         }
     }
 
-    fn opposition(&self, pads: &Pads, width: f32) -> Option<Opposition> {
+    fn opposition(&self, rig: &Rig, pads: &Pads, width: f32) -> Option<Opposition> {
         let [thumb_cos, fingers_cos] = pads.facing();
         let fits = (pads.width() - width).abs() <= WIDTH_ROOM;
         (fits && thumb_cos.min(fingers_cos) >= least_cos(width)).then(|| Opposition {
+            place: 0,
             shape: HandShape {
                 preshape: self.closed.map(|closed| (closed - PRESHAPE_ROOM).max(0.0)),
                 ..self.shape
@@ -353,7 +358,27 @@ impl Meeting {
             closed: self.closed,
             thumb: pads.thumb.0,
             fingers: pads.fingers.0,
+            links: self.links(rig),
         })
+    }
+
+    fn links(&self, rig: &Rig) -> [Balls; LINK_BALLS] {
+        let pose = HandPose {
+            frame_from_wrist: Pose::IDENTITY,
+            digits: Digit::ALL.map(|digit| {
+                let closed = self.closed[usize::from(digit != Digit::Thumb)];
+                self.shape.flexing(rig, digit).closed_by(closed)
+            }),
+        };
+        let links = HandSolids::of_pose(rig, &pose).phalanges;
+        let closing = (0..5).filter(|&digit| self.shape.closing[digit]);
+        let balls: Vec<_> = closing
+            .flat_map(|digit| {
+                let links = &links[digit];
+                LINK_SPOTS.map(|(link, along)| (links[link].at(along), links[link].radius_at(along)))
+            })
+            .collect();
+        Balls::of_all(&balls)
     }
 }
 

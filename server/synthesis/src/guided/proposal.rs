@@ -7,6 +7,7 @@ use glam::{Mat3, Quat, Vec3};
 use super::{
     opposition::{Opposition, draw_shape},
     prospects::{Bulk, TAUGHT},
+    repertoire::Repertoire,
     surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
 };
 use crate::{
@@ -75,6 +76,8 @@ pub struct Place<'a> {
     pub giver: Option<&'a PreparedHand>,
     /// The hand that is to hold.
     pub rig: &'a Rig,
+    /// Where it is known that the hand has room at the object, if that is to be gone by.
+    pub repertoire: Option<&'a Repertoire>,
 }
 
 /// A hand whose opposed pads are at opposed points of the surface.
@@ -90,7 +93,7 @@ pub struct Candidate<'a> {
 
 impl<'a> Candidate<'a> {
     /// The hand turned anyhow about the line between the points.
-    fn drawn(opposition: &'a Opposition, pair: SurfacePair, stream: &mut AttemptStream) -> Self {
+    pub(super) fn drawn(opposition: &'a Opposition, pair: SurfacePair, stream: &mut AttemptStream) -> Self {
         let across = opposition.fingers - opposition.thumb;
         let target = (pair.end - pair.start).normalize_or(Vec3::X);
         let arc = Quat::from_rotation_arc(across.normalize_or(Vec3::X), target);
@@ -127,7 +130,8 @@ pub fn propose(
     } else if stream.unit() < PALM_SHARE {
         place.palm_on_surface(stream, interrupted)
     } else {
-        place.likely_pads_on_pair(stream, interrupted)
+        let known = place.likely_of_repertoire(stream);
+        known.or_else(|| place.likely_pads_on_pair(stream, interrupted))
     }
 }
 
@@ -151,10 +155,20 @@ impl<'a> Place<'a> {
     pub fn pads_on_pair(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
         let pair = self.free_pair(stream)?;
         let opposition = self.opposing(&pair, stream)?;
-        let links = opposition.link_balls(self.rig);
         (0..MOST_TURNS)
             .map(|_| Candidate::drawn(opposition, pair, stream))
-            .find(|candidate| self.fits(candidate, &links))
+            .find(|candidate| self.fits(candidate))
+    }
+
+    /// One of those that are known to have room at the object, where it has room beside the giver and is likely to hold.
+    fn likely_of_repertoire(&self, stream: &mut AttemptStream) -> Option<Proposal> {
+        let row = self.repertoire?.row(stream.attempt(), self.rig);
+        let free = row.filter(|candidate| self.giver.is_none_or(|giver| candidate.pair.is_free_of(giver)));
+        let likely = self.by_prospect(&Bulk::of(self.object), PREFERENCE, free.collect(), stream);
+        let clear = likely
+            .iter()
+            .find(|candidate| self.is_clear_of_giver(candidate))?;
+        Some(clear.proposal())
     }
 
     /// The same where hands are likely to hold, turned so that they are.
@@ -164,30 +178,36 @@ impl<'a> Place<'a> {
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
         let bulk = Bulk::of(self.object);
-        let mut places = Vec::with_capacity(COMPARED);
-        for _ in 0..COMPARED {
-            let Some(pair) = self.free_pair(stream) else { break };
-            if let Some(opposition) = self.opposing(&pair, stream) {
-                places.push(Candidate::drawn(opposition, pair, stream));
-            }
-        }
-        self.by_prospect(&bulk, places, stream)
+        let places = self.drawn(COMPARED, stream);
+        self.by_prospect(&bulk, PREFERENCE, places, stream)
             .iter()
             .take(MOST_PLACES)
             .take_while(|_| !interrupted())
             .find_map(|place| {
                 let turned = (0..MOST_TURNS).map(|_| Candidate::drawn(place.opposition, place.pair, stream));
-                let turned = self.by_prospect(&bulk, turned.collect(), stream);
-                let links = place.opposition.link_balls(self.rig);
-                let fitting = turned.iter().find(|candidate| self.fits(candidate, &links))?;
+                let turned = self.by_prospect(&bulk, PREFERENCE, turned.collect(), stream);
+                let fitting = turned.iter().find(|candidate| self.fits(candidate))?;
                 Some(fitting.proposal())
             })
     }
 
-    /// In an order by chance, in which those come early that are likely to hold.
-    fn by_prospect(
+    /// As many hands at places off the giver's hand, or fewer where there are none.
+    pub(super) fn drawn(&self, count: usize, stream: &mut AttemptStream) -> Vec<Candidate<'a>> {
+        let mut drawn = Vec::with_capacity(count);
+        for _ in 0..count {
+            let Some(pair) = self.free_pair(stream) else { break };
+            if let Some(opposition) = self.opposing(&pair, stream) {
+                drawn.push(Candidate::drawn(opposition, pair, stream));
+            }
+        }
+        drawn
+    }
+
+    /// In an order by chance, in which those come early that are likely to hold, by that power of the likelihood.
+    pub(super) fn by_prospect(
         &self,
         bulk: &Bulk,
+        preference: f32,
         candidates: Vec<Candidate<'a>>,
         stream: &mut AttemptStream,
     ) -> Vec<Candidate<'a>> {
@@ -203,7 +223,7 @@ impl<'a> Place<'a> {
                 let log_prospect = -(-TAUGHT.log_odds(&told)).exp().ln_1p();
                 // Gumbel's trick: by these keys, they are drawn without replacement by their weights.
                 let chance = -(-stream.unit().max(f32::MIN_POSITIVE).ln()).ln();
-                (PREFERENCE * log_prospect + chance, candidate)
+                (preference * log_prospect + chance, candidate)
             })
             .collect();
         keyed.sort_by(|(a, _), (b, _)| b.total_cmp(a));
@@ -233,11 +253,23 @@ impl<'a> Place<'a> {
             .find(|point| self.giver.is_none_or(|giver| point.is_free_of(giver)))
     }
 
-    /// True if palm, forearm and digits, whose balls are `links`, have room there.
-    fn fits(&self, candidate: &Candidate<'_>, links: &[Balls]) -> bool {
+    /// True if palm, forearm and digits have room there.
+    pub(super) fn fits(&self, candidate: &Candidate<'_>) -> bool {
         let pad_depth = PAD_DEPTHS[usize::from(candidate.pair.thickness > THIN)];
         self.has_room(candidate.object_from_wrist)
-            && self.have_room(candidate.object_from_wrist, links, pad_depth)
+            && self.have_room(
+                candidate.object_from_wrist,
+                &candidate.opposition.links,
+                pad_depth,
+            )
+    }
+
+    /// True if palm, forearm and digits are off the giver's hand there.
+    fn is_clear_of_giver(&self, candidate: &Candidate<'_>) -> bool {
+        let balls = [self.rig.oppositions().cores(), &candidate.opposition.links];
+        balls
+            .iter()
+            .all(|balls| !self.meet_giver(candidate.object_from_wrist, balls))
     }
 
     /// Lays the palm on the surface where there is room.
@@ -290,17 +322,24 @@ impl<'a> Place<'a> {
 
     /// True if balls, in the wrist's frame, are off the giver's hand and at most `depth` metres in the object.
     fn have_room(&self, object_from_wrist: Pose, balls: &[Balls], depth: f32) -> bool {
-        let moved = balls.iter().map(|balls| balls.transformed(object_from_wrist));
-        let meets = |giver: &PreparedHand| {
-            let mut moved = moved.clone();
-            moved.any(|balls| giver.surely_nears_any(&balls, 0.0))
-        };
-        !self.giver.is_some_and(meets)
-            && moved.clone().all(|balls| {
-                balls.iter().all(|(middle, radius)| {
-                    let surface = &self.object.surface;
-                    radius <= depth || surface.closest_point_within(middle, radius - depth).is_none()
-                })
+        !self.meet_giver(object_from_wrist, balls)
+            && balls.iter().all(|balls| {
+                balls
+                    .transformed(object_from_wrist)
+                    .iter()
+                    .all(|(middle, radius)| {
+                        let surface = &self.object.surface;
+                        radius <= depth || surface.closest_point_within(middle, radius - depth).is_none()
+                    })
             })
+    }
+
+    /// True if one of these balls, in the wrist's frame, certainly meets the giver's hand.
+    fn meet_giver(&self, object_from_wrist: Pose, balls: &[Balls]) -> bool {
+        self.giver.is_some_and(|giver| {
+            balls
+                .iter()
+                .any(|balls| giver.surely_nears_any(&balls.transformed(object_from_wrist), 0.0))
+        })
     }
 }

@@ -96,6 +96,11 @@ impl RigGuide {
     pub fn is_derived(&self) -> bool {
         self.0.get().is_some()
     }
+
+    /// True if both are of the same rig or of copies of it.
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
 }
 
 impl PartialEq for RigGuide {

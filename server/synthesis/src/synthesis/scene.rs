@@ -11,6 +11,7 @@ use crate::{
     constraints::Constraints,
     guided::{
         proposal::{Place, propose, propose_evenly},
+        repertoire::{ROWS, Repertoire},
         surface_pairs::SurfacePairs,
     },
     hand::rig::Rig,
@@ -43,6 +44,8 @@ pub struct Scene<'a> {
     pub(super) physical: Option<(ObjectScene<'a>, Presented)>,
     /// What the giver's hand leaves of the object's surface, once it was asked for.
     free_surface: OnceLock<SurfacePairs>,
+    /// Where the receiving hand has room at the object, once it was asked for.
+    repertoire: OnceLock<Arc<Repertoire>>,
     pub(super) constraints: Constraints,
     /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`, …
     pub(super) known: Option<Arc<Atlas>>,
@@ -82,6 +85,7 @@ impl<'a> Scene<'a> {
             },
             physical: None,
             free_surface: OnceLock::new(),
+            repertoire: OnceLock::new(),
             constraints: Constraints::default(),
             known: None,
             starts: OnceLock::new(),
@@ -139,6 +143,19 @@ impl<'a> Scene<'a> {
             surface,
             giver,
             rig: self.rig,
+            repertoire: None,
+        }
+    }
+
+    /// The same with what the first attempts choose from.
+    fn known_place(&self, attempt: u64) -> Place<'_> {
+        let repertoire = || {
+            self.repertoire
+                .get_or_init(|| self.holdout.object.repertoire(self.rig))
+        };
+        Place {
+            repertoire: (attempt < ROWS).then(|| &**repertoire()),
+            ..self.place(attempt)
         }
     }
 
@@ -151,7 +168,7 @@ impl<'a> Scene<'a> {
     ) -> Option<Proposal> {
         if self.physical.is_some() {
             // Palm and forearm are looked at on the way there.
-            return propose(&self.place(stream.attempt()), stream, interrupted);
+            return propose(&self.known_place(stream.attempt()), stream, interrupted);
         }
         // What is likely to hold was learned of what holds by `PHYSICAL` validity.
         let proposal = propose_evenly(&self.place(stream.attempt()), stream, interrupted)?;

@@ -34,12 +34,10 @@ impl Balls {
     }
 
     /// All of some balls, by eights; where that leaves room, nothing that is near to anything.
-    pub fn of_all(balls: &[(Vec3, f32)]) -> Vec<Self> {
+    pub fn of_all<const GROUPS: usize>(balls: &[(Vec3, f32)]) -> [Self; GROUPS] {
+        debug_assert!(balls.len() <= GROUPS * BALLS, "{} balls do not fit", balls.len());
         let nothing = (Vec3::ZERO, f32::NEG_INFINITY);
-        let groups = balls.chunks(BALLS);
-        groups
-            .map(|group| Self::new(|i| group.get(i).copied().unwrap_or(nothing)))
-            .collect()
+        std::array::from_fn(|group| Self::new(|i| balls.get(group * BALLS + i).copied().unwrap_or(nothing)))
     }
 
     /// Their middles and radii in metres.
