@@ -323,6 +323,7 @@ fn synthesized_grasps_are_found_again() {
             atlas: None,
             starts: None,
             recent: RecentGrips::default(),
+            known_tried: 0,
         };
         let grasp = search(&free, &settings)
             .grasp
@@ -362,6 +363,7 @@ fn a_receiver_finds_a_grasp_on_each() {
             atlas: None,
             starts: None,
             recent: RecentGrips::default(),
+            known_tried: 0,
         };
         let outcome = search(&held, &settings);
         assert!(outcome.grasp.is_some(), "{}: {:?}", built_in.name, outcome.report);

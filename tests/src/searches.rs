@@ -114,6 +114,7 @@ impl Bench {
             atlas: None,
             starts: None,
             recent: RecentGrips::default(),
+            known_tried: 0,
         };
         let clock = MonotonicClock::default();
         find_grasp(

@@ -2,6 +2,7 @@
 
 mod codec;
 mod exclusion;
+mod looking;
 mod palm;
 mod recent;
 mod shortlist;

@@ -12,7 +12,7 @@ use grasp_synthesis::{
     holdout::{Holdout, PresentingHand},
     key_frames::plan_way,
     object::GraspObject,
-    search::{GraspSource, SearchOutcome, SearchSettings, find_known_grasp},
+    search::{GraspSource, LookUp, SearchOutcome, SearchSettings, find_known_grasp},
     strategy::{Choice, Validity},
 };
 use rayon::ThreadPool;
@@ -132,6 +132,7 @@ impl FindJob {
             } else {
                 self.known.recent
             },
+            known_tried: 0,
             reproducible: query.reproducible,
             first_attempt: query.first_attempt,
             max_attempts: query.max_attempts,
@@ -152,14 +153,19 @@ impl FindJob {
 }
 
 impl PreparedJob {
-    /// The answer by a known grip, if one is found at once.
+    /// The answer by a known grip, if one is found at once; [`PreparedJob::run`] goes on where this ends.
     ///
     /// # Errors
     /// None that a known grip can have; those of [`PreparedJob::run`].
-    pub(crate) fn look_up(&self) -> Option<Result<Answered, ServiceError>> {
+    pub(crate) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         let rig = &self.query.receiving_hand.rig;
-        let outcome = find_known_grasp(&self.holdout, rig, &self.settings, &self.clock, LOOK_UP_TIME)?;
-        Some(self.answer(outcome))
+        match find_known_grasp(&self.holdout, rig, &self.settings, &self.clock, LOOK_UP_TIME) {
+            LookUp::Found(outcome) => Some(self.answer(*outcome)),
+            LookUp::NotFound { tried } => {
+                self.settings.known_tried = tried;
+                None
+            }
+        }
     }
 
     /// Searches and words the answer.
@@ -194,12 +200,16 @@ impl PreparedJob {
         })
     }
 
-    /// What was found afresh, if it is known like the grips of an atlas are: under the object's own friction.
+    /// What was not known so before, if it is known like the grips of an atlas are: under the object's own friction. Finding
+    /// out which fingers can be spared takes longer than all other looks at known grips.
     fn newly_known(&self, outcome: &SearchOutcome) -> Option<Entry> {
         let own_friction = self.holdout.object.friction_under(Validity::Physical);
-        let is_fresh = matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
+        let is_new = matches!(
+            outcome.report.source,
+            Some(GraspSource::Attempt(_) | GraspSource::Spared(_))
+        );
         let grasp = outcome.grasp.as_ref()?;
-        (is_fresh && self.settings.friction == own_friction)
+        (is_new && self.settings.friction == own_friction)
             .then(|| Entry::of_grasp(grasp))
             .flatten()
     }

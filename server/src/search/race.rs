@@ -188,6 +188,7 @@ mod tests {
             atlas: None,
             starts: None,
             recent: RecentGrips::default(),
+            known_tried: 0,
             reproducible: false,
             first_attempt: 0,
             max_attempts: 10_000,

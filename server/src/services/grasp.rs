@@ -74,7 +74,7 @@ impl GraspHandler {
             known,
         };
         let answered = if job.may_be_known() {
-            let job = job.prepare()?;
+            let mut job = job.prepare()?;
             if let Some(answered) = job.look_up() {
                 answered?
             } else {

@@ -14,7 +14,7 @@ use grasp_synthesis::{
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
     object::GraspObject,
-    search::{SearchSettings, find_grasp, find_known_grasp},
+    search::{LookUp, SearchSettings, find_grasp, find_known_grasp},
     strategy::{Choice, Strategy, Validity},
 };
 use grasp_tests::searches::MonotonicClock;
@@ -69,14 +69,17 @@ impl Core {
 
     /// The wall time of a search as the server runs it: a look on the calling thread, then a race of the workers.
     pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Taken {
-        let settings = settings(holdout, atlas, seed);
+        let mut settings = settings(holdout, atlas, seed);
         let clock = MonotonicClock::default();
         let start = Instant::now();
-        let known = find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME);
-        let outcome = known.unwrap_or_else(|| {
-            let stop = AtomicBool::new(false);
-            find_grasp(&self.pool, holdout, self.rig, &settings, &clock, &stop)
-        });
+        let outcome = match find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME) {
+            LookUp::Found(outcome) => *outcome,
+            LookUp::NotFound { tried } => {
+                settings.known_tried = tried;
+                let stop = AtomicBool::new(false);
+                find_grasp(&self.pool, holdout, self.rig, &settings, &clock, &stop)
+            }
+        };
         Taken {
             time: start.elapsed(),
             found: outcome.grasp.is_some(),
@@ -92,7 +95,7 @@ impl Core {
         let outcome = find_known_grasp(holdout, self.rig, &settings, &clock, ANSWERED_WITHIN);
         Taken {
             time: thread_time().saturating_sub(start),
-            found: outcome.is_some(),
+            found: outcome.found().is_some(),
         }
     }
 }
@@ -110,6 +113,7 @@ fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings 
         atlas: Some(Arc::clone(atlas)),
         starts: Some(Arc::clone(atlas)),
         recent: RecentGrips::default(),
+        known_tried: 0,
         reproducible: false,
         first_attempt: 0,
         max_attempts: u64::MAX,

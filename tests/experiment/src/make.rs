@@ -136,6 +136,7 @@ impl Maker {
             atlas: self.atlases.of(cell).cloned(),
             starts: self.atlases.of(cell).cloned(),
             recent: RecentGrips::default(),
+            known_tried: 0,
             reproducible: false,
             first_attempt: 0,
             max_attempts: cell.set.most_attempts(),

@@ -117,6 +117,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
             atlas: None,
             starts: None,
             recent: RecentGrips::default(),
+            known_tried: 0,
         };
         let outcome = find_grasp(
             &pool,

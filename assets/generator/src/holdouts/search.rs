@@ -103,6 +103,7 @@ fn next_grasp(
         atlas: None,
         starts: None,
         recent: RecentGrips::default(),
+        known_tried: 0,
     };
     let outcome = find_grasp(pool, holdout, rig, &settings, &NoClock, &AtomicBool::new(false));
     outcome.report.attempt.zip(outcome.grasp)

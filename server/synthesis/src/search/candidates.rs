@@ -142,8 +142,13 @@ impl<'a> KnownGrips<'a> {
             giver,
             rig: scene.rig(),
             excluded: OnceLock::new(),
-            next: AtomicUsize::new(0),
+            next: AtomicUsize::new(settings.known_tried),
         })
+    }
+
+    /// How many were tried or are out of the question, all of those that others are trying included.
+    pub(super) fn tried(&self) -> usize {
+        self.next.load(Ordering::Relaxed)
     }
 
     /// How many of the atlas there are.
@@ -234,7 +239,7 @@ impl<'a> KnownGrips<'a> {
                 solids,
             }) => (source, self.hold(entry, &solids, gripper)),
             Taken::Open(Open::Sparing(index)) => {
-                (GraspSource::Atlas(index), self.hold_sparing(index, gripper))
+                (GraspSource::Spared(index), self.hold_sparing(index, gripper))
             }
         };
         match grasp {

@@ -53,6 +53,8 @@ pub struct SearchSettings {
     /// Grips that earlier searches found for this object and rig, under the object's own friction: tried after those of the
     /// atlas, and not if the search is reproducible.
     pub recent: RecentGrips,
+    /// Known grips that need not be tried again, as [`LookUp::NotFound`] told of the same ones.
+    pub known_tried: usize,
     /// Answer with the valid grip of the atlas that is first in its order, or else with the valid attempt of the lowest
     /// index, instead of with the first to finish.
     pub reproducible: bool,
@@ -99,24 +101,52 @@ pub fn uses_atlas(strategy: Strategy, validity: Validity) -> bool {
     strategy == Strategy::Guided && validity == Validity::Physical
 }
 
+/// The end of a look at known grips.
+#[derive(Clone, Debug)]
+pub enum LookUp {
+    /// One of them holds.
+    Found(Box<SearchOutcome>),
+    /// Nothing was found in time.
+    NotFound {
+        /// How many were tried, or are out of the question.
+        tried: usize,
+    },
+}
+
+impl LookUp {
+    /// What was found.
+    pub fn found(self) -> Option<SearchOutcome> {
+        match self {
+            Self::Found(outcome) => Some(*outcome),
+            Self::NotFound { .. } => None,
+        }
+    }
+}
+
 /// Looks for a valid grip among those that `settings` say are known, for no longer than `within` and without any other
-/// thread. None if none was found by then: [`find_grasp`] looks further. For first answers only, not for the best.
+/// thread. If none was found by then, [`find_grasp`] looks further, from there on where it is told how many were tried. For
+/// first answers only, not for the best.
 pub fn find_known_grasp(
     holdout: &Holdout,
     rig: &Rig,
     settings: &SearchSettings,
     clock: &dyn Clock,
     within: Duration,
-) -> Option<SearchOutcome> {
+) -> LookUp {
     if settings.choice != Choice::FirstValid || settings.reproducible {
-        return None;
+        return LookUp::NotFound { tried: 0 };
     }
     let scene = prepare(holdout, rig, settings);
-    let known = KnownGrips::of(&scene, settings)?;
+    let Some(known) = KnownGrips::of(&scene, settings) else {
+        return LookUp::NotFound { tried: 0 };
+    };
     let stop = AtomicBool::new(false);
     let race = Race::new(&scene, settings, Some(&known), clock, &stop);
-    race.look_ahead(Some(clock.now() + within))
-        .then(|| race.outcome())
+    if race.look_ahead(Some(clock.now() + within)) {
+        LookUp::Found(Box::new(race.outcome()))
+    } else {
+        LookUp::NotFound { tried: known.tried() }
+    }
 }
 
 /// Races `settings.workers` tasks of `pool` for a valid grasp. Returns when all of them have stopped.

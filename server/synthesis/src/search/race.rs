@@ -289,7 +289,7 @@ impl<'a> Race<'a> {
             // Reproducible: an attempt of a lower index that was cut short might have won.
             .filter(|winner| match winner.source {
                 GraspSource::Attempt(index) => !self.settings.reproducible || index < interrupted,
-                GraspSource::Atlas(_) | GraspSource::Recent => true,
+                GraspSource::Atlas(_) | GraspSource::Spared(_) | GraspSource::Recent => true,
             });
         let source = winner.as_ref().map(|winner| winner.source);
         let winning_index = match source {

@@ -63,6 +63,8 @@ pub enum GraspSource {
     Attempt(u64),
     /// The atlas' grip of this index.
     Atlas(u16),
+    /// The same without the fingers that the giver is in the way of: they rest elsewhere.
+    Spared(u16),
     /// A grip that an earlier search found.
     Recent,
 }

@@ -258,6 +258,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
         atlas: None,
         starts: None,
         recent: RecentGrips::default(),
+        known_tried: 0,
     }
 }
 

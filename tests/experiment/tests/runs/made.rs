@@ -53,6 +53,7 @@ fn search(record: &Record, first_attempt: u64, max_attempts: u64) -> SearchOutco
         atlas: None,
         starts: None,
         recent: RecentGrips::default(),
+        known_tried: 0,
     };
     find_grasp(&pool, &holdout, rig, &settings, &NoClock, &AtomicBool::new(false))
 }
