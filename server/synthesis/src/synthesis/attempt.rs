@@ -147,7 +147,7 @@ impl Attempt {
         let Some(around) = scene.surroundings() else {
             return Ok(None);
         };
-        let starts = scene.starts(known, around.presented, interrupted);
+        let starts = scene.starts(known, around.presented, stream.attempt(), interrupted);
         let starts = starts.ok_or(Interrupted)?;
         let place = scene.place(stream.attempt());
         for _ in 0..BESIDE_KNOWN {

@@ -29,6 +29,12 @@ use crate::{
 /// them; from then on it is worth 180 µs to ask it of all pairs at once, of which a giver who covers the object leaves few.
 const SOON: u64 = 4;
 
+/// Attempts that start from those known grips alone that are not certainly in the giver's way, which are found in a fifth of
+/// the time: 0.8 ms instead of 4. Of later ones, every other does. Of 51 holdouts that atlases of the built-in objects do
+/// not answer, hands beside these hold as soon as hands beside those that are nearest to keeping clear of all, and beside
+/// some givers sooner or later by a tenfold.
+const FROM_OPEN_ONES: u64 = 8;
+
 /// A holdout and how attempts at it go, with what they find out about it once.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {
@@ -49,8 +55,10 @@ pub struct Scene<'a> {
     pub(super) constraints: Constraints,
     /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`, …
     pub(super) known: Option<Arc<Atlas>>,
-    /// … and which of them, once it was asked for.
+    /// … and which of them, once it was asked for, …
     starts: OnceLock<Starts>,
+    /// … or of those that are not certainly in the giver's way.
+    open_starts: OnceLock<Starts>,
 }
 
 impl<'a> Scene<'a> {
@@ -89,6 +97,7 @@ impl<'a> Scene<'a> {
             constraints: Constraints::default(),
             known: None,
             starts: OnceLock::new(),
+            open_starts: OnceLock::new(),
         }
     }
 
@@ -180,24 +189,34 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// Of the known grips, those that attempts start from: the ones that hold under this gravity and are what is
+    /// Of the known grips, those that an attempt starts from: the ones that hold under this gravity and are what is
     /// demanded, if the giver were not in their way. None if interrupted.
     pub(super) fn starts(
         &self,
         known: &Atlas,
         presented: &Presented,
+        attempt: u64,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&Starts> {
-        if let Some(starts) = self.starts.get() {
+        let giver = presented.giver.as_ref();
+        let from_open_ones = attempt < FROM_OPEN_ONES || attempt.is_multiple_of(2);
+        let excluding = giver.filter(|_| from_open_ones);
+        let starts = match excluding {
+            Some(_) => &self.open_starts,
+            None => &self.starts,
+        };
+        if let Some(starts) = starts.get() {
             return Some(starts);
         }
+        let excluded = excluding.map(|giver| known.excluded_by(giver));
         let holding = known.holding_under(presented.up).iter().copied();
-        let wanted =
-            holding.filter(|&entry| known.entries()[usize::from(entry)].is_wanted(&self.constraints));
-        let giver = presented.giver.as_ref();
+        let wanted = holding.filter(|&entry| {
+            excluded.as_ref().is_none_or(|excluded| !excluded.contains(entry))
+                && known.entries()[usize::from(entry)].is_wanted(&self.constraints)
+        });
         let found = Starts::of(known.grips(), self.rig(), wanted, giver, interrupted)?;
         // Another worker may have found the same meanwhile.
-        Some(self.starts.get_or_init(|| found))
+        Some(starts.get_or_init(|| found))
     }
 
     /// What is demanded of the grasps.
