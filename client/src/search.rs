@@ -369,7 +369,7 @@ pub enum GraspSource {
     Search,
     /// The object's atlas.
     Atlas,
-    /// The search of an earlier request: its grasp also holds what is held out now.
+    /// An earlier request: what its search found, or which fingers it spared, also holds what is held out now.
     Recent,
 }
 
