@@ -84,6 +84,13 @@ fn the_newest_come_first_and_the_oldest_go() {
         recent.without_oldest().entries(),
         &mut grips[9..40].iter().rev()
     ));
+    // What is found again is the newest, and nothing else goes for it.
+    let again = recent.with(grips[20].clone());
+    let others = grips[8..40].iter().rev().filter(|&grip| grip != &grips[20]);
+    assert!(is_kept(
+        again.entries(),
+        &mut std::iter::once(&grips[20]).chain(others)
+    ));
 }
 
 #[test]

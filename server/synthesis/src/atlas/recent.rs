@@ -18,10 +18,12 @@ const KEPT: usize = 32;
 pub struct RecentGrips(Arc<[Arc<Entry>]>);
 
 impl RecentGrips {
-    /// These and a newer one; where there are too many, without the oldest.
+    /// These and a newer one; where there are too many, without the oldest. The same hand is kept once: reproducible requests
+    /// find it again and again.
     #[must_use]
     pub fn with(&self, newest: Entry) -> Self {
-        let older = self.0.iter().take(KEPT - 1).cloned();
+        let others = self.0.iter().filter(|entry| entry.grip.pose != newest.grip.pose);
+        let older: Vec<_> = others.take(KEPT - 1).cloned().collect();
         Self(std::iter::once(Arc::new(newest)).chain(older).collect())
     }
 
