@@ -135,11 +135,7 @@ impl Starts {
         if self.0.is_empty() {
             return None;
         }
-        // Those that are nearest to keeping clear come more often, the first of 32 six times as often as if all did alike. Of 44
-        // holdouts that atlases of the built-in objects do not answer, 27 are answered sooner so and 17 later: in four fifths of
-        // the time where it takes less than 5 ms, elsewhere in as much.
-        let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
-        let Start { entry, kept } = self.0[rank];
+        let Start { entry, kept } = self.0[stream.below(self.0.len())];
         let entry = &entries[usize::from(entry)];
         let known = Proposal {
             object_from_wrist: entry.grip.pose.frame_from_wrist,
