@@ -14,8 +14,8 @@ use crate::objects::StoredObject;
 /// found, those that were found first are forgotten.
 pub(super) const MOST: usize = 1024;
 
-/// Whose grips are kept, in the order in which they were found. The grips themselves are on the objects' shelves, and end
-/// with these.
+/// Whose grips are kept, in the order in which they were found: an object and hand stands here as often as it has grips. The
+/// grips themselves are on the objects' shelves, and end with these.
 #[derive(Debug, Default)]
 pub(super) struct Recents(Mutex<VecDeque<(Weak<StoredObject>, &'static Hand)>>);
 
@@ -24,8 +24,13 @@ impl Recents {
     pub(super) fn keep(&self, object: &Arc<StoredObject>, hand: &'static Hand, grip: Entry) {
         // No code panics while it holds the lock; were it to, the queue would still be whole.
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        object.shelf.remember(hand, grip);
-        kept.push_back((Arc::downgrade(object), hand));
+        let owner = Arc::downgrade(object);
+        if !object.shelf.remember(hand, grip)
+            && let Some(place) = kept.iter().position(|(of, with)| of.ptr_eq(&owner) && std::ptr::eq(*with, hand))
+        {
+            kept.remove(place);
+        }
+        kept.push_back((owner, hand));
         if kept.len() > MOST
             && let Some((object, hand)) = kept.pop_front()
             && let Some(object) = object.upgrade()

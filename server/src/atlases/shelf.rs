@@ -75,9 +75,14 @@ impl Shelf {
         self.with(hand, |slot| slot.standing = Standing::Finished);
     }
 
-    /// Keeps a grip that a search found.
-    pub(super) fn remember(&self, hand: &'static Hand, grip: Entry) {
-        self.with(hand, |slot| slot.recent = slot.recent.with(grip));
+    /// Keeps a grip that a search found. True if one more is kept now than before: not if it was kept already, nor if another
+    /// went for it.
+    pub(super) fn remember(&self, hand: &'static Hand, grip: Entry) -> bool {
+        self.with(hand, |slot| {
+            let before = slot.recent.entries().len();
+            slot.recent = slot.recent.with(grip);
+            slot.recent.entries().len() > before
+        })
     }
 
     /// Forgets the grip that is kept for longest.

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf, time::Instant};
 
 use glam::Vec3;
 use grasp_synthesis::{
-    atlas::growth::Growth, geometry::mesh::TriangleMesh, object::GraspObject, physical::grip::Gripper,
+    atlas::{entry::Entry, growth::Growth}, geometry::mesh::TriangleMesh, object::GraspObject, physical::grip::Gripper,
 };
 
 use super::{shelf::Standing, *};
@@ -47,6 +47,13 @@ fn grown(object: &StoredObject) -> Arc<Grown> {
         growth.round(&mut gripper);
     }
     Arc::new(growth.grown())
+}
+
+/// The same grip with its hand so many millimetres further along x: the same hand is kept once, this is another.
+fn moved(grip: &Entry, by: usize) -> Entry {
+    let mut moved = grip.clone();
+    moved.grip.pose.frame_from_wrist.position.x += by as f32 * 1e-3;
+    moved
 }
 
 /// A store with room for so many objects and bytes.
@@ -108,8 +115,8 @@ fn of_what_was_found_the_latest_thousand_are_kept() {
     let grip = grown(&objects[0]).atlas.entries()[0].clone();
     let atlases = start(1, &store(10, 0));
     for object in &objects {
-        for _ in 0..EACH {
-            atlases.remember(object, adult(), grip.clone());
+        for k in 0..EACH {
+            atlases.remember(object, adult(), moved(&grip, k));
         }
     }
     let kept = |object: &Arc<StoredObject>| atlases.get(object, adult()).recent.entries().len();
@@ -128,6 +135,28 @@ fn of_what_was_found_the_latest_thousand_are_kept() {
     let another = Arc::new(small("another"));
     atlases.remember(&another, adult(), grip);
     assert_eq!(kept(&another), 1);
+}
+
+#[test]
+fn what_is_found_again_and_again_takes_the_place_of_one() {
+    let [a, b] = ["a", "b"].map(|id| Arc::new(small(id)));
+    let grip = grown(&a).atlas.entries()[0].clone();
+    let atlases = start(1, &store(10, 0));
+    let kept = |object: &Arc<StoredObject>| atlases.get(object, adult()).recent.entries().len();
+    atlases.remember(&b, adult(), grip.clone());
+    for _ in 0..2 * recents::MOST {
+        atlases.remember(&a, adult(), grip.clone());
+    }
+    assert_eq!([kept(&a), kept(&b)], [1, 1]);
+    // Nor do those take any that went for others of their hand.
+    let most_of_one = {
+        for k in 0..2 * recents::MOST {
+            atlases.remember(&a, adult(), moved(&grip, k));
+        }
+        kept(&a)
+    };
+    assert!(most_of_one < recents::MOST, "{most_of_one}");
+    assert_eq!(kept(&b), 1);
 }
 
 #[test]
