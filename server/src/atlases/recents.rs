@@ -26,7 +26,9 @@ impl Recents {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let owner = Arc::downgrade(object);
         if !object.shelf.remember(hand, grip)
-            && let Some(place) = kept.iter().position(|(of, with)| of.ptr_eq(&owner) && std::ptr::eq(*with, hand))
+            && let Some(place) = kept
+                .iter()
+                .position(|(of, with)| of.ptr_eq(&owner) && std::ptr::eq(*with, hand))
         {
             kept.remove(place);
         }

@@ -4,7 +4,10 @@ use std::{fs, path::PathBuf, time::Instant};
 
 use glam::Vec3;
 use grasp_synthesis::{
-    atlas::{entry::Entry, growth::Growth}, geometry::mesh::TriangleMesh, object::GraspObject, physical::grip::Gripper,
+    atlas::{entry::Entry, growth::Growth},
+    geometry::mesh::TriangleMesh,
+    object::GraspObject,
+    physical::grip::Gripper,
 };
 
 use super::{shelf::Standing, *};
