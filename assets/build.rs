@@ -1,12 +1,18 @@
-//! Embeds the atlases that are there, under the names of their files.
+//! Embeds the atlases and the grips at primitives that are there, under the names of their files.
 
 use std::{env, error::Error, fmt::Write as _, fs, path::Path};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join("atlases");
+    embed("atlases")?;
+    embed("primitives")
+}
+
+/// Writes the table of a folder's files.
+fn embed(name: &str) -> Result<(), Box<dyn Error>> {
+    let folder = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join(name);
     println!("cargo::rerun-if-changed={}", folder.display());
     let mut paths = Vec::new();
-    // Without the folder, there are no atlases to embed, and a server builds its own.
+    // Without the folder, there is nothing to embed: a server builds its own atlases, and searches without primitives.
     if folder.is_dir() {
         for file in fs::read_dir(&folder)? {
             paths.push(file?.path());
@@ -21,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         writeln!(table, "({name:?}, include_bytes!({path:?})),")?;
     }
     table.push_str("]\n");
-    fs::write(Path::new(&env::var("OUT_DIR")?).join("atlases.rs"), table)?;
+    let table_path = Path::new(&env::var("OUT_DIR")?).join(name).with_extension("rs");
+    fs::write(table_path, table)?;
     Ok(())
 }

@@ -8,3 +8,4 @@ pub mod hands;
 pub mod holdouts;
 pub mod obj;
 pub mod objects;
+pub mod primitives;

@@ -20,7 +20,7 @@ use grasp_synthesis::{
         kinematics::hand_frames,
     },
     holdout::Holdout,
-    search::{SearchOutcome, SearchSettings, find_grasp},
+    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
     strategy::{BendRatioChoice, Choice, Strategy},
 };
 
@@ -321,7 +321,7 @@ fn synthesized_grasps_are_found_again() {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: None,
+            starts: StartFrom::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };
@@ -361,7 +361,7 @@ fn a_receiver_finds_a_grasp_on_each() {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: None,
+            starts: StartFrom::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };

@@ -260,7 +260,7 @@ fn report(
         atlas_entries: u32::try_from(report.known_grips).unwrap_or(u32::MAX),
         atlas_stamp: settings
             .starts
-            .as_ref()
+            .atlas()
             .filter(|atlas| !atlas.entries().is_empty())
             .map(|atlas| stamp(atlas))
             .unwrap_or_default(),

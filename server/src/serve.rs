@@ -168,7 +168,7 @@ impl Server {
         let directory_bytes = directory.iter().map(StoredObject::bytes).sum();
         let objects = Arc::new(ObjectStore::new(config.store, directory));
         for object in objects.pinned() {
-            object.draw_repertoires(&config.default_rig);
+            object.get_ready(&config.default_rig);
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let files = match config.atlas_directory {

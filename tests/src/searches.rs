@@ -16,7 +16,7 @@ use grasp_synthesis::{
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
     object::THESIS_FRICTION,
-    search::{SearchOutcome, SearchSettings, find_grasp},
+    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
     strategy::{Choice, Strategy, Validity},
 };
 
@@ -112,7 +112,7 @@ impl Bench {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: None,
+            starts: StartFrom::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };

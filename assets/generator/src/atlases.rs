@@ -1,6 +1,6 @@
-//! The atlases of the built-in objects for both hands of the rig `adult`.
+//! The atlases of the built-in objects for both hands of the rig `adult`, and of primitives the grips of their lists.
 
-use std::{fs, path::Path, sync::LazyLock};
+use std::{fs, path::Path, sync::Arc};
 
 use grasp_assets::{
     atlases::file_name,
@@ -11,11 +11,12 @@ use grasp_synthesis::{
     atlas::{
         Atlas,
         codec::{AtlasError, decode, encode},
-        growth::{EARLY_PROPOSALS, Growth},
+        growth::{EARLY_PROPOSALS, Growth, MOST_PROPOSALS},
     },
     hand::{Handedness, rig::Rig},
     object::GraspObject,
     physical::{grip::Gripper, scene::ObjectScene},
+    primitives::Primitive,
     strategy::Validity,
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
@@ -51,67 +52,114 @@ enum Difference {
     OtherWorth(usize),
 }
 
-/// Every object with every hand.
-static PAIRS: LazyLock<Vec<(&BuiltInObject, &Rig)>> = LazyLock::new(|| {
-    let hands = [Handedness::Right, Handedness::Left].map(|side| {
-        let hand = hand(RIG, side).expect("the rig is built in");
-        &hand.rig
-    });
-    objects()
-        .iter()
-        .flat_map(|object| hands.map(|rig| (object, rig)))
-        .collect()
-});
-
-/// Builds all of them: minutes.
-pub(crate) fn generate() -> Vec<AssetFile> {
-    let bars = MultiProgress::new();
-    let style = ProgressStyle::with_template("{msg:24} {bar:40} {pos}/{len} proposals, {elapsed}")
-        .expect("the template is right");
-    PAIRS
-        .par_iter()
-        .map(|(object, rig)| {
-            let name = file_name(object.name, rig);
-            let most = grasp_synthesis::atlas::growth::MOST_PROPOSALS;
-            let bar = bars.add(ProgressBar::new(most).with_style(style.clone()));
-            bar.set_message(name.clone());
-            (path(&name), complete(&object.object, rig, &bar))
-        })
-        .collect()
+/// What is made of an atlas.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kept {
+    /// All its grips: for the built-in objects.
+    All,
+    /// Those of its lists: for the primitives.
+    Listed,
 }
 
-fn complete(object: &GraspObject, rig: &Rig, bar: &ProgressBar) -> Vec<u8> {
-    let mut growth = Growth::new(object, rig);
-    let mut gripper = Gripper::default();
-    while !growth.is_complete() {
-        growth.round(&mut gripper);
-        bar.set_position(growth.proposed());
-    }
-    bar.abandon();
-    encode(&growth.grown(), object, rig)
+/// A file to be made.
+struct Making {
+    name: String,
+    object: Arc<GraspObject>,
+    rig: &'static Rig,
 }
 
-/// Says of every file below `folder` that is missing or not what would be made now why; true if there is none. Without
-/// any, a server builds its own.
-pub(crate) fn check(folder: &Path) -> bool {
-    if !folder.join("atlases").is_dir() {
-        return true;
+impl Kept {
+    /// The folder of the files, below the assets'.
+    const fn folder(self) -> &'static str {
+        match self {
+            Self::All => "atlases",
+            Self::Listed => "primitives",
+        }
     }
-    let complaints: Vec<String> = PAIRS
-        .par_iter()
-        .filter_map(|(object, rig)| {
-            let path = path(&file_name(object.name, rig));
-            let complaint = match fs::read(folder.join(&path)) {
-                Err(error) => format!("cannot be read: {error}"),
-                Ok(bytes) => compare(&bytes, &object.object, rig).err()?.to_string(),
-            };
-            Some(format!("{path}: {complaint}"))
-        })
-        .collect();
-    for complaint in &complaints {
-        println!("{complaint}");
+
+    /// Everything to be held with every hand.
+    fn makings(self) -> Vec<Making> {
+        let held: Vec<(String, Arc<GraspObject>)> = match self {
+            Self::All => {
+                let named = |object: &BuiltInObject| (object.name.to_owned(), Arc::clone(&object.object));
+                objects().iter().map(named).collect()
+            }
+            Self::Listed => {
+                let named = |primitive: Primitive| (primitive.name(), Arc::new(primitive.object()));
+                Primitive::ALL.map(named).into()
+            }
+        };
+        let hands = [Handedness::Right, Handedness::Left].map(|side| {
+            let hand = hand(RIG, side).expect("the rig is built in");
+            &hand.rig
+        });
+        let each = |(name, object): (String, Arc<GraspObject>)| {
+            hands.map(|rig| Making {
+                name: file_name(&name, rig),
+                object: Arc::clone(&object),
+                rig,
+            })
+        };
+        held.into_iter().flat_map(each).collect()
     }
-    complaints.is_empty()
+
+    /// Builds all of them: minutes.
+    pub(crate) fn generate(self) -> Vec<AssetFile> {
+        let bars = MultiProgress::new();
+        let style = ProgressStyle::with_template("{msg:28} {bar:40} {pos}/{len} proposals, {elapsed}")
+            .expect("the template is right");
+        self.makings()
+            .par_iter()
+            .map(|making| {
+                let bar = bars.add(ProgressBar::new(MOST_PROPOSALS).with_style(style.clone()));
+                bar.set_message(making.name.clone());
+                (self.path(&making.name), self.make(making, &bar))
+            })
+            .collect()
+    }
+
+    fn make(self, Making { object, rig, .. }: &Making, bar: &ProgressBar) -> Vec<u8> {
+        let mut growth = Growth::new(object, rig);
+        let mut gripper = Gripper::default();
+        while !growth.is_complete() {
+            growth.round(&mut gripper);
+            bar.set_position(growth.proposed());
+        }
+        bar.abandon();
+        let grown = match self {
+            Self::All => growth.grown(),
+            Self::Listed => growth.grown().listed(object, rig),
+        };
+        encode(&grown, object, rig)
+    }
+
+    /// Says of every file below `folder` that is missing or not what would be made now why; true if there is none. Without
+    /// any, a server builds its own atlases and does without primitives.
+    pub(crate) fn check(self, folder: &Path) -> bool {
+        if !folder.join(self.folder()).is_dir() {
+            return true;
+        }
+        let complaints: Vec<String> = self
+            .makings()
+            .par_iter()
+            .filter_map(|Making { name, object, rig }| {
+                let path = self.path(name);
+                let complaint = match fs::read(folder.join(&path)) {
+                    Err(error) => format!("cannot be read: {error}"),
+                    Ok(bytes) => compare(&bytes, object, rig).err()?.to_string(),
+                };
+                Some(format!("{path}: {complaint}"))
+            })
+            .collect();
+        for complaint in &complaints {
+            println!("{complaint}");
+        }
+        complaints.is_empty()
+    }
+
+    fn path(self, name: &str) -> String {
+        format!("{}/{name}.atlas", self.folder())
+    }
 }
 
 /// Compares an atlas with what would be made now.
@@ -151,10 +199,6 @@ fn early_stamp(object: &GraspObject, rig: &Rig) -> u64 {
     growth.grown().early_stamp()
 }
 
-fn path(name: &str) -> String {
-    format!("atlases/{name}.atlas")
-}
-
 #[cfg(test)]
 mod tests {
     use grasp_synthesis::{
@@ -166,8 +210,9 @@ mod tests {
 
     #[test]
     fn the_early_stamp_is_that_of_the_first_proposals() {
-        let (object, rig) = PAIRS[0];
-        let object = &object.object;
+        let [Making { object, rig, .. }, other, ..] = &Kept::All.makings()[..] else {
+            panic!("there are objects and hands");
+        };
         let mut growth = Growth::new(object, rig);
         let mut gripper = Gripper::default();
         while growth.proposed() < EARLY_PROPOSALS {
@@ -183,14 +228,12 @@ mod tests {
         let read = decode(&encode(&later, object, rig), object, rig).expect("it was just written");
         assert_eq!(read.early_stamp(), early);
         // The other hand's is another: the stamp tells growth apart.
-        let (_, other) = PAIRS[1];
-        assert_ne!(early_stamp(object, other), early);
+        assert_ne!(early_stamp(object, other.rig), early);
     }
 
     #[test]
     fn a_grip_that_is_worth_something_else_is_named() {
-        let (object, rig) = PAIRS[0];
-        let object = &object.object;
+        let Making { object, rig, .. } = &Kept::All.makings()[0];
         let mut growth = Growth::new(object, rig);
         let mut gripper = Gripper::default();
         while growth.len() < 20 {
@@ -222,11 +265,11 @@ mod tests {
 
     #[test]
     fn what_is_not_complete_is_told() {
-        let (object, rig) = PAIRS[0];
-        let bytes = encode(&Growth::new(&object.object, rig).grown(), &object.object, rig);
-        assert_eq!(compare(&bytes, &object.object, rig), Err(Difference::Incomplete));
+        let Making { object, rig, .. } = &Kept::All.makings()[0];
+        let bytes = encode(&Growth::new(object, rig).grown(), object, rig);
+        assert_eq!(compare(&bytes, object, rig), Err(Difference::Incomplete));
         assert_eq!(
-            compare(&bytes[..bytes.len() - 1], &object.object, rig),
+            compare(&bytes[..bytes.len() - 1], object, rig),
             Err(Difference::Unreadable(AtlasError::Damaged))
         );
     }

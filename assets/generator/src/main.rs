@@ -1,4 +1,4 @@
-//! Makes the built-in objects, hands, holdouts and atlases. A rerun gives identical bytes.
+//! Makes the built-in objects, hands, holdouts, atlases and grips of primitives. A rerun gives identical bytes.
 
 mod atlases;
 mod hands;
@@ -12,6 +12,7 @@ use std::{
     process::ExitCode,
 };
 
+use atlases::Kept;
 use clap::{Parser, ValueEnum};
 
 /// A file of the assets: its path below the assets folder, with `/` between the parts, and its bytes.
@@ -71,10 +72,13 @@ enum Section {
     /// Atlases of the objects for both hands of the rig adult; minutes of work. With --check, they are read and some of
     /// their grips found again.
     Atlases,
+    /// Grips of the primitives for both hands of the rig adult, for objects without an atlas; minutes of work, and checked
+    /// likewise.
+    Primitives,
     /// The numbers by which GUIDED search prefers hands that are likely to hold, which are part of `grasp-synthesis`;
     /// minutes of work.
     Prospects,
-    /// Objects, hands and holdouts; with --check, the atlases too.
+    /// Objects, hands and holdouts; with --check, atlases and primitives too.
     All,
 }
 
@@ -85,7 +89,8 @@ impl Section {
             Self::Objects => objects::generate(),
             Self::Hands => hands::generate(),
             Self::Holdouts => holdouts::generate(),
-            Self::Atlases => atlases::generate(),
+            Self::Atlases => Kept::All.generate(),
+            Self::Primitives => Kept::Listed.generate(),
             Self::Prospects => prospects::generate(),
             Self::All => [Self::Objects, Self::Hands, Self::Holdouts]
                 .into_iter()
@@ -107,14 +112,14 @@ fn main() -> ExitCode {
     if let Some(folder) = &arguments.pictures {
         return exit_code("the pictures", holdouts::pictures(folder, &arguments.only));
     }
-    let atlases = match arguments.section {
-        Section::Atlases => true,
+    let grips = match arguments.section {
+        Section::Atlases | Section::Primitives => true,
         Section::All => arguments.check,
         Section::Objects | Section::Hands | Section::Holdouts | Section::Prospects => false,
     };
-    if atlases && FUSES {
+    if grips && FUSES {
         eprintln!(
-            "atlases: this build fuses multiplications with additions, rounds otherwise and finds other grips than one \
+            "grips: this build fuses multiplications with additions, rounds otherwise and finds other grips than one \
              for any processor of the architecture, whose grips the shipped atlases are: build without target-cpu and \
              target-feature"
         );
@@ -156,11 +161,19 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// Names every file of a section below `folder` that is missing or not what is made now.
 fn check(folder: &Path, section: Section) -> ExitCode {
     let mut code = ExitCode::SUCCESS;
-    if matches!(section, Section::Atlases | Section::All) && !atlases::check(folder) {
-        code = ExitCode::FAILURE;
+    let grips: &[Kept] = match section {
+        Section::Atlases => &[Kept::All],
+        Section::Primitives => &[Kept::Listed],
+        Section::All => &[Kept::All, Kept::Listed],
+        Section::Objects | Section::Hands | Section::Holdouts | Section::Prospects => &[],
+    };
+    for kept in grips {
+        if !kept.check(folder) {
+            code = ExitCode::FAILURE;
+        }
     }
     let files = match section {
-        Section::Atlases => Vec::new(),
+        Section::Atlases | Section::Primitives => Vec::new(),
         section => section.generate(),
     };
     for (path, bytes) in files {

@@ -22,7 +22,7 @@ use grasp_synthesis::{
         shape::Proposal,
         solids::{HandSolids, ToldSolids},
     },
-    search::{SearchOutcome, SearchSettings, find_grasp},
+    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
     strategy::Validity,
     synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
 };
@@ -178,7 +178,7 @@ fn search(
         .build()
         .expect("threads");
     let settings = SearchSettings {
-        starts: starts.cloned(),
+        starts: starts.cloned().map_or(StartFrom::Nothing, StartFrom::Atlas),
         first_attempt: attempts.start,
         max_attempts: attempts.end - attempts.start,
         workers,

@@ -22,7 +22,7 @@ use grasp_synthesis::{
         scene::Presented,
         solids::{HandSolids, ToldSolids},
     },
-    search::SearchSettings,
+    search::{SearchSettings, StartFrom},
     strategy::{BendRatioChoice, Choice, Strategy, Validity},
 };
 
@@ -99,7 +99,7 @@ pub(crate) fn reproducible(holdout: &Holdout) -> SearchSettings {
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: None,
+        starts: StartFrom::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
         reproducible: true,

@@ -6,13 +6,19 @@ mod centre_of_mass;
 pub(crate) mod directory;
 pub(crate) mod store;
 
-use std::{sync::Arc, thread};
+use std::{
+    sync::{Arc, OnceLock},
+    thread,
+};
 
-use grasp_assets::hands::hand;
+use grasp_assets::{
+    hands::{Hand, hand},
+    primitives::held_primitives,
+};
 use grasp_proto::v1;
 use grasp_synthesis::{
     geometry::mesh::TriangleMesh, guided::repertoire::Repertoires, hand::Handedness, object::GraspObject,
-    strategy::Validity,
+    primitives::borrowed::Borrowed, strategy::Validity,
 };
 use sha2::{Digest as _, Sha256};
 
@@ -40,6 +46,8 @@ pub(crate) struct StoredObject {
     pub warnings: Vec<String>,
     /// What is known of how hands hold it.
     pub shelf: Shelf,
+    /// What it borrows for each of [`held_primitives`], once it was asked for.
+    borrowed: Vec<OnceLock<Arc<Borrowed>>>,
 }
 
 impl StoredObject {
@@ -52,15 +60,18 @@ impl StoredObject {
             object,
             warnings,
             shelf: Shelf::default(),
+            borrowed: held_primitives().iter().map(|_| OnceLock::new()).collect(),
         }
     }
 
-    /// Draws where both hands of a rig have room now instead of by the first search with each: five milliseconds of work
-    /// for each, at the same time. Where the system has no thread for it, one after the other.
-    pub(crate) fn draw_repertoires(&self, rig: &str) {
+    /// Finds out now instead of by the first search with each where both hands of a rig have room, and what is borrowed for
+    /// them: some ten milliseconds of work for each, at the same time. Where the system has no thread for it, one after the
+    /// other.
+    pub(crate) fn get_ready(&self, rig: &str) {
         let draw = |handedness| {
             if let Some(hand) = hand(rig, handedness) {
                 self.object.repertoire(&hand.rig);
+                self.borrowed(hand);
             }
         };
         thread::scope(|scope| {
@@ -70,6 +81,15 @@ impl StoredObject {
                 draw(Handedness::Left);
             }
         });
+    }
+
+    /// Grips of primitives for a hand, for searches to start from while the object has no atlas; none if the hand knows no
+    /// primitives or none of their grips fits.
+    pub(crate) fn borrowed(&self, hand: &'static Hand) -> Option<Arc<Borrowed>> {
+        let mut all = held_primitives().iter().zip(&self.borrowed);
+        let ((_, held), borrowed) = all.find(|((of, _), _)| std::ptr::eq(*of, hand))?;
+        let borrowed = borrowed.get_or_init(|| Arc::new(Borrowed::of(&self.object, held)));
+        (!borrowed.is_empty()).then(|| Arc::clone(borrowed))
     }
 
     /// "objects/{object}".
@@ -97,6 +117,7 @@ impl StoredObject {
             + self.object.surface.field_bytes()
             + self.object.surface_pairs.bytes()
             + Repertoires::MOST_BYTES
+            + self.borrowed.len() * Borrowed::MOST_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()
     }
 

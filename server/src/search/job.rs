@@ -12,7 +12,7 @@ use grasp_synthesis::{
     holdout::{Holdout, PresentingHand},
     key_frames::plan_way,
     object::GraspObject,
-    search::{GraspSource, LookUp, SearchOutcome, SearchSettings, find_known_grasp},
+    search::{GraspSource, LookUp, SearchOutcome, SearchSettings, StartFrom, find_known_grasp, uses_atlas},
     strategy::{Choice, Validity},
 };
 use rayon::ThreadPool;
@@ -22,6 +22,7 @@ use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     atlases::Known,
     error::ServiceError,
+    objects::StoredObject,
     validate::FindQuery,
 };
 
@@ -32,6 +33,8 @@ pub(crate) struct FindJob {
     pub query: FindQuery,
     /// The object; held, it is not evicted.
     pub object: Arc<GraspObject>,
+    /// The same with what is kept of it.
+    pub stored: Arc<StoredObject>,
     /// The seed that was asked for or drawn.
     pub seed: u64,
     /// When the call arrived: the budget counts from here.
@@ -114,6 +117,14 @@ impl FindJob {
             presenting_hand,
             up: object_from_client.transform_vector(query.up),
         };
+        let starts = match &self.known.atlas {
+            Some(atlas) => StartFrom::Atlas(Arc::clone(atlas)),
+            None if uses_atlas(query.strategy, query.validity) => {
+                let borrowed = self.stored.borrowed(query.receiving_hand);
+                borrowed.map_or(StartFrom::Nothing, StartFrom::Borrowed)
+            }
+            None => StartFrom::Nothing,
+        };
         let settings = SearchSettings {
             seed: self.seed,
             strategy: query.strategy,
@@ -125,8 +136,8 @@ impl FindJob {
             constraints: query.constraints.transformed(object_from_client),
             choice: query.choice,
             // A replay runs one attempt, which known grips would come before.
-            atlas: self.known.atlas.clone().filter(|_| !query.is_replay),
-            starts: self.known.atlas,
+            atlas: self.known.atlas.filter(|_| !query.is_replay),
+            starts,
             recent: if query.is_replay {
                 RecentGrips::default()
             } else {
@@ -401,7 +412,8 @@ mod tests {
                 budget: effective_budget(query.budget, budgets, arrived, None),
                 patience: Duration::ZERO,
                 query,
-                object: object.object,
+                object: Arc::clone(&object.object),
+                stored: Arc::new(object),
                 seed: 3,
                 arrived,
                 workers: 1,

@@ -157,6 +157,7 @@ mod tests {
         hand::{DigitAngles, HandPose, Handedness},
         pose::Pose,
         rejection::Rejection,
+        search::StartFrom,
         strategy::{BendRatioChoice, Strategy, Validity},
     };
 
@@ -186,7 +187,7 @@ mod tests {
             constraints: Constraints::default(),
             choice,
             atlas: None,
-            starts: None,
+            starts: StartFrom::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
             reproducible: false,

@@ -62,6 +62,7 @@ impl GraspHandler {
         let job = FindJob {
             seed: query.seed.unwrap_or_else(drawn_seed),
             object,
+            stored: Arc::clone(&stored),
             arrived: call.arrived,
             budget,
             patience: if query.goes_on {

@@ -48,7 +48,7 @@ impl ObjectHandler {
         let object = run_blocking(move || {
             let _permit = permit;
             let object = build_object(fields, limits, violations)?;
-            object.draw_repertoires(&shared.default_rig);
+            object.get_ready(&shared.default_rig);
             Ok::<_, ServiceError>(object)
         })
         .await??;

@@ -19,6 +19,7 @@ pub mod key_frames;
 pub mod object;
 pub mod physical;
 pub mod pose;
+pub mod primitives;
 pub mod rejection;
 pub mod score;
 pub mod search;

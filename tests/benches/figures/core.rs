@@ -14,7 +14,7 @@ use grasp_synthesis::{
     hand::{Handedness, rig::Rig},
     holdout::Holdout,
     object::GraspObject,
-    search::{LookUp, SearchSettings, find_grasp, find_known_grasp},
+    search::{LookUp, SearchSettings, StartFrom, find_grasp, find_known_grasp},
     strategy::{Choice, Strategy, Validity},
 };
 use grasp_tests::searches::MonotonicClock;
@@ -111,7 +111,7 @@ fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings 
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: Some(Arc::clone(atlas)),
-        starts: Some(Arc::clone(atlas)),
+        starts: StartFrom::Atlas(Arc::clone(atlas)),
         recent: RecentGrips::default(),
         known_tried: 0,
         reproducible: false,

@@ -22,7 +22,7 @@ use grasp_synthesis::{
     holdout::Holdout,
     physical::grip::Gripper,
     rejection::Rejection,
-    search::{SearchEnd, SearchSettings, find_grasp},
+    search::{SearchEnd, SearchSettings, StartFrom, find_grasp},
     strategy::{Choice, Validity},
     synthesis::{
         attempt::{Attempt, AttemptEnd},
@@ -134,7 +134,11 @@ impl Maker {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: self.atlases.of(cell).cloned(),
-            starts: self.atlases.of(cell).cloned(),
+            starts: self
+                .atlases
+                .of(cell)
+                .cloned()
+                .map_or(StartFrom::Nothing, StartFrom::Atlas),
             recent: RecentGrips::default(),
             known_tried: 0,
             reproducible: false,

@@ -11,7 +11,7 @@ use grasp_synthesis::{
     constraints::Constraints,
     hand::{Digit, HandPose, Handedness, Phalanx},
     holdout::Holdout,
-    search::{SearchSettings, find_grasp},
+    search::{SearchSettings, StartFrom, find_grasp},
     strategy::{Choice, Strategy},
 };
 
@@ -115,7 +115,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: None,
+            starts: StartFrom::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };

@@ -21,7 +21,7 @@ use grasp_synthesis::{
     hand::rig::Rig,
     holdout::Holdout,
     object::{GraspObject, THESIS_FRICTION},
-    search::{SearchSettings, find_grasp},
+    search::{SearchSettings, StartFrom, find_grasp},
     strategy::{BendRatioChoice, Choice, Strategy},
 };
 use indicatif::{ProgressBar, ProgressStyle};
@@ -101,7 +101,7 @@ fn next_grasp(
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: None,
+        starts: StartFrom::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
     };

@@ -22,7 +22,7 @@ use super::{
     growth::{ENTRIES, Grown},
     key::{KEY_BYTES, key},
 };
-use crate::{hand::rig::Rig, object::GraspObject};
+use crate::{hand::rig::Rig, object::GraspObject, physical::shape::HandShape};
 
 /// What the bytes of every atlas start with.
 const MARK: [u8; 8] = *b"GRASPATL";
@@ -81,6 +81,39 @@ pub fn encode(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
 /// # Errors
 /// The bytes are anything else; see [`AtlasError`].
 pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, AtlasError> {
+    let Content {
+        grips,
+        shapes,
+        complete,
+        proposed,
+        early_stamp,
+    } = read(bytes, object, rig)?;
+    Ok(Grown {
+        atlas: Arc::new(Atlas::new(object, rig, grips, complete)),
+        shapes,
+        proposed,
+        early_stamp,
+    })
+}
+
+/// The grips alone of what has grown for an object and a hand: without the lists of an atlas, which take most of the time.
+///
+/// # Errors
+/// The bytes are anything else; see [`AtlasError`].
+pub fn decode_grips(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grips, AtlasError> {
+    Ok(read(bytes, object, rig)?.grips)
+}
+
+/// What the bytes say.
+struct Content {
+    grips: Grips,
+    shapes: Vec<HandShape>,
+    complete: bool,
+    proposed: u64,
+    early_stamp: u64,
+}
+
+fn read(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Content, AtlasError> {
     let mut reader = Reader::new(bytes);
     if reader.array() != Ok(MARK) {
         return Err(AtlasError::NotAnAtlas);
@@ -121,9 +154,10 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
     if reader.left() > 0 {
         return Err(AtlasError::Malformed("something follows the last grip"));
     }
-    Ok(Grown {
-        atlas: Arc::new(Atlas::new(object, rig, Grips::new(rig, entries), complete)),
+    Ok(Content {
+        grips: Grips::new(rig, entries),
         shapes,
+        complete,
         proposed,
         early_stamp,
     })

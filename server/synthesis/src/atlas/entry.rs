@@ -16,6 +16,7 @@ use crate::{
         scene::ObjectScene,
         solids::{HandSolids, ToldSolids},
     },
+    pose::Pose,
     score::{Score, Term, Values, force_values, grip_values},
     taxonomy::{Classification, classify},
 };
@@ -130,6 +131,19 @@ impl Entry {
         };
         let solids = HandSolids::of_pose(rig, &grip.pose);
         Some(Self::new(scene, rig, grip, &solids, gripper))
+    }
+
+    /// The same grip moved and turned. Which triangles it touches and what it is worth stays as it was where it was tried.
+    #[must_use]
+    pub fn moved(&self, way: Pose) -> Self {
+        let mut moved = self.clone();
+        let wrist = &mut moved.grip.pose.frame_from_wrist;
+        *wrist = way * *wrist;
+        for contact in &mut moved.contacts {
+            contact.position = way.transform_point(contact.position);
+            contact.normal = way.transform_vector(contact.normal);
+        }
+        moved
     }
 
     /// The hand as solids, in the object's frame. They are not kept, as they would take twice as much memory as the rest.

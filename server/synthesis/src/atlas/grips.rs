@@ -11,6 +11,7 @@ use crate::{
         grip::GIVER_CLEARANCE,
         solids::{Balls, PreparedHand, ToldSolids},
     },
+    pose::Pose,
 };
 
 /// Grips, in the order of [`super::Atlas::entries`]. Whoever asks hands in the rig that they were made for.
@@ -84,7 +85,16 @@ impl Grips {
     /// What thumb, palm, forearm and those fingers of a grip that hold without the others are from the giver's hand at most, in
     /// metres, by the first balls inside alone.
     pub(super) fn clearance_at_most(&self, entry: usize, giver: &PreparedHand) -> f32 {
-        let distances = giver.distances_at_most(&self.cores[entry]);
+        self.core_clearance(entry, &self.cores[entry], giver)
+    }
+
+    /// The same for a grip that is moved.
+    pub(crate) fn moved_clearance_at_most(&self, entry: usize, way: Pose, giver: &PreparedHand) -> f32 {
+        self.core_clearance(entry, &self.cores[entry].transformed(way), giver)
+    }
+
+    fn core_clearance(&self, entry: usize, core: &Balls, giver: &PreparedHand) -> f32 {
+        let distances = giver.distances_at_most(core);
         let (fingers, others) = farthest_by_first(&distances);
         let (_, of_fingers) = self.finger_sets[entry].farthest(fingers);
         of_fingers.min(others)

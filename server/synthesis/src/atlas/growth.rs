@@ -91,6 +91,19 @@ impl Grown {
         self.early_stamp
     }
 
+    /// The grips of its lists alone: of few, nearly every giver leaves some.
+    #[must_use]
+    pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
+        let places: Vec<usize> = self.atlas.listed().map(usize::from).collect();
+        let entries = places.iter().map(|&place| self.atlas.entries()[place].clone());
+        let grips = Grips::new(rig, entries.collect());
+        Self {
+            atlas: Arc::new(Atlas::new(object, rig, grips, self.atlas.is_complete())),
+            shapes: places.iter().map(|&place| self.shapes[place]).collect(),
+            ..*self
+        }
+    }
+
     /// Bytes that it takes in memory.
     pub fn bytes(&self) -> usize {
         self.atlas.bytes() + size_of_val(self.shapes.as_slice())
@@ -306,7 +319,7 @@ impl<'a> Growth<'a> {
             repertoire: None,
         };
         match giver.map(|giver| &giver.starts) {
-            Some(Some(starts)) if is_beside => starts.propose(self.grips.entries(), &place, stream),
+            Some(Some(starts)) if is_beside => starts.propose_evenly(self.grips.entries(), &place, stream),
             None if is_beside => Some(self.beside_known(stream)),
             // Beside a giver who leaves enough, most known grips are of no use.
             _ => propose_evenly(&place, stream, &|| false),

@@ -96,6 +96,11 @@ impl Atlas {
         self.shortlists.under(up)
     }
 
+    /// The grips that are on any of these lists, as rising indices of [`Atlas::entries`].
+    pub fn listed(&self) -> impl Iterator<Item = u16> {
+        self.shortlists.all().iter().map(|listed| listed.entry)
+    }
+
     /// Those of [`Atlas::by_score`] that the object does not slip out of.
     pub fn holding_under(&self, up: Vec3) -> &[u16] {
         self.order.holding_under(up)

@@ -151,6 +151,11 @@ impl Shortlists {
         }
     }
 
+    /// The grips of all lists, in the order of the entries.
+    pub(super) fn all(&self) -> &[Listed] {
+        &self.grips
+    }
+
     /// Bytes that they take in memory.
     pub(super) fn bytes(&self) -> usize {
         let lists = self.of_directions.iter();

@@ -124,9 +124,23 @@ impl Starts {
         &self.0
     }
 
-    /// A hand beside one of them that may keep clear of the giver; none if none was drawn. `entries` are those that they
-    /// are of.
+    /// A hand beside one of them that may keep clear of the giver, more often beside the first; none if none was drawn.
+    /// `entries` are those that they are of.
     pub fn propose(
+        &self,
+        entries: &[Entry],
+        place: &Place<'_>,
+        stream: &mut AttemptStream,
+    ) -> Option<Proposal> {
+        // The first of 32 comes six times as often as if all did alike. Of 44 holdouts that atlases of the built-in objects do
+        // not answer, 27 are answered sooner so and 17 later: in four fifths of the time where it takes less than 5 ms,
+        // elsewhere in as much.
+        let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
+        Self::beside(*self.0.get(rank)?, entries, place, stream)
+    }
+
+    /// The same, beside one as often as beside another: what is to be known for many givers is not to lie beside few.
+    pub fn propose_evenly(
         &self,
         entries: &[Entry],
         place: &Place<'_>,
@@ -135,7 +149,16 @@ impl Starts {
         if self.0.is_empty() {
             return None;
         }
-        let Start { entry, kept } = self.0[stream.below(self.0.len())];
+        Self::beside(self.0[stream.below(self.0.len())], entries, place, stream)
+    }
+
+    /// A hand beside a known grip that may keep clear of the giver, if one is drawn.
+    fn beside(
+        Start { entry, kept }: Start,
+        entries: &[Entry],
+        place: &Place<'_>,
+        stream: &mut AttemptStream,
+    ) -> Option<Proposal> {
         let entry = &entries[usize::from(entry)];
         let known = Proposal {
             object_from_wrist: entry.grip.pose.frame_from_wrist,

@@ -27,7 +27,7 @@ use candidates::KnownGrips;
 use race::Race;
 pub use report::{GraspSource, NearestMiss, SearchReport};
 
-pub use crate::synthesis::stopwatch::StepTimes;
+pub use crate::synthesis::{start_grips::StartFrom, stopwatch::StepTimes};
 
 /// How to search.
 #[derive(Clone, Debug)]
@@ -48,8 +48,8 @@ pub struct SearchSettings {
     pub choice: Choice,
     /// Grips that are known, to be tried first under `GUIDED` and `PHYSICAL`; made for this object and rig.
     pub atlas: Option<Arc<Atlas>>,
-    /// Grips that are known, for attempts to start from where the giver is in their way; likewise.
-    pub starts: Option<Arc<Atlas>>,
+    /// Grips for attempts to start from where what is known is in the giver's way, or nothing is; likewise.
+    pub starts: StartFrom,
     /// Grips that earlier searches found for this object and rig, under the object's own friction: tried after those of the
     /// atlas, and not if the search is reproducible.
     pub recent: RecentGrips,
@@ -211,8 +211,11 @@ pub fn find_grasp_in(
 
 /// What the attempts of a search share.
 pub fn prepare<'a>(holdout: &'a Holdout, rig: &'a Rig, settings: &SearchSettings) -> Scene<'a> {
-    let starts = settings.starts.as_ref();
-    let starts = starts.filter(|_| uses_atlas(settings.strategy, settings.validity));
+    let starts = if uses_atlas(settings.strategy, settings.validity) {
+        settings.starts.clone()
+    } else {
+        StartFrom::Nothing
+    };
     // The validity comes last: it brings kilobytes, which each step after it would move.
     Scene::new(
         holdout,
@@ -222,6 +225,6 @@ pub fn prepare<'a>(holdout: &'a Holdout, rig: &'a Rig, settings: &SearchSettings
         settings.friction,
     )
     .with_constraints(settings.constraints)
-    .starting_from(starts.cloned())
+    .starting_from(starts)
     .with_validity(settings.validity)
 }

@@ -15,7 +15,6 @@ use super::{
     wrist_placement::WristFrame,
 };
 use crate::{
-    atlas::Atlas,
     grasp::{Contact, Grasp},
     hand::{Digit, HandPose},
     physical::{
@@ -122,16 +121,14 @@ impl Attempt {
     ) -> AttemptEnd {
         stopwatch.start();
         let end = self.try_anew(scene, stream, stopwatch, interrupted);
-        match (&end, &scene.known) {
-            (AttemptEnd::Rejected { .. }, Some(known)) => {
-                match self.try_beside_known(scene, known, stream, stopwatch, interrupted) {
-                    Ok(Some(grasp)) => AttemptEnd::Valid(grasp),
-                    // What is told of an attempt that fails is the hand that was placed anew.
-                    Ok(None) => end,
-                    Err(Interrupted) => AttemptEnd::Interrupted,
-                }
-            }
-            _ => end,
+        if scene.starts.is_empty() || !matches!(end, AttemptEnd::Rejected { .. }) {
+            return end;
+        }
+        match self.try_beside_known(scene, stream, stopwatch, interrupted) {
+            Ok(Some(grasp)) => AttemptEnd::Valid(grasp),
+            // What is told of an attempt that fails is the hand that was placed anew.
+            Ok(None) => end,
+            Err(Interrupted) => AttemptEnd::Interrupted,
         }
     }
 
@@ -139,7 +136,6 @@ impl Attempt {
     fn try_beside_known(
         &mut self,
         scene: &Scene<'_>,
-        known: &Atlas,
         stream: &mut AttemptStream,
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
@@ -147,15 +143,15 @@ impl Attempt {
         let Some(around) = scene.surroundings() else {
             return Ok(None);
         };
-        let starts = scene.starts(known, around.presented, stream.attempt(), interrupted);
-        let starts = starts.ok_or(Interrupted)?;
+        let starts = scene.starts(around.presented, stream.attempt(), interrupted);
+        let (starts, entries) = starts.ok_or(Interrupted)?;
         let place = scene.place(stream.attempt());
         for _ in 0..BESIDE_KNOWN {
             if interrupted() {
                 return Err(Interrupted);
             }
             let proposal = starts
-                .propose(known.entries(), &place, stream)
+                .propose(entries, &place, stream)
                 .filter(|proposal| scene.constraints.admits_wrist(proposal.object_from_wrist));
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };

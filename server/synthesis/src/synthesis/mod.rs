@@ -28,6 +28,7 @@ pub mod immobility_validation;
 pub mod placement_measures;
 pub mod random;
 pub mod scene;
+pub mod start_grips;
 pub mod stopwatch;
 pub mod wrenches;
 pub mod wrist_placement;

@@ -3,11 +3,15 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{
-    closing_motion::DigitMotion, immobility_validation::Load, random::AttemptStream, wrenches::Wrench,
+    closing_motion::DigitMotion,
+    immobility_validation::Load,
+    random::AttemptStream,
+    start_grips::{Demand, StartFrom, StartGrips},
+    wrenches::Wrench,
     wrist_placement::WristPlacer,
 };
 use crate::{
-    atlas::{Atlas, starts::Starts},
+    atlas::{entry::Entry, starts::Starts},
     constraints::Constraints,
     guided::{
         proposal::{Place, propose, propose_evenly},
@@ -29,12 +33,6 @@ use crate::{
 /// them; from then on it is worth 180 µs to ask it of all pairs at once, of which a giver who covers the object leaves few.
 const SOON: u64 = 4;
 
-/// Attempts that start from those known grips alone that are not certainly in the giver's way, which are found in a fifth of
-/// the time: 0.8 ms instead of 4. Of later ones, every other does. Of 51 holdouts that atlases of the built-in objects do
-/// not answer, hands beside these hold as soon as hands beside those that are nearest to keeping clear of all, and beside
-/// some givers sooner or later by a tenfold.
-const FROM_OPEN_ONES: u64 = 8;
-
 /// A holdout and how attempts at it go, with what they find out about it once.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {
@@ -53,12 +51,8 @@ pub struct Scene<'a> {
     /// Where the receiving hand has room at the object, once it was asked for.
     repertoire: OnceLock<Arc<Repertoire>>,
     pub(super) constraints: Constraints,
-    /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`, …
-    pub(super) known: Option<Arc<Atlas>>,
-    /// … and which of them, once it was asked for, …
-    starts: OnceLock<Starts>,
-    /// … or of those that are not certainly in the giver's way.
-    open_starts: OnceLock<Starts>,
+    /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`.
+    pub(super) starts: StartGrips,
 }
 
 impl<'a> Scene<'a> {
@@ -95,16 +89,17 @@ impl<'a> Scene<'a> {
             free_surface: OnceLock::new(),
             repertoire: OnceLock::new(),
             constraints: Constraints::default(),
-            known: None,
-            starts: OnceLock::new(),
-            open_starts: OnceLock::new(),
+            starts: StartGrips::default(),
         }
     }
 
     /// The same with attempts that, having failed, start from known grips; for `GUIDED` and `PHYSICAL`.
     #[must_use]
-    pub fn starting_from(self, known: Option<Arc<Atlas>>) -> Self {
-        Self { known, ..self }
+    pub fn starting_from(self, from: StartFrom) -> Self {
+        Self {
+            starts: StartGrips::new(from),
+            ..self
+        }
     }
 
     /// The same with demands on the grasps, in the object's frame.
@@ -189,34 +184,19 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// Of the known grips, those that an attempt starts from: the ones that hold under this gravity and are what is
-    /// demanded, if the giver were not in their way. None if interrupted.
+    /// The grips that an attempt starts from, and those that they are of. None if there are none, or if interrupted.
     pub(super) fn starts(
         &self,
-        known: &Atlas,
         presented: &Presented,
         attempt: u64,
         interrupted: &impl Fn() -> bool,
-    ) -> Option<&Starts> {
-        let giver = presented.giver.as_ref();
-        let from_open_ones = attempt < FROM_OPEN_ONES || attempt.is_multiple_of(2);
-        let excluding = giver.filter(|_| from_open_ones);
-        let starts = match excluding {
-            Some(_) => &self.open_starts,
-            None => &self.starts,
+    ) -> Option<(&Starts, &[Entry])> {
+        let demand = Demand {
+            rig: self.rig,
+            presented,
+            constraints: &self.constraints,
         };
-        if let Some(starts) = starts.get() {
-            return Some(starts);
-        }
-        let excluded = excluding.map(|giver| known.excluded_by(giver));
-        let holding = known.holding_under(presented.up).iter().copied();
-        let wanted = holding.filter(|&entry| {
-            excluded.as_ref().is_none_or(|excluded| !excluded.contains(entry))
-                && known.entries()[usize::from(entry)].is_wanted(&self.constraints)
-        });
-        let found = Starts::of(known.grips(), self.rig(), wanted, giver, interrupted)?;
-        // Another worker may have found the same meanwhile.
-        Some(starts.get_or_init(|| found))
+        self.starts.of_attempt(attempt, &demand, interrupted)
     }
 
     /// What is demanded of the grasps.

@@ -22,7 +22,7 @@ use grasp_synthesis::{
     holdout::{Holdout, PresentingHand},
     object::{GraspObject, THESIS_FRICTION},
     pose::Pose,
-    search::SearchSettings,
+    search::{SearchSettings, StartFrom},
     strategy::{Choice, Strategy},
 };
 
@@ -256,7 +256,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: None,
+        starts: StartFrom::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
     }

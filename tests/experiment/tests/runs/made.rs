@@ -10,7 +10,7 @@ use grasp_synthesis::{
     constraints::Constraints,
     hand::Handedness,
     rejection::Rejection,
-    search::{SearchOutcome, SearchSettings, find_grasp},
+    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
     strategy::{BendRatioChoice, Choice, Strategy, Validity},
 };
 
@@ -51,7 +51,7 @@ fn search(record: &Record, first_attempt: u64, max_attempts: u64) -> SearchOutco
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: None,
+        starts: StartFrom::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
     };

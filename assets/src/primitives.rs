@@ -1,0 +1,52 @@
+//! Grips of the built-in hands at primitives, embedded for objects that have no atlas yet.
+
+use std::sync::{Arc, LazyLock};
+
+use grasp_synthesis::{
+    atlas::codec::decode_grips,
+    hand::{Handedness, rig::Rig},
+    primitives::{HeldPrimitive, Primitive},
+};
+
+use crate::{
+    atlases::file_name,
+    hands::{Hand, hand},
+};
+
+/// The rig whose hands know the primitives.
+const RIG: &str = "adult";
+
+/// The files by name.
+const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/primitives.rs"));
+
+/// A hand, and what it knows.
+type Known = (&'static Hand, Arc<[HeldPrimitive]>);
+
+/// The hands that know primitives, and where they are held: read when they are first asked for, some ten milliseconds.
+pub fn held_primitives() -> &'static [Known] {
+    static HELD: LazyLock<Vec<Known>> = LazyLock::new(|| {
+        let hands = [Handedness::Left, Handedness::Right].map(|side| hand(RIG, side));
+        let held = hands.into_iter().flatten().map(|hand| (hand, held_by(&hand.rig)));
+        held.collect()
+    });
+    &HELD
+}
+
+/// The embedded grips of a primitive and a hand; none if there is none.
+pub fn grips(primitive: Primitive, rig: &Rig) -> Option<&'static [u8]> {
+    let name = file_name(&primitive.name(), rig);
+    FILES
+        .iter()
+        .find(|(file, _)| *file == name)
+        .map(|(_, bytes)| *bytes)
+}
+
+/// What is there of all primitives and was made by this program's algorithm: a primitive less is no error, only fewer
+/// starts. The generator's check tells what is missing.
+fn held_by(rig: &Rig) -> Arc<[HeldPrimitive]> {
+    let held = Primitive::ALL.into_iter().filter_map(|primitive| {
+        let grips = decode_grips(grips(primitive, rig)?, &primitive.object(), rig).ok()?;
+        Some(HeldPrimitive { primitive, grips })
+    });
+    held.collect()
+}

@@ -1,0 +1,211 @@
+//! Grips of boxes that an object is like, laid on the object.
+
+use std::{cmp::Reverse, sync::Arc};
+
+use glam::{Mat3, Quat, Vec3};
+
+use super::HeldPrimitive;
+use crate::{
+    atlas::{entry::Entry, grips::Grips},
+    constraints::Constraints,
+    geometry::oriented_box::OrientedBox,
+    grasp::Contact,
+    hand::{Digit, rig::Rig},
+    object::GraspObject,
+    physical::{grip::GIVER_CLEARANCE, solids::PreparedHand},
+    pose::Pose,
+};
+
+/// Grips that an object borrows at most. More leave more beside a giver, and take longer to choose from: some fifty
+/// nanoseconds each.
+const MOST: usize = 1024;
+
+/// Boxes that it borrows from at most, those that are most like it. More find grips for parts that are not like the whole,
+/// as a knife's blade, and take longer to try: a millisecond each.
+const BOXES: usize = 5;
+
+/// How far from the surface what touches the box may come to be, in metres: fingers that close anew reach it from there.
+/// Less borrows fewer grips, more those that close on nothing.
+const WITHIN: f32 = 0.004;
+
+/// Borrowed grips that are looked at more closely for a giver: those of which the balls inside are farthest from its hand.
+const NEAREST: usize = 96;
+
+/// Grips that are compared with the giver by balls between two looks at the clock, …
+const BOUNDED_AT_ONCE: usize = 128;
+
+/// … and grips that are laid on the object.
+const MOVED_AT_ONCE: usize = 32;
+
+/// What is thinner than this is compared as if it were this, in metres: logarithms have no zero.
+const LEAST_SIZE: f32 = 0.001;
+
+/// The turns that leave a box as it is, by which axes they turn around.
+const TURNS: [Vec3; 4] = [
+    Vec3::ONE,
+    Vec3::new(1.0, -1.0, -1.0),
+    Vec3::new(-1.0, 1.0, -1.0),
+    Vec3::new(-1.0, -1.0, 1.0),
+];
+
+/// Where a grip of a box is laid on the object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Laid {
+    /// Which of the boxes it is of, …
+    primitive: u8,
+    /// … and which of its grips.
+    grip: u16,
+    object_from_primitive: Pose,
+}
+
+/// Grips of boxes that fit an object, as far as that shows before a hand is closed. They hold the boxes, not the object:
+/// searches start from them.
+#[derive(Clone, Debug)]
+pub struct Borrowed {
+    known: Arc<[HeldPrimitive]>,
+    laid: Vec<Laid>,
+}
+
+impl Borrowed {
+    /// Bytes that one takes at most, beside what all share.
+    pub const MOST_BYTES: usize = MOST * size_of::<Laid>();
+
+    /// What an object borrows of the boxes that a hand knows: some milliseconds of work.
+    pub fn of(object: &GraspObject, known: &Arc<[HeldPrimitive]>) -> Self {
+        let around = SortedBox::of(&object.bounding_box);
+        let mut likest: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
+        likest.sort_by(|(_, a), (_, b)| around.unlikeness(a).total_cmp(&around.unlikeness(b)));
+        let laid = likest.into_iter().take(BOXES).flat_map(|(primitive, held)| {
+            let around = &around;
+            TURNS.into_iter().flat_map(move |turn| {
+                held.grips
+                    .entries()
+                    .iter()
+                    .enumerate()
+                    .filter_map(move |(grip, entry)| {
+                        let object_from_primitive = around.lay(held, turn, &entry.contacts);
+                        let fits = touches(&entry.contacts, object, object_from_primitive);
+                        fits.then_some(Laid {
+                            primitive: primitive as u8,
+                            grip: grip as u16,
+                            object_from_primitive,
+                        })
+                    })
+            })
+        });
+        Self {
+            laid: laid.take(MOST).collect(),
+            known: Arc::clone(known),
+        }
+    }
+
+    /// How many grips there are.
+    pub fn len(&self) -> usize {
+        self.laid.len()
+    }
+
+    /// True if no box has a grip that fits.
+    pub fn is_empty(&self) -> bool {
+        self.laid.is_empty()
+    }
+
+    /// The grips that are what is demanded and seem least in a giver's way, on the object. `rig` is the hand that knows the
+    /// boxes. None if interrupted.
+    pub fn beside(
+        &self,
+        rig: &Rig,
+        giver: Option<&PreparedHand>,
+        constraints: &Constraints,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<Grips> {
+        let mut by_clearance: Vec<(Reverse<i32>, usize)> = Vec::with_capacity(self.laid.len());
+        for (place, laid) in self.laid.iter().enumerate() {
+            if place.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
+                return None;
+            }
+            let clearance = giver.map_or(GIVER_CLEARANCE, |giver| self.clearance_at_most(laid, giver));
+            by_clearance.push((Reverse(nanometres(clearance.min(GIVER_CLEARANCE))), place));
+        }
+        by_clearance.sort_unstable();
+        let mut entries = Vec::with_capacity(NEAREST);
+        for (count, (_, place)) in by_clearance.into_iter().enumerate() {
+            if entries.len() == NEAREST {
+                break;
+            }
+            if count.is_multiple_of(MOVED_AT_ONCE) && interrupted() {
+                return None;
+            }
+            let entry = self.entry(&self.laid[place]);
+            if entry.is_wanted(constraints) {
+                entries.push(entry);
+            }
+        }
+        Some(Grips::new(rig, entries))
+    }
+
+    fn clearance_at_most(&self, laid: &Laid, giver: &PreparedHand) -> f32 {
+        let grips = &self.known[usize::from(laid.primitive)].grips;
+        grips.moved_clearance_at_most(usize::from(laid.grip), laid.object_from_primitive, giver)
+    }
+
+    /// A grip where it is laid.
+    fn entry(&self, laid: &Laid) -> Entry {
+        let entry = &self.known[usize::from(laid.primitive)].grips.entries()[usize::from(laid.grip)];
+        entry.moved(laid.object_from_primitive)
+    }
+}
+
+/// An object's box with its longest edges first, as those of primitives are.
+struct SortedBox {
+    object_from_box: Pose,
+    half_extents: Vec3,
+}
+
+impl SortedBox {
+    fn of(around: &OrientedBox) -> Self {
+        let mut axes = [0, 1, 2].map(|axis| (around.half_extents[axis], Vec3::AXES[axis]));
+        axes.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let [x, y, _] = axes.map(|(_, axis)| axis);
+        let turn = Quat::from_mat3(&Mat3::from_cols(x, y, x.cross(y))).normalize();
+        Self {
+            object_from_box: around.object_from_box * Pose::new(Vec3::ZERO, turn),
+            half_extents: Vec3::from(axes.map(|(half, _)| half.max(LEAST_SIZE))),
+        }
+    }
+
+    /// How much the sizes differ from those of a primitive: the sum of squared logarithms of their ratios.
+    fn unlikeness(&self, other: &HeldPrimitive) -> f32 {
+        let ratios = self.half_extents / other.primitive.half_extents;
+        ratios.to_array().map(|ratio| ratio.ln().powi(2)).iter().sum()
+    }
+
+    /// Where a primitive's frame is laid so that what touches comes to be where it was by the boxes' sizes.
+    fn lay(&self, held: &HeldPrimitive, turn: Vec3, contacts: &[Contact]) -> Pose {
+        let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
+        let middle = sum / contacts.len().max(1) as f32;
+        let scaled = middle * self.half_extents / held.primitive.half_extents;
+        let turned = Quat::from_mat3(&Mat3::from_diagonal(turn)).normalize();
+        self.object_from_box * Pose::new(turned * (scaled - middle), turned)
+    }
+}
+
+/// A distance in metres as a number that can be ordered.
+fn nanometres(distance: f32) -> i32 {
+    (distance * 1e9) as i32
+}
+
+/// True if thumb and a finger come to be near to the object's surface.
+fn touches(contacts: &[Contact], object: &GraspObject, object_from_primitive: Pose) -> bool {
+    let is_near = |contact: &Contact| {
+        let place = object_from_primitive.transform_point(contact.position);
+        object.surface.closest_point_within(place, WITHIN).is_some()
+    };
+    let any_near = |is_thumb: bool| {
+        let of_part = |contact: &&Contact| {
+            let digit = contact.part.digit();
+            digit.is_some_and(|digit| (digit == Digit::Thumb) == is_thumb)
+        };
+        contacts.iter().filter(of_part).any(is_near)
+    };
+    any_near(true) && any_near(false)
+}
