@@ -5,6 +5,7 @@ use std::sync::{Arc, LazyLock};
 use grasp_synthesis::{
     atlas::codec::decode_grips,
     hand::{Handedness, rig::Rig},
+    object::GraspObject,
     primitives::{HeldPrimitive, Primitive},
 };
 
@@ -22,11 +23,15 @@ const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/primitives.r
 /// A hand, and what it knows.
 type Known = (&'static Hand, Arc<[HeldPrimitive]>);
 
-/// The hands that know primitives, and where they are held: read when they are first asked for, some ten milliseconds.
+/// The hands that know primitives, and how they hold them: read when they are first asked for, some tens of milliseconds.
 pub fn held_primitives() -> &'static [Known] {
     static HELD: LazyLock<Vec<Known>> = LazyLock::new(|| {
+        let boxes = Primitive::ALL.map(|primitive| (primitive, primitive.object()));
         let hands = [Handedness::Left, Handedness::Right].map(|side| hand(RIG, side));
-        let held = hands.into_iter().flatten().map(|hand| (hand, held_by(&hand.rig)));
+        let held = hands
+            .into_iter()
+            .flatten()
+            .map(|hand| (hand, held_by(&hand.rig, &boxes)));
         held.collect()
     });
     &HELD
@@ -43,10 +48,13 @@ pub fn grips(primitive: Primitive, rig: &Rig) -> Option<&'static [u8]> {
 
 /// What is there of all primitives and was made by this program's algorithm: a primitive less is no error, only fewer
 /// starts. The generator's check tells what is missing.
-fn held_by(rig: &Rig) -> Arc<[HeldPrimitive]> {
-    let held = Primitive::ALL.into_iter().filter_map(|primitive| {
-        let grips = decode_grips(grips(primitive, rig)?, &primitive.object(), rig).ok()?;
-        Some(HeldPrimitive { primitive, grips })
+fn held_by(rig: &Rig, boxes: &[(Primitive, GraspObject)]) -> Arc<[HeldPrimitive]> {
+    let held = boxes.iter().filter_map(|(primitive, object)| {
+        let grips = decode_grips(grips(*primitive, rig)?, object, rig).ok()?;
+        Some(HeldPrimitive {
+            primitive: *primitive,
+            grips,
+        })
     });
     held.collect()
 }

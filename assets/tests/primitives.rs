@@ -58,7 +58,7 @@ fn both_hands_know_all_primitives_by_many_grips_that_touch_them() {
             let name = held.primitive.name();
             assert!(grips(held.primitive, &hand.rig).is_some());
             let entries = held.grips.entries();
-            assert!((100..1000).contains(&entries.len()), "{name}: {}", entries.len());
+            assert!((50..1000).contains(&entries.len()), "{name}: {}", entries.len());
             for contact in entries.iter().flat_map(|entry| &entry.contacts) {
                 let off = from_box(held.primitive.half_extents, contact.position);
                 assert!(off < 1e-5, "{name}: a contact is off by {off}");
@@ -90,10 +90,13 @@ fn a_primitive_borrows_its_own_grips_where_they_are() {
     assert_eq!(borrowed.len(), all.min(1024));
     let laid = unconstrained(&borrowed);
     assert!(!laid.is_empty());
-    for (laid, own) in laid.iter().zip(held.grips.entries()) {
-        let apart = laid.grip.pose.frame_from_wrist.position - own.grip.pose.frame_from_wrist.position;
-        assert!(apart.length() < 1e-5, "{apart}");
-        assert_eq!(laid.grip.pose.digits, own.grip.pose.digits);
+    // A turn that leaves a box as it is leaves a coordinate what it is, or negates it.
+    let size = |entry: &Entry| entry.grip.pose.frame_from_wrist.position.abs();
+    for laid in laid {
+        let is_own = |own: &Entry| {
+            own.grip.pose.digits == laid.grip.pose.digits && size(own).distance(size(&laid)) < 1e-5
+        };
+        assert!(held.grips.entries().iter().any(is_own), "{}", size(&laid));
     }
 }
 
@@ -102,7 +105,10 @@ fn bar(half: Vec3, object_from_bar: Pose) -> GraspObject {
     let primitive = Primitive { half_extents: half };
     let mesh = primitive.object();
     let mesh = mesh.surface.mesh();
-    let moved = mesh.positions().iter().map(|&point| object_from_bar.transform_point(point));
+    let moved = mesh
+        .positions()
+        .iter()
+        .map(|&point| object_from_bar.transform_point(point));
     let mesh = TriangleMesh::new(moved.collect(), mesh.triangles().to_vec()).expect("it is sound");
     GraspObject::new(mesh, 0.1, object_from_bar.position, None, &[]).expect("it is sound")
 }
@@ -126,18 +132,16 @@ fn borrowed_grips_touch_what_is_like_the_box_wherever_it_lies() {
                 .fold(f32::INFINITY, f32::min)
         };
         for off in [nearest(true), nearest(false)] {
-            assert!(off < 0.0041, "a digit is off by {off}");
+            assert!(off < 0.0021, "a digit is off by {off}");
         }
     }
 }
 
 #[test]
 fn what_is_like_no_primitive_borrows_nothing() {
-    for half in [Vec3::splat(0.001), Vec3::splat(2.0)] {
-        let borrowed = Borrowed::of(&bar(half, Pose::IDENTITY), known_by_the_right());
-        assert!(borrowed.is_empty(), "{half}: {}", borrowed.len());
-        assert!(unconstrained(&borrowed).is_empty());
-    }
+    let borrowed = Borrowed::of(&bar(Vec3::splat(2.0), Pose::IDENTITY), known_by_the_right());
+    assert!(borrowed.is_empty(), "{}", borrowed.len());
+    assert!(unconstrained(&borrowed).is_empty());
     let nothing: Arc<[HeldPrimitive]> = [].into();
     assert!(Borrowed::of(&object("remote").unwrap().object, &nothing).is_empty());
 }
@@ -151,7 +155,9 @@ fn what_is_not_wanted_is_not_borrowed_and_what_is_interrupted_has_no_end() {
         excluded_types: [unwanted].into_iter().collect(),
         ..Constraints::default()
     };
-    let rest = borrowed.beside(right(), None, &constraints, &|| false).expect("nobody interrupts");
+    let rest = borrowed
+        .beside(right(), None, &constraints, &|| false)
+        .expect("nobody interrupts");
     assert!(!rest.entries().is_empty());
     for entry in rest.entries() {
         assert_ne!(entry.classification.grasp_type, Some(unwanted));
@@ -184,15 +190,16 @@ fn beside_a_giver_those_come_that_are_least_in_its_way() {
             let grips = borrowed.beside(right(), giver, &Constraints::default(), &|| false);
             grips.expect("nobody interrupts")
         };
-        let clear = |entry: &Entry| {
-            giver.clearance(&entry.told_solids(right()), 0.0).is_some()
-        };
-        let count = |grips: &Grips| {
-            grips.entries().iter().filter(|entry| clear(entry)).count()
-        };
+        let clear = |entry: &Entry| giver.clearance(&entry.told_solids(right()), 0.0).is_some();
+        let count = |grips: &Grips| grips.entries().iter().filter(|entry| clear(entry)).count();
         let (chosen, any) = (beside(Some(&giver)), beside(None));
         assert_eq!(chosen.entries().len(), any.entries().len());
-        assert!(count(&chosen) >= count(&any), "{} of {}", count(&chosen), count(&any));
+        assert!(
+            count(&chosen) >= count(&any),
+            "{} of {}",
+            count(&chosen),
+            count(&any)
+        );
     }
 }
 
@@ -225,8 +232,18 @@ fn search(holdout: &Holdout, starts: StartFrom, seed: u64, workers: usize) -> Se
         workers,
         record_step_times: false,
     };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build().expect("threads");
-    find_grasp(&pool, holdout, right(), &settings, &NoClock, &AtomicBool::new(false))
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(workers)
+        .build()
+        .expect("threads");
+    find_grasp(
+        &pool,
+        holdout,
+        right(),
+        &settings,
+        &NoClock,
+        &AtomicBool::new(false),
+    )
 }
 
 #[test]
@@ -247,5 +264,8 @@ fn attempts_that_start_from_borrowed_grips_find_more_and_are_as_reproducible() {
         }
     }
     let [with, without] = found;
-    assert!(2 * with < without, "{with} attempts with borrowed grips, {without} without");
+    assert!(
+        2 * with < without,
+        "{with} attempts with borrowed grips, {without} without"
+    );
 }
