@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use grasp_synthesis::{
     atlas::{
-        codec::{AtlasError, decode, encode},
+        codec::{AtlasError, decode, decode_grips, encode},
         growth::{Grown, Growth},
     },
     hand::Handedness,
@@ -42,6 +42,8 @@ fn what_is_read_is_what_was_written() {
             let bytes = encode(&written, object, rig);
             let read = decode(&bytes, object, rig).expect("it is whole");
             assert_eq!(read, written);
+            let grips = decode_grips(&bytes, object, rig).expect("it is whole");
+            assert_eq!(&grips, written.atlas.grips());
             assert_eq!(encode(&read, object, rig), bytes);
             // The first grips take more than most: 8,192 take some 2.1 MB.
             assert!(
@@ -173,4 +175,22 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn what_is_listed_are_grips_of_the_lists_with_their_shapes() {
+    let (object, rig) = (object("scissors"), adult(Handedness::Right));
+    let (grown, _) = &*SCISSORS;
+    let listed = grown.listed(object, rig);
+    let (few, all) = (listed.atlas.entries(), grown.atlas.entries());
+    let expected: Vec<_> = grown
+        .atlas
+        .listed()
+        .map(|entry| &all[usize::from(entry)])
+        .collect();
+    assert!(!few.is_empty() && few.len() <= all.len());
+    assert!(few.iter().eq(expected));
+    // It is written and read like any other.
+    let bytes = encode(&listed, object, rig);
+    assert_eq!(decode_scissors(&bytes).expect("it is whole"), listed);
 }
