@@ -87,7 +87,7 @@ fn a_primitive_borrows_its_own_grips_where_they_are() {
     let borrowed = Borrowed::of(&held.primitive.object(), &own);
     // All four turns of a box fit it.
     let all = 4 * held.grips.entries().len();
-    assert_eq!(borrowed.len(), all.min(1024));
+    assert_eq!(borrowed.len(), all.min(2048));
     let laid = unconstrained(&borrowed);
     assert!(!laid.is_empty());
     // A turn that leaves a box as it is leaves a coordinate what it is, or negates it.

@@ -24,11 +24,13 @@ pub struct Primitive {
 const MASS: f32 = 0.1;
 
 impl Primitive {
-    /// All whose grips are known. They are close where thickness decides which fingers get round: from a scalpel's handle
+    /// All whose grips are known. They are close where thickness decides which fingers get round: from blades and handles
     /// over pens and bars to a phone, and one that is as wide as a mug. What is easy to hold needs none.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::of_millimetres(160, 10, 5),
+        Self::of_millimetres(160, 12, 3),
         Self::of_millimetres(160, 20, 6),
+        Self::of_millimetres(160, 26, 4),
         Self::of_millimetres(160, 18, 18),
         Self::of_millimetres(160, 32, 14),
         Self::of_millimetres(160, 40, 8),
