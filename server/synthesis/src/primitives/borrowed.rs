@@ -41,12 +41,12 @@ const MOVED_AT_ONCE: usize = 32;
 /// What is thinner than this is compared as if it were this, in metres: logarithms have no zero.
 const LEAST_SIZE: f32 = 0.001;
 
-/// The turns that leave a box as it is, by which axes they turn around.
-const TURNS: [Vec3; 4] = [
-    Vec3::ONE,
-    Vec3::new(1.0, -1.0, -1.0),
-    Vec3::new(-1.0, 1.0, -1.0),
-    Vec3::new(-1.0, -1.0, 1.0),
+/// The turns that leave a box as it is: none, and half a turn about each axis.
+const TURNS: [Quat; 4] = [
+    Quat::IDENTITY,
+    Quat::from_xyzw(1.0, 0.0, 0.0, 0.0),
+    Quat::from_xyzw(0.0, 1.0, 0.0, 0.0),
+    Quat::from_xyzw(0.0, 0.0, 1.0, 0.0),
 ];
 
 /// Where a grip of a box is laid on the object.
@@ -187,12 +187,11 @@ impl SortedBox {
     }
 
     /// Where a primitive's frame is laid so that what touches comes to be where it was by the boxes' sizes.
-    fn lay(&self, held: &HeldPrimitive, turn: Vec3, contacts: &[Contact]) -> Pose {
+    fn lay(&self, held: &HeldPrimitive, turn: Quat, contacts: &[Contact]) -> Pose {
         let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
         let middle = sum / contacts.len().max(1) as f32;
         let scaled = middle * self.half_extents / held.primitive.half_extents;
-        let turned = Quat::from_mat3(&Mat3::from_diagonal(turn)).normalize();
-        self.object_from_box * Pose::new(turned * (scaled - middle), turned)
+        self.object_from_box * Pose::new(turn * (scaled - middle), turn)
     }
 }
 
