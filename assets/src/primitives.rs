@@ -26,13 +26,20 @@ type Known = (&'static Hand, Arc<[HeldPrimitive]>);
 /// The hands that know primitives, and how they hold them: read when they are first asked for, some tens of milliseconds.
 pub fn held_primitives() -> &'static [Known] {
     static HELD: LazyLock<Vec<Known>> = LazyLock::new(|| {
-        let boxes = Primitive::ALL.map(|primitive| (primitive, primitive.object()));
         let hands = [Handedness::Left, Handedness::Right].map(|side| hand(RIG, side));
-        let held = hands
+        let mut held: Vec<(&Hand, Vec<HeldPrimitive>)> = hands
             .into_iter()
             .flatten()
-            .map(|hand| (hand, held_by(&hand.rig, &boxes)));
-        held.collect()
+            .map(|hand| (hand, Vec::new()))
+            .collect();
+        // One box at a time: its search structures take more than its grips.
+        for primitive in Primitive::ALL {
+            let object = primitive.object();
+            for (hand, held) in &mut held {
+                held.extend(held_by(&hand.rig, primitive, &object));
+            }
+        }
+        held.into_iter().map(|(hand, held)| (hand, held.into())).collect()
     });
     &HELD
 }
@@ -46,15 +53,9 @@ pub fn grips(primitive: Primitive, rig: &Rig) -> Option<&'static [u8]> {
         .map(|(_, bytes)| *bytes)
 }
 
-/// What is there of all primitives and was made by this program's algorithm: a primitive less is no error, only fewer
-/// starts. The generator's check tells what is missing.
-fn held_by(rig: &Rig, boxes: &[(Primitive, GraspObject)]) -> Arc<[HeldPrimitive]> {
-    let held = boxes.iter().filter_map(|(primitive, object)| {
-        let grips = decode_grips(grips(*primitive, rig)?, object, rig).ok()?;
-        Some(HeldPrimitive {
-            primitive: *primitive,
-            grips,
-        })
-    });
-    held.collect()
+/// What is there of a primitive and was made by this program's algorithm: a primitive less is no error, only fewer starts. The
+/// generator's check tells what is missing.
+fn held_by(rig: &Rig, primitive: Primitive, object: &GraspObject) -> Option<HeldPrimitive> {
+    let grips = decode_grips(grips(primitive, rig)?, object, rig).ok()?;
+    Some(HeldPrimitive { primitive, grips })
 }
