@@ -29,7 +29,8 @@ const BOXES: usize = 5;
 /// as many fit; without borrowed grips 56 and 55 %.
 const WITHIN: f32 = 0.002;
 
-/// Borrowed grips that are looked at more closely for a giver: those of which the balls inside are farthest from its hand.
+/// Borrowed grips that are looked at more closely for a giver: those of which the balls inside are farthest from its hand. With
+/// half as many, two or three scissors of a hundred fewer are answered in 33 ms, and hardly anything sooner.
 const NEAREST: usize = 96;
 
 /// Grips that are compared with the giver by balls between two looks at the clock, …

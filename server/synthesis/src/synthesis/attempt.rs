@@ -121,7 +121,7 @@ impl Attempt {
     ) -> AttemptEnd {
         stopwatch.start();
         let end = self.try_anew(scene, stream, stopwatch, interrupted);
-        if !scene.starts.serve(stream.attempt()) || !matches!(end, AttemptEnd::Rejected { .. }) {
+        if scene.starts.is_empty() || !matches!(end, AttemptEnd::Rejected { .. }) {
             return end;
         }
         match self.try_beside_known(scene, stream, stopwatch, interrupted) {

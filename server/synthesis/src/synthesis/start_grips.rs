@@ -16,11 +16,6 @@ use crate::{
 /// some givers sooner or later by a tenfold.
 const FROM_OPEN_ONES: u64 = 8;
 
-/// Attempts that place hands anew alone where grips are borrowed: most objects are easy to hold, and choosing what to borrow
-/// takes as long as two attempts. With none, a phone takes two fifths longer and a mug a fifth; with twice as many, scalpel
-/// and scissors a tenth.
-const WITHOUT_BORROWED: u64 = 2;
-
 /// Where grips to start from come from.
 #[derive(Clone, Debug, Default)]
 pub enum StartFrom {
@@ -71,13 +66,9 @@ impl StartGrips {
         }
     }
 
-    /// True if there is something that an attempt starts from.
-    pub(super) fn serve(&self, attempt: u64) -> bool {
-        match self.from {
-            StartFrom::Nothing => false,
-            StartFrom::Atlas(_) => true,
-            StartFrom::Borrowed(_) => attempt >= WITHOUT_BORROWED,
-        }
+    /// True if there is nothing to start from.
+    pub(super) fn is_empty(&self) -> bool {
+        matches!(self.from, StartFrom::Nothing)
     }
 
     /// Those that an attempt starts from, and the grips that they are of: of an atlas, the ones that hold under this
