@@ -5,9 +5,8 @@ use std::{fs, path::PathBuf, time::Instant};
 use glam::Vec3;
 use grasp_synthesis::{
     atlas::{entry::Entry, growth::Growth},
-    geometry::mesh::TriangleMesh,
-    object::GraspObject,
     physical::grip::Gripper,
+    primitives::Primitive,
 };
 
 use super::{shelf::Standing, *};
@@ -17,20 +16,8 @@ use crate::StoreLimits;
 const HANGS_AFTER: Duration = Duration::from_mins(1);
 
 /// A closed box of these half edges in metres.
-fn cuboid(id: &str, half: Vec3) -> StoredObject {
-    let corner =
-        |k: usize| half * Vec3::new([-1.0, 1.0][k & 1], [-1.0, 1.0][k >> 1 & 1], [-1.0, 1.0][k >> 2]);
-    let faces = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
-    let mesh = TriangleMesh::new((0..8).map(corner).collect(), triangles.collect()).unwrap();
-    let object = GraspObject::new(mesh, 0.1, Vec3::ZERO, None, &[]).unwrap();
+fn cuboid(id: &str, half_extents: Vec3) -> StoredObject {
+    let object = Primitive { half_extents }.object();
     StoredObject::new(id.to_owned(), false, Arc::new(object), Vec::new())
 }
 

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     grasp::Contact,
     guided::proposal::Place,
-    hand::{Digit, rig::Rig},
+    hand::rig::Rig,
     object::GraspObject,
     physical::{
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},
@@ -204,7 +204,7 @@ impl Starts {
 }
 
 /// A distance in metres as a number that can be ordered.
-fn nanometres(distance: f32) -> i32 {
+pub(crate) fn nanometres(distance: f32) -> i32 {
     (distance * 1e9) as i32
 }
 
@@ -222,10 +222,7 @@ fn still_touch(contacts: &[Contact], object: &GraspObject, way: Pose) -> bool {
         object.surface.closest_point_within(place, TOUCHING).is_some()
     };
     let touches = |is_thumb: bool| {
-        let of_part = |contact: &&Contact| {
-            let digit = contact.part.digit();
-            digit.is_some_and(|digit| (digit == Digit::Thumb) == is_thumb)
-        };
+        let of_part = |contact: &&Contact| contact.part.is_thumb() == Some(is_thumb);
         contacts.iter().filter(of_part).any(is_near)
     };
     touches(true) && touches(false)

@@ -103,6 +103,11 @@ impl HandPart {
         self.digit().is_none_or(|digit| digits[digit.index()])
     }
 
+    /// True of the thumb's links, false of the fingers', none of the palm.
+    pub fn is_thumb(self) -> Option<bool> {
+        self.digit().map(|digit| digit == Digit::Thumb)
+    }
+
     /// The link of the digit; none for the palm.
     pub const fn phalanx(self) -> Option<Phalanx> {
         match self {

@@ -6,11 +6,11 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::HeldPrimitive;
 use crate::{
-    atlas::{entry::Entry, grips::Grips},
+    atlas::{entry::Entry, grips::Grips, starts::nanometres},
     constraints::Constraints,
     geometry::oriented_box::OrientedBox,
     grasp::Contact,
-    hand::{Digit, rig::Rig},
+    hand::rig::Rig,
     object::GraspObject,
     physical::{grip::GIVER_CLEARANCE, solids::PreparedHand},
     pose::Pose,
@@ -75,7 +75,7 @@ impl Borrowed {
     /// Bytes that one takes at most, beside what all share.
     pub const MOST_BYTES: usize = MOST * size_of::<Laid>();
 
-    /// What an object borrows of the boxes that a hand knows: some milliseconds of work.
+    /// What an object borrows of the boxes that a hand knows, at most 256: some milliseconds of work.
     pub fn of(object: &GraspObject, known: &Arc<[HeldPrimitive]>) -> Self {
         let around = SortedBox::of(&object.bounding_box);
         let mut likest: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
@@ -101,6 +101,7 @@ impl Borrowed {
         let mut laid: Vec<Laid> = laid.collect();
         laid.sort_by(|a, b| a.off.total_cmp(&b.off));
         laid.truncate(MOST);
+        laid.shrink_to_fit();
         Self {
             laid,
             known: Arc::clone(known),
@@ -196,19 +197,13 @@ impl SortedBox {
     }
 }
 
-/// A distance in metres as a number that can be ordered.
-fn nanometres(distance: f32) -> i32 {
-    (distance * 1e9) as i32
-}
-
 /// How far from the object's surface thumb or nearest finger come to be, whichever is farther; none if that is more than
 /// [`WITHIN`].
 fn farther_digit(contacts: &[Contact], object: &GraspObject, object_from_primitive: Pose) -> Option<f32> {
     let nearest = |is_thumb: bool| {
-        let of_part = contacts.iter().filter(|contact| {
-            let digit = contact.part.digit();
-            digit.is_some_and(|digit| (digit == Digit::Thumb) == is_thumb)
-        });
+        let of_part = contacts
+            .iter()
+            .filter(|contact| contact.part.is_thumb() == Some(is_thumb));
         let distances = of_part.filter_map(|contact| {
             let place = object_from_primitive.transform_point(contact.position);
             let closest = object.surface.closest_point_within(place, WITHIN)?;
