@@ -50,16 +50,15 @@ const TURNS: [Quat; 4] = [
     Quat::from_xyzw(0.0, 0.0, 1.0, 0.0),
 ];
 
-/// Where a grip of a box is laid on the object.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A grip of a box that is laid on the object. Where it is follows, so that it takes four bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Laid {
     /// Which of the boxes it is of, …
     primitive: u8,
+    /// … by which of the turns, …
+    turn: u8,
     /// … and which of its grips.
     grip: u16,
-    /// How far thumb or finger is from the surface, in metres.
-    off: f32,
-    object_from_primitive: Pose,
 }
 
 /// Grips of boxes that fit an object, as far as that shows before a hand is closed. They hold the boxes, not the object:
@@ -67,6 +66,7 @@ struct Laid {
 #[derive(Clone, Debug)]
 pub struct Borrowed {
     known: Arc<[HeldPrimitive]>,
+    around: SortedBox,
     /// By how well they fit.
     laid: Vec<Laid>,
 }
@@ -80,31 +80,28 @@ impl Borrowed {
         let around = SortedBox::of(&object.bounding_box);
         let mut likest: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
         likest.sort_by(|(_, a), (_, b)| around.unlikeness(a).total_cmp(&around.unlikeness(b)));
-        let laid = likest.into_iter().take(BOXES).flat_map(|(primitive, held)| {
-            let around = &around;
-            TURNS.into_iter().flat_map(move |turn| {
-                held.grips
-                    .entries()
-                    .iter()
-                    .enumerate()
-                    .filter_map(move |(grip, entry)| {
-                        let object_from_primitive = around.lay(held, turn, &entry.contacts);
-                        Some(Laid {
-                            primitive: primitive as u8,
-                            grip: grip as u16,
-                            off: farther_digit(&entry.contacts, object, object_from_primitive)?,
-                            object_from_primitive,
-                        })
-                    })
-            })
-        });
-        let mut laid: Vec<Laid> = laid.collect();
-        laid.sort_by(|a, b| a.off.total_cmp(&b.off));
-        laid.truncate(MOST);
-        laid.shrink_to_fit();
+        let mut fitting: Vec<(f32, Laid)> = Vec::new();
+        for (primitive, held) in likest.into_iter().take(BOXES) {
+            for turn in 0..TURNS.len() {
+                for (grip, entry) in held.grips.entries().iter().enumerate() {
+                    let laid = Laid {
+                        primitive: primitive as u8,
+                        turn: turn as u8,
+                        grip: grip as u16,
+                    };
+                    let object_from_primitive = around.lay(held, laid);
+                    if let Some(off) = farther_digit(&entry.contacts, object, object_from_primitive) {
+                        fitting.push((off, laid));
+                    }
+                }
+            }
+        }
+        fitting.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        fitting.truncate(MOST);
         Self {
-            laid,
             known: Arc::clone(known),
+            around,
+            laid: fitting.iter().map(|&(_, laid)| laid).collect(),
         }
     }
 
@@ -128,7 +125,7 @@ impl Borrowed {
         interrupted: &impl Fn() -> bool,
     ) -> Option<Grips> {
         let mut by_clearance: Vec<(Reverse<i32>, usize)> = Vec::with_capacity(self.laid.len());
-        for (place, laid) in self.laid.iter().enumerate() {
+        for (place, &laid) in self.laid.iter().enumerate() {
             if place.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
                 return None;
             }
@@ -144,7 +141,7 @@ impl Borrowed {
             if count.is_multiple_of(MOVED_AT_ONCE) && interrupted() {
                 return None;
             }
-            let entry = self.entry(&self.laid[place]);
+            let entry = self.entry(self.laid[place]);
             if entry.is_wanted(constraints) {
                 entries.push(entry);
             }
@@ -152,19 +149,25 @@ impl Borrowed {
         Some(Grips::new(rig, entries))
     }
 
-    fn clearance_at_most(&self, laid: &Laid, giver: &PreparedHand) -> f32 {
-        let grips = &self.known[usize::from(laid.primitive)].grips;
-        grips.moved_clearance_at_most(usize::from(laid.grip), laid.object_from_primitive, giver)
+    fn clearance_at_most(&self, laid: Laid, giver: &PreparedHand) -> f32 {
+        let held = self.held(laid);
+        held.grips
+            .moved_clearance_at_most(usize::from(laid.grip), self.around.lay(held, laid), giver)
     }
 
     /// A grip where it is laid.
-    fn entry(&self, laid: &Laid) -> Entry {
-        let entry = &self.known[usize::from(laid.primitive)].grips.entries()[usize::from(laid.grip)];
-        entry.moved(laid.object_from_primitive)
+    fn entry(&self, laid: Laid) -> Entry {
+        let held = self.held(laid);
+        held.grips.entries()[usize::from(laid.grip)].moved(self.around.lay(held, laid))
+    }
+
+    fn held(&self, laid: Laid) -> &HeldPrimitive {
+        &self.known[usize::from(laid.primitive)]
     }
 }
 
 /// An object's box with its longest edges first, as those of primitives are.
+#[derive(Clone, Copy, Debug)]
 struct SortedBox {
     object_from_box: Pose,
     half_extents: Vec3,
@@ -188,11 +191,14 @@ impl SortedBox {
         ratios.to_array().map(|ratio| ratio.ln().powi(2)).iter().sum()
     }
 
-    /// Where a primitive's frame is laid so that what touches comes to be where it was by the boxes' sizes.
-    fn lay(&self, held: &HeldPrimitive, turn: Quat, contacts: &[Contact]) -> Pose {
+    /// Where the frame of a primitive is laid for one of its grips: so that the middle of what touches comes to be where it was
+    /// by the boxes' sizes.
+    fn lay(&self, held: &HeldPrimitive, laid: Laid) -> Pose {
+        let contacts = &held.grips.entries()[usize::from(laid.grip)].contacts;
         let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
         let middle = sum / contacts.len().max(1) as f32;
         let scaled = middle * self.half_extents / held.primitive.half_extents;
+        let turn = TURNS[usize::from(laid.turn)];
         self.object_from_box * Pose::new(turn * (scaled - middle), turn)
     }
 }
