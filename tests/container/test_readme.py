@@ -63,7 +63,7 @@ def test_the_sum_of_the_default_memory_is_the_server_s():
     mib = 1 << 20
     upload = 2 * value["maximum_object_bytes"] + 640 * value["maximum_object_triangles"] + 512 * 1024
     total = (
-        16 * mib
+        20 * mib
         + value["cache_bytes"]
         + value["maximum_uploads"] * upload
         + 20 * mib * value["builder_threads"]
