@@ -252,9 +252,9 @@ async fn a_grasp_beside_a_known_one_is_replayed_with_the_same_atlas() {
         assert_eq!((replay.attempts, replay.atlas_entries), (1, 0));
         assert_eq!(replay.atlas_stamp, report.atlas_stamp);
         assert!(!replay.atlas_stamp.is_empty());
-        // Without the atlas, that attempt gives another grasp or none.
+        // Without the atlas, that attempt gives another grasp or, mostly, none.
         let without = ask(&server, replay_of(&request, report, v1::AtlasUse::None)).await;
-        replayed += usize::from(without.grasp != first.grasp);
+        replayed += usize::from(without.grasp.is_none());
         if replayed == 2 {
             break;
         }
