@@ -1,13 +1,14 @@
 //! Places a recorded hand on an object so that it holds it, as a giver would.
 //!
-//! A seeded random search followed by a pattern search over the wrist's pose: the hand is a set of spheres along its
-//! bones, and the cost asks that digits and palm touch the surface, that nothing sinks in, and that the hand stays
-//! near one end, so that a receiver finds room at the other.
+//! A seeded random search followed by a pattern search over the wrist's pose: the hand is the solids of its skin, palm,
+//! wrist and forearm among them, and the cost asks that digits and palm touch the surface, that nothing sinks in, and
+//! that the hand stays near one end, so that a receiver finds room at the other.
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
     hand::joints::{HandJoints, index},
     object::GraspObject,
+    physical::solids::{HandSolids, TaperedCapsule, clearance},
     pose::Pose,
 };
 use rand::{RngExt as _, SeedableRng as _};
@@ -18,7 +19,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 pub struct GiverPlacement {
     /// The wrist's `OpenXR` frame in the object's frame.
     pub object_from_wrist: Pose,
-    /// How deep the hand's skin is in the object at worst, in metres.
+    /// How deep the skin of hand or forearm is in the object at worst, in metres.
     pub penetration: f32,
     /// How many digits come within [`TOUCH`] of the surface.
     pub touching_digits: usize,
@@ -27,59 +28,44 @@ pub struct GiverPlacement {
 /// Skin closer to the surface than this counts as touching, in metres.
 pub const TOUCH: f32 = 0.004;
 
-/// A sphere of the hand's volume.
-struct Ball {
-    /// In the wrist's frame.
-    centre: Vec3,
-    radius: f32,
-    /// 0 to 4, or none for the palm.
-    digit: Option<usize>,
+/// Gaps from here on are all the same, in metres: half a hand away.
+const FAR: f32 = 0.05;
+
+/// What a solid of the hand belongs to.
+#[derive(Clone, Copy)]
+enum Owner {
+    /// 0 to 4.
+    Digit(usize),
+    /// The palm with the ball of the thumb.
+    Palm,
+    /// The forearm, which does not hold.
+    Forearm,
 }
 
-/// Spheres at the joints and midway between neighbours of a digit, and across the palm.
-fn balls(joints: &HandJoints) -> Vec<Ball> {
-    let at = |i: usize| (joints.joints[i].pose.position, joints.joints[i].radius);
-    let mut balls = Vec::new();
-    for digit in 0..5 {
-        let first = index::FIRST_OF_DIGIT[digit];
-        for joint in first..=index::TIP_OF_DIGIT[digit] {
-            let (centre, radius) = at(joint);
-            // A finger's metacarpal belongs to the palm.
-            let owner = (digit == 0 || joint > first).then_some(digit);
-            balls.push(Ball {
-                centre,
-                radius,
-                digit: owner,
-            });
-            if joint < index::TIP_OF_DIGIT[digit] {
-                let (next, next_radius) = at(joint + 1);
-                balls.push(Ball {
-                    centre: centre.midpoint(next),
-                    radius: radius.midpoint(next_radius),
-                    digit: owner,
-                });
-            }
-        }
-    }
-    balls
+/// All solids of a hand, in the frame of its joints.
+fn parts(joints: &HandJoints) -> Vec<(TaperedCapsule, Owner)> {
+    let solids = HandSolids::of_joints(joints);
+    let phalanges = solids.phalanges.iter().enumerate();
+    let of_digits = phalanges.flat_map(|(digit, links)| links.map(|link| (link, Owner::Digit(digit))));
+    let of_palm = solids.palm.iter().chain(&solids.thenar);
+    let of_palm = of_palm.map(|&solid| (solid, Owner::Palm));
+    let of_forearm = solids.forearm.map(|solid| (solid, Owner::Forearm));
+    of_digits.chain(of_palm).chain(of_forearm).collect()
 }
 
-/// Signed distance from the surface in metres, negative inside; exact up to 5 cm.
-fn signed_distance(object: &GraspObject, point: Vec3) -> f32 {
-    const FAR: f32 = 0.05;
-    let outside_box = object.bounding_box.distance(point);
-    if outside_box > FAR {
-        return outside_box;
+/// The gap between a solid and an object in metres, negative where they overlap; at most [`FAR`].
+fn gap(object: &GraspObject, solid: &TaperedCapsule, object_from_wrist: Pose) -> f32 {
+    let placed = TaperedCapsule {
+        start: object_from_wrist.transform_point(solid.start),
+        end: object_from_wrist.transform_point(solid.end),
+        ..*solid
+    };
+    // No point of it is farther from its middle than that.
+    let reach = 0.5 * solid.start.distance(solid.end) + solid.start_radius.max(solid.end_radius);
+    if object.bounding_box.distance(placed.start.midpoint(placed.end)) > reach + FAR {
+        return FAR;
     }
-    let distance = object
-        .surface
-        .closest_point_within(point, FAR)
-        .map_or(FAR, |closest| closest.distance);
-    if object.surface.contains(point) {
-        -distance
-    } else {
-        distance
-    }
+    clearance(&placed, &object.surface, FAR)
 }
 
 struct Judged {
@@ -87,15 +73,18 @@ struct Judged {
     placement: GiverPlacement,
 }
 
-fn judge(object: &GraspObject, balls: &[Ball], object_from_wrist: Pose) -> Judged {
-    let mut gap_of_digit = [f32::INFINITY; 5];
-    let mut palm_gap = f32::INFINITY;
+fn judge(object: &GraspObject, parts: &[(TaperedCapsule, Owner)], object_from_wrist: Pose) -> Judged {
+    let mut gap_of_digit = [FAR; 5];
+    let mut palm_gap = FAR;
     let mut sunk = 0.0;
     let mut penetration: f32 = 0.0;
-    for ball in balls {
-        let gap = signed_distance(object, object_from_wrist.transform_point(ball.centre)) - ball.radius;
-        let slot = ball.digit.map_or(&mut palm_gap, |digit| &mut gap_of_digit[digit]);
-        *slot = slot.min(gap);
+    for (solid, owner) in parts {
+        let gap = gap(object, solid, object_from_wrist);
+        match owner {
+            Owner::Digit(digit) => gap_of_digit[*digit] = gap_of_digit[*digit].min(gap),
+            Owner::Palm => palm_gap = palm_gap.min(gap),
+            Owner::Forearm => {}
+        }
         if gap < 0.0 {
             sunk += gap * gap;
             penetration = penetration.max(-gap);
@@ -104,11 +93,11 @@ fn judge(object: &GraspObject, balls: &[Ball], object_from_wrist: Pose) -> Judge
     // The thumb and the two best fingers should touch; the palm may.
     let mut fingers = [gap_of_digit[1], gap_of_digit[2], gap_of_digit[3], gap_of_digit[4]];
     fingers.sort_by(f32::total_cmp);
-    let away = |gap: f32| gap.clamp(0.0, 0.05);
+    let away = |gap: f32| gap.max(0.0);
     let reach = away(gap_of_digit[0]) + away(fingers[0]) + 0.5 * away(fingers[1]) + 0.1 * away(palm_gap);
     let touching_digits = gap_of_digit.iter().filter(|&&gap| gap < TOUCH).count();
     Judged {
-        // 1 mm of gap weighs as much as 1 mm of depth of ten spheres.
+        // 1 mm of gap weighs as much as 1 mm of depth of ten solids.
         cost: reach + 100.0 * sunk,
         placement: GiverPlacement {
             object_from_wrist,
@@ -123,7 +112,7 @@ pub fn place_giver(object: &GraspObject, joints: &HandJoints, seed: u64) -> Give
     const STARTS: usize = 1500;
     const REFINED: usize = 12;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let balls = balls(joints);
+    let parts = parts(joints);
     let position = |i: usize| joints.joints[i].pose.position;
     // Where things are held: between the thumb's tip and those of index and middle finger.
     let grip = (2.0 * position(index::TIP_OF_DIGIT[0])
@@ -151,7 +140,7 @@ pub fn place_giver(object: &GraspObject, joints: &HandJoints, seed: u64) -> Give
             let orientation = random_rotation(&mut random);
             judge(
                 object,
-                &balls,
+                &parts,
                 Pose::new(target - orientation * grip, orientation),
             )
         })
@@ -160,15 +149,19 @@ pub fn place_giver(object: &GraspObject, joints: &HandJoints, seed: u64) -> Give
     starts
         .into_iter()
         .take(REFINED)
-        .map(|start| refine(object, &balls, start))
+        .map(|start| refine(object, &parts, start))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
         .expect("there are starts")
         .placement
 }
 
 /// Pattern search: steps along and about each axis, halved when none helps.
-fn refine(object: &GraspObject, balls: &[Ball], start: Judged) -> Judged {
+fn refine(object: &GraspObject, parts: &[(TaperedCapsule, Owner)], start: Judged) -> Judged {
     let mut best = start;
+    // Turned about the middle of the hand, not about the wrist.
+    let of_hand = parts.iter().filter(|(_, owner)| !matches!(owner, Owner::Forearm));
+    let middles: Vec<Vec3> = of_hand.map(|(solid, _)| solid.start.midpoint(solid.end)).collect();
+    let pivot = middles.iter().sum::<Vec3>() / middles.len() as f32;
     let (mut shift, mut turn) = (0.01_f32, 0.3_f32);
     while shift > 0.0002 {
         let from = best.placement.object_from_wrist;
@@ -176,16 +169,14 @@ fn refine(object: &GraspObject, balls: &[Ball], start: Judged) -> Judged {
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
             for sign in [-1.0, 1.0] {
                 let moved = Pose::new(from.position + sign * shift * axis, from.orientation);
-                // Turned about the middle of the hand's balls, not about the wrist.
-                let pivot =
-                    from.transform_point(balls.iter().map(|b| b.centre).sum::<Vec3>() / balls.len() as f32);
+                let pivot = from.transform_point(pivot);
                 let rotation = Quat::from_axis_angle(axis, sign * turn);
                 let turned = Pose::new(
                     pivot + rotation * (from.position - pivot),
                     (rotation * from.orientation).normalize(),
                 );
                 for candidate in [moved, turned] {
-                    let judged = judge(object, balls, candidate);
+                    let judged = judge(object, parts, candidate);
                     if judged.cost < best.cost {
                         best = judged;
                         improved = true;

@@ -173,7 +173,8 @@ impl Setting {
         } else {
             "built-in"
         };
-        let file = format!("givers-{hands}-{made_of:032x}-{SEED}.json");
+        // Named after how they are placed too: others are there from before.
+        let file = format!("givers-by-skin-{hands}-{made_of:032x}-{SEED}.json");
         let file = self.folder.join(file);
         let kept = fs::read(&file)
             .ok()
