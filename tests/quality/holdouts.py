@@ -32,6 +32,8 @@ HOLDING = {"Cup", "Grip", "Grip 1", "Grip 2", "Grip 3", "Grip 4", "Grip 5", "Gri
 HOLDING |= {"Pinch Large", "Pinch Middle", "Pinch Tight", "Pinch Up", "PingPong", "Rounded", "relax"}
 # How deep a giver's skin may be in the object, in metres; deeper ones are placed anew.
 GIVER_DEPTH = 0.004
+# How often a hand is placed anew until it is not; then the shallowest is taken.
+PLACEMENTS = 24
 
 
 def data_folder():
@@ -137,12 +139,16 @@ class Placer:
 
     def place(self, hand, random):
         """The hand on the object, in the object's frame."""
-        for _ in range(6):
+        shallowest, least = None, np.inf
+        for _ in range(PLACEMENTS):
             placed = self._attempt(hand, random)
             capsules, _ = placed.solids()
-            if max(0.0, -capsules.distances(self.all_points).min()) <= GIVER_DEPTH:
+            depth = max(0.0, -capsules.distances(self.all_points).min())
+            if depth < least:
+                shallowest, least = placed, depth
+            if depth <= GIVER_DEPTH:
                 break
-        return placed
+        return shallowest
 
     def _attempt(self, hand, random, starts=400, refined=6):
         balls = self._balls(hand)

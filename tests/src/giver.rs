@@ -160,7 +160,9 @@ fn refine(object: &GraspObject, parts: &[(TaperedCapsule, Owner)], start: Judged
     let mut best = start;
     // Turned about the middle of the hand, not about the wrist.
     let of_hand = parts.iter().filter(|(_, owner)| !matches!(owner, Owner::Forearm));
-    let middles: Vec<Vec3> = of_hand.map(|(solid, _)| solid.start.midpoint(solid.end)).collect();
+    let middles: Vec<Vec3> = of_hand
+        .map(|(solid, _)| solid.start.midpoint(solid.end))
+        .collect();
     let pivot = middles.iter().sum::<Vec3>() / middles.len() as f32;
     let (mut shift, mut turn) = (0.01_f32, 0.3_f32);
     while shift > 0.0002 {

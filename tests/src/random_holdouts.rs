@@ -318,7 +318,10 @@ mod tests {
                 let mut nearest = f32::INFINITY;
                 for joint in hand.joints {
                     let position = joint.pose.position;
-                    assert!(!object.surface.contains(position), "{what}: a bone is in the object");
+                    assert!(
+                        !object.surface.contains(position),
+                        "{what}: a bone is in the object"
+                    );
                     if let Some(closest) = object.surface.closest_point_within(position, 0.1) {
                         nearest = nearest.min(closest.distance - joint.radius);
                     }

@@ -23,7 +23,7 @@ use super::solids::PALM_SOLIDS;
 use crate::hand::Digit;
 pub(crate) use balance::firm_force;
 pub use balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance, balance_with};
-pub use closure::{EPSILON_TOLERANCE, epsilon};
+pub use closure::{EPSILON_TOLERANCE, epsilon, epsilon_at_most};
 
 /// Contacts of a hand at most: one a link of each digit, and one a solid of the palm.
 pub const MOST_CONTACTS: usize = 15 + PALM_SOLIDS;

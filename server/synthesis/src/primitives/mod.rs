@@ -7,6 +7,7 @@
 //! Primitives, ICRA 2003; there they have rules, here grips that were tried.
 
 pub mod borrowed;
+mod promise;
 
 use glam::Vec3;
 

@@ -7,7 +7,7 @@ use crate::{
     constraints::Constraints,
     hand::rig::Rig,
     physical::scene::Presented,
-    primitives::borrowed::Borrowed,
+    primitives::borrowed::{Among, Borrowed},
 };
 
 /// Attempts that start from those known grips alone that are not certainly in the giver's way, which are found in a fifth of
@@ -54,8 +54,10 @@ pub(super) struct StartGrips {
     nearest: OnceLock<Starts>,
     /// … or of those that are not certainly in the giver's way.
     open: OnceLock<Starts>,
-    /// Borrowed ones.
-    borrowed: OnceLock<(Grips, Starts)>,
+    /// Of borrowed ones, those that are promising, …
+    promising: OnceLock<(Grips, Starts)>,
+    /// … or of all.
+    fitting: OnceLock<(Grips, Starts)>,
 }
 
 impl StartGrips {
@@ -86,7 +88,7 @@ impl StartGrips {
                 Some((starts, atlas.entries()))
             }
             StartFrom::Borrowed(borrowed) => {
-                let (grips, starts) = self.of_borrowed(borrowed, demand, interrupted)?;
+                let (grips, starts) = self.of_borrowed(borrowed, attempt, demand, interrupted)?;
                 Some((starts, grips.entries()))
             }
         }
@@ -120,19 +122,34 @@ impl StartGrips {
         Some(starts.get_or_init(|| found))
     }
 
+    /// Every other attempt starts from promising ones: beside some givers, none of these finds a way. Of scalpels and scissors
+    /// held out by 360 recorded givers, two workers answer 94.4 and 95.8 % in 33 ms where all start from any that fit, and 96.5
+    /// and 97.1 so; three of four are no better.
     fn of_borrowed(
         &self,
         borrowed: &Borrowed,
+        attempt: u64,
         demand: &Demand<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&(Grips, Starts)> {
-        if let Some(found) = self.borrowed.get() {
+        let (among, starts) = if attempt.is_multiple_of(2) {
+            (Among::Promising, &self.promising)
+        } else {
+            (Among::All, &self.fitting)
+        };
+        if let Some(found) = starts.get() {
             return Some(found);
         }
         let giver = demand.presented.giver.as_ref();
-        let grips = borrowed.beside(demand.rig, giver, demand.constraints, interrupted)?;
+        // What is unlike all that was tried promises nothing, and may do all the same.
+        let among = if borrowed.promising() == 0 {
+            Among::All
+        } else {
+            among
+        };
+        let grips = borrowed.beside(among, demand.rig, giver, demand.constraints, interrupted)?;
         let all = 0..grips.entries().len() as u16;
-        let starts = Starts::of(&grips, demand.rig, all, giver, interrupted)?;
-        Some(self.borrowed.get_or_init(|| (grips, starts)))
+        let found = Starts::of(&grips, demand.rig, all, giver, interrupted)?;
+        Some(starts.get_or_init(|| (grips, found)))
     }
 }

@@ -1,12 +1,18 @@
 //! Epsilon against closed forms, dense sampling and its invariances.
 
 use glam::Vec3;
-use grasp_synthesis::physical::immobility::{Buffers, EPSILON_TOLERANCE, Load, SoftContact, epsilon};
+use grasp_synthesis::physical::immobility::{
+    Buffers, EPSILON_TOLERANCE, Load, SoftContact, epsilon, epsilon_at_most,
+};
 
 use crate::support::{Random, contacts_at, load, moved, pyramid_wrenches, sampled_reach, scaled, unit};
 
 fn whole(contacts: &[SoftContact], load: &Load) -> f32 {
     epsilon(contacts, load, 0.0, &mut Buffers::default())
+}
+
+fn bound(contacts: &[SoftContact], load: &Load) -> f32 {
+    epsilon_at_most(contacts, load, &mut Buffers::default())
 }
 
 /// A lower bound of the truth, at most the tolerance below it.
@@ -64,6 +70,9 @@ fn no_closure_is_zero() {
         (Vec3::new(0.0, -0.02, -0.03), Vec3::NEG_Y),
     ];
     assert_eq!(whole(&contacts_at(&table, 0.9, 0.01), &load), 0.0);
+    for what in [&table[..], &line[..1], &[]] {
+        assert_eq!(bound(&contacts_at(what, 0.9, 0.01), &load), 0.0);
+    }
 }
 
 /// Six pairs of frictionless point contacts, each pair for a force and its torque alone: the hull of ±eₓ ± a·eₜ, whose
@@ -120,6 +129,11 @@ fn agrees_with_all_facets_of_frictionless_contacts() {
             .collect();
         let truth = nearest_facet(&wrenches);
         assert_near(whole(&contacts, &load), truth, &format!("case {case}"));
+        let bound = f64::from(bound(&contacts, &load));
+        assert!(
+            bound >= truth * 0.9999,
+            "case {case}: {bound} is no bound of {truth}"
+        );
         closed += u32::from(truth > 0.0);
     }
     assert!(closed > 30, "only {closed} cases have closure");
@@ -148,6 +162,11 @@ fn agrees_with_all_facets_of_a_box_on_a_grid() {
         let load = load(0.3, Vec3::Y, 0.03);
         let truth = nearest_facet(&pyramid_wrenches(&contacts, &load, 0));
         assert_near(whole(&contacts, &load), truth, &format!("case {case}"));
+        let bound = f64::from(bound(&contacts, &load));
+        assert!(
+            bound >= truth * 0.9999,
+            "case {case}: {bound} is no bound of {truth}"
+        );
         closed += u32::from(truth > 0.0);
     }
     assert!(closed > 10, "only {closed} cases have closure");
