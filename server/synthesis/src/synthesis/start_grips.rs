@@ -122,9 +122,10 @@ impl StartGrips {
         Some(starts.get_or_init(|| found))
     }
 
-    /// Every other attempt starts from promising ones: beside some givers, none of these finds a way. Of scalpels and scissors
-    /// held out by 360 recorded givers, two workers answer 94.4 and 95.8 % in 33 ms where all start from any that fit, and 96.5
-    /// and 97.1 so; three of four are no better.
+    /// Every other attempt starts from promising ones. Of the 96 that fit best, these hold more often than others on a scalpel (63 %
+    /// against 40) and less often on a remote (20 % against 37), and where one kind finds no way beside a giver, the other
+    /// may: of scalpels and scissors held out by 360 recorded givers, two workers answer 94.4 and 95.8 % in 33 ms where all start
+    /// from any that fit, and 96.5 and 97.1 so; three of four are no better.
     fn of_borrowed(
         &self,
         borrowed: &Borrowed,
@@ -141,12 +142,6 @@ impl StartGrips {
             return Some(found);
         }
         let giver = demand.presented.giver.as_ref();
-        // What is unlike all that was tried promises nothing, and may do all the same.
-        let among = if borrowed.promising() == 0 {
-            Among::All
-        } else {
-            among
-        };
         let grips = borrowed.beside(among, demand.rig, giver, demand.constraints, interrupted)?;
         let all = 0..grips.entries().len() as u16;
         let found = Starts::of(&grips, demand.rig, all, giver, interrupted)?;
