@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
 
 use super::mesh::TriangleMesh;
-use crate::pose::Pose;
+use crate::base::pose::Pose;
 
 /// Directions in which the outermost vertices are looked up; the box is fitted to those. More fit rounded objects
 /// better and take longer: 256 are about 7° apart, which leaves a sphere's box 0.2 % loose before the last step makes

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::pose::Pose;
+use crate::base::pose::Pose;
 
 /// Squared sine of the angle below which two axes count as parallel: over 10 cm, they part by a micrometre. There is always
 /// an end of parallel axes among their nearest points.

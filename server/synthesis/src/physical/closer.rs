@@ -9,9 +9,8 @@ use super::{
     solids::{PreparedHand, link_radii},
 };
 use crate::{
-    hand::{Digit, HandPose, kinematics::DigitPlane, rig::Rig},
-    pose::Pose,
-    rejection::Rejection,
+    base::{pose::Pose, rejection::Rejection},
+    model::hand::{Digit, HandPose, kinematics::DigitPlane, rig::Rig},
 };
 
 /// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     geometry::mesh_bvh::MeshBvh,
-    hand::{DigitAngles, kinematics::DigitPlane},
+    model::hand::{DigitAngles, kinematics::DigitPlane},
 };
 
 /// How deep a link's capsule is in the surface when it is said to touch, in metres: soft pads give way that much under a

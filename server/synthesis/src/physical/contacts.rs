@@ -7,7 +7,7 @@ use super::{
     immobility::SoftContact,
     solids::{HandSolids, ToldPalm, Touch, closest},
 };
-use crate::{
+use crate::model::{
     grasp::Contact,
     hand::{Digit, HandPart, HandPose, Phalanx, rig::Rig},
     object::GraspObject,

@@ -1,6 +1,6 @@
 //! How a digit's three joints bend together, object or not.
 
-use crate::hand::{
+use crate::model::hand::{
     DigitAngles,
     rig::{AngleRange, DigitRig},
 };

@@ -18,11 +18,15 @@ use super::{
     solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids, clearance, comes_within, self_clearance},
 };
 use crate::{
-    grasp::Contact,
-    hand::{Digit, DigitAngles, HandPose, rig::Rig},
-    pose::Pose,
-    rejection::Rejection,
-    synthesis::stopwatch::{Step, Stopwatch},
+    base::{
+        pose::Pose,
+        rejection::Rejection,
+        stopwatch::{Step, Stopwatch},
+    },
+    model::{
+        grasp::Contact,
+        hand::{Digit, DigitAngles, HandPose, rig::Rig},
+    },
 };
 
 /// How deep any part of the hand may sink into the rigid object, in metres: soft flesh gives way by about as much under
@@ -269,7 +273,7 @@ impl Gripper {
     }
 
     /// After a hand that was refused: at most how much of enough closure it has, if that is near.
-    pub(super) fn near_miss(&self) -> Option<f32> {
+    pub fn near_miss(&self) -> Option<f32> {
         (NEARLY..1.0)
             .contains(&self.closure_share)
             .then_some(self.closure_share)

@@ -1,14 +1,13 @@
 //! `PHYSICAL` validity: grasps that a person would believe.
 //!
 //! Where the thesis tests a few segments, the hand is solid here ([`solids`]), and digits close until their flesh touches
-//! ([`closing`]); where it draws force distributions until one is lucky, forces are solved for ([`immobility`]). Placing
-//! the wrist is common to both; a hand closed on an object is a [`grip`], and one that holds what is presented a grasp
-//! ([`attempt`]).
+//! ([`closing`]); where it draws force distributions until one is lucky, forces are solved for ([`immobility`]). A hand closed on an
+//! object is a [`grip`].
 
-pub mod attempt;
 mod closer;
 pub mod closing;
-pub(crate) mod contacts;
+pub mod contacts;
+pub mod finger_subset;
 pub mod flexing;
 pub mod grip;
 pub mod immobility;
@@ -16,5 +15,3 @@ pub mod obstacle;
 pub mod scene;
 pub mod shape;
 pub mod solids;
-pub mod sparing;
-pub mod stiffness;

@@ -6,7 +6,7 @@ use super::{
     immobility::Load,
     solids::{PreparedHand, ToldSolids},
 };
-use crate::{holdout::Holdout, object::GraspObject};
+use crate::model::{holdout::Holdout, object::GraspObject};
 
 /// Smallest Ferrari-Canny epsilon of a grasp on an object that fingers get round. In a simulation, grasps above 0.02 did
 /// not fall under gravity and half of them held against pulls in all directions. A higher one gives firmer grasps and

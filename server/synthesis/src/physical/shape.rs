@@ -4,15 +4,13 @@ use glam::{Quat, Vec3};
 
 use super::{closing::ClosedDigit, flexing::Flexing, grip::Grip};
 use crate::{
-    hand::{
-        Digit,
-        rig::{AngleRange, Rig},
-    },
-    pose::Pose,
-    strategy::BendRatioChoice,
-    synthesis::{
-        closing_motion::{BEND_RATIOS, allowed_ratios},
-        random::AttemptStream,
+    base::{pose::Pose, random::AttemptStream},
+    model::{
+        bend_ratios::{BEND_RATIOS, BendRatioChoice, allowed_ratios},
+        hand::{
+            Digit,
+            rig::{AngleRange, Rig},
+        },
     },
 };
 

@@ -5,23 +5,23 @@
 //! [`comes_within()`]); how far from other parts of itself by [`self_clearance`], and how far from a giver's hand, of that
 //! hand when it is a [`PreparedHand`].
 
-mod balls;
 mod flesh;
 mod hand_clearance;
 mod hand_solids;
 mod mesh_clearance;
 mod prepared_hand;
-mod told_palm;
-mod told_solids;
+mod spheres;
+mod tracked_palm;
+mod tracked_solids;
 
-pub use balls::{BALLS, Balls};
-pub use flesh::{PALM_SOLIDS, THENAR_SOLIDS};
-pub(super) use hand_clearance::Bounded;
-pub use hand_clearance::{SOFT_CONTACT, self_clearance};
-pub use hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
-pub use mesh_clearance::{Touch, clearance, closest, comes_within};
-pub use prepared_hand::PreparedHand;
-pub use told_palm::ToldPalm;
-pub use told_solids::{TOLD_SOLIDS, ToldSolids};
+pub use crate::physical::solids::flesh::{PALM_SOLIDS, THENAR_SOLIDS};
+pub(super) use crate::physical::solids::hand_clearance::Bounded;
+pub use crate::physical::solids::hand_clearance::{SOFT_CONTACT, self_clearance};
+pub use crate::physical::solids::hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
+pub use crate::physical::solids::mesh_clearance::{Touch, clearance, closest, comes_within};
+pub use crate::physical::solids::prepared_hand::PreparedHand;
+pub use crate::physical::solids::spheres::{BALLS, Balls};
+pub use crate::physical::solids::tracked_palm::ToldPalm;
+pub use crate::physical::solids::tracked_solids::{TOLD_SOLIDS, ToldSolids};
 
 pub use crate::geometry::tapered_capsule::TaperedCapsule;

@@ -10,23 +10,18 @@ use std::{
 };
 
 use super::{
-    SearchEnd, SearchOutcome, SearchSettings,
-    candidates::{KnownGrips, Tried, value},
+    SearchEnd, SearchOutcome,
+    attempt::{Attempt, AttemptEnd},
+    known_grips::{KnownGrips, Tried, value},
     report::{GraspSource, SearchReport},
+    scene::Scene,
+    settings::SearchSettings,
     tally::{Record, Tally},
 };
 use crate::{
-    clock::Clock,
-    grasp::Grasp,
+    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
+    model::{grasp::Grasp, strategy::Choice},
     physical::grip::Gripper,
-    rejection::Rejection,
-    strategy::Choice,
-    synthesis::{
-        attempt::{Attempt, AttemptEnd},
-        random::AttemptStream,
-        scene::Scene,
-        stopwatch::Stopwatch,
-    },
 };
 
 /// How long known grips are looked at before other workers are woken to look for fresh ones. Waking them takes about
@@ -92,16 +87,19 @@ impl<'a> Race<'a> {
             settings,
             clock,
             stop,
-            end: settings.first_attempt.saturating_add(settings.max_attempts),
-            next: AtomicU64::new(settings.first_attempt),
+            end: settings
+                .run
+                .first_attempt
+                .saturating_add(settings.run.max_attempts),
+            next: AtomicU64::new(settings.run.first_attempt),
             bound: AtomicU64::new(u64::MAX),
             over: AtomicBool::new(false),
             lowest_interrupted: AtomicU64::new(u64::MAX),
-            running: (0..settings.workers).map(|_| AtomicU64::new(IDLE)).collect(),
+            running: (0..settings.run.workers).map(|_| AtomicU64::new(IDLE)).collect(),
             known,
             candidates: AtomicU64::new(0),
             winner: Mutex::new(None),
-            tallies: Mutex::new(Vec::with_capacity(settings.workers)),
+            tallies: Mutex::new(Vec::with_capacity(settings.run.workers)),
         }
     }
 
@@ -112,8 +110,8 @@ impl<'a> Race<'a> {
         let mut attempt = Attempt::default();
         self.try_known_grips(worker);
         while let Some(index) = self.take_attempt(worker) {
-            let mut stream = AttemptStream::new(self.settings.seed, index);
-            let ended = attempt.try_synthesize_grasp(self.scene, &mut stream, &mut stopwatch, &|| {
+            let mut stream = AttemptStream::new(self.settings.run.seed, index);
+            let ended = attempt.run(self.scene, &mut stream, &mut stopwatch, &|| {
                 self.is_over_for(index)
             });
             let pruned = attempt.pruned_placements();
@@ -133,7 +131,7 @@ impl<'a> Race<'a> {
                     wrench_angle,
                 } => {
                     // A wrist that may not be there is no near miss.
-                    if rejection != Rejection::UnmetConstraint || !attempt.posed_digits().is_empty() {
+                    if rejection != Rejection::UnmetConstraint || !attempt.is_unposed() {
                         tally.note_miss(rejection, wrench_angle, index, || attempt.pose(self.scene));
                     }
                     Some(rejection)
@@ -144,7 +142,7 @@ impl<'a> Race<'a> {
                 pruned,
                 rejection,
             };
-            if self.settings.reproducible {
+            if self.settings.run.reproducible {
                 tally.count_when_settled(record, || self.last_settled());
             } else {
                 tally.count(&record);
@@ -179,6 +177,7 @@ impl<'a> Race<'a> {
             || self.stop.load(Ordering::Relaxed)
             || self
                 .settings
+                .run
                 .deadline
                 .is_some_and(|deadline| self.clock.now() >= deadline)
     }
@@ -189,7 +188,7 @@ impl<'a> Race<'a> {
         if self.known.is_none() {
             return false;
         }
-        match (self.settings.choice, self.settings.reproducible) {
+        match (self.settings.query.choice, self.settings.run.reproducible) {
             (Choice::BestWithinBudget, _) => false,
             (Choice::FirstValid, true) => self.look_ahead(None),
             (Choice::FirstValid, false) => self.look_ahead(Some(self.clock.now() + HEAD_START)),
@@ -218,7 +217,7 @@ impl<'a> Race<'a> {
     /// Tries known grips beside the other workers' fresh attempts: one worker does, or all if the best is wanted.
     fn try_known_grips(&self, worker: usize) {
         let Some(known) = self.known else { return };
-        if worker > 0 && self.settings.choice == Choice::FirstValid {
+        if worker > 0 && self.settings.query.choice == Choice::FirstValid {
             return;
         }
         let mut gripper = Gripper::default();
@@ -237,9 +236,9 @@ impl<'a> Race<'a> {
     fn enter_winner(&self, source: GraspSource, grasp: Box<Grasp>, value: f32) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let mut winner = self.winner.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_preferred = match (self.settings.choice, source) {
+        let is_preferred = match (self.settings.query.choice, source) {
             (Choice::BestWithinBudget, _) => winner.as_ref().is_none_or(|best| value > best.value),
-            (Choice::FirstValid, GraspSource::Attempt(index)) if self.settings.reproducible => {
+            (Choice::FirstValid, GraspSource::Attempt(index)) if self.settings.run.reproducible => {
                 self.bound.fetch_min(index, Ordering::SeqCst);
                 // A known grip comes before every attempt.
                 winner.as_ref().is_none_or(
@@ -258,7 +257,7 @@ impl<'a> Race<'a> {
 
     /// How good a fresh grasp is; only asked where the best is wanted.
     fn value_of(&self, grasp: &Grasp) -> f32 {
-        if self.settings.choice == Choice::FirstValid {
+        if self.settings.query.choice == Choice::FirstValid {
             return 0.0;
         }
         value(grasp)
@@ -288,7 +287,7 @@ impl<'a> Race<'a> {
             .unwrap_or_else(PoisonError::into_inner)
             // Reproducible: an attempt of a lower index that was cut short might have won.
             .filter(|winner| match winner.source {
-                GraspSource::Attempt(index) => !self.settings.reproducible || index < interrupted,
+                GraspSource::Attempt(index) => !self.settings.run.reproducible || index < interrupted,
                 GraspSource::Atlas(_) | GraspSource::Spared(_) | GraspSource::Recent => true,
             });
         let source = winner.as_ref().map(|winner| winner.source);
@@ -309,7 +308,7 @@ impl<'a> Race<'a> {
             attempt: winning_index,
             source,
             // How many more others had found by then hangs on their number.
-            candidates: if self.settings.reproducible {
+            candidates: if self.settings.run.reproducible {
                 u64::from(source.is_some())
             } else {
                 self.candidates.into_inner()
@@ -317,7 +316,7 @@ impl<'a> Race<'a> {
             known_grips: self.known.map_or(0, KnownGrips::of_atlas),
             ..SearchReport::default()
         };
-        let lowest_winner = winning_index.filter(|_| self.settings.reproducible);
+        let lowest_winner = winning_index.filter(|_| self.settings.run.reproducible);
         for tally in self.tallies.into_inner().unwrap_or_else(PoisonError::into_inner) {
             tally.add_to(&mut report, lowest_winner);
         }

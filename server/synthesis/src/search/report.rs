@@ -1,6 +1,9 @@
 //! What a search did.
 
-use crate::{hand::HandPose, rejection::Rejection, synthesis::stopwatch::StepTimes};
+use crate::{
+    base::{rejection::Rejection, stopwatch::StepTimes},
+    model::hand::HandPose,
+};
 
 /// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of
 /// [`Rejection::ALL`]), of those the one with the smallest wrench angle, of those the one with the lowest index.

@@ -1,7 +1,10 @@
 //! What one worker counts.
 
 use super::report::{NearestMiss, SearchReport};
-use crate::{hand::HandPose, rejection::Rejection, synthesis::stopwatch::StepTimes};
+use crate::{
+    base::{rejection::Rejection, stopwatch::StepTimes},
+    model::hand::HandPose,
+};
 
 /// Attempts that are kept apart before the worker asks which of them are settled. More cost memory (24 bytes each),
 /// fewer cost time.

@@ -7,7 +7,7 @@ use super::{
     contact_model::{ContactCone, ScaledWrench, UnitPush, dot},
     least_squares::{Column, ConicLeastSquares},
 };
-use crate::synthesis::{force_distribution::COMFORTABLE_SHARES, wrenches::GRAVITY};
+use crate::model::forces::{COMFORTABLE_SHARES, GRAVITY};
 
 /// The most force at a contact in newtons: peak force of a finger (thesis 2.5, after Didomenico and Nussbaum). A smaller
 /// one refuses heavy objects.

@@ -216,7 +216,7 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;
-    use crate::hand::Digit;
+    use crate::model::hand::Digit;
 
     /// Steps of each angle that pushes are tried at.
     const STEPS: usize = 160;

@@ -9,15 +9,15 @@ use glam::{Mat3, Vec3};
 
 use super::{
     TaperedCapsule,
-    told_palm::{METACARPAL_ENDS, ToldPalm, joint_of_end},
+    tracked_palm::{METACARPAL_ENDS, ToldPalm, joint_of_end},
 };
 use crate::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         Handedness,
         joints::{HandJoints, index, thesis_from_openxr_frame},
         rig::Rig,
     },
-    pose::Pose,
 };
 
 /// Solids of the palm that do not move with a digit: over the four metacarpals, between them, the ball of the little

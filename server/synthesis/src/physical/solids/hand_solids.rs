@@ -7,13 +7,13 @@ use super::{
     flesh::{Bones, PALM_SOLIDS, Skeleton, THENAR_SOLIDS},
 };
 use crate::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         Digit, HandPose,
         joints::{HandJoints, index, thesis_from_openxr_frame},
         kinematics::DigitPlane,
         rig::Rig,
     },
-    pose::Pose,
 };
 
 /// Solids that the forearm is made of: side by side, since it is twice as wide as thick at the wrist.

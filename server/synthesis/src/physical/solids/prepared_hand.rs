@@ -5,8 +5,8 @@ use glam::Vec3;
 
 use super::{
     TaperedCapsule, ToldSolids,
-    balls::{BALLS, Balls},
     hand_clearance::Bounded,
+    spheres::{BALLS, Balls},
 };
 
 /// Solids that are compared at once: those of a giver, filled up to whole registers.
@@ -14,7 +14,7 @@ const LANES: usize = ToldSolids::COUNT.next_multiple_of(8);
 
 /// The solids of a giver, indices of [`ToldSolids::iter`], in the order in which they settle most: each is the one that
 /// met most of the receiving hands that those before it did not, of 933,479 known grips of the built-in objects that meet
-/// a recorded giver and are not [excluded](crate::atlas::Atlas::excluded_by) before. The first four meet 79 % of them,
+/// a recorded giver and are not [excluded](crate::known::atlas::Atlas::excluded_by) before. The first four meet 79 % of them,
 /// eight 95 %.
 const MET_FIRST: [usize; ToldSolids::COUNT] = [
     8, 2, 18, 5, 15, 11, 29, 6, 13, 25, 17, 30, 3, 14, 12, 1, 16, 22, 7, 26, 4, 9, 39, 21, 20, 10, 24, 19,

@@ -1,0 +1,103 @@
+//! What an atlas was made of: another object, another hand or another algorithm makes other grips.
+
+use sha2::{Digest as _, Sha256};
+
+use crate::{
+    base::pose::Pose,
+    geometry::Segment,
+    model::{
+        hand::{
+            Handedness,
+            rig::{AngleRange, DigitRig, Rig},
+        },
+        object::GraspObject,
+        strategy::Validity,
+    },
+};
+
+/// Counts the algorithms that made atlases. It is raised whenever the same object and hand get other grips, contacts or
+/// scores than before, so that atlases made earlier are not taken for today's.
+pub const ALGORITHM: u32 = 16;
+
+/// Bytes of a key.
+pub const KEY_BYTES: usize = 32;
+
+/// The SHA-256 of everything that the grips of an object and a hand depend on.
+pub fn key(object: &GraspObject, rig: &Rig) -> [u8; KEY_BYTES] {
+    let mut hash = Hash(Sha256::new());
+    hash.count(ALGORITHM);
+    hash.object(object);
+    hash.rig(rig);
+    hash.0.finalize().into()
+}
+
+/// Hashes numbers, little-endian.
+struct Hash(Sha256);
+
+impl Hash {
+    fn count(&mut self, count: u32) {
+        self.0.update(count.to_le_bytes());
+    }
+
+    fn numbers(&mut self, numbers: impl IntoIterator<Item = f32>) {
+        for number in numbers {
+            self.0.update(number.to_le_bytes());
+        }
+    }
+
+    fn object(&mut self, object: &GraspObject) {
+        let mesh = object.surface.mesh();
+        self.count(mesh.positions().len() as u32);
+        self.count(mesh.triangles().len() as u32);
+        for position in mesh.positions() {
+            self.numbers(position.to_array());
+        }
+        for (triangle, corners) in mesh.triangles().iter().enumerate() {
+            for &corner in corners {
+                self.count(corner);
+            }
+            self.0.update([u8::from(object.is_forbidden(triangle as u32))]);
+        }
+        self.numbers([object.mass, object.friction_under(Validity::Physical)]);
+        self.numbers(object.centre_of_mass.to_array());
+    }
+
+    /// All of it but the name: a hand under another name holds alike.
+    fn rig(&mut self, rig: &Rig) {
+        self.0.update([u8::from(rig.handedness == Handedness::Right)]);
+        self.numbers(rig.palm.to_array());
+        self.numbers([rig.reach]);
+        for digit in &rig.digits {
+            self.digit(digit);
+        }
+        for start in rig.finger_metacarpals {
+            self.numbers(start.to_array());
+        }
+        for Segment { start, end } in rig.palm_segments {
+            self.numbers(start.to_array());
+            self.numbers(end.to_array());
+        }
+        self.numbers(rig.joint_radii);
+    }
+
+    fn digit(&mut self, digit: &DigitRig) {
+        let Pose {
+            position,
+            orientation,
+        } = digit.wrist_from_base;
+        self.numbers(position.to_array());
+        self.numbers(orientation.to_array());
+        self.numbers([digit.yaw_sign]);
+        self.numbers(digit.lengths);
+        self.numbers(digit.diameters);
+        let limits = &digit.limits;
+        for AngleRange { min, max } in [
+            limits.base_yaw,
+            limits.base_pitch,
+            limits.second_pitch,
+            limits.third_pitch,
+        ] {
+            self.numbers([min, max]);
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! What is known of how a hand can hold an object before anybody holds it out.
+//!
+//! A grip that passes every check on object and hand alone fits every holdout whose giver and gravity allow it. So grips
+//! are collected once per object and rig ([`growth`]) into an [`atlas`]. A request tries them by their score under its
+//! gravity (`gravity_order`); with a giver, it first tries some that complement one another (`shortlist`). All that is
+//! left to check is the giver's hand and the forces ([`recheck`]). The thesis rejects precomputed grasps because a giver
+//! may spoil all of them (thesis 1). Hence the atlas never answers alone: a fresh search runs in parallel.
+//!
+//! Where no known grip is valid as it is, hands are perturbed near known ones ([`seeds`]). An object without an atlas
+//! takes its seeds from boxes like it ([`primitives`], [`transferred_grips`]).
+
+pub mod atlas;
+mod closure_screen;
+pub mod codec;
+pub mod entry;
+pub mod finger_subsets;
+pub mod friction_uses;
+pub mod gravity;
+mod gravity_order;
+pub mod grips;
+pub mod growth;
+mod inner_spheres;
+pub mod key;
+mod occupancy;
+pub mod primitives;
+pub mod recent_grips;
+pub mod recheck;
+pub mod seed_source;
+pub mod seeds;
+mod shortlist;
+mod spread;
+pub mod subset_grasps;
+pub mod transferred_grips;

@@ -1,0 +1,67 @@
+//! Known grips without the fingers that a giver is in the way of, where those can be spared.
+
+use super::{
+    entry::Entry,
+    inner_spheres::{in_way_by_second, second_balls},
+};
+use crate::{
+    base::stopwatch::NoStopwatch,
+    model::grasp::Grasp,
+    physical::{
+        finger_subset::KnownGrip,
+        grip::{GIVER_CLEARANCE, Gripper},
+        solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids},
+    },
+    rating::assessment::Surroundings,
+};
+
+/// The grasp that a known grip is without the fingers that the giver is in the way of, which rest elsewhere; none if it does
+/// not hold so, or if the giver is in the way of no finger.
+pub fn spared(
+    entry: &Entry,
+    around: &Surroundings<'_>,
+    giver: &PreparedHand,
+    gripper: &mut Gripper,
+) -> Option<Box<Grasp>> {
+    let solids = entry.solids(around.rig);
+    let kept = kept(entry, &solids, giver)?;
+    let told = ToldSolids::of_rig(around.rig, entry.grip.pose.frame_from_wrist, &solids);
+    if is_met(giver, told.still()) {
+        return None;
+    }
+    let known = KnownGrip {
+        grip: &entry.grip,
+        contacts: &entry.contacts,
+        solids: &solids,
+    };
+    let (grip, solids) = gripper
+        .spare(&around.object, around.rig, &known, kept, giver)
+        .ok()?;
+    around.hold_with(&grip, &solids, gripper, &mut NoStopwatch).ok()
+}
+
+/// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others or leave out
+/// one between them, if the thumb or its ball comes too near to the giver, or if no digit does.
+fn kept(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> Option<[bool; 5]> {
+    let sets = entry.finger_sets;
+    let holding = sets.holding();
+    let is_too_much = |near| !sets.hold_beside(in_way_by_second(near));
+    let near = giver.surely_near(&second_balls(solids), GIVER_CLEARANCE, is_too_much);
+    if is_too_much(near) || is_met(giver, solids.thenar.iter()) {
+        return None;
+    }
+    let is_in_way: [bool; 5] = std::array::from_fn(|digit| is_met(giver, solids.phalanges[digit].iter()));
+    let kept = std::array::from_fn(|digit| holding[digit] && !is_in_way[digit]);
+    let does = is_in_way.contains(&true) && sets.contains(kept) && (kept == holding || are_neighbours(kept));
+    does.then_some(kept)
+}
+
+/// True if the fingers among some digits, thumb first, lie side by side: nobody lifts a finger between two that hold.
+fn are_neighbours(digits: [bool; 5]) -> bool {
+    let runs = digits[1..].chunk_by(|a, b| a == b).filter(|run| run[0]);
+    runs.count() == 1
+}
+
+fn is_met<'a>(giver: &PreparedHand, solids: impl Iterator<Item = &'a TaperedCapsule> + Clone) -> bool {
+    giver.is_neared_by(solids, GIVER_CLEARANCE)
+}

@@ -1,0 +1,398 @@
+//! The 33 grasp types of the GRASP taxonomy (T. Feix et al., "The GRASP Taxonomy of Human Grasp Types", 2016; thesis 2.4,
+//! Figure 2.5) and the 17 cells that they share. Numbers and names are the paper's, which the thesis uses. The thesis says
+//! 34 types, but its figure and the paper list 33.
+
+use serde::{Deserialize, Serialize};
+
+/// How firmly a type holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GraspClass {
+    /// The object cannot be moved in the hand.
+    Power,
+    /// It can be moved a little.
+    Intermediate,
+    /// The fingers can move it.
+    Precision,
+}
+
+/// What the fingers push against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Opposition {
+    /// The palm.
+    Palm,
+    /// The thumb's pad, with their own pads.
+    Pad,
+    /// The thumb's pad or another finger, with the side of a finger.
+    Side,
+}
+
+/// The fingers that act as one against palm or thumb (VF 2), counted as in the taxonomy: 2 is the index finger, 5 the
+/// little one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum VirtualFinger {
+    /// 2.
+    Two,
+    /// 2 and 3.
+    TwoToThree,
+    /// 2 to 4.
+    TwoToFour,
+    /// 2 to 5.
+    TwoToFive,
+    /// 3.
+    Three,
+    /// 3 and 4.
+    ThreeToFour,
+    /// 3 to 5.
+    ThreeToFive,
+}
+
+/// Where the thumb is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ThumbPosition {
+    /// It stands opposite to palm and fingers.
+    Abducted,
+    /// It lies beside the palm.
+    Adducted,
+}
+
+/// A cell of the taxonomy's table: types in the same one differ by the object's size and shape only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Cell {
+    /// How firmly.
+    pub class: GraspClass,
+    /// Against what.
+    pub opposition: Opposition,
+    /// With which fingers.
+    pub virtual_finger: VirtualFinger,
+    /// With the thumb where.
+    pub thumb: ThumbPosition,
+}
+
+impl Cell {
+    const POWER_PALM_3_TO_5: Self = Self::new(
+        GraspClass::Power,
+        Opposition::Palm,
+        VirtualFinger::ThreeToFive,
+        ThumbPosition::Adducted,
+    );
+    const POWER_PALM_ABDUCTED: Self = Self::new(
+        GraspClass::Power,
+        Opposition::Palm,
+        VirtualFinger::TwoToFive,
+        ThumbPosition::Abducted,
+    );
+    const POWER_PALM_ADDUCTED: Self = Self::new(
+        GraspClass::Power,
+        Opposition::Palm,
+        VirtualFinger::TwoToFive,
+        ThumbPosition::Adducted,
+    );
+    const POWER_PAD_2: Self = Self::new(
+        GraspClass::Power,
+        Opposition::Pad,
+        VirtualFinger::Two,
+        ThumbPosition::Abducted,
+    );
+    const POWER_PAD_2_TO_3: Self = Self::new(
+        GraspClass::Power,
+        Opposition::Pad,
+        VirtualFinger::TwoToThree,
+        ThumbPosition::Abducted,
+    );
+    const POWER_PAD_2_TO_4: Self = Self::new(
+        GraspClass::Power,
+        Opposition::Pad,
+        VirtualFinger::TwoToFour,
+        ThumbPosition::Abducted,
+    );
+    const POWER_PAD_2_TO_5: Self = Self::new(
+        GraspClass::Power,
+        Opposition::Pad,
+        VirtualFinger::TwoToFive,
+        ThumbPosition::Abducted,
+    );
+    const INTERMEDIATE_SIDE_2_ABDUCTED: Self = Self::new(
+        GraspClass::Intermediate,
+        Opposition::Side,
+        VirtualFinger::Two,
+        ThumbPosition::Abducted,
+    );
+    const INTERMEDIATE_SIDE_2_ADDUCTED: Self = Self::new(
+        GraspClass::Intermediate,
+        Opposition::Side,
+        VirtualFinger::Two,
+        ThumbPosition::Adducted,
+    );
+    const INTERMEDIATE_SIDE_3: Self = Self::new(
+        GraspClass::Intermediate,
+        Opposition::Side,
+        VirtualFinger::Three,
+        ThumbPosition::Adducted,
+    );
+    const INTERMEDIATE_SIDE_3_TO_4: Self = Self::new(
+        GraspClass::Intermediate,
+        Opposition::Side,
+        VirtualFinger::ThreeToFour,
+        ThumbPosition::Abducted,
+    );
+    const PRECISION_PAD_2: Self = Self::new(
+        GraspClass::Precision,
+        Opposition::Pad,
+        VirtualFinger::Two,
+        ThumbPosition::Abducted,
+    );
+    const PRECISION_PAD_2_TO_3: Self = Self::new(
+        GraspClass::Precision,
+        Opposition::Pad,
+        VirtualFinger::TwoToThree,
+        ThumbPosition::Abducted,
+    );
+    const PRECISION_PAD_2_TO_4: Self = Self::new(
+        GraspClass::Precision,
+        Opposition::Pad,
+        VirtualFinger::TwoToFour,
+        ThumbPosition::Abducted,
+    );
+    const PRECISION_PAD_2_TO_5: Self = Self::new(
+        GraspClass::Precision,
+        Opposition::Pad,
+        VirtualFinger::TwoToFive,
+        ThumbPosition::Abducted,
+    );
+    const PRECISION_PAD_2_TO_5_ADDUCTED: Self = Self::new(
+        GraspClass::Precision,
+        Opposition::Pad,
+        VirtualFinger::TwoToFive,
+        ThumbPosition::Adducted,
+    );
+    const PRECISION_SIDE_3: Self = Self::new(
+        GraspClass::Precision,
+        Opposition::Side,
+        VirtualFinger::Three,
+        ThumbPosition::Abducted,
+    );
+
+    const fn new(
+        class: GraspClass,
+        opposition: Opposition,
+        virtual_finger: VirtualFinger,
+        thumb: ThumbPosition,
+    ) -> Self {
+        Self {
+            class,
+            opposition,
+            virtual_finger,
+            thumb,
+        }
+    }
+}
+
+/// A grasp type; its value is its number in the taxonomy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GraspType {
+    /// All fingers and the palm around something thick, the thumb against them.
+    LargeDiameter = 1,
+    /// As [`GraspType::LargeDiameter`], around something thin.
+    SmallDiameter = 2,
+    /// As [`GraspType::LargeDiameter`], around something between thick and thin.
+    MediumWrap = 3,
+    /// Fingers and palm around a handle, the thumb's whole inside along it.
+    AdductedThumb = 4,
+    /// Fingers and palm around a thin handle, the thumb's tip on it.
+    LightTool = 5,
+    /// The tips of four fingers in a row against the thumb's.
+    #[serde(rename = "prismatic_4_finger")]
+    Prismatic4Finger = 6,
+    /// The tips of three fingers in a row against the thumb's.
+    #[serde(rename = "prismatic_3_finger")]
+    Prismatic3Finger = 7,
+    /// The tips of two fingers beside each other against the thumb's.
+    #[serde(rename = "prismatic_2_finger")]
+    Prismatic2Finger = 8,
+    /// The pads of thumb and index finger.
+    PalmarPinch = 9,
+    /// The palm on a disk's face, the digits around its rim.
+    PowerDisk = 10,
+    /// Palm and digits around a ball.
+    PowerSphere = 11,
+    /// The tips of all digits around a disk's rim.
+    PrecisionDisk = 12,
+    /// The tips of all digits around a ball.
+    PrecisionSphere = 13,
+    /// The tips of thumb, index and middle finger around something round.
+    Tripod = 14,
+    /// A handle hangs in the hooked fingers; the thumb has nothing to do.
+    FixedHook = 15,
+    /// The thumb's pad presses something flat onto the side of the index finger.
+    Lateral = 16,
+    /// The index finger stretched along the object, the others close around it.
+    IndexFingerExtension = 17,
+    /// Stretched fingers against the thumb, on something flat.
+    ExtensionType = 18,
+    /// More than the tips of all fingers against the thumb, as in the loops of scissors.
+    DistalType = 19,
+    /// Pads of thumb and index finger, and the side of the middle finger, as on a pen.
+    WritingTripod = 20,
+    /// As [`GraspType::WritingTripod`], with the ring finger beside the middle one.
+    TripodVariation = 21,
+    /// Stretched fingers and the stretched thumb on both sides of something flat.
+    ParallelExtension = 22,
+    /// Between the sides of index and middle finger.
+    AdductionGrip = 23,
+    /// The very tips of thumb and index finger.
+    TipPinch = 24,
+    /// As [`GraspType::WritingTripod`], with the thumb flat beside the fingers.
+    LateralTripod = 25,
+    /// More than the tips of three fingers, and the thumb, around a ball.
+    #[serde(rename = "sphere_4_finger")]
+    Sphere4Finger = 26,
+    /// The tips of thumb and three fingers around something round.
+    Quadpod = 27,
+    /// More than the tips of two fingers, and the thumb, around a ball. The thesis' figure says "Sphere Finger".
+    #[serde(rename = "sphere_3_finger")]
+    Sphere3Finger = 28,
+    /// As [`GraspType::Lateral`], on a rod that the other fingers' pads steady.
+    Stick = 29,
+    /// Stretched fingers press something flat against the palm.
+    Palmar = 30,
+    /// Thumb and index finger bent around the object.
+    Ring = 31,
+    /// As [`GraspType::Lateral`], on a handle that reaches into the palm.
+    Ventral = 32,
+    /// The pads of the stretched index finger and the thumb.
+    InferiorPincer = 33,
+}
+
+impl GraspType {
+    /// All types by number.
+    pub const ALL: [Self; 33] = [
+        Self::LargeDiameter,
+        Self::SmallDiameter,
+        Self::MediumWrap,
+        Self::AdductedThumb,
+        Self::LightTool,
+        Self::Prismatic4Finger,
+        Self::Prismatic3Finger,
+        Self::Prismatic2Finger,
+        Self::PalmarPinch,
+        Self::PowerDisk,
+        Self::PowerSphere,
+        Self::PrecisionDisk,
+        Self::PrecisionSphere,
+        Self::Tripod,
+        Self::FixedHook,
+        Self::Lateral,
+        Self::IndexFingerExtension,
+        Self::ExtensionType,
+        Self::DistalType,
+        Self::WritingTripod,
+        Self::TripodVariation,
+        Self::ParallelExtension,
+        Self::AdductionGrip,
+        Self::TipPinch,
+        Self::LateralTripod,
+        Self::Sphere4Finger,
+        Self::Quadpod,
+        Self::Sphere3Finger,
+        Self::Stick,
+        Self::Palmar,
+        Self::Ring,
+        Self::Ventral,
+        Self::InferiorPincer,
+    ];
+
+    /// The type of a number of the taxonomy; none but for 1 to 33.
+    pub fn of_number(number: u32) -> Option<Self> {
+        let place = usize::try_from(number.checked_sub(1)?).ok()?;
+        Self::ALL.get(place).copied()
+    }
+
+    /// Its number in the taxonomy, from 1 to 33.
+    pub const fn number(self) -> u32 {
+        self as u32
+    }
+
+    /// Its name in the taxonomy.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::LargeDiameter => "Large Diameter",
+            Self::SmallDiameter => "Small Diameter",
+            Self::MediumWrap => "Medium Wrap",
+            Self::AdductedThumb => "Adducted Thumb",
+            Self::LightTool => "Light Tool",
+            Self::Prismatic4Finger => "Prismatic 4 Finger",
+            Self::Prismatic3Finger => "Prismatic 3 Finger",
+            Self::Prismatic2Finger => "Prismatic 2 Finger",
+            Self::PalmarPinch => "Palmar Pinch",
+            Self::PowerDisk => "Power Disk",
+            Self::PowerSphere => "Power Sphere",
+            Self::PrecisionDisk => "Precision Disk",
+            Self::PrecisionSphere => "Precision Sphere",
+            Self::Tripod => "Tripod",
+            Self::FixedHook => "Fixed Hook",
+            Self::Lateral => "Lateral",
+            Self::IndexFingerExtension => "Index Finger Extension",
+            Self::ExtensionType => "Extension Type",
+            Self::DistalType => "Distal Type",
+            Self::WritingTripod => "Writing Tripod",
+            Self::TripodVariation => "Tripod Variation",
+            Self::ParallelExtension => "Parallel Extension",
+            Self::AdductionGrip => "Adduction Grip",
+            Self::TipPinch => "Tip Pinch",
+            Self::LateralTripod => "Lateral Tripod",
+            Self::Sphere4Finger => "Sphere 4-Finger",
+            Self::Quadpod => "Quadpod",
+            Self::Sphere3Finger => "Sphere 3-Finger",
+            Self::Stick => "Stick",
+            Self::Palmar => "Palmar",
+            Self::Ring => "Ring",
+            Self::Ventral => "Ventral",
+            Self::InferiorPincer => "Inferior Pincer",
+        }
+    }
+
+    /// Its cell of the taxonomy's table.
+    pub const fn cell(self) -> Cell {
+        match self {
+            Self::IndexFingerExtension => Cell::POWER_PALM_3_TO_5,
+            Self::LargeDiameter
+            | Self::SmallDiameter
+            | Self::MediumWrap
+            | Self::PowerDisk
+            | Self::PowerSphere => Cell::POWER_PALM_ABDUCTED,
+            Self::AdductedThumb | Self::LightTool | Self::FixedHook | Self::Palmar => {
+                Cell::POWER_PALM_ADDUCTED
+            }
+            Self::Ring => Cell::POWER_PAD_2,
+            Self::Sphere3Finger => Cell::POWER_PAD_2_TO_3,
+            Self::ExtensionType | Self::Sphere4Finger => Cell::POWER_PAD_2_TO_4,
+            Self::DistalType => Cell::POWER_PAD_2_TO_5,
+            Self::AdductionGrip => Cell::INTERMEDIATE_SIDE_2_ABDUCTED,
+            Self::Lateral | Self::Stick | Self::Ventral => Cell::INTERMEDIATE_SIDE_2_ADDUCTED,
+            Self::LateralTripod => Cell::INTERMEDIATE_SIDE_3,
+            Self::TripodVariation => Cell::INTERMEDIATE_SIDE_3_TO_4,
+            Self::PalmarPinch | Self::TipPinch | Self::InferiorPincer => Cell::PRECISION_PAD_2,
+            Self::Prismatic2Finger | Self::Tripod => Cell::PRECISION_PAD_2_TO_3,
+            Self::Prismatic3Finger | Self::Quadpod => Cell::PRECISION_PAD_2_TO_4,
+            Self::Prismatic4Finger | Self::PrecisionDisk | Self::PrecisionSphere => {
+                Cell::PRECISION_PAD_2_TO_5
+            }
+            Self::ParallelExtension => Cell::PRECISION_PAD_2_TO_5_ADDUCTED,
+            Self::WritingTripod => Cell::PRECISION_SIDE_3,
+        }
+    }
+}
+
+/// The confidence from which a grasp is said to be of a type. A higher one leaves more grasps without a type.
+pub const LEAST_CONFIDENCE: f32 = 0.25;
+
+/// What a grasp was found to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Classification {
+    /// The type; none if the grasp is not like any: a person would not call it natural.
+    pub grasp_type: Option<GraspType>,
+    /// How sure that is: how well the best type fits, less half of how well the next one does; 0 to 1. Without a type,
+    /// below [`LEAST_CONFIDENCE`].
+    pub confidence: f32,
+}

@@ -1,0 +1,168 @@
+//! The 26 joints of `XR_EXT_hand_tracking`: the one place where the thesis' frames become `OpenXR` ones.
+
+use glam::{Quat, Vec3};
+
+use super::{HandPose, Handedness, kinematics, rig::Rig};
+use crate::base::pose::Pose;
+
+/// Number of joints.
+pub const JOINT_COUNT: usize = 26;
+
+/// Joint indices in `OpenXR` order.
+pub mod index {
+    /// Centre of the middle metacarpal.
+    pub const PALM: usize = 0;
+    /// The wrist.
+    pub const WRIST: usize = 1;
+    /// First joint of each digit: thumb, index, middle, ring, little. The thumb has four joints (metacarpal, proximal,
+    /// distal, tip), the fingers five (metacarpal, proximal, intermediate, distal, tip).
+    pub const FIRST_OF_DIGIT: [usize; 5] = [2, 6, 11, 16, 21];
+    /// The tip of each digit.
+    pub const TIP_OF_DIGIT: [usize; 5] = [5, 10, 15, 20, 25];
+}
+
+/// The joints' names in `OpenXR` order, as the `WebXR` hand input module writes them ("palm" is `OpenXR`'s own).
+pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
+    "palm",
+    "wrist",
+    "thumb-metacarpal",
+    "thumb-phalanx-proximal",
+    "thumb-phalanx-distal",
+    "thumb-tip",
+    "index-finger-metacarpal",
+    "index-finger-phalanx-proximal",
+    "index-finger-phalanx-intermediate",
+    "index-finger-phalanx-distal",
+    "index-finger-tip",
+    "middle-finger-metacarpal",
+    "middle-finger-phalanx-proximal",
+    "middle-finger-phalanx-intermediate",
+    "middle-finger-phalanx-distal",
+    "middle-finger-tip",
+    "ring-finger-metacarpal",
+    "ring-finger-phalanx-proximal",
+    "ring-finger-phalanx-intermediate",
+    "ring-finger-phalanx-distal",
+    "ring-finger-tip",
+    "pinky-finger-metacarpal",
+    "pinky-finger-phalanx-proximal",
+    "pinky-finger-phalanx-intermediate",
+    "pinky-finger-phalanx-distal",
+    "pinky-finger-tip",
+];
+
+/// The rotation that takes the axes of an `OpenXR` joint (-Z to the tip, +Y out of the back) to those of the thesis'
+/// frame at the same place (+y to the tip, +z out of the palm): a half turn about (0, 1, -1), its own inverse.
+pub const THESIS_FROM_OPENXR: Quat = Quat::from_xyzw(
+    0.0,
+    std::f32::consts::FRAC_1_SQRT_2,
+    -std::f32::consts::FRAC_1_SQRT_2,
+    0.0,
+);
+
+/// The `OpenXR` joint frame at the place of a thesis frame.
+pub fn openxr_from_thesis_frame(frame: Pose) -> Pose {
+    Pose {
+        position: frame.position,
+        orientation: frame.orientation * THESIS_FROM_OPENXR,
+    }
+}
+
+/// The thesis frame at the place of an `OpenXR` joint frame.
+pub fn thesis_from_openxr_frame(joint: Pose) -> Pose {
+    // The half turn is its own inverse.
+    openxr_from_thesis_frame(joint)
+}
+
+/// One joint as a headset reports it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    /// The joint's `OpenXR` frame.
+    pub pose: Pose,
+    /// Distance from the joint to the skin in metres.
+    pub radius: f32,
+}
+
+/// All joints of a hand, in `OpenXR` order and axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandJoints {
+    /// Which hand.
+    pub handedness: Handedness,
+    /// The joints.
+    pub joints: [Joint; JOINT_COUNT],
+}
+
+impl HandJoints {
+    /// The joints of a posed rig, in the frame of the pose.
+    pub fn of_pose(rig: &Rig, pose: &HandPose) -> Self {
+        let frames = kinematics::hand_frames(rig, pose);
+        let wrist = frames.wrist;
+        let mut thesis_frames = [wrist; JOINT_COUNT];
+        for (digit, digit_frames) in frames.digits.iter().enumerate() {
+            let mut next = index::FIRST_OF_DIGIT[digit];
+            if digit > 0 {
+                let start = wrist.transform_point(rig.finger_metacarpals[digit - 1]);
+                let along = digit_frames.links[0].position - start;
+                thesis_frames[next] = Pose {
+                    position: start,
+                    orientation: aim_y(wrist.orientation, along),
+                };
+                next += 1;
+            }
+            for link in digit_frames.links {
+                thesis_frames[next] = link;
+                next += 1;
+            }
+            thesis_frames[next] = Pose {
+                position: digit_frames.tip,
+                orientation: digit_frames.links[2].orientation,
+            };
+        }
+        let metacarpal = thesis_frames[index::FIRST_OF_DIGIT[2]];
+        let knuckle = thesis_frames[index::FIRST_OF_DIGIT[2] + 1];
+        thesis_frames[index::PALM] = Pose {
+            position: (metacarpal.position + knuckle.position) * 0.5,
+            orientation: metacarpal.orientation,
+        };
+        let mut joints = [Joint {
+            pose: wrist,
+            radius: 0.0,
+        }; JOINT_COUNT];
+        for (joint, (frame, radius)) in joints
+            .iter_mut()
+            .zip(thesis_frames.into_iter().zip(rig.joint_radii))
+        {
+            *joint = Joint {
+                pose: openxr_from_thesis_frame(frame),
+                radius,
+            };
+        }
+        Self {
+            handedness: rig.handedness,
+            joints,
+        }
+    }
+
+    /// The same joints seen from another frame.
+    #[must_use]
+    pub fn transformed(&self, a_from_b: Pose) -> Self {
+        let mut transformed = self.clone();
+        // A loop, as mapped arrays stay calls.
+        for joint in &mut transformed.joints {
+            joint.pose = a_from_b * joint.pose;
+        }
+        transformed
+    }
+
+    /// The middle of the palm's skin: one radius out of the palm joint on the palm's side.
+    pub fn palm_skin(&self) -> Vec3 {
+        let palm = self.joints[index::PALM];
+        palm.pose.transform_point(Vec3::new(0.0, -palm.radius, 0.0))
+    }
+}
+
+/// `orientation` turned by the smallest rotation that brings its +y axis along `direction`.
+fn aim_y(orientation: Quat, direction: Vec3) -> Quat {
+    let y = orientation * Vec3::Y;
+    Quat::from_rotation_arc(y, direction.normalize_or(y)) * orientation
+}

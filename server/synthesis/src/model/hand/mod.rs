@@ -1,0 +1,155 @@
+//! The hand: its rig, its pose, where its bones, joints and skin are.
+
+pub mod description;
+pub mod joints;
+pub mod kinematics;
+pub mod rig;
+pub mod skin;
+
+use serde::{Deserialize, Serialize};
+
+use crate::base::pose::Pose;
+
+/// Which hand of a person.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Handedness {
+    /// The left hand.
+    Left,
+    /// The right hand.
+    Right,
+}
+
+impl Handedness {
+    /// The other hand.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+}
+
+/// A digit of the hand; the thesis' finger index i.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Digit {
+    /// 0.
+    Thumb,
+    /// 1.
+    Index,
+    /// 2.
+    Middle,
+    /// 3.
+    Ring,
+    /// 4.
+    Little,
+}
+
+impl Digit {
+    /// All digits in the thesis' order.
+    pub const ALL: [Self; 5] = [Self::Thumb, Self::Index, Self::Middle, Self::Ring, Self::Little];
+
+    /// The thesis' finger index: 0 for the thumb to 4 for the little finger.
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// A link of a digit's chain; the thesis' phalanx index j.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Phalanx {
+    /// 1: the proximal phalanx of a finger, the metacarpal of the thumb.
+    First,
+    /// 2: the intermediate phalanx of a finger, the proximal phalanx of the thumb.
+    Second,
+    /// 3: the distal phalanx.
+    Third,
+}
+
+impl Phalanx {
+    /// All links from the wrist outward.
+    pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::Third];
+
+    /// 0 for the link next to the palm to 2 for the distal one.
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// A part of the hand that can touch something.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HandPart {
+    /// A link of a digit.
+    Phalanx(Digit, Phalanx),
+    /// The palm, with the ball of the thumb.
+    Palm,
+}
+
+impl HandPart {
+    /// The digit; none for the palm.
+    pub const fn digit(self) -> Option<Digit> {
+        match self {
+            Self::Phalanx(digit, _) => Some(digit),
+            Self::Palm => None,
+        }
+    }
+
+    /// True of the palm, and of parts of some digits, thumb first.
+    pub fn is_among(self, digits: [bool; 5]) -> bool {
+        self.digit().is_none_or(|digit| digits[digit.index()])
+    }
+
+    /// True of the thumb's links, false of the fingers', none of the palm.
+    pub fn is_thumb(self) -> Option<bool> {
+        self.digit().map(|digit| digit == Digit::Thumb)
+    }
+
+    /// The link of the digit; none for the palm.
+    pub const fn phalanx(self) -> Option<Phalanx> {
+        match self {
+            Self::Phalanx(_, phalanx) => Some(phalanx),
+            Self::Palm => None,
+        }
+    }
+}
+
+/// The joint angles of one digit, in radians: the thesis' q = (θ1, ψ1, θ2), with θ3 beside them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DigitAngles {
+    /// ψ1: sideways rotation of the base joint, toward the little finger's side; for the thumb, off the palm's plane.
+    pub base_yaw: f32,
+    /// θ1: bend of the base joint toward the palm.
+    pub base_pitch: f32,
+    /// θ2: bend of the second joint.
+    pub second_pitch: f32,
+    /// θ3: bend of the third joint; two thirds of θ2 in the thesis' model.
+    pub third_pitch: f32,
+}
+
+impl DigitAngles {
+    /// θ3 / θ2, from the dependency of DIP on PIP (thesis 4.4, Table 4.2).
+    pub const THIRD_PITCH_SHARE: f32 = 2.0 / 3.0;
+
+    /// The thesis' finger pose, in which the third joint follows the second.
+    pub fn coupled(base_yaw: f32, base_pitch: f32, second_pitch: f32) -> Self {
+        Self {
+            base_yaw,
+            base_pitch,
+            second_pitch,
+            third_pitch: Self::THIRD_PITCH_SHARE * second_pitch,
+        }
+    }
+}
+
+/// A complete configuration of the hand: the thesis' 21-dimensional vector (and the third joints).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HandPose {
+    /// F0: the wrist frame (+y along the fingers, +z out of the palm) in the frame of the computation.
+    pub frame_from_wrist: Pose,
+    /// The digits, thumb first.
+    pub digits: [DigitAngles; 5],
+}

@@ -1,0 +1,128 @@
+//! A hand's bones, limits and widths.
+
+use glam::Vec3;
+
+use super::{Digit, DigitAngles, Handedness, Phalanx};
+use crate::{base::pose::Pose, geometry::Segment};
+
+/// A closed range of angles in radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AngleRange {
+    /// Smallest angle.
+    pub min: f32,
+    /// Largest angle.
+    pub max: f32,
+}
+
+impl AngleRange {
+    /// A range from degrees.
+    pub fn from_degrees(min: f32, max: f32) -> Self {
+        Self {
+            min: min.to_radians(),
+            max: max.to_radians(),
+        }
+    }
+
+    /// True if `angle` lies inside, with `slack` radians of room for rounding.
+    pub fn contains(self, angle: f32, slack: f32) -> bool {
+        angle >= self.min - slack && angle <= self.max + slack
+    }
+}
+
+/// The limits of a digit's joints (thesis Table 4.1).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DigitLimits {
+    /// ψ1.
+    pub base_yaw: AngleRange,
+    /// θ1.
+    pub base_pitch: AngleRange,
+    /// θ2.
+    pub second_pitch: AngleRange,
+    /// θ3.
+    pub third_pitch: AngleRange,
+}
+
+/// One digit chain: three links with a base that is fixed in the wrist frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DigitRig {
+    /// The base joint's frame of the stretched digit (all angles zero) in the wrist frame: +y along the first link,
+    /// +z to the digit's pad.
+    pub wrist_from_base: Pose,
+    /// The sense of a positive yaw ψ1: +1 turns counter-clockwise about the base's +z, -1 clockwise. A positive yaw
+    /// brings a finger toward the little finger's side (+1 on the right hand, thesis Figure 4.2b) and lifts the thumb
+    /// off the palm's plane (-1 on the right hand, because the thumb's pad faces the little finger's side).
+    pub yaw_sign: f32,
+    /// Lengths L of the three links in metres; the last one reaches the fingertip.
+    pub lengths: [f32; 3],
+    /// Diameters W of the three links in metres (Eq. 4.1).
+    pub diameters: [f32; 3],
+    /// What its joints can do.
+    pub limits: DigitLimits,
+}
+
+/// A hand's rig. All of it in the wrist frame: +y along the stretched fingers, +z out of the palm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rig {
+    /// "thesis", "adult" or an own name.
+    pub name: String,
+    /// Which hand.
+    pub handedness: Handedness,
+    /// H: the middle of the palm's skin, from which the palm distance is measured (thesis 5.3).
+    pub palm: Vec3,
+    /// d: distance from the wrist to the tip of the stretched middle finger (thesis 4.3), in metres.
+    pub reach: f32,
+    /// The digit chains, thumb first.
+    pub digits: [DigitRig; 5],
+    /// Where the metacarpals of index, middle, ring and little finger start.
+    pub finger_metacarpals: [Vec3; 4],
+    /// The ten collision segments under the palm's skin (thesis 4.5, Figure 4.4).
+    pub palm_segments: [Segment; 10],
+    /// Distance from joint to skin for the 26 `OpenXR` joints in their order, in metres. The tips lie on the skin
+    /// themselves, as in trackers' data; their radius is that of the fingertip's rounding, so that a capsule around
+    /// the last phalanx must end one radius before the tip.
+    pub joint_radii: [f32; 26],
+}
+
+impl Rig {
+    /// The digit's chain.
+    pub fn digit(&self, digit: Digit) -> &DigitRig {
+        &self.digits[digit.index()]
+    }
+
+    /// Length of a link in metres.
+    pub fn length(&self, digit: Digit, phalanx: Phalanx) -> f32 {
+        self.digits[digit.index()].lengths[phalanx.index()]
+    }
+
+    /// The stretched hand: every angle at zero, or at the limit nearest to it.
+    pub fn stretched(&self) -> [DigitAngles; 5] {
+        self.digits.map(|digit| DigitAngles {
+            base_yaw: 0.0_f32.clamp(digit.limits.base_yaw.min, digit.limits.base_yaw.max),
+            base_pitch: 0.0_f32.clamp(digit.limits.base_pitch.min, digit.limits.base_pitch.max),
+            second_pitch: 0.0_f32.clamp(digit.limits.second_pitch.min, digit.limits.second_pitch.max),
+            third_pitch: 0.0_f32.clamp(digit.limits.third_pitch.min, digit.limits.third_pitch.max),
+        })
+    }
+
+    /// The other hand of the same person: the mirror image in the plane x = 0.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);
+        Self {
+            name: self.name.clone(),
+            handedness: self.handedness.other(),
+            palm: flip(self.palm),
+            reach: self.reach,
+            digits: self.digits.map(|digit| DigitRig {
+                wrist_from_base: digit.wrist_from_base.mirrored_x(),
+                yaw_sign: -digit.yaw_sign,
+                ..digit
+            }),
+            finger_metacarpals: self.finger_metacarpals.map(flip),
+            palm_segments: self
+                .palm_segments
+                .map(|s| Segment::new(flip(s.start), flip(s.end))),
+            joint_radii: self.joint_radii,
+        }
+    }
+}

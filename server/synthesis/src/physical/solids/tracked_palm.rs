@@ -1,0 +1,146 @@
+//! The flesh of the palm as a hand's own joints tell it: tapered capsules from joint to joint, as wide as the joints'
+//! radii say.
+
+use std::array::from_fn;
+
+use glam::Vec3;
+
+use super::TaperedCapsule;
+use crate::{
+    base::pose::Pose,
+    model::hand::{
+        joints::{HandJoints, index},
+        rig::Rig,
+    },
+};
+
+/// Two joints, indices of [`ToldPalm::joints`].
+type Bone = [usize; 2];
+
+/// The ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
+pub(super) const METACARPAL_ENDS: usize = 8;
+
+/// The wrist, and …
+const WRIST: usize = METACARPAL_ENDS;
+
+/// … the base of the thumb.
+const THUMB: usize = WRIST + 1;
+
+/// The bases of the metacarpals, from index to little finger, and …
+const BASES: [usize; 4] = [0, 2, 4, 6];
+
+/// … the knuckles.
+const KNUCKLES: [usize; 4] = [1, 3, 5, 7];
+
+/// Along the metacarpals.
+const METACARPALS: [Bone; 4] = [[0, 1], [2, 3], [4, 5], [6, 7]];
+
+/// From one base to the next.
+const ACROSS_BASES: [Bone; 3] = neighbours(BASES);
+
+/// From one knuckle to the next.
+const ACROSS_KNUCKLES: [Bone; 3] = neighbours(KNUCKLES);
+
+/// From the wrist to the bases of the metacarpals, the thumb's last.
+const FROM_WRIST: [Bone; 5] = [
+    [WRIST, BASES[0]],
+    [WRIST, BASES[1]],
+    [WRIST, BASES[2]],
+    [WRIST, BASES[3]],
+    [WRIST, THUMB],
+];
+
+/// How many capsules [`ToldPalm::around_metacarpals`] gives.
+pub(super) const AROUND_METACARPALS: usize = ACROSS_KNUCKLES.len() + FROM_WRIST.len();
+
+const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
+    let [a, b, c, d] = joints;
+    [[a, b], [b, c], [c, d]]
+}
+
+/// The joints that stay where they are in the palm, each with how far it is from there to the skin.
+#[derive(Clone, Copy, Debug)]
+pub struct ToldPalm {
+    /// Base and knuckle of each metacarpal from index to little finger, the wrist, and the base of the thumb: places and
+    /// radii in metres.
+    joints: [(Vec3, f32); THUMB + 1],
+}
+
+impl ToldPalm {
+    /// That of tracked joints, in their frame.
+    pub fn of_joints(joints: &HandJoints) -> Self {
+        Self {
+            joints: from_fn(|place| {
+                let joint = joints.joints[openxr_joint(place)];
+                (joint.pose.position, joint.radius)
+            }),
+        }
+    }
+
+    /// That of a rig's hand, whatever its digits do.
+    pub fn of_rig(rig: &Rig, frame_from_wrist: Pose) -> Self {
+        let in_wrist = |place: usize| match place {
+            WRIST => Vec3::ZERO,
+            THUMB => rig.digits[0].wrist_from_base.position,
+            end if end.is_multiple_of(2) => rig.finger_metacarpals[end / 2],
+            end => rig.digits[end / 2 + 1].wrist_from_base.position,
+        };
+        Self {
+            joints: from_fn(|place| {
+                (
+                    frame_from_wrist.transform_point(in_wrist(place)),
+                    rig.joint_radii[openxr_joint(place)],
+                )
+            }),
+        }
+    }
+
+    /// Place and radius at a share of the way between two ends of metacarpals.
+    pub(super) fn between(&self, a: usize, b: usize, share: f32) -> (Vec3, f32) {
+        let [(a, a_radius), (b, b_radius)] = [self.joints[a], self.joints[b]];
+        (a.lerp(b, share), a_radius + (b_radius - a_radius) * share)
+    }
+
+    /// What is told of the palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist
+    /// to the bases.
+    pub(super) fn around_metacarpals(&self) -> [TaperedCapsule; AROUND_METACARPALS] {
+        let mut solids = [TaperedCapsule::default(); AROUND_METACARPALS];
+        let bones = ACROSS_KNUCKLES.into_iter().chain(FROM_WRIST);
+        for (solid, bone) in solids.iter_mut().zip(bones) {
+            *solid = self.capsule(bone);
+        }
+        solids
+    }
+
+    /// How far a point is from the skin that is told, in metres, from outside or inside: around the four metacarpals, from
+    /// one to the next across knuckles and bases, and from the wrist to the bases and the thumb's.
+    pub fn distance_of_skin(&self, point: Vec3) -> f32 {
+        METACARPALS
+            .into_iter()
+            .chain(ACROSS_BASES)
+            .chain(ACROSS_KNUCKLES)
+            .chain(FROM_WRIST)
+            .map(|bone| self.capsule(bone).signed_distance(point))
+            .fold(f32::INFINITY, f32::min)
+            .abs()
+    }
+
+    fn capsule(&self, [a, b]: Bone) -> TaperedCapsule {
+        let [(start, start_radius), (end, end_radius)] = [self.joints[a], self.joints[b]];
+        TaperedCapsule::new(start, end, start_radius, end_radius)
+    }
+}
+
+/// The `OpenXR` joint at the end of a metacarpal.
+pub(super) fn joint_of_end(end: usize) -> usize {
+    index::FIRST_OF_DIGIT[end / 2 + 1] + end % 2
+}
+
+/// The `OpenXR` joint of one of [`ToldPalm::joints`].
+fn openxr_joint(place: usize) -> usize {
+    match place {
+        WRIST => index::WRIST,
+        THUMB => index::FIRST_OF_DIGIT[0],
+        end => joint_of_end(end),
+    }
+}

@@ -1,0 +1,193 @@
+//! Algorithm 1 (`TRYSYNTHESIZEGRASP`): one attempt at a grasp.
+//!
+//! The thesis prints "or `ISIMMOBILIZINGGRASP`" in line 6; a grasp is invalid if it does NOT immobilize.
+
+use glam::Vec3;
+
+use super::{
+    collision_validation::collision,
+    contact_validation::{collect_contacts, touches_forbidden_surface},
+    finger_posing::{PosedDigit, find_touching_finger_pose, missing_contacts},
+    immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers},
+    scene::Scene,
+    wrist_placement::WristFrame,
+};
+use crate::{
+    base::{
+        random::AttemptStream,
+        rejection::Rejection,
+        stopwatch::{Step, Stopwatch},
+    },
+    model::{
+        grasp::Contact,
+        hand::{Digit, HandPose},
+    },
+};
+
+/// A hand that passed every check of Algorithm 1, in the object's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeldObject {
+    /// The hand.
+    pub pose: HandPose,
+    /// The bend ratio that each digit was closed with, thumb first; none where the digit found no contact.
+    pub bend_ratios: [Option<f32>; 5],
+    /// Where it touches, thumb first.
+    pub contacts: Vec<Contact>,
+    /// The force on the object at each contact, in newtons.
+    pub forces: Vec<Vec3>,
+    /// The force magnitudes of each digit in newtons, thumb first.
+    pub digit_totals: [f32; 5],
+    /// The angle of Eq. 4.5, in radians.
+    pub wrench_angle: f32,
+}
+
+/// Why an attempt gave no grasp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Failure {
+    /// A check failed.
+    Rejected {
+        /// The check.
+        rejection: Rejection,
+        /// For `NotImmobilizing`: the smallest angle of Eq. 4.5, in radians.
+        wrench_angle: Option<f32>,
+    },
+    /// The stop signal came before the attempt was over.
+    Interrupted,
+}
+
+impl From<Rejection> for Failure {
+    fn from(rejection: Rejection) -> Self {
+        Self::Rejected {
+            rejection,
+            wrench_angle: None,
+        }
+    }
+}
+
+/// The state of an attempt. Reuse it: the next attempt keeps its buffers.
+#[derive(Clone, Debug, Default)]
+pub struct ThesisAttempt {
+    digits: [PosedDigit; 5],
+    /// How many of `digits` this attempt posed.
+    posed: usize,
+    contacts: Vec<Contact>,
+    immobility: ImmobilityBuffers,
+}
+
+impl ThesisAttempt {
+    /// The digits that the attempt posed, thumb first: all five, or none, or the thumb alone where the search stops
+    /// without it.
+    pub fn posed_digits(&self) -> &[PosedDigit] {
+        &self.digits[..self.posed]
+    }
+
+    /// `TRYSYNTHESIZEGRASP`. `place_wrist` is step 1: [`Scene::placer`], or another source of wrist frames. `interrupted`
+    /// is called after at most some 50 µs of work.
+    ///
+    /// # Errors
+    /// The first check that fails, or the stop signal.
+    pub fn try_synthesize_grasp(
+        &mut self,
+        scene: &Scene<'_>,
+        place_wrist: impl FnOnce(&mut AttemptStream) -> Result<WristFrame, Failure>,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<HeldObject, Failure> {
+        self.posed = 0;
+
+        // Step 1, Wrist Placement.
+        let wrist = place_wrist(stream);
+        stopwatch.lap(Step::WristPlacement);
+        let wrist = wrist?;
+
+        // Step 2, Finger Posing.
+        let posed = self.pose_digits(scene, &wrist, stream, interrupted);
+        stopwatch.lap(Step::FingerPosing);
+        posed?;
+        if let Some(rejection) = missing_contacts(scene.strategy, &self.digits[..self.posed]) {
+            return Err(rejection.into());
+        }
+
+        // Step 3, Collision Validation.
+        let collision = collision(scene.holdout, scene.rig, &wrist, &self.digits);
+        stopwatch.lap(Step::CollisionValidation);
+        if let Some(rejection) = collision {
+            return Err(rejection.into());
+        }
+
+        // Step 4, Contact Validation.
+        let object = &scene.holdout.object;
+        collect_contacts(object, &self.digits, &mut self.contacts);
+        let unwanted = touches_forbidden_surface(object, &self.contacts);
+        stopwatch.lap(Step::ContactValidation);
+        if unwanted {
+            return Err(Rejection::UnwantedContact.into());
+        }
+
+        // Step 5, Immobility Validation.
+        let choice = if scene.strategy.takes_first_force_distribution() {
+            DistributionChoice::FirstSufficient
+        } else {
+            DistributionChoice::Best
+        };
+        let immobility = self
+            .immobility
+            .validate(&self.contacts, &scene.load, choice, stream, interrupted);
+        stopwatch.lap(Step::ImmobilityValidation);
+        match immobility {
+            Immobility::Immobilizing(wrench_angle) => Ok(self.held_object(&wrist, wrench_angle)),
+            Immobility::NotImmobilizing(wrench_angle) => Err(Failure::Rejected {
+                rejection: Rejection::NotImmobilizing,
+                wrench_angle: Some(wrench_angle),
+            }),
+            Immobility::Interrupted => Err(Failure::Interrupted),
+        }
+    }
+
+    /// `CALCULATEHOLDPOSEANDCONTACTS`: poses the digits in turn, from strategy D on only while the thumb touches
+    /// (Algorithm 12).
+    fn pose_digits(
+        &mut self,
+        scene: &Scene<'_>,
+        wrist: &WristFrame,
+        stream: &mut AttemptStream,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<(), Failure> {
+        for (digit, motion) in Digit::ALL.into_iter().zip(scene.motion()) {
+            if interrupted() {
+                return Err(Failure::Interrupted);
+            }
+            let posed = find_touching_finger_pose(
+                &scene.holdout.object,
+                wrist,
+                motion,
+                digit,
+                scene.bend_ratios,
+                stream,
+            );
+            let touches = posed.touches();
+            self.digits[digit.index()] = posed;
+            self.posed += 1;
+            if digit == Digit::Thumb && !touches && scene.strategy.stops_without_thumb() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// What an attempt that passed all checks found.
+    fn held_object(&self, wrist: &WristFrame, wrench_angle: f32) -> HeldObject {
+        HeldObject {
+            pose: HandPose {
+                frame_from_wrist: wrist.object_from_wrist,
+                digits: self.digits.map(|digit| digit.angles),
+            },
+            bend_ratios: self.digits.map(|digit| digit.bend_ratio),
+            contacts: self.contacts.clone(),
+            forces: self.immobility.forces(),
+            digit_totals: self.immobility.digit_totals(&self.contacts),
+            wrench_angle,
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Step 3, Collision Validation: Algorithm 6 (`COLLIDESWITHMESH`) for the object and for the presenting hand.
+//!
+//! The 25 collision segments are the rig's ten through the palm and the fifteen bones of the digits. A segment
+//! collides if it crosses the mesh or lies inside it. Palm and fingers are told apart, as Table 5.2 does; the palm
+//! comes first.
+
+use glam::Vec3;
+
+use super::{finger_posing::PosedDigit, wrist_placement::WristFrame};
+use crate::{
+    base::rejection::Rejection,
+    geometry::{Segment, mesh_bvh::MeshBvh},
+    model::{hand::rig::Rig, holdout::Holdout},
+};
+
+/// How the posed hand collides with the object or with the presenting hand, if it does.
+pub fn collision(
+    holdout: &Holdout,
+    rig: &Rig,
+    wrist: &WristFrame,
+    digits: &[PosedDigit; 5],
+) -> Option<Rejection> {
+    let object = &holdout.object.surface;
+    let giver = holdout.presenting_hand.as_ref().map(|hand| {
+        let surface = hand.surface.as_ref();
+        surface.expect("under THESIS validity the giver's hand has a skin")
+    });
+    let palm = rig.palm_segments.map(|segment| {
+        Segment::new(
+            wrist.transform_point(segment.start),
+            wrist.transform_point(segment.end),
+        )
+    });
+    let palm_collides = |mesh: &MeshBvh| palm_collides_with_mesh(&palm, mesh);
+    if palm_collides(object) || giver.is_some_and(palm_collides) {
+        return Some(Rejection::PalmCollision);
+    }
+    let fingers_collide = |mesh: &MeshBvh| {
+        digits
+            .iter()
+            .any(|digit| digit_collides_with_mesh(&digit.joints, mesh))
+    };
+    (fingers_collide(object) || giver.is_some_and(fingers_collide)).then_some(Rejection::FingerCollision)
+}
+
+/// True if a segment crosses the mesh or lies inside it. One that does not cross is inside if its start is.
+fn palm_collides_with_mesh(segments: &[Segment], mesh: &MeshBvh) -> bool {
+    segments.iter().any(|&segment| mesh.is_crossed_by(segment))
+        || segments.iter().any(|segment| mesh.contains(segment.start))
+}
+
+/// The same for the bones of a digit. They form one chain: if none of them crosses, all are inside if one end is.
+fn digit_collides_with_mesh(joints: &[Vec3; 4], mesh: &MeshBvh) -> bool {
+    joints
+        .windows(2)
+        .any(|bone| mesh.is_crossed_by(Segment::new(bone[0], bone[1])))
+        || mesh.contains(joints[0])
+}

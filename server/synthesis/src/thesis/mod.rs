@@ -1,0 +1,29 @@
+//! Grasp synthesis: Algorithm 1 (`TRYSYNTHESIZEGRASP`) and its five steps.
+//!
+//! | Algorithm of the thesis | here |
+//! |---|---|
+//! | 1 `TRYSYNTHESIZEGRASP` | [`algorithm_1`] |
+//! | 2 `PLACEWRISTFRAME`, 11 modified | [`wrist_placement`], measures in [`placement_measures`] |
+//! | 3 `CALCULATEHOLDPOSEANDCONTACTS`, 12 modified | [`algorithm_1`], [`finger_posing`] |
+//! | 4 `FINDTOUCHINGFINGERPOSE`, 13 modified | [`finger_posing`], tables in [`closing_motion`] |
+//! | 5 `GRASPINGCONTACTSEXIST` | [`finger_posing`] |
+//! | 6 `COLLIDESWITHMESH` | [`collision_validation`] |
+//! | 7 `COLLIDESWITHFORBIDDENSURFACE` | [`contact_validation`] |
+//! | 8 `FOURUNITWRENCHESFROMCONTACT` | [`wrenches`] |
+//! | 9 `ISIMMOBILIZINGGRASP`, 14 modified | [`immobility_validation`] |
+//! | 10 `FORCEDISTRIBUTIONSOVERCONTACTS` | [`force_distribution`] |
+//!
+//! Invariants: nothing here allocates on the way to a rejection; nothing reads a clock except through a
+//! [`crate::base::stopwatch::Stopwatch`]; an attempt's outcome depends on the scene, the seed and the attempt's index alone.
+
+pub mod algorithm_1;
+pub mod closing_motion;
+pub mod collision_validation;
+pub mod contact_validation;
+pub mod finger_posing;
+pub mod force_distribution;
+pub mod immobility_validation;
+pub mod placement_measures;
+pub mod scene;
+pub mod wrenches;
+pub mod wrist_placement;
