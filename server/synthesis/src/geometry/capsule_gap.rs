@@ -10,7 +10,6 @@ use super::{
     closest::{closest_on_triangle, pack_distances},
     crossing::{cross, dot, lanes, minus, on_way},
     mesh::TriangleMesh,
-    mesh_bvh::CapsuleGap,
     tapered_capsule::TaperedCapsule,
     waiting::{Waiting, sorted_falling},
     wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
@@ -27,6 +26,19 @@ const ACCURACY: f32 = 1e-5;
 /// The least determinant of two directions that is divided by, in m⁴: less than what a micrometre makes with another,
 /// and more than 0. What comes out for such pairs is clamped and measured, never trusted.
 const LEAST_DETERMINANT: f32 = 1e-30;
+
+/// Where the surface of a mesh is closest to a capsule's skin or deepest below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CapsuleGap {
+    /// The point of the mesh.
+    pub position: Vec3,
+    /// The triangle it lies on.
+    pub triangle: u32,
+    /// Where on the capsule's axis the ball is that comes closest: 0 is the start, 1 the end.
+    pub along: f32,
+    /// From the capsule's skin to the point in metres, negative below the skin.
+    pub gap: f32,
+}
 
 /// Three coordinates of four points.
 type Four = [Vec4; 3];

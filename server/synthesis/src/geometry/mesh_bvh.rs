@@ -5,7 +5,8 @@ use glam::Vec3;
 use super::{
     Segment,
     aabb::Aabb,
-    capsule_gap, closest,
+    capsule_gap::{self, CapsuleGap},
+    closest,
     containment::Containment,
     crossing,
     distance_field::DistanceField,
@@ -34,19 +35,6 @@ pub struct ClosestPoint {
     pub distance: f32,
     /// The triangle it lies on.
     pub triangle: u32,
-}
-
-/// Where the surface of a mesh is closest to a capsule's skin or deepest below it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CapsuleGap {
-    /// The point of the mesh.
-    pub position: Vec3,
-    /// The triangle it lies on.
-    pub triangle: u32,
-    /// Where on the capsule's axis the ball is that comes closest: 0 is the start, 1 the end.
-    pub along: f32,
-    /// From the capsule's skin to the point in metres, negative below the skin.
-    pub gap: f32,
 }
 
 /// A mesh and its hierarchy. Queries take metres in the mesh's frame, never allocate for a tree of usual depth, and

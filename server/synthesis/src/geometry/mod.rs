@@ -1,7 +1,7 @@
 //! Segments, meshes, bounding boxes and the queries that the synthesis needs.
 
 pub mod aabb;
-mod capsule_gap;
+pub mod capsule_gap;
 mod closest;
 mod containment;
 mod crossing;

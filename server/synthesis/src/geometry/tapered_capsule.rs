@@ -58,7 +58,7 @@ impl TaperedCapsule {
     }
 
     /// The smallest ball around it: its centre and radius in metres.
-    pub fn bounding_ball(&self) -> (Vec3, f32) {
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
         let length = self.length();
         let (start, end) = (self.start_radius, self.end_radius);
         if length <= (end - start).abs() {

@@ -8,7 +8,7 @@ use crate::{
     physical::{
         contacts::soften,
         grip::FORBIDDEN_CLEARANCE,
-        immobility::{Buffers, SoftContact, epsilon_at_most},
+        immobility::{Buffers, SoftContact, epsilon_upper_bound},
         scene::ObjectScene,
     },
 };
@@ -24,14 +24,14 @@ const FACING_COS: f32 = 0.7;
 
 /// Looks at laid grips, and keeps its buffers from one to the next.
 #[derive(Debug)]
-pub(super) struct Promise<'a> {
+pub(super) struct ClosureScreen<'a> {
     scene: ObjectScene<'a>,
     on_surface: Vec<Contact>,
     soft_contacts: Vec<SoftContact>,
     buffers: Buffers,
 }
 
-impl<'a> Promise<'a> {
+impl<'a> ClosureScreen<'a> {
     /// For an object under its own friction.
     pub(super) fn new(object: &'a GraspObject) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl<'a> Promise<'a> {
 
     /// True if the contacts, put onto the surface where they come near to it and face it, are off what is forbidden and may have
     /// enough closure, by a bound from above: some two microseconds of work.
-    pub(super) fn is_given(&mut self, contacts: &[Contact], object_from_primitive: Pose) -> bool {
+    pub(super) fn passes(&mut self, contacts: &[Contact], object_from_primitive: Pose) -> bool {
         let object = self.scene.object;
         self.on_surface.clear();
         for contact in contacts {
@@ -73,6 +73,6 @@ impl<'a> Promise<'a> {
         soften(&self.on_surface, self.scene.friction, &mut self.soft_contacts);
         // Closure is the same wherever gravity pulls.
         let load = self.scene.load(Vec3::Y);
-        epsilon_at_most(&self.soft_contacts, &load, &mut self.buffers) >= self.scene.least_epsilon
+        epsilon_upper_bound(&self.soft_contacts, &load, &mut self.buffers) >= self.scene.least_epsilon
     }
 }

@@ -1,7 +1,7 @@
 //! A grip of the atlas.
 
 use super::{
-    finger_subsets::FingerSets,
+    finger_subsets::FingerSubsets,
     friction_uses::FrictionUses,
     gravity::{DIRECTIONS, direction},
 };
@@ -19,7 +19,7 @@ use crate::{
         grip::{Grip, Gripper},
         immobility::{FrictionUse, balance},
         scene::ObjectScene,
-        solids::{HandSolids, ToldSolids},
+        solids::{HandSolids, TrackedSolids},
     },
     rating::{
         scoring::{force_values, grip_values},
@@ -46,7 +46,7 @@ pub struct Entry {
     /// For each of them, how much friction the forces use; all of it where there are none.
     pub friction_uses: FrictionUses,
     /// Which fingers hold without the others.
-    pub finger_sets: FingerSets,
+    pub finger_subsets: FingerSubsets,
 }
 
 impl Entry {
@@ -84,7 +84,7 @@ impl Entry {
                 quantised(of_grip + Score { values }.total())
             })
         });
-        let finger_sets = FingerSets::of(grip.holding_digits(), |kept| {
+        let finger_subsets = FingerSubsets::of(grip.holding_digits(), |kept| {
             let of_kept = contacts.iter().filter(|contact| contact.part.is_among(kept));
             soften(of_kept, scene.friction, &mut gripper.soft_contacts);
             gripper.closure(scene).is_some()
@@ -96,7 +96,7 @@ impl Entry {
             grip_values,
             scores,
             friction_uses,
-            finger_sets,
+            finger_subsets,
         }
     }
 
@@ -117,7 +117,7 @@ impl Entry {
             epsilon: margins.epsilon,
         };
         Some(Self {
-            finger_sets: FingerSets::whole(grip.holding_digits()),
+            finger_subsets: FingerSubsets::whole(grip.holding_digits()),
             grip,
             contacts: grasp.contacts.clone(),
             classification: grasp.classification,
@@ -128,7 +128,7 @@ impl Entry {
     }
 
     /// What a grip of the same hand and contacts is worth now; none if its closure is not enough.
-    pub fn assessed_anew(&self, scene: &ObjectScene<'_>, rig: &Rig, gripper: &mut Gripper) -> Option<Self> {
+    pub fn reassessed(&self, scene: &ObjectScene<'_>, rig: &Rig, gripper: &mut Gripper) -> Option<Self> {
         gripper.contacts.clone_from(&self.contacts);
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
         let grip = Grip {
@@ -158,8 +158,8 @@ impl Entry {
     }
 
     /// The hand as solids for where it is beside a giver's, in the object's frame.
-    pub fn told_solids(&self, rig: &Rig) -> ToldSolids {
-        ToldSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids(rig))
+    pub fn tracked_solids(&self, rig: &Rig) -> TrackedSolids {
+        TrackedSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids(rig))
     }
 
     /// True if wrist, contacts and type are what is demanded.

@@ -8,7 +8,7 @@ const FINGERS: usize = 4;
 /// Sets of fingers that hold without the others: a bit for each of the sixteen, whose number has a bit for each finger from
 /// the index finger on. The thumb always holds with them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FingerSets(u16);
+pub struct FingerSubsets(u16);
 
 /// What a giver's hand is in the way of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl InWay {
     }
 }
 
-impl FingerSets {
+impl FingerSubsets {
     /// All fingers that hold, and those of them that have enough closure alone, as `closes` says of digits, thumb first. It
     /// is not asked of fewer fingers than do not close: every contact only adds to what can be resisted.
     pub fn of(holding: [bool; 5], mut closes: impl FnMut([bool; 5]) -> bool) -> Self {
@@ -70,7 +70,7 @@ impl FingerSets {
         (are_of_whole && bits >> whole & 1 == 1).then_some(Self(bits))
     }
 
-    /// The bits of [`FingerSets::from_bits`].
+    /// The bits of [`FingerSubsets::from_bits`].
     pub(super) fn to_bits(self) -> u16 {
         self.0
     }
@@ -82,7 +82,7 @@ impl FingerSets {
 
     /// True if what a giver leaves holds.
     #[inline]
-    pub fn hold_beside(self, in_way: InWay) -> bool {
+    pub fn hold_without(self, in_way: InWay) -> bool {
         !in_way.others && self.has(self.whole_number() & !in_way.fingers)
     }
 
@@ -152,19 +152,19 @@ mod tests {
 
     #[test]
     fn sets_are_those_that_close_of_fingers_that_hold() {
-        let all = FingerSets::of([true; 5], closes);
+        let all = FingerSubsets::of([true; 5], closes);
         for set in 0..16 {
             assert_eq!(all.contains(digits(set)), closes(digits(set)), "{set:04b}");
         }
         assert_eq!(all.holding(), [true; 5]);
         let without_ring = [true, true, true, false, true];
-        let sets = FingerSets::of(without_ring, closes);
+        let sets = FingerSubsets::of(without_ring, closes);
         assert!(sets.contains(without_ring) && sets.contains(digits(0b1001)));
         assert!(!sets.contains(digits(0b0111)), "the ring finger does not hold");
         assert_eq!(sets.holding(), without_ring);
         assert!(
             !sets.contains([false, true, true, false, true]),
-            "the thumb is not spared"
+            "the thumb is not subset_grasp"
         );
     }
 
@@ -175,7 +175,7 @@ mod tests {
             let holding = digits(1 + case % 15);
             // Any that grows by fingers, as closure does.
             let weights = numbers.next().unwrap();
-            let sets = FingerSets::of(holding, |kept| {
+            let sets = FingerSubsets::of(holding, |kept| {
                 let weight_of = |finger: u32| weights >> (2 * finger) & 3;
                 (0..4)
                     .filter(|&finger| kept[1 + finger as usize])
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn fewer_fingers_than_do_not_close_are_not_asked_about() {
         let mut asked = Vec::new();
-        FingerSets::of([true, true, true, true, false], |digits| {
+        FingerSubsets::of([true, true, true, true, false], |digits| {
             asked.push(number(digits));
             number(digits) == 0b110
         });
@@ -217,14 +217,18 @@ mod tests {
     #[test]
     fn bits_come_again_and_others_are_refused() {
         let holding = [true, true, false, true, true];
-        let sets = FingerSets::of(holding, closes);
-        assert_eq!(FingerSets::from_bits(sets.to_bits(), holding), Some(sets));
-        assert_eq!(FingerSets::from_bits(sets.to_bits(), [true; 5]), None, "not all");
+        let sets = FingerSubsets::of(holding, closes);
+        assert_eq!(FingerSubsets::from_bits(sets.to_bits(), holding), Some(sets));
         assert_eq!(
-            FingerSets::from_bits(sets.to_bits() | 1 << 0b0010, holding),
+            FingerSubsets::from_bits(sets.to_bits(), [true; 5]),
+            None,
+            "not all"
+        );
+        assert_eq!(
+            FingerSubsets::from_bits(sets.to_bits() | 1 << 0b0010, holding),
             None,
             "the middle finger"
         );
-        assert_eq!(FingerSets::from_bits(0, holding), None);
+        assert_eq!(FingerSubsets::from_bits(0, holding), None);
     }
 }

@@ -2,15 +2,15 @@
 
 use super::{
     entry::Entry,
-    finger_subsets::FingerSets,
-    inner_spheres::{farthest_by_first, first_balls, in_way_by_first, second_balls},
+    finger_subsets::FingerSubsets,
+    inner_spheres::{farthest_by_first, first_spheres, in_way_by_first, second_spheres},
 };
 use crate::{
     base::pose::Pose,
     model::hand::rig::Rig,
     physical::{
         grip::GIVER_CLEARANCE,
-        solids::{Balls, PreparedHand, ToldSolids},
+        solids::{PreparedHand, Spheres, TrackedSolids},
     },
 };
 
@@ -19,18 +19,18 @@ use crate::{
 pub struct Grips {
     entries: Vec<Entry>,
     /// The first balls inside each hand, side by side, so that looking at one mostly takes two lines of the cache.
-    cores: Vec<Balls>,
+    inner_spheres: Vec<Spheres>,
     /// Which fingers hold without the others.
-    finger_sets: Vec<FingerSets>,
+    finger_subsets: Vec<FingerSubsets>,
 }
 
 impl Grips {
     /// Some grips of a rig.
     pub fn new(rig: &Rig, entries: Vec<Entry>) -> Self {
-        let core = |entry: &Entry| first_balls(&entry.solids(rig));
+        let core = |entry: &Entry| first_spheres(&entry.solids(rig));
         Self {
-            cores: entries.iter().map(core).collect(),
-            finger_sets: entries.iter().map(|entry| entry.finger_sets).collect(),
+            inner_spheres: entries.iter().map(core).collect(),
+            finger_subsets: entries.iter().map(|entry| entry.finger_subsets).collect(),
             entries,
         }
     }
@@ -42,23 +42,23 @@ impl Grips {
 
     /// Adds a grip.
     pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
-        self.cores.push(first_balls(&entry.solids(rig)));
-        self.finger_sets.push(entry.finger_sets);
+        self.inner_spheres.push(first_spheres(&entry.solids(rig)));
+        self.finger_subsets.push(entry.finger_subsets);
         self.entries.push(entry);
     }
 
     /// Puts a grip in the place of another one.
     pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
-        self.cores[index] = first_balls(&entry.solids(rig));
-        self.finger_sets[index] = entry.finger_sets;
+        self.inner_spheres[index] = first_spheres(&entry.solids(rig));
+        self.finger_subsets[index] = entry.finger_subsets;
         self.entries[index] = entry;
     }
 
     /// The solids of a grip, an index of [`Grips::entries`]; none only if it comes too near to a giver's hand, and not
     /// always then. Sooner told than exactly: mostly by some 20 ns of work.
     #[inline]
-    pub fn unless_met(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<ToldSolids>> {
-        if giver.surely_nears_any(&self.cores[entry], GIVER_CLEARANCE) {
+    pub fn unless_met(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<TrackedSolids>> {
+        if giver.surely_nears_any(&self.inner_spheres[entry], GIVER_CLEARANCE) {
             return None;
         }
         self.unless_met_by_second(entry, rig, giver)
@@ -66,44 +66,49 @@ impl Grips {
 
     /// One in fifty that meet gets as far as the second balls, which are not kept for that.
     #[inline(never)]
-    fn unless_met_by_second(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<ToldSolids>> {
-        let solids = self.entries[entry].told_solids(rig);
-        let is_met = giver.surely_nears_any(&second_balls(&solids.hand), GIVER_CLEARANCE);
+    fn unless_met_by_second(
+        &self,
+        entry: usize,
+        rig: &Rig,
+        giver: &PreparedHand,
+    ) -> Option<Box<TrackedSolids>> {
+        let solids = self.entries[entry].tracked_solids(rig);
+        let is_met = giver.surely_nears_any(&second_spheres(&solids.hand), GIVER_CLEARANCE);
         (!is_met).then(|| Box::new(solids))
     }
 
     /// False only if the giver's hand surely leaves too few digits of a grip to hold the object, or is too near to its palm or
     /// forearm; not always then. Mostly by some 20 ns of work.
     #[inline]
-    pub fn may_spare(&self, entry: usize, giver: &PreparedHand) -> bool {
-        let sets = self.finger_sets[entry];
-        let is_too_much = |near| !sets.hold_beside(in_way_by_first(near));
-        let near = giver.surely_near(&self.cores[entry], GIVER_CLEARANCE, is_too_much);
+    pub fn may_hold_with_subset(&self, entry: usize, giver: &PreparedHand) -> bool {
+        let sets = self.finger_subsets[entry];
+        let is_too_much = |near| !sets.hold_without(in_way_by_first(near));
+        let near = giver.surely_near(&self.inner_spheres[entry], GIVER_CLEARANCE, is_too_much);
         !is_too_much(near)
     }
 
     /// What thumb, palm, forearm and those fingers of a grip that hold without the others are from the giver's hand at most, in
     /// metres, by the first balls inside alone.
-    pub(super) fn clearance_at_most(&self, entry: usize, giver: &PreparedHand) -> f32 {
-        self.core_clearance(entry, &self.cores[entry], giver)
+    pub(super) fn clearance_upper_bound(&self, entry: usize, giver: &PreparedHand) -> f32 {
+        self.core_clearance(entry, &self.inner_spheres[entry], giver)
     }
 
     /// The same for a grip that is moved.
-    pub(crate) fn moved_clearance_at_most(&self, entry: usize, way: Pose, giver: &PreparedHand) -> f32 {
-        self.core_clearance(entry, &self.cores[entry].transformed(way), giver)
+    pub(crate) fn moved_clearance_upper_bound(&self, entry: usize, way: Pose, giver: &PreparedHand) -> f32 {
+        self.core_clearance(entry, &self.inner_spheres[entry].transformed(way), giver)
     }
 
-    fn core_clearance(&self, entry: usize, core: &Balls, giver: &PreparedHand) -> f32 {
-        let distances = giver.distances_at_most(core);
+    fn core_clearance(&self, entry: usize, core: &Spheres, giver: &PreparedHand) -> f32 {
+        let distances = giver.distance_upper_bounds(core);
         let (fingers, others) = farthest_by_first(&distances);
-        let (_, of_fingers) = self.finger_sets[entry].farthest(fingers);
+        let (_, of_fingers) = self.finger_subsets[entry].farthest(fingers);
         of_fingers.min(others)
     }
 
     /// Bytes that they take in memory.
     pub(super) fn bytes(&self) -> usize {
         self.entries.iter().map(Entry::bytes).sum::<usize>()
-            + size_of_val(self.cores.as_slice())
-            + size_of_val(self.finger_sets.as_slice())
+            + size_of_val(self.inner_spheres.as_slice())
+            + size_of_val(self.finger_subsets.as_slice())
     }
 }

@@ -15,7 +15,7 @@ use super::{
     atlas::{Atlas, stamp},
     entry::Entry,
     grips::Grips,
-    seeds::Starts,
+    seeds::Seeds,
     spread::{Cell, Room, Spread, worth},
 };
 use crate::{
@@ -30,7 +30,7 @@ use crate::{
         grip::{Gripper, clear_of_giver},
         scene::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
-        solids::{PreparedHand, ToldSolids},
+        solids::{PreparedHand, TrackedSolids},
     },
     propose::{
         prepared::{PreparedObject, PreparedRig},
@@ -59,7 +59,7 @@ const SEED: u64 = 0x4154_4c41;
 
 /// Share of proposals beside known grips, once there are any: they succeed ten times as often as new ones, which find
 /// what is not known yet.
-const BESIDE_SHARE: f32 = 0.5;
+const PERTURBED_SHARE: f32 = 0.5;
 
 /// The seed of the choice of givers.
 const GIVERS_SEED: u64 = 0x4749_5645;
@@ -121,13 +121,13 @@ struct Giver {
     presented: Presented,
     surface: SurfacePairs,
     /// Known grips that it is nearly clear of, if there is need of more that keep clear of it.
-    starts: Option<Starts>,
+    seeds: Option<Seeds>,
 }
 
 impl Giver {
     /// Is there need of grips that keep clear of it?
     fn is_needy(&self) -> bool {
-        self.starts.is_some()
+        self.seeds.is_some()
     }
 }
 
@@ -251,10 +251,10 @@ impl<'a> Growth<'a> {
         }
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
         let pose = &self.grips.entries()[self.draw(&mut stream)].grip.pose;
-        let hand = PreparedHand::new(&ToldSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
+        let hand = PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
         let all = 0..self.len() as u16;
-        let starts = if self.count_free(&hand) < ENOUGH_FREE {
-            Starts::of(&self.grips, self.rig, all, Some(&hand), || false)
+        let seeds = if self.count_free(&hand) < ENOUGH_FREE {
+            Seeds::of(&self.grips, self.rig, all, Some(&hand), || false)
         } else {
             None
         };
@@ -265,7 +265,7 @@ impl<'a> Growth<'a> {
                 giver_palm: None,
                 up: Vec3::Y,
             },
-            starts,
+            seeds,
         })
     }
 
@@ -314,7 +314,7 @@ impl<'a> Growth<'a> {
     }
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
-        let is_beside = !self.is_empty() && stream.unit() < BESIDE_SHARE;
+        let is_beside = !self.is_empty() && stream.unit() < PERTURBED_SHARE;
         let place = Place {
             object: self.scene.object,
             surface: giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface),
@@ -322,9 +322,9 @@ impl<'a> Growth<'a> {
             rig: self.rig,
             placements: None,
         };
-        match giver.map(|giver| &giver.starts) {
-            Some(Some(starts)) if is_beside => starts.propose_evenly(self.grips.entries(), &place, stream),
-            None if is_beside => Some(self.beside_known(stream)),
+        match giver.map(|giver| &giver.seeds) {
+            Some(Some(seeds)) if is_beside => seeds.propose_evenly(self.grips.entries(), &place, stream),
+            None if is_beside => Some(self.perturbed_known(stream)),
             // Beside a giver who leaves enough, most known grips are of no use.
             _ => propose_evenly(&place, stream, &|| false),
         }
@@ -348,14 +348,14 @@ impl<'a> Growth<'a> {
     }
 
     /// A hand beside a known grip.
-    fn beside_known(&self, stream: &mut AttemptStream) -> Proposal {
+    fn perturbed_known(&self, stream: &mut AttemptStream) -> Proposal {
         let index = self.draw(stream);
         let known = Proposal {
             object_from_wrist: self.grips.entries()[index].grip.pose.frame_from_wrist,
             shape: self.shapes[index],
             advance: 0.0,
         };
-        known.beside(stream)
+        known.perturbed(stream)
     }
 
     /// Takes a grip over, if there is room for it or it is needed.

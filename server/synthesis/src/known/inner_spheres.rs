@@ -1,17 +1,17 @@
 //! Balls inside a hand: what they come too near to, the hand does.
 
 use super::finger_subsets::InWay;
-use crate::physical::solids::{BALLS, Balls, HandSolids};
+use crate::physical::solids::{HandSolids, SPHERES, Spheres};
 
 /// A ball inside a hand: the index of its solid in [`HandSolids::iter`], and where on its axis, from 0 to 1.
-type Core = (usize, f32);
+type InnerSpheres = (usize, f32);
 
 /// Solids of a digit, which come first in [`HandSolids::iter`].
 const LINKS: usize = 3;
 
 /// The balls that settle most, each the one that settled most of what those before it had left: of 32,203 pairs of hands
 /// that meet, grips of the built-in objects by falling score beside recorded givers, these leave 2 %, …
-const FIRST: [Core; BALLS] = [
+const FIRST: [InnerSpheres; SPHERES] = [
     // The middle finger's first link, the thumb's second, the tips of ring and index finger, the palm below the little
     // finger, the little finger, the tips of middle finger and thumb.
     (6, 0.3),
@@ -25,7 +25,7 @@ const FIRST: [Core; BALLS] = [
 ];
 
 /// … and these 2 in a thousand. What is left takes fifty times as long each.
-const SECOND: [Core; BALLS] = [
+const SECOND: [InnerSpheres; SPHERES] = [
     // The ball of the thumb, the first links of index, little and ring finger, the tips of middle and index finger, the
     // forearm, the tip of the little finger.
     (26, 0.9),
@@ -39,40 +39,40 @@ const SECOND: [Core; BALLS] = [
 ];
 
 /// The first balls inside a hand.
-pub(super) fn first_balls(solids: &HandSolids) -> Balls {
-    balls(solids, &FIRST)
+pub(super) fn first_spheres(solids: &HandSolids) -> Spheres {
+    spheres(solids, &FIRST)
 }
 
 /// The second ones.
-pub(super) fn second_balls(solids: &HandSolids) -> Balls {
-    balls(solids, &SECOND)
+pub(super) fn second_spheres(solids: &HandSolids) -> Spheres {
+    spheres(solids, &SECOND)
 }
 
 /// Of first balls, those of some digits, palm and forearm; in place of the others nothing that is near to anything.
-pub(super) fn first_of_digits(first: Balls, digits: [bool; 5]) -> Balls {
+pub(super) fn first_of_digits(first: Spheres, digits: [bool; 5]) -> Spheres {
     of_digits(first, &FIRST, digits)
 }
 
 /// Of second ones, likewise.
-pub(super) fn second_of_digits(second: Balls, digits: [bool; 5]) -> Balls {
+pub(super) fn second_of_digits(second: Spheres, digits: [bool; 5]) -> Spheres {
     of_digits(second, &SECOND, digits)
 }
 
 /// How far fingers, from the index finger on, and what cannot be spared are at most, by the distances of the first balls.
 #[inline]
-pub(super) fn farthest_by_first(distances: &[f32; BALLS]) -> ([f32; 4], f32) {
+pub(super) fn farthest_by_first(distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
     by_owner(&FIRST, distances)
 }
 
 /// The same by those of the second ones.
-pub(super) fn farthest_by_second(distances: &[f32; BALLS]) -> ([f32; 4], f32) {
+pub(super) fn farthest_by_second(distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
     by_owner(&SECOND, distances)
 }
 
 #[inline]
-fn by_owner(cores: &[Core; BALLS], distances: &[f32; BALLS]) -> ([f32; 4], f32) {
+fn by_owner(inner_spheres: &[InnerSpheres; SPHERES], distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
     let (mut fingers, mut others) = ([f32::INFINITY; 4], f32::INFINITY);
-    for (core, &distance) in cores.iter().zip(distances) {
+    for (core, &distance) in inner_spheres.iter().zip(distances) {
         let digit = core.0 / LINKS;
         let owner = match digit.checked_sub(1) {
             Some(finger) if finger < fingers.len() => &mut fingers[finger],
@@ -96,18 +96,18 @@ pub(super) fn in_way_by_second(near: u8) -> InWay {
 }
 
 /// For any of the first balls, looked up: it is asked for every grip.
-static OF_FIRST: [InWay; 1 << BALLS] = in_way_of(&FIRST);
+static OF_FIRST: [InWay; 1 << SPHERES] = in_way_of(&FIRST);
 
-static OF_SECOND: [InWay; 1 << BALLS] = in_way_of(&SECOND);
+static OF_SECOND: [InWay; 1 << SPHERES] = in_way_of(&SECOND);
 
-const fn in_way_of(cores: &[Core; BALLS]) -> [InWay; 1 << BALLS] {
-    let mut in_way = [InWay::NOTHING; 1 << BALLS];
+const fn in_way_of(inner_spheres: &[InnerSpheres; SPHERES]) -> [InWay; 1 << SPHERES] {
+    let mut in_way = [InWay::NOTHING; 1 << SPHERES];
     let mut near = 0;
     while near < in_way.len() {
         let mut ball = 0;
-        while ball < BALLS {
+        while ball < SPHERES {
             if near >> ball & 1 == 1 {
-                in_way[near] = in_way[near].and_of(cores[ball].0 / LINKS);
+                in_way[near] = in_way[near].and_of(inner_spheres[ball].0 / LINKS);
             }
             ball += 1;
         }
@@ -116,14 +116,18 @@ const fn in_way_of(cores: &[Core; BALLS]) -> [InWay; 1 << BALLS] {
     in_way
 }
 
-fn of_digits(balls: Balls, cores: &[Core; BALLS], digits: [bool; 5]) -> Balls {
-    balls.kept(|i| digits.get(cores[i].0 / LINKS).is_none_or(|&counts| counts))
+fn of_digits(spheres: Spheres, inner_spheres: &[InnerSpheres; SPHERES], digits: [bool; 5]) -> Spheres {
+    spheres.kept(|i| {
+        digits
+            .get(inner_spheres[i].0 / LINKS)
+            .is_none_or(|&counts| counts)
+    })
 }
 
 #[inline]
-fn balls(solids: &HandSolids, cores: &[Core; BALLS]) -> Balls {
-    Balls::new(|i| {
-        let (index, along) = cores[i];
+fn spheres(solids: &HandSolids, inner_spheres: &[InnerSpheres; SPHERES]) -> Spheres {
+    Spheres::new(|i| {
+        let (index, along) = inner_spheres[i];
         let solid = solids.solid(index);
         (solid.at(along), solid.radius_at(along))
     })

@@ -8,14 +8,14 @@ use crate::{
         grip::{Gripper, clear_of_giver},
         immobility::{FrictionUse, balance_with},
         scene::{ObjectScene, Presented},
-        solids::ToldSolids,
+        solids::TrackedSolids,
     },
     rating::{assessment::grasp, scoring::score},
 };
 
 /// An object that is held out, as known grips are asked to hold it.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked<'a> {
+pub struct Recheck<'a> {
     scene: &'a ObjectScene<'a>,
     rig: &'a Rig,
     presented: &'a Presented,
@@ -25,7 +25,7 @@ pub struct Asked<'a> {
     friction_differs: bool,
 }
 
-impl<'a> Asked<'a> {
+impl<'a> Recheck<'a> {
     /// Asks grips of an object and a rig.
     pub fn new(scene: &'a ObjectScene<'a>, rig: &'a Rig, presented: &'a Presented) -> Self {
         Self {
@@ -38,8 +38,8 @@ impl<'a> Asked<'a> {
     }
 
     /// The grasp that a grip is for what is presented, with its score; none if it comes too near to the giver or the object
-    /// slips. `solids` are the grip's, as [`Entry::told_solids`] gives them.
-    pub fn hold(&self, entry: &Entry, solids: &ToldSolids, gripper: &mut Gripper) -> Option<Grasp> {
+    /// slips. `solids` are the grip's, as [`Entry::tracked_solids`] gives them.
+    pub fn hold(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
         let Self {
             scene,
             rig,

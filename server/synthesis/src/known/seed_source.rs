@@ -6,8 +6,8 @@ use super::{
     atlas::Atlas,
     entry::Entry,
     grips::Grips,
-    seeds::Starts,
-    transferred_grips::{Among, Borrowed},
+    seeds::Seeds,
+    transferred_grips::{Among, TransferredGrips},
 };
 use crate::{
     model::{constraints::Constraints, hand::rig::Rig},
@@ -18,26 +18,26 @@ use crate::{
 /// the time: 0.8 ms instead of 4. Of later ones, every other does. Of 51 holdouts that atlases of the built-in objects do
 /// not answer, hands beside these hold as soon as hands beside those that are nearest to keeping clear of all, and beside
 /// some givers sooner or later by a tenfold.
-const FROM_OPEN_ONES: u64 = 8;
+const ATTEMPTS_FROM_OPEN_SEEDS: u64 = 8;
 
 /// Where grips to start from come from.
 #[derive(Clone, Debug, Default)]
-pub enum StartFrom {
+pub enum SeedSource {
     /// There are none.
     #[default]
     Nothing,
     /// Grips that hold the object.
     Atlas(Arc<Atlas>),
     /// Grips that hold something like it, where it has no atlas yet.
-    Borrowed(Arc<Borrowed>),
+    TransferredGrips(Arc<TransferredGrips>),
 }
 
-impl StartFrom {
+impl SeedSource {
     /// The atlas, if it is one.
     pub fn atlas(&self) -> Option<&Arc<Atlas>> {
         match self {
             Self::Atlas(atlas) => Some(atlas),
-            Self::Nothing | Self::Borrowed(_) => None,
+            Self::Nothing | Self::TransferredGrips(_) => None,
         }
     }
 }
@@ -52,20 +52,20 @@ pub struct Demand<'a> {
 
 /// The grips to start from beside a giver, each kind once it was asked for.
 #[derive(Clone, Debug, Default)]
-pub struct StartGrips {
-    from: StartFrom,
+pub struct SeedSets {
+    from: SeedSource,
     /// Of an atlas, those that are nearest to keeping clear, …
-    nearest: OnceLock<Starts>,
+    nearest: OnceLock<Seeds>,
     /// … or of those that are not certainly in the giver's way.
-    open: OnceLock<Starts>,
+    open: OnceLock<Seeds>,
     /// Of borrowed ones, those that are promising, …
-    promising: OnceLock<(Grips, Starts)>,
+    passing: OnceLock<(Grips, Seeds)>,
     /// … or of all.
-    fitting: OnceLock<(Grips, Starts)>,
+    fitting: OnceLock<(Grips, Seeds)>,
 }
 
-impl StartGrips {
-    pub fn new(from: StartFrom) -> Self {
+impl SeedSets {
+    pub fn new(from: SeedSource) -> Self {
         Self {
             from,
             ..Self::default()
@@ -74,7 +74,7 @@ impl StartGrips {
 
     /// True if there is nothing to start from.
     pub fn is_empty(&self) -> bool {
-        matches!(self.from, StartFrom::Nothing)
+        matches!(self.from, SeedSource::Nothing)
     }
 
     /// Those that an attempt starts from, and the grips that they are of: of an atlas, the ones that hold under this
@@ -84,16 +84,16 @@ impl StartGrips {
         attempt: u64,
         demand: &Demand<'_>,
         interrupted: &impl Fn() -> bool,
-    ) -> Option<(&Starts, &[Entry])> {
+    ) -> Option<(&Seeds, &[Entry])> {
         match &self.from {
-            StartFrom::Nothing => None,
-            StartFrom::Atlas(atlas) => {
-                let starts = self.of_atlas(atlas, attempt, demand, interrupted)?;
-                Some((starts, atlas.entries()))
+            SeedSource::Nothing => None,
+            SeedSource::Atlas(atlas) => {
+                let seeds = self.of_atlas(atlas, attempt, demand, interrupted)?;
+                Some((seeds, atlas.entries()))
             }
-            StartFrom::Borrowed(borrowed) => {
-                let (grips, starts) = self.of_borrowed(borrowed, attempt, demand, interrupted)?;
-                Some((starts, grips.entries()))
+            SeedSource::TransferredGrips(borrowed) => {
+                let (grips, seeds) = self.of_transferred(borrowed, attempt, demand, interrupted)?;
+                Some((seeds, grips.entries()))
             }
         }
     }
@@ -104,16 +104,16 @@ impl StartGrips {
         attempt: u64,
         demand: &Demand<'_>,
         interrupted: &impl Fn() -> bool,
-    ) -> Option<&Starts> {
+    ) -> Option<&Seeds> {
         let giver = demand.presented.giver.as_ref();
-        let from_open_ones = attempt < FROM_OPEN_ONES || attempt.is_multiple_of(2);
+        let from_open_ones = attempt < ATTEMPTS_FROM_OPEN_SEEDS || attempt.is_multiple_of(2);
         let excluding = giver.filter(|_| from_open_ones);
-        let starts = match excluding {
+        let seeds = match excluding {
             Some(_) => &self.open,
             None => &self.nearest,
         };
-        if let Some(starts) = starts.get() {
-            return Some(starts);
+        if let Some(seeds) = seeds.get() {
+            return Some(seeds);
         }
         let excluded = excluding.map(|giver| atlas.excluded_by(giver));
         let holding = atlas.holding_under(demand.presented.up).iter().copied();
@@ -121,34 +121,34 @@ impl StartGrips {
             excluded.as_ref().is_none_or(|excluded| !excluded.contains(entry))
                 && atlas.entries()[usize::from(entry)].is_wanted(demand.constraints)
         });
-        let found = Starts::of(atlas.grips(), demand.rig, wanted, giver, interrupted)?;
+        let found = Seeds::of(atlas.grips(), demand.rig, wanted, giver, interrupted)?;
         // Another worker may have found the same meanwhile.
-        Some(starts.get_or_init(|| found))
+        Some(seeds.get_or_init(|| found))
     }
 
     /// Every other attempt starts from promising ones. Of the 96 that fit best, these hold more often than others on a scalpel (63 %
     /// against 40) and less often on a remote (20 % against 37), and where one kind finds no way beside a giver, the other
     /// may: of scalpels and scissors held out by 360 recorded givers, two workers answer 94.4 and 95.8 % in 33 ms where all start
     /// from any that fit, and 96.5 and 97.1 so; three of four are no better.
-    fn of_borrowed(
+    fn of_transferred(
         &self,
-        borrowed: &Borrowed,
+        borrowed: &TransferredGrips,
         attempt: u64,
         demand: &Demand<'_>,
         interrupted: &impl Fn() -> bool,
-    ) -> Option<&(Grips, Starts)> {
-        let (among, starts) = if attempt.is_multiple_of(2) {
-            (Among::Promising, &self.promising)
+    ) -> Option<&(Grips, Seeds)> {
+        let (among, seeds) = if attempt.is_multiple_of(2) {
+            (Among::Passing, &self.passing)
         } else {
             (Among::All, &self.fitting)
         };
-        if let Some(found) = starts.get() {
+        if let Some(found) = seeds.get() {
             return Some(found);
         }
         let giver = demand.presented.giver.as_ref();
-        let grips = borrowed.beside(among, demand.rig, giver, demand.constraints, interrupted)?;
+        let grips = borrowed.perturbed(among, demand.rig, giver, demand.constraints, interrupted)?;
         let all = 0..grips.entries().len() as u16;
-        let found = Starts::of(&grips, demand.rig, all, giver, interrupted)?;
-        Some(starts.get_or_init(|| (grips, found)))
+        let found = Seeds::of(&grips, demand.rig, all, giver, interrupted)?;
+        Some(seeds.get_or_init(|| (grips, found)))
     }
 }

@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::{
     entry::Entry,
     grips::Grips,
-    inner_spheres::{farthest_by_second, first_balls, first_of_digits, second_balls, second_of_digits},
+    inner_spheres::{farthest_by_second, first_of_digits, first_spheres, second_of_digits, second_spheres},
 };
 use crate::{
     base::{pose::Pose, random::AttemptStream},
@@ -18,14 +18,14 @@ use crate::{
     physical::{
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},
         shape::{HandShape, Proposal},
-        solids::{Balls, HandSolids, PreparedHand, TaperedCapsule},
+        solids::{HandSolids, PreparedHand, Spheres, TaperedCapsule},
     },
     propose::proposal::Place,
 };
 
 /// Grips to start from. With fewer, fewer givers are answered at all; more are farther from keeping clear, and hold less
 /// often.
-const STARTS: usize = 32;
+const SEEDS: usize = 32;
 
 /// Hands beside a grip that are looked at until one keeps clear, first by balls inside alone. More find one more often
 /// beside grips that are deep in the giver: of 31 holdouts of the built-in scalpel that the atlas does not answer, 22 had a
@@ -51,7 +51,7 @@ const BOUNDED_AT_ONCE: usize = 64;
 
 /// A known grip to start from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Start {
+pub struct Seed {
     /// Which of the entries it is.
     pub entry: u16,
     /// The digits that are to hold, thumb first; others that the giver is in the way of are spared.
@@ -61,9 +61,9 @@ pub struct Start {
 /// The known grips that are least in a giver's way, by its clearance of palm, forearm, thumb and those fingers that are
 /// farthest from it of those that hold without the others.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Starts(Vec<Start>);
+pub struct Seeds(Vec<Seed>);
 
-impl Starts {
+impl Seeds {
     /// Those of `candidates`, indices of the entries of `known`; of those that keep clear, the first. None if interrupted.
     pub fn of(
         known: &Grips,
@@ -73,11 +73,11 @@ impl Starts {
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
         let Some(giver) = giver else {
-            let whole = |entry: u16| Start {
+            let whole = |entry: u16| Seed {
                 entry,
                 kept: known.entries()[usize::from(entry)].grip.holding_digits(),
             };
-            return Some(Self(candidates.take(STARTS).map(whole).collect()));
+            return Some(Self(candidates.take(SEEDS).map(whole).collect()));
         };
         // What is found by balls alone is never too little: those for which it is most are looked at first, until no other can
         // have more.
@@ -86,13 +86,13 @@ impl Starts {
             if count.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
                 return None;
             }
-            let clearance = known.clearance_at_most(usize::from(index), giver);
+            let clearance = known.clearance_upper_bound(usize::from(index), giver);
             at_most.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
         // Not sorted, as that would take longer than between two looks at the clock.
         let mut at_most = BinaryHeap::from(at_most);
         // By falling clearance.
-        let mut nearest: Vec<(f32, Start)> = Vec::with_capacity(STARTS + 1);
+        let mut nearest: Vec<(f32, Seed)> = Vec::with_capacity(SEEDS + 1);
         let mut count = 0_usize;
         while let Some((most, _, index)) = at_most.pop() {
             if count.is_multiple_of(AT_ONCE) && interrupted() {
@@ -100,7 +100,7 @@ impl Starts {
             }
             count += 1;
             let least = nearest
-                .get(STARTS - 1)
+                .get(SEEDS - 1)
                 .map_or(f32::NEG_INFINITY, |(least, _)| *least);
             if most <= nanometres(least) {
                 break;
@@ -110,14 +110,14 @@ impl Starts {
                 continue;
             };
             let place = nearest.partition_point(|&(other, _)| other >= clearance);
-            nearest.insert(place, (clearance, Start { entry: index, kept }));
-            nearest.truncate(STARTS);
+            nearest.insert(place, (clearance, Seed { entry: index, kept }));
+            nearest.truncate(SEEDS);
         }
         Some(Self(nearest.into_iter().map(|(_, start)| start).collect()))
     }
 
     /// Which they are, by falling clearance.
-    pub fn all(&self) -> &[Start] {
+    pub fn all(&self) -> &[Seed] {
         &self.0
     }
 
@@ -133,7 +133,7 @@ impl Starts {
         // not answer, 27 are answered sooner so and 17 later: in four fifths of the time where it takes less than 5 ms,
         // elsewhere in as much.
         let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
-        Self::beside(*self.0.get(rank)?, entries, place, stream)
+        Self::perturbed(*self.0.get(rank)?, entries, place, stream)
     }
 
     /// The same, beside one as often as beside another: what is to be known for many givers is not to lie beside few.
@@ -146,12 +146,12 @@ impl Starts {
         if self.0.is_empty() {
             return None;
         }
-        Self::beside(self.0[stream.below(self.0.len())], entries, place, stream)
+        Self::perturbed(self.0[stream.below(self.0.len())], entries, place, stream)
     }
 
     /// A hand beside a known grip that may keep clear of the giver, if one is drawn.
-    fn beside(
-        Start { entry, kept }: Start,
+    fn perturbed(
+        Seed { entry, kept }: Seed,
         entries: &[Entry],
         place: &Place<'_>,
         stream: &mut AttemptStream,
@@ -169,8 +169,8 @@ impl Starts {
         };
         let solids = entry.solids(place.rig);
         let inside = [
-            first_of_digits(first_balls(&solids), kept),
-            second_of_digits(second_balls(&solids), kept),
+            first_of_digits(first_spheres(&solids), kept),
+            second_of_digits(second_spheres(&solids), kept),
         ];
         let contacts = entry.contacts.iter();
         let contacts: Vec<Contact> = contacts
@@ -179,10 +179,11 @@ impl Starts {
             .collect();
         let pivot = middle_of(&contacts);
         (0..DRAWS).find_map(|_| {
-            let beside = known.beside_about(pivot, [SHIFT, TURN], stream);
-            let way = beside.object_from_wrist * known.object_from_wrist.inverse();
+            let perturbed = known.perturbed_about(pivot, [SHIFT, TURN], stream);
+            let way = perturbed.object_from_wrist * known.object_from_wrist.inverse();
             let is_met = |giver: &PreparedHand| {
-                let nears = |balls: &Balls| giver.surely_nears_any(&balls.transformed(way), GIVER_CLEARANCE);
+                let nears =
+                    |spheres: &Spheres| giver.surely_nears_any(&spheres.transformed(way), GIVER_CLEARANCE);
                 inside.iter().any(nears)
             };
             if place.giver.is_some_and(is_met) {
@@ -195,7 +196,7 @@ impl Starts {
             let is_likely = keeps_clear
                 && still_touch(&contacts, place.object, way)
                 && keeps_off(kept, place.object, &moved);
-            is_likely.then_some(beside)
+            is_likely.then_some(perturbed)
         })
     }
 }
@@ -234,8 +235,8 @@ fn keeps_off(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -> bool 
 /// [`GIVER_CLEARANCE`], and which digits hold then; none if it is less than `least`.
 fn clearance(entry: &Entry, rig: &Rig, giver: &PreparedHand, least: f32) -> Option<(f32, [bool; 5])> {
     let solids = entry.solids(rig);
-    let sets = entry.finger_sets;
-    let (fingers, others) = farthest_by_second(&giver.distances_at_most(&second_balls(&solids)));
+    let sets = entry.finger_subsets;
+    let (fingers, others) = farthest_by_second(&giver.distance_upper_bounds(&second_spheres(&solids)));
     if sets.farthest(fingers).1.min(others) < least {
         return None;
     }

@@ -20,14 +20,14 @@ use glam::Vec3;
 use super::{
     entry::{Entry, SLIPS},
     gravity::{DIRECTIONS, nearest},
-    inner_spheres::{first_balls, second_balls},
+    inner_spheres::{first_spheres, second_spheres},
     occupancy::Occupancy,
 };
 use crate::{
     model::hand::rig::Rig,
     physical::{
         grip::GIVER_CLEARANCE,
-        solids::{Balls, PreparedHand, ToldSolids},
+        solids::{PreparedHand, Spheres, TrackedSolids},
     },
 };
 
@@ -58,8 +58,8 @@ type LeftBy = [u8; GIVERS];
 pub struct Listed {
     /// Its index in [`super::Atlas::entries`].
     pub entry: u16,
-    second_balls: Balls,
-    solids: ToldSolids,
+    second_spheres: Spheres,
+    solids: TrackedSolids,
 }
 
 /// The lists for all directions of gravity.
@@ -67,7 +67,7 @@ pub struct Listed {
 pub(super) struct Shortlists {
     grips: Vec<Listed>,
     /// The first balls inside each of them, side by side.
-    cores: Vec<Balls>,
+    inner_spheres: Vec<Spheres>,
     /// For each direction, which of them are on its list.
     of_directions: Vec<Vec<u16>>,
 }
@@ -77,7 +77,7 @@ pub(super) struct Shortlists {
 pub struct Shortlist<'a> {
     /// The grips of all lists, and the first balls inside them.
     grips: &'a [Listed],
-    cores: &'a [Balls],
+    inner_spheres: &'a [Spheres],
     /// Which of them are on this one.
     places: &'a [u16],
 }
@@ -102,14 +102,14 @@ impl<'a> Shortlist<'a> {
     /// The grip at a place of the list with its solids; none only if it comes too near to a giver's hand, and not always
     /// then.
     #[inline]
-    pub fn unless_met(&self, place: usize, giver: &PreparedHand) -> Option<(u16, &'a ToldSolids)> {
+    pub fn unless_met(&self, place: usize, giver: &PreparedHand) -> Option<(u16, &'a TrackedSolids)> {
         let place = usize::from(self.places[place]);
-        let meets = |balls: &Balls| giver.surely_nears_any(balls, GIVER_CLEARANCE);
-        if meets(&self.cores[place]) {
+        let meets = |spheres: &Spheres| giver.surely_nears_any(spheres, GIVER_CLEARANCE);
+        if meets(&self.inner_spheres[place]) {
             return None;
         }
         let grip = &self.grips[place];
-        (!meets(&grip.second_balls)).then_some((grip.entry, &grip.solids))
+        (!meets(&grip.second_spheres)).then_some((grip.entry, &grip.solids))
     }
 }
 
@@ -131,11 +131,11 @@ impl Shortlists {
             ..Self::default()
         };
         for entry in listed {
-            let solids = entries[usize::from(entry)].told_solids(rig);
-            shortlists.cores.push(first_balls(&solids.hand));
+            let solids = entries[usize::from(entry)].tracked_solids(rig);
+            shortlists.inner_spheres.push(first_spheres(&solids.hand));
             shortlists.grips.push(Listed {
                 entry,
-                second_balls: second_balls(&solids.hand),
+                second_spheres: second_spheres(&solids.hand),
                 solids,
             });
         }
@@ -146,7 +146,7 @@ impl Shortlists {
     pub(super) fn under(&self, up: Vec3) -> Shortlist<'_> {
         Shortlist {
             grips: &self.grips,
-            cores: &self.cores,
+            inner_spheres: &self.inner_spheres,
             places: self.of_directions.get(nearest(up)).map_or(&[], Vec::as_slice),
         }
     }
@@ -160,7 +160,7 @@ impl Shortlists {
     pub(super) fn bytes(&self) -> usize {
         let lists = self.of_directions.iter();
         let lists = lists.map(|list| size_of_val(list.as_slice()));
-        size_of_val(self.grips.as_slice()) + size_of_val(self.cores.as_slice()) + lists.sum::<usize>()
+        size_of_val(self.grips.as_slice()) + size_of_val(self.inner_spheres.as_slice()) + lists.sum::<usize>()
     }
 }
 

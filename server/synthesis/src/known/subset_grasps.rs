@@ -2,22 +2,22 @@
 
 use super::{
     entry::Entry,
-    inner_spheres::{in_way_by_second, second_balls},
+    inner_spheres::{in_way_by_second, second_spheres},
 };
 use crate::{
     base::stopwatch::NoStopwatch,
     model::grasp::Grasp,
     physical::{
-        finger_subset::KnownGrip,
+        finger_subset::WholeGrip,
         grip::{GIVER_CLEARANCE, Gripper},
-        solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids},
+        solids::{HandSolids, PreparedHand, TaperedCapsule, TrackedSolids},
     },
     rating::assessment::Surroundings,
 };
 
 /// The grasp that a known grip is without the fingers that the giver is in the way of, which rest elsewhere; none if it does
 /// not hold so, or if the giver is in the way of no finger.
-pub fn spared(
+pub fn subset_grasp(
     entry: &Entry,
     around: &Surroundings<'_>,
     giver: &PreparedHand,
@@ -25,11 +25,11 @@ pub fn spared(
 ) -> Option<Box<Grasp>> {
     let solids = entry.solids(around.rig);
     let kept = kept(entry, &solids, giver)?;
-    let told = ToldSolids::of_rig(around.rig, entry.grip.pose.frame_from_wrist, &solids);
-    if is_met(giver, told.still()) {
+    let inputs = TrackedSolids::of_rig(around.rig, entry.grip.pose.frame_from_wrist, &solids);
+    if is_met(giver, inputs.still()) {
         return None;
     }
-    let known = KnownGrip {
+    let known = WholeGrip {
         grip: &entry.grip,
         contacts: &entry.contacts,
         solids: &solids,
@@ -43,10 +43,10 @@ pub fn spared(
 /// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others or leave out
 /// one between them, if the thumb or its ball comes too near to the giver, or if no digit does.
 fn kept(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> Option<[bool; 5]> {
-    let sets = entry.finger_sets;
+    let sets = entry.finger_subsets;
     let holding = sets.holding();
-    let is_too_much = |near| !sets.hold_beside(in_way_by_second(near));
-    let near = giver.surely_near(&second_balls(solids), GIVER_CLEARANCE, is_too_much);
+    let is_too_much = |near| !sets.hold_without(in_way_by_second(near));
+    let near = giver.surely_near(&second_spheres(solids), GIVER_CLEARANCE, is_too_much);
     if is_too_much(near) || is_met(giver, solids.thenar.iter()) {
         return None;
     }

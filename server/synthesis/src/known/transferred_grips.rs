@@ -5,7 +5,7 @@ use std::{cmp::Reverse, sync::Arc};
 use glam::{Mat3, Quat, Vec3};
 
 use super::{
-    closure_screen::Promise, entry::Entry, grips::Grips, primitives::HeldPrimitive, seeds::nanometres,
+    closure_screen::ClosureScreen, entry::Entry, grips::Grips, primitives::HeldPrimitive, seeds::nanometres,
 };
 use crate::{
     base::pose::Pose,
@@ -52,7 +52,7 @@ const TURNS: [Quat; 4] = [
 
 /// A grip of a box that is laid on the object. Where it is follows, so that it takes few bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Laid {
+struct Transferred {
     /// Which of the boxes it is of, …
     primitive: u8,
     /// … by which of the turns, …
@@ -60,7 +60,7 @@ struct Laid {
     /// … and which of its grips.
     grip: u16,
     /// Where it touches, it may hold the object.
-    is_promising: bool,
+    passes_screen: bool,
 }
 
 /// Which of the grips that an object borrows are asked for.
@@ -69,81 +69,84 @@ pub enum Among {
     /// All that fit.
     All,
     /// Those that may hold the object where they touch it, as far as that shows; all, if none does.
-    Promising,
+    Passing,
 }
 
 /// Grips of boxes that fit an object, as far as that shows before a hand is closed. They hold the boxes, not the object:
 /// searches start from them.
 #[derive(Clone, Debug)]
-pub struct Borrowed {
+pub struct TransferredGrips {
     known: Arc<[HeldPrimitive]>,
     around: SortedBox,
     /// By how well they fit.
-    laid: Vec<Laid>,
+    transferred: Vec<Transferred>,
 }
 
-impl Borrowed {
+impl TransferredGrips {
     /// Bytes that one takes at most, beside what all share.
-    pub const MOST_BYTES: usize = MOST * size_of::<Laid>();
+    pub const MOST_BYTES: usize = MOST * size_of::<Transferred>();
 
     /// What an object borrows of the boxes that a hand knows, at most 256: some milliseconds of work.
     pub fn of(object: &GraspObject, known: &Arc<[HeldPrimitive]>) -> Self {
         let around = SortedBox::of(&object.bounding_box);
         let mut likest: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
         likest.sort_by(|(_, a), (_, b)| around.unlikeness(a).total_cmp(&around.unlikeness(b)));
-        let mut fitting: Vec<(f32, Laid)> = Vec::new();
+        let mut fitting: Vec<(f32, Transferred)> = Vec::new();
         for (primitive, held) in likest.into_iter().take(BOXES) {
             for turn in 0..TURNS.len() {
                 for (grip, entry) in held.grips.entries().iter().enumerate() {
-                    let laid = Laid {
+                    let transferred = Transferred {
                         primitive: primitive as u8,
                         turn: turn as u8,
                         grip: grip as u16,
-                        is_promising: false,
+                        passes_screen: false,
                     };
-                    let object_from_primitive = around.lay(held, laid);
+                    let object_from_primitive = around.lay(held, transferred);
                     if let Some(off) = farther_digit(&entry.contacts, object, object_from_primitive) {
-                        fitting.push((off, laid));
+                        fitting.push((off, transferred));
                     }
                 }
             }
         }
         fitting.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         fitting.truncate(MOST);
-        let mut promise = Promise::new(object);
-        let looked_at = |(_, laid): (f32, Laid)| {
-            let held = &known[usize::from(laid.primitive)];
-            let contacts = &held.grips.entries()[usize::from(laid.grip)].contacts;
-            Laid {
-                is_promising: promise.is_given(contacts, around.lay(held, laid)),
-                ..laid
+        let mut promise = ClosureScreen::new(object);
+        let looked_at = |(_, transferred): (f32, Transferred)| {
+            let held = &known[usize::from(transferred.primitive)];
+            let contacts = &held.grips.entries()[usize::from(transferred.grip)].contacts;
+            Transferred {
+                passes_screen: promise.passes(contacts, around.lay(held, transferred)),
+                ..transferred
             }
         };
         Self {
             known: Arc::clone(known),
             around,
-            laid: fitting.into_iter().map(looked_at).collect(),
+            transferred: fitting.into_iter().map(looked_at).collect(),
         }
     }
 
     /// How many grips there are.
     pub fn len(&self) -> usize {
-        self.laid.len()
+        self.transferred.len()
     }
 
     /// True if no box has a grip that fits.
     pub fn is_empty(&self) -> bool {
-        self.laid.is_empty()
+        self.transferred.is_empty()
     }
 
     /// How many of them are promising.
-    pub fn promising(&self) -> usize {
-        self.laid.iter().filter(|laid| laid.is_promising).count()
+    pub fn passing(&self) -> usize {
+        self.transferred
+            .iter()
+            .filter(|transferred| transferred.passes_screen)
+            .count()
     }
 
     /// Those of the grips that are what is demanded and seem least in a giver's way, on the object; of those that are as little,
     /// the ones that fit best. `rig` is the hand that knows the boxes. None if interrupted.
-    pub fn beside(
+    pub fn perturbed(
         &self,
         among: Among,
         rig: &Rig,
@@ -152,16 +155,18 @@ impl Borrowed {
         interrupted: &impl Fn() -> bool,
     ) -> Option<Grips> {
         // What is unlike all that was tried promises nothing, and may do all the same.
-        let only_promising = among == Among::Promising && self.promising() > 0;
-        let mut by_clearance: Vec<(Reverse<i32>, usize)> = Vec::with_capacity(self.laid.len());
-        for (place, &laid) in self.laid.iter().enumerate() {
+        let only_promising = among == Among::Passing && self.passing() > 0;
+        let mut by_clearance: Vec<(Reverse<i32>, usize)> = Vec::with_capacity(self.transferred.len());
+        for (place, &transferred) in self.transferred.iter().enumerate() {
             if place.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
                 return None;
             }
-            if only_promising && !laid.is_promising {
+            if only_promising && !transferred.passes_screen {
                 continue;
             }
-            let clearance = giver.map_or(GIVER_CLEARANCE, |giver| self.clearance_at_most(laid, giver));
+            let clearance = giver.map_or(GIVER_CLEARANCE, |giver| {
+                self.clearance_upper_bound(transferred, giver)
+            });
             by_clearance.push((Reverse(nanometres(clearance.min(GIVER_CLEARANCE))), place));
         }
         by_clearance.sort_unstable();
@@ -173,7 +178,7 @@ impl Borrowed {
             if count.is_multiple_of(MOVED_AT_ONCE) && interrupted() {
                 return None;
             }
-            let entry = self.entry(self.laid[place]);
+            let entry = self.entry(self.transferred[place]);
             if entry.is_wanted(constraints) {
                 entries.push(entry);
             }
@@ -181,20 +186,23 @@ impl Borrowed {
         Some(Grips::new(rig, entries))
     }
 
-    fn clearance_at_most(&self, laid: Laid, giver: &PreparedHand) -> f32 {
-        let held = self.held(laid);
-        held.grips
-            .moved_clearance_at_most(usize::from(laid.grip), self.around.lay(held, laid), giver)
+    fn clearance_upper_bound(&self, transferred: Transferred, giver: &PreparedHand) -> f32 {
+        let held = self.held(transferred);
+        held.grips.moved_clearance_upper_bound(
+            usize::from(transferred.grip),
+            self.around.lay(held, transferred),
+            giver,
+        )
     }
 
     /// A grip where it is laid.
-    fn entry(&self, laid: Laid) -> Entry {
-        let held = self.held(laid);
-        held.grips.entries()[usize::from(laid.grip)].moved(self.around.lay(held, laid))
+    fn entry(&self, transferred: Transferred) -> Entry {
+        let held = self.held(transferred);
+        held.grips.entries()[usize::from(transferred.grip)].moved(self.around.lay(held, transferred))
     }
 
-    fn held(&self, laid: Laid) -> &HeldPrimitive {
-        &self.known[usize::from(laid.primitive)]
+    fn held(&self, transferred: Transferred) -> &HeldPrimitive {
+        &self.known[usize::from(transferred.primitive)]
     }
 }
 
@@ -225,12 +233,12 @@ impl SortedBox {
 
     /// Where the frame of a primitive is laid for one of its grips: so that the middle of what touches comes to be where it was
     /// by the boxes' sizes.
-    fn lay(&self, held: &HeldPrimitive, laid: Laid) -> Pose {
-        let contacts = &held.grips.entries()[usize::from(laid.grip)].contacts;
+    fn lay(&self, held: &HeldPrimitive, transferred: Transferred) -> Pose {
+        let contacts = &held.grips.entries()[usize::from(transferred.grip)].contacts;
         let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
         let middle = sum / contacts.len().max(1) as f32;
         let scaled = middle * self.half_extents / held.primitive.half_extents;
-        let turn = TURNS[usize::from(laid.turn)];
+        let turn = TURNS[usize::from(transferred.turn)];
         self.object_from_box * Pose::new(turn * (scaled - middle), turn)
     }
 }

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{
     closing::{ClosedDigit, TOUCHING},
     immobility::SoftContact,
-    solids::{HandSolids, ToldPalm, Touch, closest},
+    solids::{HandSolids, Touch, TrackedPalm, closest},
 };
 use crate::model::{
     grasp::Contact,
@@ -61,7 +61,7 @@ pub(super) fn collect_contacts(
         }
     }
     let first_of_palm = contacts.len();
-    let told = ToldPalm::of_rig(rig, pose.frame_from_wrist);
+    let inputs = TrackedPalm::of_rig(rig, pose.frame_from_wrist);
     // The ball of the thumb gives way with its metacarpal, and the web is a fold of skin: neither bears anything.
     for solid in &solids.palm {
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
@@ -72,7 +72,7 @@ pub(super) fn collect_contacts(
             let pressing = (solid.at(touch.along) - touch.point).normalize_or_zero();
             way_to_bone(solids, HandPart::Palm, touch.point).dot(pressing) >= OWN_COS
         };
-        let is_told = || told.distance_of_skin(touch.point) <= PALM_SLACK;
+        let is_told = || inputs.distance_of_skin(touch.point) <= PALM_SLACK;
         if contacts[first_of_palm..].iter().all(is_new) && is_own() && is_told() {
             contacts.extend(contact(solids, &touch, HandPart::Palm));
         }

@@ -23,7 +23,7 @@ use crate::{
 
 /// A grip that is known.
 #[derive(Clone, Copy, Debug)]
-pub struct KnownGrip<'a> {
+pub struct WholeGrip<'a> {
     /// The grip.
     pub grip: &'a Grip,
     /// Where it touches.
@@ -42,11 +42,11 @@ impl Gripper {
         &mut self,
         scene: &ObjectScene<'_>,
         rig: &Rig,
-        known: &KnownGrip<'_>,
+        known: &WholeGrip<'_>,
         kept: [bool; 5],
         giver: &PreparedHand,
     ) -> Result<(Grip, HandSolids), NoGrip> {
-        let KnownGrip {
+        let WholeGrip {
             grip,
             contacts,
             solids,

@@ -15,7 +15,9 @@ use super::{
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::Proposal,
-    solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids, clearance, comes_within, self_clearance},
+    solids::{
+        HandSolids, PreparedHand, TaperedCapsule, TrackedSolids, clearance, comes_within, self_clearance,
+    },
 };
 use crate::{
     base::{
@@ -156,8 +158,11 @@ impl Gripper {
             object_from_wrist.position += way;
             still = still.moved(way);
         }
-        let collides =
-            collides_without_digits(scene, giver, &ToldSolids::of_rig(rig, object_from_wrist, &still));
+        let collides = collides_without_digits(
+            scene,
+            giver,
+            &TrackedSolids::of_rig(rig, object_from_wrist, &still),
+        );
         stopwatch.lap(Step::CollisionValidation);
         if collides {
             return Err(NoGrip::Rejected(Rejection::PalmCollision));
@@ -281,7 +286,7 @@ impl Gripper {
 }
 
 /// The distance of a hand from the giver's, if it is enough: `Some(None)` without a giver.
-pub fn clear_of_giver(hand: &ToldSolids, giver: Option<&PreparedHand>) -> Option<Option<f32>> {
+pub fn clear_of_giver(hand: &TrackedSolids, giver: Option<&PreparedHand>) -> Option<Option<f32>> {
     match giver {
         None => Some(None),
         Some(giver) => giver.clearance(hand, GIVER_CLEARANCE).map(Some),
@@ -340,7 +345,7 @@ fn free_way(scene: &ObjectScene<'_>, still: &HandSolids, direction: Vec3, most: 
 fn collides_without_digits(
     scene: &ObjectScene<'_>,
     giver: Option<&PreparedHand>,
-    still: &ToldSolids,
+    still: &TrackedSolids,
 ) -> bool {
     let HandSolids { palm, forearm, .. } = &still.hand;
     let surface = &scene.object.surface;

@@ -23,7 +23,7 @@ use super::solids::PALM_SOLIDS;
 use crate::model::hand::Digit;
 pub(crate) use crate::physical::immobility::balance::firm_force;
 pub use crate::physical::immobility::balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance, balance_with};
-pub use crate::physical::immobility::closure::{EPSILON_TOLERANCE, epsilon, epsilon_at_most};
+pub use crate::physical::immobility::closure::{EPSILON_TOLERANCE, epsilon, epsilon_upper_bound};
 
 /// Contacts of a hand at most: one a link of each digit, and one a solid of the palm.
 pub const MOST_CONTACTS: usize = 15 + PALM_SOLIDS;

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{
     immobility::Load,
-    solids::{PreparedHand, ToldSolids},
+    solids::{PreparedHand, TrackedSolids},
 };
 use crate::model::{holdout::Holdout, object::GraspObject};
 
@@ -73,7 +73,7 @@ impl Presented {
     pub fn of(holdout: &Holdout) -> Self {
         let giver = holdout.presenting_hand.as_ref();
         Self {
-            giver: giver.map(|hand| PreparedHand::new(&ToldSolids::of_joints(&hand.joints))),
+            giver: giver.map(|hand| PreparedHand::new(&TrackedSolids::of_joints(&hand.joints))),
             giver_palm: giver.map(|hand| hand.palm),
             up: holdout.up,
         }

@@ -133,10 +133,10 @@ impl HandShape {
 }
 
 /// How far beside a proposal another one's wrist lies at most, in metres and radians, …
-const BESIDE: [f32; 2] = [0.006, 0.12];
+const PERTURBATION: [f32; 2] = [0.006, 0.12];
 
 /// … and how much the thumb's yaw and the fingers' spread differ, as shares of their ranges.
-const SHAPED_BESIDE: f32 = 0.1;
+const SHAPE_PERTURBATION: f32 = 0.1;
 
 /// A hand to be closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,13 +153,13 @@ pub struct Proposal {
 impl Proposal {
     /// One a little beside, of a hand that is a little different.
     #[must_use]
-    pub fn beside(&self, stream: &mut AttemptStream) -> Self {
-        self.beside_about(self.object_from_wrist.position, BESIDE, stream)
+    pub fn perturbed(&self, stream: &mut AttemptStream) -> Self {
+        self.perturbed_about(self.object_from_wrist.position, PERTURBATION, stream)
     }
 
     /// The same, turned about a pivot in the object's frame, and shifted, by other limits than those: metres, radians.
     #[must_use]
-    pub fn beside_about(&self, pivot: Vec3, [shift, turn]: [f32; 2], stream: &mut AttemptStream) -> Self {
+    pub fn perturbed_about(&self, pivot: Vec3, [shift, turn]: [f32; 2], stream: &mut AttemptStream) -> Self {
         let Pose {
             position,
             orientation,
@@ -168,7 +168,7 @@ impl Proposal {
         let turn = Quat::from_axis_angle(axis, stream.between(-turn, turn));
         let position = pivot + turn * (position - pivot) + stream.in_cube() * shift;
         let mut differing =
-            |share: f32| (share + stream.between(-SHAPED_BESIDE, SHAPED_BESIDE)).clamp(0.0, 1.0);
+            |share: f32| (share + stream.between(-SHAPE_PERTURBATION, SHAPE_PERTURBATION)).clamp(0.0, 1.0);
         Self {
             object_from_wrist: Pose::new(position, (turn * orientation).normalize()),
             shape: HandShape {

@@ -1,6 +1,6 @@
 //! Hands as solids: what they leave free of objects and of each other.
 //!
-//! A hand is a union of tapered capsules ([`HandSolids`]; where it is beside another person's, [`ToldSolids`]). How far
+//! A hand is a union of tapered capsules ([`HandSolids`]; where it is beside another person's, [`TrackedSolids`]). How far
 //! it is from an object's surface, and how deep in it, is asked capsule by capsule ([`clearance()`], [`closest()`],
 //! [`comes_within()`]); how far from other parts of itself by [`self_clearance`], and how far from a giver's hand, of that
 //! hand when it is a [`PreparedHand`].
@@ -20,8 +20,8 @@ pub use crate::physical::solids::hand_clearance::{SOFT_CONTACT, self_clearance};
 pub use crate::physical::solids::hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
 pub use crate::physical::solids::mesh_clearance::{Touch, clearance, closest, comes_within};
 pub use crate::physical::solids::prepared_hand::PreparedHand;
-pub use crate::physical::solids::spheres::{BALLS, Balls};
-pub use crate::physical::solids::tracked_palm::ToldPalm;
-pub use crate::physical::solids::tracked_solids::{TOLD_SOLIDS, ToldSolids};
+pub use crate::physical::solids::spheres::{SPHERES, Spheres};
+pub use crate::physical::solids::tracked_palm::TrackedPalm;
+pub use crate::physical::solids::tracked_solids::{TRACKED_SOLIDS, TrackedSolids};
 
 pub use crate::geometry::tapered_capsule::TaperedCapsule;

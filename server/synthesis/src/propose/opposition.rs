@@ -7,7 +7,7 @@ use crate::{
     model::hand::{Digit, HandPose, kinematics::digit_frames, rig::Rig},
     physical::{
         shape::HandShape,
-        solids::{BALLS, Balls, FOREARM_SOLIDS, HandSolids, PALM_SOLIDS, TaperedCapsule, link_radii},
+        solids::{FOREARM_SOLIDS, HandSolids, PALM_SOLIDS, SPHERES, Spheres, TaperedCapsule, link_radii},
     },
 };
 
@@ -34,7 +34,7 @@ const WIDTHS: [f32; 2] = [0.003, 0.11];
 const STEPS: usize = 96;
 
 /// Hands that are drawn for each opposition; the best is stepped on.
-const STARTS: usize = 16;
+const SEEDS: usize = 16;
 
 /// How far a step goes at first: a share of the thumb's range of yaw and of the digits' ways to closed.
 const FIRST_STEP: f32 = 0.3;
@@ -64,14 +64,14 @@ const OUTER_SHARE: f32 = 0.8;
 const CORE_SPOTS: [[f32; 3]; 2] = [[0.6, 0.95, 0.2], [0.2, 0.6, 1.0]];
 
 /// Eights of balls that palm and forearm take.
-const CORE_BALLS: usize = (CORE_SPOTS[0].len() * (PALM_SOLIDS + FOREARM_SOLIDS)).div_ceil(BALLS);
+const CORE_SPHERES: usize = (CORE_SPOTS[0].len() * (PALM_SOLIDS + FOREARM_SOLIDS)).div_ceil(SPHERES);
 
 /// Where in the links of a digit that closes balls are: the link, and how far along it. The first of the links are within
 /// the palm's reach and left out.
 const LINK_SPOTS: [(usize, f32); 3] = [(1, 0.5), (2, 0.2), (2, 1.0)];
 
 /// Eights of balls that five digits' links take.
-const LINK_BALLS: usize = (5 * LINK_SPOTS.len()).div_ceil(BALLS);
+const LINK_SPHERES: usize = (5 * LINK_SPOTS.len()).div_ceil(SPHERES);
 
 /// Pads that oppose each other, in the wrist's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,7 +88,7 @@ pub struct Opposition {
     pub fingers: Vec3,
     /// Balls inside the links of the digits where they are when the pads meet what is between them, fingers that do not
     /// close left out.
-    pub links: [Balls; LINK_BALLS],
+    pub links: [Spheres; LINK_SPHERES],
 }
 
 /// Which fingers close, with the shares of hands that close them on thin and on thicker things. What is thin turns between
@@ -145,7 +145,7 @@ pub struct Oppositions {
     /// Their widths in metres, side by side.
     widths: Vec<f32>,
     /// Balls inside palm and forearm, in the wrist's frame.
-    cores: [Balls; CORE_BALLS],
+    inner_spheres: [Spheres; CORE_SPHERES],
 }
 
 impl Oppositions {
@@ -170,13 +170,13 @@ impl Oppositions {
         Self {
             widths: known.iter().map(Opposition::width).collect(),
             known,
-            cores: Balls::of_all(&[of_palm.as_flattened(), of_forearm.as_flattened()].concat()),
+            inner_spheres: Spheres::of_all(&[of_palm.as_flattened(), of_forearm.as_flattened()].concat()),
         }
     }
 
     /// Balls inside palm and forearm, in the wrist's frame.
-    pub fn cores(&self) -> &[Balls] {
-        &self.cores
+    pub fn inner_spheres(&self) -> &[Spheres] {
+        &self.inner_spheres
     }
 
     /// One whose pads are between `least` and `most` metres apart; none if there is none.
@@ -241,7 +241,7 @@ impl Meeting {
             index_alone: stream.unit() < INDEX_SHARE && width <= PINCHED_WIDTH,
         };
         let mut miss = meeting.pads(rig).miss(width);
-        for _ in 0..STARTS {
+        for _ in 0..SEEDS {
             let start = meeting.with_shares(std::array::from_fn(|_| stream.unit()));
             let its_miss = start.pads(rig).miss(width);
             if its_miss < miss {
@@ -361,7 +361,7 @@ impl Meeting {
         })
     }
 
-    fn links(&self, rig: &Rig) -> [Balls; LINK_BALLS] {
+    fn links(&self, rig: &Rig) -> [Spheres; LINK_SPHERES] {
         let pose = HandPose {
             frame_from_wrist: Pose::IDENTITY,
             digits: Digit::ALL.map(|digit| {
@@ -371,13 +371,13 @@ impl Meeting {
         };
         let links = HandSolids::of_pose(rig, &pose).phalanges;
         let closing = (0..5).filter(|&digit| self.shape.closing[digit]);
-        let balls: Vec<_> = closing
+        let spheres: Vec<_> = closing
             .flat_map(|digit| {
                 let links = &links[digit];
                 LINK_SPOTS.map(|(link, along)| (links[link].at(along), links[link].radius_at(along)))
             })
             .collect();
-        Balls::of_all(&balls)
+        Spheres::of_all(&spheres)
     }
 }
 

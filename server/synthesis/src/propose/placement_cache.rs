@@ -8,7 +8,7 @@ use std::{
 use super::{
     prepared::{PreparedObject, PreparedRig},
     proposal::{Candidate, Place},
-    success_prior::Bulk,
+    success_prior::ObjectFeatures,
     surface_pairs::SurfacePair,
 };
 use crate::base::{pose::Pose, random::AttemptStream};
@@ -60,11 +60,11 @@ impl PlacementCache {
             rig,
             placements: None,
         };
-        let bulk = Bulk::of(object);
+        let bulk = ObjectFeatures::of(object);
         let row = |row| {
             let mut stream = AttemptStream::new(SEED, row);
             let drawn = place.drawn(DRAWN, &mut stream);
-            let likely = place.by_prospect(&bulk, PREFERENCE, drawn, &mut stream);
+            let likely = place.by_success_prior(&bulk, PREFERENCE, drawn, &mut stream);
             let fitting = likely.iter().filter(|candidate| place.fits(candidate));
             let rooms = fitting.take(KEPT).map(|candidate| Room {
                 opposition: candidate.opposition.place,

@@ -8,7 +8,7 @@ use super::{
     opposition::{Opposition, draw_shape},
     placement_cache::PlacementCache,
     prepared::PreparedRig,
-    success_prior::{Bulk, TAUGHT},
+    success_prior::{ObjectFeatures, TRAINED},
     surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
     physical::{
         grip::DEEPEST,
         shape::{HandShape, Proposal},
-        solids::{Balls, PreparedHand},
+        solids::{PreparedHand, Spheres},
     },
 };
 
@@ -163,7 +163,12 @@ impl<'a> Place<'a> {
     fn likely_of_cache(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let row = self.placements?.row(stream.attempt(), self.rig);
         let free = row.filter(|candidate| self.giver.is_none_or(|giver| candidate.pair.is_free_of(giver)));
-        let likely = self.by_prospect(&Bulk::of(self.object), PREFERENCE, free.collect(), stream);
+        let likely = self.by_success_prior(
+            &ObjectFeatures::of(self.object),
+            PREFERENCE,
+            free.collect(),
+            stream,
+        );
         let clear = likely
             .iter()
             .find(|candidate| self.is_clear_of_giver(candidate))?;
@@ -176,15 +181,15 @@ impl<'a> Place<'a> {
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
-        let bulk = Bulk::of(self.object);
+        let bulk = ObjectFeatures::of(self.object);
         let places = self.drawn(COMPARED, stream);
-        self.by_prospect(&bulk, PREFERENCE, places, stream)
+        self.by_success_prior(&bulk, PREFERENCE, places, stream)
             .iter()
             .take(MOST_PLACES)
             .take_while(|_| !interrupted())
             .find_map(|place| {
                 let turned = (0..MOST_TURNS).map(|_| Candidate::drawn(place.opposition, place.pair, stream));
-                let turned = self.by_prospect(&bulk, PREFERENCE, turned.collect(), stream);
+                let turned = self.by_success_prior(&bulk, PREFERENCE, turned.collect(), stream);
                 let fitting = turned.iter().find(|candidate| self.fits(candidate))?;
                 Some(fitting.proposal())
             })
@@ -203,9 +208,9 @@ impl<'a> Place<'a> {
     }
 
     /// In an order by chance, in which those come early that are likely to hold, by that power of the likelihood.
-    pub(super) fn by_prospect(
+    pub(super) fn by_success_prior(
         &self,
-        bulk: &Bulk,
+        bulk: &ObjectFeatures,
         preference: f32,
         candidates: Vec<Candidate<'a>>,
         stream: &mut AttemptStream,
@@ -218,8 +223,8 @@ impl<'a> Place<'a> {
                     object_from_wrist,
                     ..
                 } = candidate;
-                let told = bulk.told(self.rig, opposition, object_from_wrist, self.giver);
-                let log_prospect = -(-TAUGHT.log_odds(&told)).exp().ln_1p();
+                let inputs = bulk.inputs(self.rig, opposition, object_from_wrist, self.giver);
+                let log_prospect = -(-TRAINED.log_odds(&inputs)).exp().ln_1p();
                 // Gumbel's trick: by these keys, they are drawn without replacement by their weights.
                 let chance = -(-stream.unit().max(f32::MIN_POSITIVE).ln()).ln();
                 (preference * log_prospect + chance, candidate)
@@ -265,10 +270,13 @@ impl<'a> Place<'a> {
 
     /// True if palm, forearm and digits are off the giver's hand there.
     fn is_clear_of_giver(&self, candidate: &Candidate<'_>) -> bool {
-        let balls = [self.rig.oppositions().cores(), &candidate.opposition.links];
-        balls
+        let spheres = [
+            self.rig.oppositions().inner_spheres(),
+            &candidate.opposition.links,
+        ];
+        spheres
             .iter()
-            .all(|balls| !self.meet_giver(candidate.object_from_wrist, balls))
+            .all(|spheres| !self.meet_giver(candidate.object_from_wrist, spheres))
     }
 
     /// Lays the palm on the surface where there is room.
@@ -316,14 +324,14 @@ impl<'a> Place<'a> {
     /// True if balls inside palm and forearm are off the object and the giver's hand: a hundred times sooner known than
     /// the whole hand's clearance, which decides in the end.
     fn has_room(&self, object_from_wrist: Pose) -> bool {
-        self.have_room(object_from_wrist, self.rig.oppositions().cores(), DEEPEST)
+        self.have_room(object_from_wrist, self.rig.oppositions().inner_spheres(), DEEPEST)
     }
 
     /// True if balls, in the wrist's frame, are off the giver's hand and at most `depth` metres in the object.
-    fn have_room(&self, object_from_wrist: Pose, balls: &[Balls], depth: f32) -> bool {
-        !self.meet_giver(object_from_wrist, balls)
-            && balls.iter().all(|balls| {
-                balls
+    fn have_room(&self, object_from_wrist: Pose, spheres: &[Spheres], depth: f32) -> bool {
+        !self.meet_giver(object_from_wrist, spheres)
+            && spheres.iter().all(|spheres| {
+                spheres
                     .transformed(object_from_wrist)
                     .iter()
                     .all(|(middle, radius)| {
@@ -334,11 +342,11 @@ impl<'a> Place<'a> {
     }
 
     /// True if one of these balls, in the wrist's frame, certainly meets the giver's hand.
-    fn meet_giver(&self, object_from_wrist: Pose, balls: &[Balls]) -> bool {
+    fn meet_giver(&self, object_from_wrist: Pose, spheres: &[Spheres]) -> bool {
         self.giver.is_some_and(|giver| {
-            balls
+            spheres
                 .iter()
-                .any(|balls| giver.surely_nears_any(&balls.transformed(object_from_wrist), 0.0))
+                .any(|spheres| giver.surely_nears_any(&spheres.transformed(object_from_wrist), 0.0))
         })
     }
 }

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Numbers that the network is told.
-pub const TOLD: usize = 23;
+pub const INPUTS: usize = 23;
 
 /// Units of the network's one hidden layer. Twice as many rate no better.
 pub const UNITS: usize = 32;
@@ -36,17 +36,17 @@ const LEAST_SIZE: f32 = 0.001;
 const FAR: f32 = 0.1;
 
 /// The network that was taught.
-pub use crate::propose::success_prior::weights::TAUGHT;
+pub use crate::propose::success_prior::weights::TRAINED;
 
 /// A network of one hidden layer of rectified units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
     /// What is told at the mean, …
-    pub means: [f32; TOLD],
+    pub means: [f32; INPUTS],
     /// … and how many standard deviations one more of it is.
-    pub scales: [f32; TOLD],
+    pub scales: [f32; INPUTS],
     /// From what is told to each unit.
-    pub weights: [[f32; UNITS]; TOLD],
+    pub weights: [[f32; UNITS]; INPUTS],
     /// Of each unit.
     pub biases: [f32; UNITS],
     /// From each unit to the answer.
@@ -57,17 +57,17 @@ pub struct Network {
 
 impl Network {
     /// What the hidden layer is told: in standard deviations from the mean, at most [`FARTHEST`].
-    pub fn scaled(&self, told: &[f32; TOLD]) -> [f32; TOLD] {
-        std::array::from_fn(|i| ((told[i] - self.means[i]) * self.scales[i]).clamp(-FARTHEST, FARTHEST))
+    pub fn scaled(&self, inputs: &[f32; INPUTS]) -> [f32; INPUTS] {
+        std::array::from_fn(|i| ((inputs[i] - self.means[i]) * self.scales[i]).clamp(-FARTHEST, FARTHEST))
     }
 
     /// The hidden units, told what is scaled already.
-    pub fn units(&self, scaled: &[f32; TOLD]) -> [f32; UNITS] {
+    pub fn units(&self, scaled: &[f32; INPUTS]) -> [f32; UNITS] {
         let mut units = self.biases;
         // Loops over indices, as zipped and mapped arrays stay calls.
-        for (told, weights) in scaled.iter().zip(&self.weights) {
+        for (inputs, weights) in scaled.iter().zip(&self.weights) {
             for k in 0..UNITS {
-                units[k] += told * weights[k];
+                units[k] += inputs * weights[k];
             }
         }
         for unit in &mut units {
@@ -77,8 +77,8 @@ impl Network {
     }
 
     /// The log odds that the hand holds.
-    pub fn log_odds(&self, told: &[f32; TOLD]) -> f32 {
-        let units = self.units(&self.scaled(told));
+    pub fn log_odds(&self, inputs: &[f32; INPUTS]) -> f32 {
+        let units = self.units(&self.scaled(inputs));
         let weighted = units.iter().zip(&self.outputs);
         self.output_bias + weighted.map(|(unit, weight)| unit * weight).sum::<f32>()
     }
@@ -86,7 +86,7 @@ impl Network {
 
 /// What the network is told of an object.
 #[derive(Clone, Copy, Debug)]
-pub struct Bulk {
+pub struct ObjectFeatures {
     centre_of_mass: Vec3,
     /// Unit vector along the longest edges of its box.
     long_axis: Vec3,
@@ -96,7 +96,7 @@ pub struct Bulk {
     characteristic_length: f32,
 }
 
-impl Bulk {
+impl ObjectFeatures {
     /// Of an object, in its frame.
     pub fn of(object: &GraspObject) -> Self {
         let around = &object.bounding_box;
@@ -111,13 +111,13 @@ impl Bulk {
     }
 
     /// What the network is told of a hand whose pads, opposed so, come to be at `object_from_wrist`, beside a giver's.
-    pub fn told(
+    pub fn inputs(
         &self,
         rig: &Rig,
         opposition: &Opposition,
         object_from_wrist: Pose,
         giver: Option<&PreparedHand>,
-    ) -> [f32; TOLD] {
+    ) -> [f32; INPUTS] {
         let wrist_from_object = object_from_wrist.inverse();
         let mut weight = wrist_from_object.transform_point(self.centre_of_mass);
         let long_axis = wrist_from_object.transform_vector(self.long_axis).abs();
@@ -125,7 +125,7 @@ impl Bulk {
         let across = (opposition.fingers - opposition.thumb).normalize_or_zero();
         let arm = weight - (opposition.fingers + opposition.thumb) * 0.5;
         let along = arm.dot(across);
-        let beside = (arm - across * along).length();
+        let perturbed = (arm - across * along).length();
         // The network was taught on right hands.
         if rig.handedness == Handedness::Left {
             weight.x = -weight.x;
@@ -133,13 +133,15 @@ impl Bulk {
         let [from_thumb, from_fingers, from_palm] =
             [opposition.thumb, opposition.fingers, rig.palm].map(|point| {
                 let point = object_from_wrist.transform_point(point);
-                giver.map_or(FAR, |giver| giver.point_distance_at_most(point).clamp(0.0, FAR))
+                giver.map_or(FAR, |giver| {
+                    giver.point_distance_upper_bound(point).clamp(0.0, FAR)
+                })
             });
         let shape = &opposition.shape;
         let digits = shape.closing.iter().filter(|&&closes| closes).count();
         [
             opposition.width().max(LEAST_SIZE).ln(),
-            beside / self.characteristic_length,
+            perturbed / self.characteristic_length,
             along.abs(),
             weight.x,
             weight.y,

@@ -20,7 +20,7 @@ use crate::{
         grip::{Grip, Gripper, NoGrip, clear_of_giver},
         immobility::{Balance, balance},
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, ToldSolids},
+        solids::{HandSolids, TrackedSolids},
     },
     thesis::algorithm_1::HeldObject,
 };
@@ -67,8 +67,8 @@ impl Surroundings<'_> {
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        let told = ToldSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
-        let giver_clearance = clear_of_giver(&told, presented.giver.as_ref());
+        let inputs = TrackedSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
+        let giver_clearance = clear_of_giver(&inputs, presented.giver.as_ref());
         let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         let mut grasp = grasp(
             grip,

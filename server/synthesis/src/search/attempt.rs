@@ -31,7 +31,7 @@ use crate::{
 /// none found a grasp without them, and 39 with as few as eight an attempt. But they hold only where something like them is
 /// known, and fewer leave more of the time to hands that are placed anew: without any an attempt took 85 µs there, with
 /// eight 282.
-const BESIDE_KNOWN: usize = 16;
+const SEEDS_PER_ATTEMPT: usize = 16;
 
 /// How an attempt ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -236,7 +236,7 @@ impl Attempt {
         held.map_or_else(AttemptEnd::from, AttemptEnd::Valid)
     }
 
-    /// Tries [`BESIDE_KNOWN`] hands perturbed near known grips.
+    /// Tries [`SEEDS_PER_ATTEMPT`] hands perturbed near known grips.
     fn try_seeds(
         &mut self,
         scene: &Scene<'_>,
@@ -248,7 +248,7 @@ impl Attempt {
         let seeds = scene.seeds(around.presented, stream.attempt(), interrupted);
         let (seeds, entries) = seeds.ok_or(Interrupted)?;
         let place = scene.place(stream.attempt());
-        for _ in 0..BESIDE_KNOWN {
+        for _ in 0..SEEDS_PER_ATTEMPT {
             if interrupted() {
                 return Err(Interrupted);
             }

@@ -24,7 +24,7 @@ use crate::{
         flexing::Flexing,
         grip::{DEEPEST, GIVER_CLEARANCE},
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, TOLD_SOLIDS, ToldSolids, comes_within, self_clearance},
+        solids::{HandSolids, TRACKED_SOLIDS, TrackedSolids, comes_within, self_clearance},
     },
 };
 use motion::{Keep, Motion, Obstacles};
@@ -262,8 +262,8 @@ impl Planner<'_> {
     }
 
     /// A hand as it is beside the object, and beside the giver's.
-    fn solids(&self, pose: &HandPose) -> ToldSolids {
-        ToldSolids::of_rig(
+    fn solids(&self, pose: &HandPose) -> TrackedSolids {
+        TrackedSolids::of_rig(
             self.rig,
             pose.frame_from_wrist,
             &HandSolids::of_pose(self.rig, pose),
@@ -271,7 +271,7 @@ impl Planner<'_> {
     }
 
     /// True if an open hand is off the object and the giver's hand, and not through itself.
-    fn is_clear(&self, solids: &ToldSolids) -> bool {
+    fn is_clear(&self, solids: &TrackedSolids) -> bool {
         let surface = &self.obstacles.object.surface;
         let giver = self.obstacles.giver;
         !solids
@@ -283,7 +283,7 @@ impl Planner<'_> {
     }
 
     /// True if the straight way to an open hand is free.
-    fn comes(&self, pre_grasp: &ToldSolids, direction: Vec3) -> bool {
+    fn comes(&self, pre_grasp: &TrackedSolids, direction: Vec3) -> bool {
         let motion = Motion {
             solids_at: |share: f32| pre_grasp.moved(direction * (APPROACH_DISTANCE * (share - 1.0))),
             travels: pre_grasp.iter().map(|_| APPROACH_DISTANCE).collect(),
@@ -350,7 +350,7 @@ impl Planner<'_> {
             back + turn * reach
         }));
         travels.extend(solids.forearm.iter().map(|_| back));
-        travels.extend([back; TOLD_SOLIDS]);
+        travels.extend([back; TRACKED_SOLIDS]);
         travels
     }
 }

@@ -14,13 +14,13 @@ use crate::{
     known::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
-        recheck::Asked,
-        subset_grasps::spared,
+        recheck::Recheck,
+        subset_grasps::subset_grasp,
     },
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
     physical::{
         grip::Gripper,
-        solids::{PreparedHand, ToldSolids},
+        solids::{PreparedHand, TrackedSolids},
     },
     rating::scoring::comfort_value,
 };
@@ -40,7 +40,7 @@ pub(super) struct KnownGrips<'a> {
     /// Those that were found lately. Mostly they are worse than the atlas' own, which were chosen from.
     recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
-    asked: Asked<'a>,
+    asked: Recheck<'a>,
     giver: Option<&'a PreparedHand>,
     /// The front of the order again, for where a giver is in the way of fingers that can be spared.
     sparing: &'a [u16],
@@ -55,15 +55,15 @@ pub(super) struct KnownGrips<'a> {
 /// The solids of a known grip's hand.
 enum Solids<'a> {
     /// Those that the atlas keeps.
-    Kept(&'a ToldSolids),
+    Kept(&'a TrackedSolids),
     /// Made for this look.
-    Made(Box<ToldSolids>),
+    Made(Box<TrackedSolids>),
 }
 
 impl Deref for Solids<'_> {
-    type Target = ToldSolids;
+    type Target = TrackedSolids;
 
-    fn deref(&self) -> &ToldSolids {
+    fn deref(&self) -> &TrackedSolids {
         match self {
             Self::Kept(solids) => solids,
             Self::Made(solids) => solids,
@@ -136,7 +136,7 @@ impl<'a> KnownGrips<'a> {
             order: atlas.map_or(&[], |atlas| atlas.by_score(presented.up)),
             recent,
             scene,
-            asked: Asked::new(object, scene.rig(), presented),
+            asked: Recheck::new(object, scene.rig(), presented),
             sparing: match (atlas, giver) {
                 (Some(atlas), Some(_)) => atlas.holding_under(presented.up),
                 _ => &[],
@@ -194,7 +194,7 @@ impl<'a> KnownGrips<'a> {
         };
         let atlas = self.atlas?;
         let Some(giver) = self.giver else {
-            let solids = atlas.entries()[usize::from(index)].told_solids(self.rig);
+            let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
             return self.open(index, Solids::Made(Box::new(solids)));
         };
         let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
@@ -211,13 +211,13 @@ impl<'a> KnownGrips<'a> {
         let Some(entry) = self.recent.get(place) else {
             let index = self.sparing[place - self.recent.len()];
             let grips = self.atlas?.grips();
-            let is_open = grips.may_spare(usize::from(index), self.giver?);
+            let is_open = grips.may_hold_with_subset(usize::from(index), self.giver?);
             return is_open.then_some(Open::Sparing(index));
         };
         Some(Open::Whole {
             source: GraspSource::Recent,
             entry,
-            solids: Solids::Made(Box::new(entry.told_solids(self.rig))),
+            solids: Solids::Made(Box::new(entry.tracked_solids(self.rig))),
         })
     }
 
@@ -241,7 +241,7 @@ impl<'a> KnownGrips<'a> {
                 solids,
             }) => (source, self.hold(entry, &solids, gripper)),
             Taken::Open(Open::Sparing(index)) => {
-                (GraspSource::Spared(index), self.hold_sparing(index, gripper))
+                (GraspSource::Spared(index), self.hold_with_subset(index, gripper))
             }
         };
         match grasp {
@@ -254,7 +254,7 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    fn hold(&self, entry: &Entry, solids: &ToldSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+    fn hold(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let constraints = self.scene.constraints();
         if !entry.is_wanted(constraints) {
             return None;
@@ -265,9 +265,9 @@ impl<'a> KnownGrips<'a> {
 
     /// Apart, as its hands would make room for themselves on the stack of every look-up.
     #[inline(never)]
-    fn hold_sparing(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+    fn hold_with_subset(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let entry = &self.atlas?.entries()[usize::from(index)];
-        spared(entry, &self.scene.surroundings()?, self.giver?, gripper)
+        subset_grasp(entry, &self.scene.surroundings()?, self.giver?, gripper)
     }
 }
 

@@ -47,8 +47,8 @@ impl PhysicalAttempt {
         let mut in_vain = 0;
         while in_vain < PATIENCE {
             in_vain += 1;
-            let beside = nearest.1.beside(stream);
-            match self.hold(around, &beside, stopwatch, interrupted) {
+            let perturbed = nearest.1.perturbed(stream);
+            match self.hold(around, &perturbed, stopwatch, interrupted) {
                 // It holds, and is not wanted so.
                 Err(NoGrip::Rejected(Rejection::UnmetConstraint)) => {
                     refused = Err(NoGrip::Rejected(Rejection::UnmetConstraint));
@@ -58,7 +58,7 @@ impl PhysicalAttempt {
                 end => return end,
             }
             if let Some(share) = self.gripper.near_miss().filter(|&share| share > nearest.0) {
-                nearest = (share, beside);
+                nearest = (share, perturbed);
                 in_vain = 0;
             }
         }

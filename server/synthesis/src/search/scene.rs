@@ -7,8 +7,8 @@ use crate::{
     base::random::AttemptStream,
     known::{
         entry::Entry,
-        seed_source::{Demand, StartFrom, StartGrips},
-        seeds::Starts,
+        seed_source::{Demand, SeedSets, SeedSource},
+        seeds::Seeds,
     },
     model::{
         bend_ratios::BendRatioChoice,
@@ -34,7 +34,7 @@ use crate::{
 
 /// Attempts that ask of each pair of points that they draw whether it is off the giver's hand. Many searches end with
 /// them; from then on it is worth 180 µs to ask it of all pairs at once, of which a giver who covers the object leaves few.
-const SOON: u64 = 4;
+const ATTEMPTS_BEFORE_FREE_SURFACE: u64 = 4;
 
 /// What is to be taken, and by which hand.
 #[derive(Clone, Copy, Debug)]
@@ -61,12 +61,12 @@ pub struct Scene<'a> {
     placements: OnceLock<Arc<PlacementCache>>,
     constraints: Constraints,
     /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`.
-    starts: StartGrips,
+    seeds: SeedSets,
 }
 
 impl<'a> Scene<'a> {
     /// Prepares attempts at a task. Seeds come `from`, under `GUIDED` and `PHYSICAL`.
-    pub fn new(task: Task<'a>, query: &Query, from: StartFrom) -> Self {
+    pub fn new(task: Task<'a>, query: &Query, from: SeedSource) -> Self {
         let Task { holdout, rig, .. } = task;
         let friction = query.friction_on(&holdout.object);
         Self {
@@ -75,10 +75,10 @@ impl<'a> Scene<'a> {
             free_surface: OnceLock::new(),
             placements: OnceLock::new(),
             constraints: query.constraints,
-            starts: StartGrips::new(if query.uses_known_grips() {
+            seeds: SeedSets::new(if query.uses_known_grips() {
                 from
             } else {
-                StartFrom::Nothing
+                SeedSource::Nothing
             }),
             physical: match query.validity {
                 Validity::Thesis => None,
@@ -139,7 +139,7 @@ impl<'a> Scene<'a> {
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
         let giver = presented.and_then(|presented| presented.giver.as_ref());
         let surface = match giver {
-            Some(giver) if attempt >= SOON => self
+            Some(giver) if attempt >= ATTEMPTS_BEFORE_FREE_SURFACE => self
                 .free_surface
                 .get_or_init(|| object.surface_pairs().free_of(giver)),
             _ => object.surface_pairs(),
@@ -186,7 +186,7 @@ impl<'a> Scene<'a> {
 
     /// True if there is no grip to perturb hands near.
     pub(super) fn has_no_seeds(&self) -> bool {
-        self.starts.is_empty()
+        self.seeds.is_empty()
     }
 
     /// The grips that an attempt starts from, and those that they are of. None if there are none, or if interrupted.
@@ -195,12 +195,12 @@ impl<'a> Scene<'a> {
         presented: &Presented,
         attempt: u64,
         interrupted: &impl Fn() -> bool,
-    ) -> Option<(&Starts, &[Entry])> {
+    ) -> Option<(&Seeds, &[Entry])> {
         let demand = Demand {
             rig: self.task.rig,
             presented,
             constraints: &self.constraints,
         };
-        self.starts.of_attempt(attempt, &demand, interrupted)
+        self.seeds.of_attempt(attempt, &demand, interrupted)
     }
 }

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use crate::{
-    known::{atlas::Atlas, recent_grips::RecentGrips, seed_source::StartFrom},
+    known::{atlas::Atlas, recent_grips::RecentGrips, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -72,7 +72,7 @@ pub struct Known {
     /// Grips to try first, where [`Query::uses_known_grips`].
     pub atlas: Option<Arc<Atlas>>,
     /// Grips near which hands are perturbed where none of the known ones is valid; likewise.
-    pub seeds: StartFrom,
+    pub seeds: SeedSource,
     /// Grips that earlier searches found, under the object's own friction. They are tried after those of the atlas; a
     /// reproducible search ignores them.
     pub recent: RecentGrips,

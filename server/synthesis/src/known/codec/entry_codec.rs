@@ -11,7 +11,7 @@ use crate::{
     geometry::mesh::TriangleMesh,
     known::{
         entry::{Entry, SLIPS},
-        finger_subsets::FingerSets,
+        finger_subsets::FingerSubsets,
         friction_uses::FrictionUses,
         gravity::DIRECTIONS,
     },
@@ -75,7 +75,7 @@ pub(super) fn write_entry(
     writer.floats(&WRITTEN_TERMS.map(|term| entry.grip_values[term as usize]));
     write_scores(writer, &entry.scores);
     write_friction_uses(writer, entry.friction_uses);
-    writer.u16(entry.finger_sets.to_bits());
+    writer.u16(entry.finger_subsets.to_bits());
     writer.u8(entry.contacts.len() as u8);
     for contact in &entry.contacts {
         write_contact(writer, contact, object.surface.mesh());
@@ -121,9 +121,9 @@ pub(super) fn read_entry(
         penetration,
         epsilon,
     };
-    let finger_sets = FingerSets::from_bits(sets, grip.holding_digits()).ok_or(AtlasError::Malformed(
-        "sets of fingers are not of those that hold",
-    ))?;
+    let finger_subsets = FingerSubsets::from_bits(sets, grip.holding_digits()).ok_or(
+        AtlasError::Malformed("sets of fingers are not of those that hold"),
+    )?;
     let classification = classify(rig, &pose, &contacts);
     let mut grip_values = posture_values(object, rig, &pose, &contacts, classification);
     for (term, value) in WRITTEN_TERMS.into_iter().zip(written) {
@@ -136,7 +136,7 @@ pub(super) fn read_entry(
         grip_values,
         scores,
         friction_uses,
-        finger_sets,
+        finger_subsets,
     };
     Ok((entry, shape))
 }

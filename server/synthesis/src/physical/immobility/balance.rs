@@ -33,7 +33,7 @@ const SURE_GRIP: f64 = 8.0;
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
 /// Share of friction and torsion of [`FrictionUse::Sparing`]: with it, twice the load does not slip either.
-const SPARING_SHARE: f64 = 0.45;
+const FINGER_SUBSET_SHARE: f64 = 0.45;
 
 /// Of [`FrictionUse::Moderate`]: half as much again as the load holds.
 const MODERATE_SHARE: f64 = 0.7;
@@ -445,7 +445,7 @@ impl<'a> Problem<'a> {
 /// Of friction and torsion, how much may be used.
 fn share(friction_use: FrictionUse) -> f64 {
     match friction_use {
-        FrictionUse::Sparing => SPARING_SHARE,
+        FrictionUse::Sparing => FINGER_SUBSET_SHARE,
         FrictionUse::Moderate => MODERATE_SHARE,
         FrictionUse::Full => FULL_SHARE,
     }

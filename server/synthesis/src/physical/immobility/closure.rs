@@ -38,11 +38,11 @@ pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &m
     if resisted < required {
         return resisted as f32;
     }
-    inscribed_ball(&buffers.cones, resisted, required, &mut buffers.polytope) as f32
+    inscribed_sphere(&buffers.cones, resisted, required, &mut buffers.polytope) as f32
 }
 
 /// At most how much [`epsilon`] is, found in a tenth of the time; 0 if there surely is no closure.
-pub fn epsilon_at_most(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> f32 {
+pub fn epsilon_upper_bound(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> f32 {
     least_resisted(model(contacts, load, &mut buffers.cones)) as f32
 }
 
@@ -87,7 +87,7 @@ fn least_resisted(cones: &[ContactCone]) -> f64 {
 
 /// Epsilon from below. The polytope's facet nearest to the origin bounds it from below, what the contacts resist along
 /// that facet's normal from above; the wrench that does so becomes a new vertex, until the bounds meet.
-fn inscribed_ball(cones: &[ContactCone], upper: f64, required: f64, polytope: &mut Polytope) -> f64 {
+fn inscribed_sphere(cones: &[ContactCone], upper: f64, required: f64, polytope: &mut Polytope) -> f64 {
     if !polytope.start(|direction| farthest_wrench(cones, direction)) {
         return 0.0;
     }

@@ -447,8 +447,8 @@ mod tests {
                 }
                 passive += 1;
             }
-            for (&ours, &told) in residual.iter().zip(solver.residual()) {
-                assert!((ours - told).abs() < 1e-9, "case {case}: {told}, not {ours}");
+            for (&ours, &inputs) in residual.iter().zip(solver.residual()) {
+                assert!((ours - inputs).abs() < 1e-9, "case {case}: {inputs}, not {ours}");
             }
             for column in &columns {
                 let gain = dot(column, &residual);

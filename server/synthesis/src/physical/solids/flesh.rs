@@ -9,7 +9,7 @@ use glam::{Mat3, Vec3};
 
 use super::{
     TaperedCapsule,
-    tracked_palm::{METACARPAL_ENDS, ToldPalm, joint_of_end},
+    tracked_palm::{METACARPAL_ENDS, TrackedPalm, joint_of_end},
 };
 use crate::{
     base::pose::Pose,
@@ -270,14 +270,14 @@ impl Skeleton {
 
 /// The palm's fitted solids, those along the metacarpals and between them at least as thick as the joints' radii say: what
 /// a hand's owner tells of its thickness may be more than what was fitted to another hand's skin.
-pub(super) fn palm_as_told(
+pub(super) fn palm_as_tracked(
     palm: &[TaperedCapsule; PALM_SOLIDS],
-    told: &ToldPalm,
+    inputs: &TrackedPalm,
 ) -> [TaperedCapsule; PALM_SOLIDS] {
     let mut solids = *palm;
     for (solid, ends) in solids.iter_mut().zip(&PALM) {
-        let (start, start_radius) = as_told(ends[0].0, solid.start, solid.start_radius, told);
-        let (end, end_radius) = as_told(ends[1].0, solid.end, solid.end_radius, told);
+        let (start, start_radius) = as_tracked(ends[0].0, solid.start, solid.start_radius, inputs);
+        let (end, end_radius) = as_tracked(ends[1].0, solid.end, solid.end_radius, inputs);
         *solid = TaperedCapsule::new(start, end, start_radius, end_radius);
     }
     solids
@@ -285,10 +285,10 @@ pub(super) fn palm_as_told(
 
 /// The smallest ball around a fitted one that is as thick as the joints' radii say where it hangs.
 #[inline]
-fn as_told(anchor: Anchor, place: Vec3, radius: f32, told: &ToldPalm) -> (Vec3, f32) {
+fn as_tracked(anchor: Anchor, place: Vec3, radius: f32, inputs: &TrackedPalm) -> (Vec3, f32) {
     let Between(a, b, share) = anchor else {
         return (place, radius);
     };
-    let (told_place, told_radius) = told.between(a, b, share);
-    TaperedCapsule::new(place, told_place, radius, told_radius).bounding_ball()
+    let (told_place, told_radius) = inputs.between(a, b, share);
+    TaperedCapsule::new(place, told_place, radius, told_radius).bounding_sphere()
 }

@@ -51,7 +51,7 @@ pub(in crate::physical) struct Bounded {
 
 impl Bounded {
     pub(in crate::physical) fn new(solid: TaperedCapsule) -> Self {
-        let (centre, radius) = solid.bounding_ball();
+        let (centre, radius) = solid.bounding_sphere();
         Self {
             solid,
             centre,

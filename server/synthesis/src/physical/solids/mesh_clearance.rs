@@ -8,10 +8,7 @@
 use glam::Vec3;
 
 use super::TaperedCapsule;
-use crate::geometry::{
-    Segment,
-    mesh_bvh::{CapsuleGap, MeshBvh},
-};
+use crate::geometry::{Segment, capsule_gap::CapsuleGap, mesh_bvh::MeshBvh};
 
 /// Where a capsule comes closest to a mesh, or goes deepest into it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,19 +4,19 @@
 use glam::Vec3;
 
 use super::{
-    TaperedCapsule, ToldSolids,
+    TaperedCapsule, TrackedSolids,
     hand_clearance::Bounded,
-    spheres::{BALLS, Balls},
+    spheres::{SPHERES, Spheres},
 };
 
 /// Solids that are compared at once: those of a giver, filled up to whole registers.
-const LANES: usize = ToldSolids::COUNT.next_multiple_of(8);
+const LANES: usize = TrackedSolids::COUNT.next_multiple_of(8);
 
-/// The solids of a giver, indices of [`ToldSolids::iter`], in the order in which they settle most: each is the one that
+/// The solids of a giver, indices of [`TrackedSolids::iter`], in the order in which they settle most: each is the one that
 /// met most of the receiving hands that those before it did not, of 933,479 known grips of the built-in objects that meet
 /// a recorded giver and are not [excluded](crate::known::atlas::Atlas::excluded_by) before. The first four meet 79 % of them,
 /// eight 95 %.
-const MET_FIRST: [usize; ToldSolids::COUNT] = [
+const MET_FIRST: [usize; TrackedSolids::COUNT] = [
     8, 2, 18, 5, 15, 11, 29, 6, 13, 25, 17, 30, 3, 14, 12, 1, 16, 22, 7, 26, 4, 9, 39, 21, 20, 10, 24, 19,
     23, 37, 34, 31, 38, 36, 33, 32, 27, 0, 28, 35,
 ];
@@ -42,9 +42,9 @@ type Lanes = [f32; LANES];
 /// The solids of a giver's hand, which stays where it is while others are compared with it.
 #[derive(Clone, Debug)]
 pub struct PreparedHand {
-    solids: [Bounded; ToldSolids::COUNT],
+    solids: [Bounded; TrackedSolids::COUNT],
     /// Starts of the axes, in metres.
-    starts: [Lanes; 3],
+    seeds: [Lanes; 3],
     /// From there to their ends.
     axes: [Lanes; 3],
     /// One over the axes' squared lengths.
@@ -63,22 +63,22 @@ struct ToAxes {
 
 /// What some balls' middles are from the axis of one solid, as [`ToAxes`].
 struct ToAxis {
-    squares: [f32; BALLS],
+    squares: [f32; SPHERES],
     /// The solid's radii at the feet.
-    radii: [f32; BALLS],
+    radii: [f32; SPHERES],
 }
 
 impl PreparedHand {
     /// Prepares a hand: below a microsecond.
-    pub fn new(giver: &ToldSolids) -> Self {
+    pub fn new(giver: &TrackedSolids) -> Self {
         let all = giver.to_array();
-        let mut solids = [Bounded::new(all[0]); ToldSolids::COUNT];
+        let mut solids = [Bounded::new(all[0]); TrackedSolids::COUNT];
         for (place, solid) in solids.iter_mut().zip(MET_FIRST) {
             *place = Bounded::new(all[solid]);
         }
         let mut prepared = Self {
             solids,
-            starts: [[0.0; LANES]; 3],
+            seeds: [[0.0; LANES]; 3],
             axes: [[0.0; LANES]; 3],
             inverse_squares: [0.0; LANES],
             start_radii: [0.0; LANES],
@@ -86,10 +86,10 @@ impl PreparedHand {
         };
         for i in 0..LANES {
             // The rest repeats the last solid, which changes nothing.
-            let solid = &solids[i.min(ToldSolids::COUNT - 1)].solid;
+            let solid = &solids[i.min(TrackedSolids::COUNT - 1)].solid;
             let way = solid.end - solid.start;
             for axis in 0..3 {
-                prepared.starts[axis][i] = solid.start[axis];
+                prepared.seeds[axis][i] = solid.start[axis];
                 prepared.axes[axis][i] = way[axis];
             }
             let square = solid.start.distance_squared(solid.end);
@@ -122,7 +122,7 @@ impl PreparedHand {
     /// Metres that a point is at most from the hand's skin, and hardly less where solids taper as a hand's do; below 0
     /// inside.
     #[inline]
-    pub fn point_distance_at_most(&self, point: Vec3) -> f32 {
+    pub fn point_distance_upper_bound(&self, point: Vec3) -> f32 {
         let ToAxes { squares, along } = self.to_axes(point);
         let mut distances = [0.0; LANES];
         for i in 0..LANES {
@@ -134,13 +134,13 @@ impl PreparedHand {
     /// True only if one of some balls comes nearer to the hand than `distance` metres; not always then. Some 20 ns where
     /// the first solids settle it.
     #[inline]
-    pub fn surely_nears_any(&self, balls: &Balls, distance: f32) -> bool {
-        let mut reaches = balls.radii;
+    pub fn surely_nears_any(&self, spheres: &Spheres, distance: f32) -> bool {
+        let mut reaches = spheres.radii;
         for reach in &mut reaches {
             *reach += distance - ROUNDING;
         }
         (0..LANES).step_by(SOLIDS_AT_ONCE).any(|first| {
-            let nears = self.near_some(first, balls, &reaches);
+            let nears = self.near_some(first, spheres, &reaches);
             nears.iter().fold(0, |any, near| any | near) != 0
         })
     }
@@ -148,14 +148,14 @@ impl PreparedHand {
     /// Which of some balls surely come nearer to the hand than `distance` metres, a bit each; only some of them if those
     /// settle it.
     #[inline]
-    pub fn surely_near(&self, balls: &Balls, distance: f32, is_settled: impl Fn(u8) -> bool) -> u8 {
-        let mut reaches = balls.radii;
+    pub fn surely_near(&self, spheres: &Spheres, distance: f32, is_settled: impl Fn(u8) -> bool) -> u8 {
+        let mut reaches = spheres.radii;
         for reach in &mut reaches {
             *reach += distance - ROUNDING;
         }
         let mut near = 0_u8;
         for first in (0..LANES).step_by(SOLIDS_AT_ONCE) {
-            let nears = self.near_some(first, balls, &reaches);
+            let nears = self.near_some(first, spheres, &reaches);
             let bits = nears
                 .iter()
                 .enumerate()
@@ -170,12 +170,12 @@ impl PreparedHand {
 
     /// Metres that each of some balls is at most from the hand.
     #[inline]
-    pub fn distances_at_most(&self, balls: &Balls) -> [f32; BALLS] {
-        let mut least = [f32::INFINITY; BALLS];
+    pub fn distance_upper_bounds(&self, spheres: &Spheres) -> [f32; SPHERES] {
+        let mut least = [f32::INFINITY; SPHERES];
         for k in 0..SETTLING {
-            let ToAxis { squares, radii } = self.to_axis(k, balls);
-            for i in 0..BALLS {
-                let distance = squares[i].sqrt() - (balls.radii[i] + radii[i]);
+            let ToAxis { squares, radii } = self.to_axis(k, spheres);
+            for i in 0..SPHERES {
+                let distance = squares[i].sqrt() - (spheres.radii[i] + radii[i]);
                 least[i] = if distance < least[i] { distance } else { least[i] };
             }
         }
@@ -197,10 +197,10 @@ impl PreparedHand {
     }
 
     /// The smallest distance of another hand in metres, if it is at least `required`.
-    pub fn clearance(&self, other: &ToldSolids, required: f32) -> Option<f32> {
+    pub fn clearance(&self, other: &TrackedSolids, required: f32) -> Option<f32> {
         // Middle by middle, a distance that the smallest does not exceed, and for each pair one that it surely keeps.
         let mut bounds = [f32::INFINITY; LANES];
-        let mut sure = [[0.0; LANES]; ToldSolids::COUNT];
+        let mut sure = [[0.0; LANES]; TrackedSolids::COUNT];
         for (our, sure) in other.iter().zip(&mut sure) {
             let ToAxes { squares, along } = self.to_axes(our.at(0.5));
             let radius = our.radius_at(0.5);
@@ -244,7 +244,7 @@ impl PreparedHand {
     #[inline]
     fn kept_distances(&self, our: &TaperedCapsule, group: usize) -> [f32; GROUP] {
         let of = |lanes: &Lanes| lanes.as_chunks::<GROUP>().0[group];
-        let [sx, sy, sz] = self.starts.each_ref().map(of);
+        let [sx, sy, sz] = self.seeds.each_ref().map(of);
         let [ax, ay, az] = self.axes.each_ref().map(of);
         let (inverse_squares, start_radii, rises) =
             (of(&self.inverse_squares), of(&self.start_radii), of(&self.rises));
@@ -309,11 +309,11 @@ impl PreparedHand {
     /// For each of some balls, 1 if it surely comes nearer to one of the solids from `first` on, [`SOLIDS_AT_ONCE`], than how
     /// far it reaches.
     #[inline]
-    fn near_some(&self, first: usize, balls: &Balls, reaches: &[f32; BALLS]) -> [u32; BALLS] {
-        let mut nears = [0; BALLS];
+    fn near_some(&self, first: usize, spheres: &Spheres, reaches: &[f32; SPHERES]) -> [u32; SPHERES] {
+        let mut nears = [0; SPHERES];
         for k in first..first + SOLIDS_AT_ONCE {
-            let ToAxis { squares, radii } = self.to_axis(k, balls);
-            for i in 0..BALLS {
+            let ToAxis { squares, radii } = self.to_axis(k, spheres);
+            for i in 0..SPHERES {
                 // As in `surely_nears`.
                 let reach = (reaches[i] + radii[i]).max(0.0);
                 nears[i] |= u32::from(squares[i] < reach * reach);
@@ -325,7 +325,7 @@ impl PreparedHand {
     #[inline]
     fn to_axes(&self, point: Vec3) -> ToAxes {
         let (mut squares, mut along) = ([0.0; LANES], [0.0; LANES]);
-        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
+        let ([sx, sy, sz], [ax, ay, az]) = (&self.seeds, &self.axes);
         for i in 0..LANES {
             let (x, y, z) = (point.x - sx[i], point.y - sy[i], point.z - sz[i]);
             let t = (x * ax[i] + y * ay[i] + z * az[i]) * self.inverse_squares[i];
@@ -338,11 +338,11 @@ impl PreparedHand {
     }
 
     #[inline]
-    fn to_axis(&self, k: usize, balls: &Balls) -> ToAxis {
-        let [xs, ys, zs] = &balls.middles;
-        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
-        let (mut squares, mut radii) = ([0.0; BALLS], [0.0; BALLS]);
-        for i in 0..BALLS {
+    fn to_axis(&self, k: usize, spheres: &Spheres) -> ToAxis {
+        let [xs, ys, zs] = &spheres.middles;
+        let ([sx, sy, sz], [ax, ay, az]) = (&self.seeds, &self.axes);
+        let (mut squares, mut radii) = ([0.0; SPHERES], [0.0; SPHERES]);
+        for i in 0..SPHERES {
             let (x, y, z) = (xs[i] - sx[k], ys[i] - sy[k], zs[i] - sz[k]);
             let t = (x * ax[k] + y * ay[k] + z * az[k]) * self.inverse_squares[k];
             let t = t.clamp(0.0, 1.0);

@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Two joints, indices of [`ToldPalm::joints`].
+/// Two joints, indices of [`TrackedPalm::joints`].
 type Bone = [usize; 2];
 
 /// The ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
@@ -50,7 +50,7 @@ const FROM_WRIST: [Bone; 5] = [
     [WRIST, THUMB],
 ];
 
-/// How many capsules [`ToldPalm::around_metacarpals`] gives.
+/// How many capsules [`TrackedPalm::around_metacarpals`] gives.
 pub(super) const AROUND_METACARPALS: usize = ACROSS_KNUCKLES.len() + FROM_WRIST.len();
 
 const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
@@ -60,13 +60,13 @@ const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
 
 /// The joints that stay where they are in the palm, each with how far it is from there to the skin.
 #[derive(Clone, Copy, Debug)]
-pub struct ToldPalm {
+pub struct TrackedPalm {
     /// Base and knuckle of each metacarpal from index to little finger, the wrist, and the base of the thumb: places and
     /// radii in metres.
     joints: [(Vec3, f32); THUMB + 1],
 }
 
-impl ToldPalm {
+impl TrackedPalm {
     /// That of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
         Self {
@@ -136,7 +136,7 @@ pub(super) fn joint_of_end(end: usize) -> usize {
     index::FIRST_OF_DIGIT[end / 2 + 1] + end % 2
 }
 
-/// The `OpenXR` joint of one of [`ToldPalm::joints`].
+/// The `OpenXR` joint of one of [`TrackedPalm::joints`].
 fn openxr_joint(place: usize) -> usize {
     match place {
         WRIST => index::WRIST,

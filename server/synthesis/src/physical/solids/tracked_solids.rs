@@ -3,8 +3,8 @@
 use glam::Vec3;
 
 use super::{
-    HandSolids, PALM_SOLIDS, TaperedCapsule, ToldPalm, flesh::palm_as_told, hand_solids::middle_of_forearm,
-    tracked_palm::AROUND_METACARPALS,
+    HandSolids, PALM_SOLIDS, TaperedCapsule, TrackedPalm, flesh::palm_as_tracked,
+    hand_solids::middle_of_forearm, tracked_palm::AROUND_METACARPALS,
 };
 use crate::{
     base::pose::Pose,
@@ -15,12 +15,12 @@ use crate::{
 };
 
 /// Solids that such a hand has beside those of every hand.
-pub const TOLD_SOLIDS: usize = AROUND_METACARPALS + 1;
+pub const TRACKED_SOLIDS: usize = AROUND_METACARPALS + 1;
 
 /// A hand and forearm as solids for where two hands meet: nowhere thinner than skin that was fitted to a hand of its size,
 /// and nowhere more than a millimetre thinner than its joints' radii say, by which others draw it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToldSolids {
+pub struct TrackedSolids {
     /// The hand as it is beside an object.
     pub hand: HandSolids,
     /// Its palm, along the metacarpals at least as thick as told: four solids more instead would no longer fit into as many
@@ -28,12 +28,12 @@ pub struct ToldSolids {
     pub palm: [TaperedCapsule; PALM_SOLIDS],
     /// What is told of the rest: across the knuckles, from the wrist to the metacarpals' bases and the thumb's, and the
     /// middle of the forearm.
-    pub told: [TaperedCapsule; TOLD_SOLIDS],
+    pub inputs: [TaperedCapsule; TRACKED_SOLIDS],
 }
 
-impl ToldSolids {
+impl TrackedSolids {
     /// How many solids there are.
-    pub(crate) const COUNT: usize = HandSolids::COUNT + TOLD_SOLIDS;
+    pub(crate) const COUNT: usize = HandSolids::COUNT + TRACKED_SOLIDS;
 
     /// The solids of a hand's tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
@@ -41,7 +41,7 @@ impl ToldSolids {
         let forearm = middle_of_forearm(thesis_from_openxr_frame(wrist.pose), wrist.radius);
         Self::new(
             &HandSolids::of_joints(joints),
-            &ToldPalm::of_joints(joints),
+            &TrackedPalm::of_joints(joints),
             forearm,
         )
     }
@@ -49,16 +49,16 @@ impl ToldSolids {
     /// The solids of a rig's hand of which those beside an object are known, with its wrist there.
     pub fn of_rig(rig: &Rig, frame_from_wrist: Pose, hand: &HandSolids) -> Self {
         let forearm = middle_of_forearm(frame_from_wrist, rig.joint_radii[index::WRIST]);
-        Self::new(hand, &ToldPalm::of_rig(rig, frame_from_wrist), forearm)
+        Self::new(hand, &TrackedPalm::of_rig(rig, frame_from_wrist), forearm)
     }
 
-    fn new(hand: &HandSolids, palm: &ToldPalm, forearm: TaperedCapsule) -> Self {
-        let mut told = [forearm; TOLD_SOLIDS];
-        told[..AROUND_METACARPALS].copy_from_slice(&palm.around_metacarpals());
+    fn new(hand: &HandSolids, palm: &TrackedPalm, forearm: TaperedCapsule) -> Self {
+        let mut inputs = [forearm; TRACKED_SOLIDS];
+        inputs[..AROUND_METACARPALS].copy_from_slice(&palm.around_metacarpals());
         Self {
             hand: *hand,
-            palm: palm_as_told(&hand.palm, palm),
-            told,
+            palm: palm_as_tracked(&hand.palm, palm),
+            inputs,
         }
     }
 
@@ -69,7 +69,7 @@ impl ToldSolids {
             hand: self.hand.moved(way),
             ..*self
         };
-        for solid in moved.palm.iter_mut().chain(&mut moved.told) {
+        for solid in moved.palm.iter_mut().chain(&mut moved.inputs) {
             solid.start += way;
             solid.end += way;
         }
@@ -90,17 +90,17 @@ impl ToldSolids {
             .chain(&self.palm)
             .chain(thenar)
             .chain(forearm)
-            .chain(&self.told)
+            .chain(&self.inputs)
     }
 
     /// Those of them that stay where the wrist is, whatever the digits do.
     pub fn still(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
-        self.palm.iter().chain(&self.hand.forearm).chain(&self.told)
+        self.palm.iter().chain(&self.hand.forearm).chain(&self.inputs)
     }
 
-    /// All solids in the order of [`ToldSolids::iter`], side by side.
+    /// All solids in the order of [`TrackedSolids::iter`], side by side.
     pub(crate) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
-        let mut all = [self.told[0]; Self::COUNT];
+        let mut all = [self.inputs[0]; Self::COUNT];
         for (place, solid) in all.iter_mut().zip(self.iter()) {
             *place = *solid;
         }

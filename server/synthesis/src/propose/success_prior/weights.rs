@@ -6,7 +6,7 @@ use super::Network;
 
 /// Taught on hands of the rig `adult` and shapes that were drawn at random.
 #[rustfmt::skip]
-pub const TAUGHT: Network = Network {
+pub const TRAINED: Network = Network {
     means: [
             -4.05554, 0.45767, 0.01366, 0.03021, 0.10477, 0.05528, 0.51574, 0.48397,
             0.52745, -2.84754, -3.85432, -4.35315, 4.10345, 0.38528, 0.28856, 0.21256,

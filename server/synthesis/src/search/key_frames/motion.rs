@@ -8,7 +8,7 @@ use std::cell::Cell;
 
 use crate::{
     model::object::GraspObject,
-    physical::solids::{HandSolids, PreparedHand, TaperedCapsule, ToldSolids},
+    physical::solids::{HandSolids, PreparedHand, TaperedCapsule, TrackedSolids},
 };
 
 /// A part of a motion is not halved when nothing travels farther than this in half of it, in metres: what is found free
@@ -44,7 +44,7 @@ pub(super) struct Keep {
 pub(super) struct Motion<F> {
     /// The hand at a share of the motion, from 0 to 1.
     pub solids_at: F,
-    /// Metres that any point of each solid travels at most, in the order of [`ToldSolids::iter`].
+    /// Metres that any point of each solid travels at most, in the order of [`TrackedSolids::iter`].
     pub travels: Vec<f32>,
 }
 
@@ -57,7 +57,7 @@ enum Part {
     Open,
 }
 
-impl<F: Fn(f32) -> ToldSolids> Motion<F> {
+impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
     /// True if the motion keeps to what it should.
     pub(super) fn is_free(&self, obstacles: &Obstacles<'_>, keep: Keep) -> bool {
         // What does not move is where it is in the grasp.
