@@ -29,7 +29,7 @@ pub enum SeedSource {
     /// Grips that hold the object.
     Atlas(Arc<Atlas>),
     /// Grips that hold something like it, where it has no atlas yet.
-    TransferredGrips(Arc<TransferredGrips>),
+    Transferred(Arc<TransferredGrips>),
 }
 
 impl SeedSource {
@@ -37,7 +37,7 @@ impl SeedSource {
     pub fn atlas(&self) -> Option<&Arc<Atlas>> {
         match self {
             Self::Atlas(atlas) => Some(atlas),
-            Self::Nothing | Self::TransferredGrips(_) => None,
+            Self::Nothing | Self::Transferred(_) => None,
         }
     }
 }
@@ -45,8 +45,11 @@ impl SeedSource {
 /// Beside whom grips are to start from, and what they are to be.
 #[derive(Clone, Copy, Debug)]
 pub struct Demand<'a> {
+    /// The receiving hand.
     pub rig: &'a Rig,
+    /// The giver and gravity.
     pub presented: &'a Presented,
+    /// What is demanded of the grasp.
     pub constraints: &'a Constraints,
 }
 
@@ -65,6 +68,7 @@ pub struct SeedSets {
 }
 
 impl SeedSets {
+    /// No seeds yet: each kind is found on first use.
     pub fn new(from: SeedSource) -> Self {
         Self {
             from,
@@ -91,7 +95,7 @@ impl SeedSets {
                 let seeds = self.of_atlas(atlas, attempt, demand, interrupted)?;
                 Some((seeds, atlas.entries()))
             }
-            SeedSource::TransferredGrips(borrowed) => {
+            SeedSource::Transferred(borrowed) => {
                 let (grips, seeds) = self.of_transferred(borrowed, attempt, demand, interrupted)?;
                 Some((seeds, grips.entries()))
             }
