@@ -1,7 +1,7 @@
 """The object as convex pieces for the physics engine, and its mass properties.
 
-CoACD makes the pieces (Wei et al. 2022, "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and
-Tree Search"). They are cached in target/quality/convex by a hash of the mesh and the settings.
+CoACD makes the pieces (Wei et al. 2022, "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity
+and Tree Search"). They are cached in target/quality/convex by a hash of the mesh and the settings.
 """
 
 import hashlib
@@ -17,8 +17,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "target/quality/convex"
-# How far a piece may span a hollow by CoACD's measure: a share of the thinnest side of the object's box, and its bounds in
-# metres. Pieces bulge less than that (at 1.2 to 2 mm, by 0.5 to 0.9 mm at the 99th percentile); half takes ten times as long.
+# How far a piece may span a hollow by CoACD's measure: a share of the thinnest side of the object's box, and its bounds
+# in metres. Pieces bulge less than that (at 1.2 to 2 mm, by 0.5 to 0.9 mm at the 99th percentile); half takes ten times
+# as long.
 CONCAVITY, FINEST, COARSEST = 0.07, 0.001, 0.002
 # Cells along the longest side when CoACD has to make a mesh watertight; detail finer than a cell is lost.
 RESOLUTION = 100
@@ -45,7 +46,7 @@ def pieces(mesh):
 
 
 def shells(mesh):
-    """Vertices and faces of each connected part of the surface; parts may overlap, and each is simpler than the whole."""
+    """Vertices and faces of each connected part of the surface. Parts may overlap; each is simpler than the whole."""
     points, merged = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
     faces = merged.ravel()[mesh.faces]
     links = coo_array((np.ones(2 * len(faces)), (faces[:, :2].ravel(), faces[:, 1:].ravel())), 2 * [len(points)])

@@ -1,7 +1,7 @@
 """A hand built from the 26 OpenXR joints and radii of a reply: its solids, joint angles and handedness.
 
-Limits and lengths come from the rigs' descriptions (assets/hands/*.json). In their frames the fingers point along +y and
-the palm faces +z; in those of OpenXR joints, -Z and -Y.
+Limits and lengths come from the rigs' descriptions (assets/hands/*.json). In their frames the fingers point along +y
+and the palm faces +z; in those of OpenXR joints, -Z and -Y.
 """
 
 import json
@@ -32,8 +32,8 @@ NAMES = ["palm", "wrist"] + [
 ]
 # A half turn about (0, 1, -1) between the axes of a rig's frame and those of an OpenXR joint.
 HALF_TURN = Rotation.from_quat([0.0, 0.5**0.5, -(0.5**0.5), 0.0])
-# The forearm behind the wrist, in metres; its radius grows from the wrist's to this (ANSUR II: adults' forearms measure 26
-# to 31 cm around, so 41 to 49 mm).
+# The forearm behind the wrist, in metres; its radius grows from the wrist's to this (ANSUR II: adults' forearms measure
+# 26 to 31 cm around, so 41 to 49 mm).
 FOREARM_LENGTH, FOREARM_RADIUS = 0.25, 0.042
 # Range of motion of a wrist in degrees (AAOS).
 FLEXION, EXTENSION, RADIAL, ULNAR = 80, 70, 20, 30
@@ -51,7 +51,7 @@ class Hand:
 
     @classmethod
     def from_joints(cls, handedness, joints, rig=None):
-        """Reads the API's JSON: 26 joints, or 25 without the palm, which then lies halfway along the middle metacarpal."""
+        """Reads the 26 joints of the API's JSON, or 25: the palm is then put halfway along the middle metacarpal."""
         poses = [joint["client_from_joint"] for joint in joints]
         positions = [pose["position"] for pose in poses]
         orientations = [pose["orientation"] for pose in poses]
@@ -125,9 +125,9 @@ class Hand:
     def angles(self):
         """Joint angles, the largest twist, and the largest displacement.
 
-        Angles are in degrees, a yaw and three pitches per digit. The twist, in degrees, is a rotation about an axis that
-        the joint does not have. The displacement, in metres, is between a joint and where the rig's bone lengths put it,
-        given the joints' orientations.
+        Angles are in degrees, a yaw and three pitches per digit. The twist, in degrees, is a rotation about an axis
+        that the joint does not have. The displacement, in metres, is between a joint and where the rig's bone lengths
+        put it, given the joints' orientations.
         """
         rig = description(self.rig, self.handedness)
         wrist = self.rotations[WRIST] * HALF_TURN

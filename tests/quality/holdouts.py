@@ -101,8 +101,8 @@ def recorded_hands():
 class Placer:
     """Places hands on an object so that they hold it near one end, as a giver would.
 
-    A pattern search improves random placements of the grip near the object. It models the hand as balls along its bones;
-    the cost is low when thumb, two fingers and palm are near the surface and no ball is inside.
+    A pattern search improves random placements of the grip near the object. It models the hand as balls along its
+    bones; the cost is low when thumb, two fingers and palm are near the surface and no ball is inside.
     """
 
     def __init__(self, mesh):

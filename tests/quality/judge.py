@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Requests grasps from a real server and judges each reply with code that shares nothing with the search.
 
-The exit code is 0 if there were grasps to judge, good or bad. With --least-sound it is 1 if too many of them have faults,
-with --strict if a target is not met.
+The exit code is 0 if there were grasps to judge, good or bad. With --least-sound it is 1 if too many of them have
+faults, with --strict if a target is not met.
 """
 
 import argparse
@@ -187,7 +187,7 @@ def main():
         raise SystemExit("no grasp was found, so there is nothing to judge")
     sound = 100 * report.sound_share(rows)
     if sound < options.least_sound:
-        raise SystemExit(f"only {sound:.0f} % of the grasps are without fault; must be at least {options.least_sound:.0f} %")
+        raise SystemExit(f"{sound:.0f} % of the grasps are without fault; must be at least {options.least_sound:.0f} %")
     if options.strict and not all(target.met for target in targets if target.met is not None):
         raise SystemExit(1)
 

@@ -28,13 +28,13 @@ BONE_TOLERANCE = 0.001
 STRETCHED = 10.0
 # A contact's normal may be that of any triangle this near, in metres, within this angle, in degrees.
 NORMAL_REACH, NORMAL_ANGLE = 0.0005, 15.0
-# At an edge or corner it may also lie between the normals of the triangles that meet there. They are this near, in metres:
-# just rounding in single precision, or both sides of a blade would count as an edge.
+# At an edge or corner it may also lie between the normals of the triangles that meet there. They are this near, in
+# metres: just rounding in single precision, or both sides of a blade would count as an edge.
 EDGE_REACH = 0.00002
 # Strongest press of a digit, in newtons (thesis 2.5).
 STRONGEST = 27.0
-# A contact's largest torsion over friction times force, in metres: two thirds of the radius, some 6 mm, of a pad's evenly
-# pressed patch under a few newtons. Slip and torsion share the friction (an ellipse).
+# A contact's largest torsion over friction times force, in metres: two thirds of the radius, some 6 mm, of a pad's
+# evenly pressed patch under a few newtons. Slip and torsion share the friction (an ellipse).
 TORSION_RADIUS = 0.004
 # Comfortable shares of the force, thumb first (thesis 4.6).
 SHARES = np.array([0.25, 0.25, 0.25, 0.125, 0.125])
@@ -315,8 +315,8 @@ def giver_clearance(mesh, hand, giver):
 def self_clearance(hand):
     """The smallest distance between parts of the hand that are not joined: between digits, and from digits to the palm.
 
-    Neighbouring proximal phalanges share the web at the knuckles, so only their outer halves count. Against the palm only
-    what lies beyond the middle joint counts (of the thumb, the last phalanx).
+    Neighbouring proximal phalanges share the web at the knuckles, so only their outer halves count. Against the palm
+    only what lies beyond the middle joint counts (of the thumb, the last phalanx).
     """
     capsules, tags = hand.solids()
     trimmed, _ = hand.solids()

@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
-# Distance between neighbouring sample points of a surface in metres. No point is farther than half of it from a sample, so
-# a depth in flesh of radius 7 mm is underestimated by at most 0.75^2 / 14 mm = 0.04 mm.
+# Distance between neighbouring sample points of a surface in metres. No point is farther than half of it from a sample,
+# so a depth in flesh of radius 7 mm is underestimated by at most 0.75^2 / 14 mm = 0.04 mm.
 SPACING = 0.0015
 # Size of a grid cell in metres of which one sample is kept; fine and slender triangles yield too many.
 CELL = 0.0005

@@ -1,14 +1,14 @@
 """Simulates the grasp in a physics engine (MuJoCo) that is independent of the search: does the hand keep hold?
 
-The world is the object's frame. Wrist and palm are fixed; each phalanx is a body on a hinge, the pitch of its joint, while
-yaw is locked. Flesh is the judge's capsules, cut into slices of constant radius; the object is its convex pieces. As in
-every handover, both hands hold at first: the object is fixed while the digits settle at the forces they press with. Then
-the giver lets go.
+The world is the object's frame. Wrist and palm are fixed; each phalanx is a body on a hinge, the pitch of its joint,
+while yaw is locked. Flesh is the judge's capsules, cut into slices of constant radius; the object is its convex pieces.
+As in every handover, both hands hold at first: the object is fixed while the digits settle at the forces they press
+with. Then the giver lets go.
 
-Each hinge has a constant torque that makes its digit press with the forces and torsions of the reply: the torque about the
-hinge of all forces on the phalanges beyond it. A damped spring of limited strength holds the posture that the hinge has
-when the giver lets go, as a gripping hand does. It adds nothing while nothing moves, so the digits press with the reply's
-forces alone. The palm only presses back.
+Each hinge has a constant torque that makes its digit press with the forces and torsions of the reply: the torque about
+the hinge of all forces on the phalanges beyond it. A damped spring of limited strength holds the posture that the hinge
+has when the giver lets go, as a gripping hand does. It adds nothing while nothing moves, so the digits press with the
+reply's forces alone. The palm only presses back.
 """
 
 import enum
@@ -21,10 +21,12 @@ import convex
 from hand import CHAINS, DIGITS, HALF_TURN, PHALANGES
 from measures import GRAVITY, TORSION_RADIUS
 
-# Seconds of gravity, of each push, and of a time step. Steps of 0.5 ms change the verdict of about one grasp in fourteen.
+# Seconds of gravity, of each push, and of a time step. Steps of 0.5 ms change the verdict of about one grasp in
+# fourteen.
 SETTLING, PUSHING, STEP = 1.0, 2.0, 0.002
-# Seconds for which the giver still holds: a handover takes some tenths of a second (Mason and MacKenzie 2005, from memory).
-# Meanwhile the posture yields to the pads' overlap, which would otherwise press with up to ten times the reply's forces.
+# Seconds for which the giver still holds: a handover takes some tenths of a second (Mason and MacKenzie 2005, from
+# memory). Meanwhile the posture yields to the pads' overlap, which would otherwise press with up to ten times the
+# reply's forces.
 HANDING = 0.25
 # Steps between two checks of the object.
 STRIDE = 5
@@ -32,8 +34,9 @@ STRIDE = 5
 PUSH = 10.0
 # The object is lost when it has moved or turned farther than this, in metres and degrees.
 LOST_DISTANCE, LOST_ANGLE = 0.05, 15.0
-# Stiffness of the posture's spring at a fingertip in newtons per metre, shared evenly by the three joints: that of pressing
-# index fingers (200 to 800 N/m, Hajian and Howe 1997, from memory). Twice or four times as much hardly changes a verdict.
+# Stiffness of the posture's spring at a fingertip in newtons per metre, shared evenly by the three joints: that of
+# pressing index fingers (200 to 800 N/m, Hajian and Howe 1997, from memory). Twice or four times as much hardly changes
+# a verdict.
 TIP_STIFFNESS = 500.0
 # Damping over stiffness of the spring, in seconds. Smaller rings, larger creeps.
 DAMPING_TIME = 0.03
@@ -45,9 +48,9 @@ ARMATURE = 1e-5
 DENSITY = 1100.0
 # Largest difference of radii within a slice of a tapered capsule, in metres; the error is half of it.
 TAPER = 0.0005
-# Flesh as soft contacts: time constant in seconds, and impedances at first touch and at a depth of FLESH_DEPTH metres. A
-# fingertip gives way by 0.3 mm under 5 N, and an initial overlap of 2 mm does not throw the object. Half the time constant
-# loses two grasps in fourteen more.
+# Flesh as soft contacts: time constant in seconds, and impedances at first touch and at a depth of FLESH_DEPTH metres.
+# A fingertip gives way by 0.3 mm under 5 N, and an initial overlap of 2 mm does not throw the object. Half the time
+# constant loses two grasps in fourteen more.
 CONTACT_TIME, IMPEDANCES, FLESH_DEPTH = 0.005, (0.9, 0.99), 0.001
 # Stiffness of friction over that of the normal force (MuJoCo's impratio); lower values let held objects creep.
 FRICTION_STIFFNESS = 20.0
@@ -88,8 +91,8 @@ class Object:
 def simulate(obj, hand, contacts, up, axes=np.eye(3), pushes=DIRECTIONS):
     """Outcomes by name: "gravity" and, if the object survives that, each push.
 
-    `hand` (None for no hand), `contacts` and `up` are in the object's frame; pushes go along the rows of `axes`, in either
-    direction.
+    `hand` (None for no hand), `contacts` and `up` are in the object's frame; pushes go along the rows of `axes`, in
+    either direction.
     """
     model = mujoco.MjModel.from_xml_string(world(obj, hand, contacts, -GRAVITY * np.asarray(up)))
     data = mujoco.MjData(model)

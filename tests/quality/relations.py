@@ -74,8 +74,8 @@ def comfort_and_verdict(found, acceptable, faults):
             ("runs lost, of seven", lambda row: 7 - runs_survived(row), None),
         ]
     lines = [
-        "E is a cost. If it predicted the verdict, bad grasps would have the larger E (a correlation above 0), and good ones"
-        " would rank before bad ones in more than half of the pairs.",
+        "E is a cost. If it predicted the verdict, bad grasps would have the larger E (a correlation above 0), and good"
+        " ones would rank before bad ones in more than half of the pairs.",
         "",
         "| verdict | bad | rank correlation with E | good before bad |",
         "|---|--:|--:|--:|",

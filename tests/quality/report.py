@@ -111,7 +111,7 @@ def held(found):
 
 
 def classified(found):
-    """How many grasps have a type of the taxonomy, and how many types there are; nothing if the replies have no types."""
+    """How many grasps have a type of the taxonomy, and how many types there are; nothing if no reply has a type."""
     typed = [row for row in found if "type" in row]
     if not typed:
         return []

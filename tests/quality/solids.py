@@ -31,8 +31,8 @@ class Capsules:
     def distances(self, points):
         """Signed distance from each point (row) to each capsule's skin (column), negative inside.
 
-        The hull is the union of the balls along the axis, so the distance is the minimum of |p - c(u)| - r(u). The radius
-        falls by k per unit of length, and the derivative is zero where s - u = k rho / sqrt(1 - k^2).
+        The hull is the union of the balls along the axis, so the distance is the minimum of |p - c(u)| - r(u). The
+        radius falls by k per unit of length, and the derivative is zero where s - u = k rho / sqrt(1 - k^2).
         """
         offsets = np.asarray(points, float).reshape(-1, 1, 3) - self.starts
         along = np.einsum("pci,ci->pc", offsets, self.directions)
@@ -72,8 +72,8 @@ class Capsules:
 def clearance(a, b):
     """Signed distance between the skins of each capsule of `a` (row) and each of `b` (column).
 
-    Along an axis of `a`, the distance to `b` minus the radius of `a` is convex, so a ternary search finds the minimum; 60
-    steps leave 1e-10 of the length.
+    Along an axis of `a`, the distance to `b` minus the radius of `a` is convex, so a ternary search finds the minimum;
+    60 steps leave 1e-10 of the length.
     """
     rows, columns = np.divmod(np.arange(len(a) * len(b)), len(b))
     first, second = a.subset(rows), b.subset(columns)

@@ -372,7 +372,8 @@ class TestFaults:
         assert "cone" in faults(scene, balanced)
 
     def test_epsilon_of_two_pads_is_their_torsion(self):
-        # Two pads are weakest about the line between them: friction times two thirds of the patch's radius over the reach.
+        # Two pads are weakest about the line between them: friction times two thirds of the patch's radius over the
+        # reach.
         scene, grasp, _ = good()
         assert judged(scene, grasp)["epsilon"] == pytest.approx(
             FRICTION * measures.TORSION_RADIUS / scene.reach, rel=0.02
@@ -381,8 +382,8 @@ class TestFaults:
         assert judged(scene, grasp)["epsilon"] == 0.0
 
     def test_epsilon_of_a_cube_held_on_all_sides_is_that_of_an_octahedron(self):
-        # With contacts far enough out, torques are easy and the hull of the forces decides. Frictionless pushes along six
-        # axes make an octahedron, whose faces are 1 / sqrt 3 away.
+        # With contacts far enough out, torques are easy and the hull of the forces decides. Frictionless pushes along
+        # six axes make an octahedron, whose faces are 1 / sqrt 3 away.
         scene, _, _ = good()
         scene.centre_of_mass, scene.friction, scene.reach = np.zeros(3), 1e-9, 1.0
         contacts = []
