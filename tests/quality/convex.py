@@ -1,7 +1,7 @@
 """The object as convex pieces for the physics engine, and its mass properties.
 
-Pieces come from CoACD (Wei et al. 2022, "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity
-and Tree Search"), and are kept in target/quality/convex by the hash of the mesh and of the settings.
+CoACD makes the pieces (Wei et al. 2022, "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity
+and Tree Search"). They are cached in target/quality/convex by a hash of the mesh and the settings.
 """
 
 import hashlib
@@ -17,18 +17,18 @@ from scipy.spatial import ConvexHull, QhullError
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "target/quality/convex"
-# How far a piece may span a hollow by CoACD's measure, as a share of the thinnest side of the object's box, and least and
-# most in metres. What pieces add to the surface is less: at 1.2 to 2 mm, 0.5 to 0.9 mm at 99 of 100 places of a banana, a
-# hammer, a mug and a wine glass. Half of it takes up to ten times as long to decompose.
+# How far a piece may span a hollow by CoACD's measure: a share of the thinnest side of the object's box, and its bounds
+# in metres. Pieces bulge less than that (at 1.2 to 2 mm, by 0.5 to 0.9 mm at the 99th percentile); half takes ten times
+# as long.
 CONCAVITY, FINEST, COARSEST = 0.07, 0.001, 0.002
-# Cells along the longest side when CoACD has to make a mesh watertight; it loses detail finer than a cell.
+# Cells along the longest side when CoACD has to make a mesh watertight; detail finer than a cell is lost.
 RESOLUTION = 100
-# The tree search's nodes and rounds: CoACD's own 20 and 150 take several times as long for pieces as good.
+# Nodes and rounds of the tree search; CoACD's defaults, 20 and 150, take several times as long for pieces no better.
 NODES, ROUNDS = 10, 20
 
 
 def pieces(mesh):
-    """The corners of each convex piece, each (n, 3), in the mesh's frame in metres."""
+    """The corners of each convex piece, an (n, 3) array in metres in the mesh's frame."""
     concavity = float(np.clip(CONCAVITY * (mesh.high - mesh.low).min(), FINEST, COARSEST))
     key = hashlib.sha256(repr((concavity, RESOLUTION, NODES, ROUNDS)).encode())
     key.update(np.ascontiguousarray(mesh.vertices, np.float64).tobytes())
@@ -37,7 +37,7 @@ def pieces(mesh):
     if not file.exists():
         parts = [part for shell in shells(mesh) for part in decomposed(*shell, concavity)]
         FOLDER.mkdir(parents=True, exist_ok=True)
-        # Whole or not at all: others may read the folder at the same time.
+        # Written under another name and renamed, because other processes may be reading the folder.
         with tempfile.NamedTemporaryFile(dir=FOLDER, suffix=".npz", delete=False) as unfinished:
             np.savez_compressed(unfinished, *parts)
         os.replace(unfinished.name, file)
@@ -46,23 +46,23 @@ def pieces(mesh):
 
 
 def shells(mesh):
-    """Vertices and faces of each connected part of the surface: parts of a thing may overlap, and each is simpler."""
-    places, merged = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
+    """Vertices and faces of each connected part of the surface. Parts may overlap; each is simpler than the whole."""
+    points, merged = np.unique(np.round(mesh.vertices, 7), axis=0, return_inverse=True)
     faces = merged.ravel()[mesh.faces]
-    links = coo_array((np.ones(2 * len(faces)), (faces[:, :2].ravel(), faces[:, 1:].ravel())), 2 * [len(places)])
+    links = coo_array((np.ones(2 * len(faces)), (faces[:, :2].ravel(), faces[:, 1:].ravel())), 2 * [len(points)])
     _, labels = connected_components(links, directed=False)
     for label in np.unique(labels[faces[:, 0]]):
         own = faces[labels[faces[:, 0]] == label]
         used, renumbered = np.unique(own, return_inverse=True)
-        yield places[used], renumbered.reshape(-1, 3)
+        yield points[used], renumbered.reshape(-1, 3)
 
 
 def decomposed(vertices, faces, concavity):
-    """The convex pieces of one shell: itself when it spans no hollow, else what CoACD makes of it."""
+    """The convex pieces of one shell: the shell itself if it spans no hollow, else CoACD's pieces."""
     try:
         planes = ConvexHull(vertices).equations
     except QhullError:
-        # Flat: it holds nothing, and nothing can press on it from within.
+        # A flat shell encloses no volume.
         return []
     middles = np.concatenate([vertices, vertices[faces].mean(axis=1)])
     if (middles @ planes[:, :3].T + planes[:, 3]).max(axis=1).min() > -concavity:
@@ -81,9 +81,9 @@ def decomposed(vertices, faces, concavity):
 
 
 def unit_inertia(parts):
-    """The inertia tensor of one kilogram spread evenly over the pieces, about their common centre, in square metres.
+    """The inertia tensor, in square metres, of one kilogram spread evenly over the pieces, about their common centre.
 
-    Tetrahedra between a piece's faces and its middle: for corners a, b, c, d about their origin, the integral of
+    Sums tetrahedra between a piece's faces and its middle. Over a tetrahedron with corners a, b, c, d, the integral of
     x x^T is volume / 20 (sum of the corners' x x^T + the outer product of the corners' sum).
     """
     volume, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
@@ -92,11 +92,11 @@ def unit_inertia(parts):
         middle = corners.mean(axis=0)
         for a, b, c in corners[hull.simplices]:
             size = abs(np.linalg.det([a - middle, b - middle, c - middle])) / 6
-            of_all = np.array([a, b, c, middle])
-            total = of_all.sum(axis=0)
+            tetrahedron = np.array([a, b, c, middle])
+            total = tetrahedron.sum(axis=0)
             volume += size
             first += size * total / 4
-            second += size / 20 * (of_all.T @ of_all + np.outer(total, total))
+            second += size / 20 * (tetrahedron.T @ tetrahedron + np.outer(total, total))
     centre = first / volume
     second = second / volume - np.outer(centre, centre)
     return np.trace(second) * np.eye(3) - second

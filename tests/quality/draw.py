@@ -1,6 +1,6 @@
-"""Small pictures of hand and object alone, without the giver, from the side that shows most of what touches.
+"""Small pictures of hand and object, without the giver, from the side that shows the touching digits best.
 
-Points of the skin and of the surface are drawn into a depth buffer: what the judge measures, not what the client draws.
+Draws sample points of skin and surface into a depth buffer: the judge's own geometry, not the client's meshes.
 """
 
 import numpy as np
@@ -8,21 +8,21 @@ from scipy.spatial.transform import Rotation
 
 import measures
 
-# Pixels along each side; and those of the trials that choose the view.
+# Pixels along each side, of the picture and of the trials that choose the view.
 SIZE, TRIAL = 400, 100
-# What a pixel can show: background, object, palm, digits that do not touch, digits that do, contacts.
+# What a pixel can show.
 NOTHING, OBJECT, PALM, IDLE, TOUCHING, CONTACT = range(6)
 COLOURS = np.array([[1, 1, 1], [0.55, 0.6, 0.66], [0.87, 0.72, 0.6], [0.93, 0.81, 0.7], [0.95, 0.66, 0.5], [0.8, 0, 0]])
-# How much it helps to see a pixel of each: what touches matters most, and contacts lie mostly hidden.
+# Value of seeing a pixel of each: touching parts matter most, and contacts are mostly hidden.
 WORTH = np.array([0.0, 0.2, 0.1, 0.3, 1.0, 6.0])
-# Directions to look from: a spiral over the ball.
+# Number of directions to look from.
 VIEWS = 40
-# Points on skins are so far apart in metres, about a pixel of the picture.
+# Distance between points on the skin in metres, about a pixel of the picture.
 SPACING = 0.0012
 
 
 def picture(scene, grasp):
-    """An image of (SIZE, SIZE, 3) in 0 to 1, gravity downward where that can be."""
+    """An image of shape (SIZE, SIZE, 3) with values from 0 to 1; gravity points down where the view allows."""
     hand, contacts = measures.in_object_frame(scene, grasp)
     points, normals, kinds = cloud(scene.mesh, hand, contacts)
     up = scene.rotation.inv().apply(scene.up)
@@ -34,14 +34,14 @@ def picture(scene, grasp):
     axes = axes_of(best, up)
     seen, nearest = shown(points, kinds, axes, SIZE)
     light = Rotation.from_matrix(axes.T).apply([0.3, 0.5, 0.8])
-    # Surfaces may be wound either way round: both sides are lit.
+    # Light both sides: surfaces may be wound either way round.
     shade = 0.45 + 0.55 * np.abs(normals[nearest] @ light) / np.linalg.norm(light)
     shade[(seen == NOTHING) | (seen == CONTACT)] = 1.0
     return COLOURS[seen] * shade[..., None]
 
 
 def cloud(mesh, hand, contacts):
-    """Points, their normals and kinds."""
+    """Points to draw, their normals and their kinds."""
     surface, owners = measures.surface_samples(mesh)
     capsules, tags = hand.solids()
     skin, rows = capsules.skin(SPACING)
@@ -65,7 +65,7 @@ def cloud(mesh, hand, contacts):
 
 
 def directions():
-    """Directions all around, evenly spread."""
+    """Unit vectors spread evenly over the sphere, on a spiral."""
     i = np.arange(VIEWS) + 0.5
     height, around = 1 - 2 * i / VIEWS, np.pi * (1 + 5**0.5) * i
     across = np.sqrt(1 - height**2)
@@ -73,7 +73,7 @@ def directions():
 
 
 def axes_of(toward, up):
-    """Rows: right, upward and toward the eye."""
+    """The view's axes as rows: right, up, and toward the eye."""
     if abs(toward @ up) > 0.95:
         up = np.eye(3)[np.argmin(np.abs(toward))]
     right = np.cross(up, toward)
@@ -82,7 +82,7 @@ def axes_of(toward, up):
 
 
 def shown(points, kinds, axes, size, cover=1):
-    """Kind and index of the nearest point of each pixel; each point covers so many pixels on each side of its own."""
+    """Kind and index of the nearest point at each pixel; a point covers its own pixel and `cover` more on each side."""
     flat = points @ axes.T
     centre, reach = (flat.max(axis=0) + flat.min(axis=0)) / 2, np.ptp(flat[:, :2], axis=0).max() / 2 * 1.04
     pixel = ((flat[:, :2] - centre[:2]) / reach * 0.5 + 0.5) * size
@@ -93,7 +93,7 @@ def shown(points, kinds, axes, size, cover=1):
         for dy in range(-cover, cover + 1):
             x = np.clip(pixel[order, 0].astype(int) + dx, 0, size - 1)
             y = np.clip(size - 1 - pixel[order, 1].astype(int) + dy, 0, size - 1)
-            # Of several points of one pixel, the last one written is nearest to the eye.
+            # Of several points at one pixel, the last one written is the nearest to the eye.
             layer = np.full((size, size), -1)
             layer[y, x] = order
             distance = np.where(layer >= 0, flat[layer, 2], -np.inf)

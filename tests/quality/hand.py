@@ -1,7 +1,7 @@
-"""A hand from the 26 OpenXR joints and radii of a reply: its solids, its joint angles, its handedness.
+"""A hand built from the 26 OpenXR joints and radii of a reply: its solids, joint angles and handedness.
 
-The rigs' descriptions (assets/hands/*.json) are read as data for limits and lengths; their frames are +y along the
-fingers and +z out of the palm, those of OpenXR joints -Z and -Y.
+Limits and lengths come from the rigs' descriptions (assets/hands/*.json). In their frames the fingers point along +y
+and the palm faces +z; in those of OpenXR joints, -Z and -Y.
 """
 
 import json
@@ -16,7 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 DIGITS = ["thumb", "index", "middle", "ring", "little"]
 PHALANGES = ["first", "second", "third"]
 PALM, WRIST = 0, 1
-# The joints of each digit's three phalanges and its tip; a finger's metacarpal is the joint before.
+# The joints of each digit's three phalanges and its tip; a finger's metacarpal is the joint before them.
 CHAINS = [[2, 3, 4, 5], [7, 8, 9, 10], [12, 13, 14, 15], [17, 18, 19, 20], [22, 23, 24, 25]]
 METACARPALS = [6, 11, 16, 21]
 NAMES = ["palm", "wrist"] + [
@@ -30,17 +30,17 @@ NAMES = ["palm", "wrist"] + [
     ]
     for bone in bones
 ]
-# A half turn about (0, 1, -1): between the axes of a rig's frame and those of an OpenXR joint.
+# A half turn about (0, 1, -1) between the axes of a rig's frame and those of an OpenXR joint.
 HALF_TURN = Rotation.from_quat([0.0, 0.5**0.5, -(0.5**0.5), 0.0])
-# The forearm behind the wrist, in metres; its radius grows from the wrist's to the muscles' (forearm circumference of
-# adults 26 to 31 cm, ANSUR II: radius 41 to 49 mm).
+# The forearm behind the wrist, in metres; its radius grows from the wrist's to this (ANSUR II: adults' forearms measure
+# 26 to 31 cm around, so 41 to 49 mm).
 FOREARM_LENGTH, FOREARM_RADIUS = 0.25, 0.042
-# How far a wrist bends in degrees: flexion, extension, radial and ulnar (AAOS).
+# Range of motion of a wrist in degrees (AAOS).
 FLEXION, EXTENSION, RADIAL, ULNAR = 80, 70, 20, 30
 
 
 class Hand:
-    """Joint poses of one hand in one frame."""
+    """Joint poses of one hand, all in one frame."""
 
     def __init__(self, handedness, positions, orientations, radii, rig=None):
         self.handedness = handedness
@@ -50,8 +50,8 @@ class Hand:
         self.rig = rig
 
     @classmethod
-    def of_joints(cls, handedness, joints, rig=None):
-        """From the API's JSON: 26 joints, or 25 without the palm (which is put amid the middle metacarpal)."""
+    def from_joints(cls, handedness, joints, rig=None):
+        """Reads the 26 joints of the API's JSON, or 25: the palm is then put halfway along the middle metacarpal."""
         poses = [joint["client_from_joint"] for joint in joints]
         positions = [pose["position"] for pose in poses]
         orientations = [pose["orientation"] for pose in poses]
@@ -73,7 +73,7 @@ class Hand:
         )
 
     def solids(self):
-        """The tapered capsules of phalanges and palm, and a tag (digit or -1, phalanx or -1) for each."""
+        """The tapered capsules of phalanges and palm, and a tag for each: its digit and phalanx, -1 for the palm."""
         ends, tags = [], []
         for digit, chain in enumerate(CHAINS):
             for phalanx in range(3):
@@ -81,14 +81,14 @@ class Hand:
                 tags.append((digit, phalanx))
         bones = list(zip(METACARPALS, [chain[0] for chain in CHAINS[1:]]))
         ends += bones
-        # The flesh between the bones: across the knuckles, across the metacarpals' bases, and to the wrist.
+        # Flesh between the bones: across the knuckles, across the bases of the metacarpals, and to the wrist.
         ends += [(a[1], b[1]) for a, b in zip(bones, bones[1:])]
         ends += [(a[0], b[0]) for a, b in zip(bones, bones[1:])]
         ends += [(WRIST, bone[0]) for bone in bones] + [(WRIST, CHAINS[0][0])]
         tags += [(-1, -1)] * (len(ends) - len(tags))
         ends, tags = np.array(ends), np.array(tags)
         starts, stops = self.positions[ends[:, 0]], self.positions[ends[:, 1]].copy()
-        # A tip lies on the skin, so the last ball's centre is its radius before it.
+        # A tip lies on the skin, so the centre of the last ball is one radius behind it.
         for row, (digit, phalanx) in enumerate(tags):
             if phalanx == 2:
                 axis = stops[row] - starts[row]
@@ -97,25 +97,25 @@ class Hand:
         return Capsules(starts, stops, self.radii[ends[:, 0]], self.radii[ends[:, 1]]), tags
 
     def forearm(self, flexion=0.0, deviation=0.0):
-        """The forearm when the wrist is bent so far, in degrees: flexion, and deviation toward the little finger."""
+        """The forearm for a wrist bent by these degrees: flexion, and deviation toward the little finger."""
         side = 1.0 if self.handedness == "right" else -1.0
-        # Seen from the hand, flexion turns the forearm's end toward the palm (-Y), ulnar deviation (the hand turned to
-        # the little finger's side, +X of a right hand) turns it to that side too.
+        # Seen from the hand, flexion turns the elbow toward the palm (-Y), and ulnar deviation toward the little finger
+        # (+X of a right hand).
         bend = Rotation.from_euler("xy", [flexion, side * deviation], degrees=True)
         elbow = self.positions[WRIST] + self.rotations[WRIST].apply(bend.apply([0, 0, FOREARM_LENGTH]))
         return Capsules([self.positions[WRIST]], [elbow], [self.radii[WRIST]], [FOREARM_RADIUS])
 
     def forearms(self):
-        """Forearms over the wrist's range, the straight one first."""
+        """Forearms over the wrist's range of motion, the straight one first."""
         angles = [(f, d) for f in range(-EXTENSION, FLEXION + 1, 15) for d in range(-RADIAL, ULNAR + 1, 10)]
         angles.sort(key=lambda pair: abs(pair[0]) + abs(pair[1]))
         return [self.forearm()] + [self.forearm(*pair) for pair in angles]
 
     def chirality(self):
-        """The handedness that the joints' places have.
+        """The handedness implied by the joint positions.
 
-        From the wrist to the middle knuckle, crossed with the way from the index to the little knuckle, points out of
-        the palm of a right hand; the palm's side is that of the palm joint's -Y.
+        On a right hand, the vector from the wrist to the middle knuckle crossed with that from the index to the little
+        knuckle points out of the palm, which is the palm joint's -Y.
         """
         across = self.positions[CHAINS[4][0]] - self.positions[CHAINS[1][0]]
         along = self.positions[CHAINS[2][0]] - self.positions[WRIST]
@@ -123,9 +123,12 @@ class Hand:
         return "right" if np.dot(np.cross(along, across), palmar) > 0 else "left"
 
     def angles(self):
-        """Joint angles in degrees (yaw, then three pitches, of each digit), how far each joint is turned about an axis
-        that it does not have, and how far the joints' places are from the chain that the rig's lengths make of their
-        orientations, in metres."""
+        """Joint angles, the largest twist, and the largest displacement.
+
+        Angles are in degrees, a yaw and three pitches per digit. The twist, in degrees, is a rotation about an axis
+        that the joint does not have. The displacement, in metres, is between a joint and where the rig's bone lengths
+        put it, given the joints' orientations.
+        """
         rig = description(self.rig, self.handedness)
         wrist = self.rotations[WRIST] * HALF_TURN
         angles, twist = np.zeros((5, 4)), 0.0
@@ -150,7 +153,7 @@ class Hand:
         return angles, np.degrees(np.arcsin(min(1.0, twist))), displaced
 
     def beyond_limits(self):
-        """How far the worst joint is beyond its limits, in degrees; unnatural twists count."""
+        """How far the worst joint is beyond its limits, in degrees; twists count too."""
         rig = description(self.rig, self.handedness)
         angles, twist, _ = self.angles()
         worst = twist
@@ -174,11 +177,11 @@ def description(rig, handedness):
 
 
 def posed(rig, handedness, position, orientation, digits):
-    """The hand of a rig in the pose that joint angles in radians give: yaw about z, then pitches about x."""
+    """A rig's hand posed by joint angles in radians: yaw about z, then pitches about x."""
     entry = description(rig, handedness)
     wrist = Rotation.from_quat(orientation) * HALF_TURN
     position = np.asarray(position, float)
-    places, turns = np.tile(position, (26, 1)), [wrist] * 26
+    positions, rotations = np.tile(position, (26, 1)), [wrist] * 26
     for digit, chain in enumerate(CHAINS):
         bones, angles = entry["digits"][DIGITS[digit]], digits[digit]
         third = angles.get("third_pitch")
@@ -187,18 +190,18 @@ def posed(rig, handedness, position, orientation, digits):
             angles["second_pitch"],
             angles["second_pitch"] * 2 / 3 if third is None else third,
         ]
-        turn = wrist * Rotation.from_quat(bones["base_orientation_xyzw"])
-        turn = turn * Rotation.from_euler("z", bones["yaw_sign"] * angles["base_yaw"])
-        place = position + wrist.apply(bones["base_m"])
+        rotation = wrist * Rotation.from_quat(bones["base_orientation_xyzw"])
+        rotation = rotation * Rotation.from_euler("z", bones["yaw_sign"] * angles["base_yaw"])
+        joint_position = position + wrist.apply(bones["base_m"])
         for i in range(3):
-            turn = turn * Rotation.from_euler("x", pitches[i])
-            places[chain[i]], turns[chain[i]] = place, turn
-            place = place + turn.apply([0, bones["lengths_m"][i], 0])
-        places[chain[3]], turns[chain[3]] = place, turn
+            rotation = rotation * Rotation.from_euler("x", pitches[i])
+            positions[chain[i]], rotations[chain[i]] = joint_position, rotation
+            joint_position = joint_position + rotation.apply([0, bones["lengths_m"][i], 0])
+        positions[chain[3]], rotations[chain[3]] = joint_position, rotation
     for finger, joint in enumerate(METACARPALS):
-        places[joint] = position + wrist.apply(entry["finger_metacarpals_m"][finger])
-        along = wrist.inv().apply(places[joint + 1] - places[joint])
-        turns[joint] = wrist * Rotation.align_vectors([along / np.linalg.norm(along)], [[0.0, 1.0, 0.0]])[0]
-    places[PALM], turns[PALM] = (places[11] + places[12]) / 2, turns[11]
+        positions[joint] = position + wrist.apply(entry["finger_metacarpals_m"][finger])
+        along = wrist.inv().apply(positions[joint + 1] - positions[joint])
+        rotations[joint] = wrist * Rotation.align_vectors([along / np.linalg.norm(along)], [[0.0, 1.0, 0.0]])[0]
+    positions[PALM], rotations[PALM] = (positions[11] + positions[12]) / 2, rotations[11]
     radii = [entry["joint_radii_m"][name] for name in NAMES]
-    return Hand(handedness, places, [(turn * HALF_TURN).as_quat() for turn in turns], radii, rig)
+    return Hand(handedness, positions, [(rotation * HALF_TURN).as_quat() for rotation in rotations], radii, rig)

@@ -1,4 +1,4 @@
-"""Objects, and the holdouts that are asked for: the built-in ones, and random ones with recorded givers."""
+"""Objects, and the holdouts to request: the built-in ones, and random ones with recorded givers."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from hand import ROOT, Hand
 from mesh import Mesh, thinned
 
 BUILT_IN = ["remote", "scalpel", "scissors"]
-# Real objects of the recorded data: file and a usual mass in kilograms.
+# Real objects of the recorded data: file name and a typical mass in kilograms.
 REAL = {
     "osim_banana": 0.12,
     "osim_hammer": 0.45,
@@ -30,9 +30,9 @@ REAL = {
 # Recorded poses in which a hand can hold something.
 HOLDING = {"Cup", "Grip", "Grip 1", "Grip 2", "Grip 3", "Grip 4", "Grip 5", "Grip Shaft", "Hold", "OK", "Pinch Flat"}
 HOLDING |= {"Pinch Large", "Pinch Middle", "Pinch Tight", "Pinch Up", "PingPong", "Rounded", "relax"}
-# How deep a giver's skin may be in the object, in metres; deeper ones are placed anew.
+# How deep a giver's skin may be in the object, in metres; a deeper one is placed again.
 GIVER_DEPTH = 0.004
-# How often a hand is placed anew until it is not; then the shallowest is taken.
+# Most placements of a hand; if all are too deep, the shallowest is used.
 PLACEMENTS = 24
 
 
@@ -63,7 +63,7 @@ def built_in_holdouts(name):
 
 
 def recorded_hands():
-    """Recorded hands that hold, in their wrist's frame; without the data, those of the built-in holdouts."""
+    """Recorded hands in holding poses, in their wrists' frames; without the data, those of the built-in holdouts."""
     folder, result = data_folder(), []
     if folder is None:
         for path in sorted((ROOT / "assets/holdouts").glob("*.json")):
@@ -79,19 +79,19 @@ def recorded_hands():
             if pose["name"] not in HOLDING:
                 continue
             joints = pose["joints"]
-            places = [joints[name]["position"] for name in hands.NAMES[1:]]
-            turns = [joints[name]["orientation_xyzw"] for name in hands.NAMES[1:]]
-            # The files have no radii: an adult's, scaled by the length of the middle finger.
+            positions = [joints[name]["position"] for name in hands.NAMES[1:]]
+            orientations = [joints[name]["orientation_xyzw"] for name in hands.NAMES[1:]]
+            # The files have no radii: use the adult rig's, scaled by the length of the middle finger.
             rig = hands.description("adult", pose["handedness"])
-            finger = np.linalg.norm(np.diff(np.array(places)[11:15], axis=0), axis=1).sum()
+            finger = np.linalg.norm(np.diff(np.array(positions)[11:15], axis=0), axis=1).sum()
             scale = finger / sum(rig["digits"]["middle"]["lengths_m"])
             radii = [scale * rig["joint_radii_m"][name] for name in hands.NAMES[1:]]
             result.append(
-                Hand.of_joints(
+                Hand.from_joints(
                     pose["handedness"],
                     [
                         {"client_from_joint": {"position": p, "orientation": q}, "radius": r}
-                        for p, q, r in zip(places, turns, radii)
+                        for p, q, r in zip(positions, orientations, radii)
                     ],
                 )
             )
@@ -99,23 +99,23 @@ def recorded_hands():
 
 
 class Placer:
-    """Puts hands on an object so that they hold it near one end, as a giver would.
+    """Places hands on an object so that they hold it near one end, as a giver would.
 
-    The hand is balls along its bones. Random placements with the grip near the object are improved by a pattern
-    search; the cost wants thumb, two fingers and the palm near the surface, and no ball in it.
+    A pattern search improves random placements of the grip near the object. It models the hand as balls along its
+    bones; the cost is low when thumb, two fingers and palm are near the surface and no ball is inside.
     """
 
     def __init__(self, mesh):
         self.mesh = mesh
         self.all_points, owners = mesh.samples()
-        # Every third millimetre is enough to place by.
+        # Samples 3 mm apart are enough to place a hand.
         coarse = thinned(self.all_points, 0.003)
         self.points, self.normals = self.all_points[coarse], mesh.normals[owners[coarse]]
         self.tree = cKDTree(self.points)
         self.middle, self.half = (mesh.low + mesh.high) / 2, (mesh.high - mesh.low) / 2
 
     def _gaps(self, points):
-        """Signed distances by the nearest sample and its normal: quick, and good enough to place a giver."""
+        """Approximate signed distances, from the nearest sample and its normal."""
         distance, nearest = self.tree.query(points)
         outward = np.einsum("...i,...i->...", points - self.points[nearest], self.normals[nearest])
         return np.where(outward < 0, -distance, distance)
@@ -138,7 +138,7 @@ class Placer:
         return reach + 100 * (np.minimum(gaps, 0) ** 2).sum(axis=1)
 
     def place(self, hand, random):
-        """The hand on the object, in the object's frame."""
+        """The hand placed on the object, in the object's frame."""
         shallowest, least = None, np.inf
         for _ in range(PLACEMENTS):
             placed = self._attempt(hand, random)
@@ -188,10 +188,10 @@ class Placer:
 
 
 def random_request(name, placer, givers, random):
-    """A request with a recorded giver, the whole turned at random: gravity comes from anywhere."""
+    """A request with a recorded giver, turned at random as a whole, so gravity may come from any direction."""
     giver = placer.place(givers[random.integers(len(givers))], random)
     turn = Rotation.random(rng=random)
-    # A metre above the ground: the frame's origin is not the object's.
+    # Keep the object away from the frame's origin.
     shift = np.array([0.0, 1.2, 0.3])
     giver = giver.moved(turn, shift)
     joints = [
@@ -213,7 +213,7 @@ def giver_of_request(request):
     if not form:
         return None
     if joints := form.get("joints"):
-        return Hand.of_joints(joints["handedness"], joints["joints"])
+        return Hand.from_joints(joints["handedness"], joints["joints"])
     angles, pose = form["angles"], form["angles"]["client_from_wrist"]
     return hands.posed(angles["rig"], angles["handedness"], pose["position"], pose["orientation"], angles["digits"])
 

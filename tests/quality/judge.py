@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Asks a real server for grasps and judges each reply with means that share no code with the search.
+"""Requests grasps from a real server and judges each reply with code that shares nothing with the search.
 
-The exit code is 0 when replies could be judged, whatever they are worth; with --least-sound it is 1 when too many have
-faults, with --strict when a target is not met.
+The exit code is 0 if there were grasps to judge, good or bad. With --least-sound it is 1 if too many of them have
+faults, with --strict if a target is not met.
 """
 
 import argparse
@@ -22,30 +22,30 @@ import pool
 import report
 from service import Service, built_in_request
 
-# A grasp should be there within this; whether there is any at all, a long search tells.
+# Budget of a request, and of a second one that finds out whether there is any grasp at all.
 BUDGET_SECONDS, EXHAUSTIVE_SECONDS = 0.05, 5.0
-# What each notion of valid assumes where no friction is given (leather on metal; skin on plastic).
+# Default friction of each validity: leather on metal, and skin on plastic.
 THESIS_FRICTION, PHYSICAL_FRICTION = 0.34, 0.6
 
 
 def arguments():
     parser = argparse.ArgumentParser(prog="tests/quality/run", description=__doc__)
-    parser.add_argument("--sample", type=int, default=10, help="random holdouts of each object (default: 10)")
-    parser.add_argument("--seeds", type=int, default=1, help="searches on each built-in holdout (default: 1)")
+    parser.add_argument("--sample", type=int, default=10, help="random holdouts per object (default: 10)")
+    parser.add_argument("--seeds", type=int, default=1, help="searches per built-in holdout (default: 1)")
     parser.add_argument(
-        "--objects", default="all", help="all, built-in, real, or names with commas, such as remote,osim_mug"
+        "--objects", default="all", help="all, built-in, real, or comma-separated names, such as remote,osim_mug"
     )
-    parser.add_argument("--validity", help="what the requests ask for, such as thesis (default: the server's)")
-    parser.add_argument("--strategy", help="how to search, such as F (default: the server's)")
-    parser.add_argument("--choice", help="which grasp to take, such as best (default: the server's)")
-    parser.add_argument("--no-atlas", action="store_true", help="ask for grasps that are found afresh")
+    parser.add_argument("--validity", help="validity of the requests, such as thesis (default: the server's)")
+    parser.add_argument("--strategy", help="strategy of the requests, such as F (default: the server's)")
+    parser.add_argument("--choice", help="choice of the requests, such as best (default: the server's)")
+    parser.add_argument("--no-atlas", action="store_true", help="request searches without atlases")
     parser.add_argument("--rig", help="rig of the receiving hand (default: the server's)")
-    parser.add_argument("--seed", type=int, default=1, help="start of the random holdouts and searches")
-    parser.add_argument("--workers", type=int, help="threads of the server (default: the server's)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the random holdouts and searches (default: 1)")
+    parser.add_argument("--workers", type=int, help="search threads of the server (default: the server's)")
     parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count(), help="processes that judge (default: one for each core)"
+        "--jobs", type=int, default=os.cpu_count(), help="processes that judge (default: one per core)"
     )
-    parser.add_argument("--no-simulation", action="store_true", help="leave the physics engine out")
+    parser.add_argument("--no-simulation", action="store_true", help="skip the physics engine")
     parser.add_argument("--pictures", type=int, default=24, help="pictures on the contact sheet (default: 24)")
     parser.add_argument("--out", type=pathlib.Path, default=holdouts.ROOT / "target/quality/report")
     parser.add_argument(
@@ -53,14 +53,14 @@ def arguments():
         type=float,
         default=0,
         metavar="PERCENT",
-        help="exit with 1 when fewer of the grasps are without any fault (default: 0)",
+        help="exit with 1 if fewer of the grasps are without fault (default: 0)",
     )
-    parser.add_argument("--strict", action="store_true", help="exit with 1 when a target is not met")
+    parser.add_argument("--strict", action="store_true", help="exit with 1 if a target is not met")
     return parser.parse_args()
 
 
 def chosen_objects(wanted):
-    """Names of the objects that are there, and why others are not."""
+    """The names of the chosen objects; prints why real ones are skipped if there is no data."""
     real = sorted(holdouts.REAL) if holdouts.data_folder() else []
     known = {"built-in": holdouts.BUILT_IN, "real": real, "all": holdouts.BUILT_IN + real}
     if wanted != "built-in" and not real:
@@ -68,27 +68,27 @@ def chosen_objects(wanted):
     names = known.get(wanted) or wanted.split(",")
     for name in names:
         if name not in known["all"]:
-            raise SystemExit(f"object {name!r} is not there; must be one of {', '.join(known['all'])}")
+            raise SystemExit(f"unknown object {name!r}; must be one of {', '.join(known['all'])}")
     return names
 
 
 def cases(name, service, options, givers):
-    """The requests on one object, with a label each, and all that judging needs."""
+    """Yields the requests on one object, each with a label and the scene that judging needs."""
     mesh = holdouts.load_mesh(name)
     if name in holdouts.BUILT_IN:
-        told = service.object(name)
+        description = service.object(name)
     else:
-        told = service.create(name.replace("_", "-").lower(), holdouts.mesh_file(name), holdouts.REAL[name])
+        description = service.create(name.replace("_", "-").lower(), holdouts.mesh_file(name), holdouts.REAL[name])
     requests = []
     if name in holdouts.BUILT_IN:
         for holdout in holdouts.built_in_holdouts(name):
             for turn in range(options.seeds):
                 requests.append((f"{holdout}", built_in_request(holdout), options.seed + turn))
-    # One stream for each holdout: adding an object or a holdout changes no other.
+    # One random stream per holdout, so that adding an object or a holdout changes no other.
     placer = holdouts.Placer(mesh)
     for i in range(options.sample):
         random = np.random.default_rng([options.seed, i, *name.encode()])
-        request = holdouts.random_request(told["name"], placer, givers, random)
+        request = holdouts.random_request(description["name"], placer, givers, random)
         requests.append((f"random {i}", request, int(random.integers(2**31))))
     for label, request, seed in requests:
         request["seed"] = str(seed)
@@ -99,10 +99,10 @@ def cases(name, service, options, givers):
         pose = request["client_from_object"]
         yield label, request, measures.Scene(
             mesh=mesh,
-            mass=told["mass_kg"],
-            centre_of_mass=np.array(told["centre_of_mass"]),
-            friction=told["friction"],
-            reach=float(np.linalg.norm(told["box_half_extents"])),
+            mass=description["mass_kg"],
+            centre_of_mass=np.array(description["centre_of_mass"]),
+            friction=description["friction"],
+            reach=float(np.linalg.norm(description["box_half_extents"])),
             forbidden=holdouts.forbidden_triangles(name, mesh),
             rotation=Rotation.from_quat(pose["orientation"]),
             translation=np.array(pose["position"]),
@@ -112,19 +112,19 @@ def cases(name, service, options, givers):
         )
 
 
-def friction_in_force(request, told, validity):
-    """The coefficient that the answer was made with: the request's, the object's, or that of the notion of valid.
+def friction_in_force(request, described, validity):
+    """The coefficient that the answer assumes: the request's, the object's, or the default of the validity.
 
-    An object to which none was given tells the thesis' one.
+    The server describes an object without friction of its own as having the thesis' coefficient.
     """
     if request.get("friction"):
         return request["friction"]
-    return PHYSICAL_FRICTION if validity == "physical" and abs(told - THESIS_FRICTION) < 1e-6 else told
+    return PHYSICAL_FRICTION if validity == "physical" and abs(described - THESIS_FRICTION) < 1e-6 else described
 
 
 def ask(service, request, options, **picture):
-    """The answer within the usual budget, or else within a long one, and whether it was the usual one."""
-    # The best grasp is looked for until the budget is over: there the server's own short one counts.
+    """The answer within the usual budget, or else within a long one, and whether it came within the usual one."""
+    # A search for the best grasp uses its whole budget, so leave that to the server's short default.
     usual = None if options.choice == "best" else BUDGET_SECONDS
     how = {"choice": options.choice, "no_atlas": options.no_atlas, **picture}
     answer = service.find({**request, "budget_seconds": usual}, **how)
@@ -135,7 +135,7 @@ def ask(service, request, options, **picture):
 
 
 def collect(names, options):
-    """Asks for all grasps. Returns a row for each holdout, and the replies that are to be judged, by row."""
+    """Requests all grasps. Returns a row per holdout, and the replies to judge by the index of their row."""
     givers = holdouts.recorded_hands()
     pictures = options.out / "pictures"
     pictures.mkdir(parents=True, exist_ok=True)
@@ -144,7 +144,7 @@ def collect(names, options):
     rows, replies, drawn = [], {}, collections.Counter()
     share = -(-options.pictures // len(names))
     with Service(options.workers) as service, open(options.out / "replies.jsonl", "w") as file:
-        for name in pool.Progress("objects asked for").over(names):
+        for name in pool.Progress("objects requested").over(names):
             mesh_file = None if name in holdouts.BUILT_IN else holdouts.mesh_file(name)
             for label, request, scene in cases(name, service, options, givers):
                 picture = pictures / f"{name}-{drawn[name]:02}.png"
@@ -174,7 +174,7 @@ def main():
     options = arguments()
     began = time.monotonic()
     rows, replies = collect(chosen_objects(options.objects), options)
-    # The server has ended: judging takes all cores, and would make its searches late.
+    # Judging takes all cores, so it starts after the server has ended: it would delay searches.
     judged = pool.judge_all(list(replies.values()), options.jobs, not options.no_simulation)
     for row, found in zip(replies, judged):
         rows[row].update(found)
@@ -184,10 +184,10 @@ def main():
     report.write(options.out, rows, targets, vars(options))
     print(f"\n{len(rows)} holdouts in {time.monotonic() - began:.0f} s; the report is {options.out}/README.md")
     if not any(row["found"] for row in rows):
-        raise SystemExit("no grasp was found: nothing could be judged")
+        raise SystemExit("no grasp was found, so there is nothing to judge")
     sound = 100 * report.sound_share(rows)
     if sound < options.least_sound:
-        raise SystemExit(f"only {sound:.0f} % of the grasps are without fault, of at least {options.least_sound:.0f} %")
+        raise SystemExit(f"{sound:.0f} % of the grasps are without fault; must be at least {options.least_sound:.0f} %")
     if options.strict and not all(target.met for target in targets if target.met is not None):
         raise SystemExit(1)
 

@@ -1,7 +1,7 @@
-"""What is good or bad about one grasp, from the reply alone.
+"""The measures of one grasp, taken from the request and the reply alone.
 
-Everything is measured in the client's frame, from joint poses with radii, contacts and forces; the mesh is put there by
-the request's pose of the object. Lengths in metres, angles in degrees, forces in newtons.
+Inputs are the joint poses with radii, contacts and forces, moved to the object's frame by the object's pose in the
+request. Lengths are in metres, angles in degrees, forces in newtons.
 """
 
 from dataclasses import dataclass
@@ -15,27 +15,26 @@ from mesh import Mesh
 from solids import clearance
 
 GRAVITY = 9.81
-# What the targets allow.
+# Bounds of the targets in metres.
 OFF_MESH, OFF_SKIN, FORBIDDEN = 0.0005, 0.002, 0.002
-# Parts of a hand press soft flesh against each other: so much on both sides together is touch, more is one in another.
-# Neighbours side by side share skin at their roots, and are wider there than capsules tell: in recorded hands they
-# overlap by 0 to 5 mm (those of two sources, with an adult's radii scaled), while crossed ones overlap by 10 and more.
+# Overlap of two parts of a hand, in metres, that counts as touch: flesh is soft. Adjacent fingers share skin at their
+# roots, so their capsules overlap more: by 0 to 5 mm in recorded hands, by 10 mm and more where fingers cross.
 FLESH, NEIGHBOURS_FLESH = 0.002, 0.005
-# An angle of a joint beyond its limit by more than this is broken: rounding is far below.
+# How far a joint may be beyond its limit, in degrees; rounding is far below.
 LIMIT_TOLERANCE = 0.5
-# A joint that is farther than this from where the rig's bones put it belongs to another hand.
+# How far a joint may be from where the rig's bones put it, in metres; beyond, it belongs to another hand.
 BONE_TOLERANCE = 0.001
-# Both knuckles of a finger bent by less than this: stretched.
+# A finger with both knuckles bent by less than this many degrees is stretched.
 STRETCHED = 10.0
-# A contact's normal may be that of any triangle so near, within so many degrees.
+# A contact's normal may be that of any triangle this near, in metres, within this angle, in degrees.
 NORMAL_REACH, NORMAL_ANGLE = 0.0005, 15.0
-# At an edge or a corner it may also be any between those of the triangles that meet there, which are so near: rounding
-# in single precision and no more, so that both sides of a blade are not taken for an edge.
+# At an edge or corner it may also lie between the normals of the triangles that meet there. They are this near, in
+# metres: just rounding in single precision, or both sides of a blade would count as an edge.
 EDGE_REACH = 0.00002
-# Most that a digit presses with, in newtons (thesis 2.5).
+# Strongest press of a digit, in newtons (thesis 2.5).
 STRONGEST = 27.0
-# A contact resists twisting about its normal by up to friction times force times this: two thirds of the radius of a
-# pad's patch of some 6 mm under a few newtons, pressed evenly. Slip and twist share the friction (an ellipse).
+# A contact's largest torsion over friction times force, in metres: two thirds of the radius, some 6 mm, of a pad's
+# evenly pressed patch under a few newtons. Slip and torsion share the friction (an ellipse).
 TORSION_RADIUS = 0.004
 # Comfortable shares of the force, thumb first (thesis 4.6).
 SHARES = np.array([0.25, 0.25, 0.25, 0.125, 0.125])
@@ -43,13 +42,13 @@ SHARES = np.array([0.25, 0.25, 0.25, 0.125, 0.125])
 
 @dataclass
 class Scene:
-    """What the request says, in the client's frame."""
+    """The request: mesh and centre of mass in the object's frame, up and giver in the client's."""
 
     mesh: Mesh
     mass: float
     centre_of_mass: np.ndarray
     friction: float
-    # What torques are divided by to compare them with forces: half the diagonal of the object's box.
+    # Length that turns torques into forces: half the diagonal of the object's box.
     reach: float
     forbidden: np.ndarray
     rotation: Rotation
@@ -59,17 +58,17 @@ class Scene:
     asked_handedness: str = "right"
 
     def to_object(self, points):
-        """Points of the client's frame in the object's."""
+        """Maps points from the client's frame to the object's."""
         return self.rotation.inv().apply(np.asarray(points, float).reshape(-1, 3) - self.translation)
 
 
 def hand_of_reply(grasp):
     """The receiving hand of a reply in the client's frame."""
-    return Hand.of_joints(grasp["handedness"], grasp["joints"], grasp["rig"])
+    return Hand.from_joints(grasp["handedness"], grasp["joints"], grasp["rig"])
 
 
 def in_object_frame(scene, grasp):
-    """The receiving hand and the contacts of a reply in the object's frame, where the mesh is as its file has it."""
+    """The receiving hand and the contacts of a reply in the object's frame, the frame of the mesh file."""
     inverse = scene.rotation.inv()
     hand = hand_of_reply(grasp).moved(inverse, -inverse.apply(scene.translation))
     contacts = [
@@ -77,7 +76,7 @@ def in_object_frame(scene, grasp):
             "position": scene.to_object(contact["client_position"])[0],
             "normal": inverse.apply(contact["client_normal"]),
             "force": inverse.apply(contact["client_force"]),
-            # The palm's contacts have neither digit nor phalanx.
+            # Contacts of the palm have neither digit nor phalanx.
             "digit": contact.get("digit"),
             "phalanx": contact.get("phalanx"),
             "torsion": contact.get("torsion"),
@@ -104,8 +103,8 @@ def judge(scene, grasp):
         **forbidden_distance(scene, local),
         "wrong_chirality": hand.chirality() != hand.handedness or hand.handedness != scene.asked_handedness,
         **comfort(contacts, grasp["comfort"]),
-        **told_margins(grasp),
-        **told_type(grasp),
+        **reported_margins(grasp),
+        **reported_type(grasp),
         "contacts": len(contacts),
         "digits_touching": len({contact["digit"] for contact in contacts} & set(DIGITS)),
         "palm_touching": any(contact["digit"] not in DIGITS for contact in contacts),
@@ -113,14 +112,14 @@ def judge(scene, grasp):
 
 
 def penetration(mesh, hand):
-    """The deeper of skin in the object and of the object's surface in flesh."""
+    """Penetration: the deeper of skin inside the object and of the object's surface inside flesh."""
     capsules, tags = hand.solids()
     skin, owners = capsules.skin(0.002)
     near = ((skin > mesh.low) & (skin < mesh.high)).all(axis=1)
     skin, owners = skin[near], owners[near]
     skin_depth = 0.0
     if len(skin):
-        # What lies inside of another capsule is no skin.
+        # Points inside another capsule are not skin.
         others = capsules.distances(skin)
         others[np.arange(len(skin)), owners] = np.inf
         skin_depth = mesh.depth(skin[others.min(axis=1) > -1e-6])
@@ -141,21 +140,24 @@ def penetration(mesh, hand):
 
 
 def surface_samples(mesh):
-    """The mesh's sample points, made once."""
+    """The mesh's sample points, computed once."""
     if not hasattr(mesh, "sampled"):
         mesh.sampled = mesh.samples()
     return mesh.sampled
 
 
 def surface_near(mesh, hand, margin=0.03):
-    """Sample points of the surface that the hand may reach."""
+    """Sample points of the surface within reach of the hand."""
     points = surface_samples(mesh)[0]
     low, high = hand.positions.min(axis=0) - margin, hand.positions.max(axis=0) + margin
     return points[((points > low) & (points < high)).all(axis=1)]
 
 
 def forces(scene, contacts, up):
-    """Forces inside their cones, and what is left of the weight: force, and torque over the object's reach."""
+    """Whether the forces are inside their cones, and the share of the weight that they leave unbalanced.
+
+    The imbalance combines force, and torque over the object's reach.
+    """
     weight = scene.mass * GRAVITY
     if not contacts:
         return {"force_outside_cone": True, "imbalance": 1.0, "largest_force": 0.0}
@@ -165,7 +167,7 @@ def forces(scene, contacts, up):
     pressed = -np.einsum("ci,ci->c", force, normal)
     sideways = np.linalg.norm(force + pressed[:, None] * normal, axis=1)
     size = np.linalg.norm(force, axis=1)
-    # Where the force is not zero, it presses, and slips by no more than rounding allows.
+    # A force that is not zero presses inward, and inside its cone but for rounding.
     inside = sideways <= scene.friction * pressed + 1e-3 * size + 1e-6
     missing = force.sum(axis=0) - weight * up
     torque = np.cross(arm, force).sum(axis=0)
@@ -176,7 +178,7 @@ def forces(scene, contacts, up):
         inside &= np.abs(torsion) <= allowed + 1e-2 * limit + 1e-7
         torque = torque - normal.T @ torsion
     else:
-        # The reply tells no torsions: take those that help most, within what friction allows.
+        # Without torsions in the reply, take those that balance best within friction.
         bounds = (-limit - 1e-12, limit + 1e-12)
         torque = torque + normal.T @ lsq_linear(normal.T / scene.reach, -torque / scene.reach, bounds=bounds).x
     imbalance = np.hypot(np.linalg.norm(missing), np.linalg.norm(torque) / scene.reach) / weight
@@ -188,11 +190,11 @@ def forces(scene, contacts, up):
 
 
 def epsilon(scene, contacts):
-    """Ferrari and Canny's quality of the contacts as soft fingers, from above: the least of many directions' supports.
+    """Upper bound on Ferrari and Canny's epsilon of the contacts as soft fingers.
 
-    In each direction of wrench space the hull of all wrenches of one newton's pressing reaches as far as the best
-    contact does; where it reaches least is how far it holds against the worst disturbance. Random directions are
-    improved by smaller and smaller random steps.
+    Epsilon is the smallest support of the convex hull of all wrenches that a press of one newton can exert; in each
+    direction of wrench space the support is that of the best contact. The search refines random directions by ever
+    smaller random steps.
     """
     if not contacts:
         return {"epsilon": 0.0}
@@ -230,7 +232,7 @@ def epsilon(scene, contacts):
 
 
 def fingers(hand, contacts):
-    """Joint limits, and fingers that are stretched."""
+    """Joint limits and stretched fingers."""
     angles, _, displaced = hand.angles()
     beyond = hand.beyond_limits()
     stretched = (np.abs(angles[1:, 1]) < STRETCHED) & (np.abs(angles[1:, 2]) < STRETCHED)
@@ -245,7 +247,7 @@ def fingers(hand, contacts):
 
 
 def contact_places(mesh, hand, contacts):
-    """How far contacts are from mesh and skin, and whether their normals make sense."""
+    """How far the contacts are from mesh and skin, and whether their normals are right."""
     if not contacts:
         return {"off_mesh": 0.0, "off_skin": 0.0, "faces_away": 0, "normal_wrong": 0}
     capsules, tags = hand.solids()
@@ -257,7 +259,7 @@ def contact_places(mesh, hand, contacts):
         own = tags[:, 0] == digit
         if digit >= 0 and contact["phalanx"] in PHALANGES:
             own &= tags[:, 1] == PHALANGES.index(contact["phalanx"])
-        part = capsules.of(np.flatnonzero(own))
+        part = capsules.subset(np.flatnonzero(own))
         distances = part.distances(point)[0]
         nearest = int(np.argmin(distances))
         off_skin.append(abs(distances[nearest]))
@@ -274,12 +276,12 @@ def contact_places(mesh, hand, contacts):
 
 
 def is_normal(mesh, point, normal):
-    """True if the surface has this normal at the point; which of both ways is out, the winding number tells elsewhere."""
+    """Whether the surface has this normal at the point, in either direction: meshes may be inside out."""
     near = np.flatnonzero(np.linalg.norm(mesh.centres - point, axis=1) < mesh.radii + NORMAL_REACH)
     away = np.array([Mesh(mesh.triangles[t], [[0, 1, 2]]).closest([point])[0][0] for t in near])
     if (np.abs(mesh.normals[near[away < NORMAL_REACH]] @ normal) > np.cos(np.radians(NORMAL_ANGLE))).any():
         return True
-    # A direction between normals is a sum of them with weights that are not negative. Meshes may be inside out.
+    # A direction between normals is a sum of them with non-negative weights.
     at_edge = mesh.normals[near[away < EDGE_REACH]]
     return len(at_edge) > 1 and any(
         nnls(sign * at_edge.T, normal)[1] < np.sin(np.radians(NORMAL_ANGLE)) for sign in (1, -1)
@@ -287,7 +289,7 @@ def is_normal(mesh, point, normal):
 
 
 def giver_clearance(mesh, hand, giver):
-    """Smallest distances to the giver's hand and forearm, and of the receiver's forearm, held as is best, to all."""
+    """Smallest distances from the hand to the giver's hand and forearm, and from the receiver's best forearm to all."""
     capsules, _ = hand.solids()
     points = surface_samples(mesh)[0]
     result = {"giver_hand": np.inf, "giver_forearm": np.inf}
@@ -295,7 +297,7 @@ def giver_clearance(mesh, hand, giver):
     if giver is not None:
         others, _ = giver.solids()
         result["giver_hand"] = float(clearance(capsules, others).min())
-        # Where a giver's forearm is the request does not say: straight behind the wrist.
+        # The request has no giver's forearm: assume that it is straight behind the wrist.
         result["giver_forearm"] = float(clearance(capsules, giver.forearm()).min())
     best = -np.inf
     for forearm in hand.forearms():
@@ -311,10 +313,10 @@ def giver_clearance(mesh, hand, giver):
 
 
 def self_clearance(hand):
-    """The smallest distance of parts that are not joined: digits among each other, and digits to the palm.
+    """The smallest distance between parts of the hand that are not joined: between digits, and from digits to the palm.
 
-    Neighbours' proximal phalanges share the web at the knuckles, so of those only the outer halves count, and against
-    the palm only what lies beyond the middle joint (of the thumb: the last phalanx).
+    Neighbouring proximal phalanges share the web at the knuckles, so only their outer halves count. Against the palm
+    only what lies beyond the middle joint counts (of the thumb, the last phalanx).
     """
     capsules, tags = hand.solids()
     trimmed, _ = hand.solids()
@@ -346,15 +348,15 @@ def self_clearance(hand):
 
 
 def forbidden_distance(scene, hand):
-    """Distance of the forbidden surface to the nearest part of the hand."""
+    """Distance from the forbidden surface to the nearest part of the hand."""
     chosen = scene.mesh.samples(scene.forbidden)[0]
     if len(chosen) == 0:
         return {"forbidden_distance": np.inf}
     return {"forbidden_distance": float(hand.solids()[0].distances(chosen).min())}
 
 
-def comfort(contacts, told):
-    """E of Eq. 4.6 from the forces, and how far the reply's figure is from it."""
+def comfort(contacts, reported):
+    """E of Eq. 4.6 computed from the forces, and how far the reply's E is from it."""
     totals = np.zeros(5)
     for contact in contacts:
         if contact["digit"] in DIGITS:
@@ -363,17 +365,17 @@ def comfort(contacts, told):
         return {"comfort": np.nan, "comfort_error": np.inf}
     wanted = np.where(totals > 0, SHARES, 0)
     value = float(((wanted / wanted.sum() - totals / totals.sum()) ** 2).sum())
-    return {"comfort": value, "comfort_error": abs(value - told)}
+    return {"comfort": value, "comfort_error": abs(value - reported)}
 
 
-def told_margins(grasp):
-    """What the reply itself says about the grasp, where it does."""
+def reported_margins(grasp):
+    """The margins in the reply, if it has any."""
     margins = grasp.get("margins") or {}
-    return {f"told_{name}": value for name, value in margins.items()}
+    return {f"reported_{name}": value for name, value in margins.items()}
 
 
-def told_type(grasp):
-    """The type of the taxonomy that the reply names, "" for none, and its confidence; nothing if it tells no types."""
+def reported_type(grasp):
+    """The type in the reply ("" for none) and its confidence; nothing if the reply has no field for types."""
     if "type" not in grasp:
         return {}
     name = (grasp["type"] or "").lower().removeprefix("grasp_type_")

@@ -1,8 +1,8 @@
-"""The object's surface: reading it, and the signed distance of points to it.
+"""The object's surface: its OBJ file, and signed distances to it.
 
-What is inside is decided by the generalised winding number (Jacobson, Kavan and Sorkine-Hornung 2013): the solid angles
-that the triangles subtend at a point, as signed by van Oosterom and Strackee (1983), summed over 4 pi. It needs no
-closed surface: an open box or overlapping parts give sensible answers.
+The generalised winding number (Jacobson, Kavan and Sorkine-Hornung 2013) decides what is inside: the sum of the signed
+solid angles that the triangles subtend at a point (van Oosterom and Strackee 1983), divided by 4 pi. It gives sensible
+answers for open surfaces and overlapping parts as well.
 """
 
 import math
@@ -10,15 +10,15 @@ import math
 import numpy as np
 from numba import njit
 
-# Distance between neighbouring sample points of a surface in metres. What lies between two samples is at most half of
-# it from one, so a depth in flesh of radius 7 mm is underestimated by at most 0.75^2 / 14 mm = 0.04 mm.
+# Distance between neighbouring sample points of a surface in metres. No point is farther than half of it from a sample,
+# so a depth in flesh of radius 7 mm is underestimated by at most 0.75^2 / 14 mm = 0.04 mm.
 SPACING = 0.0015
-# Of the samples in a cell so wide, one is kept: fine and slender triangles make far more than are of use.
+# Size of a grid cell in metres of which one sample is kept; fine and slender triangles yield too many.
 CELL = 0.0005
 
 
 def thinned(points, cell):
-    """Indices of one point of each cell of a grid."""
+    """Indices of one point per occupied cell of a grid."""
     return np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_index=True)[1]
 
 
@@ -44,7 +44,7 @@ def _winding(points, triangles):
 
 @njit(cache=True)
 def _closest_on_triangle(p, a, b, c):
-    """The regions of Ericson, "Real-Time Collision Detection", 5.1.5."""
+    """The closest point, by the regions of Ericson, "Real-Time Collision Detection", 5.1.5."""
     ab, ac, ap = b - a, c - a, p - a
     d1, d2 = np.dot(ab, ap), np.dot(ac, ap)
     if d1 <= 0.0 and d2 <= 0.0:
@@ -91,7 +91,7 @@ def _closest(points, triangles, centres, radii):
 
 
 class Mesh:
-    """Triangles in metres, with the groups that an OBJ file names."""
+    """Triangles in metres, with the groups named in the OBJ file."""
 
     def __init__(self, vertices, faces, groups=None):
         self.vertices = np.asarray(vertices, float)
@@ -111,7 +111,7 @@ class Mesh:
 
     @classmethod
     def read_obj(cls, path, unit_metres=1.0):
-        """Vertices and polygons of an OBJ file; polygons are split into fans."""
+        """Reads the vertices and polygons of an OBJ file; polygons become triangle fans."""
         vertices, faces, groups, group = [], [], [], ""
         for line in open(path, encoding="utf-8", errors="replace"):
             words = line.split()
@@ -130,17 +130,17 @@ class Mesh:
         return cls(vertices, faces, groups)
 
     def winding(self, points):
-        """How often the surface winds round each point: 1 inside, 0 outside of a closed one."""
+        """How often the surface winds round each point: 1 inside a closed surface, 0 outside."""
         return _winding(np.ascontiguousarray(points, float).reshape(-1, 3), self.triangles)
 
     def closest(self, points):
-        """Distance to the surface, and the index of the nearest triangle."""
+        """The distance of each point to the surface, and the index of the nearest triangle."""
         return _closest(
             np.ascontiguousarray(points, float).reshape(-1, 3), self.triangles, self.centres, self.radii
         )
 
     def depth(self, points):
-        """The largest depth of a point inside of the volume in metres; 0 if none is inside."""
+        """The largest depth of a point inside the volume in metres; 0 if none is inside."""
         points = np.asarray(points, float).reshape(-1, 3)
         boxed = points[((points > self.low) & (points < self.high)).all(axis=1)]
         if len(boxed) == 0:
@@ -149,12 +149,12 @@ class Mesh:
         return float(self.closest(inside)[0].max()) if len(inside) else 0.0
 
     def signed_distance(self, points):
-        """Distance to the surface, negative inside."""
+        """The distance of each point to the surface, negative inside."""
         distance = self.closest(points)[0]
         return np.where(np.abs(self.winding(points)) > 0.5, -distance, distance)
 
     def samples(self, faces=None):
-        """Points on the surface no more than about SPACING apart, and the triangle of each."""
+        """Points on the surface, about SPACING apart or less, and the triangle of each."""
         points, owners = [], []
         for face in range(len(self.faces)) if faces is None else faces:
             a, b, c = self.triangles[face]

@@ -1,4 +1,4 @@
-"""Judging many grasps at once: measures and simulation of each in a process of its own, with a progress bar."""
+"""Judges many grasps in parallel processes, with a progress bar."""
 
 import multiprocessing
 import pathlib
@@ -18,12 +18,12 @@ import physics
 
 @dataclass
 class Case:
-    """A reply that is to be judged. The scene's mesh is left out: it is the same for many, and read once a process."""
+    """A reply to judge. Its scene has no mesh, because each process reads each mesh once."""
 
     object: str
     scene: measures.Scene
     grasp: dict
-    # Where to leave a picture of hand and object alone.
+    # Where to save a picture of hand and object alone.
     drawing: pathlib.Path | None = None
 
 
@@ -49,12 +49,12 @@ def judged(case, simulated):
 
 
 def survival(scene, grasp):
-    """How the runs in the physics engine end; pushes are along the axes of the client's frame, in which gravity is."""
+    """How the runs in the physics engine end; pushes are along the axes of the client's frame."""
     hand, contacts = measures.in_object_frame(scene, grasp)
-    thing = physics.Object(convex.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction)
+    obj = physics.Object(convex.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction)
     to_object = scene.rotation.inv()
     outcomes = physics.simulate(
-        thing, hand, contacts, to_object.apply(scene.up), to_object.apply([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        obj, hand, contacts, to_object.apply(scene.up), to_object.apply([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
     )
     result = {
         "survives_gravity": outcomes["gravity"].held,
@@ -69,18 +69,18 @@ def survival(scene, grasp):
 
 
 def decomposed(name):
-    """Sees to it that the convex pieces of an object are there."""
+    """Makes the convex pieces of an object and caches them."""
     convex.pieces(mesh_of(name))
 
 
 def judge_all(cases, jobs, simulated):
-    """The measures of each case, in the order of the cases."""
+    """The measures of all cases, in their order."""
     rows = [None] * len(cases)
-    # Forked processes would inherit threads of numba and of the decomposition in an unknown state.
+    # Forked processes would inherit the threads of numba and CoACD in an unknown state.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(max_workers=min(jobs, max(1, len(cases))), mp_context=context) as pool:
         if simulated:
-            # Each mesh once, before many processes want the same.
+            # Decompose each mesh once, before several processes need it.
             waiting = [pool.submit(decomposed, name) for name in dict.fromkeys(case.object for case in cases)]
             for done in Progress("objects decomposed").over(as_completed(waiting), len(waiting)):
                 done.result()
@@ -91,18 +91,18 @@ def judge_all(cases, jobs, simulated):
 
 
 class Progress:
-    """A bar with a count and the time, on one line of a terminal; elsewhere a line for each tenth."""
+    """A progress bar with a count and the elapsed time: one line in a terminal, elsewhere a line per tenth."""
 
     WIDTH = 30
 
     def __init__(self, what):
         self.what, self.began, self.shown = what, time.monotonic(), 0
 
-    def over(self, things, total=None):
-        """The things, one after the other, with the bar telling how many are done."""
-        total = total or len(things)
-        for done, thing in enumerate(things, 1):
-            yield thing
+    def over(self, items, total=None):
+        """Yields the items and shows how many are done."""
+        total = total or len(items)
+        for done, item in enumerate(items, 1):
+            yield item
             self._show(done, total)
 
     def _show(self, done, total):

@@ -1,4 +1,4 @@
-"""What goes with what: survival with epsilon, comfort with the verdict, and the types of grasps."""
+"""Correlations: survival with epsilon, comfort E with the verdict; and the distribution of grasp types."""
 
 import collections
 
@@ -9,12 +9,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import rankdata, spearmanr
 
-# Bounds of the classes of epsilon; the thesis' scale has no unit (force of one newton's pressing, torque over reach).
+# Bounds of the classes of epsilon, which has no unit (presses of one newton, torque over reach).
 EPSILONS = [0.0, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, np.inf]
 
 
 def survival_by_epsilon(found):
-    """How many grasps are held, for each class of the judge's epsilon."""
+    """Markdown table of the grasps that survive, by class of the judge's epsilon."""
     lines = ["| epsilon | grasps | survives gravity | single pushes | all six |", "|---|--:|--:|--:|--:|"]
     for low, high in zip(EPSILONS, EPSILONS[1:]):
         here = [row for row in found if low <= row["epsilon"] < high]
@@ -27,19 +27,19 @@ def survival_by_epsilon(found):
 
 
 def survival_cells(rows):
-    """Shares that survive gravity, single pushes (of all grasps' six), and all."""
+    """The shares that survive gravity, single pushes (six per grasp), and everything."""
     n = len(rows)
     gravity, pushes, every = (sum(row[f"survives_{name}"] for row in rows) for name in ("gravity", "pushes", "all"))
     return [f"{100 * gravity / n:.0f} % ({gravity})", f"{100 * pushes / (6 * n):.0f} %", f"{100 * every / n:.0f} % ({every})"]
 
 
 def runs_survived(row):
-    """Of the seven runs, those survived."""
+    """How many of the seven runs a grasp survived."""
     return int(row["survives_gravity"]) + row["survives_pushes"]
 
 
 def correlation(rows, name, verdict):
-    """Spearman's rank correlation as text; none when either is the same for all."""
+    """Spearman's rank correlation as text; none if either is the same for all rows."""
     pairs = np.array([(row[name], verdict(row)) for row in rows if np.isfinite(row[name])], float).reshape(-1, 2)
     if len(pairs) < 3 or (np.ptp(pairs, axis=0) == 0).any():
         return "none (all alike)"
@@ -48,9 +48,9 @@ def correlation(rows, name, verdict):
 
 
 def ranked_before(rows, good):
-    """The chance that a good grasp has a smaller E than a bad one, ties counted half; None without both kinds.
+    """The chance that a good grasp has a smaller E than a bad one, counting ties as half; None without both kinds.
 
-    Mann and Whitney's U over the number of pairs: 0.5 when E tells nothing.
+    This is Mann and Whitney's U over the number of pairs: 0.5 if E has no predictive value.
     """
     rows = [row for row in rows if np.isfinite(row["comfort"])]
     is_good = np.array([bool(good(row)) for row in rows])
@@ -62,7 +62,7 @@ def ranked_before(rows, good):
 
 
 def comfort_and_verdict(found, acceptable, faults):
-    """Whether bad grasps have a larger E: rank correlations and the chance to rank a good one before a bad one."""
+    """Markdown table of how well E predicts bad grasps: rank correlations and chances to rank a good one first."""
     verdicts = [
         ("any fault", lambda row: not acceptable(row), acceptable),
         ("number of faults", lambda row: len(faults(row)), None),
@@ -74,8 +74,8 @@ def comfort_and_verdict(found, acceptable, faults):
             ("runs lost, of seven", lambda row: 7 - runs_survived(row), None),
         ]
     lines = [
-        "E is a cost: were it a verdict, bad grasps would have the larger E (correlation above 0), and a good one would"
-        " be ranked before a bad one more often than in half of the pairs.",
+        "E is a cost. If it predicted the verdict, bad grasps would have the larger E (a correlation above 0), and good"
+        " ones would rank before bad ones in more than half of the pairs.",
         "",
         "| verdict | bad | rank correlation with E | good before bad |",
         "|---|--:|--:|--:|",
@@ -89,7 +89,7 @@ def comfort_and_verdict(found, acceptable, faults):
 
 
 def scatter(file, found, acceptable):
-    """E against epsilon of every grasp; colours say what became of it."""
+    """Plots E against epsilon for every grasp, coloured by its fate."""
     classes = [("a fault", "#c03030", lambda row: not acceptable(row)), ("no fault", "#4878a8", lambda _: True)]
     if "survives_gravity" in found[0]:
         classes = [
@@ -116,12 +116,12 @@ def scatter(file, found, acceptable):
 
 
 def types(found):
-    """How often each type of the taxonomy was told, and with what confidence."""
-    told = [row for row in found if "type" in row]
-    counts = collections.Counter(row["type"] for row in told)
+    """Markdown table of the grasp types in the replies: how often, and with what confidence."""
+    typed = [row for row in found if "type" in row]
+    counts = collections.Counter(row["type"] for row in typed)
     lines = ["| type | grasps | share | mean confidence |", "|---|--:|--:|--:|"]
     for name, count in sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])):
-        mean = np.mean([row["type_confidence"] for row in told if row["type"] == name])
+        mean = np.mean([row["type_confidence"] for row in typed if row["type"] == name])
         shown = name.replace("_", " ") or "*unclassifiable*"
-        lines.append(f"| {shown} | {count} | {100 * count / len(told):.0f} % | {mean:.2f} |")
+        lines.append(f"| {shown} | {count} | {100 * count / len(typed):.0f} % | {mean:.2f} |")
     return "\n".join(lines)

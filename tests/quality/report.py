@@ -1,4 +1,4 @@
-"""Targets and figures: a table for the terminal, CSV, and a Markdown report with plots and a contact sheet."""
+"""Targets and figures: a table for the terminal, a CSV, and a Markdown report with plots and a contact sheet."""
 
 import csv
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ import numpy as np
 import measures
 import relations
 
-# A type counts when its confidence is at least this; wanted are so many per cent of grasps with one, and so many types.
+# Confidence from which a type counts; targets for the percentage of grasps that have one, and for the number of types.
 CONFIDENT, CLASSIFIED, TYPES = 0.5, 95, 15
 
 
 @dataclass
 class Target:
-    """One line of the table; `met` is None for what is only reported."""
+    """One line of the table; `met` is None if there is no target."""
 
     measure: str
     wanted: str
@@ -27,7 +27,7 @@ class Target:
 
 
 def targets(rows):
-    """The targets, with what the rows give."""
+    """The targets, with the figures of these rows."""
     found = [row for row in rows if row["found"]]
     n = len(found)
     lines = []
@@ -90,13 +90,13 @@ def targets(rows):
 
 
 def sound_share(rows):
-    """Of the grasps that were found, the share without any fault."""
+    """The share of the found grasps that have no fault."""
     found = [row for row in rows if row["found"]]
     return sum(acceptable(row) for row in found) / len(found)
 
 
 def held(found):
-    """How many grasps keep hold of the object in the physics engine; nothing without a simulation."""
+    """How many grasps survive in the physics engine; nothing without a simulation."""
     if "survives_gravity" not in found[0]:
         return []
     lines = []
@@ -111,13 +111,13 @@ def held(found):
 
 
 def classified(found):
-    """How many grasps have a type of the taxonomy, and how many types there are; nothing if replies tell none."""
-    told = [row for row in found if "type" in row]
-    if not told:
+    """How many grasps have a type of the taxonomy, and how many types there are; nothing if no reply has a type."""
+    typed = [row for row in found if "type" in row]
+    if not typed:
         return []
-    named = [row["type"] for row in told if row["type"] and row["type_confidence"] >= CONFIDENT]
-    share, types = 100 * len(named) / len(told), len(set(named))
-    figure = f"{share:.0f} % ({len(named)} of {len(told)})"
+    named = [row["type"] for row in typed if row["type"] and row["type_confidence"] >= CONFIDENT]
+    share, types = 100 * len(named) / len(typed), len(set(named))
+    figure = f"{share:.0f} % ({len(named)} of {len(typed)})"
     return [
         Target("classified, confidence at least 0.5", f"≥ {CLASSIFIED} %", figure, share >= CLASSIFIED),
         Target("types seen", f"≥ {TYPES}", str(types), types >= TYPES),
@@ -125,24 +125,25 @@ def classified(found):
 
 
 def overstated(found):
-    """Whether the margins that the replies tell are better than what is measured."""
+    """How many replies report better margins than the judge measures."""
     lines = []
-    for told, measured, sign, slack in [
-        ("told_epsilon", "epsilon", 1, 0.002),
-        ("told_penetration", "penetration", -1, 0.0005),
-        ("told_giver_clearance", "giver_hand", 1, 0.0005),
+    for margin, measured, sign, slack in [
+        ("epsilon", "epsilon", 1, 0.002),
+        ("penetration", "penetration", -1, 0.0005),
+        ("giver_clearance", "giver_hand", 1, 0.0005),
     ]:
-        both = [(row[told], row[measured]) for row in found if row.get(told) is not None]
+        reported = f"reported_{margin}"
+        both = [(row[reported], row[measured]) for row in found if row.get(reported) is not None]
         if both:
             better = [sign * (a - b) for a, b in both]
             count = sum(value > slack for value in better)
-            figure = f"{count} of {len(both)}; by {1000 * max(better):.1f} thousandths at most"
-            lines.append(Target(f"{told[5:]} in the reply is too good", "0", figure, count == 0))
+            figure = f"{count} of {len(both)}; by at most {1000 * max(better):.1f} thousandths"
+            lines.append(Target(f"{margin} in the reply is too good", "0", figure, count == 0))
     return lines
 
 
 def acceptable(row):
-    """Whether a grasp breaks none of the bounds that hold for each grasp."""
+    """Whether a grasp has no fault: it keeps every bound that applies to single grasps."""
     return bool(
         row["penetration"] <= 0.003
         and not row["force_outside_cone"]
@@ -161,7 +162,7 @@ def acceptable(row):
 
 
 def table(lines):
-    """The table for a terminal."""
+    """The table, for a terminal."""
     rows = [("", "target", "figure", "met")]
     rows += [(t.measure, t.wanted, t.figure, {True: "yes", False: "NO", None: ""}[t.met]) for t in lines]
     widths = [max(len(row[i]) for row in rows) for i in range(4)]
@@ -169,7 +170,7 @@ def table(lines):
 
 
 def markdown(lines):
-    """The same as Markdown."""
+    """The table, as Markdown."""
     rows = ["| | target | figure | met |", "|---|---|---|---|"]
     for t in lines:
         rows.append(f"| {t.measure} | {t.wanted} | {t.figure} | {({True: 'yes', False: 'no', None: ''})[t.met]} |")
@@ -177,7 +178,7 @@ def markdown(lines):
 
 
 def write(folder, rows, lines, options):
-    """Everything that is left of a run."""
+    """Writes the report of a run: CSV, Markdown, plots and contact sheet."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     with open(folder / "grasps.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns)
@@ -185,8 +186,8 @@ def write(folder, rows, lines, options):
         writer.writerows(rows)
     found = [row for row in rows if row["found"]]
     text = ["# Quality of grasps", ""]
-    told = ", ".join(f"{key} {value}" for key, value in options.items() if key not in ("out", "strict") and value)
-    text += [f"{len(rows)} holdouts, {len(found)} grasps judged; {told}. Every grasp: [grasps.csv](grasps.csv).", ""]
+    given = ", ".join(f"{key} {value}" for key, value in options.items() if key not in ("out", "strict") and value)
+    text += [f"{len(rows)} holdouts, {len(found)} grasps judged; {given}. Every grasp: [grasps.csv](grasps.csv).", ""]
     text += [markdown(lines), ""]
     if found:
         text += ["## By object", "", by_object(rows), ""]
@@ -201,13 +202,13 @@ def write(folder, rows, lines, options):
         text += ["![Distributions](distributions.svg)", ""]
         if sheet(folder, found):
             text += ["## Contact sheet", ""]
-            text += ["Green: no fault, and gravity survived; red: what is wrong. At the right, hand and object alone.", ""]
+            text += ["Green: no fault, gravity survived. Red: the faults. On the right: hand and object alone.", ""]
             text += ["![Grasps](sheet.png)", ""]
     (folder / "README.md").write_text("\n".join(text), encoding="utf-8")
 
 
 def by_object(rows):
-    """Main figures of each object."""
+    """Markdown table of the main figures by object."""
     simulated = any("survives_gravity" in row for row in rows)
     heads = ["object", "grasps", "within 50 ms", "penetration median / worst, mm", "balanced", "giver clear", "no fault"]
     if simulated:
@@ -237,7 +238,7 @@ def by_object(rows):
 
 
 def plots(folder, found):
-    """Distributions of the measures that are lengths or ratios, with the bound of each."""
+    """Plots the distributions of the main measures, each with its bound."""
     chosen = [
         ("penetration", 1000, "penetration, mm", 3),
         ("imbalance", 100, "weight not balanced, %", 2),
@@ -261,7 +262,7 @@ def plots(folder, found):
 
 
 def faults(row):
-    """What is wrong with a grasp, in few words."""
+    """The faults of a grasp, each in a few words."""
     named = [
         (row["penetration"] > 0.003, f"{1000 * row['penetration']:.0f} mm deep"),
         (row["force_outside_cone"], "cone"),
@@ -279,7 +280,7 @@ def faults(row):
 
 
 def fate(row):
-    """What became of a grasp in the physics engine, in few words; nothing without a simulation."""
+    """The fate of a grasp in the physics engine, in a few words; nothing without a simulation."""
     if "survives_gravity" not in row:
         return []
     if not row["survives_gravity"]:
@@ -288,8 +289,10 @@ def fate(row):
 
 
 def sheet(folder, found, across=3):
-    """All pictures of a run on one sheet, from three sides each: two with the giver by the client, one without by the
-    judge; false if there are none."""
+    """Puts all pictures of a run on one sheet; false if there are none.
+
+    Each grasp has three views: two with the giver, drawn by the client, and one without, drawn by the judge.
+    """
     drawn = [row for row in found if row.get("picture") and (folder / "pictures" / row["picture"]).exists()]
     if not drawn:
         return False

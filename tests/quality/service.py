@@ -1,4 +1,4 @@
-"""The release server on a free port, and requests to it through the client's binary."""
+"""Runs the release server on a free port and calls it through the client's binary."""
 
 import json
 import os
@@ -9,12 +9,12 @@ import subprocess
 import threading
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-# Exit code of `grasp find` when the budget ended first.
+# Exit code of `grasp find` when it found no grasp within the budget.
 EXHAUSTED = 3
 
 
 class Service:
-    """A running server; use it in a with statement."""
+    """A running server, as a context manager."""
 
     def __init__(self, workers=None):
         command = [ROOT / "target/release/grasp-server", "--listen", "127.0.0.1:0", "--log", "grasp_server=info"]
@@ -32,8 +32,8 @@ class Service:
                 self.url = f"http://{match.group(0)}"
                 break
         else:
-            raise RuntimeError(f"the server ended with {self.process.wait()} before it named its address")
-        # The log must be drained, or a full pipe would hold the server up.
+            raise RuntimeError(f"the server exited with {self.process.wait()} before it logged its address")
+        # Drain the log: a full pipe would block the server.
         threading.Thread(target=lambda: self.process.stderr.read(), daemon=True).start()
 
     def __enter__(self):
@@ -52,19 +52,19 @@ class Service:
             timeout=60,
         )
         if done.returncode not in accept:
-            raise RuntimeError(f"grasp {arguments[0]} ended with {done.returncode}: {done.stderr.strip()}")
+            raise RuntimeError(f"grasp {arguments[0]} exited with {done.returncode}: {done.stderr.strip()}")
         return json.loads(done.stdout)
 
     def create(self, identifier, path, mass):
-        """Makes an object from a file; returns what the server tells about it."""
+        """Creates an object from a file and returns the server's description of it."""
         return self._client("objects", "create", identifier, "--obj", path, "--mass", mass)
 
     def object(self, name):
-        """What the server tells about an object."""
+        """The server's description of an object."""
         return self._client("objects", "get", name)
 
     def find(self, request, choice=None, no_atlas=False, picture=None, mesh=None):
-        """The answer to a request in the form of `grasp find --request`."""
+        """The answer to a request given as JSON for `grasp find --request`."""
         extra = ["--choice", choice] if choice else []
         extra += ["--no-atlas"] if no_atlas else []
         extra += ["--png", picture, "--view-size", "480x400"] if picture else []

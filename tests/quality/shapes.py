@@ -9,7 +9,7 @@ BOX_FACES = [
 
 
 def box(half, centre=(0, 0, 0), axes=None):
-    """Vertices of a box; its axes are the rows of `axes`."""
+    """Vertices of a box of these half extents along the rows of `axes`."""
     x, y, z = half
     corners = np.array([[i * x, j * y, k * z] for k in (-1, 1) for i, j in [(-1, -1), (1, -1), (1, 1), (-1, 1)]])
     return corners @ (np.eye(3) if axes is None else axes) + centre

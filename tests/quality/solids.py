@@ -1,10 +1,10 @@
-"""Tapered capsules: the convex hull of two balls, and how far things are from it."""
+"""Tapered capsules (convex hulls of two balls) and distances to them."""
 
 import numpy as np
 
 
 class Capsules:
-    """Any number of tapered capsules, as arrays."""
+    """Tapered capsules, stored as arrays."""
 
     def __init__(self, starts, ends, start_radii, end_radii):
         self.starts, self.ends = np.asarray(starts, float), np.asarray(ends, float)
@@ -16,14 +16,14 @@ class Capsules:
     def __len__(self):
         return len(self.starts)
 
-    def of(self, indices):
-        """Some of them."""
+    def subset(self, indices):
+        """The capsules at these indices."""
         return Capsules(
             self.starts[indices], self.ends[indices], self.start_radii[indices], self.end_radii[indices]
         )
 
     def at(self, fractions):
-        """Centre and radius of the ball at a fraction of each axis."""
+        """Centre and radius of the ball at a fraction of the way along each axis."""
         fractions = np.asarray(fractions)
         centres = self.starts + fractions[..., None] * (self.ends - self.starts)
         return centres, self.start_radii + fractions * (self.end_radii - self.start_radii)
@@ -31,28 +31,28 @@ class Capsules:
     def distances(self, points):
         """Signed distance from each point (row) to each capsule's skin (column), negative inside.
 
-        The hull is the union of the balls along the axis, so the distance is the smallest of |p - c(u)| - r(u); the
-        radius falls by k a unit of length, and the derivative is zero where s - u = k rho / sqrt(1 - k^2).
+        The hull is the union of the balls along the axis, so the distance is the minimum of |p - c(u)| - r(u). The
+        radius falls by k per unit of length, and the derivative is zero where s - u = k rho / sqrt(1 - k^2).
         """
         offsets = np.asarray(points, float).reshape(-1, 1, 3) - self.starts
         along = np.einsum("pci,ci->pc", offsets, self.directions)
         across = np.sqrt(np.maximum(np.einsum("pci,pci->pc", offsets, offsets) - along**2, 0.0))
         slope = (self.start_radii - self.end_radii) / self.lengths
-        # One ball holds the other: the larger one is the hull.
+        # Where one ball contains the other, the larger one is the hull.
         tilt = np.where(np.abs(slope) < 1, slope / np.sqrt(np.maximum(1 - slope**2, 1e-12)), 0.0)
         at = np.where(slope >= 1, 0.0, np.where(slope <= -1, self.lengths, along - tilt * across))
         at = np.clip(at, 0.0, self.lengths)
         return np.hypot(along - at, across) - (self.start_radii - slope * at)
 
     def skin(self, spacing):
-        """Points on the skins about `spacing` apart, and the capsule of each."""
+        """Points on the skins, about `spacing` apart, and the index of each one's capsule."""
         points, owners = [], []
         for i in range(len(self)):
             r, q, length = self.start_radii[i], self.end_radii[i], self.lengths[i]
             d = self.directions[i]
             side = np.cross(d, np.eye(3)[np.argmin(np.abs(d))])
             side /= np.linalg.norm(side)
-            # The outline is a line that touches both balls, and an arc at each end.
+            # The outline is an arc at each end and the line tangent to both balls.
             sine = np.clip((r - q) / length, -1.0, 1.0)
             tangent = np.arccos(sine)
             arcs = [np.linspace(np.pi, tangent, max(2, int(np.ceil((np.pi - tangent) * r / spacing)) + 1))]
@@ -72,11 +72,11 @@ class Capsules:
 def clearance(a, b):
     """Signed distance between the skins of each capsule of `a` (row) and each of `b` (column).
 
-    Along an axis of `a`, the distance to `b` less the radius of `a` is convex, so a ternary search finds its least
-    value: 60 steps leave 1e-10 of the length.
+    Along an axis of `a`, the distance to `b` minus the radius of `a` is convex, so a ternary search finds the minimum;
+    60 steps leave 1e-10 of the length.
     """
     rows, columns = np.divmod(np.arange(len(a) * len(b)), len(b))
-    first, second = a.of(rows), b.of(columns)
+    first, second = a.subset(rows), b.subset(columns)
 
     def value(fractions):
         centres, radii = first.at(fractions)

@@ -1,4 +1,4 @@
-"""Capsules, winding numbers and distances against closed forms and brute force."""
+"""Capsules, winding numbers and distances, against closed forms and brute force."""
 
 import numpy as np
 import pytest
@@ -13,13 +13,13 @@ def box_mesh(half):
 
 
 class TestCapsules:
-    def test_distance_to_a_straight_one(self):
+    def test_distance_to_an_untapered_capsule(self):
         capsule = Capsules([[0, 0, 0]], [[0, 0.1, 0]], [0.01], [0.01])
         points = [[0.03, 0.05, 0], [0, 0.13, 0], [0.03, 0.14, 0], [0.004, 0.05, 0], [0, -0.02, 0]]
         expected = [0.02, 0.02, 0.04, -0.006, 0.01]
         np.testing.assert_allclose(capsule.distances(points)[:, 0], expected, atol=1e-12)
 
-    def test_distance_to_a_tapered_one_is_that_to_its_balls(self):
+    def test_distance_to_a_tapered_capsule_is_the_minimum_over_its_balls(self):
         random = np.random.default_rng(1)
         for _ in range(30):
             a, b = random.uniform(-0.05, 0.05, (2, 3))
@@ -31,16 +31,16 @@ class TestCapsules:
             found = Capsules([a], [b], [r], [q]).distances(points)[:, 0]
             np.testing.assert_allclose(found, brute, atol=1e-8)
 
-    def test_skin_lies_on_the_skin(self):
+    def test_skin_samples_lie_on_the_skin(self):
         capsules = Capsules([[0, 0, 0], [0.1, 0, 0]], [[0, 0.05, 0.01], [0.1, 0, 0.03]], [0.01, 0.006], [0.006, 0.012])
         points, owners = capsules.skin(0.002)
         own = capsules.distances(points)[np.arange(len(points)), owners]
         assert np.abs(own).max() < 2e-4
-        # Both poles are there.
+        # Both poles are among them.
         for row, pole in [(0, capsules.at(np.zeros(2))), (1, capsules.at(np.ones(2)))]:
             assert np.linalg.norm(points - pole[0][row], axis=1).min() < pole[1][row] + 1e-9
 
-    def test_clearance_of_parallel_crossing_and_aligned_ones(self):
+    def test_clearance_of_parallel_crossing_and_aligned_capsules(self):
         first = Capsules([[0, 0, 0]], [[0, 0.1, 0]], [0.01], [0.01])
         others = Capsules(
             [[0.05, 0.02, 0], [-0.1, 0.05, 0.03], [0, 0.15, 0], [-0.1, 0.05, 0.005]],
@@ -53,7 +53,7 @@ class TestCapsules:
 
 
 class TestMesh:
-    def test_closed_cube(self):
+    def test_winding_and_distance_of_a_closed_cube(self):
         mesh = box_mesh([0.5, 0.5, 0.5])
         winding = mesh.winding([[0, 0, 0], [0.4, -0.3, 0.2], [0.6, 0, 0], [3, 3, 3]])
         np.testing.assert_allclose(winding, [1, 1, 0, 0], atol=1e-12)
@@ -61,8 +61,8 @@ class TestMesh:
             mesh.signed_distance([[0, 0, 0.1], [0.4, 0, 0], [0.8, 0.9, 0]]), [-0.4, -0.1, 0.5], atol=1e-12
         )
 
-    def test_open_box_and_one_inside_out(self):
-        # Without its top, the middle of a cube sees five of six equal solid angles.
+    def test_open_and_inside_out_boxes_still_have_an_inside(self):
+        # From the middle of a cube without its top, five of six equal solid angles are left.
         lid = [2, 3]
         faces = [face for i, face in enumerate(BOX_FACES) if i not in lid]
         mesh = Mesh(box([0.5, 0.5, 0.5]), faces)
@@ -72,14 +72,14 @@ class TestMesh:
         turned = Mesh(box([0.5, 0.5, 0.5]), [face[::-1] for face in BOX_FACES])
         assert turned.signed_distance([[0, 0, 0.3]])[0] == pytest.approx(-0.2)
 
-    def test_two_overlapping_parts_count_as_inside(self):
+    def test_overlap_of_two_parts_is_inside(self):
         both = Mesh(
             np.concatenate([box([0.5] * 3), box([0.5] * 3, (0.4, 0, 0))]),
             BOX_FACES + [[i + 8 for i in face] for face in BOX_FACES],
         )
         np.testing.assert_allclose(both.winding([[0.2, 0, 0], [-0.3, 0, 0]]), [2, 1], atol=1e-12)
 
-    def test_samples_leave_no_hole(self):
+    def test_samples_leave_no_gap_wider_than_the_spacing(self):
         mesh = box_mesh([0.01, 0.02, 0.005])
         points, _ = mesh.samples()
         assert mesh.closest(points)[0].max() < 1e-12
@@ -90,7 +90,7 @@ class TestMesh:
         gaps = np.linalg.norm(on_surface[:, None] - points[None], axis=2).min(axis=1)
         assert gaps.max() < 0.0015
 
-    def test_obj_with_polygons_negative_indices_and_groups(self, tmp_path):
+    def test_reads_polygons_negative_indices_and_groups_of_an_obj(self, tmp_path):
         file = tmp_path / "box.obj"
         file.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng one\nf 1/1/1 2/2/2 3//3 4\ng two\nf -4 -3 -2\n")
         mesh = Mesh.read_obj(file, 0.001)

@@ -1,4 +1,4 @@
-"""Givers are placed by the skin of their whole hand: wrist and palm, too."""
+"""Givers keep their whole hand off the object, palm and wrist included."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hand import CHAINS, METACARPALS, WRIST
 
 
 def depth_in_hand(hand, points):
-    """How deep points are below the skin from the wrist to the last joint of each digit, by its joints' radii alone."""
+    """The largest depth of the points below the skin, computed from the joints and radii alone."""
     deepest = 0.0
     for digit, chain in enumerate(CHAINS):
         joints = [WRIST] + ([METACARPALS[digit - 1]] if digit else []) + chain[:-1]
@@ -22,7 +22,7 @@ def depth_in_hand(hand, points):
 
 
 @pytest.mark.parametrize("name", holdouts.BUILT_IN)
-def test_no_object_sticks_in_its_giver(name):
+def test_placed_givers_do_not_penetrate_the_object(name):
     mesh = holdouts.load_mesh(name)
     placer, hands = holdouts.Placer(mesh), holdouts.recorded_hands()
     points, _ = mesh.samples()
@@ -33,7 +33,7 @@ def test_no_object_sticks_in_its_giver(name):
 
 
 class Placed:
-    """What a placement came to: a hand so deep in the object."""
+    """The result of a placement: a hand this deep in the object."""
 
     def __init__(self, depth):
         self.depth = depth
@@ -45,14 +45,17 @@ class Placed:
         return np.full(len(points), -self.depth)
 
 
-def placed_of(depths):
-    """Which of the depths that placements come to is taken, and how many were tried."""
+def chosen_depth(depths):
+    """Given the depths of successive placements, the one that is used, and how many were tried."""
     placer, left = holdouts.Placer(holdouts.load_mesh("remote")), list(depths)
     placer._attempt = lambda hand, random: Placed(left.pop(0))
     return placer.place(None, None).depth, len(depths) - len(left)
 
 
-def test_the_first_that_is_shallow_is_taken_and_the_shallowest_if_none_is():
-    assert placed_of([0.02, 0.003, 0.001]) == (0.003, 2)
+def test_uses_the_first_shallow_placement():
+    assert chosen_depth([0.02, 0.003, 0.001]) == (0.003, 2)
+
+
+def test_uses_the_shallowest_placement_if_none_is_shallow():
     deep = [0.02 - 0.0001 * k for k in range(holdouts.PLACEMENTS - 1)] + [0.03, 0.001]
-    assert placed_of(deep) == (min(deep[:-1]), holdouts.PLACEMENTS)
+    assert chosen_depth(deep) == (min(deep[:-1]), holdouts.PLACEMENTS)

@@ -1,4 +1,4 @@
-"""The judge is judged: a made-up grasp is good until a single fault is put into it."""
+"""Tests of the judge: it finds nothing wrong with a constructed grasp, and each single fault that is put into it."""
 
 import copy
 
@@ -13,7 +13,7 @@ from hand import Hand
 from mesh import Mesh
 from shapes import BOX_FACES, box
 
-# A pinch of the adult hand, in degrees: yaw and three pitches of each digit.
+# A pinch of the adult hand: yaw and three pitches of each digit, in degrees.
 PINCH = [[40, 8, 8, 25], [0, 50, 42, 22], [0, 45, 45, 30], [0, 45, 50, 30], [0, 45, 50, 30]]
 MASS, FRICTION = 0.1, 0.5
 
@@ -26,10 +26,10 @@ def pinching_hand(angles, handedness="right"):
 
 
 def touching_balls(hand):
-    """Where the last phalanges of thumb and index are closest, and the direction from the one to the other."""
+    """The closest points of the last phalanges of thumb and index, and the direction from one to the other."""
     capsules, tags = hand.solids()
     pair = [int(np.flatnonzero((tags == (digit, 2)).all(axis=1))[0]) for digit in (0, 1)]
-    thumb, index = capsules.of([pair[0]]), capsules.of([pair[1]])
+    thumb, index = capsules.subset([pair[0]]), capsules.subset([pair[1]])
     steps = np.linspace(0, 1, 401)
     ends = [c.at(steps[:, None])[0][:, 0] for c in (thumb, index)]
     radii = [c.at(steps[:, None])[1][:, 0] for c in (thumb, index)]
@@ -47,14 +47,14 @@ def joints_of(hand):
 
 
 def good():
-    """A block between thumb and index, held with forces that carry it; a forbidden block hangs off its outer end."""
+    """A block held between thumb and index by forces that carry it, with a forbidden block beyond its outer end."""
     hand = pinching_hand(PINCH)
     thumb, index, direction = touching_balls(hand)
     middle = (thumb + index) / 2
     outward = middle - hand.positions[hands.WRIST]
     outward -= outward @ direction * direction
     outward /= np.linalg.norm(outward)
-    # Supported by friction alone: gravity across the line between the contacts.
+    # Gravity is perpendicular to the line between the contacts, so friction alone carries the block.
     axes = np.stack([direction, outward, np.cross(direction, outward)])
     up = axes[2]
     thickness = np.linalg.norm(index - thumb) / 2
@@ -96,7 +96,7 @@ def judged(scene, grasp):
 
 
 def faults(scene, grasp):
-    """Names of the measures that are not as they should be."""
+    """The names of the measures that are out of bounds."""
     row = judged(scene, grasp)
     wrong = {
         "penetration": row["penetration"] > 0.001,
@@ -125,7 +125,7 @@ def with_hand(grasp, hand):
 
 
 def bent(grasp, changes):
-    """The same grasp with other angles, in degrees, of some joints."""
+    """The grasp with some joint angles changed, in degrees."""
     angles = np.array(PINCH, float)
     for place, value in changes.items():
         angles[place] = value
@@ -133,7 +133,7 @@ def bent(grasp, changes):
 
 
 class TestGoodGrasp:
-    def test_has_no_fault(self):
+    def test_a_good_grasp_has_no_fault(self):
         scene, grasp, _ = good()
         assert faults(scene, grasp) == set()
         row = judged(scene, grasp)
@@ -161,8 +161,8 @@ class TestGoodGrasp:
 
 
 @pytest.mark.parametrize("handedness", ["left", "right"])
-def test_hands_and_forearms_are_the_right_way_round(handedness):
-    # A hand in its own rig's frame turned to OpenXR's: -Z to the fingers, +Y out of the back.
+def test_hands_and_forearms_are_oriented_as_in_openxr(handedness):
+    # In OpenXR's frame the fingers point along -Z, and +Y is out of the back of the hand.
     straight = hands.posed("adult", handedness, [0, 0, 0], [0, 0, 0, 1], [dict.fromkeys(
         ["base_yaw", "base_pitch", "second_pitch"], 0.0)] * 5)  # fmt: skip
     fist = hands.posed("adult", handedness, [0, 0, 0], [0, 0, 0, 1], [dict(
@@ -172,7 +172,7 @@ def test_hands_and_forearms_are_the_right_way_round(handedness):
     assert middle[2] < -0.05 and abs(middle[1]) < 0.01
     assert (thumb[0] < 0 < little[0]) if handedness == "right" else (little[0] < 0 < thumb[0])
     assert fist.positions[hands.CHAINS[2][3]][1] < -0.03
-    # The elbow is behind the wrist; bent, it goes to the palm's side; toward the little finger, to its side.
+    # The elbow is behind the wrist. Flexion moves it to the palm's side, ulnar deviation to the little finger's.
     elbow = straight.forearm().ends[0]
     np.testing.assert_allclose(elbow, [0, 0, hands.FOREARM_LENGTH], atol=1e-12)
     assert straight.forearm(flexion=60).ends[0][1] < -0.2
@@ -181,15 +181,15 @@ def test_hands_and_forearms_are_the_right_way_round(handedness):
 
 class TestFaults:
     @pytest.mark.parametrize("millimetres", [5, -5])
-    def test_sunk_hand(self, millimetres):
+    def test_measures_the_depth_of_a_sunk_hand(self, millimetres):
         scene, grasp, direction = good()
         sunk = measures.hand_of_reply(grasp).moved(Rotation.identity(), millimetres / 1000 * direction)
         assert {"penetration", "off_skin"} <= faults(scene, with_hand(grasp, sunk))
         depth = judged(scene, with_hand(grasp, sunk))["penetration"]
         assert depth == pytest.approx(0.005, abs=3e-4)
 
-    def test_blade_through_a_finger(self):
-        # A thin sheet across the index finger: no skin is in its volume, but it is deep in the flesh.
+    def test_a_blade_through_a_finger_is_deep_in_its_flesh(self):
+        # A thin sheet across the index finger: its volume contains no skin, but it is deep in the flesh.
         scene, grasp, direction = good()
         hand = measures.hand_of_reply(grasp)
         centre, radius = hand.positions[hands.CHAINS[1][1]], hand.radii[hands.CHAINS[1][1]]
@@ -204,14 +204,14 @@ class TestFaults:
         assert row["skin_in_object"] < 0.001
         assert row["penetration"] == row["object_in_flesh"]
 
-    def test_finger_inside_of_a_large_block(self):
+    def test_a_finger_inside_a_large_block_is_deep_in_the_object(self):
         scene, grasp, _ = good()
         hand = measures.hand_of_reply(grasp)
         tip = hand.positions[hands.CHAINS[4][3]]
         scene.mesh, scene.forbidden = Mesh(scene.to_object(box([0.03] * 3, tip)), BOX_FACES), np.arange(0)
         assert judged(scene, grasp)["skin_in_object"] > 0.02
 
-    def test_flipped_and_tilted_normal(self):
+    def test_finds_flipped_and_tilted_normals(self):
         scene, grasp, _ = good()
         grasp["contacts"][1]["client_normal"] = [-x for x in grasp["contacts"][1]["client_normal"]]
         assert "faces_away" in faults(scene, grasp)
@@ -222,7 +222,7 @@ class TestFaults:
         assert "faces_away" not in faults(scene, grasp)
 
     @pytest.mark.parametrize("inside_out", [False, True])
-    def test_normals_at_an_edge_lie_between_those_of_its_faces(self, inside_out):
+    def test_accepts_normals_between_those_of_the_faces_at_an_edge(self, inside_out):
         faces = [face[::-1] for face in BOX_FACES] if inside_out else BOX_FACES
         mesh, edge, face = Mesh(box([1.0, 1.0, 1.0]), faces), [1.0, 1.0, 0.2], [1.0, 0.99, 0.2]
         x, y, z = np.eye(3)
@@ -233,33 +233,33 @@ class TestFaults:
             assert not measures.is_normal(mesh, edge, normal)
         assert not measures.is_normal(mesh, face, slanted)
 
-    def test_a_corner_has_all_normals_of_its_octant(self):
+    def test_accepts_all_normals_in_the_octant_of_a_corner(self):
         mesh, corner = Mesh(box([1.0, 1.0, 1.0]), BOX_FACES), [1.0, 1.0, 1.0]
         assert measures.is_normal(mesh, corner, np.ones(3) / np.sqrt(3))
         assert not measures.is_normal(mesh, corner, np.array([1.0, 1.0, -1.0]) / np.sqrt(3))
 
-    def test_the_sides_of_a_blade_are_an_edge_only_where_they_meet(self):
-        # 2 cm long, 2 mm thick at the back; two millimetres from its edge, the sides are 0.2 mm apart.
+    def test_the_sides_of_a_blade_form_an_edge_only_where_they_meet(self):
+        # 2 cm long and 2 mm thick at the back; 2 mm from the edge, the sides are 0.2 mm apart.
         corners = [[0, y, z] for y in (-0.02, 0.02) for z in (-0.001, 0.001)] + [[0.02, -0.02, 0], [0.02, 0.02, 0]]
         faces = [[1, 4, 5], [1, 5, 3], [0, 5, 4], [0, 2, 5], [0, 1, 3], [0, 3, 2], [0, 4, 1], [2, 3, 5]]
         mesh, onward = Mesh(np.array(corners), faces), np.array([1.0, 0.0, 0.0])
         assert measures.is_normal(mesh, [0.02, 0.003, 0.0], onward)
         assert not measures.is_normal(mesh, [0.018, 0.003, 0.0001], onward)
 
-    def test_mirrored_hand(self):
+    def test_finds_a_mirrored_hand(self):
         scene, grasp, _ = good()
         hand = measures.hand_of_reply(grasp)
         quaternions = hand.rotations.as_quat() * [1, -1, -1, 1]
         mirrored = Hand("right", hand.positions * [-1, 1, 1], quaternions, hand.radii, hand.rig)
         assert "chirality" in faults(scene, with_hand(grasp, mirrored))
-        # Called what it is, it is still not the hand that was asked for; but its limits are those of a left hand.
+        # Labelled as the left hand that it is, it keeps its limits but is still not the requested hand.
         grasp["handedness"] = "left"
         found = faults(scene, with_hand(grasp, mirrored))
         assert "chirality" in found and "limits" not in found
         scene.asked_handedness = "left"
         assert "chirality" not in faults(scene, with_hand(grasp, mirrored))
 
-    def test_moved_contacts(self):
+    def test_finds_contacts_off_the_mesh_or_off_the_skin(self):
         scene, grasp, direction = good()
         grasp["contacts"][0]["client_position"] = grasp["contacts"][0]["client_position"] + 0.001 * direction
         assert "off_mesh" in faults(scene, grasp) and "off_skin" not in faults(scene, grasp)
@@ -270,7 +270,7 @@ class TestFaults:
         grasp["contacts"][1]["client_position"] = moved
         assert "off_skin" in faults(scene, grasp) and "off_mesh" not in faults(scene, grasp)
 
-    def test_contact_of_another_digit(self):
+    def test_finds_a_contact_assigned_to_another_digit(self):
         scene, grasp, _ = good()
         grasp["contacts"][1]["digit"] = "little"
         assert "off_skin" in faults(scene, grasp)
@@ -278,14 +278,14 @@ class TestFaults:
     @pytest.mark.parametrize(
         "changes", [{(4, 2): 110}, {(4, 1): -10}, {(3, 0): 24}, {(0, 3): 85}, {(2, 3): 95}], ids=str
     )
-    def test_joint_beyond_its_limit(self, changes):
+    def test_measures_how_far_a_joint_is_beyond_its_limit(self, changes):
         scene, grasp, _ = good()
         row = judged(scene, bent(grasp, changes))
         assert row["limits_broken"]
         limit = {110: 10, -10: 10, 24: 4, 85: 5, 95: 5}[next(iter(changes.values()))]
         assert row["beyond_limits"] == pytest.approx(limit, abs=1e-3)
 
-    def test_twisted_and_stretched_bones(self):
+    def test_finds_twisted_and_lengthened_bones(self):
         scene, grasp, _ = good()
         hand = measures.hand_of_reply(grasp)
         turned = hand.rotations.as_matrix()
@@ -298,81 +298,82 @@ class TestFaults:
         pulled = Hand("right", longer, hand.rotations.as_quat(), hand.radii, "adult")
         assert "limits" in faults(scene, with_hand(grasp, pulled))
 
-    def test_finger_through_another(self):
+    def test_finds_a_finger_through_another(self):
         scene, grasp, _ = good()
         assert "self" not in faults(scene, bent(grasp, {(4, 0): 10}))
-        # The little finger goes through the ring finger, and the index finger through the thumb.
+        # First the little finger goes through the ring finger, then the index finger through the thumb.
         assert "self" in faults(scene, bent(grasp, {(3, 0): 15, (4, 0): -20}))
         assert "self" in faults(scene, bent(grasp, {(1, 1): 75}))
 
-    def test_fingertip_in_the_palm(self):
+    def test_finds_a_fingertip_in_the_palm(self):
         scene, grasp, _ = good()
         assert "self" in faults(scene, bent(grasp, {(4, 1): 90, (4, 2): 110, (4, 3): 60}))
 
-    def test_giver_in_the_hand(self):
+    def test_finds_a_giver_in_the_hand(self):
         scene, grasp, _ = good()
         scene.giver = measures.hand_of_reply(grasp).moved(Rotation.identity(), np.array([0.01, 0, 0]))
         assert "giver" in faults(scene, grasp)
         row = judged(scene, grasp)
         assert row["giver_hand"] < -0.005
 
-    def test_forearm_that_has_nowhere_to_go(self):
+    def test_finds_a_forearm_blocked_in_every_direction(self):
         scene, grasp, _ = good()
         wrist = measures.hand_of_reply(grasp).positions[hands.WRIST]
         giver = scene.giver
-        # A giver's fist right behind the wrist, as wide as all directions of the forearm.
+        # A giver's fist right at the wrist blocks every direction of the forearm.
         scene.giver = Hand("right", np.tile(wrist, (26, 1)) + np.linspace(-1e-3, 1e-3, 26)[:, None],
                            giver.rotations.as_quat(), giver.radii, "adult")  # fmt: skip
         assert judged(scene, grasp)["own_forearm"] < 0
 
-    def test_forces(self):
+    def test_finds_unbalanced_too_strong_slipping_and_pulling_forces(self):
         scene, grasp, direction = good()
         grasp["contacts"][0]["client_force"] = np.multiply(grasp["contacts"][0]["client_force"], 1.05)
         assert "balance" in faults(scene, grasp)
-        # Pressing harder on both sides changes nothing until it is too strong; pressing less lets it slip.
+        # Pressing harder on both sides is fine until it is too strong; pressing less lets the block slip.
         for factor, expected in [(3, set()), (14, {"strength"}), (0.4, {"cone"})]:
             scene, grasp, direction = good()
             more = (factor - 1) * MASS * measures.GRAVITY / FRICTION * direction
             for contact, sign in zip(grasp["contacts"], (1, -1)):
                 contact["client_force"] = np.add(contact["client_force"], sign * more)
             assert faults(scene, grasp) == expected
-        # Pulling is no contact.
+        # A contact cannot pull.
         scene, grasp, direction = good()
         for contact in grasp["contacts"]:
             contact["client_force"] = np.multiply(contact["client_force"], -1)
         assert {"cone", "balance"} <= faults(scene, grasp)
 
-    def test_centre_of_mass_beside_the_contacts(self):
+    def test_finds_the_torque_of_an_offset_centre_of_mass(self):
         scene, grasp, direction = good()
         scene.centre_of_mass = scene.centre_of_mass + scene.rotation.inv().apply(0.01 * direction)
         assert faults(scene, grasp) == {"balance"}
 
-    def test_torsion_that_the_reply_tells(self):
-        # A centre of mass off the line between the pads, along the other two axes: a twist about that line.
+    def test_checks_the_torsions_of_the_reply(self):
+        # A centre of mass off the line between the pads makes a torque about that line.
         scene, grasp, direction = good()
         outward = np.cross(scene.up, direction)
         scene.centre_of_mass = scene.centre_of_mass + scene.rotation.inv().apply(0.002 * outward)
         for contact in grasp["contacts"]:
             contact["client_force"] = np.add(contact["client_force"], contact["client_force"])
             contact["client_force"] -= MASS * measures.GRAVITY / 2 * scene.up
-        # Without a word, the pads may bear it; said to bear none, they do not.
+        # Without torsions in the reply the judge assumes the best; with torsions of the wrong sign nothing balances.
         assert faults(scene, grasp) == set()
         needed = MASS * measures.GRAVITY * 0.002 / 2
         inward = [-np.array(contact["client_normal"]) for contact in grasp["contacts"]]
-        told = copy.deepcopy(grasp)
-        for contact, axis in zip(told["contacts"], inward):
+        balanced = copy.deepcopy(grasp)
+        for contact, axis in zip(balanced["contacts"], inward):
             contact["torsion"] = needed * np.sign(axis @ direction)
-        flipped = copy.deepcopy(told)
+        flipped = copy.deepcopy(balanced)
         for contact in flipped["contacts"]:
             contact["torsion"] *= -1
-        assert sorted("balance" in faults(scene, g) for g in (told, flipped)) == [False, True]
-        # More than friction bears.
-        for contact in told["contacts"]:
+        assert sorted("balance" in faults(scene, g) for g in (balanced, flipped)) == [False, True]
+        # A torsion beyond what friction can bear.
+        for contact in balanced["contacts"]:
             contact["torsion"] = 1.01 * FRICTION * 2 * MASS * measures.GRAVITY / FRICTION * measures.TORSION_RADIUS
-        assert "cone" in faults(scene, told)
+        assert "cone" in faults(scene, balanced)
 
-    def test_epsilon(self):
-        # Two pads twist least easily about their line: friction times two thirds of the patch over the reach.
+    def test_epsilon_of_two_pads_is_their_torsion(self):
+        # Two pads are weakest about the line between them: friction times two thirds of the patch's radius over the
+        # reach.
         scene, grasp, _ = good()
         assert judged(scene, grasp)["epsilon"] == pytest.approx(
             FRICTION * measures.TORSION_RADIUS / scene.reach, rel=0.02
@@ -380,9 +381,9 @@ class TestFaults:
         grasp["contacts"].pop()
         assert judged(scene, grasp)["epsilon"] == 0.0
 
-    def test_epsilon_of_a_cube_held_on_all_sides(self):
-        # Far enough out, torques are easy, and the hull of the forces decides: pushes along six axes without friction
-        # make an octahedron, whose faces are 1 / sqrt 3 away.
+    def test_epsilon_of_a_cube_held_on_all_sides_is_that_of_an_octahedron(self):
+        # With contacts far enough out, torques are easy and the hull of the forces decides. Frictionless pushes along
+        # six axes make an octahedron, whose faces are 1 / sqrt 3 away.
         scene, _, _ = good()
         scene.centre_of_mass, scene.friction, scene.reach = np.zeros(3), 1e-9, 1.0
         contacts = []
@@ -392,18 +393,18 @@ class TestFaults:
                     contacts.append({"normal": axis, "position": axis + 9 * around})
         assert measures.epsilon(scene, contacts)["epsilon"] == pytest.approx(3**-0.5, rel=0.02)
 
-    def test_stretched_fingers(self):
+    def test_counts_stretched_idle_fingers(self):
         scene, grasp, _ = good()
         straight = {(3, 1): 5, (3, 2): 5, (3, 3): 5, (4, 1): 5, (4, 2): 5, (4, 3): 5}
         assert judged(scene, bent(grasp, straight))["stretched_idle"] == 2
         assert judged(scene, bent(grasp, {(3, 1): 5, (3, 2): 20}))["stretched_idle"] == 0
 
-    def test_forbidden_surface(self):
+    def test_finds_a_touched_forbidden_surface(self):
         scene, grasp, _ = good()
         scene.forbidden = np.arange(12)
         assert faults(scene, grasp) == {"forbidden"}
 
-    def test_comfort(self):
+    def test_computes_comfort_and_finds_a_wrong_one(self):
         scene, grasp, direction = good()
         grasp["comfort"] = 0.1
         assert faults(scene, grasp) == {"comfort"}
@@ -411,7 +412,7 @@ class TestFaults:
         assert judged(scene, grasp)["comfort"] == pytest.approx(2 * 0.25**2)
 
 
-def test_targets_count_what_is_wrong():
+def test_targets_count_the_grasps_with_a_fault():
     scene, grasp, _ = good()
     row = {"found": True, "in_time": True, "round_trip_in_time": True, "round_trip_ms": 3.0, **judged(scene, grasp)}
     lines = {line.measure: line for line in report.targets([row])}

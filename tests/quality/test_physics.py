@@ -1,4 +1,4 @@
-"""The simulation against what must happen: pads that press enough hold, others do not, and a palm bears what lies on it."""
+"""Tests of the simulation on cases with a known outcome: pads that press hard enough, or not, and objects on a palm."""
 
 import mujoco
 import numpy as np
@@ -17,7 +17,7 @@ WEIGHT = MASS * measures.GRAVITY
 
 
 def held_block(pressing, friction=FRICTION):
-    """The block between thumb and index, pressed with so many newtons on each side; gravity across."""
+    """The block between thumb and index, pressed with `pressing` newtons from each side, perpendicular to gravity."""
     hand = pinching_hand(PINCH)
     thumb, index, direction = touching_balls(hand)
     middle = (thumb + index) / 2
@@ -39,12 +39,12 @@ class TestPads:
         outcomes = physics.simulate(*held_block(3 * WEIGHT / FRICTION))
         assert all(outcome.held for outcome in outcomes.values()), outcomes
         assert len(outcomes) == 7
-        # It does not creep: friction lets nothing slip by a millimetre while only gravity pulls.
+        # Under gravity alone the block creeps by less than a millimetre.
         assert outcomes["gravity"].distance < 0.001
 
-    def test_presses_with_the_answered_forces(self):
-        thing, hand, contacts, up, _ = held_block(5.0)
-        model = mujoco.MjModel.from_xml_string(physics.world(thing, hand, contacts, -measures.GRAVITY * up))
+    def test_presses_with_the_forces_of_the_reply(self):
+        obj, hand, contacts, up, _ = held_block(5.0)
+        model = mujoco.MjModel.from_xml_string(physics.world(obj, hand, contacts, -measures.GRAVITY * up))
         data = mujoco.MjData(model)
         for name, torque in physics.torques(hand, contacts).items():
             data.qfrc_applied[model.joint(name).dofadr[0]] = torque
@@ -53,17 +53,17 @@ class TestPads:
         forces = np.zeros((data.ncon, 6))
         for i, force in enumerate(forces):
             mujoco.mj_contactForce(model, data, i, force)
-        # Thumb and index press alike, and both together bear the weight by friction.
+        # Thumb and index press equally, and together they bear the weight by friction.
         assert forces[:, 0].sum() == pytest.approx(2 * 5.0, rel=0.05)
         assert np.linalg.norm(forces[:, 1:3], axis=1).sum() == pytest.approx(WEIGHT, rel=0.1)
 
     @pytest.mark.parametrize("depth", [0.0005, 0.0015])
-    def test_how_deep_a_pad_touches_adds_nothing_to_what_it_presses_with(self, depth):
-        thing, hand, contacts, up, axes = held_block(5.0)
-        thing.pieces[0] = thing.pieces[0] + depth * (thing.pieces[0] - thing.centre_of_mass) @ np.outer(axes[0], axes[0]) / (
-            np.abs((thing.pieces[0] - thing.centre_of_mass) @ axes[0]).max()
+    def test_overlap_of_a_pad_adds_nothing_to_its_force(self, depth):
+        obj, hand, contacts, up, axes = held_block(5.0)
+        obj.pieces[0] = obj.pieces[0] + depth * (obj.pieces[0] - obj.centre_of_mass) @ np.outer(axes[0], axes[0]) / (
+            np.abs((obj.pieces[0] - obj.centre_of_mass) @ axes[0]).max()
         )
-        model = mujoco.MjModel.from_xml_string(physics.world(thing, hand, contacts, -measures.GRAVITY * up))
+        model = mujoco.MjModel.from_xml_string(physics.world(obj, hand, contacts, -measures.GRAVITY * up))
         data = mujoco.MjData(model)
         for name, torque in physics.torques(hand, contacts).items():
             data.qfrc_applied[model.joint(name).dofadr[0]] = torque
@@ -74,38 +74,38 @@ class TestPads:
             mujoco.mj_contactForce(model, data, i, force)
         assert forces[:, 0].sum() == pytest.approx(2 * 5.0, rel=0.15)
 
-    # Each pad has to bear half of the weight by friction, so half of weight / friction would be just enough.
+    # Each pad has to bear half the weight by friction, so half of weight / friction would be just enough.
     @pytest.mark.parametrize(("force", "friction"), [(0.2 * WEIGHT / FRICTION, FRICTION), (WEIGHT / FRICTION, 0.1)])
-    def test_too_small_a_force_or_friction_drops_it(self, force, friction):
+    def test_too_little_force_or_friction_drops_the_object(self, force, friction):
         outcomes = physics.simulate(*held_block(force, friction))
         assert not outcomes["gravity"].held
         assert len(outcomes) == 1
 
-    def test_what_gravity_spares_a_push_may_take(self):
-        # Bears the weight with little to spare: a push along gravity doubles the load.
+    def test_a_push_along_gravity_dislodges_a_weakly_held_object(self):
+        # The grip bears the weight with little in reserve, and a push along gravity doubles the load.
         outcomes = physics.simulate(*held_block(0.7 * WEIGHT / FRICTION), pushes=["-z", "+z"])
         assert outcomes["gravity"].held and outcomes["+z"].held
         assert not outcomes["-z"].held
 
-    def test_does_not_depend_on_the_frame(self):
-        thing, hand, contacts, up, axes = held_block(0.7 * WEIGHT / FRICTION)
-        before = physics.simulate(thing, hand, contacts, up, axes, ["-z"])
+    def test_verdicts_do_not_depend_on_the_frame(self):
+        obj, hand, contacts, up, axes = held_block(0.7 * WEIGHT / FRICTION)
+        before = physics.simulate(obj, hand, contacts, up, axes, ["-z"])
         turn, shift = hands.Rotation.from_quat([0.5, -0.2, 0.4, 0.7]), np.array([0.3, -0.1, 0.2])
         moved = [
             {**c, "position": turn.apply(c["position"]) + shift, **{k: turn.apply(c[k]) for k in ("normal", "force")}}
             for c in contacts
         ]
         other = physics.Object(
-            [turn.apply(thing.pieces[0]) + shift], MASS, turn.apply(thing.centre_of_mass) + shift, FRICTION
+            [turn.apply(obj.pieces[0]) + shift], MASS, turn.apply(obj.centre_of_mass) + shift, FRICTION
         )
         after = physics.simulate(other, hand.moved(turn, shift), moved, turn.apply(up), turn.apply(axes), ["-z"])
-        # How it falls once it slips hangs on rounding; whether it does, not.
+        # How it falls once it slips depends on rounding; whether it slips does not.
         assert [(name, o.held) for name, o in before.items()] == [(name, o.held) for name, o in after.items()]
         assert after["gravity"].distance == pytest.approx(before["gravity"].distance, abs=5e-4)
 
 
 def ball(centre, radius):
-    """Corners of a ball: a spiral."""
+    """Points on a ball, along a spiral."""
     i = np.arange(400) + 0.5
     height, around = 1 - 2 * i / len(i), np.pi * (1 + 5**0.5) * i
     across = np.sqrt(1 - height**2)
@@ -113,7 +113,7 @@ def ball(centre, radius):
 
 
 def cupped_palm():
-    """A hand with its palm up and its fingers a little bent, all about the origin's frame; and what is up."""
+    """A hand at the origin with its palm up and its fingers slightly bent, and the direction of up."""
     digits = [dict(base_yaw=0.3, base_pitch=0.2, second_pitch=0.2)]
     digits += [dict(base_yaw=0.0, base_pitch=0.5, second_pitch=0.6)] * 4
     hand = hands.posed("adult", "right", [0, 0, 0], [0, 0, 0, 1], digits)
@@ -121,10 +121,10 @@ def cupped_palm():
 
 
 def resting_ball(depth=0.0, radius=0.03):
-    """A ball on the palm, sunk in by so many metres."""
+    """A ball resting on the palm, sunk in by `depth` metres."""
     hand, up = cupped_palm()
     capsules, _ = hand.solids()
-    # Where the ball is lowest in the hollow of the hand: the highest place that it can fall to, by a grid.
+    # Search a grid for the lowest place where the ball can rest in the hollow of the hand.
     x, z = np.meshgrid(np.linspace(-0.03, 0.03, 41), np.linspace(-0.13, -0.03, 61), indexing="ij")
     heights = np.full(x.shape, -0.1)
     low, high = np.full(x.shape, 0.0), np.full(x.shape, 0.15)
@@ -139,29 +139,29 @@ def resting_ball(depth=0.0, radius=0.03):
 
 
 class TestPalm:
-    def test_ball_rests_but_a_push_rolls_it_off(self):
-        thing, hand, up = resting_ball()
-        outcomes = physics.simulate(thing, hand, [], up)
+    def test_a_ball_rests_on_the_palm_until_pushes_roll_it_off(self):
+        obj, hand, up = resting_ball()
+        outcomes = physics.simulate(obj, hand, [], up)
         assert outcomes["gravity"].distance < 0.01
-        # Up is -y. The thumb stops what goes to -x, and what goes down stays; all else rolls or floats off.
+        # Up is -y. The thumb stops a push to -x, and a push down changes nothing; all others move the ball off.
         assert {name for name, outcome in outcomes.items() if outcome.held} == {"gravity", "-x", "+y"}
 
-    def test_overlap_of_two_millimetres_does_not_explode(self):
-        thing, hand, up = resting_ball(depth=0.002)
-        outcome = physics.simulate(thing, hand, [], up, pushes=[])["gravity"]
+    def test_an_overlap_of_two_millimetres_does_not_eject_the_ball(self):
+        obj, hand, up = resting_ball(depth=0.002)
+        outcome = physics.simulate(obj, hand, [], up, pushes=[])["gravity"]
         assert outcome.distance < 0.01
 
 
-def test_without_a_hand_it_falls():
-    thing, _, contacts, up, axes = held_block(10)
-    outcomes = physics.simulate(thing, None, contacts, up, axes)
+def test_an_object_without_a_hand_falls():
+    obj, _, contacts, up, axes = held_block(10)
+    outcomes = physics.simulate(obj, None, contacts, up, axes)
     assert list(outcomes) == ["gravity"]
     assert outcomes["gravity"].fate is physics.Fate.SLIPPED
 
 
 class TestTorques:
-    def test_they_do_the_work_of_the_forces(self):
-        # Virtual work: when a joint turns, torque times angle is force times the contact's way, by finite differences.
+    def test_torques_do_the_virtual_work_of_the_forces(self):
+        # When a joint turns, torque times angle is force times the contact's displacement, here by finite differences.
         angles = np.array(PINCH, float)
         hand = pinching_hand(angles)
         random = np.random.default_rng(3)
@@ -187,7 +187,7 @@ class TestTorques:
                 others = [v for name, v in found.items() if not name.startswith(hands.DIGITS[digit])]
                 assert not any(others)
 
-    def test_the_palm_makes_none(self):
+    def test_contacts_of_the_palm_exert_no_torque(self):
         scene, grasp, _ = good()
         grasp["contacts"] = [{**grasp["contacts"][0], "digit": None, "phalanx": None}]
         hand, contacts = measures.in_object_frame(scene, grasp)
@@ -195,7 +195,7 @@ class TestTorques:
 
 
 class TestConvex:
-    def test_inertia_of_a_box_in_two_pieces(self):
+    def test_inertia_of_a_box_in_one_and_in_two_pieces(self):
         half = np.array([0.02, 0.05, 0.01])
         whole = [box(half, (1, 2, 3))]
         halves = [box(half * [1, 0.5, 1], (1, 2 + side * 0.025, 3)) for side in (-1, 1)]
@@ -205,7 +205,7 @@ class TestConvex:
 
     def test_pieces_follow_the_surface(self, tmp_path, monkeypatch):
         monkeypatch.setattr(convex, "FOLDER", tmp_path)
-        # A prism over an L, closed, which one convex piece would fill; and a box that overlaps its end.
+        # A closed L-shaped prism, whose hollow a single convex piece would fill, and a box that overlaps its end.
         outline = 0.01 * np.array([[0, 0], [6, 0], [6, 2], [2, 2], [2, 5], [0, 5]])
         prism = np.concatenate([np.column_stack([outline, np.full(6, z)]) for z in (-0.01, 0.01)])
         caps = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]]
@@ -226,7 +226,7 @@ class TestConvex:
         distance = mesh.signed_distance(points)
         clear = np.abs(distance) > 0.0015
         np.testing.assert_array_equal(inside[clear], distance[clear] < 0)
-        # The second time it comes from the file.
+        # The second call reads the cached file.
         file = next(tmp_path.glob("*.npz"))
         np.savez_compressed(file, parts[0] + 1.0)
         np.testing.assert_array_equal(convex.pieces(mesh)[0], parts[0] + 1.0)

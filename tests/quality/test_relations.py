@@ -1,4 +1,4 @@
-"""The types that replies tell, and what the report says of many grasps."""
+"""Grasp types in replies, the report's tables over many grasps, and the drawing."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from test_judge import good
 
 class TestTypes:
     @pytest.mark.parametrize(
-        ("told", "expected"),
+        ("reply", "expected"),
         [
             ({"type": "GRASP_TYPE_MEDIUM_WRAP", "typeConfidence": 0.75}, ("medium_wrap", 0.75)),
             ({"type": "tip_pinch", "type_confidence": 0.5}, ("tip_pinch", 0.5)),
@@ -20,15 +20,15 @@ class TestTypes:
             ({"type": "unspecified"}, ("", 0.0)),
         ],
     )
-    def test_forms_that_a_reply_may_have(self, told, expected):
-        row = measures.told_type(told)
+    def test_reads_every_form_of_a_type(self, reply, expected):
+        row = measures.reported_type(reply)
         assert (row["type"], row["type_confidence"]) == expected
 
-    def test_replies_without_types(self):
-        assert measures.told_type({}) == {}
+    def test_ignores_replies_without_types(self):
+        assert measures.reported_type({}) == {}
         assert report.classified([{"found": True}]) == []
 
-    def test_share_and_number(self):
+    def test_reports_the_classified_share_and_the_number_of_types(self):
         rows = [{"type": name, "type_confidence": c} for name, c in [("a", 0.9), ("a", 0.6), ("b", 0.4), ("", 0.9)]]
         share, types = report.classified(rows)
         assert share.figure == "50 % (2 of 4)" and not share.met
@@ -37,7 +37,7 @@ class TestTypes:
 
 
 class TestRelations:
-    def test_chance_to_rank_a_good_one_first_is_that_of_all_pairs(self):
+    def test_chance_to_rank_a_good_grasp_first_counts_all_pairs(self):
         random = np.random.default_rng(5)
         rows = [{"comfort": float(c), "good": bool(g)} for c, g in zip(
             random.integers(0, 6, 40), random.integers(0, 2, 40))]  # fmt: skip
@@ -46,7 +46,7 @@ class TestRelations:
         assert relations.ranked_before(rows, lambda row: row["good"]) == pytest.approx(brute)
         assert relations.ranked_before(rows, lambda row: True) is None
 
-    def test_survival_is_counted_by_class(self):
+    def test_counts_survival_by_class_of_epsilon(self):
         rows = [
             {"epsilon": e, "survives_gravity": g, "survives_pushes": p, "survives_all": g and p == 6}
             for e, g, p in [(0.001, False, 0), (0.025, True, 3), (0.029, True, 6), (0.09, True, 6)]
@@ -60,8 +60,8 @@ class TestRelations:
 
 
 class TestDrawing:
-    def test_the_nearest_point_is_shown_where_it_is(self):
-        # Seen from +z with +y up: right, left and upward points, and one hidden behind the first.
+    def test_shows_the_nearest_points_in_place(self):
+        # Seen from +z with +y up: points to the right, left, top and bottom, and one hidden behind the first.
         points = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [1, 0, -0.5], [0, -1, 0]])
         axes = draw.axes_of(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
         for order in (np.arange(5), np.arange(5)[::-1]):
@@ -70,7 +70,7 @@ class TestDrawing:
             assert set(at) == {0, 1, 2, 4}
             assert at[0][1] > 90 and at[1][1] < 10 and at[2][0] < 10 and at[4][0] > 90
 
-    def test_touching_digits_and_contacts_are_in_the_picture(self):
+    def test_contacts_are_in_the_picture(self):
         scene, grasp, _ = good()
         image = draw.picture(scene, grasp)
         assert image.shape == (draw.SIZE, draw.SIZE, 3)
