@@ -1,6 +1,6 @@
 //! The atlases of built-in objects and hands that are embedded, so that a server knows them from its first start.
 
-use grasp_synthesis::hand::{Handedness, rig::Rig};
+use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 
 /// The files by name.
 const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/atlases.rs"));
@@ -14,7 +14,7 @@ pub fn file_name(object: &str, rig: &Rig) -> String {
     format!("{object}-{}-{side}", rig.name)
 }
 
-/// The embedded atlas of a built-in object and a hand, to be read by `grasp_synthesis::atlas::codec::decode`; none if
+/// The embedded atlas of a built-in object and a hand, to be read by `grasp_synthesis::known::codec::decode`; none if
 /// there is none.
 pub fn atlas(object: &str, rig: &Rig) -> Option<&'static [u8]> {
     let name = file_name(object, rig);

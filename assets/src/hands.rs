@@ -4,14 +4,14 @@ use std::sync::LazyLock;
 
 use glam::{Affine3A, Mat4, Vec3};
 use grasp_synthesis::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         Handedness,
         description::{RigDescription, RigViolation},
         joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index, openxr_from_thesis_frame},
         rig::Rig,
         skin::Skin,
     },
-    pose::Pose,
 };
 
 /// The names of the built-in rigs.

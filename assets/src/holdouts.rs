@@ -25,10 +25,13 @@ use std::sync::LazyLock;
 
 use glam::Vec3;
 use grasp_synthesis::{
-    hand::{DigitAngles, HandPose, Handedness, joints::HandJoints},
-    holdout::{Holdout, PresentingHand, PresentingHandError},
-    pose::Pose,
-    strategy::{BendRatioChoice, Strategy},
+    base::pose::Pose,
+    model::{
+        bend_ratios::BendRatioChoice,
+        hand::{DigitAngles, HandPose, Handedness, joints::HandJoints},
+        holdout::{Holdout, PresentingHand, PresentingHandError},
+        strategy::Strategy,
+    },
 };
 use serde::{Deserialize, Serialize};
 

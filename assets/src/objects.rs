@@ -3,7 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use glam::{Quat, Vec3};
-use grasp_synthesis::object::GraspObject;
+use grasp_synthesis::model::object::GraspObject;
 use serde::{Deserialize, Serialize};
 
 use crate::obj::{ObjLimits, ObjMesh, read_obj};

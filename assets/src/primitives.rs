@@ -3,10 +3,14 @@
 use std::sync::{Arc, LazyLock};
 
 use grasp_synthesis::{
-    atlas::codec::decode_grips,
-    hand::{Handedness, rig::Rig},
-    object::GraspObject,
-    primitives::{HeldPrimitive, Primitive},
+    known::{
+        codec::decode_grips,
+        primitives::{HeldPrimitive, Primitive},
+    },
+    model::{
+        hand::{Handedness, rig::Rig},
+        object::GraspObject,
+    },
 };
 
 use crate::{

@@ -10,18 +10,21 @@ use grasp_assets::{
     objects::object,
 };
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    clock::Clock,
-    constraints::Constraints,
+    base::clock::Clock,
     geometry::{Segment, mesh_bvh::MeshBvh},
-    hand::{
-        DigitAngles, HandPose, Handedness,
-        joints::{HandJoints, index},
-        kinematics::hand_frames,
+    known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        bend_ratios::BendRatioChoice,
+        constraints::Constraints,
+        hand::{
+            DigitAngles, HandPose, Handedness,
+            joints::{HandJoints, index},
+            kinematics::hand_frames,
+        },
+        holdout::Holdout,
+        strategy::{Choice, Strategy},
     },
-    holdout::Holdout,
-    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
-    strategy::{BendRatioChoice, Choice, Strategy},
+    search::{SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 /// Names and types as the captions of the thesis' Figures 5.2 to 5.4 give them.
@@ -309,7 +312,7 @@ fn synthesized_grasps_are_found_again() {
         let settings = SearchSettings {
             seed,
             strategy,
-            validity: grasp_synthesis::strategy::Validity::Thesis,
+            validity: grasp_synthesis::model::strategy::Validity::Thesis,
             bend_ratios,
             friction,
             reproducible: true,
@@ -321,7 +324,7 @@ fn synthesized_grasps_are_found_again() {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: StartFrom::Nothing,
+            starts: SeedSource::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };
@@ -349,7 +352,7 @@ fn a_receiver_finds_a_grasp_on_each() {
         let settings = SearchSettings {
             seed: 1,
             strategy: Strategy::F,
-            validity: grasp_synthesis::strategy::Validity::Thesis,
+            validity: grasp_synthesis::model::strategy::Validity::Thesis,
             bend_ratios: BendRatioChoice::OneRandom,
             friction: 0.34,
             reproducible: false,
@@ -361,7 +364,7 @@ fn a_receiver_finds_a_grasp_on_each() {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: StartFrom::Nothing,
+            starts: SeedSource::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };

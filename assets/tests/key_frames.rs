@@ -8,21 +8,23 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, holdouts},
 };
 use grasp_synthesis::{
-    atlas::{asked::Asked, growth::Growth},
-    constraints::ApproachCone,
+    base::pose::Pose,
     geometry::mesh::TriangleMesh,
-    grasp::Grasp,
-    hand::{DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
-    holdout::Holdout,
-    key_frames::{APPROACH_DISTANCE, KeyFrame, OPEN_CLEARANCE, Stage, key_frames},
-    object::GraspObject,
+    known::{growth::Growth, recheck::Recheck},
+    model::{
+        constraints::ApproachCone,
+        grasp::{Grasp, KeyFrame, Stage},
+        hand::{DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
+        holdout::Holdout,
+        object::GraspObject,
+        strategy::Validity,
+    },
     physical::{
         grip::{DEEPEST, GIVER_CLEARANCE, Gripper},
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, ToldSolids, clearance, self_clearance},
+        solids::{HandSolids, TrackedSolids, clearance, self_clearance},
     },
-    pose::Pose,
-    strategy::Validity,
+    search::key_frames::{APPROACH_DISTANCE, OPEN_CLEARANCE, key_frames},
 };
 
 /// What distances and their sums are rounded by, in metres, with what is left open about a way.
@@ -59,11 +61,11 @@ fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Pla
     let presented = Presented::of(holdout);
     let mut gripper = Gripper::default();
     let atlas = grips.atlas();
-    let asked = Asked::new(&scene, rig, &presented);
+    let asked = Recheck::new(&scene, rig, &presented);
     let grasps = atlas
         .entries()
         .iter()
-        .filter_map(|entry| asked.hold(entry, &entry.told_solids(rig), &mut gripper));
+        .filter_map(|entry| asked.hold(entry, &entry.tracked_solids(rig), &mut gripper));
     grasps
         .map(|grasp| Planned {
             name: name.to_owned(),
@@ -126,15 +128,15 @@ fn followed() -> impl Iterator<Item = (&'static Planned, &'static [KeyFrame; 3])
 fn gaps(planned: &Planned, pose: &HandPose) -> (f32, f32) {
     let rig = rig(Handedness::Right);
     let solids = HandSolids::of_pose(rig, pose);
-    let told = ToldSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+    let told = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
     let surface = &planned.holdout.object.surface;
     let object = solids
         .iter()
         .map(|solid| clearance(solid, surface, 0.01))
         .fold(f32::INFINITY, f32::min);
     let giver = planned.holdout.presenting_hand.as_ref();
-    let theirs = giver.map(|giver| ToldSolids::of_joints(&giver.joints));
-    let giver = theirs.iter().flat_map(ToldSolids::iter).flat_map(|their| {
+    let theirs = giver.map(|giver| TrackedSolids::of_joints(&giver.joints));
+    let giver = theirs.iter().flat_map(TrackedSolids::iter).flat_map(|their| {
         let distances = told.iter().map(|our| our.distance(their));
         distances.collect::<Vec<_>>()
     });

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use grasp_assets::objects::{BuiltInObject, Manifest, object, objects};
 use grasp_synthesis::{
     geometry::{mesh::TriangleMesh, tapered_capsule::TaperedCapsule},
-    strategy::Validity,
+    model::strategy::Validity,
 };
 
 /// Thesis Table 5.1: name, mass in kg, triangles.

@@ -2,11 +2,10 @@
 
 use grasp_assets::hands::hand;
 use grasp_synthesis::{
-    guided::opposition::Oppositions,
-    hand::{Digit, HandPose, Handedness, rig::Rig},
+    base::{pose::Pose, random::AttemptStream},
+    model::hand::{Digit, HandPose, Handedness, rig::Rig},
     physical::solids::{HandSolids, TaperedCapsule},
-    pose::Pose,
-    synthesis::random::AttemptStream,
+    propose::opposition::Oppositions,
 };
 
 /// Widths in metres: a blade, a pen, a box, a bottle.

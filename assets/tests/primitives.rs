@@ -10,22 +10,27 @@ use grasp_assets::{
     primitives::{grips, held_primitives},
 };
 use grasp_synthesis::{
-    atlas::{entry::Entry, grips::Grips, recent::RecentGrips},
-    clock::Clock,
-    constraints::Constraints,
+    base::{clock::Clock, pose::Pose},
     geometry::mesh::TriangleMesh,
-    grasp::Contact,
-    hand::{Digit, Handedness, joints::HandJoints, rig::Rig},
-    holdout::{Holdout, PresentingHand},
-    object::GraspObject,
-    physical::scene::Presented,
-    pose::Pose,
-    primitives::{
-        HeldPrimitive, Primitive,
-        borrowed::{Among, Borrowed},
+    known::{
+        entry::Entry,
+        grips::Grips,
+        primitives::{HeldPrimitive, Primitive},
+        recent_grips::RecentGrips,
+        seed_source::SeedSource,
+        transferred_grips::{Among, Borrowed},
     },
-    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
-    strategy::{BendRatioChoice, Choice, Strategy, Validity},
+    model::{
+        bend_ratios::BendRatioChoice,
+        constraints::Constraints,
+        grasp::Contact,
+        hand::{Digit, Handedness, joints::HandJoints, rig::Rig},
+        holdout::{Holdout, PresentingHand},
+        object::GraspObject,
+        strategy::{Choice, Strategy, Validity},
+    },
+    physical::scene::Presented,
+    search::{SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 fn right() -> &'static Rig {
@@ -102,8 +107,8 @@ fn a_primitive_borrows_its_own_grips_where_they_are() {
     let all = 4 * held.grips.entries().iter().filter(by_thumb_and_finger).count();
     assert_eq!(borrowed.len(), all.min(1024));
     // All of them hold the box; what presses on an edge does not press as either face does, and is left out.
-    let promising = borrowed.promising();
-    assert!(4 * promising > 3 * borrowed.len(), "{promising} of {all}");
+    let passing = borrowed.passing();
+    assert!(4 * passing > 3 * borrowed.len(), "{passing} of {all}");
     let laid = unconstrained(&borrowed);
     assert!(!laid.is_empty());
     // A turn that leaves a box as it is leaves a coordinate what it is, or negates it.
@@ -159,10 +164,8 @@ fn borrowed_grips_touch_what_is_like_the_box_wherever_it_lies() {
 }
 
 /// The grips among those that promise something, of no giver.
-fn promising(borrowed: &Borrowed) -> Vec<Entry> {
-    let grips = borrowed.beside(Among::Promising, right(), None, &Constraints::default(), &|| {
-        false
-    });
+fn passing(borrowed: &Borrowed) -> Vec<Entry> {
+    let grips = borrowed.beside(Among::Passing, right(), None, &Constraints::default(), &|| false);
     grips.expect("nobody interrupts").entries().to_vec()
 }
 
@@ -188,12 +191,12 @@ fn promising_grips_are_off_what_is_forbidden() {
     let borrowed = Borrowed::of(&forbidding, known_by_the_right());
     assert_eq!(borrowed.len(), free.len());
     assert!(
-        (100..free.promising()).contains(&borrowed.promising()),
+        (100..free.passing()).contains(&borrowed.passing()),
         "{}",
-        borrowed.promising()
+        borrowed.passing()
     );
     assert!(unconstrained(&borrowed).iter().any(at_end), "some fit there");
-    for entry in promising(&borrowed) {
+    for entry in passing(&borrowed) {
         assert!(!at_end(&entry), "a contact is at the forbidden end");
     }
 }
@@ -204,8 +207,8 @@ fn where_nothing_is_promising_all_are_asked_for() {
     let forbidding = bar_with(Vec3::new(0.07, 0.014, 0.006), Pose::IDENTITY, &all_faces);
     let borrowed = Borrowed::of(&forbidding, known_by_the_right());
     assert!(!borrowed.is_empty());
-    assert_eq!(borrowed.promising(), 0);
-    assert_eq!(promising(&borrowed), unconstrained(&borrowed));
+    assert_eq!(borrowed.passing(), 0);
+    assert_eq!(passing(&borrowed), unconstrained(&borrowed));
 }
 
 #[test]
@@ -265,7 +268,7 @@ fn beside_a_giver_those_come_that_are_least_in_its_way() {
             let grips = borrowed.beside(Among::All, right(), giver, &Constraints::default(), &|| false);
             grips.expect("nobody interrupts")
         };
-        let clear = |entry: &Entry| giver.clearance(&entry.told_solids(right()), 0.0).is_some();
+        let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();
         let count = |grips: &Grips| grips.entries().iter().filter(|entry| clear(entry)).count();
         let (chosen, any) = (beside(Some(&giver)), beside(None));
         assert_eq!(chosen.entries().len(), any.entries().len());
@@ -287,7 +290,7 @@ impl Clock for NoClock {
     }
 }
 
-fn search(holdout: &Holdout, starts: StartFrom, seed: u64, workers: usize) -> SearchOutcome {
+fn search(holdout: &Holdout, starts: SeedSource, seed: u64, workers: usize) -> SearchOutcome {
     let settings = SearchSettings {
         seed,
         strategy: Strategy::Guided,
@@ -327,12 +330,12 @@ fn attempts_that_start_from_borrowed_grips_find_more_and_are_as_reproducible() {
     for holdout in held_out() {
         let borrowed = Arc::new(Borrowed::of(&holdout.object, known_by_the_right()));
         for seed in 0..3 {
-            let from_borrowed = || StartFrom::Borrowed(Arc::clone(&borrowed));
+            let from_borrowed = || SeedSource::Borrowed(Arc::clone(&borrowed));
             let one = search(&holdout, from_borrowed(), seed, 1);
             let three = search(&holdout, from_borrowed(), seed, 3);
             assert_eq!(one.grasp, three.grasp);
             assert_eq!(one.report.attempt, three.report.attempt);
-            let without = search(&holdout, StartFrom::Nothing, seed, 1);
+            let without = search(&holdout, SeedSource::Nothing, seed, 1);
             for (found, outcome) in found.iter_mut().zip([one, without]) {
                 *found += outcome.report.attempts;
             }

@@ -5,24 +5,26 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use grasp_assets::{hands::hand, objects::object};
 use grasp_synthesis::{
-    constraints::Constraints,
+    base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
     geometry::mesh::TriangleMesh,
-    guided::{
-        opposition::Opposition,
-        proposal::{Candidate, Place, propose, propose_evenly},
-        prospects::{Bulk, FARTHEST, TAUGHT, TOLD, UNITS},
+    model::{
+        constraints::Constraints,
+        hand::{HandPose, Handedness, joints::HandJoints, rig::Rig},
+        object::GraspObject,
+        strategy::Validity,
     },
-    hand::{HandPose, Handedness, joints::HandJoints, rig::Rig},
-    object::GraspObject,
     physical::{
-        attempt::{PhysicalAttempt, Surroundings},
         scene::{ObjectScene, Presented},
         shape::Proposal,
-        solids::{PreparedHand, ToldSolids},
+        solids::{PreparedHand, TrackedSolids},
     },
-    pose::Pose,
-    strategy::Validity,
-    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+    propose::{
+        opposition::Opposition,
+        proposal::{Candidate, Place, propose, propose_evenly},
+        success_prior::{FARTHEST, INPUTS, ObjectFeatures, TRAINED, UNITS},
+    },
+    rating::assessment::Surroundings,
+    search::physical_attempt::PhysicalAttempt,
 };
 
 const PRESENTED: Presented = Presented {
@@ -66,7 +68,7 @@ fn holds(object: &GraspObject, proposal: &Proposal, attempt: &mut PhysicalAttemp
 fn hands_that_are_rated_better_hold_more_often() {
     for name in ["remote", "scalpel", "scissors"] {
         let object = built_in(name);
-        let bulk = Bulk::of(&object);
+        let bulk = ObjectFeatures::of(&object);
         let mut attempt = PhysicalAttempt::default();
         let mut rated: Vec<(f32, bool)> = (0..6000)
             .filter_map(|index| {
@@ -78,7 +80,7 @@ fn hands_that_are_rated_better_hold_more_often() {
                     None,
                 );
                 let holds = holds(&object, &candidate.proposal(), &mut attempt);
-                Some((TAUGHT.log_odds(&told), holds))
+                Some((TRAINED.log_odds(&told), holds))
             })
             .collect();
         rated.sort_by(|(a, _), (b, _)| b.total_cmp(a));
@@ -118,19 +120,19 @@ fn hands_that_are_preferred_hold_more_often() {
 fn a_network_is_its_formula() {
     let mut stream = AttemptStream::new(47, 0);
     for _ in 0..100 {
-        let told: [f32; TOLD] =
-            std::array::from_fn(|i| TAUGHT.means[i] + stream.between(-6.0, 6.0) / TAUGHT.scales[i]);
-        let mut answer = f64::from(TAUGHT.output_bias);
+        let told: [f32; INPUTS] =
+            std::array::from_fn(|i| TRAINED.means[i] + stream.between(-6.0, 6.0) / TRAINED.scales[i]);
+        let mut answer = f64::from(TRAINED.output_bias);
         for unit in 0..UNITS {
-            let mut sum = f64::from(TAUGHT.biases[unit]);
+            let mut sum = f64::from(TRAINED.biases[unit]);
             for (i, told) in told.iter().enumerate() {
-                let scaled = (f64::from(*told) - f64::from(TAUGHT.means[i])) * f64::from(TAUGHT.scales[i]);
+                let scaled = (f64::from(*told) - f64::from(TRAINED.means[i])) * f64::from(TRAINED.scales[i]);
                 let scaled = scaled.clamp(-f64::from(FARTHEST), f64::from(FARTHEST));
-                sum += scaled * f64::from(TAUGHT.weights[i][unit]);
+                sum += scaled * f64::from(TRAINED.weights[i][unit]);
             }
-            answer += sum.max(0.0) * f64::from(TAUGHT.outputs[unit]);
+            answer += sum.max(0.0) * f64::from(TRAINED.outputs[unit]);
         }
-        let off = (f64::from(TAUGHT.log_odds(&told)) - answer).abs();
+        let off = (f64::from(TRAINED.log_odds(&told)) - answer).abs();
         assert!(off < 1e-4, "{off} off {answer}");
     }
 }
@@ -160,14 +162,14 @@ fn wedge(mirrored: bool) -> GraspObject {
 fn a_mirrored_hand_is_told_the_same() {
     let right = rig(Handedness::Right);
     let left = right.mirrored();
-    let [bulk, mirrored_bulk] = [false, true].map(|mirrored| Bulk::of(&wedge(mirrored)));
+    let [bulk, mirrored_bulk] = [false, true].map(|mirrored| ObjectFeatures::of(&wedge(mirrored)));
     let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);
     let [giver, mirrored_giver] = [right, &left].map(|rig| {
         let pose = HandPose {
             frame_from_wrist: Pose::from_position(Vec3::new(0.0, -0.1, 0.03)),
             digits: rig.stretched(),
         };
-        PreparedHand::new(&ToldSolids::of_joints(&HandJoints::of_pose(rig, &pose)))
+        PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(rig, &pose)))
     });
     for index in 0..50 {
         let mut stream = AttemptStream::new(53, index);

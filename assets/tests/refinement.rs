@@ -5,16 +5,12 @@ use std::sync::Arc;
 use glam::Vec3;
 use grasp_assets::{hands::hand, objects::object};
 use grasp_synthesis::{
-    constraints::Constraints,
-    guided::proposal::{Place, propose},
-    hand::Handedness,
-    holdout::Holdout,
-    physical::{
-        attempt::{PhysicalAttempt, Surroundings},
-        scene::{ObjectScene, Presented},
-    },
-    strategy::Validity,
-    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    model::{constraints::Constraints, hand::Handedness, holdout::Holdout, strategy::Validity},
+    physical::scene::{ObjectScene, Presented},
+    propose::proposal::{Place, propose},
+    rating::assessment::Surroundings,
+    search::physical_attempt::PhysicalAttempt,
 };
 
 const PROPOSALS: u64 = 1500;

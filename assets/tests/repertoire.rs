@@ -5,20 +5,23 @@ use std::sync::Arc;
 use glam::Vec3;
 use grasp_assets::{hands::hand, objects::object};
 use grasp_synthesis::{
-    constraints::Constraints,
-    guided::{
-        proposal::{Candidate, Place, propose},
-        repertoire::{ROWS, Repertoire},
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    model::{
+        constraints::Constraints,
+        hand::{Digit, HandPose, Handedness, rig::Rig},
+        object::GraspObject,
+        strategy::Validity,
     },
-    hand::{Digit, HandPose, Handedness, rig::Rig},
-    object::GraspObject,
     physical::{
-        attempt::{PhysicalAttempt, Surroundings},
         scene::{ObjectScene, Presented},
         solids::HandSolids,
     },
-    strategy::Validity,
-    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+    propose::{
+        placement_cache::{PlacementCache, ROWS},
+        proposal::{Candidate, Place, propose},
+    },
+    rating::assessment::Surroundings,
+    search::physical_attempt::PhysicalAttempt,
 };
 
 /// How deep a digit may be in what is thin, in metres; a palm, less.
@@ -32,7 +35,7 @@ fn built_in(name: &str) -> Arc<GraspObject> {
     Arc::clone(&object(name).expect("it is built in").object)
 }
 
-fn place<'a>(object: &'a GraspObject, repertoire: Option<&'a Repertoire>) -> Place<'a> {
+fn place<'a>(object: &'a GraspObject, repertoire: Option<&'a PlacementCache>) -> Place<'a> {
     Place {
         object,
         surface: &object.surface_pairs,
@@ -101,7 +104,7 @@ fn an_object_draws_for_each_hand_once() {
         &first,
         &scissors.as_ref().clone().repertoire(&right.clone())
     ));
-    assert_eq!(*first, Repertoire::of(&scissors, right));
+    assert_eq!(*first, PlacementCache::of(&scissors, right));
     assert_ne!(*first, *scissors.repertoire(left));
 }
 

@@ -4,10 +4,13 @@
 use glam::{Quat, Vec3};
 use grasp_assets::{hands, objects};
 use grasp_synthesis::{
-    atlas::growth::Growth,
-    grasp::Contact,
-    hand::{Digit, HandPart, HandPose, Handedness, Phalanx, kinematics::hand_frames, rig::Rig},
-    physical::{grip::Gripper, stiffness::give},
+    known::growth::Growth,
+    model::{
+        grasp::Contact,
+        hand::{Digit, HandPart, HandPose, Handedness, Phalanx, kinematics::hand_frames, rig::Rig},
+    },
+    physical::grip::Gripper,
+    rating::stiffness::give,
 };
 
 /// Unknowns: the object's shift and turn, and three joints of each digit.

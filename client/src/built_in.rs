@@ -1,7 +1,7 @@
 //! The built-in holdouts as requests (feature `cli`).
 
 use grasp_assets::holdouts::BuiltInHoldout;
-use grasp_synthesis::hand::joints::openxr_from_thesis_frame;
+use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
 
 use crate::{DigitAngles, FindRequest, HandAngles, Handedness, Pose, PresentingHand};
 
@@ -24,13 +24,13 @@ pub fn request_for(holdout: &BuiltInHoldout) -> FindRequest {
     }
 }
 
-fn client_pose(pose: grasp_synthesis::pose::Pose) -> Pose {
+fn client_pose(pose: grasp_synthesis::base::pose::Pose) -> Pose {
     Pose::new(pose.position, pose.orientation)
 }
 
-fn client_handedness(handedness: grasp_synthesis::hand::Handedness) -> Handedness {
+fn client_handedness(handedness: grasp_synthesis::model::hand::Handedness) -> Handedness {
     match handedness {
-        grasp_synthesis::hand::Handedness::Left => Handedness::Left,
-        grasp_synthesis::hand::Handedness::Right => Handedness::Right,
+        grasp_synthesis::model::hand::Handedness::Left => Handedness::Left,
+        grasp_synthesis::model::hand::Handedness::Right => Handedness::Right,
     }
 }

@@ -5,19 +5,19 @@ use std::time::Duration;
 use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    grasp::{Contact, Grasp},
-    hand::{
-        Digit, HandPose, Handedness, Phalanx,
-        joints::{HandJoints, JOINT_COUNT, openxr_from_thesis_frame},
-        rig::Rig,
+    base::{pose::Pose, rejection::Rejection, stopwatch::StepTimes},
+    model::{
+        grasp::{Contact, Grasp, KeyFrame, Stage},
+        grasp_type::GraspType,
+        hand::{
+            Digit, HandPose, Handedness, Phalanx,
+            joints::{HandJoints, JOINT_COUNT, openxr_from_thesis_frame},
+            rig::Rig,
+        },
+        score::{Score, Term},
+        strategy::{Strategy, Validity},
     },
-    key_frames::{KeyFrame, Stage},
-    pose::Pose,
-    rejection::Rejection,
-    score::{Score, Term},
-    search::{GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes},
-    strategy::{Strategy, Validity},
-    taxonomy::GraspType,
+    search::{GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, settings::SearchSettings},
 };
 
 use crate::{atlases::stamp, convention::Convention, error::ServiceError};

@@ -9,7 +9,7 @@
 
 use glam::{Quat, Vec3};
 use grasp_proto::v1;
-use grasp_synthesis::{hand::joints::JOINT_COUNT, pose::Pose};
+use grasp_synthesis::{base::pose::Pose, model::hand::joints::JOINT_COUNT};
 
 /// Centimetres in a metre: Unreal's unit.
 const CENTIMETRES_PER_METRE: f32 = 100.0;

@@ -14,7 +14,7 @@ use grasp_assets::{
     obj::ObjLimits,
 };
 use grasp_proto::v1::{grasp_service_server::GraspServiceServer, object_service_server::ObjectServiceServer};
-use grasp_synthesis::hand::Handedness;
+use grasp_synthesis::model::hand::Handedness;
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
 use tonic::{server::NamedService, transport};

@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_synthesis::{
-    object::THESIS_FRICTION,
-    strategy::Strategy,
-    synthesis::{attempt::Attempt, random::AttemptStream, scene::Scene, stopwatch::NoStopwatch},
-    taxonomy::classify,
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    model::{object::THESIS_FRICTION, strategy::Strategy},
+    rating::taxonomy::classify,
+    search::{attempt::Attempt, scene::Scene},
 };
 use grasp_tests::searches::Bench;
 

@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use grasp_client::{FindRequest, Outcome, Validity, built_in::request_for};
-use grasp_synthesis::strategy::Strategy;
+use grasp_synthesis::model::strategy::Strategy;
 use grasp_tests::{TestServer, searches::Bench};
 
 fn round_trip(criterion: &mut Criterion) {

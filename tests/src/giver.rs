@@ -6,10 +6,12 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    hand::joints::{HandJoints, index},
-    object::GraspObject,
+    base::pose::Pose,
+    model::{
+        hand::joints::{HandJoints, index},
+        object::GraspObject,
+    },
     physical::solids::{HandSolids, TaperedCapsule, clearance},
-    pose::Pose,
 };
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;

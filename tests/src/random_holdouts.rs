@@ -12,13 +12,15 @@ use grasp_assets::{
 };
 use grasp_proto::v1;
 use grasp_synthesis::{
-    hand::{
-        HandPose, Handedness,
-        joints::{HandJoints, index},
+    base::pose::Pose,
+    model::{
+        hand::{
+            HandPose, Handedness,
+            joints::{HandJoints, index},
+        },
+        holdout::{Holdout, PresentingHand},
+        object::GraspObject,
     },
-    holdout::{Holdout, PresentingHand},
-    object::GraspObject,
-    pose::Pose,
 };
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;

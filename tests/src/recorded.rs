@@ -11,12 +11,14 @@ use std::{
 use glam::{Quat, Vec3};
 use grasp_assets::obj::{ObjLimits, read_obj};
 use grasp_synthesis::{
-    hand::{
-        Handedness,
-        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index},
+    base::pose::Pose,
+    model::{
+        hand::{
+            Handedness,
+            joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index},
+        },
+        object::GraspObject,
     },
-    object::GraspObject,
-    pose::Pose,
 };
 use serde::Deserialize;
 

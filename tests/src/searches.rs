@@ -10,14 +10,16 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, holdouts},
 };
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    clock::Clock,
-    constraints::Constraints,
-    hand::{Handedness, rig::Rig},
-    holdout::Holdout,
-    object::THESIS_FRICTION,
-    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
-    strategy::{Choice, Strategy, Validity},
+    base::clock::Clock,
+    known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        constraints::Constraints,
+        hand::{Handedness, rig::Rig},
+        holdout::Holdout,
+        object::THESIS_FRICTION,
+        strategy::{Choice, Strategy, Validity},
+    },
+    search::{SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 /// The machine's monotonic clock.
@@ -112,7 +114,7 @@ impl Bench {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: StartFrom::Nothing,
+            starts: SeedSource::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };

@@ -1,7 +1,7 @@
 //! What a new server knows before it serves. A process of its own, as one that asks a hand has things found out for all.
 
 use grasp_assets::hands::{RIG_NAMES, hand};
-use grasp_synthesis::hand::{Handedness, rig::RigGuide};
+use grasp_synthesis::model::hand::{Handedness, rig::RigGuide};
 use grasp_tests::TestServer;
 
 /// What search derives of each built-in hand.

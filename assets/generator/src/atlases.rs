@@ -8,16 +8,18 @@ use grasp_assets::{
     objects::{BuiltInObject, objects},
 };
 use grasp_synthesis::{
-    atlas::{
-        Atlas,
+    known::{
+        atlas::Atlas,
         codec::{AtlasError, decode, encode},
         growth::{EARLY_PROPOSALS, Growth, MOST_PROPOSALS},
+        primitives::Primitive,
     },
-    hand::{Handedness, rig::Rig},
-    object::GraspObject,
+    model::{
+        hand::{Handedness, rig::Rig},
+        object::GraspObject,
+        strategy::Validity,
+    },
     physical::{grip::Gripper, scene::ObjectScene},
-    primitives::Primitive,
-    strategy::Validity,
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -43,11 +45,11 @@ enum Difference {
     #[error("it has {0} bytes, more than {MOST_BYTES}")]
     TooLarge(usize),
     #[error(
-        "grips are found differently now: make them again, and raise ALGORITHM of grasp_synthesis::atlas::key"
+        "grips are found differently now: make them again, and raise ALGORITHM of grasp_synthesis::known::key"
     )]
     OtherGrips,
     #[error(
-        "grip {0} is worth something else now: make them again, and raise ALGORITHM of grasp_synthesis::atlas::key"
+        "grip {0} is worth something else now: make them again, and raise ALGORITHM of grasp_synthesis::known::key"
     )]
     OtherWorth(usize),
 }
@@ -185,7 +187,7 @@ fn first_difference(made: &Atlas, object: &GraspObject, rig: &Rig) -> Option<usi
     let apart = entries.len().div_ceil(CHECKED).max(1);
     (0..entries.len()).step_by(apart).find(|&place| {
         let entry = &entries[place];
-        entry.assessed_anew(&scene, rig, &mut gripper).as_ref() != Some(entry)
+        entry.reassessed(&scene, rig, &mut gripper).as_ref() != Some(entry)
     })
 }
 
@@ -202,7 +204,7 @@ fn early_stamp(object: &GraspObject, rig: &Rig) -> u64 {
 #[cfg(test)]
 mod tests {
     use grasp_synthesis::{
-        atlas::{entry::Entry, grips::Grips},
+        known::{entry::Entry, grips::Grips},
         physical::immobility::FrictionUse,
     };
 

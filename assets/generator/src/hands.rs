@@ -10,8 +10,9 @@ mod weights;
 
 use glam::Vec3;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::Segment,
-    hand::{
+    model::hand::{
         DigitAngles, HandPose, Handedness,
         description::RigDescription,
         joints::{HandJoints, index},
@@ -19,7 +20,6 @@ use grasp_synthesis::{
         rig::Rig,
         skin::Skin,
     },
-    pose::Pose,
 };
 
 use self::{field::HandField, rig::RigKind};

@@ -24,8 +24,8 @@ use grasp_assets::{
     objects::{BuiltInObject, object},
 };
 use grasp_synthesis::{
-    hand::{HandPose, Handedness},
-    pose::Pose,
+    base::pose::Pose,
+    model::hand::{HandPose, Handedness},
 };
 
 use crate::AssetFile;

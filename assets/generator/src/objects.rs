@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 
 use glam::{Quat, Vec3};
 use grasp_assets::objects::{Manifest, ManifestBox};
-use grasp_synthesis::{geometry::oriented_box::OrientedBox, object::THESIS_FRICTION};
+use grasp_synthesis::{geometry::oriented_box::OrientedBox, model::object::THESIS_FRICTION};
 
 use crate::AssetFile;
 use builder::Shape;

@@ -7,7 +7,7 @@ mod teacher;
 use std::fmt::Write as _;
 
 use grasp_assets::hands::hand;
-use grasp_synthesis::{guided::prospects::Network, hand::Handedness};
+use grasp_synthesis::{model::hand::Handedness, propose::success_prior::Network};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
@@ -90,7 +90,7 @@ fn source(network: &Network) -> String {
          use super::Network;\n\n\
          /// Taught on hands of the rig `adult` and shapes that were drawn at random.\n\
          #[rustfmt::skip]\n\
-         pub const TAUGHT: Network = Network {\n",
+         pub const TRAINED: Network = Network {\n",
     );
     let mut field = |name: &str, numbers: &[f32]| {
         let _ = writeln!(text, "    {name}: [\n{}    ],", lines(numbers));

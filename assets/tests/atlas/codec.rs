@@ -3,13 +3,11 @@
 use std::sync::LazyLock;
 
 use grasp_synthesis::{
-    atlas::{
+    known::{
         codec::{AtlasError, decode, decode_grips, encode},
         growth::{Grown, Growth},
     },
-    hand::Handedness,
-    object::GraspObject,
-    strategy::Validity,
+    model::{hand::Handedness, object::GraspObject, strategy::Validity},
 };
 use proptest::prelude::*;
 use sha2::{Digest as _, Sha256};

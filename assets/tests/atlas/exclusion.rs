@@ -3,15 +3,17 @@
 use glam::{Quat, Vec3};
 use grasp_assets::{atlases::atlas as built_in_atlas, objects::object as built_in};
 use grasp_synthesis::{
-    atlas::{Atlas, codec::decode, grips::Grips, growth::Growth},
+    base::pose::Pose,
     geometry::mesh::TriangleMesh,
-    hand::{HandPose, Handedness, joints::HandJoints, rig::Rig},
-    object::GraspObject,
+    known::{atlas::Atlas, codec::decode, grips::Grips, growth::Growth},
+    model::{
+        hand::{HandPose, Handedness, joints::HandJoints, rig::Rig},
+        object::GraspObject,
+    },
     physical::{
         grip::GIVER_CLEARANCE,
-        solids::{HandSolids, PreparedHand, ToldSolids},
+        solids::{HandSolids, PreparedHand, TrackedSolids},
     },
-    pose::Pose,
 };
 
 use crate::support::{adult, grown, object};
@@ -26,7 +28,7 @@ fn scaled(object: &GraspObject, scale: f32) -> GraspObject {
 
 /// A posed hand as a giver's.
 fn giver_of(rig: &Rig, pose: &HandPose) -> PreparedHand {
-    PreparedHand::new(&ToldSolids::of_joints(&HandJoints::of_pose(rig, pose)))
+    PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(rig, pose)))
 }
 
 #[test]

@@ -9,11 +9,10 @@ use std::{
 };
 
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    clock::Clock,
-    hand::Handedness,
-    holdout::Holdout,
-    search::{GraspSource, LookUp, SearchSettings, find_grasp, find_known_grasp},
+    base::clock::Clock,
+    known::recent_grips::RecentGrips,
+    model::{hand::Handedness, holdout::Holdout},
+    search::{GraspSource, LookUp, find_grasp, find_known_grasp, settings::SearchSettings},
 };
 
 use crate::support::{NoClock, adult, few_of, held_out, known, reproducible};
@@ -44,7 +43,7 @@ fn a_look_goes_on_where_it_ended_and_comes_to_the_same() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let pool = pool.expect("a thread");
     let few = few_of(&known);
-    let (mut cut, mut spared, mut nothing) = (0, 0, 0);
+    let (mut cut, mut subset_grasp, mut nothing) = (0, 0, 0);
     let of_all = (0..known.entries().len())
         .step_by(71)
         .map(|giver| (giver, &known));
@@ -91,7 +90,7 @@ fn a_look_goes_on_where_it_ended_and_comes_to_the_same() {
                     (whole.grasp, whole.report.source)
                 );
                 cut += usize::from(last.is_some());
-                spared += usize::from(matches!(whole.report.source, Some(GraspSource::Spared(_))));
+                subset_grasp += usize::from(matches!(whole.report.source, Some(GraspSource::Spared(_))));
             }
             (None, None) => {
                 assert_eq!(by_search.grasp, None);
@@ -105,8 +104,8 @@ fn a_look_goes_on_where_it_ended_and_comes_to_the_same() {
         }
     }
     assert!(
-        cut >= 10 && spared >= 3 && nothing >= 3,
-        "{cut} looks were cut short, {spared} ended with spared fingers, {nothing} with nothing"
+        cut >= 10 && subset_grasp >= 3 && nothing >= 3,
+        "{cut} looks were cut short, {subset_grasp} ended with subset_grasp fingers, {nothing} with nothing"
     );
 }
 

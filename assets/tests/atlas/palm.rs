@@ -3,9 +3,9 @@
 use glam::Vec3;
 use grasp_assets::atlases;
 use grasp_synthesis::{
-    atlas::codec::decode,
     geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh},
-    hand::{HandPart, Handedness},
+    known::codec::decode,
+    model::hand::{HandPart, Handedness},
 };
 
 use crate::support::{adult, object};

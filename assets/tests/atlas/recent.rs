@@ -4,13 +4,15 @@ use std::sync::{Arc, atomic::AtomicBool};
 
 use grasp_assets::{atlases, objects};
 use grasp_synthesis::{
-    atlas::{Atlas, codec::decode, entry::Entry, recent::RecentGrips},
-    constraints::Constraints,
-    grasp::Grasp,
-    hand::{HandPose, Handedness, joints::HandJoints},
-    holdout::{Holdout, PresentingHand},
-    search::{GraspSource, SearchOutcome, SearchSettings, find_grasp},
-    strategy::Choice,
+    known::{atlas::Atlas, codec::decode, entry::Entry, recent_grips::RecentGrips},
+    model::{
+        constraints::Constraints,
+        grasp::Grasp,
+        hand::{HandPose, Handedness, joints::HandJoints},
+        holdout::{Holdout, PresentingHand},
+        strategy::Choice,
+    },
+    search::{GraspSource, SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 use crate::support::{NoClock, UP, adult, known, object, reproducible};

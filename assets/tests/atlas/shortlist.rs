@@ -4,21 +4,28 @@ use std::sync::{Arc, atomic::AtomicBool};
 
 use grasp_assets::atlases::atlas as built_in_atlas;
 use grasp_synthesis::{
-    atlas::{
-        Atlas, Listed, asked::Asked, codec::decode, gravity::direction, grips::Grips, growth::Growth,
-        spared::spared,
+    known::{
+        atlas::{Atlas, Listed},
+        codec::decode,
+        gravity::direction,
+        grips::Grips,
+        growth::Growth,
+        recheck::Recheck,
+        subset_grasps::subset_grasp,
     },
-    constraints::Constraints,
-    hand::{Handedness, joints::HandJoints},
-    holdout::Holdout,
+    model::{
+        constraints::Constraints,
+        hand::{Handedness, joints::HandJoints},
+        holdout::Holdout,
+        strategy::{Choice, Validity},
+    },
     physical::{
-        attempt::Surroundings,
         grip::{GIVER_CLEARANCE, Gripper},
         scene::{ObjectScene, Presented},
-        solids::{PreparedHand, ToldSolids},
+        solids::{PreparedHand, TrackedSolids},
     },
-    search::{GraspSource, SearchOutcome, SearchSettings, find_grasp},
-    strategy::{Choice, Validity},
+    rating::assessment::Surroundings,
+    search::{GraspSource, SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 use crate::support::{NoClock, UP, adult, grown, held_out, known, object, reproducible, scissors};
@@ -50,7 +57,7 @@ fn more_givers_leave_one_of_the_shortlist_than_of_as_many_that_score_most() {
         let (mut listed_scores, mut best_scores) = (0, 0);
         for giver in entries.iter().skip(7).step_by(entries.len() / GIVERS) {
             let joints = HandJoints::of_pose(rig, &giver.grip.pose);
-            let hand = PreparedHand::new(&ToldSolids::of_joints(&joints));
+            let hand = PreparedHand::new(&TrackedSolids::of_joints(&joints));
             let keeps_clear = |entry: &&u16| {
                 let solids = entries[usize::from(**entry)].solids(rig);
                 !hand.is_neared_by(solids.iter(), GIVER_CLEARANCE)
@@ -126,7 +133,7 @@ fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<[bool; 2]> {
     let rig = adult(Handedness::Right);
     let scene = ObjectScene::new(&holdout.object, holdout.object.friction_under(Validity::Physical));
     let presented = Presented::of(holdout);
-    let asked = Asked::new(&scene, rig, &presented);
+    let asked = Recheck::new(&scene, rig, &presented);
     let around = Surroundings {
         object: scene,
         presented: &presented,
@@ -137,9 +144,9 @@ fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<[bool; 2]> {
     let entries = known.entries().iter();
     entries
         .map(|entry| {
-            let whole = asked.hold(entry, &entry.told_solids(rig), &mut gripper);
+            let whole = asked.hold(entry, &entry.tracked_solids(rig), &mut gripper);
             let giver = presented.giver.as_ref();
-            let sparing = giver.and_then(|giver| spared(entry, &around, giver, &mut gripper));
+            let sparing = giver.and_then(|giver| subset_grasp(entry, &around, giver, &mut gripper));
             [whole.is_some(), sparing.is_some()]
         })
         .collect()
@@ -202,7 +209,7 @@ fn without_a_giver_and_for_the_best_grips_are_tried_by_score_and_once() {
     let count = |which: [bool; 2]| holds.iter().filter(|holds| **holds == which).count();
     let (whole, sparing) = (count([true, false]), count([false, true]));
     assert!(whole > 0 && sparing > 0, "the giver leaves {whole} and {sparing}");
-    assert_eq!(count([true, true]), 0, "nothing is spared of what holds");
+    assert_eq!(count([true, true]), 0, "nothing is subset_grasp of what holds");
     assert_eq!(
         best.report.candidates,
         (whole + sparing) as u64,

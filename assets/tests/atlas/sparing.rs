@@ -4,18 +4,20 @@ use std::sync::{Arc, atomic::AtomicBool};
 
 use grasp_assets::objects;
 use grasp_synthesis::{
-    atlas::{Atlas, entry::Entry, grips::Grips},
-    grasp::{Contact, Grasp},
-    hand::{Digit, DigitAngles, HandPose, Handedness},
-    holdout::Holdout,
+    known::{atlas::Atlas, entry::Entry, grips::Grips},
+    model::{
+        grasp::{Contact, Grasp},
+        hand::{Digit, DigitAngles, HandPose, Handedness},
+        holdout::Holdout,
+        strategy::Validity,
+    },
     physical::{
         grip::{DEEPEST, GIVER_CLEARANCE},
         immobility::{BALANCE_TOLERANCE, Buffers, EPSILON_TOLERANCE, SoftContact, epsilon},
         scene::ObjectScene,
-        solids::{HandSolids, TaperedCapsule, ToldSolids, clearance, self_clearance},
+        solids::{HandSolids, TaperedCapsule, TrackedSolids, clearance, self_clearance},
     },
-    search::{GraspSource, SearchOutcome, SearchSettings, find_grasp},
-    strategy::Validity,
+    search::{GraspSource, SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 use crate::support::{NoClock, UP, adult, few_of, held_out, known, object, reproducible};
@@ -76,7 +78,7 @@ fn sets_of_fingers_are_those_that_have_closure() {
         for kept in sets() {
             let is_of_holding =
                 kept[1..].contains(&true) && kept.iter().zip(holding).all(|(kept, holds)| !kept || holds);
-            let is_set = entry.finger_sets.contains(kept);
+            let is_set = entry.finger_subsets.contains(kept);
             if !is_of_holding {
                 assert!(!is_set, "grip {place}, {kept:?}");
                 continue;
@@ -96,17 +98,17 @@ fn sets_of_fingers_are_those_that_have_closure() {
 }
 
 /// The distance of some solids from a giver's, pair by pair.
-fn distance<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, giver: &ToldSolids) -> f32 {
+fn distance<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, giver: &TrackedSolids) -> f32 {
     ours.flat_map(|ours| giver.iter().map(move |theirs| ours.distance(theirs)))
         .fold(f32::INFINITY, f32::min)
 }
 
 /// What a giver leaves of a known grip: the digits that hold and that it is not in the way of, and whether it is in the way
 /// of any; none if it is in the way of palm or forearm.
-fn left(entry: &Entry, giver: &ToldSolids) -> Option<([bool; 5], bool)> {
+fn left(entry: &Entry, giver: &TrackedSolids) -> Option<([bool; 5], bool)> {
     let rig = adult(Handedness::Right);
     let solids = HandSolids::of_pose(rig, &entry.grip.pose);
-    let told = ToldSolids::of_rig(rig, entry.grip.pose.frame_from_wrist, &solids);
+    let told = TrackedSolids::of_rig(rig, entry.grip.pose.frame_from_wrist, &solids);
     if distance(told.still().chain(&solids.thenar), giver) < GIVER_CLEARANCE {
         return None;
     }
@@ -129,11 +131,11 @@ fn pose_of_digits(pose: &HandPose, digits: [bool; 5]) -> HandPose {
 }
 
 /// Every check of a grasp, by other means than the search's.
-fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &ToldSolids) {
+fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &TrackedSolids) {
     let rig = adult(Handedness::Right);
     let object = &holdout.object;
     let solids = HandSolids::of_pose(rig, &grasp.pose);
-    let told = ToldSolids::of_rig(rig, grasp.pose.frame_from_wrist, &solids);
+    let told = TrackedSolids::of_rig(rig, grasp.pose.frame_from_wrist, &solids);
     let margins = grasp.margins.expect("it is physically valid");
     let off_giver = distance(told.iter(), giver);
     assert!(off_giver >= GIVER_CLEARANCE);
@@ -157,7 +159,7 @@ fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &ToldSolids) {
 fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
     let (known, rig) = (known(), adult(Handedness::Right));
     let scissors = objects::object("scissors").expect("they are built in");
-    let (mut spared, mut refused, mut rested) = (0, 0, 0);
+    let (mut subset_grasp, mut refused, mut rested) = (0, 0, 0);
     for index in (0..known.entries().len()).step_by(109) {
         let entry = &known.entries()[index];
         let alone = Grips::new(rig, vec![entry.clone()]);
@@ -165,7 +167,7 @@ fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
         for giver in (0..known.entries().len()).step_by(61) {
             let holdout = held_out(&known, giver);
             let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
-            let hand = ToldSolids::of_joints(&hand.joints);
+            let hand = TrackedSolids::of_joints(&hand.joints);
             let found = search(&holdout, &alone, 1);
             let Some((left, is_any_met)) = left(entry, &hand) else {
                 assert_eq!(found.grasp, None, "giver {giver}, grip {index}");
@@ -183,7 +185,7 @@ fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
                 continue;
             }
             assert_eq!(found.report.source, Some(GraspSource::Spared(0)));
-            spared += 1;
+            subset_grasp += 1;
             let fingers: Vec<usize> = (1..5).filter(|&finger| left[finger]).collect();
             let holds = entry.grip.bend_ratios.map(|ratio| ratio.is_some());
             let leaves_a_gap = fingers.windows(2).any(|pair| pair[1] != pair[0] + 1);
@@ -191,7 +193,7 @@ fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
                 left == holds || !leaves_a_gap,
                 "giver {giver}, grip {index}: {left:?}"
             );
-            assert!(entry.finger_sets.contains(left), "giver {giver}, grip {index}");
+            assert!(entry.finger_subsets.contains(left), "giver {giver}, grip {index}");
             // What holds is where it was, and holds by what it touched.
             let touching = grasp.bend_ratios.map(|ratio| ratio.is_some());
             let of_left = |contact: &&Contact| contact.part.digit().is_none_or(|digit| left[digit.index()]);
@@ -210,12 +212,12 @@ fn fingers_that_a_giver_is_in_the_way_of_are_spared() {
         }
     }
     assert!(
-        spared >= 20,
-        "{spared} times fingers are spared, {refused} times not"
+        subset_grasp >= 20,
+        "{subset_grasp} times fingers are subset_grasp, {refused} times not"
     );
     assert!(
-        (1..spared).contains(&rested),
-        "of {spared}, {rested} are of idle fingers alone"
+        (1..subset_grasp).contains(&rested),
+        "of {subset_grasp}, {rested} are of idle fingers alone"
     );
 }
 
@@ -236,7 +238,7 @@ fn sparing_answers_givers_that_leave_no_whole_grip_and_is_reproducible() {
         assert_ne!(grasp.pose, few.entries()[usize::from(index)].grip.pose);
         answered += 1;
         let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
-        assert_is_valid(&grasp, &holdout, &ToldSolids::of_joints(&hand.joints));
+        assert_is_valid(&grasp, &holdout, &TrackedSolids::of_joints(&hand.joints));
         for workers in [1, 3] {
             let again = search(&holdout, &few, workers);
             assert_eq!(

@@ -6,31 +6,29 @@ use std::{
 };
 
 use grasp_synthesis::{
-    atlas::{
-        Atlas,
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    known::{
+        atlas::Atlas,
         entry::Entry,
-        starts::{Start, Starts},
+        seed_source::SeedSource,
+        seeds::{Start, Starts},
     },
-    constraints::Constraints,
-    guided::proposal::{Place, propose},
-    hand::Handedness,
-    holdout::Holdout,
+    model::{constraints::Constraints, hand::Handedness, holdout::Holdout, strategy::Validity},
     physical::{
-        attempt::{PhysicalAttempt, Surroundings},
         grip::GIVER_CLEARANCE,
         scene::{ObjectScene, Presented},
         shape::Proposal,
-        solids::{HandSolids, ToldSolids},
+        solids::{HandSolids, TrackedSolids},
     },
-    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
-    strategy::Validity,
-    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+    propose::proposal::{Place, propose},
+    rating::assessment::Surroundings,
+    search::{SearchOutcome, find_grasp, physical_attempt::PhysicalAttempt, settings::SearchSettings},
 };
 
 use crate::support::{NoClock, UP, adult, held_out, known, reproducible, tight_givers};
 
 /// How far palm, forearm, thumb and some fingers are from the giver's, pair by pair.
-fn clearance(entry: &Entry, kept: [bool; 5], giver: &ToldSolids) -> f32 {
+fn clearance(entry: &Entry, kept: [bool; 5], giver: &TrackedSolids) -> f32 {
     let solids = HandSolids::of_pose(adult(Handedness::Right), &entry.grip.pose);
     let of_digits = (0..5)
         .filter(|&digit| kept[digit])
@@ -44,10 +42,10 @@ fn clearance(entry: &Entry, kept: [bool; 5], giver: &ToldSolids) -> f32 {
 }
 
 /// The same of those fingers that are farthest, of all that hold without the others.
-fn farthest(entry: &Entry, giver: &ToldSolids) -> f32 {
+fn farthest(entry: &Entry, giver: &TrackedSolids) -> f32 {
     (1_u8..16)
         .map(|set| std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1))
-        .filter(|kept| entry.finger_sets.contains(*kept))
+        .filter(|kept| entry.finger_subsets.contains(*kept))
         .map(|kept| clearance(entry, kept, giver))
         .fold(f32::NEG_INFINITY, f32::max)
 }
@@ -62,7 +60,7 @@ fn starts_are_what_is_least_in_the_givers_way() {
     for grip in [0, 700, 1400] {
         let holdout = held_out(&known, grip);
         let hand = holdout.presenting_hand.as_ref().expect("there is a giver");
-        let giver = ToldSolids::of_joints(&hand.joints);
+        let giver = TrackedSolids::of_joints(&hand.joints);
         let presented = Presented::of(&holdout);
         let holding = known.holding_under(UP);
         let of = |order: &[u16]| {
@@ -89,7 +87,7 @@ fn starts_are_what_is_least_in_the_givers_way() {
         assert_eq!(distinct.len(), starts.all().len());
         for (&Start { entry, kept }, expected) in starts.all().iter().zip(clearances) {
             let known = &known.entries()[usize::from(entry)];
-            assert!(known.finger_sets.contains(kept), "giver {grip}, {entry}");
+            assert!(known.finger_subsets.contains(kept), "giver {grip}, {entry}");
             let found = clearance(known, kept, &giver);
             assert!(
                 (found - expected).abs() < 1e-6,
@@ -178,7 +176,7 @@ fn search(
         .build()
         .expect("threads");
     let settings = SearchSettings {
-        starts: starts.cloned().map_or(StartFrom::Nothing, StartFrom::Atlas),
+        starts: starts.cloned().map_or(SeedSource::Nothing, SeedSource::Atlas),
         first_attempt: attempts.start,
         max_attempts: attempts.end - attempts.start,
         workers,

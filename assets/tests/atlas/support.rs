@@ -5,25 +5,29 @@ use std::{sync::Arc, time::Duration};
 use glam::Vec3;
 use grasp_assets::{atlases, hands, objects};
 use grasp_synthesis::{
-    atlas::{
-        Atlas,
+    base::clock::Clock,
+    known::{
+        atlas::Atlas,
         codec::decode,
         grips::Grips,
         growth::{Grown, Growth},
-        recent::RecentGrips,
+        recent_grips::RecentGrips,
+        seed_source::SeedSource,
     },
-    clock::Clock,
-    constraints::Constraints,
-    hand::{Handedness, joints::HandJoints, rig::Rig},
-    holdout::{Holdout, PresentingHand},
-    object::GraspObject,
+    model::{
+        bend_ratios::BendRatioChoice,
+        constraints::Constraints,
+        hand::{Handedness, joints::HandJoints, rig::Rig},
+        holdout::{Holdout, PresentingHand},
+        object::GraspObject,
+        strategy::{Choice, Strategy, Validity},
+    },
     physical::{
         grip::{GIVER_CLEARANCE, Gripper},
         scene::Presented,
-        solids::{HandSolids, ToldSolids},
+        solids::{HandSolids, TrackedSolids},
     },
-    search::{SearchSettings, StartFrom},
-    strategy::{BendRatioChoice, Choice, Strategy, Validity},
+    search::settings::SearchSettings,
 };
 
 /// Where the grips of the built-in scissors are asked about as if they were givers'.
@@ -67,7 +71,7 @@ pub(crate) fn tight_givers(known: &Atlas, most: usize) -> Vec<usize> {
             .filter(|entry| {
                 let (rig, pose) = (adult(Handedness::Right), &entry.grip.pose);
                 let solids = HandSolids::of_pose(rig, pose);
-                let told = ToldSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+                let told = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
                 giver.clearance(&told, GIVER_CLEARANCE).is_some()
             })
             .take(most + 1)
@@ -99,7 +103,7 @@ pub(crate) fn reproducible(holdout: &Holdout) -> SearchSettings {
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: StartFrom::Nothing,
+        starts: SeedSource::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
         reproducible: true,

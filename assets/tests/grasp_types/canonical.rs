@@ -2,10 +2,12 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    grasp::Contact,
-    hand::{Digit, HandPart, Phalanx},
-    pose::Pose,
-    taxonomy::{GraspType, LEAST_CONFIDENCE},
+    base::pose::Pose,
+    model::{
+        grasp::Contact,
+        grasp_type::{GraspType, LEAST_CONFIDENCE},
+        hand::{Digit, HandPart, Phalanx},
+    },
 };
 use proptest::prelude::*;
 

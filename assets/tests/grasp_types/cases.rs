@@ -1,9 +1,9 @@
 //! For each type a hand that was made to be of it.
 
 use glam::Vec3;
-use grasp_synthesis::{
+use grasp_synthesis::model::{
+    grasp_type::GraspType,
     hand::{Digit, Phalanx},
-    taxonomy::GraspType,
 };
 
 use super::support::{Held, MIDDLE, Shape, TIP, Touching, held};

@@ -7,10 +7,12 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     geometry::mesh_bvh::MeshBvh,
-    grasp::Contact,
-    hand::{Digit, HandPart, HandPose, Phalanx},
+    model::{
+        grasp::Contact,
+        hand::{Digit, HandPart, HandPose, Phalanx},
+    },
     physical::solids::{HandSolids, TaperedCapsule, closest},
-    taxonomy::classify,
+    rating::taxonomy::classify,
 };
 
 /// How near skin and surface are where the hand is said to touch, in metres: the poses are touches of a skin that the solids

@@ -3,10 +3,15 @@
 use glam::Vec3;
 use grasp_assets::hands::hand;
 use grasp_synthesis::{
-    grasp::Contact,
-    hand::{Digit, DigitAngles, HandPart, HandPose, Handedness, Phalanx, kinematics::hand_frames, rig::Rig},
-    pose::Pose,
-    taxonomy::{Classification, classify},
+    base::pose::Pose,
+    model::{
+        grasp::Contact,
+        grasp_type::Classification,
+        hand::{
+            Digit, DigitAngles, HandPart, HandPose, Handedness, Phalanx, kinematics::hand_frames, rig::Rig,
+        },
+    },
+    rating::taxonomy::classify,
 };
 
 /// What is held, in the wrist frame of a right hand: +x to the thumb, +y along the fingers, +z out of the palm.

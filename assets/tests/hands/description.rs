@@ -1,7 +1,7 @@
 //! Rig descriptions: there and back, and everything that can be wrong with them at once.
 
 use grasp_assets::hands::{HandError, read_rig};
-use grasp_synthesis::hand::description::{RigDescription, RigViolation};
+use grasp_synthesis::model::hand::description::{RigDescription, RigViolation};
 
 use crate::all;
 

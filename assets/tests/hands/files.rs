@@ -2,7 +2,7 @@
 
 use glam::{Mat4, Quat, Vec3};
 use grasp_assets::hands::{HandError, read_skin};
-use grasp_synthesis::hand::joints::JOINT_NAMES;
+use grasp_synthesis::model::hand::joints::JOINT_NAMES;
 
 use crate::all;
 

@@ -2,11 +2,11 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         HandPose, Handedness,
         joints::{HandJoints, index, openxr_from_thesis_frame, thesis_from_openxr_frame},
     },
-    pose::Pose,
 };
 
 use crate::{Numbers, all, built_in};

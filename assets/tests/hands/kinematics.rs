@@ -1,8 +1,8 @@
 //! Forward kinematics against Equation 4.2 written out with 4×4 matrices in double precision; Table 4.1; the reach.
 
 use grasp_synthesis::{
-    hand::{DigitAngles, HandPose, Handedness, kinematics::hand_frames, rig::DigitRig},
-    pose::Pose,
+    base::pose::Pose,
+    model::hand::{DigitAngles, HandPose, Handedness, kinematics::hand_frames, rig::DigitRig},
 };
 
 use crate::{Numbers, all, built_in};

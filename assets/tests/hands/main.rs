@@ -11,7 +11,7 @@ mod skin_fit;
 mod solids;
 
 use grasp_assets::hands::{Hand, RIG_NAMES, hand};
-use grasp_synthesis::hand::{DigitAngles, Handedness, rig::Rig};
+use grasp_synthesis::model::hand::{DigitAngles, Handedness, rig::Rig};
 
 /// All built-in hands.
 fn all() -> impl Iterator<Item = &'static Hand> {

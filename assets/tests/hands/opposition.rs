@@ -2,8 +2,12 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
-    hand::{DigitAngles, Handedness, kinematics::digit_frames, rig::AngleRange, rig::DigitRig},
-    pose::Pose,
+    base::pose::Pose,
+    model::hand::{
+        DigitAngles, Handedness,
+        kinematics::digit_frames,
+        rig::{AngleRange, DigitRig},
+    },
 };
 
 use crate::{Numbers, built_in};

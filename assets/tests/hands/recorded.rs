@@ -4,11 +4,11 @@ use std::{env, fs, path::PathBuf};
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         Handedness,
         joints::{HandJoints, JOINT_NAMES, Joint, index},
     },
-    pose::Pose,
 };
 use serde::Deserialize;
 

@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         DigitAngles, HandPose, Handedness,
         joints::{HandJoints, index},
         rig::Rig,
         skin::Skin,
     },
-    pose::Pose,
 };
 
 use crate::{all, built_in};

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use grasp_assets::hands::Hand;
-use grasp_synthesis::hand::{
+use grasp_synthesis::model::hand::{
     joints::{index, thesis_from_openxr_frame},
     skin::Skin,
 };

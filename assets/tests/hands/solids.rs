@@ -3,15 +3,18 @@
 use glam::{Quat, Vec3};
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         DigitAngles, HandPose, Handedness,
         joints::{HandJoints, Joint, index},
     },
-    physical::grip::GIVER_CLEARANCE,
-    physical::solids::{
-        HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, ToldPalm, ToldSolids, self_clearance,
+    physical::{
+        grip::GIVER_CLEARANCE,
+        solids::{
+            HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, TrackedPalm, TrackedSolids,
+            self_clearance,
+        },
     },
-    pose::Pose,
 };
 
 use crate::{Numbers, all, built_in};
@@ -132,7 +135,7 @@ fn a_hand_beside_another_is_as_thick_as_told() {
             joint.radius += more;
         }
         let fitted = HandSolids::of_joints(&joints);
-        let told = ToldSolids::of_joints(&joints);
+        let told = TrackedSolids::of_joints(&joints);
         let solids: Vec<TaperedCapsule> = told.iter().copied().collect();
         // The deepest dip below the balls that a told part is made of.
         let dip = |[a, b]: [Joint; 2]| {
@@ -190,7 +193,7 @@ fn a_rigs_hand_beside_another_is_that_of_its_joints() {
         };
         let fitted = HandSolids::of_pose(&hand.rig, &pose);
         let way = Vec3::new(0.01, -0.02, 0.03);
-        let of_rig = ToldSolids::of_rig(&hand.rig, pose.frame_from_wrist, &fitted).moved(way);
+        let of_rig = TrackedSolids::of_rig(&hand.rig, pose.frame_from_wrist, &fitted).moved(way);
         let elsewhere = HandPose {
             frame_from_wrist: Pose::new(
                 pose.frame_from_wrist.position + way,
@@ -198,7 +201,7 @@ fn a_rigs_hand_beside_another_is_that_of_its_joints() {
             ),
             ..pose
         };
-        let of_joints = ToldSolids::of_joints(&HandJoints::of_pose(&hand.rig, &elsewhere));
+        let of_joints = TrackedSolids::of_joints(&HandJoints::of_pose(&hand.rig, &elsewhere));
         assert_eq!(of_rig.iter().count(), of_joints.iter().count());
         for (ours, theirs) in of_rig.iter().zip(of_joints.iter()) {
             assert!(ours.start.distance(theirs.start) < 1e-6, "{ours:?} {theirs:?}");
@@ -241,7 +244,7 @@ fn a_point_is_as_far_off_the_told_palm_as_off_its_balls() {
             .iter()
             .map(|(ball, radius)| ball.distance(point) - radius)
             .fold(f32::INFINITY, f32::min);
-        let found = ToldPalm::of_joints(&joints).distance_of_skin(point);
+        let found = TrackedPalm::of_joints(&joints).distance_of_skin(point);
         assert!(
             (found - expected.abs()).abs() < 3e-4,
             "{point}: {found}, not {expected}"
@@ -331,8 +334,8 @@ fn distances_between_hands_are_those_of_all_pairs() {
             [(thesis, &theirs), (adult, &ours)],
         ] {
             let receiver = HandSolids::of_pose(rig, pose);
-            let receiver = ToldSolids::of_rig(rig, pose.frame_from_wrist, &receiver);
-            let giver = ToldSolids::of_joints(&HandJoints::of_pose(giver_rig, giver_pose));
+            let receiver = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &receiver);
+            let giver = TrackedSolids::of_joints(&HandJoints::of_pose(giver_rig, giver_pose));
             let brute = receiver
                 .iter()
                 .flat_map(|a| giver.iter().map(|b| a.distance(b)))

@@ -1,7 +1,7 @@
 //! Where a picture is taken from.
 
 use glam::{Mat3, Quat, Vec2, Vec3};
-use grasp_synthesis::pose::Pose;
+use grasp_synthesis::base::pose::Pose;
 
 use crate::scene::Scene;
 

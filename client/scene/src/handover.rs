@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::mesh::TriangleMesh,
-    hand::{Digit, Phalanx, joints::HandJoints, skin::Skin},
-    pose::Pose,
+    model::hand::{Digit, Phalanx, joints::HandJoints, skin::Skin},
 };
 use serde_json::json;
 
@@ -265,7 +265,7 @@ fn srgb([r, g, b]: [u8; 3]) -> [f32; 4] {
 mod tests {
     use glam::Quat;
     use grasp_assets::hands::hand;
-    use grasp_synthesis::hand::{HandPose, Handedness, joints::index};
+    use grasp_synthesis::model::hand::{HandPose, Handedness, joints::index};
 
     use super::*;
     use crate::primitives::capsule;

@@ -1,7 +1,7 @@
 //! What makes a skinned mesh look like a hand: a paler palm, flushed tips and knuckles, fingernails.
 
 use glam::{Vec2, Vec3};
-use grasp_synthesis::hand::{joints::index, skin::Skin};
+use grasp_synthesis::model::hand::{joints::index, skin::Skin};
 
 use crate::{
     normals::corner_normals,

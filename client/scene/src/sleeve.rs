@@ -1,7 +1,7 @@
 //! Sleeves: they say whose hand it is and where its forearm runs.
 
 use glam::{Vec2, Vec3};
-use grasp_synthesis::hand::joints::{HandJoints, index};
+use grasp_synthesis::model::hand::joints::{HandJoints, index};
 
 use crate::{
     primitives::lathe,

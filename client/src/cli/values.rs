@@ -137,7 +137,7 @@ impl From<StrategyName> for Strategy {
     }
 }
 
-impl From<StrategyName> for grasp_synthesis::strategy::Strategy {
+impl From<StrategyName> for grasp_synthesis::model::strategy::Strategy {
     fn from(name: StrategyName) -> Self {
         match name {
             StrategyName::A => Self::A,

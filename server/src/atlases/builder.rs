@@ -11,11 +11,11 @@ use std::{
 
 use grasp_assets::{atlases::atlas, hands::Hand};
 use grasp_synthesis::{
-    atlas::{
+    known::{
         codec::decode,
         growth::{Grown, Growth},
     },
-    hand::Handedness,
+    model::hand::Handedness,
     physical::grip::Gripper,
 };
 

@@ -13,7 +13,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::atlas::{
+use grasp_synthesis::known::{
     codec::{decode, encode},
     growth::Grown,
     key::key,

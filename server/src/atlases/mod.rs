@@ -30,8 +30,8 @@ use std::{
 use grasp_assets::hands::{Hand, hand};
 use grasp_proto::v1;
 use grasp_synthesis::{
-    atlas::{Atlas, entry::Entry, growth::Grown, recent::RecentGrips},
-    hand::Handedness,
+    known::{atlas::Atlas, entry::Entry, growth::Grown, recent_grips::RecentGrips},
+    model::hand::Handedness,
 };
 
 use self::{files::AtlasFiles, recents::Recents};

@@ -6,7 +6,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::atlas::entry::Entry;
+use grasp_synthesis::known::entry::Entry;
 
 use crate::objects::StoredObject;
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::atlas::{entry::Entry, growth::Grown, recent::RecentGrips};
+use grasp_synthesis::known::{entry::Entry, growth::Grown, recent_grips::RecentGrips};
 
 /// What is being done about an atlas.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

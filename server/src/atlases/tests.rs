@@ -4,9 +4,8 @@ use std::{fs, path::PathBuf, time::Instant};
 
 use glam::Vec3;
 use grasp_synthesis::{
-    atlas::{entry::Entry, growth::Growth},
+    known::{entry::Entry, growth::Growth, primitives::Primitive},
     physical::grip::Gripper,
-    primitives::Primitive,
 };
 
 use super::{shelf::Standing, *};

@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
 use grasp_assets::obj::{ObjLimits, ObjMesh, read_obj};
-use grasp_synthesis::{geometry::mesh::TriangleMesh, object::GraspObject};
+use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
 use super::{
     StoredObject,

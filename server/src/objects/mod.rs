@@ -17,8 +17,10 @@ use grasp_assets::{
 };
 use grasp_proto::v1;
 use grasp_synthesis::{
-    geometry::mesh::TriangleMesh, guided::repertoire::Repertoires, hand::Handedness, object::GraspObject,
-    primitives::borrowed::Borrowed, strategy::Validity,
+    geometry::mesh::TriangleMesh,
+    known::transferred_grips::Borrowed,
+    model::{hand::Handedness, object::GraspObject, strategy::Validity},
+    propose::placement_cache::PlacementCaches,
 };
 use sha2::{Digest as _, Sha256};
 
@@ -116,7 +118,7 @@ impl StoredObject {
                 .map_or(0, |surface| of_mesh(surface.mesh()))
             + self.object.surface.field_bytes()
             + self.object.surface_pairs.bytes()
-            + Repertoires::MOST_BYTES
+            + PlacementCaches::MOST_BYTES
             + self.borrowed.len() * Borrowed::MOST_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()
     }

@@ -7,13 +7,17 @@ use std::{
 
 use grasp_proto::v1;
 use grasp_synthesis::{
-    atlas::{entry::Entry, recent::RecentGrips},
-    clock::Clock,
-    holdout::{Holdout, PresentingHand},
-    key_frames::plan_way,
-    object::GraspObject,
-    search::{GraspSource, LookUp, SearchOutcome, SearchSettings, StartFrom, find_known_grasp, uses_atlas},
-    strategy::{Choice, Validity},
+    base::clock::Clock,
+    known::{entry::Entry, recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        holdout::{Holdout, PresentingHand},
+        object::GraspObject,
+        strategy::{Choice, Validity},
+    },
+    search::{
+        GraspSource, LookUp, SearchOutcome, find_known_grasp, key_frames::plan_way, settings::SearchSettings,
+        uses_atlas,
+    },
 };
 use rayon::ThreadPool;
 
@@ -118,12 +122,12 @@ impl FindJob {
             up: object_from_client.transform_vector(query.up),
         };
         let starts = match &self.known.atlas {
-            Some(atlas) => StartFrom::Atlas(Arc::clone(atlas)),
+            Some(atlas) => SeedSource::Atlas(Arc::clone(atlas)),
             None if uses_atlas(query.strategy, query.validity) => {
                 let borrowed = self.stored.borrowed(query.receiving_hand);
-                borrowed.map_or(StartFrom::Nothing, StartFrom::Borrowed)
+                borrowed.map_or(SeedSource::Nothing, SeedSource::Borrowed)
             }
-            None => StartFrom::Nothing,
+            None => SeedSource::Nothing,
         };
         let settings = SearchSettings {
             seed: self.seed,
@@ -231,7 +235,7 @@ mod tests {
     use std::cell::Cell;
 
     use grasp_assets::hands::{self, RIG_NAMES};
-    use grasp_synthesis::hand::{Handedness, rig::AngleRange};
+    use grasp_synthesis::model::hand::{Handedness, rig::AngleRange};
     use proptest::{
         prelude::*,
         test_runner::{Config, RngSeed, TestRunner},

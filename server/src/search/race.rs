@@ -10,16 +10,12 @@ use std::{
 };
 
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    clock::Clock,
-    grasp::Grasp,
-    hand::rig::Rig,
-    holdout::Holdout,
+    base::{clock::Clock, stopwatch::StepTimes},
+    known::recent_grips::RecentGrips,
+    model::{grasp::Grasp, hand::rig::Rig, holdout::Holdout, strategy::Choice},
     search::{
-        NearestMiss, SearchEnd, SearchOutcome, SearchReport, SearchSettings, StepTimes, find_grasp_in,
-        prepare,
+        NearestMiss, SearchEnd, SearchOutcome, SearchReport, find_grasp_in, prepare, settings::SearchSettings,
     },
-    strategy::Choice,
 };
 use rayon::ThreadPool;
 
@@ -153,12 +149,14 @@ mod tests {
     use glam::Vec3;
     use grasp_assets::{hands::hand, objects::object};
     use grasp_synthesis::{
-        constraints::Constraints,
-        hand::{DigitAngles, HandPose, Handedness},
-        pose::Pose,
-        rejection::Rejection,
-        search::StartFrom,
-        strategy::{BendRatioChoice, Strategy, Validity},
+        base::{pose::Pose, rejection::Rejection},
+        known::seed_source::SeedSource,
+        model::{
+            bend_ratios::BendRatioChoice,
+            constraints::Constraints,
+            hand::{DigitAngles, HandPose, Handedness},
+            strategy::{Strategy, Validity},
+        },
     };
 
     use super::*;
@@ -187,7 +185,7 @@ mod tests {
             constraints: Constraints::default(),
             choice,
             atlas: None,
-            starts: StartFrom::Nothing,
+            starts: SeedSource::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
             reproducible: false,

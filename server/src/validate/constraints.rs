@@ -3,10 +3,10 @@
 use std::{f32::consts::PI, fmt::Debug};
 
 use grasp_proto::v1;
-use grasp_synthesis::{
+use grasp_synthesis::model::{
     constraints::{ApproachCone, Constraints, DigitSet, Reach, TypeSet},
+    grasp_type::GraspType,
     hand::Digit,
-    taxonomy::GraspType,
 };
 
 use super::{FARTHEST, Field, Violations, direction, known, point};

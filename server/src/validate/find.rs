@@ -6,9 +6,12 @@ use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    constraints::Constraints,
-    pose::Pose,
-    strategy::{BendRatioChoice, Choice, Strategy, Validity},
+    base::pose::Pose,
+    model::{
+        bend_ratios::BendRatioChoice,
+        constraints::Constraints,
+        strategy::{Choice, Strategy, Validity},
+    },
 };
 
 use super::{

@@ -4,13 +4,13 @@ use glam::Vec3;
 use grasp_assets::hands::{self, Hand, RIG_NAMES};
 use grasp_proto::v1;
 use grasp_synthesis::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         DigitAngles, HandPose, Handedness,
         joints::{HandJoints, JOINT_COUNT, Joint, index, thesis_from_openxr_frame},
         rig::{AngleRange, DigitRig},
         skin::Skin,
     },
-    pose::Pose,
 };
 
 use super::{Field, Violations, direction, known, pose, quoted};

@@ -14,7 +14,7 @@ use std::fmt;
 
 use glam::{Quat, Vec3};
 use grasp_proto::v1;
-use grasp_synthesis::pose::Pose;
+use grasp_synthesis::base::pose::Pose;
 
 pub(crate) use find::{FindQuery, find_query};
 pub(crate) use hand::GiverHand;

@@ -6,16 +6,18 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
-    atlas::{Atlas, asked::Asked, entry::Entry, growth::Growth},
-    guided::proposal::{Place, propose},
-    hand::{Handedness, rig::Rig},
-    object::GraspObject,
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::Recheck},
+    model::{
+        hand::{Handedness, rig::Rig},
+        object::GraspObject,
+        strategy::Validity,
+    },
     physical::{
         grip::Gripper,
         scene::{ObjectScene, Presented},
     },
-    strategy::Validity,
-    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+    propose::proposal::{Place, propose},
 };
 
 /// The built-in objects: a light one that is thin everywhere, and a box.
@@ -67,8 +69,8 @@ fn holds(criterion: &mut Criterion) {
     for name in OBJECTS {
         let (scene, atlas, presented) = (scene(object(name)), grown(object(name), ENTRIES), presented(name));
         let mut holds = |entry: &Entry, presented: &Presented| {
-            Asked::new(&scene, rig(), presented)
-                .hold(entry, &entry.told_solids(rig()), &mut gripper)
+            Recheck::new(&scene, rig(), presented)
+                .hold(entry, &entry.tracked_solids(rig()), &mut gripper)
                 .is_some()
         };
         let pairs = presented

@@ -5,7 +5,7 @@ use std::{hint::black_box, time::Duration};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use grasp_synthesis::{
-    hand::Digit,
+    model::hand::Digit,
     physical::immobility::{Buffers, Load, SoftContact, balance, epsilon},
 };
 use rand::{RngExt, SeedableRng};

@@ -9,13 +9,15 @@ use std::{
 
 use grasp_assets::atlases::atlas;
 use grasp_synthesis::{
-    atlas::{Atlas, codec::decode, recent::RecentGrips},
-    constraints::Constraints,
-    hand::{Handedness, rig::Rig},
-    holdout::Holdout,
-    object::GraspObject,
-    search::{LookUp, SearchSettings, StartFrom, find_grasp, find_known_grasp},
-    strategy::{Choice, Strategy, Validity},
+    known::{atlas::Atlas, codec::decode, recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        constraints::Constraints,
+        hand::{Handedness, rig::Rig},
+        holdout::Holdout,
+        object::GraspObject,
+        strategy::{Choice, Strategy, Validity},
+    },
+    search::{LookUp, find_grasp, find_known_grasp, settings::SearchSettings},
 };
 use grasp_tests::searches::MonotonicClock;
 use rayon::ThreadPool;
@@ -111,7 +113,7 @@ fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings 
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: Some(Arc::clone(atlas)),
-        starts: StartFrom::Atlas(Arc::clone(atlas)),
+        starts: SeedSource::Atlas(Arc::clone(atlas)),
         recent: RecentGrips::default(),
         known_tried: 0,
         reproducible: false,

@@ -13,7 +13,10 @@ use grasp_assets::{
     objects::{BuiltInObject, Manifest, objects},
 };
 use grasp_proto::v1;
-use grasp_synthesis::{atlas::key::key, hand::Handedness, object::GraspObject};
+use grasp_synthesis::{
+    known::key::key,
+    model::{hand::Handedness, object::GraspObject},
+};
 use grasp_tests::{
     TestServer,
     random_holdouts::{ClientHoldout, Givers, GivingHand, PlacedGiver, giving_hands, place},

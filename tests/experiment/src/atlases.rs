@@ -20,12 +20,12 @@ use grasp_assets::{
     objects::{BuiltInObject, object},
 };
 use grasp_synthesis::{
-    atlas::{
-        Atlas,
+    known::{
+        atlas::Atlas,
         codec::{AtlasError, decode, encode},
         growth::{Grown, Growth, MOST_PROPOSALS},
     },
-    hand::rig::Rig,
+    model::hand::rig::Rig,
     physical::grip::Gripper,
 };
 

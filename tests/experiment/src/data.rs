@@ -1,6 +1,6 @@
 //! A run's records, as the figures ask for them.
 
-use grasp_synthesis::strategy::Strategy;
+use grasp_synthesis::model::strategy::Strategy;
 
 use crate::{
     plan::{Cell, Set, Settings},

@@ -6,8 +6,8 @@ mod outputs;
 mod placement;
 
 use grasp_synthesis::{
-    rejection::Rejection,
-    strategy::Strategy::{A, B, C, D, F},
+    base::rejection::Rejection,
+    model::strategy::Strategy::{A, B, C, D, F},
 };
 
 use crate::{

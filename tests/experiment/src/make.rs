@@ -14,21 +14,22 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, HoldoutError, holdouts},
 };
 use grasp_synthesis::{
-    atlas::{asked::Asked, recent::RecentGrips},
-    clock::Clock,
-    constraints::Constraints,
-    grasp::Grasp,
-    hand::{Handedness, rig::Rig},
-    holdout::Holdout,
+    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::NoStopwatch},
+    known::{recent_grips::RecentGrips, recheck::Recheck, seed_source::SeedSource},
+    model::{
+        constraints::Constraints,
+        grasp::Grasp,
+        hand::{Handedness, rig::Rig},
+        holdout::Holdout,
+        strategy::{Choice, Validity},
+    },
     physical::grip::Gripper,
-    rejection::Rejection,
-    search::{SearchEnd, SearchSettings, StartFrom, find_grasp},
-    strategy::{Choice, Validity},
-    synthesis::{
+    search::{
+        SearchEnd,
         attempt::{Attempt, AttemptEnd},
-        random::AttemptStream,
+        find_grasp,
         scene::Scene,
-        stopwatch::NoStopwatch,
+        settings::SearchSettings,
     },
 };
 
@@ -138,7 +139,7 @@ impl Maker {
                 .atlases
                 .of(cell)
                 .cloned()
-                .map_or(StartFrom::Nothing, StartFrom::Atlas),
+                .map_or(SeedSource::Nothing, SeedSource::Atlas),
             recent: RecentGrips::default(),
             known_tried: 0,
             reproducible: false,
@@ -263,8 +264,8 @@ impl Maker {
         let scene = self.scene(cell);
         let (object, presented) = scene.physical()?;
         let entry = self.atlases.of(cell)?.entries().get(usize::from(entry))?;
-        let solids = entry.told_solids(scene.rig());
-        let asked = Asked::new(object, scene.rig(), presented);
+        let solids = entry.tracked_solids(scene.rig());
+        let asked = Recheck::new(object, scene.rig(), presented);
         let grasp = asked.hold(entry, &solids, &mut Gripper::default())?;
         Some(Box::new(grasp))
     }

@@ -3,7 +3,10 @@
 use std::ops::Not;
 
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
-use grasp_synthesis::strategy::{BendRatioChoice, Strategy, Validity};
+use grasp_synthesis::model::{
+    bend_ratios::BendRatioChoice,
+    strategy::{Strategy, Validity},
+};
 use serde::{Deserialize, Serialize};
 
 /// The receiving hand under the thesis' validity: the thesis' own.

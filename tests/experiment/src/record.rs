@@ -3,7 +3,7 @@
 use std::fmt;
 
 use grasp_synthesis::{
-    rejection::Rejection, search::GraspSource, synthesis::placement_measures::PlacementMeasures,
+    base::rejection::Rejection, search::GraspSource, thesis::placement_measures::PlacementMeasures,
 };
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use grasp_assets::hands::hand;
 use grasp_scene::{ContactMark, HandoverScene, Image, PosedHand, RenderOptions, contact_sheet};
-use grasp_synthesis::hand::joints::HandJoints;
+use grasp_synthesis::model::hand::joints::HandJoints;
 
 use crate::{
     data::Data,
@@ -72,7 +72,7 @@ fn picture(maker: &Maker, record: &Record) -> Option<Image> {
     let forbidden: Vec<u32> = (0..object.surface.mesh().triangles().len() as u32)
         .filter(|&triangle| object.is_forbidden(triangle))
         .collect();
-    let mark = |(contact, force): (&grasp_synthesis::grasp::Contact, &Vec3)| ContactMark {
+    let mark = |(contact, force): (&grasp_synthesis::model::grasp::Contact, &Vec3)| ContactMark {
         position: world_from_object.transform_point(contact.position),
         normal: world_from_object.transform_vector(contact.normal),
         force: world_from_object.transform_vector(*force),

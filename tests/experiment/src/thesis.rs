@@ -3,7 +3,7 @@
 //! Figures by holdout are in the order of the built-in holdouts: remote, scalpel and scissors, of each `GenHold1` to 3 and
 //! `Hold1` to 2.
 
-use grasp_synthesis::strategy::Strategy;
+use grasp_synthesis::model::strategy::Strategy;
 
 /// Attempts and milliseconds per valid grasp.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use grasp_synthesis::taxonomy::GraspType;
+use grasp_synthesis::model::grasp_type::GraspType;
 
 use crate::{
     data::Data,

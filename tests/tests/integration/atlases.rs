@@ -5,9 +5,9 @@ use std::{fs, path::PathBuf};
 use grasp_assets::{atlases::atlas, hands::hand, objects::object};
 use grasp_proto::v1;
 use grasp_synthesis::{
-    atlas::codec::decode,
-    hand::{Handedness, joints::HandJoints},
-    pose::Pose,
+    base::pose::Pose,
+    known::codec::decode,
+    model::hand::{Handedness, joints::HandJoints},
 };
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 
@@ -190,7 +190,7 @@ async fn which_fingers_can_be_spared_is_found_out_once() {
         let report = answer.report.expect("every answer has a report");
         (report.source(), answer.grasp)
     };
-    let mut spared = 0;
+    let mut subset_grasp = 0;
     for giver in atlas.entries() {
         let holdout = ClientHoldout {
             client_from_object: Pose::IDENTITY,
@@ -210,15 +210,15 @@ async fn which_fingers_can_be_spared_is_found_out_once() {
         assert_eq!(second.1, first.1);
         if second.0 == v1::GraspSource::Recent {
             assert_eq!(ask(&request).await, second);
-            spared += 1;
+            subset_grasp += 1;
         } else {
             assert_eq!(second.0, v1::GraspSource::Atlas);
         }
-        if spared == 2 {
+        if subset_grasp == 2 {
             break;
         }
     }
-    assert_eq!(spared, 2, "no giver leaves but a grip without some fingers");
+    assert_eq!(subset_grasp, 2, "no giver leaves but a grip without some fingers");
     server.stop().await;
 }
 

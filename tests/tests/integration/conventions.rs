@@ -64,7 +64,7 @@ impl Engine {
 
     fn wire(&self, pose: &v1::Pose, turn: Quat) -> v1::Pose {
         let (position, rotation) = self.pose(pose, turn);
-        wire_pose(grasp_synthesis::pose::Pose {
+        wire_pose(grasp_synthesis::base::pose::Pose {
             position,
             orientation: Quat::from_mat3(&rotation).normalize(),
         })

@@ -11,7 +11,7 @@ use grasp_client::{
     FindAnswer, FindRequest, GraspClient, HandJoints, JointPose, JointSet, NewObject, Outcome, Pose,
     PresentingHand, Strategy,
 };
-use grasp_synthesis::hand::{Handedness, joints};
+use grasp_synthesis::model::hand::{Handedness, joints};
 use grasp_tests::{
     TestServer,
     giver::{GiverPlacement, place_giver},

@@ -5,13 +5,14 @@ use std::sync::{Arc, atomic::AtomicBool};
 use grasp_assets::{atlases::atlas, hands::hand, objects::object, primitives::held_primitives};
 use grasp_proto::v1;
 use grasp_synthesis::{
-    atlas::{codec::decode, recent::RecentGrips},
-    constraints::Constraints,
-    hand::{Handedness, joints::HandJoints},
-    pose::Pose,
-    primitives::borrowed::Borrowed,
-    search::{SearchSettings, StartFrom, find_grasp},
-    strategy::{Choice, Strategy, Validity},
+    base::pose::Pose,
+    known::{codec::decode, recent_grips::RecentGrips, seed_source::SeedSource, transferred_grips::Borrowed},
+    model::{
+        constraints::Constraints,
+        hand::{Handedness, joints::HandJoints},
+        strategy::{Choice, Strategy, Validity},
+    },
+    search::{find_grasp, settings::SearchSettings},
 };
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout, searches::MonotonicClock};
 use prost::Message as _;
@@ -170,7 +171,7 @@ async fn without_an_atlas_searches_start_from_what_the_object_borrows() {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let search = |holdout: &ClientHoldout, starts: StartFrom| {
+    let search = |holdout: &ClientHoldout, starts: SeedSource| {
         let holdout = holdout.holdout(Arc::clone(scissors));
         let settings = SearchSettings {
             seed: 7,
@@ -207,10 +208,10 @@ async fn without_an_atlas_searches_start_from_what_the_object_borrows() {
         let request = reproducible_search(&holdout);
         let answer = ask(&server, request.clone()).await;
         let report = answer.report.expect("every answer has a report");
-        let expected = search(&holdout, StartFrom::Borrowed(Arc::clone(&borrowed)));
+        let expected = search(&holdout, SeedSource::Borrowed(Arc::clone(&borrowed)));
         assert_eq!(report.attempt, expected);
         assert_eq!(report.atlas_stamp, "");
-        otherwise += usize::from(search(&holdout, StartFrom::Nothing) != expected);
+        otherwise += usize::from(search(&holdout, SeedSource::Nothing) != expected);
         // The attempt alone does the same again.
         let replay = v1::FindGraspRequest {
             only_attempt: report.attempt,

@@ -4,7 +4,7 @@ use std::{future::Future, time::Duration};
 
 use glam::{Quat, Vec3};
 use grasp_proto::v1;
-use grasp_synthesis::pose::Pose;
+use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{TestServer, wire_pose};
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;

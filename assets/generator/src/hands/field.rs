@@ -4,8 +4,10 @@
 //! distance functions); neighbouring fingers are not blended with each other, only with the palm.
 
 use glam::Vec3;
-use grasp_synthesis::hand::{DigitAngles, HandPose, kinematics, rig::Rig};
-use grasp_synthesis::pose::Pose;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{DigitAngles, HandPose, kinematics, rig::Rig},
+};
 
 use super::anatomy;
 

@@ -2,11 +2,11 @@
 
 use glam::{Mat4, Vec3};
 use grasp_synthesis::{
-    hand::{
+    base::pose::Pose,
+    model::hand::{
         joints::{JOINT_COUNT, JOINT_NAMES, index},
         skin::Skin,
     },
-    pose::Pose,
 };
 use serde_json::{Value, json};
 

@@ -2,13 +2,13 @@
 
 use glam::{Mat3, Quat, Vec3};
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::Segment,
-    hand::{
+    model::hand::{
         Handedness,
         joints::{JOINT_COUNT, index},
         rig::{AngleRange, DigitLimits, DigitRig, Rig, RigGuide},
     },
-    pose::Pose,
 };
 
 use super::anatomy;

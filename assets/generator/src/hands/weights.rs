@@ -4,7 +4,7 @@
 //! its fingers. Toward the wrist the digits give way to the palm, whose weights are spread over wrist and metacarpals.
 
 use glam::Vec3;
-use grasp_synthesis::hand::{
+use grasp_synthesis::model::hand::{
     joints::{HandJoints, JOINT_COUNT, index},
     rig::Rig,
 };

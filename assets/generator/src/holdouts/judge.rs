@@ -3,10 +3,12 @@
 use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh},
-    hand::{HandPose, joints::HandJoints, kinematics::hand_frames},
-    holdout::PresentingHand,
-    pose::Pose,
+    model::{
+        hand::{HandPose, joints::HandJoints, kinematics::hand_frames},
+        holdout::PresentingHand,
+    },
 };
 
 use super::{

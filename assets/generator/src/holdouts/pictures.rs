@@ -5,7 +5,7 @@ use std::{fs, io, path::Path};
 use glam::Vec3;
 use grasp_assets::{hands::hand, holdouts::BuiltInHoldout, objects::object};
 use grasp_scene::{Camera, Finish, Part, RenderOptions, Scene, contact_sheet, linear_from_srgb, render};
-use grasp_synthesis::hand::joints::HandJoints;
+use grasp_synthesis::model::hand::joints::HandJoints;
 
 /// Where the camera is, seen from the holdout: the receiver's view, the giver's right and left, and from above.
 const VIEWS: [(&str, Vec3); 4] = [

@@ -4,12 +4,12 @@
 use glam::{Mat3, Quat, Vec2, Vec3};
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::mesh_bvh::MeshBvh,
-    hand::{
+    model::hand::{
         Digit, DigitAngles, HandPose, Phalanx,
         kinematics::{HandFrames, hand_frames},
     },
-    pose::Pose,
 };
 
 use serde::Deserialize;

@@ -7,12 +7,14 @@ use grasp_assets::{
     holdouts::BuiltInHoldout,
 };
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    constraints::Constraints,
-    hand::{Digit, HandPose, Handedness, Phalanx},
-    holdout::Holdout,
-    search::{SearchSettings, StartFrom, find_grasp},
-    strategy::{Choice, Strategy},
+    known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        constraints::Constraints,
+        hand::{Digit, HandPose, Handedness, Phalanx},
+        holdout::Holdout,
+        strategy::{Choice, Strategy},
+    },
+    search::{find_grasp, settings::SearchSettings},
 };
 
 use super::{
@@ -103,7 +105,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
         let settings = SearchSettings {
             seed,
             strategy: Strategy::F,
-            validity: grasp_synthesis::strategy::Validity::Thesis,
+            validity: grasp_synthesis::model::strategy::Validity::Thesis,
             bend_ratios: Strategy::F.default_bend_ratios(),
             friction: FRICTION,
             reproducible: true,
@@ -115,7 +117,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
-            starts: StartFrom::Nothing,
+            starts: SeedSource::Nothing,
             recent: RecentGrips::default(),
             known_tried: 0,
         };

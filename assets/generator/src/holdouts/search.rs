@@ -13,16 +13,19 @@ use std::{
 use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    clock::Clock,
-    constraints::Constraints,
+    base::clock::Clock,
     geometry::mesh_bvh::MeshBvh,
-    grasp::Grasp,
-    hand::rig::Rig,
-    holdout::Holdout,
-    object::{GraspObject, THESIS_FRICTION},
-    search::{SearchSettings, StartFrom, find_grasp},
-    strategy::{BendRatioChoice, Choice, Strategy},
+    known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        bend_ratios::BendRatioChoice,
+        constraints::Constraints,
+        grasp::Grasp,
+        hand::rig::Rig,
+        holdout::Holdout,
+        object::{GraspObject, THESIS_FRICTION},
+        strategy::{Choice, Strategy},
+    },
+    search::{find_grasp, settings::SearchSettings},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -89,7 +92,7 @@ fn next_grasp(
     let settings = SearchSettings {
         seed,
         strategy: STRATEGY,
-        validity: grasp_synthesis::strategy::Validity::Thesis,
+        validity: grasp_synthesis::model::strategy::Validity::Thesis,
         bend_ratios: BEND_RATIOS,
         friction: FRICTION,
         reproducible: true,
@@ -101,7 +104,7 @@ fn next_grasp(
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: StartFrom::Nothing,
+        starts: SeedSource::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
     };

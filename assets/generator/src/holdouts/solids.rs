@@ -4,13 +4,13 @@
 use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::mesh_bvh::MeshBvh,
-    hand::{
+    model::hand::{
         HandPose,
         joints::{HandJoints, index},
         kinematics::hand_frames,
     },
-    pose::Pose,
 };
 
 /// Samples along a capsule's axis at which its distance to the object is taken: every 5 mm on the longest phalanx.

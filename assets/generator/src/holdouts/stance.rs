@@ -1,7 +1,7 @@
 //! Turns a hold so that a person who stands at -Z could hold it out toward +Z.
 
 use glam::{Quat, Vec3};
-use grasp_synthesis::hand::HandPose;
+use grasp_synthesis::model::hand::HandPose;
 
 use super::halton::halton;
 

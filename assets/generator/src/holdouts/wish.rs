@@ -1,7 +1,7 @@
 //! What a grasp of a type looks like, and how far a grasp of the synthesis is from it.
 
 use glam::Vec3;
-use grasp_synthesis::hand::{Digit, HandPose, Phalanx};
+use grasp_synthesis::model::hand::{Digit, HandPose, Phalanx};
 
 use serde::Deserialize;
 

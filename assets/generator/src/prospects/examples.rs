@@ -2,19 +2,22 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
-    constraints::Constraints,
-    guided::{
-        proposal::Place,
-        prospects::{Bulk, TOLD},
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    model::{
+        constraints::Constraints,
+        hand::{HandPose, joints::HandJoints, rig::Rig},
+        strategy::Validity,
     },
-    hand::{HandPose, joints::HandJoints, rig::Rig},
     physical::{
-        attempt::{PhysicalAttempt, Surroundings},
         scene::{ObjectScene, Presented},
-        solids::{PreparedHand, ToldSolids},
+        solids::{PreparedHand, TrackedSolids},
     },
-    strategy::Validity,
-    synthesis::{random::AttemptStream, stopwatch::NoStopwatch},
+    propose::{
+        proposal::Place,
+        success_prior::{INPUTS, ObjectFeatures},
+    },
+    rating::assessment::Surroundings,
+    search::physical_attempt::PhysicalAttempt,
 };
 
 use super::shapes;
@@ -38,7 +41,7 @@ const SEEDS: [u64; 2] = [0x4558_414d, 0x5052_4553];
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Example {
     /// What the network is told of it.
-    pub(super) told: [f32; TOLD],
+    pub(super) told: [f32; INPUTS],
     /// Did it hold?
     pub(super) holds: bool,
 }
@@ -47,7 +50,7 @@ pub(super) struct Example {
 pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
     let object = shapes::draw(number);
     let scene = ObjectScene::new(&object, object.friction_under(Validity::Physical));
-    let bulk = Bulk::of(&object);
+    let bulk = ObjectFeatures::of(&object);
     let constraints = Constraints::default();
     let mut attempt = PhysicalAttempt::default();
     let mut holding: Vec<HandPose> = Vec::new();
@@ -102,7 +105,7 @@ fn present(holding: &[HandPose], rig: &Rig, stream: &mut AttemptStream, by_giver
     let up = stream.rotation() * Vec3::Y;
     let giver = (by_giver && holding.len() >= ENOUGH_FOR_GIVERS).then(|| {
         let pose = &holding[stream.below(holding.len())];
-        PreparedHand::new(&ToldSolids::of_joints(&HandJoints::of_pose(rig, pose)))
+        PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(rig, pose)))
     });
     Presented {
         giver,

@@ -4,7 +4,9 @@
 use std::f32::consts::TAU;
 
 use glam::Vec3;
-use grasp_synthesis::{geometry::mesh::TriangleMesh, object::GraspObject, synthesis::random::AttemptStream};
+use grasp_synthesis::{
+    base::random::AttemptStream, geometry::mesh::TriangleMesh, model::object::GraspObject,
+};
 
 /// Seed of the shapes: any will do.
 const SEED: u64 = 0x5348_4150;

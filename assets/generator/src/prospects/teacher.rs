@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use grasp_synthesis::{
-    guided::prospects::{Network, TOLD, UNITS},
-    synthesis::random::AttemptStream,
+    base::random::AttemptStream,
+    propose::success_prior::{INPUTS, Network, UNITS},
 };
 
 use super::examples::Example;
@@ -32,14 +32,14 @@ const MOST_WEIGHT: f64 = 60.0;
 const SEEDS: [u64; 2] = [0x4649_5253, 0x4241_5443];
 
 /// Numbers that are taught: per unit its weights, its bias and its output; and one more.
-const NUMBERS: usize = UNITS * (TOLD + 2) + 1;
-const BIASES: usize = UNITS * TOLD;
+const NUMBERS: usize = UNITS * (INPUTS + 2) + 1;
+const BIASES: usize = UNITS * INPUTS;
 const OUTPUTS: usize = BIASES + UNITS;
 const OUTPUT_BIAS: usize = NUMBERS - 1;
 
 /// An example as the network sees it.
 struct Lesson {
-    scaled: [f32; TOLD],
+    scaled: [f32; INPUTS],
     holds: bool,
     weight: f32,
 }
@@ -78,7 +78,7 @@ fn untaught(by_shape: &[Vec<Example>]) -> Network {
     Network {
         means,
         scales,
-        weights: [[0.0; UNITS]; TOLD],
+        weights: [[0.0; UNITS]; INPUTS],
         biases: [0.0; UNITS],
         outputs: [0.0; UNITS],
         output_bias: 0.0,
@@ -86,10 +86,10 @@ fn untaught(by_shape: &[Vec<Example>]) -> Network {
 }
 
 /// Mean and inverse standard deviation of all that is told.
-fn spread(by_shape: &[Vec<Example>]) -> ([f32; TOLD], [f32; TOLD]) {
+fn spread(by_shape: &[Vec<Example>]) -> ([f32; INPUTS], [f32; INPUTS]) {
     let count = by_shape.iter().map(Vec::len).sum::<usize>() as f64;
     let mean = |of: &dyn Fn(&Example) -> f64| by_shape.iter().flatten().map(of).sum::<f64>() / count;
-    let means: [f64; TOLD] = std::array::from_fn(|i| mean(&|example| f64::from(example.told[i])));
+    let means: [f64; INPUTS] = std::array::from_fn(|i| mean(&|example| f64::from(example.told[i])));
     let scales = std::array::from_fn(|i| {
         let variance = mean(&|example| (f64::from(example.told[i]) - means[i]).powi(2));
         variance.sqrt().max(1e-6).recip() as f32
@@ -119,7 +119,7 @@ fn lessons(by_shape: &[Vec<Example>], network: &Network) -> Vec<Lesson> {
 fn first_numbers() -> Vec<f32> {
     let mut stream = AttemptStream::new(SEEDS[0], 0);
     // He and others, 2015, with an even distribution.
-    let [hidden, output] = [TOLD, UNITS].map(|told| (6.0 / told as f32).sqrt());
+    let [hidden, output] = [INPUTS, UNITS].map(|told| (6.0 / told as f32).sqrt());
     (0..NUMBERS)
         .map(|i| match i {
             ..BIASES => stream.between(-hidden, hidden),
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     fn example(stream: &mut AttemptStream) -> Example {
-        let told: [f32; TOLD] = std::array::from_fn(|_| stream.between(-1.0, 1.0));
+        let told: [f32; INPUTS] = std::array::from_fn(|_| stream.between(-1.0, 1.0));
         // A rule that no weighted sum follows.
         let holds = (told[3] - told[7]).abs() < 0.4;
         Example { told, holds }

@@ -19,7 +19,7 @@ use grasp_experiment::{
     plan::{MOST_PER_CELL, Set, Settings},
     run::{RunEnd, run as run_missing},
 };
-use grasp_synthesis::strategy::Strategy;
+use grasp_synthesis::model::strategy::Strategy;
 
 use super::{EXIT_CODES, Ending, blocking, failure::Failure, holdout, output::Output};
 use progress::Progress;

@@ -6,11 +6,11 @@ use grasp_client::{
 };
 use grasp_scene::PosedHand;
 use grasp_synthesis::{
-    hand::{
+    base::pose,
+    model::hand::{
         self as synthesis, DigitAngles, HandPose,
         joints::{Joint, index, thesis_from_openxr_frame},
     },
-    pose,
 };
 
 use super::SceneHand;

@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::Vec3;
 use grasp_client::{Contact, Convention, Digit, FindRequest, Grasp, Phalanx};
 use grasp_scene::{ContactMark, HandoverScene, Image, PosedHand, RenderOptions, to_glb};
-use grasp_synthesis::hand;
+use grasp_synthesis::model::hand;
 
 use super::{failure::Failure, values::ViewSize};
 pub(super) use object::Model;

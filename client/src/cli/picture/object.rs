@@ -7,7 +7,7 @@ use grasp_assets::{
     objects::object,
 };
 use grasp_scene::{Finish, linear_from_srgb};
-use grasp_synthesis::{geometry::mesh::TriangleMesh, object::GraspObject};
+use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
 use crate::cli::failure::Failure;
 

@@ -7,11 +7,13 @@ use std::{
 
 use glam::{DQuat, DVec3, Quat, Vec3};
 use grasp_synthesis::{
-    constraints::{ApproachCone, Constraints, DigitSet, Reach, TypeSet, approach_direction},
-    grasp::Contact,
-    hand::{Digit, HandPart, Phalanx},
-    pose::Pose,
-    taxonomy::GraspType,
+    base::pose::Pose,
+    model::{
+        constraints::{ApproachCone, Constraints, DigitSet, Reach, TypeSet, approach_direction},
+        grasp::Contact,
+        grasp_type::GraspType,
+        hand::{Digit, HandPart, Phalanx},
+    },
 };
 use proptest::{
     collection::{btree_set, hash_set, vec},

@@ -2,15 +2,18 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
-    grasp::Contact,
-    hand::{Digit, HandPart, Phalanx},
-    object::THESIS_FRICTION,
-    synthesis::{
-        comfort::comfort,
-        force_distribution::{COMFORTABLE_SHARES, ForceDistribution, contact_counts},
+    base::random::AttemptStream,
+    model::{
+        forces::{COMFORTABLE_SHARES, GRAVITY},
+        grasp::Contact,
+        hand::{Digit, HandPart, Phalanx},
+        object::THESIS_FRICTION,
+    },
+    rating::comfort::comfort,
+    thesis::{
+        force_distribution::{ForceDistribution, contact_counts},
         immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers, Load},
-        random::AttemptStream,
-        wrenches::{GRAVITY, Wrench, four_unit_wrenches, printed_cone_cos},
+        wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
     },
 };
 

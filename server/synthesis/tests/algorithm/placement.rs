@@ -2,17 +2,14 @@
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::{
+    base::{pose::Pose, random::AttemptStream},
     geometry::mesh::TriangleMesh,
-    hand::rig::Rig,
-    holdout::Holdout,
-    pose::Pose,
-    strategy::Strategy,
-    synthesis::{
+    model::{hand::rig::Rig, holdout::Holdout, strategy::Strategy},
+    thesis::{
         placement_measures::{
             FORWARD_WRIST_ANGLE_DEGREES, PALM_COM_PALM_ANGLE_DEGREES, PALM_DISTANCE, PlacementMeasures,
             UPWARD_WRIST_ANGLE_DEGREES, WRIST_ANGLE_SUM_DEGREES, WRIST_DISTANCE,
         },
-        random::AttemptStream,
         wrist_placement::WristPlacer,
     },
 };
@@ -71,7 +68,7 @@ fn accepted_placements_have_their_measures_in_range() {
             let upward = angle(rotation * DVec3::Y, to_object);
             let forward = angle(rotation * DVec3::Z, to_object);
             let in_range =
-                |value: f64, range: grasp_synthesis::synthesis::placement_measures::MeasureRange, slack| {
+                |value: f64, range: grasp_synthesis::thesis::placement_measures::MeasureRange, slack| {
                     assert!(
                         value > f64::from(range.min) - slack && value < f64::from(range.max) + slack,
                         "{value} is not in {range:?}"

@@ -2,17 +2,18 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
+    base::{pose::Pose, random::AttemptStream, rejection::Rejection},
     geometry::{Segment, mesh_bvh::SegmentHit},
-    hand::{Digit, DigitAngles, kinematics::digit_frames, rig::DigitRig},
-    holdout::Holdout,
-    object::GraspObject,
-    pose::Pose,
-    rejection::Rejection,
-    strategy::{BendRatioChoice, Strategy},
-    synthesis::{
+    model::{
+        bend_ratios::BendRatioChoice,
+        hand::{Digit, DigitAngles, kinematics::digit_frames, rig::DigitRig},
+        holdout::Holdout,
+        object::GraspObject,
+        strategy::Strategy,
+    },
+    thesis::{
         closing_motion::{DigitMotion, hand_motion},
         finger_posing::{PosedDigit, find_touching_finger_pose, missing_contacts},
-        random::AttemptStream,
         wrist_placement::{WristFrame, WristPlacer},
     },
 };

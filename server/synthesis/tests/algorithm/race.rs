@@ -4,12 +4,9 @@ use std::sync::{OnceLock, atomic::AtomicBool};
 
 use glam::Vec3;
 use grasp_synthesis::{
-    grasp::Grasp,
-    hand::HandPart,
-    holdout::Holdout,
-    rejection::Rejection,
-    search::{SearchEnd, SearchOutcome, SearchSettings, find_grasp},
-    strategy::Strategy,
+    base::rejection::Rejection,
+    model::{grasp::Grasp, hand::HandPart, holdout::Holdout, strategy::Strategy},
+    search::{SearchEnd, SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 use crate::support::{

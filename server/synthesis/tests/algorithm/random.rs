@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use glam::Vec3;
-use grasp_synthesis::synthesis::random::AttemptStream;
+use grasp_synthesis::base::random::AttemptStream;
 
 /// Streams of neighbouring seeds and attempts share nothing.
 #[test]

@@ -12,9 +12,9 @@ use std::{
 
 use glam::Vec3;
 use grasp_synthesis::{
-    clock::Clock,
-    search::{SearchEnd, SearchSettings, find_grasp},
-    strategy::Strategy,
+    base::clock::Clock,
+    model::strategy::Strategy,
+    search::{SearchEnd, find_grasp, settings::SearchSettings},
 };
 
 use crate::{

@@ -10,20 +10,21 @@ use std::{
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    clock::Clock,
-    constraints::Constraints,
+    base::{clock::Clock, pose::Pose},
     geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh},
-    hand::{
-        HandPose, Handedness,
-        joints::HandJoints,
-        rig::{AngleRange, DigitLimits, DigitRig, Rig, RigGuide},
+    known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        constraints::Constraints,
+        hand::{
+            HandPose, Handedness,
+            joints::HandJoints,
+            rig::{AngleRange, DigitLimits, DigitRig, Rig, RigGuide},
+        },
+        holdout::{Holdout, PresentingHand},
+        object::{GraspObject, THESIS_FRICTION},
+        strategy::{Choice, Strategy},
     },
-    holdout::{Holdout, PresentingHand},
-    object::{GraspObject, THESIS_FRICTION},
-    pose::Pose,
-    search::{SearchSettings, StartFrom},
-    strategy::{Choice, Strategy},
+    search::settings::SearchSettings,
 };
 
 /// A clock that stands still until it is told to move.
@@ -244,7 +245,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
     SearchSettings {
         seed: 20_231,
         strategy,
-        validity: grasp_synthesis::strategy::Validity::Thesis,
+        validity: grasp_synthesis::model::strategy::Validity::Thesis,
         bend_ratios: strategy.default_bend_ratios(),
         friction: THESIS_FRICTION,
         reproducible: true,
@@ -256,7 +257,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: StartFrom::Nothing,
+        starts: SeedSource::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
     }

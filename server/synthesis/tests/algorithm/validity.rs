@@ -3,16 +3,18 @@
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::{
+    base::{pose::Pose, rejection::Rejection},
     geometry::mesh::TriangleMesh,
-    grasp::Grasp,
-    hand::{Digit, HandPart, HandPose, kinematics::hand_frames, rig::Rig},
-    holdout::Holdout,
-    object::GraspObject,
-    pose::Pose,
-    rejection::Rejection,
-    search::{SearchEnd, SearchSettings, find_grasp},
-    strategy::{BendRatioChoice, Strategy},
-    synthesis::{
+    model::{
+        bend_ratios::BendRatioChoice,
+        grasp::Grasp,
+        hand::{Digit, HandPart, HandPose, kinematics::hand_frames, rig::Rig},
+        holdout::Holdout,
+        object::GraspObject,
+        strategy::Strategy,
+    },
+    search::{SearchEnd, find_grasp, settings::SearchSettings},
+    thesis::{
         collision_validation::collision, finger_posing::PosedDigit, placement_measures::PlacementMeasures,
         wrist_placement::WristFrame,
     },

@@ -2,9 +2,9 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::{mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
     physical::solids::{clearance, closest, comes_within},
-    pose::Pose,
 };
 
 use crate::{files, meshes, random::Random};

@@ -2,15 +2,17 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::mesh::MeshError,
-    hand::{
-        Handedness,
-        joints::{HandJoints, JOINT_COUNT, Joint, index},
-        skin::Skin,
+    model::{
+        hand::{
+            Handedness,
+            joints::{HandJoints, JOINT_COUNT, Joint, index},
+            skin::Skin,
+        },
+        holdout::{Holdout, HoldoutError, PresentingHand, PresentingHandError},
+        object::{GraspObject, MAX_NAMED_TRIANGLES, ObjectError},
     },
-    holdout::{Holdout, HoldoutError, PresentingHand, PresentingHandError},
-    object::{GraspObject, MAX_NAMED_TRIANGLES, ObjectError},
-    pose::Pose,
 };
 
 use crate::{meshes, random::Random};

@@ -2,12 +2,12 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
-    hand::Digit,
+    model::hand::Digit,
     physical::immobility::{
         BALANCE_TOLERANCE, Balance, Buffers, FrictionUse, Load, MAX_CONTACT_FORCE, SoftContact, balance,
         balance_with,
     },
-    synthesis::comfort::comfort,
+    rating::comfort::comfort,
 };
 
 use crate::support::{Random, contacts_at, load, moved, scaled};

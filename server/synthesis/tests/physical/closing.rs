@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh},
-    hand::{
+    model::hand::{
         DigitAngles,
         kinematics::{DigitPlane, digit_frames},
         rig::{AngleRange, DigitLimits, DigitRig},
@@ -14,7 +15,6 @@ use grasp_synthesis::{
         obstacle::Obstacle,
         solids::{SOFT_CONTACT, TaperedCapsule, clearance, link_solids},
     },
-    pose::Pose,
 };
 
 use crate::support::Random;
@@ -231,8 +231,8 @@ fn nothing_is_passed_on_the_way() {
 
 /// The distance between two capsules' skins by brute force: the closest pair of many balls on both.
 fn distance_by_balls(a: &TaperedCapsule, b: &TaperedCapsule) -> f32 {
-    const BALLS: usize = 60;
-    let shares = || (0..=BALLS).map(|i| i as f32 / BALLS as f32);
+    const SPHERES: usize = 60;
+    let shares = || (0..=SPHERES).map(|i| i as f32 / SPHERES as f32);
     shares()
         .flat_map(|s| shares().map(move |t| (s, t)))
         .map(|(s, t)| a.at(s).distance(b.at(t)) - a.radius_at(s) - b.radius_at(t))

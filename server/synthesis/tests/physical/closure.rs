@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use grasp_synthesis::physical::immobility::{
-    Buffers, EPSILON_TOLERANCE, Load, SoftContact, epsilon, epsilon_at_most,
+    Buffers, EPSILON_TOLERANCE, Load, SoftContact, epsilon, epsilon_upper_bound,
 };
 
 use crate::support::{Random, contacts_at, load, moved, pyramid_wrenches, sampled_reach, scaled, unit};
@@ -12,7 +12,7 @@ fn whole(contacts: &[SoftContact], load: &Load) -> f32 {
 }
 
 fn bound(contacts: &[SoftContact], load: &Load) -> f32 {
-    epsilon_at_most(contacts, load, &mut Buffers::default())
+    epsilon_upper_bound(contacts, load, &mut Buffers::default())
 }
 
 /// A lower bound of the truth, at most the tolerance below it.

@@ -2,10 +2,11 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
+    base::pose::Pose,
     physical::solids::{
-        BALLS, Balls, HandSolids, PALM_SOLIDS, PreparedHand, TOLD_SOLIDS, TaperedCapsule, ToldSolids,
+        HandSolids, PALM_SOLIDS, PreparedHand, SPHERES, Spheres, TRACKED_SOLIDS, TaperedCapsule,
+        TrackedSolids,
     },
-    pose::Pose,
 };
 
 use crate::support::Random;
@@ -19,11 +20,11 @@ fn solid(random: &mut Random, middle: Vec3, length: f32, thick: f32) -> TaperedC
 }
 
 /// A hand as [`hand`], thicker than beside an object.
-fn told_hand(random: &mut Random, middle: Vec3) -> ToldSolids {
-    ToldSolids {
+fn told_hand(random: &mut Random, middle: Vec3) -> TrackedSolids {
+    TrackedSolids {
         hand: hand(random, middle),
         palm: [(); PALM_SOLIDS].map(|()| solid(random, middle, 0.07, 0.019)),
-        told: [(); TOLD_SOLIDS].map(|()| solid(random, middle, 0.07, 0.017)),
+        told: [(); TRACKED_SOLIDS].map(|()| solid(random, middle, 0.07, 0.017)),
     }
 }
 
@@ -38,7 +39,7 @@ fn hand(random: &mut Random, middle: Vec3) -> HandSolids {
     }
 }
 
-fn least_of_all_pairs<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, theirs: &ToldSolids) -> f32 {
+fn least_of_all_pairs<'a>(ours: impl Iterator<Item = &'a TaperedCapsule>, theirs: &TrackedSolids) -> f32 {
     ours.map(|our| {
         let distances = theirs.iter().map(|their| our.distance(their));
         distances.fold(f32::INFINITY, f32::min)
@@ -103,12 +104,12 @@ fn moved_balls_are_near_where_one_of_them_is() {
     for case in 0..2000 {
         let solids = told_hand(&mut random, Vec3::ZERO);
         let giver = PreparedHand::new(&solids);
-        let middles: [Vec3; BALLS] =
+        let middles: [Vec3; SPHERES] =
             std::array::from_fn(|_| random.direction() * random.between(0.1, 0.2) + Vec3::X * 0.1);
-        let radii: [f32; BALLS] = std::array::from_fn(|_| random.between(0.004, 0.012));
+        let radii: [f32; SPHERES] = std::array::from_fn(|_| random.between(0.004, 0.012));
         let turn = Quat::from_axis_angle(random.direction(), random.between(-3.0, 3.0));
         let way = Pose::new(random.direction() * random.between(0.0, 0.1), turn);
-        let balls = Balls::new(|i| (middles[i], radii[i])).transformed(way);
+        let balls = Spheres::new(|i| (middles[i], radii[i])).transformed(way);
         let nears = |distance: f32| {
             let mut each = middles.iter().zip(radii);
             each.any(|(middle, radius)| giver.surely_nears(way.transform_point(*middle), radius, distance))
@@ -125,7 +126,7 @@ fn moved_balls_are_near_where_one_of_them_is() {
         }
 
         // Ball by ball and solid by solid, each is no farther than told, and near as it is alone.
-        let told = giver.distances_at_most(&balls);
+        let told = giver.distance_upper_bounds(&balls);
         let near_ones = giver.surely_near(&balls, 0.001, |_| false);
         for (ball, (middle, radius)) in middles.into_iter().zip(radii).enumerate() {
             let middle = way.transform_point(middle);
@@ -160,7 +161,7 @@ fn points_are_as_far_as_from_the_nearest_solid() {
     for _ in 0..2000 {
         let giver = told_hand(&mut random, Vec3::ZERO);
         let point = random.direction() * random.between(0.0, 0.3);
-        let told = PreparedHand::new(&giver).point_distance_at_most(point);
+        let told = PreparedHand::new(&giver).point_distance_upper_bound(point);
         let least = giver.iter().map(|solid| solid.signed_distance(point));
         let least = least.fold(f32::INFINITY, f32::min);
         assert!(told >= least - 1e-5, "{told} is less than {least}");

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Quat, Vec3};
 use grasp_synthesis::{
-    hand::Digit,
+    model::hand::Digit,
     physical::immobility::{Load, SoftContact},
 };
 use rand::{RngExt, SeedableRng};

@@ -1,8 +1,8 @@
 //! Wrist placement (5.3).
 
 use grasp_synthesis::{
-    rejection::Rejection,
-    strategy::Strategy::{A, B, C},
+    base::rejection::Rejection,
+    model::strategy::Strategy::{A, B, C},
 };
 
 use super::{Claim, Verdict, verdict_of, verdict_of_ratio};

@@ -1,9 +1,11 @@
 //! Finger posing (5.4).
 
 use grasp_synthesis::{
-    hand::Digit,
-    rejection::Rejection,
-    strategy::Strategy::{C, D, E},
+    base::rejection::Rejection,
+    model::{
+        hand::Digit,
+        strategy::Strategy::{C, D, E},
+    },
 };
 
 use super::{Claim, Verdict, verdict_of, verdict_of_ratio};

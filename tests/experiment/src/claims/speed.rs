@@ -1,6 +1,6 @@
 //! The whole ladder (end of 5.6).
 
-use grasp_synthesis::strategy::Strategy::{A, E, F};
+use grasp_synthesis::model::strategy::Strategy::{A, E, F};
 
 use super::{Claim, verdict_of_ratio};
 use crate::{data::Data, plan::Set, tables::column_means};

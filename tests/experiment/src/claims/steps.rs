@@ -1,8 +1,8 @@
 //! How the naive synthesis ends and what its steps take (5.2), and Immobility Validation (5.5, 5.6).
 
 use grasp_synthesis::{
-    rejection::Rejection,
-    strategy::Strategy::{self, A, F},
+    base::rejection::Rejection,
+    model::strategy::Strategy::{self, A, F},
 };
 
 use super::{Claim, Verdict, verdict_of, verdict_of_ratio};

@@ -1,6 +1,6 @@
 //! Yaw angles, bend angles and bend ratios.
 
-use grasp_synthesis::{hand::Digit, strategy::Strategy};
+use grasp_synthesis::model::{hand::Digit, strategy::Strategy};
 
 use super::Figure;
 use crate::{

@@ -1,6 +1,6 @@
 //! How attempts end and what they take.
 
-use grasp_synthesis::{rejection::Rejection, strategy::Strategy};
+use grasp_synthesis::{base::rejection::Rejection, model::strategy::Strategy};
 
 use super::{Figure, KINDS};
 use crate::{

@@ -1,6 +1,6 @@
 //! The measures of wrist placements.
 
-use grasp_synthesis::{rejection::Rejection, strategy::Strategy};
+use grasp_synthesis::{base::rejection::Rejection, model::strategy::Strategy};
 
 use super::{Figure, KINDS, colour_of};
 use crate::{

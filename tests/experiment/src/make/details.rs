@@ -1,15 +1,21 @@
 //! A closer look at one attempt, or at one grip of an atlas.
 
 use grasp_synthesis::{
-    grasp::{Contact, Grasp},
-    hand::{Digit, HandPart},
-    pose::Pose,
-    rejection::Rejection,
-    strategy::Validity,
-    synthesis::{
-        attempt::{Attempt, AttemptEnd},
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        rejection::Rejection,
+        stopwatch::{StepStopwatch, StepTimes, Stopwatch as _},
+    },
+    model::{
+        grasp::{Contact, Grasp},
+        hand::{Digit, HandPart},
+        strategy::Validity,
+    },
+    rating::comfort::comfort,
+    search::attempt::{Attempt, AttemptEnd},
+    thesis::{
         closing_motion::hand_motion,
-        comfort::comfort,
         finger_posing::{PosedDigit, close_digit},
         force_distribution::{ForceDistribution, contact_counts},
         immobility_validation::{
@@ -17,8 +23,6 @@ use grasp_synthesis::{
             ImmobilityBuffers, Load,
         },
         placement_measures::PlacementMeasures,
-        random::AttemptStream,
-        stopwatch::{StepStopwatch, StepTimes, Stopwatch as _},
         wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
     },
 };

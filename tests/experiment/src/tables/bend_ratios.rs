@@ -1,6 +1,6 @@
 //! Bend angles and bend ratios (Figures 5.17 to 5.20).
 
-use grasp_synthesis::{hand::Digit, strategy::Strategy, synthesis::closing_motion::BEND_RATIOS};
+use grasp_synthesis::model::{bend_ratios::BEND_RATIOS, hand::Digit, strategy::Strategy};
 
 use super::ladder::{column_letter, mean_of_means};
 use crate::{

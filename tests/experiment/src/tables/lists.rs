@@ -1,6 +1,6 @@
 //! Everything, row by row: what the figures are drawn from, and what makes every row again.
 
-use grasp_synthesis::{hand::Digit, rejection::Rejection};
+use grasp_synthesis::{base::rejection::Rejection, model::hand::Digit};
 use serde::Serialize;
 
 use super::comfort::{contacts_of, touching_digits};

@@ -1,6 +1,6 @@
 //! How attempts end, and what they take until then (Figures 5.5b to 5.7, 5.12b, 5.14b, 5.16b, 5.21b, 5.22).
 
-use grasp_synthesis::rejection::Rejection;
+use grasp_synthesis::base::rejection::Rejection;
 
 use crate::{
     data::Data,

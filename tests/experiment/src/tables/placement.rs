@@ -2,9 +2,11 @@
 
 use grasp_assets::hands::hand;
 use grasp_synthesis::{
-    hand::{Digit, Handedness},
-    strategy::Strategy,
-    synthesis::placement_measures::{
+    model::{
+        hand::{Digit, Handedness},
+        strategy::Strategy,
+    },
+    thesis::placement_measures::{
         FORWARD_WRIST_ANGLE_DEGREES, MeasureRange, PALM_COM_PALM_ANGLE_DEGREES, PALM_DISTANCE,
         UPWARD_WRIST_ANGLE_DEGREES, WRIST_ANGLE_SUM_DEGREES, WRIST_DISTANCE,
     },

@@ -1,6 +1,6 @@
 //! Grasp types of the taxonomy (2.4, 6.1).
 
-use grasp_synthesis::taxonomy::GraspType;
+use grasp_synthesis::model::grasp_type::GraspType;
 
 use crate::{
     table::{Table, Value},

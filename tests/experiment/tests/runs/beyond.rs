@@ -20,18 +20,20 @@ use grasp_experiment::{
     table::Value,
 };
 use grasp_synthesis::{
-    atlas::{
-        Atlas,
-        asked::Asked,
+    known::{
+        atlas::Atlas,
         codec::{AtlasError, encode},
         growth::Growth,
+        recheck::Recheck,
     },
-    hand::{Handedness, rig::Rig},
+    model::{
+        hand::{Handedness, rig::Rig},
+        strategy::Validity,
+    },
     physical::{
         grip::Gripper,
         scene::{ObjectScene, Presented},
     },
-    strategy::Validity,
 };
 
 use crate::support::{Scratch, complete, index_of, maker, open, small};
@@ -100,8 +102,8 @@ fn an_atlas_answers_with_its_first_grip_that_holds() {
         let presented = Presented::of(&holdout);
         let held = |entry: u16| {
             let entry = &SMALL_ATLAS.0.entries()[usize::from(entry)];
-            let asked = Asked::new(&object, adult(), &presented);
-            asked.hold(entry, &entry.told_solids(adult()), &mut Gripper::default())
+            let asked = Recheck::new(&object, adult(), &presented);
+            asked.hold(entry, &entry.tracked_solids(adult()), &mut Gripper::default())
         };
         let (atlas, up) = (&SMALL_ATLAS.0, presented.up);
         let listed = atlas.shortlist(up).iter().map(|listed| listed.entry);

@@ -13,7 +13,7 @@ use grasp_experiment::{
     run::{RunEnd, run},
 };
 
-use grasp_synthesis::strategy::Strategy;
+use grasp_synthesis::model::strategy::Strategy;
 
 use crate::support::{Scratch, complete, maker, open, small, timeless};
 

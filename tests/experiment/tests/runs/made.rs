@@ -5,13 +5,15 @@ use std::{sync::atomic::AtomicBool, time::Duration};
 use grasp_assets::hands::hand;
 use grasp_experiment::{plan::Settings, record::Record};
 use grasp_synthesis::{
-    atlas::recent::RecentGrips,
-    clock::Clock,
-    constraints::Constraints,
-    hand::Handedness,
-    rejection::Rejection,
-    search::{SearchOutcome, SearchSettings, StartFrom, find_grasp},
-    strategy::{BendRatioChoice, Choice, Strategy, Validity},
+    base::{clock::Clock, rejection::Rejection},
+    known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    model::{
+        bend_ratios::BendRatioChoice,
+        constraints::Constraints,
+        hand::Handedness,
+        strategy::{Choice, Strategy, Validity},
+    },
+    search::{SearchOutcome, find_grasp, settings::SearchSettings},
 };
 
 use crate::support::{Scratch, complete, small};
@@ -51,7 +53,7 @@ fn search(record: &Record, first_attempt: u64, max_attempts: u64) -> SearchOutco
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,
-        starts: StartFrom::Nothing,
+        starts: SeedSource::Nothing,
         recent: RecentGrips::default(),
         known_tried: 0,
     };

@@ -7,7 +7,7 @@ use grasp_experiment::{
     plan::{Set, Settings},
     report::{self, Report, command_line},
 };
-use grasp_synthesis::{strategy::Strategy, taxonomy::GraspType};
+use grasp_synthesis::model::{grasp_type::GraspType, strategy::Strategy};
 
 use crate::{
     beyond,

@@ -14,7 +14,7 @@ use grasp_experiment::{
     record::{Record, Source},
     run::{RunEnd, run},
 };
-use grasp_synthesis::strategy::Strategy;
+use grasp_synthesis::model::strategy::Strategy;
 
 /// A folder of its own that is gone when the test is over.
 pub(crate) struct Scratch(PathBuf);
