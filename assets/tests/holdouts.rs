@@ -13,6 +13,7 @@ use grasp_synthesis::{
     base::clock::Clock,
     geometry::{Segment, mesh_bvh::MeshBvh},
     known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -321,6 +322,7 @@ fn synthesized_grasps_are_found_again() {
             deadline: None,
             workers: 1,
             record_step_times: false,
+            mechanisms: Mechanisms::ALL,
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,
@@ -361,6 +363,7 @@ fn a_receiver_finds_a_grasp_on_each() {
             deadline: None,
             workers: 2,
             record_step_times: false,
+            mechanisms: Mechanisms::ALL,
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,

@@ -20,6 +20,7 @@ use grasp_synthesis::{
         seed_source::SeedSource,
         transferred_grips::{Among, Borrowed},
     },
+    base::mechanisms::Mechanisms,
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -309,6 +310,7 @@ fn search(holdout: &Holdout, starts: SeedSource, seed: u64, workers: usize) -> S
         deadline: None,
         workers,
         record_step_times: false,
+        mechanisms: Mechanisms::ALL,
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(workers)

@@ -7,6 +7,7 @@ use grasp_assets::{hands::hand, objects::object};
 use grasp_synthesis::{
     base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
     geometry::mesh::TriangleMesh,
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{HandPose, Handedness, joints::HandJoints, rig::Rig},
@@ -48,6 +49,7 @@ fn place(object: &GraspObject) -> Place<'_> {
         giver: None,
         rig: rig(Handedness::Right),
         repertoire: None,
+        mechanisms: Mechanisms::ALL,
     }
 }
 

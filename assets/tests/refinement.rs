@@ -6,6 +6,7 @@ use glam::Vec3;
 use grasp_assets::{hands::hand, objects::object};
 use grasp_synthesis::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::mechanisms::Mechanisms,
     model::{constraints::Constraints, hand::Handedness, holdout::Holdout, strategy::Validity},
     physical::scene::{ObjectScene, Presented},
     propose::proposal::{Place, propose},
@@ -32,6 +33,7 @@ fn what_holds_stays_and_more_holds_beside_near_misses() {
         giver: None,
         rig,
         repertoire: None,
+        mechanisms: Mechanisms::ALL,
     };
     let (mut plain, mut refining) = (PhysicalAttempt::default(), PhysicalAttempt::default());
     let (mut held, mut refined) = (0, 0);

@@ -6,6 +6,7 @@ use glam::Vec3;
 use grasp_assets::{hands::hand, objects::object};
 use grasp_synthesis::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{Digit, HandPose, Handedness, rig::Rig},
@@ -42,6 +43,7 @@ fn place<'a>(object: &'a GraspObject, repertoire: Option<&'a PlacementCache>) ->
         giver: None,
         rig: rig(Handedness::Right),
         repertoire,
+        mechanisms: Mechanisms::ALL,
     }
 }
 

@@ -192,6 +192,7 @@ impl Server {
             budgets: config.budgets,
             obj_limits,
             default_rig: config.default_rig,
+            mechanisms: config.mechanisms,
         };
         Ok(Self {
             shared: Arc::new(shared),

@@ -12,6 +12,7 @@ use grasp_assets::{
 use grasp_synthesis::{
     base::clock::Clock,
     known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{Handedness, rig::Rig},
@@ -111,6 +112,7 @@ impl Bench {
             deadline: None,
             workers: self.workers,
             record_step_times: false,
+            mechanisms: Mechanisms::ALL,
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,

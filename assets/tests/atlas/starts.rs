@@ -13,6 +13,7 @@ use grasp_synthesis::{
         seed_source::SeedSource,
         seeds::{Start, Starts},
     },
+    base::mechanisms::Mechanisms,
     model::{constraints::Constraints, hand::Handedness, holdout::Holdout, strategy::Validity},
     physical::{
         grip::GIVER_CLEARANCE,
@@ -139,6 +140,7 @@ fn hands_beside_known_grips_hold_more_often_where_a_giver_leaves_little() {
             giver: Some(giver),
             rig,
             repertoire: None,
+            mechanisms: Mechanisms::ALL,
         };
         let mut attempt = PhysicalAttempt::default();
         let mut count = |propose: &dyn Fn(&mut AttemptStream) -> Option<Proposal>| {

@@ -14,6 +14,7 @@ use grasp_synthesis::{
         recent_grips::RecentGrips,
         seed_source::SeedSource,
     },
+    base::mechanisms::Mechanisms,
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -112,6 +113,7 @@ pub(crate) fn reproducible(holdout: &Holdout) -> SearchSettings {
         deadline: None,
         workers: 1,
         record_step_times: false,
+        mechanisms: Mechanisms::ALL,
     }
 }
 

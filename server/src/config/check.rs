@@ -99,6 +99,7 @@ impl RawConfig {
                     _ => None,
                 },
             ),
+            mechanisms: defaults.mechanisms,
             log: check.parsed("log", self.log, defaults.log, "a filter such as info", |text| {
                 tracing_subscriber::EnvFilter::try_new(text)
                     .ok()

@@ -7,6 +7,8 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration
 
 pub use raw::{RawConfig, read_file, unknown_variables};
 
+use grasp_synthesis::base::mechanisms::Mechanisms;
+
 use crate::{budget::BudgetLimits, objects::store::StoreLimits};
 
 /// How the log is written.
@@ -55,6 +57,8 @@ pub struct Config {
     pub log_format: LogFormat,
     /// What is logged, as a filter of `tracing-subscriber`: `info`, `grasp_server=debug,h2=warn`, …
     pub log: String,
+    /// The mechanisms that searches run. No file or variable sets them: fewer are for measuring what each is worth.
+    pub mechanisms: Mechanisms,
 }
 
 impl Default for Config {
@@ -88,6 +92,7 @@ impl Default for Config {
             default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,
             log: "info".to_owned(),
+            mechanisms: Mechanisms::ALL,
         }
     }
 }

@@ -9,6 +9,7 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::clock::Clock,
     known::{entry::Entry, recent_grips::RecentGrips, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         holdout::{Holdout, PresentingHand},
         object::GraspObject,
@@ -51,6 +52,8 @@ pub(crate) struct FindJob {
     pub workers: usize,
     /// Grips that are known for the object and the hand.
     pub known: Known,
+    /// The mechanisms that the search runs.
+    pub mechanisms: Mechanisms,
 }
 
 /// What a search came to.
@@ -154,6 +157,7 @@ impl FindJob {
             deadline: Some(self.budget),
             workers: self.workers,
             record_step_times: query.record_step_times,
+            mechanisms: self.mechanisms,
         };
         Ok(PreparedJob {
             query,
@@ -422,6 +426,7 @@ mod tests {
                 arrived,
                 workers: 1,
                 known: Known::default(),
+                mechanisms: Mechanisms::ALL,
             };
             match job
                 .prepare()

@@ -73,6 +73,7 @@ impl GraspHandler {
             query,
             workers: shared.executor.workers(),
             known,
+            mechanisms: shared.mechanisms,
         };
         let answered = if job.may_be_known() {
             let mut job = job.prepare()?;

@@ -6,6 +6,7 @@ mod objects;
 use std::sync::Arc;
 
 use grasp_assets::obj::ObjLimits;
+use grasp_synthesis::base::mechanisms::Mechanisms;
 
 pub(crate) use grasp::GraspHandler;
 pub(crate) use objects::ObjectHandler;
@@ -29,6 +30,8 @@ pub(crate) struct Shared {
     pub obj_limits: ObjLimits,
     /// The receiving hand's rig unless a request names one.
     pub default_rig: String,
+    /// The mechanisms that searches run.
+    pub mechanisms: Mechanisms,
 }
 
 /// An OBJ's bytes and the other fields of a request: what may be received beyond the mesh.

@@ -8,6 +8,7 @@ use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::Recheck},
+    base::mechanisms::Mechanisms,
     model::{
         hand::{Handedness, rig::Rig},
         object::GraspObject,
@@ -115,6 +116,7 @@ fn proposals(criterion: &mut Criterion) {
             giver: None,
             rig: rig(),
             repertoire: None,
+            mechanisms: Mechanisms::ALL,
         };
         let proposals: Vec<_> = (0..PROPOSALS)
             .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index), &|| false))

@@ -9,7 +9,11 @@ use std::{
 
 use grasp_assets::atlases::atlas;
 use grasp_synthesis::{
-    known::{atlas::Atlas, codec::decode, recent_grips::RecentGrips, seed_source::SeedSource},
+    known::{
+        atlas::Atlas, codec::decode, recent_grips::RecentGrips, seed_source::SeedSource,
+        transferred_grips::Borrowed,
+    },
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{Handedness, rig::Rig},
@@ -25,10 +29,10 @@ use rayon::ThreadPool;
 use crate::{asking::ANSWERED_WITHIN, setting::default_hand};
 
 /// Workers of a search, as of a test's server.
-const WORKERS: usize = 2;
+pub(crate) const WORKERS: usize = 2;
 
 /// How long the server looks for a known grip before it wakes its workers.
-const LOOK_UP_TIME: Duration = Duration::from_micros(200);
+pub(crate) const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
 /// What one search took.
 #[derive(Clone, Copy, Debug)]
@@ -43,17 +47,19 @@ pub(crate) struct Taken {
 pub(crate) struct Core {
     rig: &'static Rig,
     pool: ThreadPool,
+    mechanisms: Mechanisms,
 }
 
 impl Core {
-    /// Searches with the default right hand.
-    pub(crate) fn new() -> Self {
+    /// Searches with the default right hand by some mechanisms.
+    pub(crate) fn new(mechanisms: Mechanisms) -> Self {
         Self {
             rig: &default_hand(Handedness::Right).rig,
             pool: rayon::ThreadPoolBuilder::new()
                 .num_threads(WORKERS)
                 .build()
                 .expect("threads can be had"),
+            mechanisms,
         }
     }
 
@@ -71,7 +77,10 @@ impl Core {
 
     /// The wall time of a search as the server runs it: a look on the calling thread, then a race of the workers.
     pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Taken {
-        let mut settings = settings(holdout, atlas, seed);
+        let mut settings = SearchSettings {
+            mechanisms: self.mechanisms,
+            ..settings(holdout, Known::Atlas(atlas), seed)
+        };
         let clock = MonotonicClock::default();
         let start = Instant::now();
         let outcome = match find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME) {
@@ -91,7 +100,10 @@ impl Core {
     /// The processor time of a look through the whole atlas up to the first valid grip, on the calling thread: what else
     /// runs on the machine shows less than in wall time.
     pub(crate) fn look_up(&self, holdout: &Holdout, atlas: &Arc<Atlas>) -> Taken {
-        let settings = settings(holdout, atlas, 0);
+        let settings = SearchSettings {
+            mechanisms: self.mechanisms,
+            ..settings(holdout, Known::Atlas(atlas), 0)
+        };
         let clock = MonotonicClock::default();
         let start = thread_time();
         let outcome = find_known_grasp(holdout, self.rig, &settings, &clock, ANSWERED_WITHIN);
@@ -102,8 +114,22 @@ impl Core {
     }
 }
 
+/// What a server knows of how a hand holds an object.
+#[derive(Clone, Copy)]
+pub(crate) enum Known<'a> {
+    /// A complete atlas.
+    Atlas(&'a Arc<Atlas>),
+    /// No atlas yet, but grips of boxes like the object, if any fit.
+    Boxes(Option<&'a Arc<Borrowed>>),
+}
+
 /// The settings that the server's defaults come to.
-fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings {
+pub(crate) fn settings(holdout: &Holdout, known: Known<'_>, seed: u64) -> SearchSettings {
+    let (atlas, starts) = match known {
+        Known::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
+        Known::Boxes(Some(borrowed)) => (None, SeedSource::Borrowed(Arc::clone(borrowed))),
+        Known::Boxes(None) => (None, SeedSource::Nothing),
+    };
     SearchSettings {
         seed,
         strategy: Strategy::Guided,
@@ -112,8 +138,8 @@ fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings 
         friction: holdout.object.friction_under(Validity::Physical),
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
-        atlas: Some(Arc::clone(atlas)),
-        starts: SeedSource::Atlas(Arc::clone(atlas)),
+        atlas,
+        starts,
         recent: RecentGrips::default(),
         known_tried: 0,
         reproducible: false,
@@ -122,6 +148,7 @@ fn settings(holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> SearchSettings 
         deadline: Some(ANSWERED_WITHIN),
         workers: WORKERS,
         record_step_times: false,
+        mechanisms: Mechanisms::ALL,
     }
 }
 

@@ -6,6 +6,7 @@
 //! `target/figures`. Server and client share the process and two cores, as on a developer's machine; the load average is
 //! told, for whatever else runs there shows in the outer quantiles. That a target is not met is told and is no failure.
 
+mod ablation;
 mod asking;
 mod best;
 mod cold;
@@ -21,6 +22,7 @@ mod wire;
 
 use clap::{Parser, ValueEnum};
 use grasp_experiment::machine::Machine;
+use grasp_synthesis::base::mechanisms::{Mechanism, Mechanisms};
 use serde::Serialize;
 
 use setting::Setting;
@@ -48,6 +50,8 @@ enum Row {
     Registration,
     /// Beside `GraspIt!`.
     Graspit,
+    /// All mechanisms against each one switched off; only where it is named.
+    Ablation,
 }
 
 impl Row {
@@ -59,6 +63,7 @@ impl Row {
             Self::Cold => "cold",
             Self::Registration => "registration",
             Self::Graspit => "graspit",
+            Self::Ablation => "ablation",
         }
     }
 }
@@ -76,6 +81,9 @@ struct Arguments {
     /// one giver of 48 who leaves no room is 2 % of the holdouts.
     #[arg(long, default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..))]
     givers: u32,
+    /// Switch these mechanisms off in every row but the ablation, which switches off each in turn.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', num_args = 1..)]
+    without: Vec<Mechanism>,
     /// Write JSON.
     #[arg(long)]
     json: bool,
@@ -95,6 +103,7 @@ struct Report {
     load_after: Option<String>,
     holdouts: usize,
     givers: usize,
+    without: Vec<&'static str>,
     lines: Vec<Line>,
 }
 
@@ -110,17 +119,23 @@ fn main() {
     } else {
         arguments.givers as usize
     };
-    let setting = Setting::new(arguments.test, holdouts, givers);
+    let without = &arguments.without;
+    let mechanisms = without
+        .iter()
+        .fold(Mechanisms::ALL, |rest, &mechanism| rest.without(mechanism));
+    let setting = Setting::new(arguments.test, holdouts, givers, mechanisms);
     let load_before = load_average();
     let report = Report {
         lines: measure(&setting, |row| {
-            arguments.only.is_empty() || arguments.only.contains(&row)
+            let is_usual = row != Row::Ablation || arguments.test;
+            arguments.only.contains(&row) || arguments.only.is_empty() && is_usual
         }),
         machine: Machine::this(),
         load_before,
         load_after: load_average(),
         holdouts,
         givers,
+        without: without.iter().map(|mechanism| mechanism.name()).collect(),
     };
     if arguments.json {
         println!(
@@ -130,6 +145,9 @@ fn main() {
         return;
     }
     let load = |load: &Option<String>| load.clone().unwrap_or_else(|| "unknown".to_owned());
+    if !report.without.is_empty() {
+        println!("without {}", report.without.join(", "));
+    }
     println!(
         "{}; load average {} before and {} after; {holdouts} random holdouts an object, of {givers} givers\n\n{}",
         report.machine,
@@ -164,11 +182,14 @@ fn measure(setting: &Setting, is_wanted: impl Fn(Row) -> bool) -> Vec<Line> {
     if is_wanted(Row::Graspit) {
         lines.extend(graspit::measure(setting));
     }
+    if is_wanted(Row::Ablation) {
+        lines.extend(ablation::measure(setting, &things));
+    }
     lines
 }
 
 /// The machine's load average over the last minute, where the system tells.
-fn load_average() -> Option<String> {
+pub(crate) fn load_average() -> Option<String> {
     let text = std::fs::read_to_string("/proc/loadavg").ok()?;
     text.split_whitespace().next().map(str::to_owned)
 }

@@ -15,6 +15,7 @@ use grasp_assets::{
 use grasp_proto::v1;
 use grasp_synthesis::{
     known::key::key,
+    base::mechanisms::Mechanisms,
     model::{hand::Handedness, object::GraspObject},
 };
 use grasp_tests::{
@@ -49,7 +50,9 @@ pub(crate) struct Setting {
     /// Random holdouts an object.
     pub(crate) holdouts: usize,
     /// Givers that are placed on an object.
-    givers: usize,
+    pub(crate) givers: usize,
+    /// The mechanisms that searches run.
+    pub(crate) mechanisms: Mechanisms,
     /// Where servers run.
     pub(crate) serving: Runtime,
     /// Where clients run: one thread, as in a game.
@@ -88,7 +91,7 @@ impl Thing {
 
 impl Setting {
     /// Starts the runtimes and finds the folder.
-    pub(crate) fn new(quick: bool, holdouts: usize, givers: usize) -> Self {
+    pub(crate) fn new(quick: bool, holdouts: usize, givers: usize, mechanisms: Mechanisms) -> Self {
         let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
         let folder = target.expect("cargo's folder lies in another").join("figures");
         fs::create_dir_all(&folder).expect("cargo's target folder can be written");
@@ -96,6 +99,7 @@ impl Setting {
             quick,
             holdouts,
             givers,
+            mechanisms,
             serving: Builder::new_multi_thread()
                 .worker_threads(SERVING_THREADS)
                 .thread_name("serving")
@@ -109,6 +113,11 @@ impl Setting {
             folder,
             hands: giving_hands(),
         }
+    }
+
+    /// The folder that keeps what takes long to make.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// The folder that atlases are kept in.
@@ -206,7 +215,10 @@ impl Setting {
 
     /// A server as the binary's defaults make it, but for what `adapt` changes.
     pub(crate) fn server(&self, adapt: impl FnOnce(&mut grasp_server::Config)) -> TestServer {
-        self.serving.block_on(TestServer::start_with(adapt))
+        self.serving.block_on(TestServer::start_with(|config| {
+            config.mechanisms = self.mechanisms;
+            adapt(config);
+        }))
     }
 
     /// A server that knows `things` and has complete atlases of them for both hands, so that nothing grows any more; in a

@@ -103,7 +103,7 @@ fn line(what: &str, answers: &[Answer], about_late: &str) -> Line {
 
 /// The same holdouts without a server.
 fn in_the_core(setting: &Setting, things: &[Thing]) -> Vec<Line> {
-    let core = Core::new();
+    let core = Core::new(setting.mechanisms);
     let built_in = built_in_holdouts();
     let mut searches = Vec::new();
     let mut look_ups = Vec::new();

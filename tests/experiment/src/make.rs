@@ -16,6 +16,7 @@ use grasp_assets::{
 use grasp_synthesis::{
     base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::NoStopwatch},
     known::{recent_grips::RecentGrips, recheck::Recheck, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         grasp::Grasp,
@@ -148,6 +149,7 @@ impl Maker {
             deadline: None,
             workers: cell.threads,
             record_step_times: false,
+            mechanisms: Mechanisms::ALL,
         };
         let (_, pool) = self.pools.iter().find(|(threads, _)| *threads == cell.threads)?;
         // From inside the pool, so that waking a thread is not measured where one thread is asked for.

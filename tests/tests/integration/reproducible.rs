@@ -7,6 +7,7 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     known::{codec::decode, recent_grips::RecentGrips, seed_source::SeedSource, transferred_grips::Borrowed},
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{Handedness, joints::HandJoints},
@@ -191,6 +192,7 @@ async fn without_an_atlas_searches_start_from_what_the_object_borrows() {
             deadline: None,
             workers: 1,
             record_step_times: false,
+            mechanisms: Mechanisms::ALL,
         };
         let clock = MonotonicClock::default();
         let found = find_grasp(

@@ -8,6 +8,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{Digit, HandPose, Handedness, Phalanx},
@@ -114,6 +115,7 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
             deadline: None,
             workers: pool.current_num_threads(),
             record_step_times: false,
+            mechanisms: Mechanisms::ALL,
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
             atlas: None,

@@ -16,6 +16,7 @@ use grasp_synthesis::{
     base::clock::Clock,
     geometry::mesh_bvh::MeshBvh,
     known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -101,6 +102,7 @@ fn next_grasp(
         deadline: None,
         workers: 1,
         record_step_times: false,
+        mechanisms: Mechanisms::ALL,
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,

@@ -3,6 +3,7 @@
 use glam::Vec3;
 use grasp_synthesis::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{HandPose, joints::HandJoints, rig::Rig},
@@ -69,6 +70,7 @@ pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
             giver: presented.giver.as_ref(),
             rig,
             repertoire: None,
+            mechanisms: Mechanisms::ALL,
         };
         let around = Surroundings {
             object: scene,

@@ -20,6 +20,7 @@ use super::{
 };
 use crate::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::mechanisms::Mechanisms,
     model::{
         hand::{joints::HandJoints, rig::Rig},
         object::GraspObject,
@@ -321,6 +322,7 @@ impl<'a> Growth<'a> {
             giver: giver.and_then(|giver| giver.presented.giver.as_ref()),
             rig: self.rig,
             placements: None,
+            mechanisms: Mechanisms::ALL,
         };
         match giver.map(|giver| &giver.seeds) {
             Some(Some(seeds)) if is_beside => seeds.propose_evenly(self.grips.entries(), &place, stream),

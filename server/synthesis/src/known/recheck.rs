@@ -2,6 +2,7 @@
 
 use super::{entry::Entry, gravity::nearest};
 use crate::{
+    base::mechanisms::{Mechanism, Mechanisms},
     model::{grasp::Grasp, hand::rig::Rig, strategy::Validity},
     physical::{
         contacts::soften,
@@ -23,17 +24,30 @@ pub struct Recheck<'a> {
     direction: usize,
     /// Is the friction another than the one that grips are known under?
     friction_differs: bool,
+    /// Is the friction that they use known from before?
+    knows_friction_uses: bool,
 }
 
 impl<'a> Recheck<'a> {
     /// Asks grips of an object and a rig.
     pub fn new(scene: &'a ObjectScene<'a>, rig: &'a Rig, presented: &'a Presented) -> Self {
+        let friction_differs = scene.friction != scene.object.friction_under(Validity::Physical);
         Self {
             scene,
             rig,
             presented,
             direction: nearest(presented.up),
-            friction_differs: scene.friction != scene.object.friction_under(Validity::Physical),
+            friction_differs,
+            knows_friction_uses: !friction_differs,
+        }
+    }
+
+    /// The same by some of the mechanisms.
+    #[must_use]
+    pub(crate) fn with_mechanisms(self, mechanisms: Mechanisms) -> Self {
+        Self {
+            knows_friction_uses: self.knows_friction_uses && mechanisms.has(Mechanism::FrictionUses),
+            ..self
         }
     }
 
@@ -49,10 +63,10 @@ impl<'a> Recheck<'a> {
         let giver_clearance = clear_of_giver(solids, presented.giver.as_ref())?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
-        let least_use = if self.friction_differs {
-            FrictionUse::default()
-        } else {
+        let least_use = if self.knows_friction_uses {
             entry.friction_uses.get(self.direction)
+        } else {
+            FrictionUse::default()
         };
         let balance = balance_with(&gripper.soft_contacts, &load, least_use, &mut gripper.buffers)?;
         let epsilon = if self.friction_differs {

@@ -10,6 +10,7 @@ use super::{
     transferred_grips::{Among, TransferredGrips},
 };
 use crate::{
+    base::mechanisms::{Mechanism, Mechanisms},
     model::{constraints::Constraints, hand::rig::Rig},
     physical::scene::Presented,
 };
@@ -51,6 +52,8 @@ pub struct Demand<'a> {
     pub presented: &'a Presented,
     /// What is demanded of the grasp.
     pub constraints: &'a Constraints,
+    /// Which mechanisms are on.
+    pub mechanisms: Mechanisms,
 }
 
 /// The grips to start from beside a giver, each kind once it was asked for.
@@ -110,7 +113,11 @@ impl SeedSets {
         interrupted: &impl Fn() -> bool,
     ) -> Option<&Seeds> {
         let giver = demand.presented.giver.as_ref();
-        let from_open_ones = attempt < ATTEMPTS_FROM_OPEN_SEEDS || attempt.is_multiple_of(2);
+        let mechanisms = demand.mechanisms;
+        let may_be_open = mechanisms.has(Mechanism::OpenSeeds) && mechanisms.has(Mechanism::CellOccupancy);
+        let must_be_open = !mechanisms.has(Mechanism::NearestSeeds);
+        let from_open_ones =
+            may_be_open && (must_be_open || attempt < ATTEMPTS_FROM_OPEN_SEEDS || attempt.is_multiple_of(2));
         let excluding = giver.filter(|_| from_open_ones);
         let seeds = match excluding {
             Some(_) => &self.open,
@@ -120,12 +127,16 @@ impl SeedSets {
             return Some(seeds);
         }
         let excluded = excluding.map(|giver| atlas.excluded_by(giver));
-        let holding = atlas.holding_under(demand.presented.up).iter().copied();
-        let wanted = holding.filter(|&entry| {
+        let (holding, unordered) = if mechanisms.has(Mechanism::GravityOrder) {
+            (atlas.holding_under(demand.presented.up), 0)
+        } else {
+            (&[][..], atlas.entries().len() as u16)
+        };
+        let wanted = holding.iter().copied().chain(0..unordered).filter(|&entry| {
             excluded.as_ref().is_none_or(|excluded| !excluded.contains(entry))
                 && atlas.entries()[usize::from(entry)].is_wanted(demand.constraints)
         });
-        let found = Seeds::of(atlas.grips(), demand.rig, wanted, giver, interrupted)?;
+        let found = Seeds::of_with(mechanisms, atlas.grips(), demand.rig, wanted, giver, interrupted)?;
         // Another worker may have found the same meanwhile.
         Some(seeds.get_or_init(|| found))
     }
@@ -141,7 +152,8 @@ impl SeedSets {
         demand: &Demand<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&(Grips, Seeds)> {
-        let (among, seeds) = if attempt.is_multiple_of(2) {
+        let screens = demand.mechanisms.has(Mechanism::ClosureScreen);
+        let (among, seeds) = if screens && attempt.is_multiple_of(2) {
             (Among::Passing, &self.passing)
         } else {
             (Among::All, &self.fitting)
@@ -152,7 +164,7 @@ impl SeedSets {
         let giver = demand.presented.giver.as_ref();
         let grips = borrowed.perturbed(among, demand.rig, giver, demand.constraints, interrupted)?;
         let all = 0..grips.entries().len() as u16;
-        let found = Seeds::of(&grips, demand.rig, all, giver, interrupted)?;
+        let found = Seeds::of_with(demand.mechanisms, &grips, demand.rig, all, giver, interrupted)?;
         Some(seeds.get_or_init(|| (grips, found)))
     }
 }

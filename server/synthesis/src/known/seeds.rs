@@ -14,6 +14,7 @@ use super::{
 };
 use crate::{
     base::{pose::Pose, random::AttemptStream},
+    base::mechanisms::{Mechanism, Mechanisms},
     model::{grasp::Contact, hand::rig::Rig, object::GraspObject},
     physical::{
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},
@@ -72,6 +73,19 @@ impl Seeds {
         giver: Option<&PreparedHand>,
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
+        Self::of_with(Mechanisms::ALL, known, rig, candidates, giver, interrupted)
+    }
+
+    /// [`Seeds::of`] by some of the mechanisms.
+    pub(crate) fn of_with(
+        mechanisms: Mechanisms,
+        known: &Grips,
+        rig: &Rig,
+        candidates: impl Iterator<Item = u16>,
+        giver: Option<&PreparedHand>,
+        interrupted: impl Fn() -> bool,
+    ) -> Option<Self> {
+        let screens = mechanisms.has(Mechanism::InnerSpheres);
         let Some(giver) = giver else {
             let whole = |entry: u16| Seed {
                 entry,
@@ -86,7 +100,11 @@ impl Seeds {
             if count.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
                 return None;
             }
-            let clearance = known.clearance_upper_bound(usize::from(index), giver);
+            let clearance = if screens {
+                known.clearance_upper_bound(usize::from(index), giver)
+            } else {
+                GIVER_CLEARANCE
+            };
             at_most.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
         // Not sorted, as that would take longer than between two looks at the clock.
@@ -106,7 +124,7 @@ impl Seeds {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
-            let Some((clearance, kept)) = clearance(entry, rig, giver, least) else {
+            let Some((clearance, kept)) = clearance(entry, rig, giver, least, screens) else {
                 continue;
             };
             let place = nearest.partition_point(|&(other, _)| other >= clearance);
@@ -167,6 +185,7 @@ impl Seeds {
             },
             advance: 0.0,
         };
+        let screens = place.mechanisms.has(Mechanism::InnerSpheres);
         let solids = entry.solids(place.rig);
         let inside = [
             first_of_digits(first_spheres(&solids), kept),
@@ -186,7 +205,7 @@ impl Seeds {
                     |spheres: &Spheres| giver.surely_nears_any(&spheres.transformed(way), GIVER_CLEARANCE);
                 inside.iter().any(nears)
             };
-            if place.giver.is_some_and(is_met) {
+            if screens && place.giver.is_some_and(is_met) {
                 return None;
             }
             let moved = solids.transformed(way);
@@ -233,12 +252,20 @@ fn keeps_off(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -> bool 
 
 /// How far a grip is from a giver's hand without the fingers that are nearest to it and can be spared, up to
 /// [`GIVER_CLEARANCE`], and which digits hold then; none if it is less than `least`.
-fn clearance(entry: &Entry, rig: &Rig, giver: &PreparedHand, least: f32) -> Option<(f32, [bool; 5])> {
+fn clearance(
+    entry: &Entry,
+    rig: &Rig,
+    giver: &PreparedHand,
+    least: f32,
+    screens: bool,
+) -> Option<(f32, [bool; 5])> {
     let solids = entry.solids(rig);
     let sets = entry.finger_subsets;
-    let (fingers, others) = farthest_by_second(&giver.distance_upper_bounds(&second_spheres(&solids)));
-    if sets.farthest(fingers).1.min(others) < least {
-        return None;
+    if screens {
+        let (fingers, others) = farthest_by_second(&giver.distance_upper_bounds(&second_spheres(&solids)));
+        if sets.farthest(fingers).1.min(others) < least {
+            return None;
+        }
     }
     let no_fingers = [true, false, false, false, false];
     let others = giver.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, least)?;

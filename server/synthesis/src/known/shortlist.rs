@@ -99,6 +99,12 @@ impl<'a> Shortlist<'a> {
         self.places.is_empty()
     }
 
+    /// The grip at a place of the list with its solids.
+    pub fn at(&self, place: usize) -> (u16, &'a TrackedSolids) {
+        let grip = &self.grips[usize::from(self.places[place])];
+        (grip.entry, &grip.solids)
+    }
+
     /// The grip at a place of the list with its solids; none only if it comes too near to a giver's hand, and not always
     /// then.
     #[inline]

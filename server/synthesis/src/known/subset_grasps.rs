@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     base::stopwatch::NoStopwatch,
+    base::mechanisms::{Mechanism, Mechanisms},
     model::grasp::Grasp,
     physical::{
         finger_subset::WholeGrip,
@@ -23,7 +24,21 @@ pub fn subset_grasp(
     giver: &PreparedHand,
     gripper: &mut Gripper,
 ) -> Option<Box<Grasp>> {
+    spared_with(Mechanisms::ALL, entry, around, giver, gripper)
+}
+
+/// [`subset_grasp`] by some of the mechanisms.
+pub(crate) fn spared_with(
+    mechanisms: Mechanisms,
+    entry: &Entry,
+    around: &Surroundings<'_>,
+    giver: &PreparedHand,
+    gripper: &mut Gripper,
+) -> Option<Box<Grasp>> {
     let solids = entry.solids(around.rig);
+    if mechanisms.has(Mechanism::InnerSpheres) && is_too_near(entry, &solids, giver) {
+        return None;
+    }
     let kept = kept(entry, &solids, giver)?;
     let inputs = TrackedSolids::of_rig(around.rig, entry.grip.pose.frame_from_wrist, &solids);
     if is_met(giver, inputs.still()) {
@@ -40,14 +55,18 @@ pub fn subset_grasp(
     around.hold_with(&grip, &solids, gripper, &mut NoStopwatch).ok()
 }
 
+/// True only if spheres inside show that the giver leaves too few digits of a grip to hold; not always then.
+fn is_too_near(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> bool {
+    let is_too_much = |near| !entry.finger_subsets.hold_without(in_way_by_second(near));
+    is_too_much(giver.surely_near(&second_spheres(solids), GIVER_CLEARANCE, is_too_much))
+}
+
 /// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others or leave out
 /// one between them, if the thumb or its ball comes too near to the giver, or if no digit does.
 fn kept(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> Option<[bool; 5]> {
     let sets = entry.finger_subsets;
     let holding = sets.holding();
-    let is_too_much = |near| !sets.hold_without(in_way_by_second(near));
-    let near = giver.surely_near(&second_spheres(solids), GIVER_CLEARANCE, is_too_much);
-    if is_too_much(near) || is_met(giver, solids.thenar.iter()) {
+    if is_met(giver, solids.thenar.iter()) {
         return None;
     }
     let is_in_way: [bool; 5] = std::array::from_fn(|digit| is_met(giver, solids.phalanges[digit].iter()));

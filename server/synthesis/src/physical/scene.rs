@@ -6,7 +6,10 @@ use super::{
     immobility::Load,
     solids::{PreparedHand, TrackedSolids},
 };
-use crate::model::{holdout::Holdout, object::GraspObject};
+use crate::{
+    base::mechanisms::{Mechanism, Mechanisms},
+    model::{holdout::Holdout, object::GraspObject},
+};
 
 /// Smallest Ferrari-Canny epsilon of a grasp on an object that fingers get round. In a simulation, grasps above 0.02 did
 /// not fall under gravity and half of them held against pulls in all directions. A higher one gives firmer grasps and
@@ -71,9 +74,21 @@ pub struct Presented {
 impl Presented {
     /// How the object of a holdout is presented.
     pub fn of(holdout: &Holdout) -> Self {
+        Self::of_with(Mechanisms::ALL, holdout)
+    }
+
+    /// [`Presented::of`] by some of the mechanisms.
+    pub(crate) fn of_with(mechanisms: Mechanisms, holdout: &Holdout) -> Self {
+        let prepared = |solids: &TrackedSolids| {
+            if mechanisms.has(Mechanism::GiverOrder) {
+                PreparedHand::new(solids)
+            } else {
+                PreparedHand::in_anatomical_order(solids)
+            }
+        };
         let giver = holdout.presenting_hand.as_ref();
         Self {
-            giver: giver.map(|hand| PreparedHand::new(&TrackedSolids::of_joints(&hand.joints))),
+            giver: giver.map(|hand| prepared(&TrackedSolids::of_joints(&hand.joints))),
             giver_palm: giver.map(|hand| hand.palm),
             up: holdout.up,
         }

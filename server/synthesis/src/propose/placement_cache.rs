@@ -11,7 +11,11 @@ use super::{
     success_prior::ObjectFeatures,
     surface_pairs::SurfacePair,
 };
-use crate::base::{pose::Pose, random::AttemptStream};
+use crate::base::{
+    mechanisms::{Mechanism, Mechanisms},
+    pose::Pose,
+    random::AttemptStream,
+};
 
 /// Attempts of a search that choose from the repertoire, each from a row of its own. Most searches end within them; later
 /// ones draw anew, so that they are not bound to what is here.
@@ -53,12 +57,17 @@ pub struct PlacementCache {
 impl PlacementCache {
     /// Draws it: some five milliseconds.
     pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
+        Self::of_with(Mechanisms::ALL, object, rig)
+    }
+
+    fn of_with(mechanisms: Mechanisms, object: &PreparedObject, rig: &PreparedRig) -> Self {
         let place = Place {
             object,
             surface: object.surface_pairs(),
             giver: None,
             rig,
             placements: None,
+            mechanisms,
         };
         let bulk = ObjectFeatures::of(object);
         let row = |row| {
@@ -93,31 +102,42 @@ impl PlacementCache {
 #[derive(Clone, Default)]
 pub struct PlacementCaches(Arc<Mutex<Vec<Drawn>>>);
 
-/// The repertoire of a hand, which its guide stands for.
-type Drawn = (PreparedRig, Arc<OnceLock<Arc<PlacementCache>>>);
+/// The mechanisms that cached placements depend on.
+const DRAWN_BY: [Mechanism; 2] = [Mechanism::SuccessPrior, Mechanism::RoomScreen];
+
+/// The placements of a hand, by some mechanisms.
+type Drawn = (PreparedRig, Mechanisms, Arc<OnceLock<Arc<PlacementCache>>>);
 
 impl PlacementCaches {
     /// Bytes that they take at most.
     pub const MOST_BYTES: usize = MOST_HANDS * ROWS as usize * KEPT * size_of::<Room>();
 
     /// That of a hand, drawn now if nobody asked for it yet; of more than [`MOST_HANDS`], the first is forgotten.
-    pub(super) fn of(&self, object: &PreparedObject, rig: &PreparedRig) -> Arc<PlacementCache> {
+    pub(super) fn of(
+        &self,
+        object: &PreparedObject,
+        rig: &PreparedRig,
+        mechanisms: Mechanisms,
+    ) -> Arc<PlacementCache> {
+        let mechanisms = mechanisms.only_of(&DRAWN_BY);
         let found = {
             let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            let found = known.iter().find(|(known_rig, _)| known_rig.is_same(rig));
-            if let Some((_, found)) = found {
+            let found = known
+                .iter()
+                .find(|(known_rig, by, _)| *by == mechanisms && known_rig.is_same(rig));
+            if let Some((_, _, found)) = found {
                 Arc::clone(found)
             } else {
                 if known.len() == MOST_HANDS {
                     known.remove(0);
                 }
                 let new = Arc::default();
-                known.push((rig.clone(), Arc::clone(&new)));
+                known.push((rig.clone(), mechanisms, Arc::clone(&new)));
                 new
             }
         };
         // Not under the lock: searches with other hands go on meanwhile.
-        Arc::clone(found.get_or_init(|| Arc::new(PlacementCache::of(object, rig))))
+        Arc::clone(found.get_or_init(|| Arc::new(PlacementCache::of_with(mechanisms, object, rig))))
     }
 }
 

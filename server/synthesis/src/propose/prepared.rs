@@ -10,7 +10,10 @@ use super::{
     placement_cache::{PlacementCache, PlacementCaches},
     surface_pairs::SurfacePairs,
 };
-use crate::model::{hand::rig::Rig, object::GraspObject};
+use crate::{
+    base::mechanisms::Mechanisms,
+    model::{hand::rig::Rig, object::GraspObject},
+};
 
 /// A rig with how its digits can oppose each other, derived on first use. Copies share both.
 #[derive(Clone, Debug)]
@@ -87,7 +90,12 @@ impl PreparedObject {
     /// Where a hand has room at the object and is likely to hold it, whoever presents it. The first call for a hand takes
     /// some five milliseconds.
     pub fn placement_cache(&self, rig: &PreparedRig) -> Arc<PlacementCache> {
-        self.placements.of(self, rig)
+        self.placement_cache_with(Mechanisms::ALL, rig)
+    }
+
+    /// The same by some of the mechanisms.
+    pub fn placement_cache_with(&self, mechanisms: Mechanisms, rig: &PreparedRig) -> Arc<PlacementCache> {
+        self.placements.of(self, rig, mechanisms)
     }
 }
 

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     base::{pose::Pose, random::AttemptStream},
+    base::mechanisms::{Mechanism, Mechanisms},
     model::object::GraspObject,
     physical::{
         grip::DEEPEST,
@@ -77,6 +78,8 @@ pub struct Place<'a> {
     pub rig: &'a PreparedRig,
     /// Where it is known that the hand has room at the object, if that is to be gone by.
     pub placements: Option<&'a PlacementCache>,
+    /// The mechanisms by which hands are proposed.
+    pub mechanisms: Mechanisms,
 }
 
 /// A hand whose opposed pads are at opposed points of the surface.
@@ -126,7 +129,7 @@ pub fn propose(
 ) -> Option<Proposal> {
     if stream.unit() < EVEN_SHARE {
         propose_evenly(place, stream, interrupted)
-    } else if stream.unit() < PALM_SHARE {
+    } else if stream.unit() < place.palm_share() {
         place.palm_on_surface(stream, interrupted)
     } else {
         let known = place.likely_of_cache(stream);
@@ -140,15 +143,33 @@ pub fn propose_evenly(
     stream: &mut AttemptStream,
     interrupted: &impl Fn() -> bool,
 ) -> Option<Proposal> {
-    if stream.unit() < PALM_SHARE {
+    if stream.unit() < place.palm_share() {
         return place.palm_on_surface(stream, interrupted);
     }
-    (0..MOST_PLACES)
-        .take_while(|_| !interrupted())
-        .find_map(|_| Some(place.pads_on_pair(stream)?.proposal()))
+    place.any_pads_on_pair(stream, interrupted)
 }
 
 impl<'a> Place<'a> {
+    /// How often the palm is laid on the object.
+    fn palm_share(&self) -> f32 {
+        if self.mechanisms.has(Mechanism::PalmPlacement) {
+            PALM_SHARE
+        } else {
+            0.0
+        }
+    }
+
+    /// The first of some places that has room.
+    fn any_pads_on_pair(
+        &self,
+        stream: &mut AttemptStream,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<Proposal> {
+        (0..MOST_PLACES)
+            .take_while(|_| !interrupted())
+            .find_map(|_| Some(self.pads_on_pair(stream)?.proposal()))
+    }
+
     /// Brings opposed pads to opposed points of the surface, and turns the hand about the line between them until palm,
     /// forearm and digits have room.
     pub fn pads_on_pair(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
@@ -181,6 +202,9 @@ impl<'a> Place<'a> {
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
+        if !self.mechanisms.has(Mechanism::SuccessPrior) {
+            return self.any_pads_on_pair(stream, interrupted);
+        }
         let bulk = ObjectFeatures::of(self.object);
         let places = self.drawn(COMPARED, stream);
         self.by_success_prior(&bulk, PREFERENCE, places, stream)
@@ -215,6 +239,7 @@ impl<'a> Place<'a> {
         candidates: Vec<Candidate<'a>>,
         stream: &mut AttemptStream,
     ) -> Vec<Candidate<'a>> {
+        let is_rated = self.mechanisms.has(Mechanism::SuccessPrior);
         let mut keyed: Vec<(f32, Candidate<'_>)> = candidates
             .into_iter()
             .map(|candidate| {
@@ -223,8 +248,12 @@ impl<'a> Place<'a> {
                     object_from_wrist,
                     ..
                 } = candidate;
-                let inputs = bulk.inputs(self.rig, opposition, object_from_wrist, self.giver);
-                let log_prospect = -(-TRAINED.log_odds(&inputs)).exp().ln_1p();
+                let log_prospect = if is_rated {
+                    let inputs = bulk.inputs(self.rig, opposition, object_from_wrist, self.giver);
+                    -(-TRAINED.log_odds(&inputs)).exp().ln_1p()
+                } else {
+                    0.0
+                };
                 // Gumbel's trick: by these keys, they are drawn without replacement by their weights.
                 let chance = -(-stream.unit().max(f32::MIN_POSITIVE).ln()).ln();
                 (preference * log_prospect + chance, candidate)
@@ -274,9 +303,10 @@ impl<'a> Place<'a> {
             self.rig.oppositions().inner_spheres(),
             &candidate.opposition.links,
         ];
-        spheres
-            .iter()
-            .all(|spheres| !self.meet_giver(candidate.object_from_wrist, spheres))
+        !self.mechanisms.has(Mechanism::RoomScreen)
+            || spheres
+                .iter()
+                .all(|spheres| !self.meet_giver(candidate.object_from_wrist, spheres))
     }
 
     /// Lays the palm on the surface where there is room.
@@ -329,6 +359,9 @@ impl<'a> Place<'a> {
 
     /// True if balls, in the wrist's frame, are off the giver's hand and at most `depth` metres in the object.
     fn have_room(&self, object_from_wrist: Pose, spheres: &[Spheres], depth: f32) -> bool {
+        if !self.mechanisms.has(Mechanism::RoomScreen) {
+            return true;
+        }
         !self.meet_giver(object_from_wrist, spheres)
             && spheres.iter().all(|spheres| {
                 spheres

@@ -4,6 +4,7 @@
 use super::{physical_attempt::PhysicalAttempt, scene::Scene};
 use crate::{
     base::{
+        mechanisms::Mechanism,
         pose::Pose,
         random::AttemptStream,
         rejection::Rejection,
@@ -205,7 +206,7 @@ impl Attempt {
         interrupted: &impl Fn() -> bool,
     ) -> AttemptEnd {
         let is_guided = scene.strategy() == Strategy::Guided;
-        let placed = if is_guided {
+        let placed = if is_guided && scene.mechanisms().has(Mechanism::Oppositions) {
             guided_proposal(scene, stream, interrupted)
                 .map(|proposal| (WristFrame::new(proposal.object_from_wrist), Some(proposal)))
         } else {
@@ -227,7 +228,7 @@ impl Attempt {
             advance: 0.0,
         });
         let physical = &mut self.physical;
-        let held = if is_guided {
+        let held = if is_guided && scene.mechanisms().has(Mechanism::NearMisses) {
             physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted)
         } else {
             physical.hold(around, &proposal, stopwatch, interrupted)
@@ -248,17 +249,24 @@ impl Attempt {
         let seeds = scene.seeds(around.presented, stream.attempt(), interrupted);
         let (seeds, entries) = seeds.ok_or(Interrupted)?;
         let place = scene.place(stream.attempt());
+        let refines = scene.mechanisms().has(Mechanism::NearMisses);
         for _ in 0..SEEDS_PER_ATTEMPT {
             if interrupted() {
                 return Err(Interrupted);
             }
             let proposal = seeds
                 .propose(entries, &place, stream)
+                .map(|proposal| scene.shaped(proposal))
                 .filter(|proposal| scene.constraints().admits_wrist(proposal.object_from_wrist));
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
             let physical = &mut self.physical;
-            match physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted) {
+            let held = if refines {
+                physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted)
+            } else {
+                physical.hold(around, &proposal, stopwatch, interrupted)
+            };
+            match held {
                 Ok(grasp) => return Ok(Some(grasp)),
                 Err(NoGrip::Rejected(_)) => {}
                 Err(NoGrip::Interrupted) => return Err(Interrupted),

@@ -4,7 +4,7 @@
 use std::{
     ops::Deref,
     sync::{
-        Arc, OnceLock,
+        Arc, LazyLock, OnceLock,
         atomic::{AtomicUsize, Ordering},
     },
 };
@@ -15,8 +15,9 @@ use crate::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
         recheck::Recheck,
-        subset_grasps::subset_grasp,
+        subset_grasps::spared_with,
     },
+    base::mechanisms::{Mechanism, Mechanisms},
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
     physical::{
         grip::Gripper,
@@ -27,6 +28,9 @@ use crate::{
 
 /// Grips that are passed over at most before somebody looks at the clock: one or two microseconds' worth.
 const PASSED_AT_ONCE: usize = 64;
+
+/// The order in which an atlas keeps its grips.
+static AS_KEPT: LazyLock<Vec<u16>> = LazyLock::new(|| (0..u16::MAX).collect());
 
 /// Known grips in the order in which they are tried.
 #[derive(Debug)]
@@ -45,6 +49,7 @@ pub(super) struct KnownGrips<'a> {
     /// The front of the order again, for where a giver is in the way of fingers that can be spared.
     sparing: &'a [u16],
     rig: &'a Rig,
+    mechanisms: Mechanisms,
     /// Those that certainly meet the giver, once somebody asks.
     excluded: OnceLock<Excluded<'a>>,
     /// The next place that nobody has taken, in the shortlist or, counted on, in the order, among the recent ones or those
@@ -114,8 +119,10 @@ impl<'a> KnownGrips<'a> {
     /// The grips that a search may use, if any.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
         let (object, presented) = scene.physical()?;
+        let mechanisms = settings.run.mechanisms;
         let atlas = settings.known.atlas.as_deref();
-        let recent = if settings.run.reproducible {
+        let atlas = atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp));
+        let recent = if settings.run.reproducible || !mechanisms.has(Mechanism::RecentGrips) {
             &[]
         } else {
             settings.known.recent.entries()
@@ -127,22 +134,35 @@ impl<'a> KnownGrips<'a> {
         let giver = presented.giver.as_ref();
         // The shortlist is for givers that are in the way, and the best is not wanted for being on it.
         let shortlist = match (atlas, settings.query.choice) {
-            (Some(atlas), Choice::FirstValid) if giver.is_some() => atlas.shortlist(presented.up),
+            (Some(atlas), Choice::FirstValid) if giver.is_some() && mechanisms.has(Mechanism::Shortlists) => {
+                atlas.shortlist(presented.up)
+            }
             _ => Shortlist::default(),
+        };
+        let by_gravity = mechanisms.has(Mechanism::GravityOrder);
+        let order = |atlas: &'a Atlas| {
+            if by_gravity {
+                atlas.by_score(presented.up)
+            } else {
+                &AS_KEPT[..atlas.entries().len()]
+            }
         };
         Some(Self {
             atlas,
             shortlist,
-            order: atlas.map_or(&[], |atlas| atlas.by_score(presented.up)),
+            order: atlas.map_or(&[], order),
             recent,
             scene,
-            asked: Recheck::new(object, scene.rig(), presented),
+            asked: Recheck::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
             sparing: match (atlas, giver) {
-                (Some(atlas), Some(_)) => atlas.holding_under(presented.up),
+                _ if !mechanisms.has(Mechanism::FingerSubsets) => &[],
+                (Some(atlas), Some(_)) if by_gravity => atlas.holding_under(presented.up),
+                (Some(atlas), Some(_)) => order(atlas),
                 _ => &[],
             },
             giver,
             rig: scene.rig(),
+            mechanisms,
             excluded: OnceLock::new(),
             next: AtomicUsize::new(settings.known.tried),
         })
@@ -186,7 +206,11 @@ impl<'a> KnownGrips<'a> {
     /// The grip at a place, unless it certainly meets the giver.
     fn unless_met(&self, place: usize) -> Option<Open<'a>> {
         let Some(place) = place.checked_sub(self.shortlist.len()) else {
-            let (index, solids) = self.shortlist.unless_met(place, self.giver?)?;
+            let (index, solids) = if self.mechanisms.has(Mechanism::InnerSpheres) {
+                self.shortlist.unless_met(place, self.giver?)?
+            } else {
+                self.shortlist.at(place)
+            };
             return self.open(index, Solids::Kept(solids));
         };
         let Some(&index) = self.order.get(place) else {
@@ -197,9 +221,15 @@ impl<'a> KnownGrips<'a> {
             let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
             return self.open(index, Solids::Made(Box::new(solids)));
         };
-        let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
-        if excluded.contains(index) {
-            return None;
+        if self.mechanisms.has(Mechanism::CellOccupancy) {
+            let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
+            if excluded.contains(index) {
+                return None;
+            }
+        }
+        if !self.mechanisms.has(Mechanism::InnerSpheres) {
+            let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
+            return self.open(index, Solids::Made(Box::new(solids)));
         }
         let solids = atlas.grips().unless_met(usize::from(index), self.rig, giver)?;
         self.open(index, Solids::Made(solids))
@@ -211,7 +241,8 @@ impl<'a> KnownGrips<'a> {
         let Some(entry) = self.recent.get(place) else {
             let index = self.sparing[place - self.recent.len()];
             let grips = self.atlas?.grips();
-            let is_open = grips.may_hold_with_subset(usize::from(index), self.giver?);
+            let is_open = !self.mechanisms.has(Mechanism::InnerSpheres)
+                || grips.may_hold_with_subset(usize::from(index), self.giver?);
             return is_open.then_some(Open::Sparing(index));
         };
         Some(Open::Whole {
@@ -267,7 +298,8 @@ impl<'a> KnownGrips<'a> {
     #[inline(never)]
     fn hold_with_subset(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let entry = &self.atlas?.entries()[usize::from(index)];
-        subset_grasp(entry, &self.scene.surroundings()?, self.giver?, gripper)
+        let around = self.scene.surroundings()?;
+        spared_with(self.mechanisms, entry, &around, self.giver?, gripper)
     }
 }
 

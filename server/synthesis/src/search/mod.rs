@@ -15,6 +15,7 @@ use std::{sync::atomic::AtomicBool, time::Duration};
 use crate::{
     base::{
         clock::Clock,
+        mechanisms::Mechanism,
         stopwatch::{NoStopwatch, StepStopwatch},
     },
     model::{grasp::Grasp, strategy::Choice},
@@ -83,7 +84,8 @@ pub fn find_known_grasp(
     clock: &dyn Clock,
     within: Duration,
 ) -> LookUp {
-    if settings.query.choice != Choice::FirstValid || settings.run.reproducible {
+    let is_first_valid = settings.query.choice == Choice::FirstValid && !settings.run.reproducible;
+    if !is_first_valid || !settings.run.mechanisms.has(Mechanism::CallerLookUp) {
         return LookUp::NotFound { tried: 0 };
     }
     let scene = prepare(task, settings);
@@ -160,5 +162,5 @@ pub fn find_grasp_in(
 
 /// What the attempts of a search share.
 pub fn prepare<'a>(task: Task<'a>, settings: &SearchSettings) -> Scene<'a> {
-    Scene::new(task, &settings.query, settings.known.seeds.clone())
+    Scene::new(task, settings)
 }

@@ -20,6 +20,7 @@ use super::{
 };
 use crate::{
     base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
+    base::mechanisms::Mechanism,
     model::{grasp::Grasp, strategy::Choice},
     physical::grip::Gripper,
 };
@@ -191,7 +192,10 @@ impl<'a> Race<'a> {
         match (self.settings.query.choice, self.settings.run.reproducible) {
             (Choice::BestWithinBudget, _) => false,
             (Choice::FirstValid, true) => self.look_ahead(None),
-            (Choice::FirstValid, false) => self.look_ahead(Some(self.clock.now() + HEAD_START)),
+            (Choice::FirstValid, false) => {
+                self.settings.run.mechanisms.has(Mechanism::HeadStart)
+                    && self.look_ahead(Some(self.clock.now() + HEAD_START))
+            }
         }
     }
 

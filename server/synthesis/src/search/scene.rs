@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::settings::Query;
+use super::settings::SearchSettings;
 use crate::{
     base::random::AttemptStream,
     known::{
@@ -10,6 +10,7 @@ use crate::{
         seed_source::{Demand, SeedSets, SeedSource},
         seeds::Seeds,
     },
+    base::mechanisms::{Mechanism, Mechanisms},
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -62,11 +63,24 @@ pub struct Scene<'a> {
     constraints: Constraints,
     /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`.
     seeds: SeedSets,
+    mechanisms: Mechanisms,
 }
 
 impl<'a> Scene<'a> {
-    /// Prepares attempts at a task. Seeds come `from`, under `GUIDED` and `PHYSICAL`.
-    pub fn new(task: Task<'a>, query: &Query, from: SeedSource) -> Self {
+    /// Prepares attempts at a task.
+    pub fn new(task: Task<'a>, settings: &SearchSettings) -> Self {
+        let query = &settings.query;
+        let mechanisms = settings.run.mechanisms;
+        let seeds_are_used = match &settings.known.seeds {
+            SeedSource::Nothing => false,
+            SeedSource::Atlas(_) => mechanisms.has(Mechanism::Seeds),
+            SeedSource::Transferred(_) => mechanisms.has(Mechanism::TransferredGrips),
+        };
+        let seeds = if seeds_are_used && query.uses_known_grips() {
+            settings.known.seeds.clone()
+        } else {
+            SeedSource::Nothing
+        };
         let Task { holdout, rig, .. } = task;
         let friction = query.friction_on(&holdout.object);
         Self {
@@ -75,16 +89,13 @@ impl<'a> Scene<'a> {
             free_surface: OnceLock::new(),
             placements: OnceLock::new(),
             constraints: query.constraints,
-            seeds: SeedSets::new(if query.uses_known_grips() {
-                from
-            } else {
-                SeedSource::Nothing
-            }),
+            seeds: SeedSets::new(seeds),
+            mechanisms,
             physical: match query.validity {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
                     ObjectScene::new(&holdout.object, friction),
-                    Presented::of(holdout),
+                    Presented::of_with(mechanisms, holdout),
                 )),
             },
         }
@@ -139,9 +150,12 @@ impl<'a> Scene<'a> {
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
         let giver = presented.and_then(|presented| presented.giver.as_ref());
         let surface = match giver {
-            Some(giver) if attempt >= ATTEMPTS_BEFORE_FREE_SURFACE => self
-                .free_surface
-                .get_or_init(|| object.surface_pairs().free_of(giver)),
+            Some(giver)
+                if attempt >= ATTEMPTS_BEFORE_FREE_SURFACE && self.mechanisms.has(Mechanism::FreeSurface) =>
+            {
+                self.free_surface
+                    .get_or_init(|| object.surface_pairs().free_of(giver))
+            }
             _ => object.surface_pairs(),
         };
         Place {
@@ -150,15 +164,20 @@ impl<'a> Scene<'a> {
             giver,
             rig,
             placements: None,
+            mechanisms: self.mechanisms,
         }
     }
 
     /// The same with the cached placements that the first attempts choose from.
     fn cached_place(&self, attempt: u64) -> Place<'_> {
         let Task { object, rig, .. } = self.task;
-        let placements = || self.placements.get_or_init(|| object.placement_cache(rig));
+        let placements = || {
+            self.placements
+                .get_or_init(|| object.placement_cache_with(self.mechanisms, rig))
+        };
+        let chooses = attempt < ROWS && self.mechanisms.has(Mechanism::PlacementCache);
         Place {
-            placements: (attempt < ROWS).then(|| &**placements()),
+            placements: chooses.then(|| &**placements()),
             ..self.place(attempt)
         }
     }
@@ -172,7 +191,8 @@ impl<'a> Scene<'a> {
     ) -> Option<Proposal> {
         if self.physical.is_some() {
             // Palm and forearm are looked at on the way there.
-            return propose(&self.cached_place(stream.attempt()), stream, interrupted);
+            let proposal = propose(&self.cached_place(stream.attempt()), stream, interrupted)?;
+            return Some(self.shaped(proposal));
         }
         // What is likely to hold was learned of what holds by `PHYSICAL` validity.
         let proposal = propose_evenly(&self.place(stream.attempt()), stream, interrupted)?;
@@ -182,6 +202,22 @@ impl<'a> Scene<'a> {
             advance: 0.0,
             ..proposal
         })
+    }
+
+    /// A proposal shaped by the mechanisms that are on.
+    pub(super) fn shaped(&self, mut proposal: Proposal) -> Proposal {
+        if !self.mechanisms.has(Mechanism::Preshape) {
+            proposal.shape.preshape = [0.0; 2];
+        }
+        if !self.mechanisms.has(Mechanism::TuckedFingers) {
+            proposal.shape.tucks = false;
+        }
+        proposal
+    }
+
+    /// The mechanisms that are on.
+    pub(super) fn mechanisms(&self) -> Mechanisms {
+        self.mechanisms
     }
 
     /// True if there is no grip to perturb hands near.
@@ -200,6 +236,7 @@ impl<'a> Scene<'a> {
             rig: self.task.rig,
             presented,
             constraints: &self.constraints,
+            mechanisms: self.mechanisms,
         };
         self.seeds.of_attempt(attempt, &demand, interrupted)
     }

@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use crate::{
+    base::mechanisms::Mechanisms,
     known::{atlas::Atlas, recent_grips::RecentGrips, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
@@ -98,6 +99,8 @@ pub struct Run {
     pub workers: usize,
     /// Record the time spent in each step?
     pub record_step_times: bool,
+    /// Which mechanisms of a default search are on.
+    pub mechanisms: Mechanisms,
 }
 
 impl Default for Run {
@@ -110,6 +113,7 @@ impl Default for Run {
             deadline: None,
             workers: 1,
             record_step_times: false,
+            mechanisms: Mechanisms::ALL,
         }
     }
 }

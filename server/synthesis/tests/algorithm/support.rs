@@ -13,6 +13,7 @@ use grasp_synthesis::{
     base::{clock::Clock, pose::Pose},
     geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh},
     known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{
@@ -254,6 +255,7 @@ pub(crate) fn settings(strategy: Strategy) -> SearchSettings {
         deadline: None,
         workers: 1,
         record_step_times: false,
+        mechanisms: Mechanisms::ALL,
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,

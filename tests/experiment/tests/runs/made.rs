@@ -7,6 +7,7 @@ use grasp_experiment::{plan::Settings, record::Record};
 use grasp_synthesis::{
     base::{clock::Clock, rejection::Rejection},
     known::{recent_grips::RecentGrips, seed_source::SeedSource},
+    base::mechanisms::Mechanisms,
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -50,6 +51,7 @@ fn search(record: &Record, first_attempt: u64, max_attempts: u64) -> SearchOutco
         deadline: None,
         workers: 1,
         record_step_times: false,
+        mechanisms: Mechanisms::ALL,
         constraints: Constraints::default(),
         choice: Choice::FirstValid,
         atlas: None,

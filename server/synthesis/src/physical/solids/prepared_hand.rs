@@ -71,9 +71,18 @@ struct ToAxis {
 impl PreparedHand {
     /// Prepares a hand: below a microsecond.
     pub fn new(giver: &TrackedSolids) -> Self {
+        Self::in_order(giver, &MET_FIRST)
+    }
+
+    /// The same with its solids compared in the order of [`TrackedSolids::iter`].
+    pub(crate) fn in_anatomical_order(giver: &TrackedSolids) -> Self {
+        Self::in_order(giver, &std::array::from_fn(|solid| solid))
+    }
+
+    fn in_order(giver: &TrackedSolids, order: &[usize; TrackedSolids::COUNT]) -> Self {
         let all = giver.to_array();
         let mut solids = [Bounded::new(all[0]); TrackedSolids::COUNT];
-        for (place, solid) in solids.iter_mut().zip(MET_FIRST) {
+        for (place, &solid) in solids.iter_mut().zip(order) {
             *place = Bounded::new(all[solid]);
         }
         let mut prepared = Self {
