@@ -3,6 +3,7 @@
 mod codec;
 mod exclusion;
 mod looking;
+mod mechanisms;
 mod palm;
 mod recent;
 mod shortlist;

@@ -131,7 +131,7 @@ fn pose_of_digits(pose: &HandPose, digits: [bool; 5]) -> HandPose {
 }
 
 /// Every check of a grasp, by other means than the search's.
-fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &TrackedSolids) {
+pub(crate) fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &TrackedSolids) {
     let rig = adult(Handedness::Right);
     let object = &holdout.object;
     let solids = HandSolids::of_pose(rig, &grasp.pose);
