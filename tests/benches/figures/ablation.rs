@@ -2,8 +2,10 @@
 //!
 //! Every variant searches the same holdout with the same seed before the next holdout comes, in an order that is shuffled
 //! for each, so that whatever else runs on the machine slows all of them alike. All mechanisms run twice: what the two
-//! differ by is noise.
+//! differ by is noise. Budgets and times are in processor time, as an idle machine would take it (see [`effort`]); wall
+//! times are kept too, since they show what waking threads costs.
 
+mod effort;
 mod page;
 mod summary;
 
@@ -33,10 +35,11 @@ use rayon::ThreadPool;
 use crate::{
     Row,
     asking::ANSWERED_WITHIN,
-    core::{Core, Known, LOOK_UP_TIME, WORKERS, settings},
+    core::{Core, Known, LOOK_UP_TIME, WORKERS, settings, thread_time},
     setting::{Setting, Thing, bar, built_in_holdouts, default_hand},
     table::{Line, Spread, Unit, time},
 };
+use effort::Effort;
 use summary::{Class, Results};
 
 /// Seed of the variants' order.
@@ -99,10 +102,10 @@ impl Knowledge {
 /// One search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Searched {
-    /// Wall time.
+    /// Processor time, as the time that the search takes on an idle machine.
     time: Duration,
-    /// Processor time of all threads.
-    processor_time: Duration,
+    /// Wall time on this machine, with what else it does.
+    wall_time: Duration,
     /// The grasp's score, if there is a grasp.
     score: Option<f32>,
 }
@@ -150,25 +153,31 @@ impl Searcher {
             mechanisms,
             ..settings(holdout, known, seed)
         };
-        let clock = MonotonicClock::default();
-        let (start, processor_start) = (Instant::now(), processor_time());
+        let (start, look_up_start) = (Instant::now(), thread_time());
         let look = match knowledge {
-            Knowledge::Warm => find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME),
+            Knowledge::Warm => {
+                let clock = MonotonicClock::default();
+                find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME)
+            }
             Knowledge::Cold => LookUp::NotFound { tried: 0 },
         };
-        let outcome = match look {
-            LookUp::Found(outcome) => *outcome,
+        let look_up_time = thread_time().saturating_sub(look_up_start);
+        let (outcome, race_time) = match look {
+            LookUp::Found(outcome) => (*outcome, Duration::ZERO),
             LookUp::NotFound { tried } => {
                 settings.known_tried = tried;
-                let stop = AtomicBool::new(false);
-                self.coordinator
-                    .install(|| find_grasp(&self.workers, holdout, self.rig, &settings, &clock, &stop))
+                settings.deadline = Some(ANSWERED_WITHIN.saturating_sub(look_up_time));
+                self.coordinator.install(|| {
+                    let clock = Effort::start(WORKERS);
+                    let stop = AtomicBool::new(false);
+                    let outcome = find_grasp(&self.workers, holdout, self.rig, &settings, &clock, &stop);
+                    (outcome, clock.total())
+                })
             }
         };
-        let time = start.elapsed();
         Searched {
-            time,
-            processor_time: processor_time().saturating_sub(processor_start),
+            time: look_up_time + race_time,
+            wall_time: start.elapsed(),
             score: outcome
                 .grasp
                 .map(|grasp| grasp.score.as_ref().map_or(0.0, Score::total)),
@@ -184,49 +193,70 @@ fn variants(knowledge: Knowledge) -> Vec<Option<Mechanism>> {
         .collect()
 }
 
+/// What is measured of one class with the same knowledge.
+struct Part<'a> {
+    knowledge: Knowledge,
+    variants: Vec<Option<Mechanism>>,
+    class: Class,
+    cases: &'a [Case],
+    /// For each variant.
+    searched: Vec<Vec<Searched>>,
+}
+
+impl Part<'_> {
+    fn search(&self, searcher: &Searcher, case: usize, variant: usize, seed: u64) -> Searched {
+        let mechanisms = self.variants[variant].map_or(Mechanisms::ALL, |off| Mechanisms::ALL.without(off));
+        searcher.search(&self.cases[case], self.knowledge, mechanisms, seed)
+    }
+}
+
 /// Measures, and writes the table and the page.
-pub(crate) fn measure(setting: &Setting, things: &[Thing]) -> Vec<Line> {
+pub(crate) fn measure(setting: &Setting, things: &[Thing], longest: Option<Duration>) -> Vec<Line> {
     let load_before = crate::load_average();
     let classes = classes(setting, things);
     let searcher = Searcher::new();
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-    let mut all = Vec::new();
+    let mut parts: Vec<Part<'_>> = Vec::new();
     for knowledge in Knowledge::ALL {
-        let variants = variants(knowledge);
-        let bar = bar(
-            classes.iter().map(|(_, cases)| cases.len()).sum(),
-            format!("ablation, {}", knowledge.name()),
-        );
-        let mut searched: Vec<Vec<Vec<Searched>>> =
-            classes.iter().map(|_| vec![Vec::new(); variants.len()]).collect();
-        let search = |case: &Case, variant: usize, seed: u64| {
-            let mechanisms = variants[variant].map_or(Mechanisms::ALL, |off| Mechanisms::ALL.without(off));
-            searcher.search(case, knowledge, mechanisms, seed)
-        };
-        for (_, cases) in &classes {
-            for case in cases.iter().take(UNMEASURED) {
-                for variant in 0..variants.len() {
-                    search(case, variant, u64::MAX);
-                }
-            }
-        }
-        let mut order: Vec<usize> = (0..variants.len()).collect();
-        // Classes take turns, too: what a machine is busy with passes.
-        let longest = classes.iter().map(|(_, cases)| cases.len()).max().unwrap_or(0);
-        for number in 0..longest {
-            for ((_, cases), searched) in classes.iter().zip(&mut searched) {
-                let Some(case) = cases.get(number) else { continue };
-                order.shuffle(&mut random);
-                for &variant in &order {
-                    searched[variant].push(search(case, variant, number as u64));
-                }
-                bar.inc(1);
-            }
-        }
-        for ((class, _), searched) in classes.iter().zip(searched) {
-            all.push(Results::of(knowledge, *class, &variants, searched));
+        for (class, cases) in &classes {
+            let variants = variants(knowledge);
+            parts.push(Part {
+                knowledge,
+                searched: vec![Vec::new(); variants.len()],
+                variants,
+                class: *class,
+                cases,
+            });
         }
     }
+    for part in &parts {
+        for case in 0..UNMEASURED.min(part.cases.len()) {
+            for variant in 0..part.variants.len() {
+                part.search(&searcher, case, variant, u64::MAX);
+            }
+        }
+    }
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+    let start = Instant::now();
+    let bar = bar(setting.holdouts, "ablation, holdouts of each class".to_owned());
+    // All parts take turns: what the machine is busy with passes, and a run that is cut short has some of each.
+    for number in 0..setting.holdouts {
+        if number > 0 && longest.is_some_and(|longest| start.elapsed() >= longest) {
+            break;
+        }
+        for part in &mut parts {
+            let mut order: Vec<usize> = (0..part.variants.len()).collect();
+            order.shuffle(&mut random);
+            for variant in order {
+                let searched = part.search(&searcher, number, variant, number as u64);
+                part.searched[variant].push(searched);
+            }
+        }
+        bar.inc(1);
+    }
+    let all: Vec<Results> = parts
+        .into_iter()
+        .map(|part| Results::of(part.knowledge, part.class, &part.variants, part.searched))
+        .collect();
     let folder = results_folder(setting);
     fs::create_dir_all(&folder).expect("the folder can be made");
     let write = |name: &str, text: String| {
@@ -294,20 +324,6 @@ fn line(results: &Results) -> Line {
         "all on; the same again: median {:.3} ×, p99 {:.3} ×, answered {:+.2} points",
         noise.median.value, noise.p99.value, noise.answered.value
     ))
-}
-
-/// Processor time of all threads.
-#[cfg(target_os = "linux")]
-fn processor_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Duration::try_from(time).expect("a process' time is positive")
-}
-
-/// Where the system tells no process' time, wall time must do.
-#[cfg(not(target_os = "linux"))]
-fn processor_time() -> Duration {
-    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
-    START.elapsed()
 }
 
 /// A time for people.

@@ -154,14 +154,14 @@ pub(crate) fn settings(holdout: &Holdout, known: Known<'_>, seed: u64) -> Search
 
 /// Processor time of this thread.
 #[cfg(target_os = "linux")]
-fn thread_time() -> Duration {
+pub(crate) fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     Duration::try_from(time).expect("a thread's time is positive")
 }
 
 /// Where the system tells no thread's time, wall time must do.
 #[cfg(not(target_os = "linux"))]
-fn thread_time() -> Duration {
+pub(crate) fn thread_time() -> Duration {
     static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
     START.elapsed()
 }

@@ -20,6 +20,8 @@ mod table;
 mod warm;
 mod wire;
 
+use std::time::Duration;
+
 use clap::{Parser, ValueEnum};
 use grasp_experiment::machine::Machine;
 use grasp_synthesis::base::mechanisms::{Mechanism, Mechanisms};
@@ -84,6 +86,9 @@ struct Arguments {
     /// Switch these mechanisms off in every row but the ablation, which switches off each in turn.
     #[arg(long, value_name = "NAME", value_delimiter = ',', num_args = 1..)]
     without: Vec<Mechanism>,
+    /// End the ablation after this many minutes, with what was measured by then.
+    #[arg(long)]
+    minutes: Option<u32>,
     /// Write JSON.
     #[arg(long)]
     json: bool,
@@ -126,7 +131,7 @@ fn main() {
     let setting = Setting::new(arguments.test, holdouts, givers, mechanisms);
     let load_before = load_average();
     let report = Report {
-        lines: measure(&setting, |row| {
+        lines: measure(&setting, arguments.minutes, |row| {
             let is_usual = row != Row::Ablation || arguments.test;
             arguments.only.contains(&row) || arguments.only.is_empty() && is_usual
         }),
@@ -157,7 +162,7 @@ fn main() {
     );
 }
 
-fn measure(setting: &Setting, is_wanted: impl Fn(Row) -> bool) -> Vec<Line> {
+fn measure(setting: &Setting, minutes: Option<u32>, is_wanted: impl Fn(Row) -> bool) -> Vec<Line> {
     let things = setting.built_in_things();
     let mut lines = Vec::new();
     if [Row::Warm, Row::Wire, Row::Best].into_iter().any(&is_wanted) {
@@ -183,7 +188,8 @@ fn measure(setting: &Setting, is_wanted: impl Fn(Row) -> bool) -> Vec<Line> {
         lines.extend(graspit::measure(setting));
     }
     if is_wanted(Row::Ablation) {
-        lines.extend(ablation::measure(setting, &things));
+        let longest = minutes.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));
+        lines.extend(ablation::measure(setting, &things, longest));
     }
     lines
 }
