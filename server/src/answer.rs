@@ -1,4 +1,4 @@
-//! Grasps and reports become messages, in the client's frame and convention.
+//! Converts grasps and reports to messages in the client's frame and convention.
 
 use std::time::Duration;
 
@@ -6,6 +6,7 @@ use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::{pose::Pose, rejection::Rejection, stopwatch::StepTimes},
+    known::atlas::Atlas,
     model::{
         grasp::{Contact, Grasp, KeyFrame, Stage},
         grasp_type::GraspType,
@@ -20,9 +21,9 @@ use grasp_synthesis::{
     search::{GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, settings::SearchSettings},
 };
 
-use crate::{atlases::stamp, convention::Convention, error::ServiceError};
+use crate::{convention::Convention, error::ServiceError};
 
-/// Where and how a client wants its answer.
+/// The frame and convention in which a client gets its answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ClientFrame {
     /// Axes, units and joint order.
@@ -31,19 +32,19 @@ pub(crate) struct ClientFrame {
     pub client_from_object: Pose,
 }
 
-/// What a report tells beside what the search found out.
+/// What a report contains in addition to the search's own report.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Circumstances {
     /// Wall time of the search.
     pub search_time: Duration,
-    /// The budget that was in force.
+    /// Effective budget.
     pub budget: Duration,
 }
 
-/// The answer to a holdout.
+/// The response to a `FindGrasp` request.
 ///
 /// # Errors
-/// [`ServiceError::Cancelled`] if the search was told to stop.
+/// [`ServiceError::Cancelled`] if the search was stopped.
 pub(crate) fn find_response(
     outcome: &SearchOutcome,
     rig: &Rig,
@@ -63,7 +64,7 @@ pub(crate) fn find_response(
     })
 }
 
-/// A vector without any conversion.
+/// A vector, in the same frame and unit.
 pub(crate) fn vector(v: Vec3) -> v1::Vector3 {
     v1::Vector3 {
         x: v.x,
@@ -72,7 +73,16 @@ pub(crate) fn vector(v: Vec3) -> v1::Vector3 {
     }
 }
 
-/// A pose without any conversion.
+/// An atlas' stamp; empty for an empty atlas.
+pub(crate) fn atlas_stamp(atlas: &Atlas) -> String {
+    if atlas.entries().is_empty() {
+        String::new()
+    } else {
+        format!("{:016x}", atlas.stamp())
+    }
+}
+
+/// A pose, in the same frame and unit.
 pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
     let [x, y, z, w] = pose.orientation.to_array();
     v1::Pose {
@@ -81,7 +91,7 @@ pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
     }
 }
 
-/// A hand as grasps and key frames have it.
+/// The fields that grasps and key frames share.
 struct WireHand {
     client_from_wrist: v1::Pose,
     digits: Vec<v1::DigitAngles>,
@@ -135,7 +145,7 @@ fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
             .contacts
             .iter()
             .zip(&grasp.forces)
-            // The thesis' validity has no torsions.
+            // THESIS validity has no torsions.
             .zip(grasp.torsions.iter().copied().chain(std::iter::repeat(0.0)))
             .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, frame))
             .collect(),
@@ -261,8 +271,7 @@ fn report(
         atlas_stamp: settings
             .starts
             .atlas()
-            .filter(|atlas| !atlas.entries().is_empty())
-            .map(|atlas| stamp(atlas))
+            .map(|atlas| atlas_stamp(atlas))
             .unwrap_or_default(),
     }
 }
@@ -294,7 +303,7 @@ fn nearest_miss(miss: &NearestMiss, frame: ClientFrame) -> v1::NearestMiss {
     }
 }
 
-/// Searches take far less than the 292 billion years that fit.
+/// Saturates at the 292 billion years that the message can hold.
 fn wire_duration(duration: Duration) -> prost_types::Duration {
     prost_types::Duration {
         seconds: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),

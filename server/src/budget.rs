@@ -1,26 +1,25 @@
-//! How long a search may take.
+//! The time budget of a search.
 
 use std::time::{Duration, Instant};
 
-/// The limits that the server sets.
+/// The server's limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BudgetLimits {
-    /// For requests that name none.
+    /// Budget of a request that names none.
     pub default: Duration,
-    /// No search takes longer.
+    /// Largest budget.
     pub maximum: Duration,
-    /// Left of a call's deadline for the way back to the client.
+    /// Part of a call's deadline reserved for the response.
     pub reserve: Duration,
 }
 
-/// From here on, clients of gRPC's C++ core (Python, Ruby, PHP …) write a deadline with three digits, rounded up: their
-/// own clock ends the call up to 1 % before the deadline that they send.
+/// Shortest timeout that clients of gRPC's C++ core (Python, Ruby, PHP …) round up to three digits: they may end the call
+/// up to 1 % before the deadline that they send.
 const ROUNDED_FROM: Duration = Duration::from_secs(1);
 
-/// The budget that is in force: the smallest of the request's (or the default), the server's maximum, and what the
-/// call's deadline leaves after the reserve. All count from the call's arrival, so that waiting for a free worker
-/// is part of the budget. Of a deadline that is shorter than two reserves, half is searched: a grasp may still be
-/// found, and its answer may still arrive.
+/// The effective budget: the smallest of the requested one (or the default), the server's maximum, and the call's deadline
+/// less the reserve. It counts from the call's arrival, so waiting for a free worker uses it up. With a deadline shorter
+/// than two reserves, the budget is half of it: a grasp may still be found, and the response may still arrive.
 pub(crate) fn effective_budget(
     requested: Option<Duration>,
     limits: BudgetLimits,
@@ -43,8 +42,8 @@ pub(crate) fn effective_budget(
     }
 }
 
-/// The time that a `grpc-timeout` header gives: up to eight digits and a unit (H, M, S, m, u or n). Nothing for a
-/// header that breaks the protocol; such a call has no deadline, as if the header were absent.
+/// Parses a `grpc-timeout` header: up to eight digits and a unit (H, M, S, m, u or n). None if the header is malformed;
+/// such a call has no deadline, as without the header.
 pub(crate) fn parse_grpc_timeout(header: &str) -> Option<Duration> {
     let (digits, unit) = header.split_at_checked(header.len().checked_sub(1)?)?;
     if digits.is_empty() || digits.len() > 8 || !digits.bytes().all(|b| b.is_ascii_digit()) {
@@ -83,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_limit_wins() {
+    fn budget_is_the_smallest_limit() {
         let ms = Duration::from_millis;
         assert_eq!(budget(None, None), ms(1000), "the default");
         assert_eq!(budget(Some(20), None), ms(20), "the request's");
@@ -97,7 +96,7 @@ mod tests {
         assert_eq!(
             budget(Some(9000), Some(2000)),
             ms(1975),
-            "a deadline of seconds may have been rounded up by 1 %"
+            "a deadline of seconds may be rounded up by 1 %"
         );
         assert_eq!(
             budget(None, Some(4)),
@@ -108,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn timeouts_of_the_protocol_are_read() {
+    fn parses_every_unit() {
         assert_eq!(parse_grpc_timeout("3H"), Some(Duration::from_hours(3)));
         assert_eq!(parse_grpc_timeout("2M"), Some(Duration::from_mins(2)));
         assert_eq!(parse_grpc_timeout("42S"), Some(Duration::from_secs(42)));
@@ -121,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn other_timeouts_are_not() {
+    fn rejects_malformed_timeouts() {
         for header in [
             "",
             "S",

@@ -1,5 +1,4 @@
-//! What holds for every call: its arrival and deadline, its line in the log, its place in the count of calls, and
-//! the bound on uploads.
+//! A layer around every call: records arrival and deadline, counts and logs calls, and bounds uploads.
 
 use std::{
     fmt,
@@ -22,48 +21,48 @@ use crate::{
     error::{Limit, ServiceError},
 };
 
-/// Path of the one method whose messages are large: it is admitted before its message is received.
+/// Path of the only method with large messages; its calls are admitted before the message is received.
 const UPLOAD_METHOD: &str = "/grasp.v1.ObjectService/CreateObject";
 
-/// Services whose calls are logged for every request; the others are asked by probes and tools.
+/// Services whose calls are logged at level info. Probes and tools call the others.
 const LOGGED_PACKAGE: &str = "/grasp.v1.";
 
-/// When a client whose upload was turned away should try again: about the time of an upload.
+/// When a client whose upload was rejected should retry: after about the time of an upload.
 const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
 
-/// Characters of a method's path that are logged at most.
+/// Largest number of logged characters of a method's path.
 const LONGEST_LOGGED_METHOD: usize = 96;
 
-/// What a handler may know and tell about its call.
+/// What a handler knows about its call, and adds to the call's log line.
 #[derive(Clone, Debug)]
 pub(crate) struct CallContext {
     /// When the call's headers arrived.
     pub arrived: Instant,
-    /// When the client stops waiting.
+    /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
-    told: Arc<Told>,
+    log_fields: Arc<LogFields>,
 }
 
-/// What a handler adds to the line in the log.
+/// What a handler adds to the log line.
 #[derive(Debug, Default)]
-struct Told {
+struct LogFields {
     object: OnceLock<String>,
     search: OnceLock<SearchSummary>,
 }
 
-/// A search in a line of the log.
+/// A search as it is logged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchSummary {
-    /// How it ended, as the contract names it.
+    /// Name of the outcome in the contract.
     pub outcome: &'static str,
-    /// Attempts that were run.
+    /// Number of attempts.
     pub attempts: u64,
     /// Its wall time.
     pub time: Duration,
 }
 
 impl CallContext {
-    /// The context of a request; of one that came without [`CallLayer`], a new one without a deadline.
+    /// The context of a request; a new one without a deadline if the request did not pass [`CallLayer`].
     pub(crate) fn of<T>(request: &tonic::Request<T>) -> Self {
         request
             .extensions()
@@ -76,25 +75,25 @@ impl CallContext {
         let arrived = Instant::now();
         Self {
             arrived,
-            // A deadline beyond the clock's end is none.
+            // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
-            told: Arc::default(),
+            log_fields: Arc::default(),
         }
     }
 
-    /// Names the object in the log.
-    pub(crate) fn tell_object(&self, id: &str) {
-        // A handler tells once; a second word would change nothing.
-        let _ = self.told.object.set(id.to_owned());
+    /// Adds the object's id to the log line.
+    pub(crate) fn log_object(&self, id: &str) {
+        // The first value stays.
+        let _ = self.log_fields.object.set(id.to_owned());
     }
 
-    /// Describes the search in the log.
-    pub(crate) fn tell_search(&self, summary: SearchSummary) {
-        let _ = self.told.search.set(summary);
+    /// Adds the search to the log line.
+    pub(crate) fn log_search(&self, summary: SearchSummary) {
+        let _ = self.log_fields.search.set(summary);
     }
 }
 
-/// The calls that have no answer yet.
+/// Counts the calls in flight.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CallsInFlight(Arc<Counter>);
 
@@ -105,12 +104,12 @@ struct Counter {
 }
 
 impl CallsInFlight {
-    /// How many there are.
+    /// Number of calls.
     pub(crate) fn count(&self) -> usize {
         self.0.count.load(Ordering::Acquire)
     }
 
-    /// Returns when there is none.
+    /// Waits until there are none.
     pub(crate) async fn none(&self) {
         loop {
             let reached_zero = self.0.reached_zero.notified();
@@ -137,14 +136,14 @@ impl Drop for InFlight {
     }
 }
 
-/// Wraps every service; see the module.
+/// Wraps every service; see the module documentation.
 #[derive(Clone, Debug)]
 pub(crate) struct CallLayer {
-    /// Counts the calls.
+    /// Counter of calls.
     pub in_flight: CallsInFlight,
-    /// Bounds the uploads.
+    /// One permit per concurrent upload.
     pub uploads: Arc<Semaphore>,
-    /// How many uploads there may be.
+    /// Largest number of concurrent uploads.
     pub maximum_uploads: usize,
 }
 
@@ -196,7 +195,7 @@ where
         };
         let upload = if request.uri().path() == UPLOAD_METHOD {
             let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
-                line.ends_with(Code::ResourceExhausted);
+                line.set_code(Code::ResourceExhausted);
                 let status = Status::from(ServiceError::Overloaded {
                     limit: Limit::Uploads,
                     maximum: self.layer.maximum_uploads,
@@ -218,7 +217,7 @@ where
         let answer = self.inner.call(request);
         Box::pin(async move {
             let answer = answer.await;
-            line.ends_with(match &answer {
+            line.set_code(match &answer {
                 Ok(response) => code_of(response),
                 Err(_) => Code::Internal,
             });
@@ -227,13 +226,13 @@ where
     }
 }
 
-/// The right to receive and build an object. It travels with the request, and from there into the work.
+/// The right to receive and build an object. The handler takes it from the request and holds it while it works.
 #[derive(Clone, Debug)]
 pub(crate) struct UploadPermit {
     _permit: Arc<OwnedSemaphorePermit>,
 }
 
-/// The status of a response: in its headers if it has no message, else it ended well when it began.
+/// The status of a response: that of its headers if it has no message, otherwise OK.
 fn code_of<R>(response: &Response<R>) -> Code {
     response
         .headers()
@@ -241,7 +240,7 @@ fn code_of<R>(response: &Response<R>) -> Code {
         .map_or(Code::Ok, |status| Code::from_bytes(status.as_bytes()))
 }
 
-/// A call's line in the log, written when the call ends in whatever way.
+/// A call's log line, written when the call ends, for whatever reason.
 struct LogLine {
     method: String,
     context: CallContext,
@@ -250,23 +249,23 @@ struct LogLine {
 }
 
 impl LogLine {
-    /// Notes the status; without it, the call was cancelled.
-    fn ends_with(&mut self, code: Code) {
+    /// Records the status. A line without one is logged as cancelled.
+    fn set_code(&mut self, code: Code) {
         self.code = Some(code);
     }
 }
 
 impl Drop for LogLine {
     fn drop(&mut self) {
-        let told = &self.context.told;
-        let search = told.search.get();
-        let status = Shouted(self.code.unwrap_or(Code::Cancelled));
+        let fields = &self.context.log_fields;
+        let search = fields.search.get();
+        let status = GrpcName(self.code.unwrap_or(Code::Cancelled));
         let total_us = micros(self.context.arrived.elapsed());
         macro_rules! log {
             ($level:ident) => {
                 tracing::$level!(
                     method = %self.method,
-                    object = told.object.get(),
+                    object = fields.object.get(),
                     outcome = search.map(|s| s.outcome),
                     attempts = search.map(|s| s.attempts),
                     search_us = search.map(|s| micros(s.time)),
@@ -288,10 +287,10 @@ fn micros(duration: Duration) -> u64 {
     u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
 }
 
-/// A code as gRPC writes it: `INVALID_ARGUMENT`.
-struct Shouted(Code);
+/// A code in the spelling of gRPC: `INVALID_ARGUMENT`.
+struct GrpcName(Code);
 
-impl fmt::Display for Shouted {
+impl fmt::Display for GrpcName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (place, character) in format!("{:?}", self.0).chars().enumerate() {
             if place > 0 && character.is_ascii_uppercase() {
@@ -310,13 +309,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_are_written_as_grpc_does() {
-        assert_eq!(Shouted(Code::InvalidArgument).to_string(), "INVALID_ARGUMENT");
-        assert_eq!(Shouted(Code::Ok).to_string(), "OK");
+    fn status_codes_are_spelled_as_in_grpc() {
+        assert_eq!(GrpcName(Code::InvalidArgument).to_string(), "INVALID_ARGUMENT");
+        assert_eq!(GrpcName(Code::Ok).to_string(), "OK");
     }
 
     #[tokio::test]
-    async fn the_count_is_none_only_when_all_calls_have_ended() {
+    async fn waits_until_all_calls_have_ended() {
         let calls = CallsInFlight::default();
         calls.none().await;
         let (first, second) = (calls.enter(), calls.enter());
@@ -331,7 +330,7 @@ mod tests {
         waiting.await.unwrap();
     }
 
-    /// A service that keeps every request without an answer.
+    /// A service that keeps every request and never answers.
     #[derive(Clone, Default)]
     struct Keeper(Arc<Mutex<Vec<Request<()>>>>);
 
@@ -359,7 +358,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn an_upload_too_many_is_turned_away_before_it_is_received() {
+    async fn rejects_uploads_beyond_the_maximum_before_they_are_received() {
         let layer = CallLayer {
             in_flight: CallsInFlight::default(),
             uploads: Arc::new(Semaphore::new(1)),
@@ -370,12 +369,12 @@ mod tests {
         let first = service.call(request(UPLOAD_METHOD));
         let second = service.call(request(UPLOAD_METHOD)).await.unwrap();
         assert_eq!(code_of(&second), Code::ResourceExhausted);
-        // Calls of other methods are not uploads.
+        // Other methods need no permit.
         let other = service.call(request("/grasp.v1.GraspService/FindGrasp"));
         assert_eq!(layer.in_flight.count(), 2);
         drop((first, other));
         assert_eq!(layer.in_flight.count(), 0);
-        // The permit goes with the request, which the keeper still works on.
+        // The kept request still holds the permit.
         assert_eq!(layer.uploads.available_permits(), 0);
         assert_eq!(keeper.0.lock().unwrap().len(), 2);
         keeper.0.lock().unwrap().clear();
@@ -383,7 +382,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_handler_learns_when_its_call_arrived_and_ends() {
+    async fn passes_arrival_and_deadline_to_the_handler() {
         let keeper = Keeper::default();
         let layer = CallLayer {
             in_flight: CallsInFlight::default(),

@@ -1,20 +1,20 @@
-//! The engines' conventions: the one place where poses, points, directions and joint orders of the wire become
-//! `OpenXR` ones and back.
+//! The engines' conventions: the only place that converts poses, points, directions and joint orders of messages to
+//! `OpenXR` and back.
 //!
-//! `OpenXR` is right-handed, +Y up, in metres. Unity mirrors z, Unreal permutes the axes and counts centimetres:
-//! both are changes of basis that apply to every frame alike. Godot keeps the basis, but its `XRHandTracker` turns
-//! each hand joint by a half turn, so that joint frames convert differently from all other poses.
+//! `OpenXR` is right-handed, +Y up, in metres. Unity mirrors z, Unreal permutes the axes and uses centimetres: both are
+//! changes of basis that apply to every frame. Godot keeps the basis, but its `XRHandTracker` rotates each hand joint by a
+//! half turn, so joint frames convert differently from other poses.
 //!
-//! Functions come in pairs: `*_to_openxr` reads the client's convention, `*_from_openxr` writes it.
+//! Functions come in pairs: `*_to_openxr` converts from the client's convention, `*_from_openxr` to it.
 
 use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::{base::pose::Pose, model::hand::joints::JOINT_COUNT};
 
-/// Centimetres in a metre: Unreal's unit.
+/// Centimetres, Unreal's unit, per metre.
 const CENTIMETRES_PER_METRE: f32 = 100.0;
 
-/// The half turn about (0, -1, 1) between an `OpenXR` joint's axes and those of Godot's `XRHandTracker`; its own
+/// The half turn about (0, -1, 1) between an `OpenXR` joint's axes and those of Godot's `XRHandTracker`. It is its own
 /// inverse, up to the quaternion's sign.
 const GODOT_JOINT_TURN: Quat = Quat::from_xyzw(
     0.0,
@@ -26,18 +26,18 @@ const GODOT_JOINT_TURN: Quat = Quat::from_xyzw(
 /// The axes, units and joint order of a client's engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Convention {
-    /// Right-handed, +Y up, metres; Bevy's and `WebXR`'s too.
+    /// Right-handed, +Y up, metres; also Bevy and `WebXR`.
     OpenXr,
     /// Left-handed, +Y up, +Z forward, metres.
     Unity,
     /// Left-handed, +Z up, +X forward, centimetres.
     Unreal,
-    /// As `OpenXr`, but for the axes of hand joints.
+    /// Like `OpenXr`, except for the axes of hand joints.
     Godot,
 }
 
 impl Convention {
-    /// The convention that a request names; unspecified means `OpenXR`.
+    /// The convention of a request; unspecified means `OpenXR`.
     pub(crate) fn from_wire(convention: v1::Convention) -> Self {
         match convention {
             v1::Convention::Unspecified | v1::Convention::Openxr => Self::OpenXr,
@@ -47,7 +47,7 @@ impl Convention {
         }
     }
 
-    /// Metres in one of the convention's units of length.
+    /// Length of the convention's unit in metres.
     pub(crate) fn metres_per_unit(self) -> f32 {
         match self {
             Self::OpenXr | Self::Unity | Self::Godot => 1.0,
@@ -55,7 +55,7 @@ impl Convention {
         }
     }
 
-    /// A length in metres.
+    /// Converts a length to metres.
     pub(crate) fn length_to_openxr(self, length: f32) -> f32 {
         match self {
             Self::OpenXr | Self::Unity | Self::Godot => length,
@@ -63,7 +63,7 @@ impl Convention {
         }
     }
 
-    /// A length in the convention's unit.
+    /// Converts a length from metres.
     pub(crate) fn length_from_openxr(self, metres: f32) -> f32 {
         match self {
             Self::OpenXr | Self::Unity | Self::Godot => metres,
@@ -71,7 +71,7 @@ impl Convention {
         }
     }
 
-    /// A direction, or a force in newtons: the axes change, the length does not.
+    /// Converts a direction, or a force in newtons: the axes change, the length does not.
     pub(crate) fn direction_to_openxr(self, v: Vec3) -> Vec3 {
         match self {
             Self::OpenXr | Self::Godot => v,
@@ -89,18 +89,18 @@ impl Convention {
         }
     }
 
-    /// A point, in metres.
+    /// Converts a point to metres.
     pub(crate) fn point_to_openxr(self, point: Vec3) -> Vec3 {
         self.direction_to_openxr(point).map(|x| self.length_to_openxr(x))
     }
 
-    /// A point, from metres.
+    /// Converts a point from metres.
     pub(crate) fn point_from_openxr(self, point: Vec3) -> Vec3 {
         self.direction_from_openxr(point)
             .map(|x| self.length_from_openxr(x))
     }
 
-    /// The pose of anything but a hand joint.
+    /// Converts the pose of anything but a hand joint.
     pub(crate) fn pose_to_openxr(self, pose: Pose) -> Pose {
         let q = pose.orientation;
         Pose {
@@ -126,7 +126,7 @@ impl Convention {
         }
     }
 
-    /// The pose of a hand joint, the wrist included.
+    /// Converts the pose of a hand joint or wrist.
     pub(crate) fn joint_to_openxr(self, joint: Pose) -> Pose {
         match self {
             Self::OpenXr | Self::Unity | Self::Unreal => self.pose_to_openxr(joint),
@@ -142,8 +142,8 @@ impl Convention {
         }
     }
 
-    /// The `OpenXR` index of the joint that comes at `place` in the convention's list of 26; also the other way
-    /// round, since Unity's swap of palm and wrist is its own inverse.
+    /// The `OpenXR` index of the joint at `place` in the convention's list of 26. It is its own inverse: Unity swaps palm
+    /// and wrist.
     pub(crate) fn joint_at(self, place: usize) -> usize {
         debug_assert!(place < JOINT_COUNT);
         match self {
@@ -156,7 +156,7 @@ impl Convention {
         }
     }
 
-    /// The convention's axis against gravity, seen in `OpenXR`: +Y in all of them once converted.
+    /// The convention's axis against gravity, in `OpenXR` axes: always +Y.
     pub(crate) fn up_in_openxr(self) -> Vec3 {
         match self {
             Self::OpenXr | Self::Unity | Self::Godot => self.direction_to_openxr(Vec3::Y),
@@ -165,7 +165,7 @@ impl Convention {
     }
 }
 
-/// A joint with Godot's half turn added or taken away.
+/// A joint with Godot's half turn added or removed.
 fn turned(joint: Pose) -> Pose {
     Pose {
         position: joint.position,
@@ -188,8 +188,8 @@ mod tests {
         Convention::Godot,
     ];
 
-    /// The change of basis that the table of conventions states, written down independently as a matrix whose
-    /// columns are the `OpenXR` axes in the engine's.
+    /// The documented change of basis, written independently as a matrix whose columns are the `OpenXR` axes in the
+    /// engine's.
     fn engine_from_openxr(convention: Convention) -> Mat3 {
         match convention {
             Convention::OpenXr | Convention::Godot => Mat3::IDENTITY,
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_converted_and_back_is_the_same() {
+    fn conversions_there_and_back_are_the_identity() {
         for convention in ALL {
             for pose in samples() {
                 for back in [
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn known_values_of_the_table() {
+    fn converts_known_values() {
         let pose = Pose {
             position: Vec3::new(1.0, 2.0, 3.0),
             orientation: Quat::from_xyzw(0.1, 0.3, 0.5, 0.806_226),
@@ -277,7 +277,7 @@ mod tests {
         assert_eq!(unreal.orientation.to_array(), [-0.5, 0.1, 0.3, -0.806_226]);
         let godot = Convention::Godot.pose_from_openxr(pose);
         assert_eq!(godot, pose);
-        // The half turn about (0, -1, 1), multiplied out by hand for the joint at the identity.
+        // The half turn about (0, -1, 1), multiplied by hand for the joint at the identity.
         let joint = Convention::Godot.joint_from_openxr(Pose::IDENTITY);
         assert_eq!(
             joint.orientation.to_array(),
@@ -287,7 +287,7 @@ mod tests {
 
     #[test]
     fn godot_joints_point_with_y_to_the_tip() {
-        // An OpenXR joint at the identity points -Z to the tip and has +Y out of the back of the hand.
+        // In OpenXR, -Z points to the tip and +Y out of the back of the hand.
         let joint = Convention::Godot.joint_from_openxr(Pose::IDENTITY);
         assert!((joint.orientation * Vec3::Y - Vec3::NEG_Z).length() < 1e-6);
         assert!((joint.orientation * Vec3::Z - Vec3::NEG_Y).length() < 1e-6);

@@ -1,79 +1,79 @@
-//! What can go wrong with a call, and the status that tells it.
+//! Errors of calls, and their gRPC status.
 
 use std::{collections::HashMap, time::Duration};
 
 use tonic::{Code, Status, metadata::MetadataValue};
 use tonic_types::{ErrorDetails, FieldViolation, StatusExt as _};
 
-/// The domain of every `ErrorInfo`: the package of the contract.
+/// Domain of every `ErrorInfo`: the package of the contract.
 pub(crate) const ERROR_DOMAIN: &str = "grasp.v1";
 
-/// Trailer by which a gRPC client's retry policy learns when to try again, in milliseconds.
+/// Trailer with the delay of a gRPC client's retry policy, in milliseconds.
 const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
 
-/// One thing that is wrong with a request.
+/// One violation of the contract by a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
     /// Path of the field, as in `presenting_hand.angles.digits[2].base_pitch`.
     pub field: String,
-    /// The value, and what would be right.
+    /// The value, and what a valid one is.
     pub description: String,
 }
 
-/// What is bounded and was full.
+/// A limit that was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
-    /// Searches that run or wait.
+    /// Running and waiting searches.
     Searches,
-    /// Uploads that are received or built.
+    /// Objects being received or built.
     Uploads,
-    /// Bytes of created objects of which every one is in use.
+    /// Created objects, all of which are in use.
     ObjectCache,
 }
 
-/// Why a call has no answer.
+/// Why a call failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ServiceError {
-    /// The request breaks the contract; everything that is wrong with it.
+    /// The request violates the contract; with all violations.
     #[error("{}", summary(.0))]
     Invalid(Vec<Violation>),
     /// No object has the name.
     #[error("{name} does not exist{}", if *.evicted { ": it was evicted from the cache; create it again" } else { "" })]
     ObjectNotFound {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
-        /// True if it existed once and was pushed out by others.
+        /// True if it existed and was evicted.
         evicted: bool,
     },
     /// An object with the name exists.
     #[error("{name} already exists; choose another object_id")]
     ObjectExists {
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
     },
-    /// The server has enough to do.
+    /// The server is at one of its limits.
     #[error("{} ({maximum}); try again", limit_text(*.limit))]
     Overloaded {
-        /// What is full.
+        /// The limit.
         limit: Limit,
-        /// How much it holds.
+        /// Its value.
         maximum: usize,
-        /// When to try again.
+        /// When to retry.
         retry_after: Duration,
     },
     /// The call's deadline passed before a search could start.
     #[error("the deadline passed before the search could start")]
     DeadlineExceeded,
-    /// The search was told to stop before its end.
+    /// The search was stopped before its end.
     #[error("the call was cancelled")]
     Cancelled,
-    /// A job panicked. The panic is in the server's log.
-    #[error("the server failed on this call; the log tells why")]
+    /// A job panicked. The server's log contains the panic.
+    #[error("the server failed on this call; its log says why")]
     Panicked,
 }
 
 impl ServiceError {
-    /// The one violation of a request that has no other.
+    /// The error of a request with a single violation.
     pub fn invalid(field: impl Into<String>, description: impl Into<String>) -> Self {
         Self::Invalid(vec![Violation {
             field: field.into(),
@@ -156,13 +156,13 @@ fn limit_reason(limit: Limit) -> &'static str {
 
 fn limit_text(limit: Limit) -> &'static str {
     match limit {
-        Limit::Searches => "the server runs as many searches as it may",
-        Limit::Uploads => "the server receives as many objects at once as it may",
+        Limit::Searches => "the server is at its limit of concurrent searches",
+        Limit::Uploads => "the server is at its limit of concurrent uploads",
         Limit::ObjectCache => "every object in the full cache is in use",
     }
 }
 
-/// The first violation and how many more there are: what fits a status message.
+/// The first violation and the number of others, for the status message.
 fn summary(violations: &[Violation]) -> String {
     match violations {
         [] => "the request is invalid".to_owned(),
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_error_carries_a_reason_in_the_domain() {
+    fn every_status_has_a_reason_in_the_domain() {
         let errors = [
             (
                 ServiceError::invalid("seed", "is wrong"),
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn overload_says_when_to_try_again() {
+    fn overload_says_when_to_retry() {
         let status = Status::from(ServiceError::Overloaded {
             limit: Limit::Uploads,
             maximum: 4,
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn all_violations_are_in_the_details_and_the_message_says_how_many() {
+    fn details_list_all_violations_and_the_message_counts_them() {
         let violations = (0..3)
             .map(|i| Violation {
                 field: format!("f{i}"),

@@ -1,4 +1,4 @@
-//! Asks a server whether it serves: what a container's health check runs, without a shell or another tool.
+//! Asks a running server for its health, for container health checks without a shell or other tools.
 
 use std::{
     net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
@@ -10,52 +10,52 @@ use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
 
-/// How long a server may take to answer, from the connection on. An idle one takes a millisecond; one whose cores all
-/// search, tens of them. Kubernetes gives a probe one second unless told otherwise: this stays below.
+/// Time limit for connection and answer. An idle server takes a millisecond, a busy one tens of them. Below the default
+/// of Kubernetes' probes, one second.
 const TIMEOUT: Duration = Duration::from_millis(900);
 
-/// Why a server is not healthy.
+/// Why a health check failed.
 #[derive(Debug, thiserror::Error)]
 pub enum HealthCheckError {
-    /// The configuration leaves the port to the system, so nobody knows it.
+    /// The configuration leaves the port to the system, so the check does not know it.
     #[error("listen is {0}; the port must be more than 0 for a health check")]
     NoPort(SocketAddr),
-    /// Nobody listens, or it does not speak HTTP/2.
+    /// Nothing listens, or it does not speak HTTP/2.
     #[error("cannot connect to {address}: {reason}")]
     Connect {
-        /// Where.
+        /// The server's address.
         address: SocketAddr,
         /// The innermost cause.
         reason: String,
     },
-    /// It listens but does not answer.
+    /// The server does not answer.
     #[error("{address} did not answer within {} ms", TIMEOUT.as_millis())]
     Timeout {
-        /// Where.
+        /// The server's address.
         address: SocketAddr,
     },
-    /// It answers, but not the question.
+    /// The server rejects the health check.
     #[error("{address} answered with {code:?}: {message}")]
     Refused {
-        /// Where.
+        /// The server's address.
         address: SocketAddr,
         /// The status code.
         code: tonic::Code,
         /// The status message.
         message: String,
     },
-    /// It does not serve, or not yet, or not any more.
-    #[error("{address} says {status}; only SERVING is healthy")]
+    /// The server does not serve, does not serve yet, or is shutting down.
+    #[error("{address} is {status}; only SERVING is healthy")]
     NotServing {
-        /// Where.
+        /// The server's address.
         address: SocketAddr,
-        /// What it said, as the protocol names it.
+        /// Its status, as named in the protocol.
         status: &'static str,
     },
 }
 
-/// Asks the server that listens on `listen` for the health of all its services; an unspecified address is asked over
-/// the loopback interface.
+/// Asks the server that listens on `listen` for its overall health. For an unspecified address, it connects over the
+/// loopback interface.
 ///
 /// # Errors
 /// Anything but `SERVING` within 900 ms; see [`HealthCheckError`].
@@ -70,7 +70,7 @@ pub async fn check_health(listen: SocketAddr) -> Result<(), HealthCheckError> {
     }
 }
 
-/// Where a server that listens there can be reached from the same machine.
+/// The address to reach a server on the same machine.
 fn reachable(listen: SocketAddr) -> SocketAddr {
     let ip = match listen.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
@@ -107,7 +107,7 @@ async fn ask(address: SocketAddr) -> Result<(), HealthCheckError> {
     }
 }
 
-/// The first cause of an error; the transport's own words only say that there was one.
+/// The innermost cause of an error; the transport's own text does not contain it.
 fn innermost(error: &dyn std::error::Error) -> String {
     let mut cause = error;
     while let Some(source) = cause.source() {
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unspecified_addresses_are_asked_over_loopback() {
+    fn reaches_unspecified_addresses_over_loopback() {
         for (listen, asked) in [
             ("0.0.0.0:50051", "127.0.0.1:50051"),
             ("[::]:50051", "[::1]:50051"),
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_port_that_the_system_chose_cannot_be_checked() {
+    async fn rejects_a_port_chosen_by_the_system() {
         let error = check_health("[::1]:0".parse().unwrap()).await.unwrap_err();
         assert!(matches!(error, HealthCheckError::NoPort(_)), "{error}");
     }

@@ -1,26 +1,45 @@
 //! The gRPC service that answers grasp requests.
 //!
-//! [`run`] serves on a listener until it is told to stop; the binary `grasp-server` only wires it to flags, logs and
-//! signals. The way of a request: `call` notes arrival and deadline; `validate` turns the message into checked
-//! values or a list of everything wrong; `objects` has the object with its search structures; `search` admits the
-//! search, runs it on threads of its own and stops it when the call is dropped; `answer` words what was found. Between
-//! calls, `atlases` finds out how hands can hold the objects.
+//! [`run`] serves on a listener until it is shut down; the binary `grasp-server` adds flags, logs and signals.
 //!
-//! Before it serves, `memory` compares what it may take with what it may have, and `objects::directory` reads the folder
-//! of objects. `health_check` is the other side: it asks a server that runs.
+//! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the
+//! message into checked values or a list of everything that is wrong; `objects` finds the object with its search
+//! structures, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
+//! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response.
 //!
-//! What is not here: the algorithm (crate `grasp-synthesis`), which in turn knows nothing of gRPC or async code.
-//! Only `convention` knows the engines' axes, only `error` knows status codes, and nothing but `search` and
-//! `atlases` starts threads.
+//! Before serving, `memory` compares what the configuration may use with the limits of the process, and
+//! `objects::directory` loads the folder of objects. Between calls, `atlases` builds atlases in the background.
+//! `health_check` is a client: it asks a running server for its health.
+//!
+//! # Order of modules
+//!
+//! A module imports only modules of the rows above its own, which a test of the workspace checks:
+//!
+//! ```text
+//! atlas_slots  budget  convention  error  health_check  limits  net
+//! answer  call  config  executor  validate
+//! memory  objects
+//! atlases
+//! search
+//! services
+//! serve
+//! ```
+//!
+//! The algorithm is in the crate `grasp-synthesis`, which knows nothing of gRPC or async code. Only `convention` knows
+//! the engines' axes, only `error` knows status codes, and only `executor`, `atlases` and the preparation of objects and
+//! hands start threads.
 
 mod answer;
+mod atlas_slots;
 mod atlases;
 mod budget;
 mod call;
 pub mod config;
 mod convention;
 mod error;
+mod executor;
 mod health_check;
+mod limits;
 mod memory;
 mod net;
 mod objects;
@@ -32,9 +51,7 @@ mod validate;
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
 pub use health_check::{HealthCheckError, check_health};
+pub use limits::StoreLimits;
 pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory, memory_limits};
-pub use objects::{
-    directory::{DirectoryError, DirectoryProblem},
-    store::StoreLimits,
-};
+pub use objects::directory::{DirectoryError, DirectoryProblem};
 pub use serve::{Gauges, ServeError, Server, run};

@@ -1,4 +1,4 @@
-//! The binary: configuration, log, memory, runtime, listener, signals; and the health check of a server that runs.
+//! The binary: configuration, log, memory check, runtime, listener and signals; and the health check.
 
 use std::{io::IsTerminal as _, path::PathBuf, process::ExitCode, time::Duration};
 
@@ -11,29 +11,29 @@ use grasp_server::{
 use tokio::{net::TcpListener, signal::unix::SignalKind};
 use tracing_subscriber::EnvFilter;
 
-/// How long work that ignores its end is waited for before the process ends.
+/// How long to wait at the end for work that has not stopped.
 const RUNTIME_END: Duration = Duration::from_millis(500);
 
 /// Answers grasp requests over gRPC.
 ///
-/// Every option can also be set in the environment or in a file; flags win over the environment, and the environment
-/// over the file.
+/// Every option can also be set in the environment or in a file. Flags override the environment, and the environment
+/// overrides the file.
 ///
-/// The server does not start, says why, and exits with 1 if a value cannot be used, if an object of the objects
-/// directory is wrong, or if the configuration may take more memory than the process may have (by its control groups,
-/// `RLIMIT_AS` or `RLIMIT_DATA`). SIGTERM and SIGINT end it with 0 after running calls were answered.
+/// The server refuses to start, prints the reason and exits with 1 if a value is invalid, if an object of the objects
+/// directory is invalid, or if the configuration may use more memory than the process is allowed (by its control groups,
+/// `RLIMIT_AS` or `RLIMIT_DATA`). After SIGTERM or SIGINT it answers running calls and exits with 0.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {
-    /// Configuration file (TOML); its keys are the options' names with _ for -.
+    /// Configuration file (TOML); its keys are the names of the options with _ instead of -.
     #[arg(long, env = "GRASP_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Print the configuration that is in force as TOML and exit.
+    /// Print the effective configuration as TOML and exit.
     #[arg(long)]
     print_config: bool,
-    /// Ask the server that runs with this configuration for its health and exit: with 0 if it serves.
+    /// Check the health of the server that runs with this configuration; exit with 0 if it serves.
     ///
-    /// An unspecified address (0.0.0.0, [::]) is asked over the loopback interface. The answer may take 900 ms.
+    /// An unspecified address (0.0.0.0, [::]) is reached over the loopback interface. The time limit is 900 ms.
     #[arg(long, conflicts_with = "print_config")]
     health_check: bool,
     #[command(flatten)]
@@ -71,9 +71,9 @@ fn start(flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     let json = config.log_format == LogFormat::Json;
     match run(&config) {
         Ok(()) => Ok(ExitCode::SUCCESS),
-        // Whoever reads the log as JSON reads the reason for its end there too.
+        // Readers of a JSON log need the reason there, too.
         Err(error) if json && tracing::enabled!(tracing::Level::ERROR) => {
-            tracing::error!(%error, "the server ends");
+            tracing::error!(%error, "the server failed");
             Ok(ExitCode::FAILURE)
         }
         Err(error) => Err(error),
@@ -84,10 +84,10 @@ fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     for name in unknown_variables(variables(), &known_variables()) {
         tracing::warn!(
             name,
-            "an environment variable looks like one of the server's and is none"
+            "unknown environment variable with the prefix of the server's"
         );
     }
-    // Before the objects directory is read, which a server with too little memory might not survive to tell.
+    // Before loading the objects directory, during which a server with too little memory might be killed.
     let limits = memory_limits();
     check_memory(config, 0, &limits)?;
     let server = Server::new(config.clone())?;
@@ -105,7 +105,7 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
     let listener = TcpListener::bind(config.listen)
         .await
         .map_err(|error| format!("cannot listen on {}: {error}", config.listen))?;
-    // Before anybody is told that the server is there: from now on a signal is a drain.
+    // Before logging that the server is there: from now on, signals start the drain.
     let mut terminate = tokio::signal::unix::signal(SignalKind::terminate())?;
     let mut interrupt = tokio::signal::unix::signal(SignalKind::interrupt())?;
     let shutdown = async move {

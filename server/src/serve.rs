@@ -1,4 +1,4 @@
-//! From a listener to a server, and back to silence.
+//! Starts, runs and shuts down the server.
 
 use std::{
     future::Future,
@@ -24,83 +24,82 @@ use crate::{
     atlases::{Atlases, files::AtlasFiles},
     call::{CallLayer, CallsInFlight},
     config::Config,
+    executor::SearchExecutor,
+    limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
     net::{AcceptLimits, accept},
     objects::{
         StoredObject,
         directory::{self, DirectoryError},
         store::ObjectStore,
     },
-    search::executor::SearchExecutor,
-    services::{
-        BYTES_BESIDE_MESH, GraspHandler, LARGEST_ANSWER, LARGEST_FIND_REQUEST, ObjectHandler, Shared,
-    },
+    services::{GraspHandler, ObjectHandler, Shared},
 };
 
-/// Streams that a client may have open on a connection.
+/// Largest number of open streams per connection.
 const STREAMS_PER_CONNECTION: u32 = 100;
 
-/// Calls of a connection that are worked on at a time; more are turned away.
+/// Largest number of concurrent calls per connection; more are rejected.
 const CALLS_PER_CONNECTION: usize = 64;
 
-/// Bytes of a request's headers.
+/// Largest headers of a request, in bytes.
 const LARGEST_HEADERS: u32 = 16 << 10;
 
-/// Streams that a client may open and reset before it is taken for an attacker.
+/// Largest number of streams that a client may open and reset before its connection is closed as an attack.
 const PENDING_RESETS: usize = 20;
 
-/// Bytes in flight on a stream.
+/// Flow-control window of a stream, in bytes.
 const STREAM_WINDOW: u32 = 256 << 10;
 
-/// Bytes in flight on a connection.
+/// Flow-control window of a connection, in bytes.
 const CONNECTION_WINDOW: u32 = 1 << 20;
 
-/// Bytes of a frame.
+/// Largest HTTP/2 frame, in bytes.
 const LARGEST_FRAME: u32 = 16 << 10;
 
-/// How often a silent connection is asked whether it lives …
+/// Interval of pings on a silent connection.
 const KEEPALIVE_EVERY: Duration = Duration::from_secs(30);
 
-/// … and how long the answer may take.
+/// Time limit for the answer to a ping.
 const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// How long a client may take to send the preface of HTTP/2.
+/// Time limit for a client's HTTP/2 preface.
 const PREFACE_TIME: Duration = Duration::from_secs(10);
 
-/// What a call may take beyond the longest budget: reading and building a large mesh.
+/// Time limit of a call beyond the largest budget: enough to read and build a large mesh.
 const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
 
-/// From the last answer to the end of its connection: time for it to be sent, and for the clients to close.
+/// Delay between the last response and closing its connection: time to send it, and for the client to close first.
 const LINGER: Duration = Duration::from_millis(200);
 
-/// Why the server ended, or did not start.
+/// Why the server ended or did not start.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// The threads that search cannot be started.
+    /// The search threads cannot be started.
     #[error("cannot start the search workers: {0}")]
     Workers(#[from] rayon::ThreadPoolBuildError),
     /// The objects directory cannot be used.
     #[error(transparent)]
     Objects(#[from] DirectoryError),
-    /// The folder of atlases cannot be used.
-    #[error("atlas_directory is {}; it must be a folder or a name for a new one: {source}", path.display())]
+    /// The atlas directory cannot be used.
+    #[error("atlas_directory is {}; it must be a folder or the name of a new one: {source}", path.display())]
     AtlasDirectory {
         /// The folder.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// The threads that build atlases cannot be started.
-    #[error("cannot start the builders of atlases: {0}")]
+    /// The builder threads cannot be started.
+    #[error("cannot start the atlas builders: {0}")]
     Builders(std::io::Error),
     /// The descriptors of the contract are broken.
     #[error("cannot offer reflection: {0}")]
     Reflection(#[from] tonic_reflection::server::Error),
-    /// The transport gave up.
+    /// The transport failed.
     #[error("the transport failed: {0}")]
     Transport(#[from] transport::Error),
 }
 
-/// A server that is ready to serve.
+/// A server that is ready to listen.
 #[derive(Debug)]
 pub struct Server {
     shared: Arc<Shared>,
@@ -111,7 +110,7 @@ pub struct Server {
     directory_bytes: usize,
 }
 
-/// What the server is doing, for tests and monitors.
+/// The server's activity, for tests and monitoring.
 #[derive(Clone, Debug)]
 pub struct Gauges {
     shared: Arc<Shared>,
@@ -119,24 +118,24 @@ pub struct Gauges {
 }
 
 impl Gauges {
-    /// Searches that run or wait.
+    /// Number of running and waiting searches.
     pub fn searches(&self) -> usize {
         self.shared.executor.jobs()
     }
 
-    /// Threads that build atlases.
+    /// Number of running atlas builders.
     pub fn builders(&self) -> usize {
         self.shared.atlases.builders()
     }
 
-    /// Calls without an answer.
+    /// Number of calls in flight.
     pub fn calls(&self) -> usize {
         self.calls.count()
     }
 }
 
-/// Serves on a listener until `shutdown` completes: then health says `NOT_SERVING`, no connection is accepted any
-/// more, running calls may end within the drain time, and every connection is closed.
+/// Serves on a listener until `shutdown` completes. Then health becomes `NOT_SERVING`, no more connections are accepted,
+/// running calls have the drain time to end, and every connection is closed.
 ///
 /// # Errors
 /// See [`ServeError`].
@@ -149,12 +148,12 @@ pub async fn run(
 }
 
 impl Server {
-    /// Starts the search workers and reads the built-in objects and hands, and the objects directory.
+    /// Loads the built-in objects and hands and the objects directory, and starts the search and builder threads.
     ///
     /// # Errors
     /// [`ServeError::Workers`], [`ServeError::Objects`], [`ServeError::AtlasDirectory`], [`ServeError::Builders`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
-        read_hands();
+        prepare_hands();
         let triangles = config.maximum_object_triangles.get();
         let obj_limits = ObjLimits {
             bytes: config.maximum_object_bytes.get(),
@@ -162,13 +161,13 @@ impl Server {
             triangles,
         };
         let directory = match &config.objects_directory {
-            Some(path) => tell(path, directory::load(path, obj_limits, config.store)?),
+            Some(path) => logged(path, directory::load(path, obj_limits, config.store)?),
             None => Vec::new(),
         };
         let directory_bytes = directory.iter().map(StoredObject::bytes).sum();
         let objects = Arc::new(ObjectStore::new(config.store, directory));
         for object in objects.pinned() {
-            object.get_ready(&config.default_rig);
+            object.prepare(&config.default_rig);
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let files = match config.atlas_directory {
@@ -204,12 +203,12 @@ impl Server {
         })
     }
 
-    /// Bytes that the objects of the objects directory take, by estimate.
+    /// Estimated size in bytes of the objects of the objects directory.
     pub fn directory_bytes(&self) -> usize {
         self.directory_bytes
     }
 
-    /// What the server is doing.
+    /// The server's activity.
     pub fn gauges(&self) -> Gauges {
         Gauges {
             shared: Arc::clone(&self.shared),
@@ -228,10 +227,10 @@ impl Server {
     ) -> Result<(), ServeError> {
         let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
             .max_decoding_message_size(LARGEST_FIND_REQUEST)
-            .max_encoding_message_size(LARGEST_ANSWER);
+            .max_encoding_message_size(LARGEST_RESPONSE);
         let objects = ObjectServiceServer::new(ObjectHandler::new(Arc::clone(&self.shared)))
-            .max_decoding_message_size(self.shared.obj_limits.bytes + BYTES_BESIDE_MESH)
-            .max_encoding_message_size(LARGEST_ANSWER);
+            .max_decoding_message_size(self.shared.obj_limits.bytes + BYTES_BESIDES_MESH)
+            .max_encoding_message_size(LARGEST_RESPONSE);
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, ServingStatus::Serving).await;
 
@@ -266,7 +265,7 @@ impl Server {
             .add_service(reflection().build_v1alpha()?)
             .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());
 
-        // Ends what is left, whichever way this function ends.
+        // Stops everything that still runs, however this function ends.
         let _builders_end = self.shared.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
@@ -278,10 +277,13 @@ impl Server {
             stop.cancel();
             let drained = tokio::time::timeout(self.drain, self.calls.none()).await;
             if drained.is_err() {
-                tracing::warn!(calls = self.calls.count(), "the drain time is over");
+                tracing::warn!(
+                    calls = self.calls.count(),
+                    "the drain time has passed; cutting off running calls"
+                );
             }
             tokio::time::sleep(LINGER).await;
-            // Idle connections and open streams would be waited for without end.
+            // The transport would wait for idle connections and open streams forever.
             close.cancel();
             std::future::pending::<()>().await;
         };
@@ -294,14 +296,14 @@ impl Server {
     }
 }
 
-/// Tells in the log which objects a folder gave, and what is odd about them.
-fn tell(path: &Path, objects: Vec<StoredObject>) -> Vec<StoredObject> {
+/// Logs the objects of a folder and their warnings.
+fn logged(path: &Path, objects: Vec<StoredObject>) -> Vec<StoredObject> {
     for object in &objects {
         for warning in &object.warnings {
             tracing::warn!(
                 object = object.name(),
                 warning,
-                "an object of the objects directory is odd"
+                "an object of the objects directory has a warning"
             );
         }
     }
@@ -309,9 +311,9 @@ fn tell(path: &Path, objects: Vec<StoredObject>) -> Vec<StoredObject> {
     objects
 }
 
-/// Has the built-in hands read now, and what search derives of them, instead of by the first call that needs them: it
-/// takes tenths of a second, which no budget would end.
-fn read_hands() {
+/// Loads the built-in hands and prepares them for searches. The first call with each hand would otherwise do so, outside
+/// its budget: it takes tenths of a second.
+fn prepare_hands() {
     thread::scope(|scope| {
         for rig in RIG_NAMES {
             for handedness in [Handedness::Left, Handedness::Right] {
@@ -321,14 +323,14 @@ fn read_hands() {
     });
 }
 
-/// Reflection for the contract and for health.
+/// Reflection for the contract and the health service.
 fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
 }
 
-/// Says the same of every service, and of the server as a whole.
+/// Sets the health of every service and of the server as a whole.
 async fn set_health(health: &HealthReporter, status: ServingStatus) {
     for service in [
         "",

@@ -28,9 +28,9 @@ def test_everything_wrong_with_a_folder_of_objects_is_told(refused, objects):
     error = json.loads(log.splitlines()[-1])["error"]
     for part in (
         "my-remote.toml: mass_kg: is -1; it must be more than 0",
-        "my-remote.toml: colour: is no key",
-        "orphan.toml: has no orphan.obj beside it",
-        "scissors.obj: is named like the built-in object",
+        "my-remote.toml: colour: is unknown",
+        "orphan.toml: has no orphan.obj next to it",
+        "scissors.obj: has the name of the built-in object",
     ):
         assert part in error, error
 

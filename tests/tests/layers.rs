@@ -10,6 +10,43 @@ use std::{
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
+/// The server's top-level modules, as documented in its `lib.rs`.
+const SERVER: &[&[&str]] = &[
+    &[
+        "atlas_slots",
+        "budget",
+        "convention",
+        "error",
+        "health_check",
+        "limits",
+        "net",
+    ],
+    &["answer", "call", "config", "executor", "validate"],
+    &["memory", "objects"],
+    &["atlases"],
+    &["search"],
+    &["services"],
+    &["serve"],
+];
+
+#[test]
+fn server_modules_import_only_earlier_layers() {
+    assert_layered("server/src", SERVER);
+}
+
+/// Checks a crate's sources, given by their path in the workspace.
+fn assert_layered(src: &str, layers: &[&[&str]]) {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("the crate is in the workspace");
+    let found = violations(&workspace.join(src), layers);
+    assert!(
+        found.is_empty(),
+        "imports against the order of layers:\n{}",
+        found.join("\n")
+    );
+}
+
 /// Every import against the order, as `file:line: what is wrong`. A module may import modules of the rows before its
 /// own; since modules of one row may not import each other, an order without violations has no circle.
 ///

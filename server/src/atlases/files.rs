@@ -1,14 +1,19 @@
-//! Atlases on disk: a file for each object and hand, named by the key of what it was made of.
+//! Atlases on disk: one file per object and hand, named after a hash of what the atlas was made from.
 //!
-//! A file is written under another name first and then renamed, so that a reader finds the old one or the new one, whole.
-//! All files together take at most [`MOST_BYTES`]: beyond that, those go first that were not used for longest.
+//! A file is written under a temporary name ending in `.part` and then renamed, so that readers find the old file or
+//! the new one, never half of one. All files together take at most [`MOST_BYTES`]; beyond that, the least recently used
+//! ones are removed. Unfinished files that a crash left behind are removed at the next start.
 
 use std::{
+    collections::BTreeSet,
     fmt::Write as _,
     fs::{self, File},
     io::{self, Read as _},
     path::{Path, PathBuf},
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
     time::SystemTime,
 };
 
@@ -19,20 +24,23 @@ use grasp_synthesis::known::{
     key::key,
 };
 
-use super::builder::told;
+use super::hand_label;
 use crate::objects::StoredObject;
 
-/// Bytes of all files together: those of 800 complete atlases. More remember more objects; clients who create objects
-/// without end must not fill the disk.
+/// Largest total size of all files, in bytes: 800 complete atlases. More remembers more objects; the bound keeps
+/// clients that create objects without end from filling the disk.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Bytes of a file at most: three times those of a complete atlas. What is larger is not read.
+/// Largest file that is read, in bytes: three times a complete atlas.
 const LARGEST_FILE: u64 = 4 << 20;
 
-/// How the files' names end.
+/// Extension of a finished file.
 const EXTENSION: &str = "atlas";
 
-/// Characters of a file's name: 128 bits of the key, which nobody hits by chance.
+/// Extension of an unfinished file.
+const PART_EXTENSION: &str = "part";
+
+/// Bytes of the hash in a file's name: 128 bits, which do not collide by chance.
 const NAME_BYTES: usize = 16;
 
 /// A folder of atlases.
@@ -40,31 +48,32 @@ const NAME_BYTES: usize = 16;
 pub(crate) struct AtlasFiles {
     folder: PathBuf,
     most_bytes: u64,
-    /// Counts what was written, for names that no other thread uses.
-    written: AtomicU64,
 }
 
 impl AtlasFiles {
-    /// Makes the folder if need be.
+    /// Opens the folder, creating it if necessary, and removes unfinished files that a crash left in it.
     ///
     /// # Errors
-    /// It cannot be made.
+    /// The folder cannot be created.
     pub(crate) fn open(folder: PathBuf) -> io::Result<Self> {
         fs::create_dir_all(&folder)?;
+        if let Err(error) = remove_unfinished(&folder) {
+            let folder = folder.display();
+            tracing::warn!(%folder, %error, "cannot remove unfinished atlas files");
+        }
         Ok(Self {
             folder,
             most_bytes: MOST_BYTES,
-            written: AtomicU64::new(0),
         })
     }
 
     /// The same folder with another bound.
     #[cfg(test)]
-    pub(super) fn bounded(self, most_bytes: u64) -> Self {
+    fn bounded(self, most_bytes: u64) -> Self {
         Self { most_bytes, ..self }
     }
 
-    /// What was written for an object and a hand; none if nothing was, or if it cannot be used, which the log tells.
+    /// Reads the atlas of an object and a hand; none if there is no file, or a broken one, which is logged.
     pub(super) fn read(&self, object: &StoredObject, hand: &Hand) -> Option<Grown> {
         let path = self.path(object, hand);
         let read = read_bounded(&path).and_then(|bytes| {
@@ -73,7 +82,7 @@ impl AtlasFiles {
         });
         match read {
             Ok(grown) => {
-                // Used now: others go first. A folder that cannot be written to is still read.
+                // Marks the file as used. A read-only folder still serves atlases.
                 let _ = File::options()
                     .append(true)
                     .open(&path)
@@ -83,49 +92,53 @@ impl AtlasFiles {
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => {
                 let file = path.display();
-                tracing::warn!(object = object.name(), %file, %error, "an atlas cannot be read and is built again");
+                tracing::warn!(object = object.name(), %file, %error, "rebuilding an atlas that cannot be read");
                 None
             }
         }
     }
 
-    /// Writes what has grown for an object and a hand; the log tells if it cannot.
-    pub(super) fn write(&self, object: &StoredObject, hand: &'static Hand, grown: &Grown) {
+    /// Writes the atlas of an object and a hand; a failure is logged.
+    pub(super) fn write(&self, object: &StoredObject, hand: &Hand, grown: &Grown) {
         let bytes = encode(grown, &object.object, &hand.rig);
         if let Err(error) = self.replace(&self.path(object, hand), &bytes) {
             let folder = self.folder.display();
-            let hand = told(hand);
-            tracing::warn!(object = object.name(), %hand, %folder, %error, "an atlas cannot be written");
+            let hand = hand_label(hand);
+            tracing::warn!(object = object.name(), %hand, %folder, %error, "cannot write an atlas");
         }
     }
 
     fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
-        let number = self.written.fetch_add(1, Ordering::Relaxed);
-        // Of this process and this write alone, and not an atlas by its name.
-        let temporary = path.with_extension(format!("{}-{number}.part", std::process::id()));
-        let result = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
-        if result.is_err() {
-            let _ = fs::remove_file(&temporary);
+        let write = || PartFile::of(path).write(bytes);
+        match write() {
+            // Another server that shares the folder started just now and took the file for one that a crash left.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => write()?,
+            result => result?,
         }
-        result?;
         self.make_room(path)
     }
 
-    /// Removes the files that were not used for longest, until the others take no more than they may. What was just
-    /// written stays.
+    /// Removes the least recently used files but `written`, until all files are within the bound. Unfinished files
+    /// count, but are not removed here.
     fn make_room(&self, written: &Path) -> io::Result<()> {
-        let mut files = Vec::new();
+        let mut finished = Vec::new();
+        let mut taken = 0;
         for file in fs::read_dir(&self.folder)? {
             let path = file?.path();
-            if path.extension().is_some_and(|extension| extension == EXTENSION)
-                && let Ok(about) = fs::metadata(&path)
-            {
-                files.push((about.modified()?, about.len(), path));
+            let is_finished = path.extension().is_some_and(|extension| extension == EXTENSION);
+            if !is_finished && !is_part_file(&path) {
+                continue;
+            }
+            let Ok(about) = fs::metadata(&path) else {
+                continue;
+            };
+            taken += about.len();
+            if is_finished {
+                finished.push((about.modified()?, about.len(), path));
             }
         }
-        files.sort_unstable();
-        let mut taken: u64 = files.iter().map(|(_, bytes, _)| bytes).sum();
-        for (_, bytes, path) in files {
+        finished.sort_unstable();
+        for (_, bytes, path) in finished {
             if taken <= self.most_bytes {
                 break;
             }
@@ -147,6 +160,97 @@ impl AtlasFiles {
     }
 }
 
+/// Paths of the unfinished files that this process is writing, in any folder.
+static BEING_WRITTEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn being_written() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    // No code panics while it holds the lock; if some did, the set would still be consistent.
+    BEING_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An unfinished file `KEY.PROCESS-NUMBER.part`, removed when it is dropped unless it was finished.
+struct PartFile<'a> {
+    target: &'a Path,
+    path: PathBuf,
+}
+
+impl<'a> PartFile<'a> {
+    /// A new name next to the file that is to be written.
+    fn of(target: &'a Path) -> Self {
+        /// Number of the next file, unique in this process.
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let extension = format!("{}-{number}.{PART_EXTENSION}", std::process::id());
+        let path = target.with_extension(extension);
+        being_written().insert(path.clone());
+        Self { target, path }
+    }
+
+    /// Writes the bytes and gives the file its final name.
+    fn write(self, bytes: &[u8]) -> io::Result<()> {
+        fs::write(&self.path, bytes)?;
+        fs::rename(&self.path, self.target)
+    }
+}
+
+impl Drop for PartFile<'_> {
+    fn drop(&mut self) {
+        // After a rename there is nothing to remove.
+        let _ = fs::remove_file(&self.path);
+        being_written().remove(&self.path);
+    }
+}
+
+/// Is this a name that [`PartFile`] gives?
+fn is_part_file(path: &Path) -> bool {
+    let parts = path.file_name().and_then(|name| name.to_str()).map(|name| {
+        let mut parts = name.split('.');
+        [parts.next(), parts.next(), parts.next(), parts.next()]
+    });
+    let Some([Some(key), Some(writer), Some(PART_EXTENSION), None]) = parts else {
+        return false;
+    };
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    key.len() == 2 * NAME_BYTES
+        && key.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+        && writer
+            .split_once('-')
+            .is_some_and(|(process, number)| is_number(process) && is_number(number))
+}
+
+/// Removes the unfinished files of earlier processes, and logs how many there were.
+///
+/// # Errors
+/// The folder cannot be listed, or a file cannot be removed; other files are removed nonetheless.
+fn remove_unfinished(folder: &Path) -> io::Result<()> {
+    let mut removed = 0_usize;
+    let mut removed_bytes = 0;
+    let mut failed = Ok(());
+    for file in fs::read_dir(folder)? {
+        let path = file?.path();
+        // A process id says nothing: in a container, it is the same after every restart.
+        if !is_part_file(&path) || being_written().contains(&path) {
+            continue;
+        }
+        match fs::symlink_metadata(&path) {
+            Ok(about) if about.is_file() => match fs::remove_file(&path) {
+                Ok(()) => {
+                    removed += 1;
+                    removed_bytes += about.len();
+                }
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => failed = Err(error),
+            },
+            _ => {}
+        }
+    }
+    if removed > 0 {
+        let folder = folder.display();
+        tracing::info!(%folder, files = removed, bytes = removed_bytes, "removed unfinished atlas files");
+    }
+    failed
+}
+
 /// The bytes of a file, unless it is too large for an atlas.
 fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
@@ -158,4 +262,159 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
         ));
     }
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use glam::Vec3;
+
+    use super::*;
+    use crate::atlases::tests::{adult, cuboid, grown, small};
+
+    /// A test's own folder, removed at its end.
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(test: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("grasp-atlases-{test}-{}", std::process::id()));
+            fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn open(&self) -> AtlasFiles {
+            AtlasFiles::open(self.0.clone()).unwrap()
+        }
+
+        fn names(&self) -> Vec<String> {
+            let files = fs::read_dir(&self.0).unwrap();
+            let mut names: Vec<String> = files
+                .map(|file| file.unwrap().file_name().into_string().unwrap())
+                .collect();
+            names.sort();
+            names
+        }
+
+        fn bytes(&self) -> u64 {
+            let files = fs::read_dir(&self.0).unwrap();
+            files.map(|file| file.unwrap().metadata().unwrap().len()).sum()
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            // A folder left in the temporary directory does no harm.
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    /// Longer than the resolution of any file system's clock.
+    fn pause() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+
+    const KEY: &str = "0123456789abcdef0123456789abcdef";
+
+    #[test]
+    fn reads_what_was_written_and_rejects_broken_files() {
+        let folder = Folder::new("files");
+        let files = folder.open();
+        let (object, other) = (small("a"), cuboid("b", Vec3::new(0.03, 0.015, 0.05)));
+        let grown = grown(&object);
+        assert!(files.read(&object, adult()).is_none());
+        files.write(&object, adult(), &grown);
+        files.write(&object, adult(), &grown);
+        assert_eq!(files.read(&object, adult()).as_ref(), Some(&*grown));
+        assert!(files.read(&other, adult()).is_none());
+        let names = folder.names();
+        assert!(names.len() == 1 && names[0].ends_with(".atlas"), "{names:?}");
+        let path = folder.0.join(&names[0]);
+        let whole = fs::read(&path).unwrap();
+        for broken in [&whole[..whole.len() / 2], b"", &[&whole[..], b"more"].concat()] {
+            fs::write(&path, broken).unwrap();
+            assert!(files.read(&object, adult()).is_none());
+        }
+        files.write(&object, adult(), &grown);
+        assert_eq!(files.read(&object, adult()).as_ref(), Some(&*grown));
+    }
+
+    #[test]
+    fn evicts_least_recently_used_files() {
+        let folder = Folder::new("room");
+        let objects = [0.02, 0.021, 0.022].map(|x| cuboid("any", Vec3::new(x, 0.015, 0.05)));
+        let grown = objects.each_ref().map(grown);
+        let files = folder.open();
+        files.write(&objects[0], adult(), &grown[0]);
+        let files = files.bounded(5 * folder.bytes() / 2);
+        pause();
+        files.write(&objects[1], adult(), &grown[1]);
+        pause();
+        let is_there = |place: usize| files.read(&objects[place], adult()).is_some();
+        assert!(is_there(0));
+        pause();
+        files.write(&objects[2], adult(), &grown[2]);
+        assert_eq!([0, 1, 2].map(is_there), [true, false, true]);
+    }
+
+    #[test]
+    fn unfinished_files_count_to_the_bound() {
+        let folder = Folder::new("part-bound");
+        let objects = [0.02, 0.021].map(|x| cuboid("any", Vec3::new(x, 0.015, 0.05)));
+        let grown = objects.each_ref().map(grown);
+        let files = folder.open();
+        files.write(&objects[0], adult(), &grown[0]);
+        let bytes = folder.bytes();
+        let files = files.bounded(5 * bytes / 2);
+        fs::write(folder.0.join(format!("{KEY}.7-0.part")), vec![0; bytes as usize]).unwrap();
+        pause();
+        files.write(&objects[1], adult(), &grown[1]);
+        let is_there = |place: usize| files.read(&objects[place], adult()).is_some();
+        assert_eq!([0, 1].map(is_there), [false, true]);
+    }
+
+    #[test]
+    fn opening_removes_unfinished_files_and_nothing_else() {
+        let folder = Folder::new("part");
+        // The name of this process too: a restarted container gives it to the next one.
+        let own = format!("{KEY}.{}-0.part", std::process::id());
+        let left_by_a_crash = [own, format!("{KEY}.1-25.part")];
+        let foreign = [
+            format!("{KEY}.atlas"),
+            format!("{KEY}.part"),
+            format!("{KEY}.1-.part"),
+            format!("{KEY}.1-2.part.bak"),
+            format!("{KEY}.x-2.part"),
+            format!("{}.1-2.part", &KEY[1..]),
+            format!("{}.1-2.part", KEY.to_uppercase()),
+            "download.part".to_owned(),
+        ];
+        for name in left_by_a_crash.iter().chain(&foreign) {
+            fs::write(folder.0.join(name), "unfinished").unwrap();
+        }
+        let directory = format!("{KEY}.1-3.part");
+        fs::create_dir(folder.0.join(&directory)).unwrap();
+        folder.open();
+        let mut expected = [&foreign[..], &[directory]].concat();
+        expected.sort();
+        assert_eq!(folder.names(), expected);
+    }
+
+    #[test]
+    fn opening_keeps_files_that_this_process_is_writing() {
+        let folder = Folder::new("part-writing");
+        let target = folder.0.join(KEY).with_extension(EXTENSION);
+        let part = PartFile::of(&target);
+        assert!(is_part_file(&part.path), "{:?}", part.path);
+        fs::write(&part.path, "half").unwrap();
+        folder.open();
+        assert!(part.path.exists());
+        part.write(b"whole").unwrap();
+        assert_eq!(folder.names(), [format!("{KEY}.atlas")]);
+        // One that was given up leaves nothing.
+        let part = PartFile::of(&target);
+        fs::write(&part.path, "half").unwrap();
+        drop(part);
+        assert_eq!(folder.names(), [format!("{KEY}.atlas")]);
+    }
 }

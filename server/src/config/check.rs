@@ -1,17 +1,17 @@
-//! Checks the configuration as it was written.
+//! Checks the configuration.
 
 use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use grasp_assets::hands::RIG_NAMES;
 
 use super::{BadValue, Config, ConfigError, LogFormat, RawConfig};
-use crate::{budget::BudgetLimits, objects::store::StoreLimits};
+use crate::{budget::BudgetLimits, limits::StoreLimits};
 
 impl RawConfig {
     /// Checks every value; absent ones get their defaults.
     ///
     /// # Errors
-    /// [`ConfigError::BadValues`] with every value that cannot be used.
+    /// [`ConfigError::BadValues`] with every invalid value.
     pub fn validate(self) -> Result<Config, ConfigError> {
         let defaults = Config::default();
         let mut bad = Vec::new();
@@ -135,7 +135,7 @@ impl RawConfig {
             ),
         };
         if budgets.default > budgets.maximum {
-            check.refuse(
+            check.reject(
                 "default_budget_ms",
                 budgets.default.as_millis(),
                 format!("at most maximum_budget_ms, {}", budgets.maximum.as_millis()),
@@ -145,11 +145,11 @@ impl RawConfig {
     }
 }
 
-/// Collects the values that cannot be used.
+/// Collects the invalid values.
 struct Check<'a>(&'a mut Vec<BadValue>);
 
 impl Check<'_> {
-    fn refuse(&mut self, key: &'static str, value: impl fmt::Display, needed: impl Into<String>) {
+    fn reject(&mut self, key: &'static str, value: impl fmt::Display, needed: impl Into<String>) {
         self.0.push(BadValue {
             key,
             value: value.to_string(),
@@ -167,7 +167,7 @@ impl Check<'_> {
         if range.contains(&value) {
             return Some(value);
         }
-        self.refuse(key, value, format!("{} to {}", range.start(), range.end()));
+        self.reject(key, value, format!("{} to {}", range.start(), range.end()));
         None
     }
 
@@ -204,11 +204,11 @@ impl Check<'_> {
             .map_or(default, Duration::from_millis)
     }
 
-    /// A folder, which is read later: here it only has to have a name.
+    /// A path that is not empty. The folder itself is opened later.
     fn folder(&mut self, key: &'static str, value: Option<PathBuf>) -> Option<PathBuf> {
         let path = value?;
         if path.as_os_str().is_empty() {
-            self.refuse(key, "\"\"", "a folder, or absent");
+            self.reject(key, "\"\"", "a folder, or absent");
             return None;
         }
         Some(path)
@@ -224,7 +224,7 @@ impl Check<'_> {
     ) -> T {
         let Some(text) = value else { return default };
         parse(&text).unwrap_or_else(|| {
-            self.refuse(key, format_args!("{text:?}"), needed);
+            self.reject(key, format_args!("{text:?}"), needed);
             default
         })
     }
@@ -236,12 +236,12 @@ mod tests {
     use crate::config::unknown_variables;
 
     #[test]
-    fn nothing_said_gives_the_defaults() {
+    fn empty_configuration_has_the_defaults() {
         assert_eq!(RawConfig::default().validate().unwrap(), Config::default());
     }
 
     #[test]
-    fn what_is_printed_can_be_read_again() {
+    fn printed_configuration_can_be_read() {
         let config = Config {
             log_format: LogFormat::Json,
             drain: Duration::from_millis(77),
@@ -256,13 +256,13 @@ mod tests {
     }
 
     #[test]
-    fn unknown_keys_are_refused_by_name() {
+    fn rejects_unknown_keys_by_name() {
         let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
         assert!(error.to_string().contains("wokers"), "{error}");
     }
 
     #[test]
-    fn the_first_source_that_says_something_wins() {
+    fn earlier_source_wins() {
         let flags = RawConfig {
             workers: Some(3),
             ..RawConfig::default()
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bad_value_is_told_with_its_key() {
+    fn reports_every_invalid_value_with_its_key() {
         let raw = RawConfig {
             listen: Some("here".into()),
             workers: Some(0),
@@ -304,17 +304,17 @@ mod tests {
             panic!("all of it is wrong");
         };
         assert_eq!(bad.len(), 20, "{bad:?}");
-        let told: Vec<String> = bad.iter().map(ToString::to_string).collect();
+        let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",
             "workers is 0; it must be 1 to 1024",
         ] {
-            assert!(told.iter().any(|text| text == expected), "{told:?}");
+            assert!(texts.iter().any(|text| text == expected), "{texts:?}");
         }
     }
 
     #[test]
-    fn a_default_budget_above_the_maximum_is_told() {
+    fn rejects_a_default_budget_above_the_maximum() {
         let raw = RawConfig {
             default_budget_ms: Some(500),
             maximum_budget_ms: Some(400),
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn misspelt_variables_are_found() {
+    fn finds_misspelt_variables() {
         let present = ["GRASP_WORKER", "GRASP_WORKERS", "PATH"].map(str::to_owned);
         assert_eq!(
             unknown_variables(present, &["GRASP_WORKERS".to_owned()]),

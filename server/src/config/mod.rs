@@ -1,4 +1,4 @@
-//! The server's configuration: checked values, and where they come from.
+//! The server's configuration: checked values and their sources.
 
 mod check;
 mod raw;
@@ -9,53 +9,53 @@ pub use raw::{RawConfig, read_file, unknown_variables};
 
 use grasp_synthesis::base::mechanisms::Mechanisms;
 
-use crate::{budget::BudgetLimits, objects::store::StoreLimits};
+use crate::{budget::BudgetLimits, limits::StoreLimits};
 
-/// How the log is written.
+/// Format of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogFormat {
     /// For people.
     Text,
-    /// For machines: one JSON object a line.
+    /// For machines: one JSON object per line.
     Json,
 }
 
-/// A configuration that was checked. The defaults serve one machine's worth of clients.
+/// A checked configuration. The defaults suit the clients of one machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Config {
-    /// Where to listen. `run` takes a listener and does not look here.
+    /// Address to listen on. `run` ignores it and takes a listener.
     pub listen: SocketAddr,
-    /// Threads that search. More find grasps sooner, up to the number of cores.
+    /// Number of search threads. More find grasps sooner, up to the number of cores.
     pub workers: NonZeroUsize,
-    /// Threads of the async runtime that the binary starts.
+    /// Number of threads of the binary's async runtime.
     pub io_threads: NonZeroUsize,
-    /// How long searches may take.
+    /// Bounds on search times.
     pub budgets: BudgetLimits,
-    /// Searches that run or wait at most; others are turned away.
+    /// Largest number of running and waiting searches; others are rejected.
     pub maximum_searches: NonZeroUsize,
-    /// Objects that are received or built at a time; others are turned away.
+    /// Largest number of objects received or built at a time; others are rejected.
     pub maximum_uploads: NonZeroUsize,
-    /// Bytes of an OBJ mesh.
+    /// Largest OBJ mesh, in bytes.
     pub maximum_object_bytes: NonZeroUsize,
-    /// Triangles, and vertices, of a mesh.
+    /// Largest number of triangles, and of vertices, in a mesh.
     pub maximum_object_triangles: NonZeroUsize,
-    /// How much the created objects may take.
+    /// Bound on the created objects.
     pub store: StoreLimits,
-    /// A folder of objects that the server starts with; none for the built-in ones alone.
+    /// Folder of objects to start with; none for the built-in objects only.
     pub objects_directory: Option<PathBuf>,
-    /// Threads that find out in the background how hands can hold the objects; 0: none does, and no atlases are kept.
+    /// Number of background threads that build atlases; with 0 there are no atlases.
     pub builder_threads: usize,
-    /// A folder to keep atlases in; none to keep them in memory alone.
+    /// Folder that keeps atlases; none to keep them in memory only.
     pub atlas_directory: Option<PathBuf>,
-    /// Connections; others wait.
+    /// Largest number of connections; others wait.
     pub maximum_connections: NonZeroUsize,
-    /// How long running calls are waited for at the end.
+    /// How long to wait for running calls at shutdown.
     pub drain: Duration,
-    /// The receiving hand's rig unless a request names one; under `THESIS` validity, that is always the thesis' own.
+    /// Rig of the receiving hand if a request names none. Under `THESIS` validity it is always the rig `thesis`.
     pub default_rig: String,
-    /// How the log is written.
+    /// Format of the log.
     pub log_format: LogFormat,
-    /// What is logged, as a filter of `tracing-subscriber`: `info`, `grasp_server=debug,h2=warn`, …
+    /// Filter of the log, as in `tracing-subscriber`: `info`, `grasp_server=debug,h2=warn`, …
     pub log: String,
     /// The mechanisms that searches run. No file or variable sets them: fewer are for measuring what each is worth.
     pub mechanisms: Mechanisms,
@@ -68,12 +68,12 @@ impl Default for Config {
         Self {
             listen: SocketAddr::from((std::net::Ipv6Addr::LOCALHOST, 50051)),
             workers: cores,
-            // Requests and answers are small: a thread serves thousands of them a second.
+            // Messages are small: a thread serves thousands of calls per second.
             io_threads: non_zero((cores.get() / 8).max(2)),
             budgets: BudgetLimits {
                 default: Duration::from_secs(1),
                 maximum: Duration::from_secs(10),
-                // Measured: timers of the runtime are up to 6 ms late while all cores search.
+                // Timers of the runtime are up to 6 ms late while all cores search.
                 reserve: Duration::from_millis(5),
             },
             maximum_searches: non_zero(64),
@@ -97,14 +97,14 @@ impl Default for Config {
     }
 }
 
-/// A value of the configuration that cannot be used.
+/// An invalid value of the configuration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BadValue {
-    /// The key, as it stands in the file.
+    /// The key, as in the file.
     pub key: &'static str,
     /// The value.
     pub value: String,
-    /// What would be right.
+    /// What a valid value is.
     pub needed: String,
 }
 
@@ -119,7 +119,7 @@ pub enum ConfigError {
         /// Why.
         source: std::io::Error,
     },
-    /// The file is no TOML, or has a key or a type that is not known.
+    /// The file is not TOML, or has an unknown key or a value of the wrong type.
     #[error("the configuration file {} is wrong: {source}", path.display())]
     Malformed {
         /// The file.
@@ -127,7 +127,7 @@ pub enum ConfigError {
         /// Where and why.
         source: Box<toml::de::Error>,
     },
-    /// Values that cannot be used; all of them.
+    /// All invalid values.
     #[error("{}", listed(.0))]
     BadValues(Vec<BadValue>),
 }

@@ -1,4 +1,4 @@
-//! The configuration as it is written: flags before environment before file before defaults.
+//! The unchecked configuration: flags before environment before file before defaults.
 
 use std::{
     fs,
@@ -14,85 +14,87 @@ use serde::{Deserialize, Serialize};
 
 use super::{Config, ConfigError, LogFormat};
 
-/// What every variable of the environment starts with.
+/// Prefix of every environment variable of the server.
 const VARIABLE_PREFIX: &str = "GRASP_";
 
-/// Every key, unchecked. What is absent is left to the next source.
+/// Every key, unchecked. An absent one falls back to the next source.
 #[derive(Args, Clone, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawConfig {
     /// Address to listen on [default: `[::1]:50051`].
     #[arg(long, env = "GRASP_LISTEN", value_name = "ADDRESS")]
     pub listen: Option<String>,
-    /// Threads that search [default: one per core].
+    /// Search threads [default: one per core].
     #[arg(long, env = "GRASP_WORKERS", value_name = "COUNT")]
     pub workers: Option<u64>,
-    /// Threads for requests and answers [default: 2, or an eighth of the cores].
+    /// Threads for requests and responses [default: 2, or an eighth of the cores].
     #[arg(long, env = "GRASP_IO_THREADS", value_name = "COUNT")]
     pub io_threads: Option<u64>,
-    /// Budget of a search that names none [default: 1000].
+    /// Budget of a request that names none, in milliseconds [default: 1000].
     #[arg(long, env = "GRASP_DEFAULT_BUDGET_MS", value_name = "MS")]
     pub default_budget_ms: Option<u64>,
-    /// Budget that no search exceeds [default: 10000].
+    /// Largest budget of a search, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_MAXIMUM_BUDGET_MS", value_name = "MS")]
     pub maximum_budget_ms: Option<u64>,
-    /// Left of a call's deadline for the way back to the client [default: 5].
+    /// Part of a call's deadline reserved for the response, in milliseconds [default: 5].
     #[arg(long, env = "GRASP_DEADLINE_RESERVE_MS", value_name = "MS")]
     pub deadline_reserve_ms: Option<u64>,
-    /// Searches that run or wait at most [default: 64].
+    /// Most searches running or waiting; others are rejected [default: 64].
     #[arg(long, env = "GRASP_MAXIMUM_SEARCHES", value_name = "COUNT")]
     pub maximum_searches: Option<u64>,
-    /// Objects that are received or built at a time [default: 4].
+    /// Most objects received or built at a time; others are rejected [default: 4].
     #[arg(long, env = "GRASP_MAXIMUM_UPLOADS", value_name = "COUNT")]
     pub maximum_uploads: Option<u64>,
-    /// Bytes of an OBJ mesh at most [default: 8388608].
+    /// Largest OBJ mesh, in bytes [default: 8388608].
     #[arg(long, env = "GRASP_MAXIMUM_OBJECT_BYTES", value_name = "BYTES")]
     pub maximum_object_bytes: Option<u64>,
-    /// Triangles, and vertices, of a mesh at most [default: 200000].
+    /// Most triangles, and most vertices, in a mesh [default: 200000].
     #[arg(long, env = "GRASP_MAXIMUM_OBJECT_TRIANGLES", value_name = "COUNT")]
     pub maximum_object_triangles: Option<u64>,
-    /// Created objects that are kept at most [default: 1000].
+    /// Most created objects kept [default: 1000].
     #[arg(long, env = "GRASP_CACHE_OBJECTS", value_name = "COUNT")]
     pub cache_objects: Option<u64>,
-    /// Bytes that created objects take at most, by estimate [default: 536870912].
+    /// Memory for created objects and atlases, in bytes, by estimate [default: 536870912].
     #[arg(long, env = "GRASP_CACHE_BYTES", value_name = "BYTES")]
     pub cache_bytes: Option<u64>,
-    /// Folder of objects to start with: NAME.toml beside NAME.obj makes objects/NAME [default: none].
+    /// Folder of objects to start with: NAME.obj with NAME.toml becomes objects/NAME [default: none].
     ///
-    /// The TOML file has the keys of a `CreateObject` request: `mass_kg`, and where needed `unit_metres`,
-    /// `centre_of_mass`, `friction`, `forbidden.groups` and `forbidden.triangles`. Each file is bounded like an upload,
-    /// all together by `cache_objects` and `cache_bytes`, beside what clients create. The objects are never evicted.
+    /// The TOML file has the keys of a `CreateObject` request: `mass_kg` and optionally `unit_metres`, `centre_of_mass`,
+    /// `friction`, `forbidden.groups` and `forbidden.triangles`. Each file has the limits of an upload; all objects
+    /// together have the limits `cache_objects` and `cache_bytes`, in addition to those that clients create. They are
+    /// never evicted.
     #[arg(long, env = "GRASP_OBJECTS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub objects_directory: Option<PathBuf>,
-    /// Threads of low priority that find out how hands can hold the objects, before anybody asks [default: 1].
+    /// Low-priority threads that build the objects' atlases in the background [default: 1].
     ///
-    /// What they find, the objects' atlases, makes answers quick. It takes what created objects leave of `cache_bytes`.
-    /// With 0, there are no atlases.
+    /// An atlas is a collection of grips that makes answers quick. Atlases take what created objects leave of
+    /// `cache_bytes`. With 0 there are none.
     #[arg(long, env = "GRASP_BUILDER_THREADS", value_name = "COUNT")]
     pub builder_threads: Option<u64>,
-    /// Folder to keep atlases in from one start to the next [default: none].
+    /// Folder that keeps atlases between runs [default: none].
     ///
-    /// It is made if need be. Its files take up to 1 GiB; those that were not used for longest go first.
+    /// It is created if necessary. Its files take up to 1 GiB; the least recently used are removed first. Unfinished files
+    /// that a crash left behind are removed at the next start.
     #[arg(long, env = "GRASP_ATLAS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub atlas_directory: Option<PathBuf>,
-    /// Connections at most [default: 1000].
+    /// Most connections; others wait [default: 1000].
     #[arg(long, env = "GRASP_MAXIMUM_CONNECTIONS", value_name = "COUNT")]
     pub maximum_connections: Option<u64>,
-    /// How long running calls are waited for at the end [default: 10000].
+    /// How long to wait for running calls at shutdown, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
     pub drain_ms: Option<u64>,
-    /// Rig of a receiving hand that names none, under PHYSICAL validity [default: adult].
+    /// Rig of the receiving hand if a request with PHYSICAL validity names none [default: adult].
     #[arg(long, env = "GRASP_DEFAULT_RIG", value_name = "NAME")]
     pub default_rig: Option<String>,
-    /// How the log is written: text or json [default: text].
+    /// Format of the log: text or json [default: text].
     #[arg(long, env = "GRASP_LOG_FORMAT", value_name = "FORMAT")]
     pub log_format: Option<String>,
-    /// What is logged: info, debug, or a filter such as `grasp_server=debug,h2=warn` [default: info].
+    /// Filter of the log: info, debug, or a list such as `grasp_server=debug,h2=warn` [default: info].
     #[arg(long, env = "GRASP_LOG", value_name = "FILTER")]
     pub log: Option<String>,
 }
 
-/// Takes an empty path too: it is told with everything else that is wrong, as in a file.
+/// Accepts an empty path, which validation rejects together with everything else that is wrong.
 fn any_path() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().map(PathBuf::from)
 }
@@ -100,7 +102,7 @@ fn any_path() -> impl TypedValueParser<Value = PathBuf> {
 /// Reads a configuration file.
 ///
 /// # Errors
-/// It cannot be read, is no TOML, or has a key that does not exist.
+/// The file cannot be read, is not TOML, or has an unknown key.
 pub fn read_file(path: &Path) -> Result<RawConfig, ConfigError> {
     let text = fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
         path: path.to_owned(),
@@ -112,8 +114,8 @@ pub fn read_file(path: &Path) -> Result<RawConfig, ConfigError> {
     })
 }
 
-/// Names among `present` that start like a variable of the server and are none: most likely misspelt. They are told,
-/// not refused, because container platforms add variables of their own.
+/// Names among `present` that have the server's prefix but are not `known`, most likely misspelt. They are logged, not
+/// rejected, because container platforms add their own variables.
 pub fn unknown_variables(present: impl IntoIterator<Item = String>, known: &[String]) -> Vec<String> {
     present
         .into_iter()
@@ -122,7 +124,7 @@ pub fn unknown_variables(present: impl IntoIterator<Item = String>, known: &[Str
 }
 
 impl RawConfig {
-    /// These values, and those of `fallback` where there is none.
+    /// These values, with those of `fallback` where they are absent.
     #[must_use]
     pub fn or(self, fallback: Self) -> Self {
         Self {

@@ -1,90 +1,88 @@
-//! Does what the configuration may take fit the memory that the process may have?
+//! Checks that the configuration fits in the memory that the process may use.
 //!
-//! A server that the kernel kills under load tells nobody why. So it adds up before it starts, from measured figures,
-//! and refuses a configuration that does not fit. The figures were measured as growth of the resident set (`VmHWM`) of
-//! the release build on 64-bit Linux with glibc's allocator, and rounded up; to raise one makes the server refuse more
-//! limits, to lower one risks being killed.
+//! A server that the kernel kills under load cannot say why. The check adds up measured figures before the server
+//! starts, and rejects a configuration that does not fit. The figures are the growth of the resident set (`VmHWM`) of the
+//! release build on 64-bit Linux with glibc's allocator, rounded up. A higher figure rejects more configurations; a lower
+//! one risks being killed.
 
-mod limits;
+mod process_limits;
 
 use std::fmt;
 
-pub use limits::memory_limits;
+pub use process_limits::memory_limits;
 
 use crate::config::Config;
 
-/// Bytes of a mebibyte, in which sizes are told.
+/// Bytes in a mebibyte, the unit of error messages.
 const MIB: u64 = 1 << 20;
 
-/// Bytes of a server without connections, searches and created objects, beside pages of the program, which the kernel may
-/// take back: measured 12.2 MiB, half of it the grips of primitives, and a quarter the hands and their skins.
+/// Bytes of a server without connections, searches and created objects, excluding pages of the program, which the kernel
+/// can reclaim. Measured: 12.2 MiB.
 const AT_REST: u64 = 20 * MIB;
 
-/// Bytes of an idle thread: measured 19 KiB, most of it the touched part of its stack.
+/// Bytes per idle thread, mostly the used part of its stack. Measured: 19 KiB.
 const PER_THREAD: u64 = 64 << 10;
 
-/// Bytes of a connection without calls: measured 21 KiB.
+/// Bytes per connection without calls. Measured: 21 KiB.
 const PER_CONNECTION: u64 = 32 << 10;
 
-/// Bytes of a search that runs or waits: its thread, the giver's posed hand and its search structure. Measured 1.6 MiB
-/// with 16 at once, 1.1 MiB with 48.
+/// Bytes per running or waiting search: its thread, and the giver's posed hand with its search structure. Measured:
+/// 1.6 MiB.
 const PER_SEARCH: u64 = 2 * MIB;
 
-/// Bytes for each byte of a mesh's text while it is received and read: the request and the text in it. Measured 1.9 on
-/// a mesh of which most is comments.
+/// Bytes per byte of a mesh's text while it is received and read: the request and the text in it. Measured: 1.9.
 const PER_TEXT_BYTE: u64 = 2;
 
-/// Bytes for each triangle of a mesh while its search structures are built, beyond the text: measured 360 on closed
-/// surfaces and where every triangle has a vertex of its own, 503 and 553 where all of them are forbidden; 16 groups for
-/// each triangle took 73 more.
+/// Bytes per triangle of a mesh while its search structures are built, excluding the text. Measured: 360, and up to 626
+/// for a mesh of forbidden triangles in many groups.
 const PER_BUILT_TRIANGLE: u64 = 640;
 
-/// Bytes of an object that is built, whatever its size: the distances around it and what is known of its surface.
-/// Measured 0.24 MiB at most.
+/// Bytes per object that is built, independent of its size: the distance field and the surface pairs. Measured: up to
+/// 0.24 MiB.
 const PER_BUILT_OBJECT: u64 = 512 << 10;
 
-/// Bytes of an atlas that grows, beside what is published of it: its grips twice, while they are published, and their
-/// bytes for the disk. Complete ones take 10 MB.
+/// Bytes per growing atlas, excluding its published form: its grips twice during publication, and their encoding for the
+/// disk. A complete atlas takes 10 MB.
 const PER_BUILDER: u64 = 20 * MIB;
 
-/// Bytes of address space that a thread reserves: the stack of a Rust thread, which the async runtime uses too.
+/// Bytes of address space reserved per thread: Rust's default stack, which the async runtime uses too.
 const STACK: u64 = 2 * MIB;
 
-/// Which memory a limit bounds.
+/// The kind of memory that a limit bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitKind {
-    /// What is in use, as control groups count it.
+    /// Memory in use, as control groups count it.
     Used,
-    /// What is reserved, used or not, as `RLIMIT_AS` and `RLIMIT_DATA` count it.
+    /// Reserved memory, used or not, as `RLIMIT_AS` and `RLIMIT_DATA` count it.
     Reserved,
 }
 
-/// A bound on the process' memory.
+/// A limit on the memory of the process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryLimit {
-    /// How much there may be.
+    /// The limit in bytes.
     pub bytes: u64,
-    /// What it bounds.
+    /// The memory that it bounds.
     pub kind: LimitKind,
-    /// Where it comes from: the control group's file, or the name of the resource limit.
+    /// Its origin: the control group's file, or the name of the resource limit.
     pub source: String,
 }
 
-/// A share of the memory that a configuration may take.
+/// A share of the memory that a configuration may use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryShare {
-    /// How much it may be.
+    /// Its largest size in bytes.
     pub bytes: u64,
-    /// For what, and which settings make it so large.
+    /// Its purpose, with the settings that determine its size.
     pub purpose: String,
 }
 
-/// A configuration that may take more memory than there is.
+/// A configuration that may use more memory than the process has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct MemoryError {
-    /// The limits that are too low, with what is needed under each.
+    /// The limits that are too low, with the bytes needed under each.
     pub too_low: Vec<(MemoryLimit, u64)>,
-    /// What the memory would be for, the largest share first.
+    /// The shares of the memory, largest first.
     pub shares: Vec<MemoryShare>,
 }
 
@@ -93,7 +91,7 @@ impl fmt::Display for MemoryError {
         for (limit, needed) in &self.too_low {
             writeln!(
                 f,
-                "too little memory: the limit is {} ({}); this configuration may take {}",
+                "too little memory: the limit is {} ({}); this configuration may use {}",
                 Mebibytes(limit.bytes),
                 limit.source,
                 Mebibytes(*needed)
@@ -107,7 +105,7 @@ impl fmt::Display for MemoryError {
     }
 }
 
-/// Bytes as a person reads them, rounded up.
+/// Bytes in a readable unit, rounded up.
 struct Mebibytes(u64);
 
 impl fmt::Display for Mebibytes {
@@ -116,10 +114,10 @@ impl fmt::Display for Mebibytes {
     }
 }
 
-/// Checks a configuration, with the bytes that the objects of its directory take, against limits.
+/// Checks a configuration against limits. `directory_bytes` is the size of the objects in its objects directory.
 ///
 /// # Errors
-/// Every limit below what the configuration may take.
+/// Every limit below what the configuration may use.
 pub fn check_memory(
     config: &Config,
     directory_bytes: usize,
@@ -149,7 +147,7 @@ pub fn check_memory(
     Err(MemoryError { too_low, shares })
 }
 
-/// What a configuration may take, share by share.
+/// The shares of the memory that a configuration may use.
 fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     let text = config.maximum_object_bytes.get() as u64;
     let triangles = config.maximum_object_triangles.get() as u64;
@@ -208,8 +206,8 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     shares
 }
 
-/// What threads reserve but do not use: the pools' own, one for each search, and two for each upload, whose object's box
-/// and surface are looked at side by side.
+/// Memory that threads reserve but do not use: threads of the pools, one per search, and two per upload, whose object is
+/// prepared by two threads in parallel.
 fn stacks(config: &Config) -> MemoryShare {
     let threads = [
         config.workers.get(),
@@ -233,7 +231,7 @@ fn stacks(config: &Config) -> MemoryShare {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::StoreLimits;
+    use crate::limits::StoreLimits;
 
     fn limit(bytes: u64, kind: LimitKind) -> MemoryLimit {
         MemoryLimit {
@@ -270,7 +268,7 @@ mod tests {
         + 7 * (32 << 10);
 
     #[test]
-    fn exactly_enough_is_enough_and_a_byte_less_is_not() {
+    fn accepts_the_exact_need_and_rejects_one_byte_less() {
         let check = |bytes| check_memory(&config(), 0, &[limit(bytes, LimitKind::Used)]);
         assert_eq!(check(NEEDED), Ok(()));
         let error = check(NEEDED - 1).unwrap_err();
@@ -278,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_reserved_includes_a_stack_for_every_thread() {
+    fn reserved_memory_includes_every_threads_stack() {
         let reserved = NEEDED + (1 + 1 + 5 + 2 * 3 + 1) * 2 * MIB;
         let check = |bytes| check_memory(&config(), 0, &[limit(bytes, LimitKind::Reserved)]);
         assert_eq!(check(reserved), Ok(()));
@@ -290,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_of_the_directory_count() {
+    fn directory_objects_count() {
         let config = Config {
             objects_directory: Some("/objects".into()),
             ..config()
@@ -301,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn every_limit_that_is_too_low_is_told_with_what_to_lower() {
+    fn reports_every_low_limit_with_the_settings_to_lower() {
         let limits = [
             limit(30 * MIB, LimitKind::Used),
             limit(1 << 40, LimitKind::Used),
@@ -312,8 +310,8 @@ mod tests {
         assert_eq!(
             lines[..4],
             [
-                "too little memory: the limit is 30 MiB (a test); this configuration may take 160 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may take 188 MiB",
+                "too little memory: the limit is 30 MiB (a test); this configuration may use 160 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may use 188 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]
@@ -333,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_settings_do_not_overflow() {
+    fn largest_settings_do_not_overflow() {
         let most = std::num::NonZeroUsize::MAX;
         let config = Config {
             maximum_uploads: most,
@@ -346,8 +344,8 @@ mod tests {
     }
 
     #[test]
-    fn the_defaults_fit_the_machine_that_they_were_made_for() {
-        // What docker/README.md tells of the defaults on four cores.
+    fn defaults_fit_the_documented_memory() {
+        // docker/README.md gives this figure for four cores.
         let config = Config {
             workers: 4.try_into().unwrap(),
             ..Config::default()

@@ -1,7 +1,7 @@
 //! The accept loop.
 //!
-//! It is the server's own because the transport's loop tries again at once when an accept fails: with all file
-//! descriptors in use, that costs most of a core.
+//! It replaces the transport's loop, which retries immediately when an accept fails: with all file descriptors in use,
+//! that costs most of a core.
 
 use std::{io, sync::Arc, time::Duration};
 
@@ -14,29 +14,29 @@ use tokio_util::sync::CancellationToken;
 
 use super::Connection;
 
-/// First pause after an accept failed for want of resources; doubled up to [`LONGEST_PAUSE`].
+/// First pause after an accept failed for lack of resources; doubles up to [`LONGEST_PAUSE`].
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
 
-/// Longest pause: how late the server may notice that resources are there again.
+/// Longest pause, and so the longest delay after resources are free again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
-/// What bounds the connections.
+/// Bounds on connections.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AcceptLimits {
-    /// How many there may be; others wait in the kernel's queue.
+    /// Largest number of connections; others wait in the kernel's queue.
     pub connections: usize,
-    /// How long a client may take to send the preface of HTTP/2.
+    /// Longest wait for a client's HTTP/2 preface.
     pub preface: Duration,
 }
 
-/// Accepts connections until `stop`; then the listener is closed at once. `close` ends every connection.
+/// Accepts connections until `stop`, which closes the listener immediately. `close` ends every connection.
 pub(crate) fn accept(
     listener: TcpListener,
     limits: AcceptLimits,
     stop: CancellationToken,
     close: CancellationToken,
 ) -> ReceiverStream<io::Result<Connection>> {
-    // One connection waits while the transport sets up the one before.
+    // One connection may wait while the transport sets up the previous one.
     let (sender, receiver) = mpsc::channel(1);
     tokio::spawn(async move {
         let accepting = accept_all(listener, limits, close, sender);
@@ -58,14 +58,14 @@ async fn accept_all(
         match listener.accept().await {
             Ok((stream, _)) => {
                 pause = FIRST_PAUSE;
-                // Small messages must not wait for others. A connection that is gone already shows at its first read.
+                // Small messages must not wait for others. If this fails, the first read fails too.
                 let _ = stream.set_nodelay(true);
                 let connection = Connection::new(stream, place, close.clone(), limits.preface);
                 if sender.send(Ok(connection)).await.is_err() {
                     return;
                 }
             }
-            Err(error) if is_of_the_connection(&error) => {
+            Err(error) if concerns_one_connection(&error) => {
                 tracing::debug!(%error, "a connection ended before it was accepted");
             }
             Err(error) => {
@@ -77,8 +77,8 @@ async fn accept_all(
     }
 }
 
-/// Is it only the one connection that is lost? Everything else is a want of resources.
-fn is_of_the_connection(error: &io::Error) -> bool {
+/// True if only one connection is lost. All other errors are a lack of resources.
+fn concerns_one_connection(error: &io::Error) -> bool {
     matches!(
         error.kind(),
         io::ErrorKind::ConnectionAborted

@@ -1,4 +1,4 @@
-//! A connection that can be ended from outside.
+//! A connection that the server can close at any time.
 
 use std::{
     io,
@@ -19,8 +19,8 @@ use tonic::transport::server::{Connected, TcpConnectInfo};
 /// Bytes of the client's HTTP/2 preface (RFC 9113, 3.4).
 const PREFACE_BYTES: usize = 24;
 
-/// A TCP connection that holds one of the server's places. Reading ends when the server closes, or when the client
-/// did not send the preface of HTTP/2 in time: the transport waits for that without end.
+/// A TCP connection that counts to the server's limit. Reading ends when the server closes the connection, and fails if
+/// the client does not send the HTTP/2 preface in time, for which the transport would wait forever.
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,
@@ -29,7 +29,7 @@ pub(crate) struct Connection {
     _place: OwnedSemaphorePermit,
 }
 
-/// A preface that is still to come.
+/// An incomplete preface.
 #[derive(Debug)]
 struct Preface {
     missing: usize,
@@ -72,7 +72,7 @@ impl AsyncRead for Connection {
     ) -> Poll<io::Result<()>> {
         use std::future::Future as _;
         if self.closed.as_mut().poll(cx).is_ready() {
-            // Nothing read is the end of the stream.
+            // Reading 0 bytes means the end of the stream.
             return Poll::Ready(Ok(()));
         }
         let before = buffer.filled().len();
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_client_without_a_preface_is_left() {
+    async fn reading_fails_without_a_preface() {
         let (mut client, mut connection) =
             connected(CancellationToken::new(), Duration::from_millis(20)).await;
         client.write_all(b"PRI * HTTP/2.0").await.unwrap();
@@ -150,13 +150,13 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn after_the_preface_there_is_all_the_time_until_the_end() {
+    async fn after_the_preface_reading_lasts_until_close() {
         let close = CancellationToken::new();
         let (mut client, mut connection) = connected(close.clone(), Duration::from_millis(20)).await;
         client.write_all(&[b'x'; PREFACE_BYTES]).await.unwrap();
         connection.read_exact(&mut [0; PREFACE_BYTES]).await.unwrap();
         let reading = tokio::spawn(async move { connection.read_to_end(&mut Vec::new()).await });
-        // Longer than the preface may take.
+        // Longer than the limit for the preface.
         tokio::time::sleep(Duration::from_millis(60)).await;
         assert!(!reading.is_finished());
         close.cancel();

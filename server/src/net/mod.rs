@@ -1,4 +1,4 @@
-//! Connections: accepting them, bounding their number, ending them.
+//! Accepts connections, bounds their number and closes them.
 
 mod accept;
 mod connection;

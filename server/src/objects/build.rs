@@ -1,4 +1,4 @@
-//! Makes objects of meshes that clients send.
+//! Builds objects from meshes.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -15,29 +15,29 @@ use crate::{
     validate::{Field, ObjectFields, Violations, quoted},
 };
 
-/// Largest edge of an object's bounding box, in metres; above it, the unit is wrong.
+/// Longest edge of an object's bounding box, in metres; a longer one means a wrong unit.
 const LARGEST_EXTENT: f32 = 10.0;
 
-/// Smallest edge of an object along its longest axis, in metres; below it, the unit is wrong.
+/// Shortest longest edge of an object's bounding box, in metres; a shorter one means a wrong unit.
 const SMALLEST_EXTENT: f32 = 1e-3;
 
-/// Longest edge in metres that nobody wonders about: what is longer is not handed over with one hand.
+/// Longest edge in metres without a warning: longer objects are not handed over with one hand.
 const USUAL_EXTENT: f32 = 2.0;
 
-/// Names of groups that an answer lists at most.
+/// Largest number of group names in an error.
 const LISTED_GROUPS: usize = 12;
 
-/// Reads the mesh, checks it and builds its search structures: up to seconds of work for the largest meshes.
+/// Reads and checks the mesh and builds its search structures. Takes up to seconds for the largest meshes.
 ///
 /// # Errors
-/// [`ServiceError::Invalid`] with `violations` and everything that is wrong with the mesh.
+/// [`ServiceError::Invalid`] with `violations` and everything else that is wrong.
 pub(crate) fn build_object(
     fields: ObjectFields,
     limits: ObjLimits,
     mut violations: Violations,
 ) -> Result<StoredObject, ServiceError> {
     if fields.obj.is_empty() || fields.obj.len() > limits.bytes {
-        // Reported with the fields; there is nothing to read.
+        // `object_fields` has added the violation.
         return Err(violations.into_error());
     }
     let obj = match read_obj(&fields.obj, fields.unit_metres, limits) {
@@ -74,7 +74,7 @@ pub(crate) fn build_object(
     }
 }
 
-/// Is the object as large as something that is held?
+/// Checks that the object has the size of something that can be held.
 fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>, violations: &mut Violations) {
     let mut low = Vec3::INFINITY;
     let mut high = Vec3::NEG_INFINITY;
@@ -83,12 +83,12 @@ fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>, violations: &mu
         high = high.max(position);
     }
     let extent = (high - low).max_element();
-    // The negation also refuses an extent that overflowed.
+    // The negation also rejects an extent that overflowed.
     if !(SMALLEST_EXTENT..=LARGEST_EXTENT).contains(&extent) {
         violations.add(
             Field::root("obj"),
             format_args!(
-                "is {extent} m long; {SMALLEST_EXTENT} m to {LARGEST_EXTENT} m are allowed (is unit_metres right?)"
+                "is {extent} m long; it must be {SMALLEST_EXTENT} m to {LARGEST_EXTENT} m (is unit_metres right?)"
             ),
         );
     } else if extent > USUAL_EXTENT {
@@ -114,7 +114,7 @@ fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Vi
             ),
         }
     }
-    // The client counts the triangles of its file; some of those may have been dropped and need not be forbidden.
+    // Clients count the triangles of their file, some of which may have been dropped.
     let triangles = obj.places_in_file;
     for (place, &triangle) in fields.forbidden_triangles.iter().enumerate() {
         if let Ok(index) = obj.places.binary_search(&triangle) {
@@ -183,14 +183,14 @@ mod tests {
     }
 
     #[test]
-    fn forbidden_triangles_are_counted_as_in_the_file() {
+    fn counts_forbidden_triangles_as_in_the_file() {
         let stored = build_object(fields(&[1, 2, 4]), LIMITS, Violations::default()).unwrap();
         let forbidden: Vec<bool> = (0..4).map(|t| stored.object.is_forbidden(t)).collect();
         assert_eq!(forbidden, [false, true, false, true]);
     }
 
     #[test]
-    fn triangles_beyond_the_file_are_refused() {
+    fn rejects_triangles_beyond_the_file() {
         assert!(build_object(fields(&[5]), LIMITS, Violations::default()).is_err());
     }
 
@@ -200,7 +200,7 @@ mod tests {
         triangles: 1000,
     };
 
-    /// Text with a group "lid", whose first triangle is forbidden too.
+    /// A mesh that has a group "lid", with its first triangle forbidden as well.
     fn text_fields(obj: String, unit_metres: f32) -> ObjectFields {
         ObjectFields {
             obj: obj.into_bytes(),
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn every_text_is_an_object_or_refused() {
+    fn every_text_becomes_an_object_or_an_invalid_argument() {
         let lines = "((v|f|g|o|usemtl|vn|l|#)( -?[1-4](\\.[0-9])?){0,5}\\\\?\n){0,12}";
         let units = prop_oneof![6 => Just(0.01_f32), 1 => Just(1e-6), 1 => Just(1e3)];
         let config = Config {
@@ -238,12 +238,12 @@ mod tests {
             Ok(())
         });
         outcome.unwrap_or_else(|failure| panic!("{failure}"));
-        // The test says something only if texts of both kinds were tried.
+        // The test is meaningful only if it tried texts of both kinds.
         assert!((100..900).contains(&built.get()), "{built:?}");
     }
 
     #[test]
-    fn an_object_without_a_volume_is_warned_about() {
+    fn warns_about_a_mesh_without_volume() {
         let sheet = "g lid\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
         let stored = build_object(text_fields(sheet, 0.1), ROOMY, Violations::default())
             .expect("a sheet is an object");
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unusually_large_object_is_warned_about() {
+    fn warns_about_an_unusually_large_object() {
         let beam = "g lid\nv 0 0 0\nv 3 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
         let stored =
             build_object(text_fields(beam, 1.0), ROOMY, Violations::default()).expect("a beam is an object");

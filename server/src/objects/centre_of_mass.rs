@@ -1,24 +1,24 @@
-//! The centre of mass of an object that names none.
+//! The centre of mass of an object that gives none.
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 
-/// Where a centre of mass came from.
+/// What a centre of mass was computed from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
-    /// Of the volume that the mesh encloses, of even density.
+    /// The volume that the mesh encloses, at uniform density.
     Volume,
-    /// Of the surface, of even thickness: the mesh encloses no volume to speak of.
+    /// The surface, at uniform thickness: the mesh encloses almost no volume.
     Surface,
 }
 
-/// Share of its bounding box that a mesh has to enclose for its volume to mean something. A sheet of paper encloses
-/// less, and so does an open mesh whose signed tetrahedra cancel.
+/// Smallest enclosed share of the bounding box for which the volume is used. A sheet of paper encloses less, and so does
+/// an open mesh whose signed tetrahedra cancel.
 const SMALLEST_VOLUME_SHARE: f64 = 1e-4;
 
-/// The centre of mass of a mesh, in metres: the volume's by the divergence theorem (the signed tetrahedra between
-/// every triangle and one point), or the surface's where there is no volume, or where the volume's would lie outside
-/// the mesh's bounding box, as it may for a mesh that is open or wound both ways.
+/// The centre of mass of a mesh, in metres: that of the volume, by the divergence theorem (signed tetrahedra between
+/// every triangle and one point). It is that of the surface if there is no volume, or if the volume's would be outside
+/// the bounding box, as it may be for a mesh that is open or has inconsistent winding.
 pub(super) fn centre_of_mass(mesh: &TriangleMesh) -> (Vec3, Source) {
     let mut low = DVec3::INFINITY;
     let mut high = DVec3::NEG_INFINITY;
@@ -26,7 +26,7 @@ pub(super) fn centre_of_mass(mesh: &TriangleMesh) -> (Vec3, Source) {
         low = low.min(position.as_dvec3());
         high = high.max(position.as_dvec3());
     }
-    // About the middle of the box: far from the origin the products would cancel.
+    // Relative to the middle of the box: far from the origin, the products would lose precision.
     let middle = (low + high) * 0.5;
     let (mut volume, mut volume_moment) = (0.0, DVec3::ZERO);
     let (mut area, mut area_moment) = (0.0, DVec3::ZERO);
@@ -46,7 +46,7 @@ pub(super) fn centre_of_mass(mesh: &TriangleMesh) -> (Vec3, Source) {
             return (centre.as_vec3(), Source::Volume);
         }
     }
-    // Every triangle of a mesh has an area, so that the division is safe.
+    // Every triangle of a mesh has an area: no division by 0.
     ((area_moment / area + middle).as_vec3(), Source::Surface)
 }
 
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_far_from_the_origin_has_its_centre_in_its_middle() {
+    fn centre_of_a_box_far_from_the_origin_is_its_middle() {
         let low = Vec3::new(10.0, -3.0, 7.0);
         let (centre, source) = centre_of_mass(&boxed(low, low + Vec3::new(0.1, 0.2, 0.3), false));
         assert_eq!(source, Source::Volume);
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tetrahedron_has_its_centre_at_the_mean_of_its_corners() {
+    fn centre_of_a_tetrahedron_is_the_mean_of_its_corners() {
         let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
         let mesh = TriangleMesh::new(corners, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]).unwrap();
         let (centre, source) = centre_of_mass(&mesh);
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_sheet_has_the_centre_of_its_surface() {
+    fn centre_of_a_sheet_is_that_of_its_surface() {
         let corners = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
         let mesh = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
         let (centre, source) = centre_of_mass(&mesh);
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_box_keeps_its_centre_inside() {
+    fn centre_of_an_open_box_is_inside() {
         let (centre, _) = centre_of_mass(&boxed(Vec3::ZERO, Vec3::ONE, true));
         assert!(
             centre.cmpge(Vec3::ZERO).all() && centre.cmple(Vec3::ONE).all(),

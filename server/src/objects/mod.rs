@@ -1,5 +1,5 @@
-//! The objects that can be held out: the built-in ones, those of a folder that the server started with, and those that
-//! clients created, in a cache of bounded size.
+//! The objects that can be held out: built-in ones, those of the objects directory, and those that clients created, in a
+//! cache of bounded size.
 
 pub(crate) mod build;
 mod centre_of_mass;
@@ -26,11 +26,11 @@ use sha2::{Digest as _, Sha256};
 
 use crate::{
     answer::{vector, wire_pose},
-    atlases::shelf::Shelf,
+    atlas_slots::AtlasSlots,
 };
 
-/// Bytes that a triangle takes in the search structures beside its three indices: the nodes and the prepared
-/// triangle of the hierarchy, and the forbidden flag. An estimate, on the large side: it bounds the cache.
+/// Bytes per triangle in the search structures, besides its three indices: the hierarchy's nodes, the prepared triangle
+/// and the forbidden flag. A generous estimate, because it bounds the cache.
 const SEARCH_BYTES_PER_TRIANGLE: usize = 192;
 
 /// An object as the server keeps it.
@@ -38,22 +38,22 @@ const SEARCH_BYTES_PER_TRIANGLE: usize = 192;
 pub(crate) struct StoredObject {
     /// The last part of its name.
     pub id: String,
-    /// Does it come with the server?
+    /// True if it is part of the server.
     pub built_in: bool,
-    /// Ready to be grasped; a search holds a clone of its own.
+    /// The object in the form that searches use; every search holds a clone.
     pub object: Arc<GraspObject>,
-    /// SHA-256 of vertices, triangles and forbidden set, hexadecimal.
+    /// SHA-256 of vertices, triangles and forbidden set, in hexadecimal.
     pub content_hash: String,
-    /// What is odd about its mesh.
+    /// Oddities of its mesh.
     pub warnings: Vec<String>,
-    /// What is known of how hands hold it.
-    pub shelf: Shelf,
-    /// What it borrows for each of [`held_primitives`], once it was asked for.
-    borrowed: Vec<OnceLock<Arc<Borrowed>>>,
+    /// Its atlases.
+    pub atlas_slots: AtlasSlots,
+    /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
+    transferred_grips: Vec<OnceLock<Arc<Borrowed>>>,
 }
 
 impl StoredObject {
-    /// An object under its id.
+    /// An object with its id.
     pub(crate) fn new(id: String, built_in: bool, object: Arc<GraspObject>, warnings: Vec<String>) -> Self {
         Self {
             id,
@@ -61,37 +61,36 @@ impl StoredObject {
             content_hash: content_hash(&object),
             object,
             warnings,
-            shelf: Shelf::default(),
-            borrowed: held_primitives().iter().map(|_| OnceLock::new()).collect(),
+            atlas_slots: AtlasSlots::default(),
+            transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
         }
     }
 
-    /// Finds out now instead of by the first search with each where both hands of a rig have room, and what is borrowed for
-    /// them: some ten milliseconds of work for each, at the same time. Where the system has no thread for it, one after the
-    /// other.
-    pub(crate) fn get_ready(&self, rig: &str) {
-        let draw = |handedness| {
+    /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with each
+    /// hand would have to do. Takes some ten milliseconds per hand, in parallel if the system has a thread for it.
+    pub(crate) fn prepare(&self, rig: &str) {
+        let prepare_hand = |handedness| {
             if let Some(hand) = hand(rig, handedness) {
                 self.object.repertoire(&hand.rig);
-                self.borrowed(hand);
+                self.transferred_grips(hand);
             }
         };
         thread::scope(|scope| {
-            let beside = thread::Builder::new().spawn_scoped(scope, || draw(Handedness::Left));
-            draw(Handedness::Right);
-            if beside.is_err() {
-                draw(Handedness::Left);
+            let left = thread::Builder::new().spawn_scoped(scope, || prepare_hand(Handedness::Left));
+            prepare_hand(Handedness::Right);
+            if left.is_err() {
+                prepare_hand(Handedness::Left);
             }
         });
     }
 
-    /// Grips of primitives for a hand, for searches to start from while the object has no atlas; none if the hand knows no
-    /// primitives or none of their grips fits.
-    pub(crate) fn borrowed(&self, hand: &'static Hand) -> Option<Arc<Borrowed>> {
-        let mut all = held_primitives().iter().zip(&self.borrowed);
-        let ((_, held), borrowed) = all.find(|((of, _), _)| std::ptr::eq(*of, hand))?;
-        let borrowed = borrowed.get_or_init(|| Arc::new(Borrowed::of(&self.object, held)));
-        (!borrowed.is_empty()).then(|| Arc::clone(borrowed))
+    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if there are
+    /// no primitives for the hand or none of their grips fits.
+    pub(crate) fn transferred_grips(&self, hand: &'static Hand) -> Option<Arc<Borrowed>> {
+        let mut all = held_primitives().iter().zip(&self.transferred_grips);
+        let ((_, held), grips) = all.find(|((of, _), _)| std::ptr::eq(*of, hand))?;
+        let grips = grips.get_or_init(|| Arc::new(Borrowed::of(&self.object, held)));
+        (!grips.is_empty()).then(|| Arc::clone(grips))
     }
 
     /// "objects/{object}".
@@ -99,12 +98,12 @@ impl StoredObject {
         name_of(&self.id)
     }
 
-    /// Does a search hold it? Then evicting it would free nothing.
+    /// True if a search holds it: evicting it would free nothing.
     pub(crate) fn is_in_use(&self) -> bool {
         Arc::strong_count(&self.object) > 1
     }
 
-    /// About how many bytes it takes, without its atlases.
+    /// Its estimated size in bytes, without atlases.
     pub(crate) fn bytes(&self) -> usize {
         let of_mesh = |mesh: &TriangleMesh| {
             size_of_val(mesh.positions())
@@ -119,11 +118,11 @@ impl StoredObject {
             + self.object.surface.field_bytes()
             + self.object.surface_pairs.bytes()
             + PlacementCaches::MOST_BYTES
-            + self.borrowed.len() * Borrowed::MOST_BYTES
+            + self.transferred_grips.len() * Borrowed::MOST_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()
     }
 
-    /// The object as the contract tells it, with the state of its atlas.
+    /// The message that describes the object, with the state of its atlas.
     pub(crate) fn to_wire(&self, atlas: Option<v1::AtlasState>) -> v1::Object {
         let mesh = self.object.surface.mesh();
         let bounding_box = &self.object.bounding_box;
@@ -145,12 +144,12 @@ impl StoredObject {
     }
 }
 
-/// The name of an object with this id.
+/// The resource name of an id: "objects/{object}".
 pub(crate) fn name_of(id: &str) -> String {
     format!("objects/{id}")
 }
 
-/// Meshes are bounded far below 2^32 triangles and vertices.
+/// Saturates; meshes are bounded far below 2^32 triangles and vertices.
 fn count(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
 }
@@ -198,7 +197,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_hash_depends_on_mesh_and_forbidden_set_alone() {
+    fn content_hash_covers_mesh_and_forbidden_set_only() {
         let hash = |id, edge, forbidden| tetrahedron(id, edge, forbidden).content_hash;
         assert_eq!(hash("a", 1.0, &[]), hash("b", 1.0, &[]));
         assert_ne!(hash("a", 1.0, &[]), hash("a", 2.0, &[]));

@@ -1,7 +1,7 @@
-//! Objects by name. The built-in ones and those of the objects directory stay; created ones are kept while they fit.
+//! Objects by name. Built-in ones and those of the objects directory stay; created ones stay while they fit.
 //!
-//! When a new object does not fit, created objects that no call uses are evicted, the least recently used first. A
-//! client that asks for an evicted object is told that it was evicted, and creates it again.
+//! When a new object does not fit, created objects that no call uses are evicted, the least recently used first. The
+//! error for an evicted object says that it was evicted, so that its client creates it again.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -13,27 +13,21 @@ use std::{
 use grasp_assets::objects::{object, objects};
 
 use super::{StoredObject, name_of};
-use crate::error::{Limit, ServiceError};
+use crate::{
+    error::{Limit, ServiceError},
+    limits::StoreLimits,
+};
 
-/// Ids of evicted objects that are remembered, so that their clients are told.
+/// Number of evicted ids that are remembered for error messages.
 const REMEMBERED_EVICTIONS: usize = 1024;
 
-/// When to try again after every object in the full cache was in use: searches end within seconds.
+/// When to retry if every object in the full cache is in use: searches end within seconds.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
-
-/// How much the created objects may take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StoreLimits {
-    /// How many there may be.
-    pub objects: usize,
-    /// How many bytes they may take together, by estimate.
-    pub bytes: usize,
-}
 
 /// All objects.
 #[derive(Debug)]
 pub(crate) struct ObjectStore {
-    /// Those that the server started with; they stay.
+    /// Objects that the server started with; never evicted.
     pinned: BTreeMap<String, Arc<StoredObject>>,
     created: Mutex<Created>,
     limits: StoreLimits,
@@ -43,7 +37,7 @@ pub(crate) struct ObjectStore {
 struct Created {
     objects: BTreeMap<String, Entry>,
     bytes: usize,
-    /// Counts uses; the largest is the latest.
+    /// Number of uses so far: the clock of `last_used`.
     uses: u64,
     evicted: VecDeque<String>,
 }
@@ -54,13 +48,13 @@ struct Entry {
     last_used: u64,
 }
 
-/// Does a built-in object have this id?
+/// True if a built-in object has this id.
 pub(crate) fn is_built_in(id: &str) -> bool {
     object(id).is_some()
 }
 
 impl ObjectStore {
-    /// The built-in objects, those of the objects directory, none of which has the id of another, and room for others.
+    /// A store of the built-in objects and those of the objects directory, whose ids must all differ.
     pub(crate) fn new(limits: StoreLimits, directory: Vec<StoredObject>) -> Self {
         let built_in = objects().iter().map(|built_in| {
             let id = built_in.name.to_owned();
@@ -81,7 +75,7 @@ impl ObjectStore {
         self.pinned.values()
     }
 
-    /// Bytes that created objects leave of what they may take.
+    /// Bytes of the limit that created objects do not use.
     pub(crate) fn room(&self) -> usize {
         self.limits.bytes.saturating_sub(self.created().bytes)
     }
@@ -91,7 +85,7 @@ impl ObjectStore {
         self.pinned.contains_key(id) || self.created().objects.contains_key(id)
     }
 
-    /// The object with this id. While its `object` is held, it is not evicted.
+    /// The object with this id. It is not evicted while its `object` is held.
     ///
     /// # Errors
     /// [`ServiceError::ObjectNotFound`].
@@ -114,12 +108,12 @@ impl ObjectStore {
         }
     }
 
-    /// Adds an object, in place of others if need be.
+    /// Adds an object, evicting others if necessary.
     ///
     /// # Errors
-    /// - [`ServiceError::ObjectExists`] if one has its id.
+    /// - [`ServiceError::ObjectExists`] if the id is taken.
     /// - [`ServiceError::Invalid`] if it is larger than the whole cache.
-    /// - [`ServiceError::Overloaded`] if those that would have to go are in use.
+    /// - [`ServiceError::Overloaded`] if the objects that would have to be evicted are in use.
     pub(crate) fn insert(&self, object: StoredObject) -> Result<Arc<StoredObject>, ServiceError> {
         let bytes = object.bytes();
         if bytes > self.limits.bytes {
@@ -156,11 +150,11 @@ impl ObjectStore {
         Ok(object)
     }
 
-    /// Up to `size` objects by name, from the first after `after`, and whether there are more.
+    /// Up to `size` objects ordered by name, starting after `after`, and whether there are more.
     pub(crate) fn page(&self, after: Option<&str>, size: usize) -> (Vec<Arc<StoredObject>>, bool) {
         let from = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
         let created = self.created();
-        // One more of each than fits the page: enough to know whether there is another.
+        // One more than fits on the page shows whether there is another page.
         let mut objects: Vec<_> = self
             .pinned
             .range::<str, _>(from)
@@ -182,13 +176,13 @@ impl ObjectStore {
     }
 
     fn created(&self) -> MutexGuard<'_, Created> {
-        // No code panics while it holds the lock; were it to, the map would still be whole.
+        // No code panics while it holds the lock; if some did, the map would still be consistent.
         self.created.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Created {
-    /// Evicts the least recently used object that no call uses; false if there is none.
+    /// Evicts the least recently used object that no call uses. False if there is none.
     fn evict_one(&mut self) -> bool {
         let oldest = self
             .objects
@@ -223,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_least_recently_used_goes_first_by_count_and_by_bytes() {
+    fn evicts_least_recently_used_by_count_and_by_bytes() {
         for store in [store(2, 100), store(100, 2)] {
             insert(&store, "a").unwrap();
             insert(&store, "b").unwrap();
@@ -244,20 +238,20 @@ mod tests {
                     evicted: false
                 }
             );
-            // What was created again was not evicted any more, once it is gone for another reason.
+            // An evicted object can be created again.
             insert(&store, "b").unwrap();
             store.get("b").unwrap();
         }
     }
 
     #[test]
-    fn what_is_in_use_stays() {
+    fn keeps_objects_in_use() {
         let store = store(2, 100);
         insert(&store, "a").unwrap();
         insert(&store, "b").unwrap();
         let a = Arc::clone(&store.get("a").unwrap().object);
         let b = Arc::clone(&store.get("b").unwrap().object);
-        // To look at an object is not to use it.
+        // Listing an object does not use it.
         let looked_at = store.page(None, 10);
         assert!(matches!(
             insert(&store, "c"),
@@ -274,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_never_fit_evicts_nothing() {
+    fn rejects_objects_larger_than_the_cache() {
         let limits = StoreLimits {
             objects: 10,
             bytes: 10,
@@ -284,26 +278,26 @@ mod tests {
     }
 
     #[test]
-    fn objects_of_the_directory_stay_and_take_no_client_s_place() {
+    fn directory_objects_stay_and_do_not_count() {
         let limits = StoreLimits {
             objects: 1,
             bytes: tetrahedron("any", 1.0, &[]).bytes(),
         };
-        let store = ObjectStore::new(limits, vec![tetrahedron("shelf", 1.0, &[])]);
+        let store = ObjectStore::new(limits, vec![tetrahedron("stay", 1.0, &[])]);
         for id in ["a", "b"] {
             insert(&store, id).unwrap();
         }
-        assert!(store.contains("shelf") && store.contains("b") && !store.contains("a"));
+        assert!(store.contains("stay") && store.contains("b") && !store.contains("a"));
         assert!(matches!(
-            insert(&store, "shelf"),
+            insert(&store, "stay"),
             Err(ServiceError::ObjectExists { .. })
         ));
         let listed: Vec<String> = store.page(None, 100).0.iter().map(|o| o.id.clone()).collect();
-        assert_eq!(listed, ["b", "remote", "scalpel", "scissors", "shelf"]);
+        assert_eq!(listed, ["b", "remote", "scalpel", "scissors", "stay"]);
     }
 
     #[test]
-    fn an_id_is_given_once() {
+    fn rejects_a_taken_id() {
         let store = store(10, 10);
         insert(&store, "a").unwrap();
         assert_eq!(
@@ -315,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_go_through_all_objects_once() {
+    fn pages_list_every_object_once() {
         let store = store(10, 10);
         for id in ["e", "a", "d", "b", "c"] {
             insert(&store, id).unwrap();

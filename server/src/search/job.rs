@@ -1,4 +1,4 @@
-//! One search: what a call asks for, run on the threads of the executor.
+//! One search: a checked request with everything it needs, from preparation to the response.
 
 use std::{
     sync::{Arc, atomic::AtomicBool},
@@ -22,11 +22,12 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-use super::race::race;
+use super::slices::search_in_slices;
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
-    atlases::Known,
+    atlases::KnownGrips,
     error::ServiceError,
+    executor::{Admission, SearchExecutor},
     objects::StoredObject,
     validate::FindQuery,
 };
@@ -34,40 +35,40 @@ use crate::{
 /// Everything that a search needs.
 #[derive(Debug)]
 pub(crate) struct FindJob {
-    /// What was asked for.
+    /// The request.
     pub query: FindQuery,
-    /// The object; held, it is not evicted.
+    /// The object. Holding this reference keeps it from being evicted.
     pub object: Arc<GraspObject>,
-    /// The same with what is kept of it.
+    /// The same object as stored, for its transferred grips.
     pub stored: Arc<StoredObject>,
-    /// The seed that was asked for or drawn.
+    /// The request's seed, or a drawn one.
     pub seed: u64,
-    /// When the call arrived: the budget counts from here.
+    /// When the call arrived; times count from here.
     pub arrived: Instant,
-    /// The budget that is in force.
+    /// Effective budget.
     pub budget: Duration,
-    /// How long the first grasp is looked for if none is found within the budget: at least as long.
+    /// How long the search continues for a first grasp if it finds none within the budget; at least the budget.
     pub patience: Duration,
-    /// Workers that race.
+    /// Number of workers.
     pub workers: usize,
-    /// Grips that are known for the object and the hand.
-    pub known: Known,
-    /// The mechanisms that the search runs.
+    /// Known grips of the object and the hand.
+    pub known: KnownGrips,
+    /// Mechanisms of the search that are on.
     pub mechanisms: Mechanisms,
 }
 
-/// What a search came to.
+/// The result of a search.
 #[derive(Debug)]
 pub(crate) struct Answered {
-    /// What the call is answered with.
+    /// The response to the call.
     pub response: v1::FindGraspResponse,
-    /// A grip that was not known before, to be known from now on.
-    pub newly_known: Option<Entry>,
+    /// The grip if it was not known before, to be remembered.
+    pub new_grip: Option<Entry>,
 }
 
-/// A job that has everything computed that its search works on.
+/// A job whose holdout and settings are ready to be searched.
 #[derive(Debug)]
-pub(crate) struct PreparedJob {
+struct PreparedJob {
     query: FindQuery,
     holdout: Holdout,
     settings: SearchSettings,
@@ -77,8 +78,8 @@ pub(crate) struct PreparedJob {
     patience: Duration,
 }
 
-/// How long a call's own thread may look for a known grip: a message takes about as long to be decoded and answered.
-/// Longer answers more calls without a change of threads, and keeps others waiting.
+/// How long a look-up of known grips may take on the call's own thread: about as long as decoding and encoding its
+/// messages. A longer look-up answers more calls without switching threads, and delays other calls.
 const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
 /// Time since a call's arrival.
@@ -91,9 +92,31 @@ impl Clock for SinceArrival {
     }
 }
 
+/// Runs a job: looks known grips up on this thread if that is quick, else searches on the executor.
+///
+/// # Errors
+/// The giver's joints fold its skin, or the search was stopped or panicked.
+pub(crate) async fn find(
+    job: FindJob,
+    executor: &SearchExecutor,
+    admission: Admission,
+) -> Result<Answered, ServiceError> {
+    if !job.is_quick_if_known() {
+        let run = executor.run(admission, move |pool, stop| job.prepare()?.run(pool, stop));
+        return run.await?;
+    }
+    let mut job = job.prepare()?;
+    if let Some(answered) = job.look_up() {
+        return answered;
+    }
+    executor
+        .run(admission, move |pool, stop| job.run(pool, stop))
+        .await?
+}
+
 impl FindJob {
-    /// True if preparing, a look-up and the answer are quick enough for a call's own thread: planning a way is not.
-    pub(crate) fn may_be_known(&self) -> bool {
+    /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames is not.
+    fn is_quick_if_known(&self) -> bool {
         (self.known.atlas.is_some() || !self.known.recent.is_empty())
             && !self.query.is_replay
             && self.query.choice == Choice::FirstValid
@@ -101,11 +124,11 @@ impl FindJob {
             && !self.query.plan_key_frames
     }
 
-    /// Poses the giver's hand.
+    /// Poses the giver's hand and makes the settings.
     ///
     /// # Errors
     /// The giver's joints fold its skin.
-    pub(crate) fn prepare(self) -> Result<PreparedJob, ServiceError> {
+    fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
         let query = self.query;
         let object_from_client = query.client_from_object.inverse();
@@ -124,11 +147,16 @@ impl FindJob {
             presenting_hand,
             up: object_from_client.transform_vector(query.up),
         };
-        let starts = match &self.known.atlas {
+        // A growing atlas would change the answer to the same request.
+        let atlas = self
+            .known
+            .atlas
+            .filter(|atlas| !query.reproducible || atlas.is_complete());
+        let starts = match &atlas {
             Some(atlas) => SeedSource::Atlas(Arc::clone(atlas)),
             None if uses_atlas(query.strategy, query.validity) => {
-                let borrowed = self.stored.borrowed(query.receiving_hand);
-                borrowed.map_or(SeedSource::Nothing, SeedSource::Borrowed)
+                let transferred = self.stored.transferred_grips(query.receiving_hand);
+                transferred.map_or(SeedSource::Nothing, SeedSource::Borrowed)
             }
             None => SeedSource::Nothing,
         };
@@ -142,8 +170,8 @@ impl FindJob {
                 .unwrap_or_else(|| holdout.object.friction_under(query.validity)),
             constraints: query.constraints.transformed(object_from_client),
             choice: query.choice,
-            // A replay runs one attempt, which known grips would come before.
-            atlas: self.known.atlas.filter(|_| !query.is_replay),
+            // A replay runs one attempt and tries no known grips.
+            atlas: atlas.filter(|_| !query.is_replay),
             starts,
             recent: if query.is_replay {
                 RecentGrips::default()
@@ -172,11 +200,8 @@ impl FindJob {
 }
 
 impl PreparedJob {
-    /// The answer by a known grip, if one is found at once; [`PreparedJob::run`] goes on where this ends.
-    ///
-    /// # Errors
-    /// None that a known grip can have; those of [`PreparedJob::run`].
-    pub(crate) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
+    /// Answers with a known grip if one is found quickly; otherwise [`PreparedJob::run`] continues where this stopped.
+    fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         let rig = &self.query.receiving_hand.rig;
         match find_known_grasp(&self.holdout, rig, &self.settings, &self.clock, LOOK_UP_TIME) {
             LookUp::Found(outcome) => Some(self.answer(*outcome)),
@@ -187,14 +212,14 @@ impl PreparedJob {
         }
     }
 
-    /// Searches and words the answer.
+    /// Searches.
     ///
     /// # Errors
-    /// The search was told to stop.
-    pub(crate) fn run(&self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Answered, ServiceError> {
+    /// The search was stopped.
+    fn run(&self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
         let (holdout, settings) = (&self.holdout, &self.settings);
-        let outcome = race(pool, holdout, rig, settings, self.patience, &self.clock, stop);
+        let outcome = search_in_slices(pool, holdout, rig, settings, self.patience, &self.clock, stop);
         self.answer(outcome)
     }
 
@@ -215,13 +240,13 @@ impl PreparedJob {
         };
         Ok(Answered {
             response: find_response(&outcome, rig, frame, &self.settings, circumstances)?,
-            newly_known: self.newly_known(&outcome),
+            new_grip: self.new_grip(&outcome),
         })
     }
 
-    /// What was not known so before, if it is known like the grips of an atlas are: under the object's own friction. Finding
-    /// out which fingers can be spared takes longer than all other looks at known grips.
-    fn newly_known(&self, outcome: &SearchOutcome) -> Option<Entry> {
+    /// The grip to remember: one that was found by an attempt or with fewer fingers than its atlas entry, under the object's
+    /// own friction, which the grips of an atlas are made for.
+    fn new_grip(&self, outcome: &SearchOutcome) -> Option<Entry> {
         let own_friction = self.holdout.object.friction_under(Validity::Physical);
         let is_new = matches!(
             outcome.report.source,
@@ -253,7 +278,7 @@ mod tests {
         validate::find_query,
     };
 
-    /// Numbers of every kind that a client may send, most of them ordinary.
+    /// Any number that a client may send, most of them ordinary.
     fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
         prop_oneof![1000 => ordinary, 1 => any::<f32>(), 1 => Just(0.0)]
     }
@@ -315,7 +340,7 @@ mod tests {
         )
     }
 
-    /// Angles within the limits, as shares of their ranges.
+    /// Angles given as shares of their ranges.
     fn angled_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
         let shares = proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5);
         (shares, pose(0.2), 1..=2_i32, 0..RIG_NAMES.len()).prop_map(
@@ -396,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn what_passes_validation_is_searched_and_answered() {
+    fn answers_every_request_that_passes_validation() {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
@@ -425,7 +450,7 @@ mod tests {
                 seed: 3,
                 arrived,
                 workers: 1,
-                known: Known::default(),
+                known: KnownGrips::default(),
                 mechanisms: Mechanisms::ALL,
             };
             match job
@@ -452,7 +477,7 @@ mod tests {
             Ok(())
         });
         outcome.unwrap_or_else(|failure| panic!("{failure}"));
-        // The test says something only if many requests of every kind get past validation.
+        // The test is meaningful only if many requests of every kind pass validation.
         assert!(searched.get().iter().all(|&count| count >= 20), "{searched:?}");
     }
 }

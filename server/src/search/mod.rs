@@ -1,5 +1,6 @@
-//! From async calls to the threads that search, and back.
+//! Grasp searches: what a request asks for and what is known, run on the threads of the executor.
 
-pub(crate) mod executor;
-pub(crate) mod job;
-mod race;
+mod job;
+mod slices;
+
+pub(crate) use job::{Answered, FindJob, find};

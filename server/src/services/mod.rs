@@ -1,44 +1,33 @@
-//! The services of the contract: unwrap, call the domain, map the error.
+//! The handlers of the gRPC services.
 
-mod grasp;
-mod objects;
+mod grasp_service;
+mod object_service;
 
 use std::sync::Arc;
 
 use grasp_assets::obj::ObjLimits;
 use grasp_synthesis::base::mechanisms::Mechanisms;
 
-pub(crate) use grasp::GraspHandler;
-pub(crate) use objects::ObjectHandler;
+pub(crate) use grasp_service::GraspHandler;
+pub(crate) use object_service::ObjectHandler;
 
-use crate::{
-    atlases::Atlases, budget::BudgetLimits, objects::store::ObjectStore, search::executor::SearchExecutor,
-};
+use crate::{atlases::Atlases, budget::BudgetLimits, executor::SearchExecutor, objects::store::ObjectStore};
 
-/// What the handlers share.
+/// State shared by the handlers.
 #[derive(Debug)]
 pub(crate) struct Shared {
-    /// The objects.
+    /// The objects by name.
     pub objects: Arc<ObjectStore>,
-    /// What is known of how hands hold them.
+    /// The atlases of the objects.
     pub atlases: Atlases,
     /// The search pool.
     pub executor: SearchExecutor,
-    /// How long searches may take.
+    /// Bounds on search times.
     pub budgets: BudgetLimits,
-    /// How large meshes may be.
+    /// Bounds on meshes.
     pub obj_limits: ObjLimits,
-    /// The receiving hand's rig unless a request names one.
+    /// Rig of the receiving hand if a request names none.
     pub default_rig: String,
     /// The mechanisms that searches run.
     pub mechanisms: Mechanisms,
 }
-
-/// An OBJ's bytes and the other fields of a request: what may be received beyond the mesh.
-pub(crate) const BYTES_BESIDE_MESH: usize = 1 << 20;
-
-/// Largest request of `GraspService`: a hand of 26 joints takes about 2 kB.
-pub(crate) const LARGEST_FIND_REQUEST: usize = 64 << 10;
-
-/// Largest answer of either service: a full page of objects takes less than 1 MiB.
-pub(crate) const LARGEST_ANSWER: usize = 4 << 20;

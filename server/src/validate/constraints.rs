@@ -12,7 +12,7 @@ use grasp_synthesis::model::{
 use super::{FARTHEST, Field, Violations, direction, known, point};
 use crate::convention::Convention;
 
-/// What a request demands of its grasp, in the client's frame and `OpenXR` axes. What is wrong demands nothing.
+/// The constraints on the grasp, in the client's frame and `OpenXR` axes. Wrong fields constrain nothing.
 pub(super) fn constraints(
     field: Field<'_>,
     sent: Option<v1::Constraints>,
@@ -34,7 +34,7 @@ pub(super) fn constraints(
         listed::<_, TypeSet>(field.child(name), sent, grasp_type, opposite, violations)
     };
     let allowed_types = types("allowed_grasp_types", &sent.allowed_grasp_types, None, violations);
-    // No type is named by an empty list, or by one of nothing but mistakes.
+    // An empty list allows all types, and so does one with only wrong values.
     let allowed_types = Some(allowed_types).filter(|&allowed| allowed != TypeSet::default());
     let excluded_types = types(
         "excluded_grasp_types",
@@ -46,7 +46,7 @@ pub(super) fn constraints(
         violations.add(
             field.child("excluded_grasp_types"),
             format_args!(
-                "names all {} types; at least one must be left",
+                "lists all {} types; at least one must be allowed",
                 GraspType::ALL.len()
             ),
         );
@@ -129,7 +129,7 @@ fn approach(
     })
 }
 
-/// The members of a list, read one by one, none of which may be in the list that is called `opposite`.
+/// The members of a list, read one by one. None may be in the list named `opposite`.
 fn listed<M: Copy + Debug, S: FromIterator<M>>(
     field: Field<'_>,
     sent: &[i32],
@@ -143,7 +143,7 @@ fn listed<M: Copy + Debug, S: FromIterator<M>>(
         if is_in_opposite(member) {
             violations.add(
                 field,
-                format_args!("is {member:?}, which is in {opposite}, too; it cannot be in both"),
+                format_args!("is {member:?}, which {opposite} contains as well; it cannot be in both"),
             );
             return None;
         }
@@ -161,7 +161,7 @@ fn grasp_type(field: Field<'_>, value: i32, violations: &mut Violations) -> Opti
         return None;
     }
     let wire: v1::GraspType = known(field, value, violations);
-    // The contract numbers types as the taxonomy does.
+    // The contract uses the taxonomy's numbers.
     u32::try_from(i32::from(wire)).ok().and_then(GraspType::of_number)
 }
 
@@ -215,8 +215,8 @@ mod tests {
     }
 
     #[test]
-    fn places_lengths_and_directions_are_converted() {
-        // Columns: where OpenXR's axes go; and units in a metre.
+    fn converts_points_lengths_and_directions() {
+        // Columns: OpenXR's axes in the engine's. Last: units per metre.
         let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
         let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
         for (convention, axes, units) in [
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn every_type_is_known_by_its_name() {
+    fn every_grasp_type_has_its_name_in_the_contract() {
         for one in GraspType::ALL {
             let name = one.name().to_uppercase().replace([' ', '-'], "_");
             let wire = v1::GraspType::from_str_name(&format!("GRASP_TYPE_{name}")).expect("the same names");
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn digits_and_comfort_are_kept() {
+    fn reads_digits_and_comfort() {
         use v1::Digit::{Index, Little, Middle, Ring, Thumb};
         let sent = v1::Constraints {
             must_touch: vec![Thumb.into(), Middle.into(), Thumb.into()],
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_that_demands_nothing_is_none() {
+    fn empty_message_is_no_constraint() {
         assert!(checked(v1::Constraints::default(), Convention::Unreal).is_empty());
     }
 }

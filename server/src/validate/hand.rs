@@ -1,4 +1,4 @@
-//! Checks hands: joint angles of a rig and tracked joints.
+//! Checks hands: joint angles of a rig, and tracked joints.
 
 use glam::Vec3;
 use grasp_assets::hands::{self, Hand, RIG_NAMES};
@@ -16,20 +16,20 @@ use grasp_synthesis::{
 use super::{Field, Violations, direction, known, pose, quoted};
 use crate::convention::Convention;
 
-/// How far a joint angle may be outside its limits, in radians: room for the rounding of a client that clamps in
-/// degrees. It is clamped to the limit.
+/// How far a joint angle may be outside its limits, in radians, before it is rejected rather than clamped: room for the
+/// rounding of clients that clamp in degrees.
 const ANGLE_SLACK: f32 = 1e-3;
 
-/// Largest distance from a joint to the skin, in metres; palms of large hands have about 0.03.
+/// Largest distance from a joint to the skin, in metres. Palms of large hands have about 0.03.
 const LARGEST_RADIUS: f32 = 0.1;
 
-/// Largest distance from the wrist to any other joint, in metres; the longest hand on record has 0.33.
+/// Largest distance from the wrist to any other joint, in metres. The longest hand on record has 0.33.
 const LARGEST_REACH: f32 = 0.5;
 
-/// Smallest distance from the wrist to the middle finger's knuckle, in metres: below it, it is no hand.
+/// Smallest distance from the wrist to the middle finger's knuckle, in metres.
 const SMALLEST_PALM: f32 = 0.01;
 
-/// The rig whose skin a tracked hand wears.
+/// The rig whose skin is posed on tracked joints.
 const TRACKED_HAND_RIG: &str = "adult";
 
 /// The giver's hand, in the client's frame and `OpenXR` axes.
@@ -39,11 +39,11 @@ pub(crate) struct GiverHand {
     pub joints: HandJoints,
     /// The skin to pose on them.
     pub skin: &'static Skin,
-    /// The field that gave the joints, to blame if they fold the skin.
+    /// The field that gave the joints, for the error if they fold the skin.
     pub field: &'static str,
 }
 
-/// The giver's hand of a request; none if it names none, or if it is wrong.
+/// The giver's hand; none if it is wrong.
 pub(super) fn presenting_hand(
     field: Field<'_>,
     hand: v1::PresentingHand,
@@ -52,10 +52,7 @@ pub(super) fn presenting_hand(
 ) -> Option<GiverHand> {
     match hand.form {
         None => {
-            violations.add(
-                field,
-                "is empty; angles or joints are required, or no presenting_hand at all",
-            );
+            violations.add(field, "is empty; it must have angles or joints, or be absent");
             None
         }
         Some(v1::presenting_hand::Form::Angles(angles)) => {
@@ -67,7 +64,7 @@ pub(super) fn presenting_hand(
     }
 }
 
-/// The receiving hand: the server's default rig and the right hand unless said otherwise.
+/// The receiving hand; by default the right hand of the default rig.
 pub(super) fn receiving_hand(
     field: Field<'_>,
     hand: Option<v1::ReceivingHand>,
@@ -107,7 +104,7 @@ fn built_in(
     hand
 }
 
-/// The side of a hand that has to say it.
+/// A handedness without a default.
 fn required_handedness(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Handedness> {
     if v1::Handedness::try_from(value) == Ok(v1::Handedness::Unspecified) {
         violations.add(field, "is required: HANDEDNESS_LEFT or HANDEDNESS_RIGHT");
@@ -127,7 +124,7 @@ fn angled_hand(
     violations: &mut Violations,
 ) -> Option<GiverHand> {
     let handedness = required_handedness(field.child("handedness"), angles.handedness, violations);
-    // The limits of both hands are the same: they are checked even if the side is missing.
+    // Both hands have the same limits, which are checked even if the handedness is missing.
     let hand = built_in(
         field.child("rig"),
         &angles.rig,
@@ -144,7 +141,7 @@ fn angled_hand(
     if angles.digits.len() != 5 {
         violations.add(
             digits_field,
-            format_args!("has {} digits; 5 are needed, thumb first", angles.digits.len()),
+            format_args!("has {} digits; it must have 5, thumb first", angles.digits.len()),
         );
     }
     let hand = hand?;
@@ -240,7 +237,7 @@ fn tracked_hand(
         let joint = joint_pose(joints_field.at(place), sent, convention, violations);
         match set {
             v1::JointSet::Openxr26 => joints[convention.joint_at(place)] = joint,
-            // Without the palm, every convention lists the joints in OpenXR's order.
+            // Without the palm, every convention has OpenXR's order.
             v1::JointSet::Webxr25 => joints[place + 1] = joint,
             v1::JointSet::Unspecified => {}
         }
@@ -249,7 +246,7 @@ fn tracked_hand(
         return None;
     };
     if violations.len() > before {
-        // Distances between joints that were replaced mean nothing.
+        // Distances between replaced joints would be meaningless.
         return None;
     }
     if set == v1::JointSet::Webxr25 {
@@ -272,7 +269,7 @@ fn joint_pose(
     let unit = convention.metres_per_unit();
     let pose_field = field.child("client_from_joint");
     if sent.client_from_joint.is_none() {
-        violations.add(pose_field, "is absent; every joint needs a pose");
+        violations.add(pose_field, "is absent; every joint must have a pose");
     }
     let radius = convention.length_to_openxr(sent.radius);
     if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
@@ -291,7 +288,7 @@ fn joint_pose(
     }
 }
 
-/// The palm joint that `WebXR` leaves out: the middle of the middle finger's metacarpal, with its axes and radius.
+/// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, with its axes and radius.
 fn synthesised_palm(joints: &[Joint; JOINT_COUNT]) -> Joint {
     let metacarpal = joints[index::FIRST_OF_DIGIT[2]];
     let proximal = joints[index::FIRST_OF_DIGIT[2] + 1];
@@ -304,7 +301,7 @@ fn synthesised_palm(joints: &[Joint; JOINT_COUNT]) -> Joint {
     }
 }
 
-/// Are the joints as far apart as those of a hand?
+/// Checks that the joints are as far apart as those of a hand.
 fn proportions(field: Field<'_>, joints: &[Joint; JOINT_COUNT], violations: &mut Violations) {
     let wrist = joints[index::WRIST].pose.position;
     let from_wrist = |joint: &Joint| joint.pose.position.distance(wrist);
@@ -312,7 +309,7 @@ fn proportions(field: Field<'_>, joints: &[Joint; JOINT_COUNT], violations: &mut
     if farthest > LARGEST_REACH {
         violations.add(
             field,
-            format_args!("reach {farthest} m from the wrist; a hand reaches at most {LARGEST_REACH} m"),
+            format_args!("reach {farthest} m from the wrist; the limit is {LARGEST_REACH} m"),
         );
     }
     let knuckle = from_wrist(&joints[index::FIRST_OF_DIGIT[2] + 1]);
@@ -320,14 +317,14 @@ fn proportions(field: Field<'_>, joints: &[Joint; JOINT_COUNT], violations: &mut
         violations.add(
             field,
             format_args!(
-                "have the middle finger's proximal joint {knuckle} m from the wrist; at least {SMALLEST_PALM} m \
-                 are needed"
+                "have the middle finger's proximal joint {knuckle} m from the wrist; it must be at least \
+                 {SMALLEST_PALM} m"
             ),
         );
     }
 }
 
-/// The direction against gravity of a request, seen in `OpenXR` axes: a unit vector.
+/// The direction against gravity, in `OpenXR` axes: a unit vector.
 pub(super) fn up(
     field: Field<'_>,
     up: Option<v1::Vector3>,
@@ -349,7 +346,7 @@ mod tests {
 
     const FIELD: Field<'static> = Field::root("presenting_hand");
 
-    /// A bent hand somewhere, as `OpenXR` joints.
+    /// A bent hand, as `OpenXR` joints.
     fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
         let hand = hands::hand("adult", handedness).expect("the rig is built in");
         let mut digits = hand.rig.stretched();
@@ -363,7 +360,7 @@ mod tests {
         HandJoints::of_pose(&hand.rig, &pose)
     }
 
-    /// The same joints as a client of the convention sends them.
+    /// The joints as a client with the convention sends them.
     fn sent(joints: &HandJoints, convention: Convention, set: v1::JointSet) -> v1::PresentingHand {
         let places = match set {
             v1::JointSet::Webxr25 => 1..JOINT_COUNT,
@@ -394,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn joints_are_the_same_in_every_convention_and_set() {
+    fn reads_joints_in_every_convention_and_set() {
         for convention in [
             Convention::OpenXr,
             Convention::Unity,
@@ -412,21 +409,21 @@ mod tests {
                         &mut violations,
                     );
                     assert!(violations.is_empty(), "{violations:?}");
-                    let read = hand.expect("a right hand is read").joints;
+                    let read = hand.expect("the hand is valid").joints;
                     assert_eq!(read.handedness, handedness);
                     for (joint, (read, expected)) in read.joints.iter().zip(&expected.joints).enumerate() {
-                        let told = format!("{convention:?} {set:?} {joint}: {read:?} {expected:?}");
+                        let context = format!("{convention:?} {set:?} {joint}: {read:?} {expected:?}");
                         assert!(
                             read.pose.position.distance(expected.pose.position) < 1e-5,
-                            "{told}"
+                            "{context}"
                         );
                         assert!(
                             read.pose.orientation.dot(expected.pose.orientation).abs() > 1.0 - 1e-5,
-                            "{told}"
+                            "{context}"
                         );
-                        // The palm's own radius is not sent in WebXR's set.
+                        // WebXR's set does not contain the palm's radius.
                         if joint != index::PALM || set == v1::JointSet::Openxr26 {
-                            assert!((read.radius - expected.radius).abs() < 1e-6, "{told}");
+                            assert!((read.radius - expected.radius).abs() < 1e-6, "{context}");
                         }
                     }
                 }
@@ -435,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_are_clamped_within_the_slack_and_coupled_when_absent() {
+    fn clamps_angles_within_the_slack_and_couples_absent_ones() {
         let hand = hands::hand("thesis", Handedness::Right).expect("the rig is built in");
         let rig = &hand.rig.digits[1];
         let limit = rig.limits.second_pitch.max;

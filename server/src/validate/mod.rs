@@ -1,11 +1,10 @@
-//! Requests become checked values, or a list of everything that is wrong with them.
+//! Turns requests into checked values, or into a list of everything that is wrong with them.
 //!
-//! Every function takes the field's path and the violations found so far, and returns a value with which checking
-//! can go on even if it was wrong; [`Violations::finish`] decides. Nothing here allocates for a request that is
-//! right.
+//! Every function takes the field's path and the violations so far, and returns a usable value even for wrong input, so
+//! that all violations are found; [`Violations::finish`] decides in the end. A valid request causes no allocations here.
 
 mod constraints;
-mod find;
+mod find_grasp;
 mod hand;
 mod object;
 mod page;
@@ -16,62 +15,63 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 
-pub(crate) use find::{FindQuery, find_query};
+pub(crate) use find_grasp::{FindQuery, find_query};
 pub(crate) use hand::GiverHand;
 pub(crate) use object::{ObjectFields, object_fields, object_id_of};
 pub(crate) use page::{page_query, page_token};
 
 use crate::error::{ServiceError, Violation};
 
-/// Violations that are told at most; a client that sends thousands gets the first ones and their number.
-const MAXIMUM_TOLD: usize = 64;
+/// Largest number of listed violations; the others are only counted.
+const MAXIMUM_LISTED: usize = 64;
 
-/// Characters of a client's text that are told back at most.
+/// Largest number of characters that an error quotes of a client's text.
 const MAXIMUM_QUOTED: usize = 80;
 
-/// How far the norm of a quaternion may be from one.
+/// Largest deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f32 = 0.01;
 
-/// Largest distance from the client's origin along an axis, in metres: beyond it a float resolves less than 0.1 mm.
+/// Largest distance from the client's origin along an axis, in metres. Beyond it, the resolution of a float is worse than
+/// 0.1 mm.
 const FARTHEST: f32 = 1000.0;
 
 /// Largest coefficient of static friction; silicone rubber on itself stays below 2.
 pub(crate) const MAXIMUM_FRICTION: f32 = 5.0;
 
-/// What was found to be wrong so far.
+/// The violations found so far.
 #[derive(Debug, Default)]
 pub(crate) struct Violations {
-    told: Vec<Violation>,
-    untold: usize,
+    listed: Vec<Violation>,
+    unlisted: usize,
 }
 
 impl Violations {
-    /// Adds one; texts are written out only if they are told.
+    /// Adds a violation. The texts are formatted only if it is listed.
     pub(crate) fn add(&mut self, field: impl fmt::Display, description: impl fmt::Display) {
-        if self.told.len() < MAXIMUM_TOLD {
-            self.told.push(Violation {
+        if self.listed.len() < MAXIMUM_LISTED {
+            self.listed.push(Violation {
                 field: field.to_string(),
                 description: description.to_string(),
             });
         } else {
-            self.untold += 1;
+            self.unlisted += 1;
         }
     }
 
-    /// True if nothing is wrong.
+    /// True if there are none.
     pub(crate) fn is_empty(&self) -> bool {
-        self.told.is_empty()
+        self.listed.is_empty()
     }
 
-    /// How many there are.
+    /// Number of violations.
     pub(crate) fn len(&self) -> usize {
-        self.told.len() + self.untold
+        self.listed.len() + self.unlisted
     }
 
-    /// `value` if nothing is wrong.
+    /// `value` if there are no violations.
     ///
     /// # Errors
-    /// [`ServiceError::Invalid`] with everything that was found.
+    /// [`ServiceError::Invalid`] with the violations.
     pub(crate) fn finish<T>(self, value: T) -> Result<T, ServiceError> {
         if self.is_empty() {
             Ok(value)
@@ -80,19 +80,19 @@ impl Violations {
         }
     }
 
-    /// The error that tells them.
+    /// The error that lists the violations.
     pub(crate) fn into_error(mut self) -> ServiceError {
-        if self.untold > 0 {
-            self.told.push(Violation {
+        if self.unlisted > 0 {
+            self.listed.push(Violation {
                 field: String::new(),
-                description: format!("{} more violations are not listed", self.untold),
+                description: format!("{} more violations are not listed", self.unlisted),
             });
         }
-        ServiceError::Invalid(self.told)
+        ServiceError::Invalid(self.listed)
     }
 }
 
-/// The path of a field, written out only when it is told.
+/// The path of a field, formatted only when it is needed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Field<'a> {
     parent: Option<&'a Field<'a>>,
@@ -141,7 +141,7 @@ impl fmt::Display for Field<'_> {
     }
 }
 
-/// A client's text in quotes, shortened.
+/// A client's text in quotes, shortened if it is long.
 pub(crate) fn quoted(text: &str) -> String {
     let mut characters = text.chars();
     let start: String = characters.by_ref().take(MAXIMUM_QUOTED).collect();
@@ -149,12 +149,12 @@ pub(crate) fn quoted(text: &str) -> String {
     format!("{start:?}{ellipsis}")
 }
 
-/// A vector as it was sent.
+/// An unchecked vector.
 fn raw(v: v1::Vector3) -> Vec3 {
     Vec3::new(v.x, v.y, v.z)
 }
 
-/// A vector whose numbers are finite; zero otherwise.
+/// A finite vector; zero if it is not finite.
 fn finite(field: Field<'_>, v: v1::Vector3, violations: &mut Violations) -> Vec3 {
     let vector = raw(v);
     if vector.is_finite() {
@@ -165,7 +165,7 @@ fn finite(field: Field<'_>, v: v1::Vector3, violations: &mut Violations) -> Vec3
     }
 }
 
-/// A point in the client's convention, one unit of which is `metres_per_unit` long.
+/// A point in the client's convention, whose unit is `metres_per_unit` long.
 fn point(field: Field<'_>, v: v1::Vector3, metres_per_unit: f32, violations: &mut Violations) -> Vec3 {
     let point = finite(field, v, violations);
     let farthest = FARTHEST / metres_per_unit;
@@ -179,18 +179,15 @@ fn point(field: Field<'_>, v: v1::Vector3, metres_per_unit: f32, violations: &mu
     point
 }
 
-/// A direction of any length but 0, in the client's axes, as a unit vector; none if it has none.
+/// A vector of any length but 0, in the client's axes, as a unit vector; none if it is wrong.
 fn direction(field: Field<'_>, v: v1::Vector3, violations: &mut Violations) -> Option<Vec3> {
     let direction = raw(v);
-    // Scaled first: the square of a huge or tiny vector is no number.
+    // Scaled first: the squares of huge or tiny numbers overflow or vanish.
     let unit = (direction / direction.abs().max_element())
         .try_normalize()
         .filter(|_| direction.is_finite());
     if unit.is_none() {
-        violations.add(
-            field,
-            format_args!("is {direction}; it must be finite and point somewhere"),
-        );
+        violations.add(field, format_args!("is {direction}; it must be finite and not 0"));
     }
     unit
 }
@@ -202,15 +199,15 @@ fn orientation(field: Field<'_>, q: v1::Quaternion, violations: &mut Violations)
     if (norm - 1.0).abs() <= QUATERNION_TOLERANCE {
         return quaternion.normalize();
     }
-    // Also reached by NaN and infinity, for which the comparison is false.
+    // NaN and infinity come here too: the comparison is false for them.
     violations.add(
         field,
-        format_args!("is {quaternion}, of norm {norm}; a unit quaternion is needed, within 1 %"),
+        format_args!("is {quaternion}, of norm {norm}; it must be a unit quaternion, within 1 %"),
     );
     Quat::IDENTITY
 }
 
-/// A pose in the client's convention; an absent one, or absent part of one, is the identity.
+/// A pose in the client's convention. An absent pose, or an absent part, is the identity.
 fn pose(field: Field<'_>, pose: Option<v1::Pose>, metres_per_unit: f32, violations: &mut Violations) -> Pose {
     let Some(pose) = pose else {
         return Pose::IDENTITY;
@@ -236,7 +233,7 @@ fn friction(field: Field<'_>, value: f32, violations: &mut Violations) -> f32 {
     value
 }
 
-/// The value of an enum that the contract knows; its default otherwise.
+/// A value of an enum of the contract; its default if the contract does not define the number.
 fn known<E: TryFrom<i32> + Default>(field: Field<'_>, value: i32, violations: &mut Violations) -> E {
     E::try_from(value).unwrap_or_else(|_| {
         violations.add(
@@ -252,7 +249,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn paths_name_every_level() {
+    fn field_paths_name_every_level() {
         let hand = Field::root("presenting_hand");
         let angles = hand.child("angles");
         let digit = angles.child("digits").at(2);
@@ -263,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn quaternions_near_one_are_normalised_and_others_refused() {
+    fn normalises_quaternions_of_norm_near_1_and_rejects_others() {
         let field = Field::root("q");
         let mut violations = Violations::default();
         let q = orientation(
@@ -290,13 +287,13 @@ mod tests {
                 },
                 &mut violations,
             );
-            assert_eq!(violations.told.len(), 1, "{w}");
+            assert_eq!(violations.listed.len(), 1, "{w}");
             assert_eq!(q, Quat::IDENTITY);
         }
     }
 
     #[test]
-    fn points_beyond_a_kilometre_and_not_finite_ones_are_refused() {
+    fn rejects_points_beyond_a_kilometre_and_non_finite_ones() {
         let field = Field::root("p");
         for (x, unit, right) in [
             (999.0, 1.0, true),
@@ -313,31 +310,31 @@ mod tests {
     }
 
     #[test]
-    fn a_flood_of_violations_is_cut_and_counted() {
+    fn lists_some_violations_and_counts_the_others() {
         let mut violations = Violations::default();
         for i in 0..1000 {
             violations.add(Field::root("f").at(i), "is wrong");
         }
-        let Err(ServiceError::Invalid(told)) = violations.finish(()) else {
+        let Err(ServiceError::Invalid(listed)) = violations.finish(()) else {
             panic!("violations must not pass");
         };
-        assert_eq!(told.len(), MAXIMUM_TOLD + 1);
-        assert!(told[MAXIMUM_TOLD].description.starts_with("936 more"));
+        assert_eq!(listed.len(), MAXIMUM_LISTED + 1);
+        assert!(listed[MAXIMUM_LISTED].description.starts_with("936 more"));
     }
 
     #[test]
-    fn long_texts_are_told_back_shortened() {
+    fn shortens_long_quotes() {
         assert_eq!(quoted("a\nb"), "\"a\\nb\"");
         assert_eq!(quoted(&"é".repeat(500)).chars().count(), MAXIMUM_QUOTED + 3);
     }
 
     #[test]
-    fn enums_of_the_future_are_refused() {
+    fn rejects_undefined_enum_values() {
         let mut violations = Violations::default();
         let strategy: v1::Strategy = known(Field::root("strategy"), 77, &mut violations);
         assert_eq!(strategy, v1::Strategy::Unspecified);
         assert_eq!(
-            violations.told[0].description,
+            violations.listed[0].description,
             "is 77, which the contract does not define"
         );
     }

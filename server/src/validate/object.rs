@@ -1,23 +1,23 @@
-//! Checks what is said about objects: names, and the fields of a new one beside its mesh.
+//! Checks object names, and all fields of a new object but its mesh.
 
 use glam::Vec3;
 use grasp_proto::v1;
 
 use super::{Field, Violations, friction, point, quoted};
 
-/// What every object's name starts with.
+/// Prefix of every object's name.
 const COLLECTION: &str = "objects/";
 
-/// Characters of an object's id at most.
+/// Largest number of characters in an object's id.
 const LONGEST_ID: usize = 63;
 
-/// Largest mass of an object in kilograms: more than anybody holds out.
+/// Largest mass of an object in kilograms: more than anyone can hold out.
 const LARGEST_MASS: f32 = 1000.0;
 
-/// Lengths that one unit of a mesh may have, in metres: a micrometre to a kilometre.
+/// Allowed lengths of a mesh's unit, in metres: a micrometre to a kilometre.
 const UNIT_RANGE: std::ops::RangeInclusive<f32> = 1e-6..=1e3;
 
-/// A new object but for its mesh.
+/// The checked fields of a new object, with its unread mesh.
 #[derive(Debug)]
 pub(crate) struct ObjectFields {
     /// The last part of its name.
@@ -26,15 +26,15 @@ pub(crate) struct ObjectFields {
     pub obj: Vec<u8>,
     /// Metres per unit of the mesh.
     pub unit_metres: f32,
-    /// In kilograms.
+    /// Mass in kilograms.
     pub mass: f32,
-    /// In metres, in the object's frame; none to compute it.
+    /// Centre of mass in metres, in the object's frame; none to compute it.
     pub centre_of_mass: Option<Vec3>,
-    /// Coefficient of static friction, if it was given.
+    /// Coefficient of static friction, if given.
     pub friction: Option<f32>,
-    /// Groups, objects and materials of the OBJ text that may not be touched.
+    /// Groups, objects and materials of the OBJ text that must not be touched.
     pub forbidden_groups: Vec<String>,
-    /// Triangles that may not be touched.
+    /// Triangles that must not be touched.
     pub forbidden_triangles: Vec<u32>,
 }
 
@@ -56,7 +56,7 @@ pub(crate) fn object_id_of(field: Field<'_>, name: &str, violations: &mut Violat
     }
 }
 
-/// Checks the fields of a new object. The mesh is read later; what is wrong with it adds to `violations`.
+/// Checks the fields of a new object. Reading the mesh adds its own violations later.
 pub(crate) fn object_fields(
     request: v1::CreateObjectRequest,
     maximum_bytes: usize,
@@ -79,10 +79,7 @@ pub(crate) fn object_fields(
     } else if request.obj.len() > maximum_bytes {
         violations.add(
             Field::root("obj"),
-            format_args!(
-                "has {} bytes; at most {maximum_bytes} are allowed",
-                request.obj.len()
-            ),
+            format_args!("has {} bytes; the limit is {maximum_bytes}", request.obj.len()),
         );
     }
     let unit_metres = match request.unit_metres {
@@ -97,7 +94,7 @@ pub(crate) fn object_fields(
                     UNIT_RANGE.end()
                 ),
             );
-            // The mesh is still read, to tell what is wrong with it.
+            // The mesh is still read, to find its violations too.
             1.0
         }
     };
@@ -142,7 +139,7 @@ mod tests {
     use super::*;
     use crate::error::ServiceError;
 
-    fn right() -> v1::CreateObjectRequest {
+    fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest {
             object_id: "mug-1".into(),
             obj: b"v 0 0 0".to_vec(),
@@ -165,37 +162,37 @@ mod tests {
     }
 
     #[test]
-    fn a_right_request_has_defaults() {
+    fn optional_fields_have_defaults() {
         let mut violations = Violations::default();
-        let fields = object_fields(right(), 100, &mut violations);
+        let fields = object_fields(valid(), 100, &mut violations);
         assert!(violations.is_empty());
         assert_eq!((fields.unit_metres, fields.friction), (1.0, None));
     }
 
     #[test]
-    fn every_violation_is_told() {
+    fn reports_every_violation_by_field() {
         for id in ["", "1mug", "Mug", "mug_1", "mug/1", "mög", &"m".repeat(64)] {
             let request = v1::CreateObjectRequest {
                 object_id: id.into(),
-                ..right()
+                ..valid()
             };
             assert_eq!(fields_of_violations(request), ["object_id"], "{id}");
         }
         for mass_kg in [0.0, -1.0, f32::NAN, f32::INFINITY, 1001.0] {
-            let request = v1::CreateObjectRequest { mass_kg, ..right() };
+            let request = v1::CreateObjectRequest { mass_kg, ..valid() };
             assert_eq!(fields_of_violations(request), ["mass_kg"], "{mass_kg}");
         }
         for friction in [0.0, -0.1, 5.1, f32::NAN, f32::INFINITY] {
             let request = v1::CreateObjectRequest {
                 friction: Some(friction),
-                ..right()
+                ..valid()
             };
             assert_eq!(fields_of_violations(request), ["friction"], "{friction}");
         }
         for unit in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e4, 1e-9] {
             let request = v1::CreateObjectRequest {
                 unit_metres: Some(unit),
-                ..right()
+                ..valid()
             };
             assert_eq!(fields_of_violations(request), ["unit_metres"], "{unit}");
         }
@@ -203,12 +200,12 @@ mod tests {
             let centre_of_mass = Some(v1::Vector3 { x, y: 0.0, z: 0.0 });
             let request = v1::CreateObjectRequest {
                 centre_of_mass,
-                ..right()
+                ..valid()
             };
             assert_eq!(fields_of_violations(request), ["centre_of_mass"], "{x}");
         }
         for obj in [vec![], vec![b' '; 101]] {
-            let request = v1::CreateObjectRequest { obj, ..right() };
+            let request = v1::CreateObjectRequest { obj, ..valid() };
             assert_eq!(fields_of_violations(request), ["obj"]);
         }
         let all = v1::CreateObjectRequest::default();
@@ -216,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn names_have_the_collection_and_an_id() {
+    fn names_consist_of_collection_and_id() {
         let mut violations = Violations::default();
         let field = Field::root("name");
         assert_eq!(

@@ -1,25 +1,25 @@
-//! Checks list requests and makes page tokens.
+//! Checks list requests, and makes page tokens.
 
 use grasp_proto::v1;
 
 use super::{Field, Violations, quoted};
 use crate::error::ServiceError;
 
-/// Objects on a page that names no size.
+/// Number of objects on a page if the request gives no size.
 const DEFAULT_PAGE_SIZE: usize = 50;
 
-/// Objects on a page at most.
+/// Largest number of objects on a page.
 const LARGEST_PAGE_SIZE: usize = 1000;
 
-/// Marks the tokens of this version: a token of another is refused instead of misread.
+/// Prefix of tokens of this version, so that tokens of other versions are rejected.
 const TOKEN_PREFIX: &str = "a1-";
 
 /// A page to list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PageQuery {
-    /// How many objects.
+    /// Number of objects.
     pub size: usize,
-    /// The id that the page starts after; none for the first page.
+    /// The last id of the previous page; none for the first page.
     pub after: Option<String>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
             violations.add(
                 Field::root("page_token"),
                 format_args!(
-                    "is {}; it must be the next_page_token of an earlier answer",
+                    "is {}; it must be the next_page_token of an earlier response",
                     quoted(&request.page_token)
                 ),
             );
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn tokens_come_back() {
+    fn reads_its_own_tokens() {
         let token = page_token("mug-1");
         assert!(!token.contains("mug"));
         assert_eq!(
@@ -106,16 +106,16 @@ mod tests {
     }
 
     #[test]
-    fn sizes_have_a_default_and_a_maximum() {
+    fn page_size_has_a_default_and_a_maximum() {
         assert_eq!(query(0, "").unwrap().size, 50);
         assert_eq!(query(5000, "").unwrap().size, 1000);
     }
 
     #[test]
-    fn both_fields_are_blamed_at_once() {
+    fn reports_both_fields_at_once() {
         for token in ["x", "a1-", "a1-6", "a1-zz", "a1-ff", "a1-é0", "mug"] {
             let Err(ServiceError::Invalid(violations)) = query(-1, token) else {
-                panic!("{token} must be refused");
+                panic!("{token} must be rejected");
             };
             let fields: Vec<_> = violations.iter().map(|v| v.field.as_str()).collect();
             assert_eq!(fields, ["page_size", "page_token"], "{token}");

@@ -1,4 +1,4 @@
-//! The binary as a platform runs it: exit codes, messages, signals, health checks.
+//! The binary: exit codes, messages, signals, health checks.
 #![cfg(target_os = "linux")]
 
 mod process;
@@ -11,15 +11,15 @@ use std::{
 
 use process::{Running, output};
 
-/// An address where nobody listens: a port that was free a moment ago.
+/// An address where nothing listens: its port was free a moment ago.
 fn free_address() -> String {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("there is a free port");
     listener.local_addr().expect("it is bound").to_string()
 }
 
 #[test]
-fn a_server_is_healthy_from_its_start_to_its_end() {
-    // On all addresses, which cannot be connected to: the check has to know which one to take.
+fn health_check_passes_while_the_server_runs() {
+    // All addresses, to which no client can connect: the check must choose one.
     let port = free_address()
         .rsplit_once(':')
         .expect("it has a port")
@@ -45,12 +45,12 @@ fn a_server_is_healthy_from_its_start_to_its_end() {
 }
 
 #[test]
-fn the_health_check_reads_the_same_configuration() {
+fn health_check_reads_the_configuration_of_the_server() {
     let server = Running::start(&[("GRASP_LISTEN", "127.0.0.1:0")]);
-    let folder = std::env::temp_dir().join(format!("grasp-health-{}", std::process::id()));
-    let mut file = fs::File::create(&folder).expect("the temporary directory can be written to");
+    let file_path = std::env::temp_dir().join(format!("grasp-health-{}", std::process::id()));
+    let mut file = fs::File::create(&file_path).expect("the temporary directory can be written to");
     writeln!(file, "listen = {:?}", server.address()).expect("a file can be written");
-    let path = folder.to_str().expect("the path is text");
+    let path = file_path.to_str().expect("the path is text");
     assert_eq!(
         output("grasp-server --health-check", &[("GRASP_CONFIG", path)]).code,
         0
@@ -61,12 +61,12 @@ fn the_health_check_reads_the_same_configuration() {
     assert_eq!(wrong.code, 1);
     assert!(wrong.text.contains("listen is \"here\""), "{}", wrong.text);
     server.terminate();
-    fs::remove_file(&folder).expect("the file is still there");
+    fs::remove_file(&file_path).expect("the file is still there");
 }
 
 #[test]
-fn one_that_accepts_but_does_not_answer_is_not_healthy() {
-    // The kernel accepts; nobody reads.
+fn health_check_fails_without_an_answer() {
+    // The kernel accepts connections; nothing reads them.
     let silent = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("there is a free port");
     let address = silent.local_addr().expect("it is bound").to_string();
     let result = output("grasp-server --health-check", &[("GRASP_LISTEN", &address)]);
@@ -79,7 +79,7 @@ fn one_that_accepts_but_does_not_answer_is_not_healthy() {
 }
 
 #[test]
-fn every_bad_setting_is_named() {
+fn reports_every_invalid_setting() {
     let result = output(
         "grasp-server --workers 0",
         &[("GRASP_LOG_FORMAT", "xml"), ("GRASP_OBJECTS_DIRECTORY", "")],
@@ -95,7 +95,7 @@ fn every_bad_setting_is_named() {
 }
 
 #[test]
-fn the_log_says_in_json_why_there_is_no_server() {
+fn json_log_contains_the_reason_of_a_failed_start() {
     let settings = [
         ("GRASP_LOG_FORMAT", "json"),
         ("GRASP_OBJECTS_DIRECTORY", "/nowhere/at/all"),
@@ -107,7 +107,7 @@ fn the_log_says_in_json_why_there_is_no_server() {
         .lines()
         .map(|line| serde_json::from_str(line).expect("every line is JSON"))
         .collect();
-    let error = lines.last().expect("it says something")["error"]
+    let error = lines.last().expect("the log is not empty")["error"]
         .as_str()
         .expect("a text");
     assert!(
@@ -117,8 +117,8 @@ fn the_log_says_in_json_why_there_is_no_server() {
 }
 
 #[test]
-fn too_little_memory_is_told_with_what_to_lower() {
-    // 1 GiB of address space; the cache alone may take more.
+fn reports_too_little_memory_with_the_settings_to_lower() {
+    // 1 GiB of address space, less than the cache alone.
     let command = "ulimit -v 1048576 && exec grasp-server --listen 127.0.0.1:0 --cache-bytes 2147483648";
     let result = output(command, &[]);
     assert_eq!(result.code, 1);
@@ -131,7 +131,7 @@ fn too_little_memory_is_told_with_what_to_lower() {
 }
 
 #[test]
-fn a_configuration_that_fits_the_memory_serves_in_it() {
+fn serves_within_a_memory_limit_that_the_configuration_fits() {
     let settings = [
         ("GRASP_LISTEN", "127.0.0.1:0"),
         ("GRASP_CACHE_BYTES", "67108864"),

@@ -1,4 +1,4 @@
-//! The server's binary as a process.
+//! Runs the server's binary.
 
 use std::{
     io::{BufRead as _, BufReader, Read as _},
@@ -6,16 +6,15 @@ use std::{
     process::{Child, ChildStderr, Command, Stdio},
 };
 
-/// How a process ended.
+/// A process that has ended.
 pub(crate) struct Ended {
     /// Its exit code.
     pub code: i32,
-    /// What it wrote to standard error.
+    /// Its standard error.
     pub text: String,
 }
 
-/// A command of the shell in which `grasp-server` is the binary under test, and of the server's variables there are
-/// only these.
+/// A shell command in which `grasp-server` is the binary under test, with these environment variables only.
 fn command(line: &str, variables: &[(&str, &str)]) -> Command {
     let binary = Path::new(env!("CARGO_BIN_EXE_grasp-server"));
     let folder = binary.parent().expect("a binary lies in a folder");
@@ -35,7 +34,7 @@ pub(crate) fn output(line: &str, variables: &[(&str, &str)]) -> Ended {
     }
 }
 
-/// A server that runs; killed when it is dropped.
+/// A running server, killed when it is dropped.
 pub(crate) struct Running {
     child: Child,
     log: BufReader<ChildStderr>,
@@ -43,12 +42,12 @@ pub(crate) struct Running {
 }
 
 impl Running {
-    /// Starts the server and waits until it names its address.
+    /// Starts the server and waits until it logs its address.
     pub(crate) fn start(variables: &[(&str, &str)]) -> Self {
         Self::start_command("exec grasp-server", variables)
     }
 
-    /// Starts the server by a command, which has to become the server, and waits until it names its address.
+    /// Starts the server by a command that must `exec` it, and waits until it logs its address.
     pub(crate) fn start_command(line: &str, variables: &[(&str, &str)]) -> Self {
         let mut child = command(line, variables).spawn().expect("there is a shell");
         let log = BufReader::new(child.stderr.take().expect("it is piped"));
@@ -63,23 +62,23 @@ impl Running {
 
     /// Reads the log up to the line that names the address.
     fn read_address(&mut self) -> String {
-        let mut told = String::new();
+        let mut log = String::new();
         loop {
-            let start = told.len();
-            let read = self.log.read_line(&mut told).expect("the server writes text");
-            assert!(read > 0, "the server ended before it named its address: {told}");
-            if let Some((_, rest)) = told[start..].split_once("address=") {
+            let start = log.len();
+            let read = self.log.read_line(&mut log).expect("the server writes text");
+            assert!(read > 0, "the server ended before it logged its address: {log}");
+            if let Some((_, rest)) = log[start..].split_once("address=") {
                 return rest.split_whitespace().next().expect("it follows").to_owned();
             }
         }
     }
 
-    /// Where it listens.
+    /// The address that it listens on.
     pub(crate) fn address(&self) -> &str {
         &self.address
     }
 
-    /// Sends SIGTERM and waits for the end, which must be a success; gives the rest of the log.
+    /// Sends SIGTERM, waits for a successful end and returns the rest of the log.
     pub(crate) fn terminate(mut self) -> Vec<String> {
         let killed = Command::new("kill")
             .arg(self.child.id().to_string())
@@ -100,7 +99,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It has ended already unless the test failed.
+        // It has already ended unless the test failed.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

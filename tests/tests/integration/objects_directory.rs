@@ -125,7 +125,7 @@ fn a_broken_folder_is_no_server() {
     for part in [
         "mug.toml: mass_kg: is -1; it must be more than 0",
         "mug.obj: ",
-        "scissors.obj: is named like the built-in object",
+        "scissors.obj: has the name of the built-in object",
     ] {
         assert!(text.contains(part), "{part} in {text}");
     }

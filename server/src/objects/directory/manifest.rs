@@ -1,4 +1,4 @@
-//! What `NAME.toml` says: what a client says beside the mesh when it creates an object, in the same words.
+//! `NAME.toml`: the fields of a `CreateObject` request besides the mesh, under the same names.
 
 use grasp_proto::v1;
 use toml::{Table, Value};
@@ -17,10 +17,10 @@ const KEYS: [&str; 5] = [
 /// The keys of `forbidden`.
 const FORBIDDEN_KEYS: [&str; 2] = ["groups", "triangles"];
 
-/// Mass in kilograms with which checking goes on where none is said; never that of an object.
+/// Mass in kilograms for further checks if none is given; no object gets it.
 const PLACEHOLDER_MASS: f32 = 1.0;
 
-/// A manifest, its values unchecked.
+/// A manifest with unchecked values.
 #[derive(Debug)]
 pub(super) struct Manifest {
     mass_kg: f32,
@@ -31,7 +31,7 @@ pub(super) struct Manifest {
 }
 
 impl Manifest {
-    /// The request by which a client would create the object.
+    /// The request that would create the object.
     pub(super) fn into_request(self, id: &str, obj: Vec<u8>) -> v1::CreateObjectRequest {
         v1::CreateObjectRequest {
             object_id: id.to_owned(),
@@ -45,12 +45,12 @@ impl Manifest {
     }
 }
 
-/// Reads a manifest key by key, so that everything that is wrong with it is told; none if it is no TOML.
+/// Reads a manifest key by key, to report everything that is wrong with it. None if it is not TOML.
 pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option<Manifest> {
     let text = match std::str::from_utf8(bytes) {
         Ok(text) => text,
         Err(error) => {
-            violations.add("", format_args!("is no text in UTF-8: {error}"));
+            violations.add("", format_args!("is not UTF-8: {error}"));
             return None;
         }
     };
@@ -61,15 +61,15 @@ pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option
             let line = error
                 .span()
                 .map_or(1, |span| 1 + text[..span.start].matches('\n').count());
-            violations.add("", format_args!("is no TOML: line {line}: {}", error.message()));
+            violations.add("", format_args!("is not TOML: line {line}: {}", error.message()));
             return None;
         }
     };
-    refuse_unknown(&table, None, &KEYS, violations);
+    reject_unknown(&table, None, &KEYS, violations);
     if !table.contains_key("mass_kg") {
         violations.add(
             Field::root("mass_kg"),
-            "is missing; the mass in kilograms is needed",
+            "is missing; it must be the mass in kilograms",
         );
     }
     let mut optional = |key| {
@@ -80,7 +80,7 @@ pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option
     let unit_metres = optional("unit_metres");
     let friction = optional("friction");
     Some(Manifest {
-        // What is wrong is told already.
+        // A missing or wrong mass was added to the violations.
         mass_kg: mass_kg.unwrap_or(PLACEHOLDER_MASS),
         unit_metres,
         centre_of_mass: table
@@ -94,9 +94,9 @@ pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option
     })
 }
 
-fn refuse_unknown(table: &Table, parent: Option<Field<'_>>, known: &[&str], violations: &mut Violations) {
+fn reject_unknown(table: &Table, parent: Option<Field<'_>>, known: &[&str], violations: &mut Violations) {
     for key in table.keys().filter(|key| !known.contains(&key.as_str())) {
-        let description = format!("is no key; there are {}", known.join(", "));
+        let description = format!("is unknown; the keys are {}", known.join(", "));
         match parent {
             Some(parent) => violations.add(parent.child(key), description),
             None => violations.add(Field::root(key), description),
@@ -104,18 +104,18 @@ fn refuse_unknown(table: &Table, parent: Option<Field<'_>>, known: &[&str], viol
     }
 }
 
-/// A number, whole or not.
+/// A number, with or without a fraction.
 fn number(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<f32> {
     match value {
         Value::Float(number) => Some(*number as f32),
         Value::Integer(number) => Some(*number as f32),
-        _ => refuse(field, value, "a number", violations),
+        _ => reject(field, value, "a number", violations),
     }
 }
 
 fn vector(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Vector3> {
     let Some([x, y, z]) = value.as_array().map(Vec::as_slice) else {
-        return refuse(
+        return reject(
             field,
             value,
             "three numbers in metres, as in [0, 0.1, 0]",
@@ -129,10 +129,10 @@ fn vector(field: Field<'_>, value: &Value, violations: &mut Violations) -> Optio
 
 fn forbidden(field: Field<'_>, value: &Value, violations: &mut Violations) -> v1::ForbiddenSurfaces {
     let Some(table) = value.as_table() else {
-        return refuse(field, value, "a table with groups, triangles or both", violations)
+        return reject(field, value, "a table with groups, triangles or both", violations)
             .unwrap_or_default();
     };
-    refuse_unknown(table, Some(field), &FORBIDDEN_KEYS, violations);
+    reject_unknown(table, Some(field), &FORBIDDEN_KEYS, violations);
     v1::ForbiddenSurfaces {
         groups: list(
             field.child("groups"),
@@ -151,8 +151,8 @@ fn forbidden(field: Field<'_>, value: &Value, violations: &mut Violations) -> v1
     }
 }
 
-/// The elements of an array; none of them if one is wrong, because what the mesh says of the others would be told of
-/// wrong places.
+/// The elements of an array; none of them if one is wrong, because later violations would give wrong indices for the
+/// others.
 fn list<T>(
     field: Field<'_>,
     value: Option<&Value>,
@@ -164,13 +164,13 @@ fn list<T>(
         return Vec::new();
     };
     let Some(values) = value.as_array() else {
-        return refuse(field, value, "a list in brackets", violations).unwrap_or_default();
+        return reject(field, value, "a list in brackets", violations).unwrap_or_default();
     };
     let elements: Vec<T> = values
         .iter()
         .enumerate()
         .filter_map(|(place, value)| {
-            element(value).or_else(|| refuse(field.at(place), value, needed, violations))
+            element(value).or_else(|| reject(field.at(place), value, needed, violations))
         })
         .collect();
     if elements.len() == values.len() {
@@ -180,8 +180,8 @@ fn list<T>(
     }
 }
 
-/// Tells that a value is of the wrong kind.
-fn refuse<T>(field: Field<'_>, value: &Value, needed: &str, violations: &mut Violations) -> Option<T> {
+/// Adds the violation of a value of the wrong type.
+fn reject<T>(field: Field<'_>, value: &Value, needed: &str, violations: &mut Violations) -> Option<T> {
     let text = match value {
         Value::String(text) => quoted(text),
         Value::Table(_) => "a table".to_owned(),

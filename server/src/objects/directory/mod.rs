@@ -1,8 +1,7 @@
-//! A folder of objects that the server starts with: for every `NAME.obj` a `NAME.toml` beside it.
+//! The folder of objects that the server starts with: every `NAME.obj` has a `NAME.toml` next to it.
 //!
-//! They go through the same checks as objects that clients create, and each within the same limits. Anything that is
-//! wrong keeps the server from starting, and everything that is wrong is told at once: a pipeline whose object is
-//! silently missing finds out too late.
+//! They pass the same checks and limits as objects that clients create. Any mistake keeps the server from starting, and
+//! the error lists all of them: a pipeline that misses an object silently would fail much later.
 
 mod manifest;
 mod pairs;
@@ -16,20 +15,16 @@ use std::{
 
 use grasp_assets::obj::ObjLimits;
 
-use super::{
-    StoredObject,
-    build::build_object,
-    store::{StoreLimits, is_built_in},
-};
+use super::{StoredObject, build::build_object, store::is_built_in};
 use crate::{
     error::ServiceError,
-    services::BYTES_BESIDE_MESH,
+    limits::{BYTES_BESIDES_MESH, StoreLimits},
     validate::{Violations, object_fields, quoted},
 };
 use manifest::read_manifest;
 use pairs::{Pair, pairs};
 
-/// Problems that are listed at most; more of them are only counted, because a log line has an end.
+/// Largest number of listed problems; the others are only counted, to bound the log line.
 const LISTED_PROBLEMS: usize = 100;
 
 /// One thing that is wrong with a folder of objects.
@@ -44,7 +39,7 @@ pub struct DirectoryProblem {
 }
 
 impl DirectoryProblem {
-    /// Of a file or, with an empty name, the folder.
+    /// A problem of a file or, with an empty name, of the folder.
     fn of(file: impl Into<String>, description: impl fmt::Display) -> Self {
         Self {
             file: file.into(),
@@ -65,7 +60,7 @@ impl fmt::Display for DirectoryProblem {
     }
 }
 
-/// A folder of objects that cannot be used, with everything that is wrong.
+/// An unusable folder of objects, with everything that is wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("objects_directory is {}; {}", path.display(), listed(problems))]
 pub struct DirectoryError {
@@ -87,11 +82,11 @@ fn listed(problems: &[DirectoryProblem]) -> String {
     lines.join("\n")
 }
 
-/// Reads every object of a folder, one after the other, so that no more memory is taken than by one upload at a time
-/// and the objects themselves.
+/// Reads every object of a folder, one after the other: more than the objects themselves, it takes the memory of a single
+/// upload.
 ///
 /// # Errors
-/// Everything that is wrong, in the order of the files' names.
+/// Everything that is wrong, in the order of the file names.
 pub(crate) fn load(
     path: &Path,
     limits: ObjLimits,
@@ -108,8 +103,8 @@ pub(crate) fn load(
                     problems.push(DirectoryProblem::of(
                         pair.obj,
                         format_args!(
-                            "takes all objects so far to about {bytes} bytes with their search structures; at most \
-                             cache_bytes, {}, are allowed (the files after it were not read)",
+                            "makes all objects so far take about {bytes} bytes with their search structures; the \
+                             limit is cache_bytes, {} (later files were not read)",
                             store.bytes
                         ),
                     ));
@@ -140,13 +135,13 @@ fn read_pair(path: &Path, pair: &Pair, limits: ObjLimits) -> Result<StoredObject
             None
         }
     };
-    let manifest = read(&pair.toml, BYTES_BESIDE_MESH);
+    let manifest = read(&pair.toml, BYTES_BESIDES_MESH);
     let obj = read(&pair.obj, limits.bytes);
     if is_built_in(&pair.id) {
         problems.push(DirectoryProblem::of(
             &pair.obj,
             format_args!(
-                "is named like the built-in object {}; another name is needed",
+                "has the name of the built-in object {}; choose another name",
                 quoted(&pair.id)
             ),
         ));
@@ -156,7 +151,7 @@ fn read_pair(path: &Path, pair: &Pair, limits: ObjLimits) -> Result<StoredObject
     };
     let mut violations = Violations::default();
     let Some(manifest) = read_manifest(&manifest, &mut violations) else {
-        problems.extend(told(pair, violations.into_error()));
+        problems.extend(problems_of(pair, violations.into_error()));
         return Err(problems);
     };
     let fields = object_fields(
@@ -168,14 +163,14 @@ fn read_pair(path: &Path, pair: &Pair, limits: ObjLimits) -> Result<StoredObject
         Ok(object) if problems.is_empty() => Ok(object),
         Ok(_) => Err(problems),
         Err(error) => {
-            problems.extend(told(pair, error));
+            problems.extend(problems_of(pair, error));
             Err(problems)
         }
     }
 }
 
-/// What is wrong with a request, told of the files that it was made of.
-fn told(pair: &Pair, error: ServiceError) -> Vec<DirectoryProblem> {
+/// The violations of a request as problems of the files that it was made from.
+fn problems_of(pair: &Pair, error: ServiceError) -> Vec<DirectoryProblem> {
     let ServiceError::Invalid(violations) = error else {
         return vec![DirectoryProblem::of(&pair.obj, error)];
     };
@@ -201,18 +196,18 @@ fn told(pair: &Pair, error: ServiceError) -> Vec<DirectoryProblem> {
         .collect()
 }
 
-/// The bytes of a file that has at most `limit` of them.
+/// The bytes of a file, if it has no more than `limit`.
 fn read_bounded(path: &Path, limit: usize) -> Result<Vec<u8>, String> {
     let unreadable = |error| format!("cannot be read: {error}");
-    // Asked before it is opened: to open a pipe would wait for its writer.
+    // Checked before opening: opening a pipe would wait for its writer.
     if !path.metadata().map_err(unreadable)?.is_file() {
-        return Err("is no regular file".to_owned());
+        return Err("is not a regular file".to_owned());
     }
     let mut bytes = Vec::new();
     let mut file = File::open(path).map_err(unreadable)?.take(limit as u64 + 1);
     file.read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() > limit {
-        return Err(format!("has more than {limit} bytes, which is what is allowed"));
+        return Err(format!("has more than {limit} bytes, the limit"));
     }
     Ok(bytes)
 }

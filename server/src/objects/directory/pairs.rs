@@ -1,4 +1,4 @@
-//! Which files of a folder belong together.
+//! Pairs the files of a folder.
 
 use std::{collections::BTreeMap, fs, io, path::Path};
 
@@ -15,22 +15,22 @@ pub(super) struct Pair {
     pub toml: String,
 }
 
-/// What there is under one name.
+/// Which files exist under one name.
 #[derive(Debug, Default)]
 struct Found {
     obj: bool,
     toml: bool,
 }
 
-/// All pairs of a folder, sorted by name; what has no partner, and a folder that cannot be read, is a problem.
+/// All pairs of a folder, sorted by name. A file without a partner and an unreadable folder are problems.
 ///
-/// Other files (pictures, material libraries, notes) and names that start with a dot (which volumes of container
-/// platforms have) are left alone.
+/// Other files (pictures, material libraries, notes) are ignored, and so are names that start with a dot, which volumes
+/// of container platforms contain.
 pub(super) fn pairs(path: &Path, maximum: usize, problems: &mut Vec<DirectoryProblem>) -> Vec<Pair> {
     let names = match read_names(path, problems) {
         Ok(names) => names,
         Err(error) => {
-            let needed = "a folder that the server may read is needed";
+            let needed = "it must be a folder that the server may read";
             problems.push(DirectoryProblem::of("", format_args!("{error}; {needed}")));
             return Vec::new();
         }
@@ -39,7 +39,7 @@ pub(super) fn pairs(path: &Path, maximum: usize, problems: &mut Vec<DirectoryPro
         problems.push(DirectoryProblem::of(
             "",
             format_args!(
-                "it has {} objects; at most cache_objects, {maximum}, are allowed",
+                "it has {} objects; the limit is cache_objects, {maximum}",
                 names.len()
             ),
         ));
@@ -55,39 +55,42 @@ pub(super) fn pairs(path: &Path, maximum: usize, problems: &mut Vec<DirectoryPro
             } => pairs.push(Pair { id, obj, toml }),
             Found { toml: false, .. } => problems.push(DirectoryProblem::of(
                 obj,
-                format_args!("has no {toml} beside it, which must say mass_kg at least"),
+                format_args!("has no {toml} next to it, which must give at least mass_kg"),
             )),
             Found { obj: false, .. } => {
-                problems.push(DirectoryProblem::of(toml, format_args!("has no {obj} beside it")));
+                problems.push(DirectoryProblem::of(
+                    toml,
+                    format_args!("has no {obj} next to it"),
+                ));
             }
         }
     }
     pairs
 }
 
-/// Names without extension, with what there is under each.
+/// Names without extension, with the files found under each.
 fn read_names(path: &Path, problems: &mut Vec<DirectoryProblem>) -> io::Result<BTreeMap<String, Found>> {
     let mut names: BTreeMap<String, Found> = BTreeMap::new();
     for entry in fs::read_dir(path)? {
         let name = entry?.file_name();
-        let told = name.to_string_lossy();
-        let Some((stem, extension)) = told.rsplit_once('.').filter(|(stem, _)| !stem.is_empty()) else {
+        let text = name.to_string_lossy();
+        let Some((stem, extension)) = text.rsplit_once('.').filter(|(stem, _)| !stem.is_empty()) else {
             continue;
         };
-        if told.starts_with('.') || !["obj", "toml"].iter().any(|e| extension.eq_ignore_ascii_case(e)) {
+        if text.starts_with('.') || !["obj", "toml"].iter().any(|e| extension.eq_ignore_ascii_case(e)) {
             continue;
         }
         if name.to_str().is_none() {
-            problems.push(DirectoryProblem::of(told, "is no name in UTF-8"));
+            problems.push(DirectoryProblem::of(text, "has a name that is not UTF-8"));
             continue;
         }
         match extension {
             "obj" => names.entry(stem.to_owned()).or_default().obj = true,
             "toml" => names.entry(stem.to_owned()).or_default().toml = true,
-            // On some file systems it would be found and on others not.
+            // Only case-insensitive file systems would find it.
             _ => problems.push(DirectoryProblem::of(
-                told.as_ref(),
-                "ends in capitals; .obj and .toml are read",
+                text.as_ref(),
+                "has an extension in capitals; it must be .obj or .toml",
             )),
         }
     }

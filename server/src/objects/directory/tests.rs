@@ -18,7 +18,7 @@ const TETRAHEDRON: &str =
 
 const MASS: &str = "mass_kg = 0.2\n";
 
-/// A folder of its own for a test, removed at its end.
+/// A test's own folder, removed at its end.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -35,7 +35,7 @@ impl Folder {
         load(&self.0, LIMITS, STORE)
     }
 
-    /// What is wrong with it, line by line.
+    /// Its problems, line by line.
     fn problems(&self) -> Vec<String> {
         let error = self.load().expect_err("the folder is wrong");
         error.problems.iter().map(ToString::to_string).collect()
@@ -44,13 +44,13 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // A folder that stays in the temporary directory harms nobody.
+        // A folder left in the temporary directory does no harm.
         let _ = fs::remove_dir_all(&self.0);
     }
 }
 
 #[test]
-fn pairs_become_objects_and_other_files_are_left_alone() {
+fn pairs_become_objects_and_other_files_are_ignored() {
     let manifest = "mass_kg = 1\nunit_metres = 0.1\ncentre_of_mass = [0, 0.01, 2e-2]\nfriction = 0.5\n\
                     [forbidden]\ngroups = [\"lid\"]\ntriangles = [3]\n";
     let folder = Folder::new(
@@ -83,7 +83,7 @@ fn pairs_become_objects_and_other_files_are_left_alone() {
 }
 
 #[test]
-fn everything_that_is_wrong_is_told_at_once() {
+fn reports_all_problems_at_once() {
     let folder = Folder::new(
         "wrong",
         &[
@@ -115,25 +115,25 @@ fn everything_that_is_wrong_is_told_at_once() {
     );
     let problems = folder.problems();
     let expected = [
-        "LOUD.OBJ: ends in capitals; .obj and .toml are read",
-        "alone.obj: has no alone.toml beside it, which must say mass_kg at least",
-        "orphan.toml: has no orphan.obj beside it",
+        "LOUD.OBJ: has an extension in capitals; it must be .obj or .toml",
+        "alone.obj: has no alone.toml next to it, which must give at least mass_kg",
+        "orphan.toml: has no orphan.obj next to it",
         "Big Mug.obj: the name: is \"Big Mug\"; it must be 1 to 63 of a-z, 0-9 and -, starting with a letter",
         "heavy.toml: unit_metres: is -1; it must be 0.000001 to 1000",
         "heavy.toml: mass_kg: is 2000; it must be more than 0 and at most 1000",
         "heavy.toml: friction: is 0; it must be more than 0 and at most 5",
         "heavy.obj: line 2: vertex 2 does not exist; 1 are known, counted from 1 or backward from -1",
-        "keys.toml: masskg: is no key; there are mass_kg, unit_metres, centre_of_mass, friction, forbidden",
-        "keys.toml: mass_kg: is missing; the mass in kilograms is needed",
+        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, centre_of_mass, friction, forbidden",
+        "keys.toml: mass_kg: is missing; it must be the mass in kilograms",
         "keys.toml: friction: is \"high\"; it must be a number",
         "keys.toml: centre_of_mass: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",
-        "keys.toml: forbidden.group: is no key; there are groups, triangles",
+        "keys.toml: forbidden.group: is unknown; the keys are groups, triangles",
         "keys.toml: forbidden.triangles[1]: is -1; it must be a triangle's number, counted from 0",
         "keys.toml: forbidden.triangles[2]: is \"two\"; it must be a triangle's number, counted from 0",
         "lids.toml: forbidden.groups[1]: is \"lit\"; the mesh has \"lid\", \"wall\"",
         "lids.toml: forbidden.triangles[0]: is 9; the mesh has 4 triangles, counted from 0",
-        "long.obj: has more than 1000 bytes, which is what is allowed",
-        "remote.obj: is named like the built-in object \"remote\"; another name is needed",
+        "long.obj: has more than 1000 bytes, the limit",
+        "remote.obj: has the name of the built-in object \"remote\"; choose another name",
     ];
     for line in expected {
         assert!(
@@ -141,18 +141,18 @@ fn everything_that_is_wrong_is_told_at_once() {
             "{line}\nnot in\n{problems:#?}"
         );
     }
-    // Its wording is the TOML parser's.
+    // The rest of the text is the TOML parser's.
     assert!(
         problems
             .iter()
-            .any(|problem| problem.starts_with("torn.toml: is no TOML: line 2: "))
+            .any(|problem| problem.starts_with("torn.toml: is not TOML: line 2: "))
     );
     // Vertex 3 does not exist either.
     assert_eq!(problems.len(), expected.len() + 2, "{problems:#?}");
 }
 
 #[test]
-fn a_path_that_is_no_readable_folder_is_told() {
+fn rejects_a_path_that_is_not_a_readable_folder() {
     let folder = Folder::new("file", &[("file", "text")]);
     for name in ["file", "nothing"] {
         let path = folder.0.join(name);
@@ -163,21 +163,21 @@ fn a_path_that_is_no_readable_folder_is_told() {
             "{text}"
         );
         assert!(
-            text.ends_with("a folder that the server may read is needed"),
+            text.ends_with("it must be a folder that the server may read"),
             "{text}"
         );
     }
 }
 
 #[test]
-fn a_folder_within_the_folder_is_no_mesh() {
+fn rejects_a_folder_named_like_a_mesh() {
     let folder = Folder::new("nested", &[("mug.toml", MASS)]);
     fs::create_dir_all(folder.0.join("mug.obj")).unwrap();
-    assert_eq!(folder.problems(), ["mug.obj: is no regular file"]);
+    assert_eq!(folder.problems(), ["mug.obj: is not a regular file"]);
 }
 
 #[test]
-fn all_objects_together_are_bounded() {
+fn bounds_all_objects_together() {
     let folder = Folder::new(
         "bounded",
         &[
@@ -192,19 +192,19 @@ fn all_objects_together_are_bounded() {
     assert_eq!(load(2, 2 * one).unwrap().len(), 2);
     let by_count = load(1, 2 * one).unwrap_err().to_string();
     assert!(
-        by_count.contains("it has 2 objects; at most cache_objects, 1, are allowed"),
+        by_count.contains("it has 2 objects; the limit is cache_objects, 1"),
         "{by_count}"
     );
     let by_bytes = load(2, 2 * one - 1).unwrap_err().to_string();
     assert!(
-        by_bytes.contains("b.obj: takes all objects so far to about"),
+        by_bytes.contains("b.obj: makes all objects so far take about"),
         "{by_bytes}"
     );
     assert!(by_bytes.contains("cache_bytes"), "{by_bytes}");
 }
 
 #[test]
-fn a_flood_of_problems_is_cut_and_counted() {
+fn lists_some_problems_and_counts_the_others() {
     let folder = Folder::new("flood", &[]);
     for number in 0..95 {
         fs::write(folder.0.join(format!("o{number}.toml")), MASS).unwrap();

@@ -59,6 +59,36 @@ pub struct SearchReport {
     pub known_grips: usize,
 }
 
+impl SearchReport {
+    /// Adds another part of the same search: a worker's share, or a later slice. The nearest miss of both stays;
+    /// attempt and source of the grasp are those of `part` if its grasp `is_better`, otherwise they stay too.
+    pub fn merge(&mut self, part: Self, is_better: bool) {
+        self.attempts += part.attempts;
+        self.pruned_placements += part.pruned_placements;
+        for (sum, count) in self.rejections.iter_mut().zip(part.rejections) {
+            *sum += count;
+        }
+        if let Some(times) = part.step_times {
+            self.step_times.get_or_insert_default().add(&times);
+        }
+        if is_better {
+            self.attempt = part.attempt;
+            self.source = part.source;
+        }
+        if let Some(miss) = part.nearest_miss
+            && self
+                .nearest_miss
+                .as_ref()
+                .is_none_or(|nearest| nearest.is_beaten_by(miss.rejection, miss.wrench_angle, miss.attempt))
+        {
+            self.nearest_miss = Some(miss);
+        }
+        self.candidates += part.candidates;
+        // Every part that tried known grips counted all of them.
+        self.known_grips = self.known_grips.max(part.known_grips);
+    }
+}
+
 /// Where a grasp came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GraspSource {
@@ -70,4 +100,81 @@ pub enum GraspSource {
     Spared(u16),
     /// A grip that an earlier search found.
     Recent,
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::{base::pose::Pose, model::hand::DigitAngles};
+
+    fn miss(rejection: Rejection, wrench_angle: Option<f32>, attempt: u64) -> NearestMiss {
+        NearestMiss {
+            rejection,
+            attempt,
+            wrench_angle,
+            pose: HandPose {
+                frame_from_wrist: Pose::IDENTITY,
+                digits: [DigitAngles::default(); 5],
+            },
+        }
+    }
+
+    fn part(nearest_miss: Option<NearestMiss>) -> SearchReport {
+        SearchReport {
+            attempts: 5,
+            pruned_placements: 7,
+            rejections: [1, 0, 0, 0, 0, 0, 0, 4, 0],
+            step_times: Some(StepTimes {
+                finger_posing: Duration::from_micros(3),
+                ..StepTimes::default()
+            }),
+            nearest_miss,
+            candidates: 2,
+            known_grips: 40,
+            ..SearchReport::default()
+        }
+    }
+
+    #[test]
+    fn merge_adds_counts_and_keeps_the_nearest_miss() {
+        let mut total = SearchReport::default();
+        for nearest_miss in [
+            Some(miss(Rejection::NotImmobilizing, Some(0.4), 3)),
+            Some(miss(Rejection::PalmCollision, None, 8)),
+            Some(miss(Rejection::NotImmobilizing, Some(0.2), 12)),
+            None,
+        ] {
+            total.merge(part(nearest_miss), false);
+        }
+        let expected = SearchReport {
+            attempts: 20,
+            pruned_placements: 28,
+            rejections: [4, 0, 0, 0, 0, 0, 0, 16, 0],
+            step_times: Some(StepTimes {
+                finger_posing: Duration::from_micros(12),
+                ..StepTimes::default()
+            }),
+            nearest_miss: Some(miss(Rejection::NotImmobilizing, Some(0.2), 12)),
+            candidates: 8,
+            known_grips: 40,
+            ..SearchReport::default()
+        };
+        assert_eq!(total, expected);
+    }
+
+    #[test]
+    fn merge_takes_the_origin_of_the_better_grasp() {
+        let of_attempt = |attempt| SearchReport {
+            attempt: Some(attempt),
+            source: Some(GraspSource::Attempt(attempt)),
+            ..SearchReport::default()
+        };
+        let mut total = of_attempt(1);
+        total.merge(of_attempt(2), false);
+        assert_eq!(total, of_attempt(1));
+        total.merge(of_attempt(3), true);
+        assert_eq!(total, of_attempt(3));
+    }
 }

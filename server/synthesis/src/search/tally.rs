@@ -101,22 +101,6 @@ impl Tally {
         if lowest_winner.is_none() {
             report.pruned_placements += self.interrupted_prunes;
         }
-        let own = self.settled;
-        report.attempts += own.attempts;
-        report.pruned_placements += own.pruned_placements;
-        for (sum, count) in report.rejections.iter_mut().zip(own.rejections) {
-            *sum += count;
-        }
-        if let Some(times) = own.step_times {
-            report.step_times.get_or_insert_default().add(&times);
-        }
-        if let Some(miss) = own.nearest_miss
-            && report
-                .nearest_miss
-                .as_ref()
-                .is_none_or(|nearest| nearest.is_beaten_by(miss.rejection, miss.wrench_angle, miss.attempt))
-        {
-            report.nearest_miss = Some(miss);
-        }
+        report.merge(self.settled, false);
     }
 }

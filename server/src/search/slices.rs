@@ -1,8 +1,8 @@
-//! A search, in slices.
+//! Runs a search in slices, so that concurrent searches share the workers.
 //!
-//! The workers are shared by all searches, and a search that found nothing yet would hold them until its budget is
-//! spent. So it runs slice by slice: after each, its next one queues behind the slices of the other searches. The
-//! slices cover consecutive attempts, so that slicing changes nothing about which attempt wins a reproducible search.
+//! A search without a grasp would otherwise hold the workers until its budget ends. Each slice queues behind the slices
+//! of other searches. Slices cover consecutive attempts: slicing does not change which attempt wins a reproducible
+//! search.
 
 use std::{
     sync::atomic::{AtomicBool, Ordering},
@@ -10,28 +10,26 @@ use std::{
 };
 
 use grasp_synthesis::{
-    base::{clock::Clock, stopwatch::StepTimes},
+    base::clock::Clock,
     known::recent_grips::RecentGrips,
     model::{grasp::Grasp, hand::rig::Rig, holdout::Holdout, strategy::Choice},
-    search::{
-        NearestMiss, SearchEnd, SearchOutcome, SearchReport, find_grasp_in, prepare, settings::SearchSettings,
-    },
+    search::{SearchEnd, SearchOutcome, SearchReport, find_grasp_in, prepare, settings::SearchSettings},
 };
 use rayon::ThreadPool;
 
-/// Time that a slice should take: short beside a second's budget, so that searches share the workers evenly; long
-/// beside the 50 µs that starting and joining the workers costs.
+/// Target duration of a slice: short compared to a budget of a second, so that searches share the workers evenly, and
+/// long compared to the 50 µs that starting and joining the workers costs.
 const SLICE: Duration = Duration::from_millis(10);
 
-/// Attempts a worker in the first slice: about a millisecond of the fastest strategy.
+/// Attempts per worker in the first slice: about a millisecond of the fastest strategy.
 const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 
-/// Attempts a worker in any slice at most.
+/// Largest number of attempts per worker in a slice.
 const MOST_ATTEMPTS_PER_WORKER: u64 = 8192;
 
-/// Runs a search to its end. Where it finds nothing by its deadline, and `patience` ends later, it goes on until then, for the
-/// first valid grasp.
-pub(super) fn race(
+/// Runs a search to its end. If it finds nothing by its deadline and `patience` ends later, it continues until then and
+/// takes the first valid grasp.
+pub(super) fn search_in_slices(
     pool: &ThreadPool,
     holdout: &Holdout,
     rig: &Rig,
@@ -51,17 +49,17 @@ pub(super) fn race(
         slice.max_attempts = left.min(per_worker.saturating_mul(workers));
         let start = clock.now();
         let outcome = find_grasp_in(pool, &scene, &slice, clock, stop);
-        // Known grips are all tried in the first slice.
+        // The first slice tries all known grips.
         slice.atlas = None;
         slice.recent = RecentGrips::default();
         left -= slice.max_attempts;
         let is_better =
             outcome.grasp.is_some() && best.as_ref().is_none_or(|(_, value)| outcome.value > *value);
-        merge(&mut total, outcome.report, is_better);
+        total.merge(outcome.report, is_better);
         if is_better {
             best = outcome.grasp.map(|grasp| (grasp, outcome.value));
         }
-        // The first valid grasp ends the search; the best is looked for as long as there is time.
+        // The first valid grasp ends the search unless the best is wanted.
         let is_enough = best.is_some() && slice.choice == Choice::FirstValid;
         let is_stopped = outcome.end == SearchEnd::Stopped || stop.load(Ordering::Relaxed);
         let is_late = outcome.end == SearchEnd::DeadlinePassed || has_passed(slice.deadline, clock);
@@ -69,12 +67,12 @@ pub(super) fn race(
         if is_late && goes_on && !is_stopped && left > 0 {
             slice.choice = Choice::FirstValid;
             slice.deadline = Some(patience);
-            // A search that waited for its workers may not have come to them.
+            // If the search waited for workers until its deadline, it has not tried known grips yet.
             slice.atlas.clone_from(&settings.atlas);
             slice.recent.clone_from(&settings.recent);
         } else if is_enough || is_stopped || is_late || left == 0 {
             if best.is_some() {
-                // A miss is of interest only when nothing was hit.
+                // The nearest miss is reported only if there is no grasp.
                 total.nearest_miss = None;
             }
             let end = match (&best, outcome.end) {
@@ -94,8 +92,8 @@ pub(super) fn race(
     }
 }
 
-/// Attempts a worker in the next slice, when `size` of them took `elapsed`. At most doubled, so that one lucky slice
-/// does not make a long one.
+/// Attempts per worker in the next slice, after `size` attempts took `elapsed`. Doubles at most, so that one
+/// unusually quick slice does not cause a long one.
 fn next_size(size: u64, elapsed: Duration) -> u64 {
     let fitting = u128::from(size) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
     u64::try_from(fitting)
@@ -105,41 +103,6 @@ fn next_size(size: u64, elapsed: Duration) -> u64 {
 
 fn has_passed(deadline: Option<Duration>, clock: &dyn Clock) -> bool {
     deadline.is_some_and(|deadline| clock.now() >= deadline)
-}
-
-/// Adds what a slice did; its grasp `is_better` than those before.
-fn merge(total: &mut SearchReport, slice: SearchReport, is_better: bool) {
-    total.attempts += slice.attempts;
-    total.pruned_placements += slice.pruned_placements;
-    for (sum, count) in total.rejections.iter_mut().zip(slice.rejections) {
-        *sum += count;
-    }
-    if let Some(times) = slice.step_times {
-        let sum = total.step_times.get_or_insert_with(StepTimes::default);
-        sum.wrist_placement += times.wrist_placement;
-        sum.finger_posing += times.finger_posing;
-        sum.collision_validation += times.collision_validation;
-        sum.contact_validation += times.contact_validation;
-        sum.immobility_validation += times.immobility_validation;
-    }
-    if is_better {
-        total.attempt = slice.attempt;
-        total.source = slice.source;
-    }
-    total.candidates += slice.candidates;
-    total.known_grips = total.known_grips.max(slice.known_grips);
-    total.nearest_miss = match (total.nearest_miss.take(), slice.nearest_miss) {
-        (Some(a), Some(b)) => Some(if closeness(&b) > closeness(&a) { b } else { a }),
-        (a, b) => a.or(b),
-    };
-}
-
-/// Larger for a miss that came closer: further through the checks of Algorithm 1, then the smaller wrench angle.
-fn closeness(miss: &NearestMiss) -> (usize, f32) {
-    (
-        miss.rejection.index(),
-        -miss.wrench_angle.unwrap_or(f32::INFINITY),
-    )
 }
 
 #[cfg(test)]
@@ -171,8 +134,8 @@ mod tests {
         }
     }
 
-    /// A search by one worker, in looks at the clock.
-    fn race_within(choice: Choice, deadline: u64, patience: u64) -> (SearchOutcome, u64) {
+    /// A search by one worker, with the number of times that it read the clock; times in clock readings.
+    fn search_within(choice: Choice, deadline: u64, patience: u64) -> (SearchOutcome, u64) {
         let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
         let object = &object("remote").expect("it is built in").object;
         let holdout = Holdout::new(Arc::clone(object), None, Vec3::Y).expect("up is a unit vector");
@@ -202,19 +165,19 @@ mod tests {
         let clock = LookedAt::default();
         let patience = Duration::from_micros(patience);
         let stop = AtomicBool::new(false);
-        let outcome = race(&pool, &holdout, rig, &settings, patience, &clock, &stop);
+        let outcome = search_in_slices(&pool, &holdout, rig, &settings, patience, &clock, &stop);
         (outcome, clock.0.into_inner())
     }
 
     #[test]
-    fn patience_is_for_the_first_grasp_alone() {
-        let (none, looks) = race_within(Choice::BestWithinBudget, 3, 3);
+    fn patience_extends_only_a_search_without_a_grasp() {
+        let (none, looks) = search_within(Choice::BestWithinBudget, 3, 3);
         assert!(none.grasp.is_none() && none.end == SearchEnd::DeadlinePassed && looks < 20);
-        let (late, looks) = race_within(Choice::BestWithinBudget, 3, 1_000_000);
+        let (late, looks) = search_within(Choice::BestWithinBudget, 3, 1_000_000);
         assert_eq!((late.end, late.report.candidates), (SearchEnd::Found, 1));
         assert!(late.grasp.is_some() && late.report.attempts > 0 && looks < 1_000_000);
-        // Where there are grasps in time, the best of them, and no more.
-        let (best, looks) = race_within(Choice::BestWithinBudget, 10_000, 1_000_000);
+        // With grasps by the deadline, the best of them, without an extension.
+        let (best, looks) = search_within(Choice::BestWithinBudget, 10_000, 1_000_000);
         assert!(best.report.candidates > 1 && (10_000..11_000).contains(&looks));
         assert!(
             best.grasp
@@ -225,65 +188,16 @@ mod tests {
                     .and_then(|grasp| grasp.score)
                     .map(|score| score.total())
         );
-        // Nobody waits longer than they are ready to.
-        let (never, looks) = race_within(Choice::BestWithinBudget, 3, 6);
+        // The extension ends with the patience.
+        let (never, looks) = search_within(Choice::BestWithinBudget, 3, 6);
         assert!(never.grasp.is_none() && looks < 20);
-    }
-
-    fn miss(rejection: Rejection, wrench_angle: Option<f32>, attempt: u64) -> NearestMiss {
-        NearestMiss {
-            rejection,
-            attempt,
-            wrench_angle,
-            pose: HandPose {
-                frame_from_wrist: Pose::IDENTITY,
-                digits: [DigitAngles::default(); 5],
-            },
-        }
     }
 
     #[test]
     fn slices_grow_to_their_time_and_shrink_to_one_attempt() {
-        assert_eq!(next_size(64, Duration::from_millis(1)), 128, "doubled at most");
+        assert_eq!(next_size(64, Duration::from_millis(1)), 128, "at most doubled");
         assert_eq!(next_size(64, Duration::from_millis(20)), 32);
         assert_eq!(next_size(64, Duration::from_secs(100)), 1);
         assert_eq!(next_size(8192, Duration::ZERO), 8192, "the maximum");
-    }
-
-    #[test]
-    fn reports_add_up_and_the_closest_miss_stays() {
-        let slice = |nearest_miss| SearchReport {
-            attempts: 5,
-            pruned_placements: 7,
-            rejections: [1, 0, 0, 0, 0, 0, 0, 4, 0],
-            step_times: Some(StepTimes {
-                finger_posing: Duration::from_micros(3),
-                ..StepTimes::default()
-            }),
-            attempt: None,
-            nearest_miss,
-            ..SearchReport::default()
-        };
-        let mut total = SearchReport::default();
-        merge(
-            &mut total,
-            slice(Some(miss(Rejection::NotImmobilizing, Some(0.4), 3))),
-            false,
-        );
-        merge(
-            &mut total,
-            slice(Some(miss(Rejection::PalmCollision, None, 8))),
-            false,
-        );
-        merge(
-            &mut total,
-            slice(Some(miss(Rejection::NotImmobilizing, Some(0.2), 12))),
-            false,
-        );
-        merge(&mut total, slice(None), false);
-        assert_eq!((total.attempts, total.pruned_placements), (20, 28));
-        assert_eq!(total.rejections, [4, 0, 0, 0, 0, 0, 0, 16, 0]);
-        assert_eq!(total.step_times.unwrap().finger_posing, Duration::from_micros(12));
-        assert_eq!(total.nearest_miss.unwrap().attempt, 12);
     }
 }

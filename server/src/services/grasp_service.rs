@@ -7,27 +7,26 @@ use std::{
 };
 
 use grasp_proto::v1::{self, grasp_service_server::GraspService};
-use grasp_synthesis::search::uses_atlas;
 use tonic::{Request, Response, Status};
 
 use super::Shared;
 use crate::{
-    atlases::Known,
+    atlases::KnownGrips,
     budget::effective_budget,
     call::{CallContext, SearchSummary},
     error::ServiceError,
-    search::job::FindJob,
+    search::{self, FindJob},
     validate::find_query,
 };
 
-/// Answers `GraspService`.
+/// Implements `GraspService`.
 #[derive(Clone, Debug)]
 pub(crate) struct GraspHandler {
     shared: Arc<Shared>,
 }
 
 impl GraspHandler {
-    /// A handler of the shared state.
+    /// A handler with the shared state.
     pub(crate) fn new(shared: Arc<Shared>) -> Self {
         Self { shared }
     }
@@ -39,64 +38,42 @@ impl GraspHandler {
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &self.shared;
         let query = find_query(request, &shared.default_rig, |id| shared.objects.contains(id))?;
-        call.tell_object(&query.object_id);
+        call.log_object(&query.object_id);
         let stored = shared.objects.get(&query.object_id)?;
         let object = Arc::clone(&stored.object);
-        let in_force = |asked| effective_budget(asked, shared.budgets, call.arrived, call.deadline);
-        let budget = in_force(query.budget);
+        let effective = |requested| effective_budget(requested, shared.budgets, call.arrived, call.deadline);
+        let budget = effective(query.budget);
         if budget.is_zero() {
             return Err(ServiceError::DeadlineExceeded);
         }
         let admission = shared.executor.admit()?;
-        let may_use_atlas = query.may_use_atlas && uses_atlas(query.strategy, query.validity);
-        let hand = query.receiving_hand;
-        let mut known = if may_use_atlas {
-            shared.atlases.get(&stored, hand)
-        } else {
-            Known::default()
-        };
-        if query.reproducible {
-            // One that still grows would answer otherwise a moment later.
-            known.atlas = known.atlas.filter(|atlas| atlas.is_complete());
-        }
+        let (hand, uses_atlas) = (query.receiving_hand, query.uses_atlas());
         let job = FindJob {
-            seed: query.seed.unwrap_or_else(drawn_seed),
             object,
             stored: Arc::clone(&stored),
+            seed: query.seed.unwrap_or_else(drawn_seed),
             arrived: call.arrived,
             budget,
-            patience: if query.goes_on {
-                in_force(None).max(budget)
+            patience: if query.is_patient {
+                effective(None).max(budget)
             } else {
                 budget
             },
-            query,
             workers: shared.executor.workers(),
-            known,
             mechanisms: shared.mechanisms,
-        };
-        let answered = if job.may_be_known() {
-            let mut job = job.prepare()?;
-            if let Some(answered) = job.look_up() {
-                answered?
+            known: if uses_atlas {
+                shared.atlases.get(&stored, hand)
             } else {
-                let run = shared
-                    .executor
-                    .run(admission, move |pool, stop| job.run(pool, stop));
-                run.await??
-            }
-        } else {
-            let run = shared
-                .executor
-                .run(admission, move |pool, stop| job.prepare()?.run(pool, stop));
-            run.await??
+                KnownGrips::default()
+            },
+            query,
         };
-        if let Some(grip) = answered.newly_known.filter(|_| may_use_atlas) {
+        let answered = search::find(job, &shared.executor, admission).await?;
+        if let Some(grip) = answered.new_grip.filter(|_| uses_atlas) {
             shared.atlases.remember(&stored, hand, grip);
         }
-        let answer = answered.response;
-        call.tell_search(summary(&answer));
-        Ok(answer)
+        call.log_search(summary(&answered.response));
+        Ok(answered.response)
     }
 }
 
@@ -111,9 +88,9 @@ impl GraspService for GraspHandler {
     }
 }
 
-/// A seed for a request that names none: unpredictable and new for every call. It is told in the report.
+/// A new unpredictable seed for a request without one. The report contains it.
 fn drawn_seed() -> u64 {
-    // The standard library's hasher is keyed from the operating system's randomness.
+    // The standard library keys its hasher with randomness of the operating system.
     RandomState::new().hash_one(0_u8)
 }
 

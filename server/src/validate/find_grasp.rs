@@ -12,6 +12,7 @@ use grasp_synthesis::{
         constraints::Constraints,
         strategy::{Choice, Strategy, Validity},
     },
+    search::uses_atlas,
 };
 
 use super::{
@@ -19,76 +20,82 @@ use super::{
 };
 use crate::{convention::Convention, error::ServiceError};
 
-/// The receiving hand of chapter 5, which the thesis' placement measures are made for.
+/// The receiving hand's rig under THESIS validity: that of chapter 5.
 const THESIS_RIG: &str = "thesis";
 
-/// Attempts beyond this index are not run; at a million a second it takes 146,000 years to get here.
+/// Largest index of an attempt: 146,000 years at a million attempts per second.
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
 
-/// Seconds that a `google.protobuf.Duration` may have: 10,000 years.
+/// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
 const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
 
-/// How long the best grasp is searched for if the request does not say: a character that turns to it within a frame of
-/// 60 Hz leaves a third of the 16 ms for it. Longer finds better grasps, later. Where there is none by then, the first one is
-/// looked for on.
+/// Budget for `CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
+/// better grasps. If there is no grasp by then, the search continues for the first one.
 const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
-/// A request that may be searched.
+/// A valid request.
 #[derive(Debug)]
 #[expect(
     clippy::struct_excessive_bools,
-    reason = "the request's switches do not hang together"
+    reason = "the request's switches are independent"
 )]
 pub(crate) struct FindQuery {
     /// The last part of the object's name.
     pub object_id: String,
-    /// How poses were sent and are to be answered.
+    /// Convention of the request and the response.
     pub convention: Convention,
-    /// The object in the client's frame, in `OpenXR` axes.
+    /// Pose of the object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
     /// The giver's hand.
     pub presenting_hand: Option<GiverHand>,
     /// The hand to pose.
     pub receiving_hand: &'static Hand,
-    /// Against gravity in the client's frame, in `OpenXR` axes: a unit vector.
+    /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
-    /// The budget that was asked for.
+    /// Requested budget.
     pub budget: Option<Duration>,
-    /// Is the first grasp looked for on where the budget ends without any? It is if the request leaves open how long the best
-    /// is looked for.
-    pub goes_on: bool,
-    /// The first attempt to run.
+    /// True if the search continues for a first grasp when the budget ends without one: the request wants the best grasp
+    /// and names no budget.
+    pub is_patient: bool,
+    /// Index of the first attempt.
     pub first_attempt: u64,
-    /// How many attempts to run at most.
+    /// Largest number of attempts.
     pub max_attempts: u64,
-    /// The step of the ladder.
+    /// Search strategy.
     pub strategy: Strategy,
-    /// Which grasps count as valid.
+    /// Notion of a valid grasp.
     pub validity: Validity,
-    /// The bend ratios.
+    /// Bend ratios to try.
     pub bend_ratios: BendRatioChoice,
-    /// The seed that was asked for.
+    /// Requested seed.
     pub seed: Option<u64>,
-    /// Is the valid attempt of the lowest index wanted?
+    /// True if the valid attempt of the lowest index must win.
     pub reproducible: bool,
-    /// Are the times of the steps wanted?
+    /// True to report the times of the steps.
     pub record_step_times: bool,
-    /// Friction for this request.
+    /// Friction in place of the object's.
     pub friction: Option<f32>,
-    /// What is demanded of the grasp, in the client's frame and `OpenXR` axes.
+    /// Constraints on the grasp, in the client's frame and `OpenXR` axes.
     pub constraints: Constraints,
-    /// Which of the valid grasps is wanted.
+    /// Which valid grasp to choose.
     pub choice: Choice,
-    /// May the atlas be used?
-    pub may_use_atlas: bool,
-    /// Is one attempt to be run again?
+    /// True unless the request excludes the atlas.
+    pub allows_atlas: bool,
+    /// True to run a single attempt again.
     pub is_replay: bool,
-    /// Is the way to the grasp wanted?
+    /// True to plan the key frames of approach and closing.
     pub plan_key_frames: bool,
 }
 
-/// Checks a request. `object_exists` tells whether an id is known; an unknown one beside other violations is listed
-/// with them, alone it is left to the look-up that follows.
+impl FindQuery {
+    /// True if the search uses known grips.
+    pub(crate) fn uses_atlas(&self) -> bool {
+        self.allows_atlas && uses_atlas(self.strategy, self.validity)
+    }
+}
+
+/// Checks a request. An id for which `object_exists` is false is a violation if there are others; without others, it is
+/// left to the look-up, which knows about evicted objects.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with every violation.
@@ -123,10 +130,10 @@ pub(crate) fn find_query(
     );
     let up = hand::up(Field::root("up"), request.up, convention, v);
     let choice = choice(known(Field::root("choice"), request.choice, v));
-    let goes_on = choice == Choice::BestWithinBudget && request.budget.is_none();
+    let is_patient = choice == Choice::BestWithinBudget && request.budget.is_none();
     let budget = match request.budget {
         Some(budget) => positive_duration(Field::root("budget"), budget, v),
-        None => goes_on.then_some(BEST_CHOICE_BUDGET),
+        None => is_patient.then_some(BEST_CHOICE_BUDGET),
     };
     let (first_attempt, max_attempts) = attempts(request.max_attempts, request.only_attempt, v);
     let strategy = strategy(known(Field::root("strategy"), request.strategy, v), validity);
@@ -142,7 +149,8 @@ pub(crate) fn find_query(
     if request.reproducible && choice == Choice::BestWithinBudget {
         v.add(
             Field::root("reproducible"),
-            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer hangs on how much fits into the budget; choose one of both",
+            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer depends on how much fits in the budget; choose one of \
+             them",
         );
     }
     if let (false, Some(id)) = (violations.is_empty(), &object_id)
@@ -151,7 +159,7 @@ pub(crate) fn find_query(
         violations.add(Field::root("object"), format_args!("objects/{id} does not exist"));
     }
     let (Some(object_id), Some(receiving_hand)) = (object_id, receiving_hand) else {
-        // Whatever is missing was reported by the function that returned nothing.
+        // The function that returned none has added a violation.
         return Err(violations.into_error());
     };
     violations.finish(FindQuery {
@@ -162,7 +170,7 @@ pub(crate) fn find_query(
         receiving_hand,
         up,
         budget,
-        goes_on,
+        is_patient,
         first_attempt,
         max_attempts,
         strategy,
@@ -174,17 +182,16 @@ pub(crate) fn find_query(
         friction,
         constraints,
         choice,
-        // A replayed attempt is to be that attempt.
-        may_use_atlas: atlas_use != v1::AtlasUse::None,
+        allows_atlas: atlas_use != v1::AtlasUse::None,
         is_replay: request.only_attempt.is_some(),
         plan_key_frames: request.plan_key_frames,
     })
 }
 
-/// The first attempt and how many.
+/// Index of the first attempt, and the number of attempts.
 fn attempts(max_attempts: Option<u64>, only_attempt: Option<u64>, violations: &mut Violations) -> (u64, u64) {
     if max_attempts == Some(0) {
-        violations.add(Field::root("max_attempts"), "is 0; at least 1 is needed");
+        violations.add(Field::root("max_attempts"), "is 0; it must be at least 1");
     }
     match only_attempt {
         Some(only) => {
@@ -212,7 +219,7 @@ fn positive_duration(
     if !in_range || !one_sign {
         violations.add(
             field,
-            format_args!("is {}, which is no valid google.protobuf.Duration", text()),
+            format_args!("is {}, which is not a valid google.protobuf.Duration", text()),
         );
         return None;
     }
@@ -225,7 +232,7 @@ fn positive_duration(
     }
 }
 
-/// The server's default is what a user should get.
+/// The default is PHYSICAL.
 fn validity(validity: v1::Validity) -> Validity {
     match validity {
         v1::Validity::Thesis => Validity::Thesis,
@@ -240,7 +247,7 @@ fn choice(choice: v1::Choice) -> Choice {
     }
 }
 
-/// The server's default is the fastest strategy; with the thesis' validity, the fastest of its ladder.
+/// The default is the fastest strategy for the validity.
 fn strategy(strategy: v1::Strategy, validity: Validity) -> Strategy {
     match strategy {
         v1::Strategy::A => Strategy::A,

@@ -9,19 +9,19 @@ use super::Shared;
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
+    executor::run_blocking,
     objects::{StoredObject, build::build_object, name_of},
-    search::executor::run_blocking,
     validate::{Field, Violations, object_fields, object_id_of, page_query, page_token},
 };
 
-/// Answers `ObjectService`.
+/// Implements `ObjectService`.
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectHandler {
     shared: Arc<Shared>,
 }
 
 impl ObjectHandler {
-    /// A handler of the shared state.
+    /// A handler with the shared state.
     pub(crate) fn new(shared: Arc<Shared>) -> Self {
         Self { shared }
     }
@@ -36,8 +36,8 @@ impl ObjectHandler {
         let mut violations = Violations::default();
         let fields = object_fields(request, limits.bytes, &mut violations);
         if violations.is_empty() {
-            call.tell_object(&fields.id);
-            // Asked again when the object is added; asked first to spare the building.
+            call.log_object(&fields.id);
+            // Checked again on insertion; checked here to avoid building the object in vain.
             if self.shared.objects.contains(&fields.id) {
                 return Err(ServiceError::ObjectExists {
                     name: name_of(&fields.id),
@@ -48,14 +48,14 @@ impl ObjectHandler {
         let object = run_blocking(move || {
             let _permit = permit;
             let object = build_object(fields, limits, violations)?;
-            object.get_ready(&shared.default_rig);
+            object.prepare(&shared.default_rig);
             Ok::<_, ServiceError>(object)
         })
         .await??;
         let object = self.shared.objects.insert(object)?;
-        self.shared.atlases.registered(&object);
+        self.shared.atlases.register(&object);
         Ok(v1::CreateObjectResponse {
-            object: Some(self.told(&object)),
+            object: Some(self.message(&object)),
         })
     }
 
@@ -64,9 +64,9 @@ impl ObjectHandler {
         let Some(id) = object_id_of(Field::root("name"), name, &mut violations) else {
             return Err(violations.into_error());
         };
-        call.tell_object(&id);
+        call.log_object(&id);
         Ok(v1::GetObjectResponse {
-            object: Some(self.told(&*self.shared.objects.get(&id)?)),
+            object: Some(self.message(&*self.shared.objects.get(&id)?)),
         })
     }
 
@@ -76,11 +76,11 @@ impl ObjectHandler {
         let last = objects.last().filter(|_| more);
         Ok(v1::ListObjectsResponse {
             next_page_token: last.map(|last| page_token(&last.id)).unwrap_or_default(),
-            objects: objects.iter().map(|object| self.told(object)).collect(),
+            objects: objects.iter().map(|object| self.message(object)).collect(),
         })
     }
 
-    fn told(&self, object: &StoredObject) -> v1::Object {
+    fn message(&self, object: &StoredObject) -> v1::Object {
         object.to_wire(self.shared.atlases.state(object))
     }
 }

@@ -1,7 +1,7 @@
-//! Which limits the process' memory has: control groups of both versions, and resource limits.
+//! Finds the limits on the memory of the process: control groups of both versions, and resource limits.
 //!
-//! Only files are read, so that no foreign code has to be called; where they are missing, as on other systems than
-//! Linux, there is no limit to be found.
+//! It only reads files, which needs no foreign code. Where they are missing, as on systems other than Linux, it finds no
+//! limits.
 
 use std::{
     fs,
@@ -10,16 +10,16 @@ use std::{
 
 use super::{LimitKind, MemoryLimit};
 
-/// From here on a number means that there is no limit: version 1 says the largest multiple of the page size.
+/// Smallest number that means "no limit": version 1 writes the largest multiple of the page size.
 const UNLIMITED: u64 = 1 << 62;
 
-/// Lines of `/proc/self/limits` that bound memory, with the names by which programmers know them.
+/// Lines of `/proc/self/limits` that bound memory, with the names of the limits.
 const RESOURCE_LIMITS: [(&str, &str); 2] = [
     ("Max address space", "RLIMIT_AS"),
     ("Max data size", "RLIMIT_DATA"),
 ];
 
-/// Every limit on the memory of this process that can be found.
+/// The limits on the memory of this process, as far as they can be found.
 pub fn memory_limits() -> Vec<MemoryLimit> {
     let read = |path: &Path| fs::read_to_string(path).ok();
     let text = |path: &str| read(Path::new(path)).unwrap_or_default();
@@ -28,8 +28,7 @@ pub fn memory_limits() -> Vec<MemoryLimit> {
     limits
 }
 
-/// The limits of the process' control groups: its own group's and those of the groups above it, as far as they are
-/// mounted.
+/// The limits of the process' control group and of the groups above it, as far as they are mounted.
 fn cgroup_limits(groups: &str, mounts: &str, read: impl Fn(&Path) -> Option<String>) -> Vec<MemoryLimit> {
     let mut limits = Vec::new();
     for mount in mounts.lines().filter_map(parse_mount) {
@@ -61,7 +60,7 @@ enum Version {
 }
 
 impl Version {
-    /// The file with the limit.
+    /// Name of the file with the limit.
     fn file(self) -> &'static str {
         match self {
             Self::One => "memory.limit_in_bytes",
@@ -69,7 +68,7 @@ impl Version {
         }
     }
 
-    /// The path of the process' group, if a line of `/proc/self/cgroup` is about it: `4:memory:/path` or `0::/path`.
+    /// The path of the process' group in a line of `/proc/self/cgroup`, which reads `4:memory:/path` or `0::/path`.
     fn group_of(self, line: &str) -> Option<&str> {
         let mut parts = line.splitn(3, ':');
         let (hierarchy, controllers, path) = (parts.next()?, parts.next()?, parts.next()?);
@@ -85,9 +84,9 @@ impl Version {
 #[derive(Debug, PartialEq, Eq)]
 struct Mount {
     version: Version,
-    /// The group that is seen at the mount point.
+    /// The group at the mount point.
     root: String,
-    /// Where it is.
+    /// The mount point.
     point: PathBuf,
 }
 
@@ -109,8 +108,8 @@ fn parse_mount(line: &str) -> Option<Mount> {
     })
 }
 
-/// The path of a group below the one that is seen at the mount point; none if it lies elsewhere, as it does where a
-/// container sees its own group as the root but the names of all of them.
+/// The path of a group relative to the one at the mount point. None if it is outside: a container may see its own group
+/// as the root, but the paths of the host.
 fn beneath(group: &str, root: &str) -> Option<PathBuf> {
     let below = Path::new(group).strip_prefix(root).ok()?;
     below
@@ -140,7 +139,7 @@ mod tests {
 
     use super::*;
 
-    /// What is found with these files.
+    /// The limits found in these files.
     fn found(groups: &str, mounts: &str, files: &[(&str, &str)]) -> Vec<(String, u64)> {
         let files: HashMap<&str, &str> = files.iter().copied().collect();
         let read = |path: &Path| files.get(path.to_str()?).map(|&text| text.to_owned());
@@ -153,7 +152,7 @@ mod tests {
     const UNIFIED: &str = "30 23 0:26 / /sys/fs/cgroup rw,nosuid shared:4 - cgroup2 cgroup2 rw,nsdelegate,memory_recursiveprot\n";
 
     #[test]
-    fn every_group_above_the_own_one_counts() {
+    fn finds_limits_of_groups_above_the_own_one() {
         let files = [
             ("/sys/fs/cgroup/a/b/memory.max", "max\n"),
             ("/sys/fs/cgroup/a/memory.max", "268435456\n"),
@@ -166,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_container_that_sees_its_group_as_the_root_finds_its_limit() {
+    fn finds_the_limit_of_a_container_whose_group_is_the_root() {
         let files = [("/sys/fs/cgroup/memory.max", "1000\n")];
         for groups in ["0::/\n", "0::/../../outside\n"] {
             assert_eq!(
@@ -178,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn version_one_is_read_by_its_controller_and_knows_large_numbers() {
+    fn finds_limits_of_version_one_but_not_its_unlimited_ones() {
         let mounts = "31 30 0:29 /box /sys/fs/cgroup/cpu rw - cgroup cgroup rw,cpu\n\
                       32 30 0:30 /box /sys/fs/cgroup/memory ro,nosuid master:9 - cgroup cgroup rw,memory\n";
         let groups = "5:cpu,cpuacct:/box\n4:memory:/box/in:side\n0::/\n";
@@ -203,20 +202,20 @@ mod tests {
     }
 
     #[test]
-    fn a_group_outside_of_what_is_mounted_is_looked_for_at_the_mount_point() {
+    fn uses_the_mount_point_for_a_group_outside_the_mount() {
         let mounts = "32 30 0:30 /box /sys/fs/cgroup/memory ro - cgroup cgroup rw,memory\n";
         let files = [("/sys/fs/cgroup/memory/memory.limit_in_bytes", "77")];
         assert_eq!(found("4:memory:/boxes\n", mounts, &files)[0].1, 77);
     }
 
     #[test]
-    fn nothing_readable_is_no_limit() {
+    fn finds_no_limits_without_readable_files() {
         assert!(found("", "", &[]).is_empty());
         assert!(found("0::/a\n", "30 23\nx - cgroup\n", &[]).is_empty());
     }
 
     #[test]
-    fn resource_limits_are_the_soft_ones() {
+    fn finds_soft_resource_limits() {
         let text = "Limit                     Soft Limit           Hard Limit           Units     \n\
                     Max data size             unlimited            unlimited            bytes     \n\
                     Max address space         1073741824           unlimited            bytes     \n";

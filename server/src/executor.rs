@@ -1,7 +1,7 @@
-//! Runs jobs on threads of their own: admission, stopping, panics.
+//! The search pool: admits jobs, runs them off the async runtime, stops them, and contains their panics.
 //!
-//! A job gets a coordinating thread, which waits for the workers of the search pool, so that no thread of the async
-//! runtime ever waits. The workers' threads are named `grasp-search-N` and shared by all jobs.
+//! Each job has a coordinating thread that waits for the workers, so that no thread of the async runtime blocks. The
+//! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
     sync::{
@@ -16,10 +16,10 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::error::{Limit, ServiceError};
 
-/// When a client that was turned away should try again: about the time of a few searches.
+/// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
-/// The search pool and its door.
+/// The search pool and its admission.
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
@@ -27,13 +27,13 @@ pub(crate) struct SearchExecutor {
     maximum: usize,
 }
 
-/// The right to run one job; given back when the job's work has ended, even if nobody waits for it any more.
+/// The right to run one job, returned when the job has ended, even if its call was dropped before.
 #[derive(Debug)]
 pub(crate) struct Admission {
     _permit: OwnedSemaphorePermit,
 }
 
-/// Sets the stop flag when the call that waits for the job is dropped.
+/// Sets the stop flag when the call that waits for a job is dropped.
 struct StopOnDrop(Arc<AtomicBool>);
 
 impl Drop for StopOnDrop {
@@ -43,7 +43,7 @@ impl Drop for StopOnDrop {
 }
 
 impl SearchExecutor {
-    /// A pool of `workers` threads that admits `maximum` jobs at a time.
+    /// A pool of `workers` threads that admits up to `maximum` jobs.
     ///
     /// # Errors
     /// The threads cannot be started.
@@ -51,7 +51,7 @@ impl SearchExecutor {
         let pool = ThreadPoolBuilder::new()
             .num_threads(workers)
             .thread_name(|index| format!("grasp-search-{index}"))
-            // Without it, a panic outside a job's own scope would abort the process.
+            // Without a handler, a panic outside a job's scope would abort the process.
             .panic_handler(|_| tracing::error!("a search worker panicked outside of a job"))
             .build()?;
         Ok(Self {
@@ -61,20 +61,20 @@ impl SearchExecutor {
         })
     }
 
-    /// How many workers race in a search.
+    /// Number of workers in a search.
     pub(crate) fn workers(&self) -> usize {
         self.pool.current_num_threads()
     }
 
-    /// How many jobs run or wait.
+    /// Number of running and waiting jobs.
     pub(crate) fn jobs(&self) -> usize {
         self.maximum - self.admission.available_permits()
     }
 
-    /// Asks for the right to run a job.
+    /// Reserves the right to run a job.
     ///
     /// # Errors
-    /// [`ServiceError::Overloaded`] if as many run or wait as may.
+    /// [`ServiceError::Overloaded`] if the maximum number of jobs run or wait.
     pub(crate) fn admit(&self) -> Result<Admission, ServiceError> {
         match Arc::clone(&self.admission).try_acquire_owned() {
             Ok(permit) => Ok(Admission { _permit: permit }),
@@ -86,8 +86,8 @@ impl SearchExecutor {
         }
     }
 
-    /// Runs a job and waits for it. The job gets the pool and a flag that tells it to stop: set when the future that
-    /// this returns is dropped.
+    /// Runs a job and waits for it. The job gets the pool and a stop flag, which is set when the returned future is
+    /// dropped.
     ///
     /// # Errors
     /// [`ServiceError::Panicked`] if the job panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
@@ -100,7 +100,7 @@ impl SearchExecutor {
         let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
         let pool = Arc::clone(&self.pool);
         run_blocking(move || {
-            // Moved into the work: a call that is dropped gives its place away only when its work has stopped.
+            // Moved into the work: a dropped call frees its place only when its work has stopped.
             let _admission = admission;
             job(&pool, &stop)
         })
@@ -108,7 +108,7 @@ impl SearchExecutor {
     }
 }
 
-/// Runs work that blocks, away from the threads of the async runtime.
+/// Runs blocking work away from the threads of the async runtime.
 ///
 /// # Errors
 /// [`ServiceError::Panicked`] if it panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
@@ -135,7 +135,7 @@ mod tests {
         SearchExecutor::new(2, maximum).expect("threads start")
     }
 
-    /// Waits until the jobs have ended; the test's own time limit is the only other end.
+    /// Waits until all jobs have ended.
     async fn until_idle(executor: &SearchExecutor) {
         while executor.jobs() > 0 {
             tokio::time::sleep(Duration::from_millis(1)).await;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_panic_ends_its_job_alone() {
+    async fn panic_ends_only_its_own_job() {
         let executor = executor(4);
         let bad = executor.run(executor.admit().unwrap(), |_, _| -> u8 { panic!("on purpose") });
         let good = executor.run(executor.admit().unwrap(), |_, _| 7);
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_panic_in_a_worker_ends_its_job_alone() {
+    async fn panic_in_a_worker_ends_only_its_own_job() {
         let executor = executor(4);
         for _ in 0..8 {
             let bad = executor.run(executor.admit().unwrap(), |pool, _| {
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_full_house_turns_the_next_away() {
+    async fn rejects_jobs_beyond_the_maximum() {
         let executor = executor(2);
         let first = executor.admit().unwrap();
         let second = executor.admit().unwrap();
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn dropping_the_call_stops_the_work_and_frees_its_place_after_it() {
+    async fn dropping_the_call_stops_its_work_then_frees_its_place() {
         let executor = executor(1);
         let (started, has_started) = mpsc::channel();
         let call = {

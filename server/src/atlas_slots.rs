@@ -1,0 +1,121 @@
+//! Atlas slots: one object's atlases, one slot per hand.
+
+use std::{
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use grasp_assets::hands::Hand;
+use grasp_synthesis::known::{entry::Entry, growth::Grown, recent_grips::RecentGrips};
+
+/// How far the building of an atlas has got.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum BuildState {
+    /// Never requested, or evicted.
+    #[default]
+    Absent,
+    /// In the build queue, or being built.
+    Growing,
+    /// Nothing is added any more.
+    Finished,
+}
+
+/// One hand's atlas and recent grips.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Slot {
+    /// State of the build.
+    pub state: BuildState,
+    /// The atlas as last published.
+    pub grown: Option<Arc<Grown>>,
+    /// Grips that searches found recently.
+    pub recent: RecentGrips,
+    /// Size of `grown` in bytes.
+    pub bytes: usize,
+    /// How long this process has worked on the atlas.
+    pub build_time: Duration,
+    /// Time of the last request, counted in requests for any atlas.
+    pub last_used: u64,
+}
+
+/// The slots of one object, for each hand that was requested.
+#[derive(Debug, Default)]
+pub(crate) struct AtlasSlots(Mutex<Vec<(&'static Hand, Slot)>>);
+
+impl AtlasSlots {
+    /// A copy of a hand's slot; none if the hand was never requested.
+    pub(crate) fn get(&self, hand: &'static Hand) -> Option<Slot> {
+        let slots = self.lock();
+        let slot = slots.iter().find(|(other, _)| std::ptr::eq(*other, hand));
+        slot.map(|(_, slot)| slot.clone())
+    }
+
+    /// Records a use at the time `now`. True if the atlas must be put in the build queue.
+    pub(crate) fn request(&self, hand: &'static Hand, now: u64) -> bool {
+        self.with(hand, |slot| {
+            slot.last_used = now;
+            let is_new = slot.state == BuildState::Absent;
+            if is_new {
+                slot.state = BuildState::Growing;
+            }
+            is_new
+        })
+    }
+
+    /// Replaces the atlas; `spent` is the work done on it since the last time.
+    pub(crate) fn publish(&self, hand: &'static Hand, grown: Arc<Grown>, bytes: usize, spent: Duration) {
+        self.with(hand, |slot| {
+            slot.grown = Some(grown);
+            slot.bytes = bytes;
+            slot.build_time += spent;
+        });
+    }
+
+    /// Ends the growth of an atlas.
+    pub(crate) fn finish(&self, hand: &'static Hand) {
+        self.with(hand, |slot| slot.state = BuildState::Finished);
+    }
+
+    /// Keeps a grip that a search found. True if the number of kept grips grew: false if the grip replaced another.
+    pub(crate) fn remember(&self, hand: &'static Hand, grip: Entry) -> bool {
+        self.with(hand, |slot| {
+            let before = slot.recent.entries().len();
+            slot.recent = slot.recent.with(grip);
+            slot.recent.entries().len() > before
+        })
+    }
+
+    /// Drops the oldest recent grip.
+    pub(crate) fn forget_oldest(&self, hand: &'static Hand) {
+        self.with(hand, |slot| slot.recent = slot.recent.without_oldest());
+    }
+
+    /// Drops the atlas and keeps the recent grips. An atlas in the build queue stays there.
+    pub(crate) fn evict(&self, hand: &'static Hand) {
+        self.with(hand, |slot| {
+            *slot = Slot {
+                state: match slot.state {
+                    BuildState::Growing => BuildState::Growing,
+                    BuildState::Absent | BuildState::Finished => BuildState::Absent,
+                },
+                last_used: slot.last_used,
+                recent: std::mem::take(&mut slot.recent),
+                ..Slot::default()
+            };
+        });
+    }
+
+    fn with<T>(&self, hand: &'static Hand, change: impl FnOnce(&mut Slot) -> T) -> T {
+        let mut slots = self.lock();
+        let place = slots.iter().position(|(other, _)| std::ptr::eq(*other, hand));
+        let place = place.unwrap_or_else(|| {
+            slots.push((hand, Slot::default()));
+            slots.len() - 1
+        });
+        change(&mut slots[place].1)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<(&'static Hand, Slot)>> {
+        // No code panics while it holds the lock; if some did, the slots would still be consistent.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,336 @@
+//! The threads that build atlases, one turn after the other.
+
+use std::{
+    cell::Cell,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, AtomicUsize, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use grasp_assets::{
+    atlases::atlas,
+    hands::{Hand, hand},
+};
+use grasp_synthesis::{
+    known::{
+        codec::decode,
+        growth::{Grown, Growth},
+    },
+    model::hand::Handedness,
+    physical::grip::Gripper,
+};
+
+use super::{
+    build_queue::{BuildJob, BuildQueue},
+    files::AtlasFiles,
+    hand_label,
+    loaded::LoadedAtlases,
+    remembered::RememberedGrips,
+};
+use crate::{
+    executor::SearchExecutor,
+    objects::{StoredObject, store::ObjectStore},
+};
+
+/// Niceness of a builder thread: 19 is the lowest priority on Linux. A lower value takes more CPU time from searches.
+#[cfg(target_os = "linux")]
+const NICENESS: i32 = 19;
+
+/// Grips in an atlas when it is first published: enough for most holdouts, which leave one grip in a hundred free. With
+/// fewer, an atlas is published sooner and answers fewer requests.
+const USEFUL: usize = 100;
+
+/// An atlas is published again once it grew by one part in this many. Publishing sorts and copies all of it.
+const GROWTH_PER_PUBLISH: usize = 4;
+
+/// Longest work on one atlas before the next in the queue has its turn. Longer turns delay new atlases; shorter ones
+/// spend more time on resuming.
+const TURN: Duration = Duration::from_secs(2);
+
+/// Pause while searches run, in multiples of the time just worked: with 9, a builder works a tenth of the time.
+const PAUSE_PER_WORK: u32 = 9;
+
+/// How often a pausing builder checks whether searches still run.
+const PAUSE_CHECK: Duration = Duration::from_millis(1);
+
+/// What the builder threads share.
+#[derive(Debug)]
+pub(super) struct Builders {
+    /// The atlases to build.
+    pub queue: BuildQueue,
+    /// The atlases in memory.
+    pub loaded: LoadedAtlases,
+    /// Grips that searches found.
+    pub remembered: RememberedGrips,
+    executor: SearchExecutor,
+    files: Option<AtlasFiles>,
+    default_rig: String,
+    /// Number of running threads.
+    running: AtomicUsize,
+    /// Requests for any atlas so far: the clock of [`Slot::last_used`](crate::atlas_slots::Slot::last_used).
+    requests: AtomicU64,
+}
+
+impl Builders {
+    /// Builders without threads.
+    pub(super) fn new(
+        objects: Arc<ObjectStore>,
+        executor: SearchExecutor,
+        files: Option<AtlasFiles>,
+        default_rig: String,
+    ) -> Self {
+        Self {
+            queue: BuildQueue::default(),
+            loaded: LoadedAtlases::new(objects),
+            remembered: RememberedGrips::default(),
+            executor,
+            files,
+            default_rig,
+            running: AtomicUsize::new(0),
+            requests: AtomicU64::new(0),
+        }
+    }
+
+    /// Number of running threads.
+    pub(super) fn running(&self) -> usize {
+        self.running.load(Ordering::Relaxed)
+    }
+
+    /// True if there are threads and nobody stopped them.
+    pub(super) fn are_running(&self) -> bool {
+        !self.queue.is_stopped() && self.running() > 0
+    }
+
+    /// A hand of the default rig.
+    pub(super) fn default_hand(&self, handedness: Handedness) -> Option<&'static Hand> {
+        hand(&self.default_rig, handedness)
+    }
+
+    /// Records a use of an atlas, and puts the atlas in the queue if it is absent.
+    pub(super) fn request(&self, object: &Arc<StoredObject>, hand: Option<&'static Hand>) {
+        let now = self.requests.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Some(hand) = hand.filter(|hand| object.atlas_slots.request(hand, now)) {
+            self.queue.push(BuildJob {
+                object: Arc::downgrade(object),
+                hand,
+                worked: Duration::ZERO,
+            });
+        }
+    }
+}
+
+/// Counts a thread for as long as it lives.
+struct RunningThread<'a>(&'a Builders);
+
+impl Drop for RunningThread<'_> {
+    fn drop(&mut self) {
+        self.0.running.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// How a turn ended.
+enum Turn {
+    /// The atlas can still grow; with the work done in this turn.
+    More(Duration),
+    /// The atlas is complete or has no room to grow.
+    Finished,
+    /// The object was evicted, or the server stops.
+    Dropped,
+}
+
+/// Starts a builder thread.
+///
+/// # Errors
+/// The thread cannot be started.
+pub(super) fn start_thread(number: usize, builders: &Arc<Builders>) -> std::io::Result<()> {
+    // Counted before the thread runs: requests that follow must find it.
+    builders.running.fetch_add(1, Ordering::Relaxed);
+    let of_thread = Arc::clone(builders);
+    let thread = thread::Builder::new()
+        .name(format!("grasp-atlas-{number}"))
+        .spawn(move || {
+            let _running = RunningThread(&of_thread);
+            while let Some(job) = of_thread.queue.next() {
+                work(&of_thread, job);
+            }
+        });
+    if thread.is_err() {
+        builders.running.fetch_sub(1, Ordering::Relaxed);
+    }
+    thread.map(|_| ())
+}
+
+/// Lowers the priority of this thread, where the system supports that. Raising it again would need privileges.
+fn lower_priority() {
+    thread_local! {
+        static IS_LOWERED: Cell<bool> = const { Cell::new(false) };
+    }
+    if IS_LOWERED.replace(true) {
+        return;
+    }
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::process::nice(NICENESS) {
+        tracing::warn!(%error, "atlases are built at the priority of searches");
+    }
+}
+
+/// Gives a job its turn and puts it back in the queue if the atlas can still grow.
+fn work(builders: &Builders, job: BuildJob) {
+    let Some(object) = job.object.upgrade() else {
+        return;
+    };
+    // A panic costs only this atlas: the state that it could leave inconsistent is local to the turn.
+    let turn = catch_unwind(AssertUnwindSafe(|| turn(builders, &object, &job)));
+    match turn {
+        Ok(Turn::More(worked)) => builders.queue.push(BuildJob {
+            worked: job.worked + worked,
+            ..job
+        }),
+        Ok(Turn::Dropped) => {}
+        Ok(Turn::Finished) => {
+            object.atlas_slots.finish(job.hand);
+            let first = builders.default_hand(Handedness::Right);
+            if first.is_some_and(|first| std::ptr::eq(first, job.hand)) {
+                builders.request(&object, builders.default_hand(Handedness::Left));
+            }
+        }
+        Err(_) => {
+            tracing::error!(object = object.name(), hand = %hand_label(job.hand), "building an atlas panicked");
+            object.atlas_slots.finish(job.hand);
+        }
+    }
+}
+
+/// Grows an atlas and publishes it.
+fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
+    let start = Instant::now();
+    let hand = job.hand;
+    let loaded = object.atlas_slots.get(hand).and_then(|slot| slot.grown);
+    let known = match loaded {
+        Some(loaded) => Some(loaded),
+        None => match read(builders, object, hand) {
+            Some(read) => {
+                let publish = |grown| builders.loaded.publish(object, hand, grown, start.elapsed());
+                if !publish(Arc::clone(&read)) {
+                    return Turn::Finished;
+                }
+                Some(read)
+            }
+            None => None,
+        },
+    };
+    let mut growth = match &known {
+        Some(known) => Growth::resume(&object.object, &hand.rig, known),
+        None => Growth::new(&object.object, &hand.rig),
+    };
+    let published = growth.len();
+    if growth.is_complete() {
+        return Turn::Finished;
+    }
+    // Not before reading: built-in atlases must be there soon after the start, however busy the machine is.
+    lower_priority();
+    let enough = USEFUL.max(published + published / GROWTH_PER_PUBLISH);
+    let mut gripper = Gripper::default();
+    let mut worked = Duration::ZERO;
+    while !growth.is_complete() && growth.len() < enough && worked < TURN {
+        // If this thread holds the last reference, the object was evicted.
+        if builders.queue.is_stopped() || Arc::strong_count(object) == 1 {
+            return Turn::Dropped;
+        }
+        let round = Instant::now();
+        growth.round(&mut gripper);
+        let took = round.elapsed();
+        worked += took;
+        pause_for_searches(builders, took);
+        // A new atlas goes before one that already had a turn.
+        if !job.worked.is_zero() && builders.queue.has_new_job() {
+            break;
+        }
+    }
+    let grown = Arc::new(growth.grown());
+    if let Some(files) = &builders.files
+        && growth.len() > published
+    {
+        files.write(object, hand, &grown);
+    }
+    let has_room = builders.loaded.publish(object, hand, Arc::clone(&grown), worked);
+    if has_room {
+        log_progress(object, hand, &grown, published);
+    } else {
+        tracing::debug!(
+            object = object.name(),
+            hand = %hand_label(hand),
+            entries = published,
+            "an atlas cannot grow: cache_bytes has no room"
+        );
+    }
+    if growth.is_complete() || !has_room {
+        Turn::Finished
+    } else {
+        Turn::More(worked)
+    }
+}
+
+/// The built-in atlas of an object and a hand, or else the one on disk.
+fn read(builders: &Builders, object: &StoredObject, hand: &'static Hand) -> Option<Arc<Grown>> {
+    let on_disk = || builders.files.as_ref()?.read(object, hand);
+    let read = Arc::new(built_in(object, hand).or_else(on_disk)?);
+    tracing::info!(
+        object = object.name(),
+        hand = %hand_label(hand),
+        entries = read.atlas.entries().len(),
+        complete = read.atlas.is_complete(),
+        "read an atlas"
+    );
+    Some(read)
+}
+
+/// The built-in atlas of an object and a hand.
+fn built_in(object: &StoredObject, hand: &'static Hand) -> Option<Grown> {
+    let bytes = object.built_in.then(|| atlas(&object.id, &hand.rig)).flatten()?;
+    match decode(bytes, &object.object, &hand.rig) {
+        Ok(grown) => Some(grown),
+        Err(error) => {
+            tracing::warn!(
+                object = object.name(),
+                hand = %hand_label(hand),
+                %error,
+                "rebuilding a built-in atlas that cannot be read"
+            );
+            None
+        }
+    }
+}
+
+/// While searches run, pauses in proportion to the time just worked.
+fn pause_for_searches(builders: &Builders, worked: Duration) {
+    let until = Instant::now() + worked * PAUSE_PER_WORK;
+    while builders.executor.jobs() > 0 && !builders.queue.is_stopped() && Instant::now() < until {
+        thread::sleep(PAUSE_CHECK);
+    }
+}
+
+/// Logs when an atlas becomes useful and when it is complete.
+fn log_progress(object: &StoredObject, hand: &'static Hand, grown: &Grown, published: usize) {
+    let entries = grown.atlas.entries().len();
+    let message = if grown.atlas.is_complete() {
+        "an atlas is complete"
+    } else if published < USEFUL && entries >= USEFUL {
+        "an atlas is useful"
+    } else {
+        return;
+    };
+    let slot = object.atlas_slots.get(hand).unwrap_or_default();
+    tracing::info!(
+        object = object.name(),
+        hand = %hand_label(hand),
+        entries,
+        bytes = slot.bytes,
+        seconds = slot.build_time.as_secs_f32(),
+        "{message}"
+    );
+}

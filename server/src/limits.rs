@@ -1,0 +1,19 @@
+//! Bounds that more than one module needs.
+
+/// Bound on the objects that clients create.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StoreLimits {
+    /// Number of objects.
+    pub objects: usize,
+    /// Total size of the objects in bytes, by estimate.
+    pub bytes: usize,
+}
+
+/// Largest size in bytes of everything but the mesh in a `CreateObject` request, and of a manifest on disk.
+pub(crate) const BYTES_BESIDES_MESH: usize = 1 << 20;
+
+/// Largest request to `GraspService`, in bytes. A hand of 26 joints takes about 2 kB.
+pub(crate) const LARGEST_FIND_REQUEST: usize = 64 << 10;
+
+/// Largest response of either service, in bytes. A full page of objects takes less than 1 MiB.
+pub(crate) const LARGEST_RESPONSE: usize = 4 << 20;
