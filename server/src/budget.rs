@@ -13,13 +13,14 @@ pub struct BudgetLimits {
     pub reserve: Duration,
 }
 
-/// Shortest timeout that clients of gRPC's C++ core (Python, Ruby, PHP …) round up to three digits: they may end the call
-/// up to 1 % before the deadline that they send.
+/// Shortest timeout that clients of gRPC's C++ core (Python, Ruby, PHP …) round up to three digits: they may end the
+/// call up to 1 % before the deadline that they send.
 const ROUNDED_FROM: Duration = Duration::from_secs(1);
 
-/// The effective budget: the smallest of the requested one (or the default), the server's maximum, and the call's deadline
-/// less the reserve. It counts from the call's arrival, so waiting for a free worker uses it up. With a deadline shorter
-/// than two reserves, the budget is half of it: a grasp may still be found, and the response may still arrive.
+/// The effective budget: the smallest of the requested one (or the default), the server's maximum, and the call's
+/// deadline less the reserve. It counts from the call's arrival, so waiting for a free worker uses it up. With a
+/// deadline shorter than two reserves, the budget is half of it: a grasp may still be found, and the response may still
+/// arrive.
 pub(crate) fn effective_budget(
     requested: Option<Duration>,
     limits: BudgetLimits,

@@ -2,8 +2,8 @@
 //! `OpenXR` and back.
 //!
 //! `OpenXR` is right-handed, +Y up, in metres. Unity mirrors z, Unreal permutes the axes and uses centimetres: both are
-//! changes of basis that apply to every frame. Godot keeps the basis, but its `XRHandTracker` rotates each hand joint by a
-//! half turn, so joint frames convert differently from other poses.
+//! changes of basis that apply to every frame. Godot keeps the basis, but its `XRHandTracker` rotates each hand joint
+//! by a half turn, so joint frames convert differently from other poses.
 //!
 //! Functions come in pairs: `*_to_openxr` converts from the client's convention, `*_from_openxr` to it.
 
@@ -142,8 +142,8 @@ impl Convention {
         }
     }
 
-    /// The `OpenXR` index of the joint at `place` in the convention's list of 26. It is its own inverse: Unity swaps palm
-    /// and wrist.
+    /// The `OpenXR` index of the joint at `place` in the convention's list of 26. It is its own inverse: Unity swaps
+    /// palm and wrist.
     pub(crate) fn joint_at(self, place: usize) -> usize {
         debug_assert!(place < JOINT_COUNT);
         match self {

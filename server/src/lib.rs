@@ -26,8 +26,8 @@
 //! ```
 //!
 //! The algorithm is in the crate `grasp-synthesis`, which knows nothing of gRPC or async code. Only `convention` knows
-//! the engines' axes, only `error` knows status codes, and only `executor`, `atlases` and the preparation of objects and
-//! hands start threads.
+//! the engines' axes, only `error` knows status codes, and only `executor`, `atlases` and the preparation of objects
+//! and hands start threads.
 
 mod answer;
 mod atlas_slots;

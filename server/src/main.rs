@@ -20,8 +20,8 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 /// overrides the file.
 ///
 /// The server refuses to start, prints the reason and exits with 1 if a value is invalid, if an object of the objects
-/// directory is invalid, or if the configuration may use more memory than the process is allowed (by its control groups,
-/// `RLIMIT_AS` or `RLIMIT_DATA`). After SIGTERM or SIGINT it answers running calls and exits with 0.
+/// directory is invalid, or if the configuration may use more memory than the process is allowed (by its control
+/// groups, `RLIMIT_AS` or `RLIMIT_DATA`). After SIGTERM or SIGINT it answers running calls and exits with 0.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {

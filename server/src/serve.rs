@@ -134,8 +134,8 @@ impl Gauges {
     }
 }
 
-/// Serves on a listener until `shutdown` completes. Then health becomes `NOT_SERVING`, no more connections are accepted,
-/// running calls have the drain time to end, and every connection is closed.
+/// Serves on a listener until `shutdown` completes. Then health becomes `NOT_SERVING`, no more connections are
+/// accepted, running calls have the drain time to end, and every connection is closed.
 ///
 /// # Errors
 /// See [`ServeError`].
@@ -311,8 +311,8 @@ fn logged(path: &Path, objects: Vec<StoredObject>) -> Vec<StoredObject> {
     objects
 }
 
-/// Loads the built-in hands and prepares them for searches. The first call with each hand would otherwise do so, outside
-/// its budget: it takes tenths of a second.
+/// Loads the built-in hands and prepares them for searches. The first call with each hand would otherwise do so,
+/// outside its budget: it takes tenths of a second.
 fn prepare_hands() {
     thread::scope(|scope| {
         for rig in RIG_NAMES {

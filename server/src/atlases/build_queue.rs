@@ -13,7 +13,7 @@ use grasp_assets::hands::Hand;
 
 use crate::objects::StoredObject;
 
-/// Length from which the queue drops jobs of deleted objects.
+/// Length from which the queue drops jobs of evicted objects.
 const MANY_JOBS: usize = 1024;
 
 /// An atlas to build.

@@ -100,7 +100,7 @@ impl Builders {
         self.running.load(Ordering::Relaxed)
     }
 
-    /// True if there are threads and nobody stopped them.
+    /// True if there are threads and they were not stopped.
     pub(super) fn are_running(&self) -> bool {
         !self.queue.is_stopped() && self.running() > 0
     }

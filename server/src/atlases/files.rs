@@ -27,8 +27,8 @@ use grasp_synthesis::known::{
 use super::hand_label;
 use crate::objects::StoredObject;
 
-/// Largest total size of all files, in bytes: 800 complete atlases. More remembers more objects; the bound keeps
-/// clients that create objects without end from filling the disk.
+/// Largest total size of all files, in bytes: 800 complete atlases. It keeps clients that create ever more objects from
+/// filling the disk.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Largest file that is read, in bytes: three times a complete atlas.
@@ -366,7 +366,11 @@ mod tests {
         files.write(&objects[0], adult(), &grown[0]);
         let bytes = folder.bytes();
         let files = files.bounded(5 * bytes / 2);
-        fs::write(folder.0.join(format!("{KEY}.7-0.part")), vec![0; bytes as usize]).unwrap();
+        fs::write(
+            folder.0.join(format!("{KEY}.7-0.part")),
+            vec![0_u8; bytes as usize],
+        )
+        .unwrap();
         pause();
         files.write(&objects[1], adult(), &grown[1]);
         let is_there = |place: usize| files.read(&objects[place], adult()).is_some();

@@ -116,7 +116,7 @@ pub enum ConfigError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
     /// The file is not TOML, or has an unknown key or a value of the wrong type.
@@ -124,7 +124,7 @@ pub enum ConfigError {
     Malformed {
         /// The file.
         path: PathBuf,
-        /// Where and why.
+        /// The place and the cause.
         source: Box<toml::de::Error>,
     },
     /// All invalid values.

@@ -59,10 +59,10 @@ pub struct RawConfig {
     pub cache_bytes: Option<u64>,
     /// Folder of objects to start with: NAME.obj with NAME.toml becomes objects/NAME [default: none].
     ///
-    /// The TOML file has the keys of a `CreateObject` request: `mass_kg` and optionally `unit_metres`, `centre_of_mass`,
-    /// `friction`, `forbidden.groups` and `forbidden.triangles`. Each file has the limits of an upload; all objects
-    /// together have the limits `cache_objects` and `cache_bytes`, in addition to those that clients create. They are
-    /// never evicted.
+    /// The TOML file has the keys of a `CreateObject` request: `mass_kg` and optionally `unit_metres`,
+    /// `centre_of_mass`, `friction`, `forbidden.groups` and `forbidden.triangles`. Each file has the limits of an
+    /// upload; all objects together have the limits `cache_objects` and `cache_bytes`, in addition to those that
+    /// clients create. They are never evicted.
     #[arg(long, env = "GRASP_OBJECTS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub objects_directory: Option<PathBuf>,
     /// Low-priority threads that build the objects' atlases in the background [default: 1].
@@ -73,8 +73,8 @@ pub struct RawConfig {
     pub builder_threads: Option<u64>,
     /// Folder that keeps atlases between runs [default: none].
     ///
-    /// It is created if necessary. Its files take up to 1 GiB; the least recently used are removed first. Unfinished files
-    /// that a crash left behind are removed at the next start.
+    /// It is created if necessary. Its files take up to 1 GiB; the least recently used are removed first. Unfinished
+    /// files that a crash left behind are removed at the next start.
     #[arg(long, env = "GRASP_ATLAS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub atlas_directory: Option<PathBuf>,
     /// Most connections; others wait [default: 1000].

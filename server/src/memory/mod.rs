@@ -1,9 +1,9 @@
 //! Checks that the configuration fits in the memory that the process may use.
 //!
 //! A server that the kernel kills under load cannot say why. The check adds up measured figures before the server
-//! starts, and rejects a configuration that does not fit. The figures are the growth of the resident set (`VmHWM`) of the
-//! release build on 64-bit Linux with glibc's allocator, rounded up. A higher figure rejects more configurations; a lower
-//! one risks being killed.
+//! starts, and rejects a configuration that does not fit. The figures are the growth of the resident set (`VmHWM`) of
+//! the release build on 64-bit Linux with glibc's allocator, rounded up. A higher figure rejects more configurations; a
+//! lower one risks being killed.
 
 mod process_limits;
 
@@ -16,8 +16,8 @@ use crate::config::Config;
 /// Bytes in a mebibyte, the unit of error messages.
 const MIB: u64 = 1 << 20;
 
-/// Bytes of a server without connections, searches and created objects, excluding pages of the program, which the kernel
-/// can reclaim. Measured: 12.2 MiB.
+/// Bytes of a server without connections, searches and created objects, excluding pages of the program, which the
+/// kernel can reclaim. Measured: 12.2 MiB.
 const AT_REST: u64 = 20 * MIB;
 
 /// Bytes per idle thread, mostly the used part of its stack. Measured: 19 KiB.
@@ -41,8 +41,8 @@ const PER_BUILT_TRIANGLE: u64 = 640;
 /// 0.24 MiB.
 const PER_BUILT_OBJECT: u64 = 512 << 10;
 
-/// Bytes per growing atlas, excluding its published form: its grips twice during publication, and their encoding for the
-/// disk. A complete atlas takes 10 MB.
+/// Bytes per growing atlas, excluding its published form: its grips twice during publication, and their encoding for
+/// the disk. A complete atlas takes 10 MB.
 const PER_BUILDER: u64 = 20 * MIB;
 
 /// Bytes of address space reserved per thread: Rust's default stack, which the async runtime uses too.
@@ -206,8 +206,8 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     shares
 }
 
-/// Memory that threads reserve but do not use: threads of the pools, one per search, and two per upload, whose object is
-/// prepared by two threads in parallel.
+/// Memory that threads reserve but do not use: threads of the pools, one per search, and two per upload, whose object
+/// is prepared by two threads in parallel.
 fn stacks(config: &Config) -> MemoryShare {
     let threads = [
         config.workers.get(),

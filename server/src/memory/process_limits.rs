@@ -1,7 +1,7 @@
 //! Finds the limits on the memory of the process: control groups of both versions, and resource limits.
 //!
-//! It only reads files, which needs no foreign code. Where they are missing, as on systems other than Linux, it finds no
-//! limits.
+//! It only reads files, which needs no foreign code. Where they are missing, as on systems other than Linux, it finds
+//! no limits.
 
 use std::{
     fs,

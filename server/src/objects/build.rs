@@ -15,10 +15,10 @@ use crate::{
     validate::{Field, ObjectFields, Violations, quoted},
 };
 
-/// Longest edge of an object's bounding box, in metres; a longer one means a wrong unit.
+/// Upper bound on the longest edge of an object's bounding box, in metres; a longer one means a wrong unit.
 const LARGEST_EXTENT: f32 = 10.0;
 
-/// Shortest longest edge of an object's bounding box, in metres; a shorter one means a wrong unit.
+/// Lower bound on the longest edge of an object's bounding box, in metres; a shorter one means a wrong unit.
 const SMALLEST_EXTENT: f32 = 1e-3;
 
 /// Longest edge in metres without a warning: longer objects are not handed over with one hand.

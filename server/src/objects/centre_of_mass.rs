@@ -12,8 +12,8 @@ pub(super) enum Source {
     Surface,
 }
 
-/// Smallest enclosed share of the bounding box for which the volume is used. A sheet of paper encloses less, and so does
-/// an open mesh whose signed tetrahedra cancel.
+/// Smallest enclosed share of the bounding box for which the volume is used. A sheet of paper encloses less, and so
+/// does an open mesh whose signed tetrahedra cancel.
 const SMALLEST_VOLUME_SHARE: f64 = 1e-4;
 
 /// The centre of mass of a mesh, in metres: that of the volume, by the divergence theorem (signed tetrahedra between

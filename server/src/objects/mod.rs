@@ -1,5 +1,5 @@
-//! The objects that can be held out: built-in ones, those of the objects directory, and those that clients created, in a
-//! cache of bounded size.
+//! The objects that can be held out: built-in ones, those of the objects directory, and those that clients created, in
+//! a cache of bounded size.
 
 pub(crate) mod build;
 mod centre_of_mass;
@@ -66,8 +66,8 @@ impl StoredObject {
         }
     }
 
-    /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with each
-    /// hand would have to do. Takes some ten milliseconds per hand, in parallel if the system has a thread for it.
+    /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with
+    /// each hand would have to do. Takes some ten milliseconds per hand, in parallel if the system has a thread for it.
     pub(crate) fn prepare(&self, rig: &str) {
         let prepare_hand = |handedness| {
             if let Some(hand) = hand(rig, handedness) {
@@ -84,8 +84,8 @@ impl StoredObject {
         });
     }
 
-    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if there are
-    /// no primitives for the hand or none of their grips fits.
+    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if there
+    /// are no primitives for the hand or none of their grips fits.
     pub(crate) fn transferred_grips(&self, hand: &'static Hand) -> Option<Arc<Borrowed>> {
         let mut all = held_primitives().iter().zip(&self.transferred_grips);
         let ((_, held), grips) = all.find(|((of, _), _)| std::ptr::eq(*of, hand))?;

@@ -115,7 +115,8 @@ pub(crate) async fn find(
 }
 
 impl FindJob {
-    /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames is not.
+    /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames is
+    /// not.
     fn is_quick_if_known(&self) -> bool {
         (self.known.atlas.is_some() || !self.known.recent.is_empty())
             && !self.query.is_replay
@@ -147,7 +148,7 @@ impl FindJob {
             presenting_hand,
             up: object_from_client.transform_vector(query.up),
         };
-        // A growing atlas would change the answer to the same request.
+        // Reproducible answers need a complete atlas: a growing one would change them.
         let atlas = self
             .known
             .atlas
@@ -244,8 +245,8 @@ impl PreparedJob {
         })
     }
 
-    /// The grip to remember: one that was found by an attempt or with fewer fingers than its atlas entry, under the object's
-    /// own friction, which the grips of an atlas are made for.
+    /// The grip to remember: one that was found by an attempt or with fewer fingers than its atlas entry, under the
+    /// object's own friction, which the grips of an atlas are made for.
     fn new_grip(&self, outcome: &SearchOutcome) -> Option<Entry> {
         let own_friction = self.holdout.object.friction_under(Validity::Physical);
         let is_new = matches!(

@@ -3,4 +3,4 @@
 mod job;
 mod slices;
 
-pub(crate) use job::{Answered, FindJob, find};
+pub(crate) use job::{FindJob, find};

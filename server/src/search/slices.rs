@@ -112,23 +112,22 @@ mod tests {
     use glam::Vec3;
     use grasp_assets::{hands::hand, objects::object};
     use grasp_synthesis::{
-        base::{pose::Pose, rejection::Rejection},
         known::seed_source::SeedSource,
         model::{
             bend_ratios::BendRatioChoice,
             constraints::Constraints,
-            hand::{DigitAngles, HandPose, Handedness},
+            hand::Handedness,
             strategy::{Strategy, Validity},
         },
     };
 
     use super::*;
 
-    /// A clock that goes on by a microsecond whenever somebody looks at it.
+    /// A clock that advances by a microsecond per reading.
     #[derive(Debug, Default)]
-    struct LookedAt(AtomicU64);
+    struct ReadingsClock(AtomicU64);
 
-    impl Clock for LookedAt {
+    impl Clock for ReadingsClock {
         fn now(&self) -> Duration {
             Duration::from_micros(self.0.fetch_add(1, Ordering::Relaxed))
         }
@@ -162,7 +161,7 @@ mod tests {
             .num_threads(1)
             .build()
             .expect("a thread");
-        let clock = LookedAt::default();
+        let clock = ReadingsClock::default();
         let patience = Duration::from_micros(patience);
         let stop = AtomicBool::new(false);
         let outcome = search_in_slices(&pool, &holdout, rig, &settings, patience, &clock, &stop);
@@ -171,14 +170,14 @@ mod tests {
 
     #[test]
     fn patience_extends_only_a_search_without_a_grasp() {
-        let (none, looks) = search_within(Choice::BestWithinBudget, 3, 3);
-        assert!(none.grasp.is_none() && none.end == SearchEnd::DeadlinePassed && looks < 20);
-        let (late, looks) = search_within(Choice::BestWithinBudget, 3, 1_000_000);
+        let (none, readings) = search_within(Choice::BestWithinBudget, 3, 3);
+        assert!(none.grasp.is_none() && none.end == SearchEnd::DeadlinePassed && readings < 20);
+        let (late, readings) = search_within(Choice::BestWithinBudget, 3, 1_000_000);
         assert_eq!((late.end, late.report.candidates), (SearchEnd::Found, 1));
-        assert!(late.grasp.is_some() && late.report.attempts > 0 && looks < 1_000_000);
+        assert!(late.grasp.is_some() && late.report.attempts > 0 && readings < 1_000_000);
         // With grasps by the deadline, the best of them, without an extension.
-        let (best, looks) = search_within(Choice::BestWithinBudget, 10_000, 1_000_000);
-        assert!(best.report.candidates > 1 && (10_000..11_000).contains(&looks));
+        let (best, readings) = search_within(Choice::BestWithinBudget, 10_000, 1_000_000);
+        assert!(best.report.candidates > 1 && (10_000..11_000).contains(&readings));
         assert!(
             best.grasp
                 .and_then(|grasp| grasp.score)
@@ -189,8 +188,8 @@ mod tests {
                     .map(|score| score.total())
         );
         // The extension ends with the patience.
-        let (never, looks) = search_within(Choice::BestWithinBudget, 3, 6);
-        assert!(never.grasp.is_none() && looks < 20);
+        let (never, readings) = search_within(Choice::BestWithinBudget, 3, 6);
+        assert!(never.grasp.is_none() && readings < 20);
     }
 
     #[test]

@@ -54,8 +54,8 @@ pub(crate) struct FindQuery {
     pub up: Vec3,
     /// Requested budget.
     pub budget: Option<Duration>,
-    /// True if the search continues for a first grasp when the budget ends without one: the request wants the best grasp
-    /// and names no budget.
+    /// True if the search continues for a first grasp when the budget ends without one: the request wants the best
+    /// grasp and names no budget.
     pub is_patient: bool,
     /// Index of the first attempt.
     pub first_attempt: u64,
@@ -149,8 +149,7 @@ pub(crate) fn find_query(
     if request.reproducible && choice == Choice::BestWithinBudget {
         v.add(
             Field::root("reproducible"),
-            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer depends on how much fits in the budget; choose one of \
-             them",
+            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer depends on the speed of the machine; use one of them",
         );
     }
     if let (false, Some(id)) = (violations.is_empty(), &object_id)

@@ -1,7 +1,8 @@
 //! Turns requests into checked values, or into a list of everything that is wrong with them.
 //!
 //! Every function takes the field's path and the violations so far, and returns a usable value even for wrong input, so
-//! that all violations are found; [`Violations::finish`] decides in the end. A valid request causes no allocations here.
+//! that all violations are found; [`Violations::finish`] decides in the end. A valid request causes no allocations
+//! here.
 
 mod constraints;
 mod find_grasp;
@@ -31,8 +32,8 @@ const MAXIMUM_QUOTED: usize = 80;
 /// Largest deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f32 = 0.01;
 
-/// Largest distance from the client's origin along an axis, in metres. Beyond it, the resolution of a float is worse than
-/// 0.1 mm.
+/// Largest distance from the client's origin along an axis, in metres. Beyond it, the resolution of a float is worse
+/// than 0.1 mm.
 const FARTHEST: f32 = 1000.0;
 
 /// Largest coefficient of static friction; silicone rubber on itself stays below 2.

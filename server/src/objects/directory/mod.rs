@@ -27,14 +27,14 @@ use pairs::{Pair, pairs};
 /// Largest number of listed problems; the others are only counted, to bound the log line.
 const LISTED_PROBLEMS: usize = 100;
 
-/// One thing that is wrong with a folder of objects.
+/// A problem of a folder of objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DirectoryProblem {
     /// The file's name; empty for the folder itself.
     pub file: String,
     /// The key of the manifest, or `obj` for the mesh; empty for the file itself.
     pub field: String,
-    /// The value, and what would be right.
+    /// The value, and what a valid one is.
     pub description: String,
 }
 
@@ -82,8 +82,8 @@ fn listed(problems: &[DirectoryProblem]) -> String {
     lines.join("\n")
 }
 
-/// Reads every object of a folder, one after the other: more than the objects themselves, it takes the memory of a single
-/// upload.
+/// Reads the objects of a folder one after the other, so that loading takes no more memory than one upload in addition
+/// to the objects themselves.
 ///
 /// # Errors
 /// Everything that is wrong, in the order of the file names.
