@@ -1,4 +1,4 @@
-//! Grasp searches: what a request asks for and what is known, run on the threads of the executor.
+//! Runs grasp searches on the threads of the executor.
 
 mod job;
 mod slices;

@@ -79,6 +79,28 @@ fn health_check_fails_without_an_answer() {
 }
 
 #[test]
+fn start_removes_unfinished_atlas_files() {
+    let folder = std::env::temp_dir().join(format!("grasp-unfinished-{}", std::process::id()));
+    let unfinished = folder.join(format!("{}.1-0.part", "0f".repeat(16)));
+    let foreign = folder.join("download.part");
+    fs::create_dir_all(&folder).expect("the temporary directory can be written to");
+    for path in [&unfinished, &foreign] {
+        fs::write(path, "unfinished").expect("a file can be written");
+    }
+    let path = folder.to_str().expect("the path is text");
+    let server = Running::start(&[("GRASP_LISTEN", "127.0.0.1:0"), ("GRASP_ATLAS_DIRECTORY", path)]);
+    assert!(!unfinished.exists() && foreign.exists());
+    let log = server.start_log();
+    let line = log
+        .lines()
+        .find(|line| line.contains("removed unfinished atlas files"));
+    let line = line.unwrap_or_else(|| panic!("{log}"));
+    assert!(line.contains("files=1") && line.contains("bytes=10"), "{line}");
+    server.terminate();
+    fs::remove_dir_all(&folder).expect("it is still there");
+}
+
+#[test]
 fn reports_every_invalid_setting() {
     let result = output(
         "grasp-server --workers 0",

@@ -38,6 +38,7 @@ pub(crate) fn output(line: &str, variables: &[(&str, &str)]) -> Ended {
 pub(crate) struct Running {
     child: Child,
     log: BufReader<ChildStderr>,
+    start_log: String,
     address: String,
 }
 
@@ -54,23 +55,29 @@ impl Running {
         let mut running = Self {
             child,
             log,
+            start_log: String::new(),
             address: String::new(),
         };
         running.address = running.read_address();
         running
     }
 
-    /// Reads the log up to the line that names the address.
+    /// Reads the log up to the line with the address.
     fn read_address(&mut self) -> String {
-        let mut log = String::new();
+        let log = &mut self.start_log;
         loop {
             let start = log.len();
-            let read = self.log.read_line(&mut log).expect("the server writes text");
+            let read = self.log.read_line(log).expect("the server writes text");
             assert!(read > 0, "the server ended before it logged its address: {log}");
             if let Some((_, rest)) = log[start..].split_once("address=") {
                 return rest.split_whitespace().next().expect("it follows").to_owned();
             }
         }
+    }
+
+    /// The log up to the line with the address.
+    pub(crate) fn start_log(&self) -> &str {
+        &self.start_log
     }
 
     /// The address that it listens on.
