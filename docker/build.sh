@@ -1,8 +1,7 @@
 #!/bin/sh
-# Builds both programs as static binaries for a processor (see TARGET_CPU in the Dockerfile) and puts them in /out.
+# Builds both programs as static binaries for a processor (see TARGET_CPU in the Dockerfile) into /out.
 set -eu
-# The target is named so that the flags apply to the programs alone, not to macros and build scripts, which the compiler
-# loads or runs and which cannot be static.
+# With an explicit target, the flags apply to the programs only; macros and build scripts cannot be static.
 target=$(rustc --version --verbose | sed -n 's/^host: //p')
 export RUSTFLAGS="-C target-feature=+crt-static -C target-cpu=$1"
 cargo build --locked --release --target "$target" --package grasp-server --package grasp-client

@@ -1,4 +1,4 @@
-"""Containers of the image under test, as a cautious operator starts them, and the client that asks them."""
+"""Starts containers of the image under test with minimal privileges, and calls them with the client."""
 
 import json
 import os
@@ -17,18 +17,17 @@ ENGINE = os.environ.get("GRASP_ENGINE", "docker")
 IMAGE = "grasp-server"
 PORT = "50051/tcp"
 
-# Nothing that the server does not need. podman would put writable folders into a read-only root.
+# Only what the server needs. podman would add writable folders to a read-only root.
 HARDENED = ["--read-only", "--cap-drop", "ALL", "--security-opt", "no-new-privileges"]
 if ENGINE == "podman":
     HARDENED.append("--read-only-tmpfs=false")
 
-# Longest that anything is waited for: never reached unless something hangs.
+# Seconds after which anything that is waited for counts as hung.
 HANGS_AFTER = 60
 
 
 def run(*command, **options):
-    """Runs a command to its end; both outputs are kept as text. By files: podman-compose leaves processes behind that
-    would keep a pipe open."""
+    """Runs a command and captures its output, in files because podman-compose leaves processes that hold pipes open."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
         done = subprocess.run(command, stdout=out, stderr=err, timeout=540, **options)
         out.seek(0)
@@ -37,7 +36,7 @@ def run(*command, **options):
 
 
 def engine(*arguments):
-    """Runs a command of the engine that must succeed; returns what it prints."""
+    """Runs an engine command that must succeed; returns its standard output."""
     done = run(ENGINE, *arguments)
     assert done.returncode == 0, f"{ENGINE} {' '.join(arguments)}: {done.stderr}"
     return done.stdout.strip()
@@ -48,25 +47,25 @@ def inspect(name, template):
 
 
 def skip(reason):
-    """Skips the test aloud: tests/run tells the reason at its end."""
+    """Skips the test and reports the reason at the end of tests/run."""
     with (WORK / "skipped").open("a") as skipped:
         print(f"container: {reason}", file=skipped)
     pytest.skip(reason)
 
 
 def limits_memory():
-    """Does the engine set a memory limit, or does it refuse or only warn that it cannot?"""
+    """Whether the engine can set a memory limit, rather than failing or printing a warning."""
     done = run(ENGINE, "run", "--rm", "--memory", "256m", IMAGE, "--print-config")
     return done.returncode == 0 and "limit" not in done.stderr.lower()
 
 
-def measured(what, value):
-    """A figure for a person to read; nothing depends on it."""
+def report_figure(what, value):
+    """Prints a figure that no test checks."""
     print(f"measured: {what}: {value}")
 
 
 def grasp(address, *arguments):
-    """The client outside of the container, asking a server."""
+    """Runs the client on the host against a server."""
     environment = {**os.environ, "GRASP_SERVER": f"http://{address}"}
     return run(ROOT / "target/release/grasp", *arguments, env=environment)
 
@@ -79,19 +78,19 @@ def wait_for(what, condition):
 
 
 class Service:
-    """A container that was started."""
+    """A started container."""
 
     def __init__(self, name):
         self.name = name
 
     def address(self):
-        """Where the host reaches it; the engine chooses a new port at every start."""
+        """Its host:port on the host; the engine picks a new port at every start."""
         host, port = engine("port", self.name, PORT).splitlines()[0].rsplit(":", 1)
         return f"{'127.0.0.1' if host in ('0.0.0.0', '::', '[::]') else host}:{port}"
 
     def wait_until_it_serves(self):
         def serves():
-            assert self.is_running(), f"it ended: {self.log()}"
+            assert self.is_running(), f"the container exited: {self.log()}"
             return grasp(self.address(), "health").returncode == 0
 
         wait_for("the service to serve", serves)
@@ -118,7 +117,7 @@ def options_for(environment, mounts):
 
 @pytest.fixture
 def start():
-    """Starts services; they are removed at the end of the test."""
+    """A function that starts a service; the test's services are removed when it ends."""
     names = []
 
     def starting(*options, environment=None, mounts=None, wait=True):
@@ -136,8 +135,8 @@ def start():
 
 
 @pytest.fixture
-def refused():
-    """Runs the server with what it must refuse; returns its log."""
+def log_of_rejected():
+    """A function that runs the server with settings that it must reject, and returns its log."""
 
     def running(*options, environment=None, mounts=None):
         done = run(ENGINE, "run", "--rm", *options_for(environment or {}, mounts or {}), *options, IMAGE)
@@ -148,8 +147,8 @@ def refused():
 
 
 @pytest.fixture
-def outside():
-    """The same server without a container, in the same configuration; its address."""
+def host_server():
+    """The address of the same server on the host, with the same configuration."""
     process = subprocess.Popen(
         [ROOT / "target/release/grasp-server", "--listen", "127.0.0.1:0"],
         stdout=subprocess.DEVNULL,
@@ -167,7 +166,7 @@ def outside():
 
 @pytest.fixture
 def objects(tmp_path):
-    """A folder with one object, which the container's user may read: the built-in remote under another name."""
+    """A folder that holds the built-in remote under another name, readable by the container's user."""
     folder = tmp_path / "objects"
     folder.mkdir()
     shutil.copy(ROOT / "assets/objects/remote.obj", folder / "my-remote.obj")
@@ -178,7 +177,7 @@ def objects(tmp_path):
         f"friction = {about['friction']}\n"
         f"forbidden = {{ groups = {about['forbidden_groups']} }}\n"
     )
-    # Whatever the mask of this process says.
+    # Independent of this process' umask.
     folder.chmod(0o755)
     for path in folder.iterdir():
         path.chmod(0o644)

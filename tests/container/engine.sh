@@ -1,6 +1,7 @@
-# Finds a container engine and what it takes to use it here. Sourced by tests/container/run, which sets `work`.
-# Every function fails with the reason in `problem`.
-# shellcheck shell=bash disable=SC2034 # What is found is used by the script that sources this one.
+# Finds a container engine, a build image and run options that work here. Sourced by tests/container/run, which sets
+# `work`.
+# Functions that fail leave the reason in `problem`.
+# shellcheck shell=bash disable=SC2034 # The results are used by the script that sources this one.
 
 engine=
 compose=
@@ -8,13 +9,13 @@ no_compose=
 build_image=
 problem=
 
-# Installs packages by name if that is possible without asking anybody.
+# Installs Debian packages by name, as root only.
 install() {
     if [ "$(id -u)" != 0 ] || ! command -v apt-get > /dev/null; then
         return 1
     fi
     echo "installing $*"
-    # What is known of the packages may be missing or too old on a fresh machine.
+    # On a fresh machine the package lists may be missing or too old.
     local get=(env DEBIAN_FRONTEND=noninteractive apt-get)
     "${get[@]}" install --yes --no-install-recommends "$@" > "$work/apt.log" 2>&1 \
         || { "${get[@]}" update && "${get[@]}" install --yes --no-install-recommends "$@"; } > "$work/apt.log" 2>&1
@@ -33,7 +34,7 @@ find_engine() {
         return
     fi
     if ! command -v podman > /dev/null; then
-        # The bridge and the name service of either network stack, whichever the distribution has.
+        # The bridge and name service of either network stack, whichever the distribution has.
         install podman runc iptables containernetworking-plugins golang-github-containernetworking-plugin-dnsname \
             || install podman runc iptables netavark aardvark-dns \
             || { problem='no docker daemon answers, and there is no podman and no way to install it'; return 1; }
@@ -46,7 +47,7 @@ find_engine() {
     fi
 }
 
-# The image to build in: GRASP_BUILD_IMAGE, or the Dockerfile's own if it can be had, or one that is made here.
+# The build image: GRASP_BUILD_IMAGE, else the Dockerfile's default if it can be pulled, else one made here.
 find_build_image() {
     build_image=${GRASP_BUILD_IMAGE:-}
     if [ -n "$build_image" ]; then
@@ -57,26 +58,26 @@ find_build_image() {
         || timeout 300 "$engine" pull --quiet "$build_image" > "$work/pull.log" 2>&1; then
         return
     fi
-    echo "no image registry in reach: $(tail -1 "$work/pull.log")"
-    # Packages that cargo has here are taken along; the lock file says which.
+    echo "no image registry reachable: $(tail -1 "$work/pull.log")"
+    # The image contains the crates that the lock file names, and this toolchain.
     build_image=localhost/grasp-build:$(cat Cargo.lock tests/container/make-build-image <(rustc --version --verbose) \
         | sha256sum | cut -c1-16)
     if "$engine" image inspect "$build_image" > /dev/null 2>&1; then
         return
     fi
     if [ "$(id -u)" != 0 ]; then
-        problem='no image registry in reach, and only root can make a build image'
+        problem='no image registry reachable, and only root can make a build image'
         return 1
     fi
-    echo 'making a build image of Debian packages and the toolchain at hand'
+    echo 'making a build image from Debian packages and the installed toolchain'
     command -v mmdebstrap > /dev/null || install mmdebstrap \
-        || { problem='no image registry in reach, and no mmdebstrap to make a build image with'; return 1; }
+        || { problem='no image registry reachable, and no mmdebstrap to make a build image with'; return 1; }
     tests/container/make-build-image "$engine" "$build_image" "$work" > "$work/build-image.log" 2>&1 \
         || { problem="cannot make a build image: $(tail -1 "$work/build-image.log")"; return 1; }
 }
 
-# Some machines do not let an engine raise the limits that it raises by default, or have a runtime that does not work.
-# podman reads a configuration file by which the first combination that works is set; docker's daemon has its own.
+# On some machines an engine may not raise resource limits as it does by default, or its default runtime does not work.
+# podman gets a configuration file with the first combination that works; docker's daemon has its own.
 find_run_options() {
     local runs=("$engine" run --rm --entrypoint /bin/true "$build_image")
     if "${runs[@]}" > "$work/run.log" 2>&1; then
@@ -102,7 +103,7 @@ find_run_options() {
     return 1
 }
 
-# A resource limit that this process may give on: its own hard one, and no more than a container needs.
+# The resource limit for containers: this process' hard limit, but no more than a container needs.
 limit() {
     local hard
     hard=$(ulimit -H "$1")

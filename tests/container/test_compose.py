@@ -1,12 +1,12 @@
-"""The compose file: the service, and a container that drives it."""
+"""Tests the compose file: the service and a container that calls it."""
 
 import os
 
 import pytest
 from conftest import ROOT, run, skip
 
-# What the client says of a server that is not there.
-NO_ANSWER = 5
+# The client's exit code when it cannot reach the server.
+UNREACHABLE = 5
 
 
 @pytest.fixture
@@ -21,11 +21,11 @@ def compose():
     running("down", "--timeout", "5")
 
 
-def test_the_test_container_s_verdict_is_the_exit_code(compose):
+def test_exit_code_is_that_of_the_test_container(compose):
     up = ("up", "--build", "--exit-code-from", "test")
     passed = compose(*up)
     assert passed.returncode == 0, passed.stdout[-4000:] + passed.stderr[-4000:]
     assert "found" in passed.stdout + passed.stderr
     compose("down", "--timeout", "5")
     failed = compose("--file", "tests/container/failing.yaml", *up)
-    assert failed.returncode == NO_ANSWER, failed.stdout[-4000:] + failed.stderr[-4000:]
+    assert failed.returncode == UNREACHABLE, failed.stdout[-4000:] + failed.stderr[-4000:]

@@ -1,24 +1,25 @@
-"""What the image is, before it runs."""
+"""Inspects the images without running the service."""
 
 import os
 import shutil
 import subprocess
 
-from conftest import ENGINE, IMAGE, ROOT, engine, inspect, measured, run
+from conftest import ENGINE, IMAGE, ROOT, engine, inspect, report_figure, run
 
+# Bytes.
 LARGEST_IMAGE = 60_000_000
 
 
-def test_the_images_are_small():
+def test_images_are_small():
     for image in (IMAGE, "grasp-client"):
         size = int(engine("image", "inspect", "--format", "{{.Size}}", image))
-        measured(f"size of the image {image}", f"{size / 1e6:.1f} MB")
+        report_figure(f"size of the image {image}", f"{size / 1e6:.1f} MB")
         assert 1_000_000 < size < LARGEST_IMAGE
 
 
-def test_the_image_says_how_it_is_run():
+def test_image_declares_user_port_health_check_and_licence():
     user = engine("image", "inspect", "--format", "{{.Config.User}}", IMAGE).split(":")[0]
-    # A number, because Kubernetes' runAsNonRoot knows no names.
+    # Kubernetes' runAsNonRoot needs a number.
     assert user.isdigit() and int(user) > 0
     assert "50051/tcp" in engine("image", "inspect", "--format", "{{.Config.ExposedPorts}}", IMAGE)
     health = engine("image", "inspect", "--format", "{{.Config.Healthcheck}}", IMAGE)
@@ -27,19 +28,19 @@ def test_the_image_says_how_it_is_run():
     assert "org.opencontainers.image.licenses:MIT OR Apache-2.0" in labels
 
 
-def test_there_is_no_shell():
+def test_image_has_no_shell():
     for shell in ("/bin/sh", "/bin/bash", "/busybox/sh"):
         assert run(ENGINE, "run", "--rm", "--entrypoint", shell, IMAGE, "-c", "true").returncode != 0
 
 
-def test_a_changed_source_file_does_not_build_the_dependencies_again(tmp_path):
+def test_source_changes_reuse_the_dependency_layer(tmp_path):
     context = tmp_path / "context"
-    # Not by git, which may not be there: everything but what is generated.
+    # Without git, which may be missing.
     ignored = shutil.ignore_patterns("target", ".git", "node_modules", "__pycache__")
     shutil.copytree(ROOT, context, ignore=ignored)
 
     def build():
-        """The identity of the layer with the dependencies."""
+        """The id of the dependency layer."""
         tag = f"grasp-dependencies-{os.getpid()}"
         arguments = ["--file", "docker/Dockerfile", "--target", "dependencies", "--tag", tag, "."]
         done = subprocess.run(["docker", "build", *arguments], cwd=context, capture_output=True, text=True)
@@ -51,6 +52,6 @@ def test_a_changed_source_file_does_not_build_the_dependencies_again(tmp_path):
     before = build()
     for source in ("server/src/lib.rs", "client/src/main.rs", "server/src/answer.rs"):
         with (context / source).open("a") as file:
-            file.write("// A comment more.\n")
-    (context / "server/src/another.rs").write_text("//! A file more.\n")
+            file.write("// Another comment.\n")
+    (context / "server/src/another.rs").write_text("//! Another file.\n")
     assert build() == before

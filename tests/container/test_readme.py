@@ -1,11 +1,13 @@
-"""Every command of docker/README.md runs as it is printed there, in its order.
+"""Runs every command of docker/README.md in its order, as printed except for ports and container names.
 
-`docker` is the engine under test, and builds get the build image that could be had; see tests/container/run.
+`docker` is the engine under test, and builds use the build image that is available; see tests/container/run. A free
+port and unique names keep the commands apart from whatever else runs on the machine.
 """
 
 import os
 import pathlib
 import re
+import socket
 import time
 
 import pytest
@@ -13,7 +15,8 @@ from conftest import HANGS_AFTER, ROOT, limits_memory, run, skip
 
 README = ROOT / "docker" / "README.md"
 
-# Names of the containers that the commands start.
+# The host port that the page publishes, and the containers that its commands start.
+PUBLISHED = "127.0.0.1:50051"
 CONTAINERS = ("grasp", "grasp-objects")
 
 
@@ -22,15 +25,41 @@ def commands():
     return re.sub(r"\\\n *", "", "".join(blocks)).splitlines()
 
 
+def container_name(printed):
+    return f"{printed}-readme-{os.getpid()}"
+
+
+def isolated(line, port):
+    """The command with the given port and unique container names."""
+    line = line.replace(PUBLISHED, f"127.0.0.1:{port}")
+    names = "|".join(CONTAINERS)
+    return re.sub(rf"(?<= )({names})(?= |$)", lambda name: container_name(name.group()), line)
+
+
+@pytest.fixture(scope="module")
+def port():
+    """A free port of the host."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
 @pytest.fixture(scope="module", autouse=True)
-def no_remains():
-    run("docker", "rm", "--force", *CONTAINERS)
+def removed_containers():
     yield
-    run("docker", "rm", "--force", *CONTAINERS)
+    run("docker", "rm", "--force", *map(container_name, CONTAINERS))
+
+
+def test_commands_are_isolated():
+    line = isolated("docker run --detach --name grasp --publish 127.0.0.1:50051:50051 grasp-server", 4711)
+    assert line == f"docker run --detach --name {container_name('grasp')} --publish 127.0.0.1:4711:50051 grasp-server"
+    line = isolated("docker stop grasp-objects", 4711)
+    assert line == f"docker stop {container_name('grasp-objects')}"
 
 
 @pytest.mark.parametrize("line", commands())
-def test_command(line):
+def test_command(line, port):
+    line = isolated(line, port)
     if line.startswith("docker compose") and not os.environ.get("GRASP_COMPOSE"):
         skip("docker/README.md's compose commands: there is no compose")
     if "--memory" in line and not limits_memory():
@@ -38,26 +67,26 @@ def test_command(line):
         line = re.sub(r" --memory \S+", "", line)
     deadline = time.monotonic() + HANGS_AFTER
     done = run("bash", "-c", line, cwd=ROOT)
-    # A person is slower than the start of the service.
+    # The service may still be starting; a person types more slowly.
     while done.returncode != 0 and "--health-check" in line and time.monotonic() < deadline:
         time.sleep(0.1)
         done = run("bash", "-c", line, cwd=ROOT)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_commands_are_those_that_the_page_is_about():
+def test_page_shows_the_essential_commands():
     printed = "\n".join(commands())
     for part in ("docker build ", "docker run ", "docker exec ", "docker stop ", "docker compose ", "/objects:ro"):
         assert part in printed
 
 
-def test_every_linked_file_is_there():
+def test_linked_files_exist():
     for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", README.read_text()):
         assert (README.parent / pathlib.PurePosixPath(target)).exists(), target
 
 
-def test_the_sum_of_the_default_memory_is_the_server_s():
-    """The figure of the page, by the formula of the page, from the configuration in force."""
+def test_default_memory_matches_the_page():
+    """The page's figure, by the page's formula, from the configuration in force."""
     printed = run("docker", "run", "--rm", "--env", "GRASP_WORKERS=30", "grasp-server", "--print-config").stdout
     value = {key: int(text) for key, text in re.findall(r"^(\w+) = (\d+)$", printed, flags=re.MULTILINE)}
     mib = 1 << 20
@@ -71,5 +100,5 @@ def test_the_sum_of_the_default_memory_is_the_server_s():
         + 32 * 1024 * value["maximum_connections"]
         + 64 * 1024 * (30 + value["io_threads"])
     )
-    told = int(re.search(r"by default (\d+) MiB", README.read_text()).group(1))
-    assert abs(total / mib - told) < 3
+    documented = int(re.search(r"by default (\d+) MiB", README.read_text()).group(1))
+    assert abs(total / mib - documented) < 3

@@ -1,4 +1,4 @@
-"""The service in a container, asked over its published port."""
+"""Calls the service in a container through its published port."""
 
 import datetime
 import json
@@ -6,15 +6,15 @@ import pathlib
 import re
 import time
 
-from conftest import ENGINE, engine, grasp, inspect, measured, run, skip, wait_for
+from conftest import ENGINE, engine, grasp, inspect, report_figure, run, skip, wait_for
 
 FIND = ["find", "--holdout", "scissors-hold1", "--seed", "7", "--reproducible", "--budget", "10s", "--json"]
 
 
-def test_the_client_is_answered(start):
+def test_answers_the_client(start):
     begin = time.monotonic()
     service = start()
-    measured("time from the engine's start to an answer", f"{1000 * (time.monotonic() - begin):.0f} ms")
+    report_figure("time from the engine's start to an answer", f"{1000 * (time.monotonic() - begin):.0f} ms")
     address = service.address()
     assert grasp(address, "health").stdout.strip() == "serving"
     listed = json.loads(grasp(address, "objects", "list", "--json").stdout)
@@ -25,7 +25,7 @@ def test_the_client_is_answered(start):
 
 
 def is_nearly(one, other):
-    """The same but for the last digits: another C library rounds sines otherwise, and only one platform is promised."""
+    """Equal but for the last digits: C libraries round sines differently, and answers repeat on one platform only."""
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(is_nearly(one[key], other[key]) for key in one)
     if isinstance(one, list):
@@ -35,54 +35,54 @@ def is_nearly(one, other):
     return one == other
 
 
-def test_a_seed_gives_the_same_grasp_as_outside(start, outside):
-    # A server that has just started may still be reading its atlases.
-    answers = [grasp(address, *FIND, "--no-atlas") for address in (start().address(), outside)]
+def test_seed_gives_the_same_grasp_as_on_the_host(start, host_server):
+    # A server that has just started may still be loading its atlases.
+    answers = [grasp(address, *FIND, "--no-atlas") for address in (start().address(), host_server)]
     assert [answer.returncode for answer in answers] == [0, 0]
-    within, without = (json.loads(answer.stdout)["grasp"] for answer in answers)
-    assert is_nearly(within, without), (within, without)
+    in_container, on_host = (json.loads(answer.stdout)["grasp"] for answer in answers)
+    assert is_nearly(in_container, on_host), (in_container, on_host)
 
 
-def test_it_runs_without_any_privilege(start):
+def test_runs_without_privileges(start):
     service = start()
     process = inspect(service.name, "{{.State.Pid}}")
     status = pathlib.Path("/proc", process, "status")
     if not status.exists() or "grasp-server" not in status.read_text():
-        skip("privileges of the process: its /proc is not on this machine")
+        skip("privileges of the process: its /proc is not visible from the host")
     fields = dict(line.split(":\t", 1) for line in status.read_text().splitlines() if ":\t" in line)
     assert "0" not in fields["Uid"].split()
     assert int(fields["CapEff"], 16) == 0 and int(fields["CapPrm"], 16) == 0 and int(fields["CapBnd"], 16) == 0
     assert fields["NoNewPrivs"].strip() == "1"
-    measured("resident memory at rest", fields["VmRSS"].strip())
+    report_figure("resident memory at rest", fields["VmRSS"].strip())
 
 
-def test_the_health_check_works_from_inside(start):
+def test_health_check_works_inside_the_container(start):
     service = start()
     check = run(ENGINE, "exec", service.name, "/grasp-server", "--health-check")
     assert (check.returncode, check.stdout + check.stderr) == (0, "")
-    # Where nobody listens.
+    # A port where nothing listens.
     check = run(ENGINE, "exec", "--env", "GRASP_LISTEN=0.0.0.0:9", service.name, "/grasp-server", "--health-check")
     assert check.returncode == 1
     assert "cannot connect to 127.0.0.1:9" in check.stdout + check.stderr
 
 
-def test_the_engine_finds_it_healthy(start):
+def test_engine_reports_it_healthy(start):
     service = start()
     if ENGINE == "podman":
-        # podman leaves the timing to systemd, which need not be there.
+        # podman schedules health checks with systemd, which may be missing.
         engine("healthcheck", "run", service.name)
     wait_for("health", lambda: "healthy" == inspect(service.name, "{{.State.Health.Status}}"))
 
 
-def test_the_environment_configures_it(start):
+def test_environment_configures_the_service(start):
     service = start(environment={"GRASP_MAXIMUM_OBJECT_TRIANGLES": "4", "GRASP_LISTEN": "0.0.0.0:50051"})
     mesh = "assets/objects/remote.obj"
-    refused = grasp(service.address(), "objects", "create", "--obj", mesh, "--mass", "0.1", "mesh")
-    assert refused.returncode == 4
-    assert "more than 4 " in refused.stderr
+    rejected = grasp(service.address(), "objects", "create", "--obj", mesh, "--mass", "0.1", "mesh")
+    assert rejected.returncode == 4
+    assert "more than 4 " in rejected.stderr
 
 
-def test_a_folder_of_objects_is_served(start, objects, tmp_path):
+def test_serves_a_mounted_folder_of_objects(start, objects, tmp_path):
     service = start(mounts={objects: "/objects"})
     about = json.loads(grasp(service.address(), "objects", "get", "my-remote", "--json").stdout)
     built_in = json.loads(grasp(service.address(), "objects", "get", "remote", "--json").stdout)
@@ -90,7 +90,7 @@ def test_a_folder_of_objects_is_served(start, objects, tmp_path):
     found = []
     for name in ("objects/my-remote", "objects/remote"):
         request = tmp_path / "request.json"
-        # The built-in one has an atlas, the other one has none yet; and it has the friction of its file.
+        # Only the built-in one has an atlas by now, and their friction differs.
         asked = {"object": name, "seed": "3", "reproducible": True, "atlas": "none", "friction": 0.6}
         request.write_text(json.dumps({**asked, "budget_seconds": 10}))
         answer = grasp(service.address(), "find", "--request", request, "--json")
@@ -99,7 +99,7 @@ def test_a_folder_of_objects_is_served(start, objects, tmp_path):
     assert found[0] == found[1]
 
 
-def test_every_line_of_the_log_is_json_and_it_is_ready_soon(start):
+def test_log_lines_are_json(start):
     service = start()
     grasp(service.address(), *FIND)
     grasp(service.address(), "objects", "get", "nothing")
@@ -109,27 +109,27 @@ def test_every_line_of_the_log_is_json_and_it_is_ready_soon(start):
     messages = [line["message"] for line in lines]
     assert "serving" in messages and "stopped" in messages
     assert sum("FindGrasp" in json.dumps(line) for line in lines) == 1
-    # The engine tells nanoseconds, Python reads microseconds.
+    # The engine prints nanoseconds, Python parses microseconds.
     serving = lines[messages.index("serving")]["timestamp"]
     moments = [re.sub(r"(\.\d{6})\d*", r"\1", text.strip('"')) for text in (started, serving)]
     begin, ready = (datetime.datetime.fromisoformat(moment.replace("Z", "+00:00")) for moment in moments)
-    measured("from the start of the container to readiness", f"{1000 * (ready - begin).total_seconds():.0f} ms")
+    report_figure("from the start of the container to readiness", f"{1000 * (ready - begin).total_seconds():.0f} ms")
 
 
-def test_killed_it_can_be_started_again(start):
+def test_restarts_after_being_killed(start):
     service = start()
     engine("kill", "--signal", "KILL", service.name)
-    wait_for("the end", lambda: not service.is_running())
+    wait_for("the exit", lambda: not service.is_running())
     assert service.exit_code() == 137
     engine("start", service.name)
     service.wait_until_it_serves()
     assert grasp(service.address(), *FIND).returncode == 0
 
 
-def test_sigterm_ends_it_cleanly(start):
+def test_sigterm_stops_it_cleanly(start):
     service = start()
     begin = time.monotonic()
     engine("kill", "--signal", "TERM", service.name)
     engine("wait", service.name)
-    measured("from SIGTERM to the end, idle", f"{1000 * (time.monotonic() - begin):.0f} ms")
+    report_figure("from SIGTERM to exit, idle", f"{1000 * (time.monotonic() - begin):.0f} ms")
     assert service.exit_code() == 0

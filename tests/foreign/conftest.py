@@ -1,4 +1,4 @@
-"""A real server for the foreign clients, and the code that grpcio-tools generated from the contract."""
+"""A running server for the foreign clients, and the code that grpcio-tools generated from the contract."""
 
 import os
 import pathlib
@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 
@@ -14,26 +15,26 @@ sys.path.insert(0, str(ROOT / "target" / "foreign"))
 
 
 def start_server(*arguments):
-    """Starts the release binary on a free port; returns the process and its host:port."""
+    """Starts the release binary, which should listen on port 0; returns the process and its host:port."""
     process = subprocess.Popen(
         [ROOT / "target/release/grasp-server", *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "NO_COLOR": "1", "RUST_LOG": "info"},
+        env={**os.environ, "NO_COLOR": "1", "GRASP_LOG": "info"},
     )
     for line in process.stderr:
-        if match := re.search(r"(?:127\.0\.0\.1|\[::1\]):(\d+)", line):
+        if match := re.search(r"(?:127\.0\.0\.1|\[::1\]):\d+", line):
+            # Drains the rest of the log, or a full pipe would block the server.
+            threading.Thread(target=process.stderr.read, daemon=True).start()
             return process, match.group(0)
-    raise RuntimeError(f"the server ended with {process.wait()} before it named its address")
+    raise RuntimeError(f"the server exited with {process.wait()} before it logged its address")
 
 
 def stop_server(process):
-    """SIGTERM must end an idle server cleanly, and soon."""
+    """Checks that SIGTERM stops an idle server promptly and cleanly."""
     process.send_signal(signal.SIGTERM)
-    # The log must be drained, or a full pipe would hold the server up.
-    process.communicate(timeout=10)
-    assert process.returncode == 0
+    assert process.wait(timeout=10) == 0
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""The service as grpcio, the C++ implementation of gRPC, sees it."""
+"""Calls the service through grpcio, which wraps gRPC's C++ implementation."""
 
 import time
 
@@ -13,7 +13,7 @@ from grpc_status import rpc_status
 from grasp.v1 import geometry_pb2, grasp_service_pb2, grasp_service_pb2_grpc, hand_pb2
 from grasp.v1 import object_service_pb2, object_service_pb2_grpc
 
-# A closed box of 2 x 2 x 12 cm, in centimetres, made here: corner i has bit k of i on axis k.
+# A closed box of 2 x 2 x 12 cm, in centimetres; bit k of i gives corner i's coordinate on axis k.
 BOX_OBJ = "\n".join(
     [f"v {2 * (i & 1) - 1} {2 * (i >> 1 & 1) - 1} {12 * (i >> 2 & 1) - 6}" for i in range(8)]
     + ["f 1 3 4 2", "f 5 6 8 7", "f 1 2 6 5", "f 3 7 8 4", "f 1 5 7 3", "f 2 4 8 6"]
@@ -21,7 +21,7 @@ BOX_OBJ = "\n".join(
 
 
 def details(error, kind):
-    """The standard details of the given kind that an error carries."""
+    """The error's standard details of the given kind."""
     found = []
     for detail in rpc_status.from_call(error).details:
         message = kind()
@@ -40,28 +40,28 @@ def objects(channel):
     return object_service_pb2_grpc.ObjectServiceStub(channel)
 
 
-def test_health_is_serving_overall_and_by_service(channel):
+def test_health_reports_serving_overall_and_per_service(channel):
     health = health_pb2_grpc.HealthStub(channel)
     for service in ["", "grasp.v1.GraspService", "grasp.v1.ObjectService"]:
         answer = health.Check(health_pb2.HealthCheckRequest(service=service))
         assert answer.status == health_pb2.HealthCheckResponse.SERVING
-    with pytest.raises(grpc.RpcError) as refused:
+    with pytest.raises(grpc.RpcError) as rejected:
         health.Check(health_pb2.HealthCheckRequest(service="grasp.v1.NoSuchService"))
-    assert refused.value.code() == grpc.StatusCode.NOT_FOUND
+    assert rejected.value.code() == grpc.StatusCode.NOT_FOUND
 
 
-def test_reflection_names_the_services(channel):
+def test_reflection_lists_the_services(channel):
     database = ProtoReflectionDescriptorDatabase(channel)
     assert {"grasp.v1.GraspService", "grasp.v1.ObjectService", "grpc.health.v1.Health"} <= set(database.get_services())
 
 
-def test_the_built_in_objects_have_the_masses_of_table_5_1(objects):
+def test_built_in_objects_have_the_masses_of_table_5_1(objects):
     masses = {o.name: o.mass_kg for o in objects.ListObjects(object_service_pb2.ListObjectsRequest()).objects}
     for name, mass in {"scissors": 0.050, "scalpel": 0.020, "remote": 0.130}.items():
         assert masses[f"objects/{name}"] == pytest.approx(mass)
 
 
-def test_pages_cover_all_objects_once(objects):
+def test_pages_list_each_object_once(objects):
     names, token = [], ""
     while True:
         page = objects.ListObjects(object_service_pb2.ListObjectsRequest(page_size=2, page_token=token))
@@ -74,7 +74,7 @@ def test_pages_cover_all_objects_once(objects):
     assert len(names) >= 3
 
 
-def test_a_created_box_is_measured_right_and_can_be_grasped(objects, grasps):
+def test_created_box_has_its_dimensions_and_can_be_grasped(objects, grasps):
     created = objects.CreateObject(
         object_service_pb2.CreateObjectRequest(object_id="box", obj=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1)
     ).object
@@ -94,22 +94,22 @@ def test_a_created_box_is_measured_right_and_can_be_grasped(objects, grasps):
     assert {c.digit for c in grasp.contacts} >= {hand_pb2.DIGIT_THUMB}
     for contact in grasp.contacts:
         p, n = contact.object_position, contact.object_normal
-        # On the surface of the box, by its closed form.
+        # On the surface of the box: its closed form is 1.
         assert max(abs(p.x) / 0.01, abs(p.y) / 0.01, abs(p.z) / 0.06) == pytest.approx(1, abs=1e-3)
         assert n.x**2 + n.y**2 + n.z**2 == pytest.approx(1, abs=1e-4)
 
 
-def test_creating_the_same_object_twice_is_refused(objects):
+def test_rejects_an_object_id_that_exists(objects):
     request = object_service_pb2.CreateObjectRequest(
         object_id="twice", obj=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1
     )
     objects.CreateObject(request)
-    with pytest.raises(grpc.RpcError) as refused:
+    with pytest.raises(grpc.RpcError) as rejected:
         objects.CreateObject(request)
-    assert refused.value.code() == grpc.StatusCode.ALREADY_EXISTS
+    assert rejected.value.code() == grpc.StatusCode.ALREADY_EXISTS
 
 
-def test_every_violation_is_named_at_once(grasps):
+def test_reports_all_violations_at_once(grasps):
     request = grasp_service_pb2.FindGraspRequest(
         object="objects/remote",
         client_from_object=geometry_pb2.Pose(
@@ -118,25 +118,25 @@ def test_every_violation_is_named_at_once(grasps):
         budget=Duration(seconds=-1),
         up=geometry_pb2.Vector3(),
     )
-    with pytest.raises(grpc.RpcError) as refused:
+    with pytest.raises(grpc.RpcError) as rejected:
         grasps.FindGrasp(request)
-    assert refused.value.code() == grpc.StatusCode.INVALID_ARGUMENT
-    (bad_request,) = details(refused.value, error_details_pb2.BadRequest)
+    assert rejected.value.code() == grpc.StatusCode.INVALID_ARGUMENT
+    (bad_request,) = details(rejected.value, error_details_pb2.BadRequest)
     fields = {violation.field for violation in bad_request.field_violations}
     assert {"client_from_object.position", "client_from_object.orientation", "budget", "up"} <= fields
-    assert details(refused.value, error_details_pb2.ErrorInfo)
+    assert details(rejected.value, error_details_pb2.ErrorInfo)
 
 
-def test_an_unknown_object_is_not_found_by_name(grasps):
-    with pytest.raises(grpc.RpcError) as refused:
+def test_unknown_object_is_not_found(grasps):
+    with pytest.raises(grpc.RpcError) as rejected:
         grasps.FindGrasp(grasp_service_pb2.FindGraspRequest(object="objects/teapot"))
-    assert refused.value.code() == grpc.StatusCode.NOT_FOUND
-    (resource,) = details(refused.value, error_details_pb2.ResourceInfo)
+    assert rejected.value.code() == grpc.StatusCode.NOT_FOUND
+    (resource,) = details(rejected.value, error_details_pb2.ResourceInfo)
     assert resource.resource_name == "objects/teapot"
 
 
 def unanswerable(**settings):
-    """A holdout that no attempt can satisfy."""
+    """A request that no attempt can satisfy."""
     return grasp_service_pb2.FindGraspRequest(object="objects/slippery", seed=7, **settings)
 
 
@@ -148,13 +148,13 @@ def slippery(objects):
             obj=BOX_OBJ.encode(),
             unit_metres=0.01,
             mass_kg=0.1,
-            # All twelve triangles are forbidden: nothing can be touched.
+            # All twelve triangles are forbidden, so nothing can be touched.
             forbidden=object_service_pb2.ForbiddenSurfaces(triangles=range(12)),
         )
     )
 
 
-def test_an_exhausted_budget_is_an_answer_with_a_report(grasps, slippery):
+def test_exhausted_budget_returns_a_report(grasps, slippery):
     answer = grasps.FindGrasp(unanswerable(budget=Duration(nanos=50_000_000)), timeout=5)
     assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
     assert not answer.HasField("grasp")
@@ -162,14 +162,14 @@ def test_an_exhausted_budget_is_an_answer_with_a_report(grasps, slippery):
     assert answer.report.HasField("nearest_miss")
 
 
-def test_the_deadline_bounds_the_search(grasps, slippery):
+def test_deadline_bounds_the_search(grasps, slippery):
     answer = grasps.FindGrasp(unanswerable(budget=Duration(seconds=9)), timeout=1)
     assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
     budget = answer.report.budget
     assert budget.seconds + budget.nanos * 1e-9 < 1
 
 
-def test_a_cancelled_call_frees_the_server(grasps, slippery):
+def test_cancelled_call_frees_the_server(grasps, slippery):
     call = grasps.FindGrasp.future(unanswerable(budget=Duration(seconds=9)))
     time.sleep(0.2)
     call.cancel()
@@ -177,8 +177,8 @@ def test_a_cancelled_call_frees_the_server(grasps, slippery):
     assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
 
 
-def until_atlas_is_complete(objects, name):
-    """The contract promises the same answer from then on: before, the atlas is read beside the first calls."""
+def wait_for_complete_atlas(objects, name):
+    """Answers are reproducible from then on; until then the atlas is being read in the background."""
     deadline = time.monotonic() + 60
     request = object_service_pb2.GetObjectRequest(name=name)
     while not objects.GetObject(request).object.atlas.complete:
@@ -186,8 +186,8 @@ def until_atlas_is_complete(objects, name):
         time.sleep(0.05)
 
 
-def test_a_reproducible_answer_is_the_same_twice(objects, grasps):
-    until_atlas_is_complete(objects, "objects/scissors")
+def test_reproducible_answer_repeats(objects, grasps):
+    wait_for_complete_atlas(objects, "objects/scissors")
     request = grasp_service_pb2.FindGraspRequest(
         object="objects/scissors", budget=Duration(seconds=9), seed=3, reproducible=True
     )

@@ -1,10 +1,10 @@
-"""What keeps the service from starting is told, and ends it with 1."""
+"""The service exits with 1 and logs every reason why it cannot start."""
 
 import json
 
 from conftest import grasp, limits_memory, skip
 
-# Settings for a container of 256 MiB, as docker/README.md has them.
+# The settings that docker/README.md gives for a container of 256 MiB.
 SMALL = {
     "GRASP_CACHE_BYTES": str(64 << 20),
     "GRASP_MAXIMUM_UPLOADS": "1",
@@ -13,18 +13,18 @@ SMALL = {
 }
 
 
-def test_every_bad_setting_is_named(refused):
-    log = refused(environment={"GRASP_WORKERS": "0", "GRASP_DEFAULT_RIG": "robot", "GRASP_LISTEN": "here"})
+def test_logs_every_invalid_setting(log_of_rejected):
+    log = log_of_rejected(environment={"GRASP_WORKERS": "0", "GRASP_DEFAULT_RIG": "robot", "GRASP_LISTEN": "here"})
     for part in ("workers is 0", 'default_rig is "robot"', 'listen is "here"'):
         assert part in log, log
 
 
-def test_everything_wrong_with_a_folder_of_objects_is_told(refused, objects):
+def test_logs_every_error_in_the_objects_folder(log_of_rejected, objects):
     (objects / "my-remote.toml").write_text("mass_kg = -1\ncolour = 'red'\n")
     (objects / "orphan.toml").write_text("mass_kg = 1\n")
     (objects / "scissors.obj").write_text("v 0 0 0\n")
     (objects / "scissors.toml").write_text("mass_kg = 1\n")
-    log = refused(mounts={objects: "/objects"})
+    log = log_of_rejected(mounts={objects: "/objects"})
     error = json.loads(log.splitlines()[-1])["error"]
     for part in (
         "my-remote.toml: mass_kg: is -1; it must be more than 0",
@@ -35,25 +35,25 @@ def test_everything_wrong_with_a_folder_of_objects_is_told(refused, objects):
         assert part in error, error
 
 
-def test_a_folder_that_is_not_mounted_is_told(refused):
-    error = json.loads(refused(environment={"GRASP_OBJECTS_DIRECTORY": "/elsewhere"}).splitlines()[-1])["error"]
+def test_logs_a_missing_objects_folder(log_of_rejected):
+    error = json.loads(log_of_rejected(environment={"GRASP_OBJECTS_DIRECTORY": "/elsewhere"}).splitlines()[-1])["error"]
     assert error.startswith("objects_directory is /elsewhere; "), error
 
 
-def test_too_little_memory_is_told(refused):
-    # By a control group where the engine may set one, else by a resource limit.
+def test_logs_too_little_memory(log_of_rejected):
+    # A control group if the engine can set one, else a resource limit.
     limit, source = ["--memory", "256m"], "memory"
     if not limits_memory():
         limit, source = ["--ulimit", f"data={256 << 20}:{256 << 20}"], "RLIMIT_DATA"
-        print("the engine cannot limit memory by a control group here; by RLIMIT_DATA instead")
-    log = refused(*limit)
+        print("the engine cannot limit memory with a control group here; using RLIMIT_DATA")
+    log = log_of_rejected(*limit)
     error = json.loads(log.splitlines()[-1])["error"]
     assert "too little memory: the limit is 256 MiB" in error and source in error, error
     for part in ("cache_bytes is ", "maximum_uploads is ", "maximum_searches is "):
         assert part in error, error
 
 
-def test_settings_that_fit_the_memory_survive_their_load(start, tmp_path):
+def test_small_settings_survive_their_largest_load(start, tmp_path):
     if not limits_memory():
         skip("load within a memory limit: the engine cannot set one here")
     service = start("--memory", "256m", environment=SMALL)
@@ -62,7 +62,7 @@ def test_settings_that_fit_the_memory_survive_their_load(start, tmp_path):
     for number in range(4):
         created = grasp(service.address(), "objects", "create", "--obj", mesh, "--mass", "1", f"large-{number}")
         assert created.returncode == 0, created.stderr
-    # One of them fits the cache: the others were evicted.
+    # The cache holds one of them; the others were evicted.
     listed = json.loads(grasp(service.address(), "objects", "list", "--json").stdout)["objects"]
     assert sum(thing["name"].startswith("objects/large-") for thing in listed) == 1
     assert service.is_running()
