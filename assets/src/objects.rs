@@ -3,10 +3,12 @@
 use std::sync::{Arc, LazyLock};
 
 use glam::{Quat, Vec3};
+use grasp_import::{
+    MeshLimits,
+    obj::{ObjMesh, read_obj},
+};
 use grasp_synthesis::model::object::GraspObject;
 use serde::{Deserialize, Serialize};
-
-use crate::obj::{ObjLimits, ObjMesh, read_obj};
 
 /// A built-in object.
 #[derive(Clone, Debug)]
@@ -97,7 +99,7 @@ const FILES: [[&str; 3]; 3] = [
 ];
 
 /// The built-in meshes are small and known; this only keeps a slip of the generator from going unnoticed.
-const LIMITS: ObjLimits = ObjLimits {
+const LIMITS: MeshLimits = MeshLimits {
     bytes: 1 << 20,
     vertices: 10_000,
     triangles: 10_000,

@@ -1,4 +1,4 @@
-//! The built-in holdouts as requests (feature `cli`).
+//! The built-in holdouts as requests (feature `built-in`).
 
 use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;

@@ -28,7 +28,7 @@
 //! The command line `grasp` (feature `cli`, on by default) is built on this library; games build it with
 //! `default-features = false`.
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "built-in")]
 pub mod built_in;
 mod client;
 mod constraints;

@@ -9,10 +9,8 @@ use std::{
     time::Duration,
 };
 
-use grasp_assets::{
-    hands::{self, RIG_NAMES},
-    obj::ObjLimits,
-};
+use grasp_assets::hands::{self, RIG_NAMES};
+use grasp_import::MeshLimits;
 use grasp_proto::v1::{grasp_service_server::GraspServiceServer, object_service_server::ObjectServiceServer};
 use grasp_synthesis::model::hand::Handedness;
 use tokio::{net::TcpListener, sync::Semaphore};
@@ -155,7 +153,7 @@ impl Server {
     pub fn new(config: Config) -> Result<Self, ServeError> {
         prepare_hands();
         let triangles = config.maximum_object_triangles.get();
-        let obj_limits = ObjLimits {
+        let obj_limits = MeshLimits {
             bytes: config.maximum_object_bytes.get(),
             vertices: triangles,
             triangles,

@@ -50,7 +50,7 @@ def test_source_changes_reuse_the_dependency_layer(tmp_path):
         return identity
 
     before = build()
-    for source in ("server/src/lib.rs", "client/src/main.rs", "server/src/answer.rs"):
+    for source in ("server/src/lib.rs", "client/cli/src/main.rs", "server/src/answer.rs"):
         with (context / source).open("a") as file:
             file.write("// Another comment.\n")
     (context / "server/src/another.rs").write_text("//! Another file.\n")

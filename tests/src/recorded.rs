@@ -9,7 +9,7 @@ use std::{
 };
 
 use glam::{Quat, Vec3};
-use grasp_assets::obj::{ObjLimits, read_obj};
+use grasp_import::{MeshLimits, obj::read_obj};
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
@@ -43,7 +43,7 @@ pub fn data_folder_or_skip(test: &str) -> Option<PathBuf> {
 /// An object of OBJ text in metres, with the mesh as the server reads it and the centre of mass at its origin: enough to
 /// place givers on. `mass` is in kilograms.
 pub fn object_of(obj: &[u8], mass: f32) -> GraspObject {
-    let limits = ObjLimits {
+    let limits = MeshLimits {
         bytes: 1 << 24,
         vertices: 1 << 20,
         triangles: 1 << 20,

@@ -25,7 +25,7 @@ mod surface;
 pub mod views;
 
 pub use camera::Camera;
-pub use glb::to_glb;
+pub use glb::{GlbWriter, to_glb};
 pub use handover::{ContactMark, HandoverScene, PosedHand};
 pub use image::{Image, contact_sheet, side_by_side};
 pub use render::{RenderOptions, render, render_png};

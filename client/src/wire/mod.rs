@@ -3,14 +3,16 @@
 //! Functions named `*_to_wire` cannot fail: the server judges requests. Functions named `*_from_wire` refuse answers
 //! that break the contract, with the path of the offending field.
 
-mod constraints;
-mod geometry;
-mod hand;
-mod object;
-mod search;
+mod constraint_codec;
+mod geometry_codec;
+mod hand_codec;
+mod object_codec;
+mod search_codec;
 
-pub(crate) use object::{health_from_wire, new_object_to_wire, object_from_wire, object_page_from_wire};
-pub(crate) use search::{find_answer_from_wire, find_request_to_wire};
+pub(crate) use object_codec::{
+    health_from_wire, new_object_to_wire, object_from_wire, object_page_from_wire,
+};
+pub(crate) use search_codec::{find_answer_from_wire, find_request_to_wire};
 
 use crate::error::ClientError;
 

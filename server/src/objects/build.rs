@@ -3,7 +3,10 @@
 use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
-use grasp_assets::obj::{ObjLimits, ObjMesh, read_obj};
+use grasp_import::{
+    MeshLimits,
+    obj::{ObjMesh, read_obj},
+};
 use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
 use super::{
@@ -33,7 +36,7 @@ const LISTED_GROUPS: usize = 12;
 /// [`ServiceError::Invalid`] with `violations` and everything else that is wrong.
 pub(crate) fn build_object(
     fields: ObjectFields,
-    limits: ObjLimits,
+    limits: MeshLimits,
     mut violations: Violations,
 ) -> Result<StoredObject, ServiceError> {
     if fields.obj.is_empty() || fields.obj.len() > limits.bytes {
@@ -161,7 +164,7 @@ mod tests {
 
     use super::*;
 
-    const LIMITS: ObjLimits = ObjLimits {
+    const LIMITS: MeshLimits = MeshLimits {
         bytes: 1000,
         vertices: 10,
         triangles: 10,
@@ -194,7 +197,7 @@ mod tests {
         assert!(build_object(fields(&[5]), LIMITS, Violations::default()).is_err());
     }
 
-    const ROOMY: ObjLimits = ObjLimits {
+    const ROOMY: MeshLimits = MeshLimits {
         bytes: 1 << 16,
         vertices: 1000,
         triangles: 1000,

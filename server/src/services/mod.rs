@@ -5,7 +5,7 @@ mod object_service;
 
 use std::sync::Arc;
 
-use grasp_assets::obj::ObjLimits;
+use grasp_import::MeshLimits;
 use grasp_synthesis::base::mechanisms::Mechanisms;
 
 pub(crate) use grasp_service::GraspHandler;
@@ -25,7 +25,7 @@ pub(crate) struct Shared {
     /// Bounds on search times.
     pub budgets: BudgetLimits,
     /// Bounds on meshes.
-    pub obj_limits: ObjLimits,
+    pub obj_limits: MeshLimits,
     /// Rig of the receiving hand if a request names none.
     pub default_rig: String,
     /// The mechanisms that searches run.

@@ -1,6 +1,7 @@
-//! Writes a skinned hand as binary glTF 2.0: 25 joints with `WebXR` names, -Z along the bones, in the wrist's frame.
+//! A skinned hand as binary glTF 2.0: 25 joints with `WebXR` names, -Z along the bones, in the wrist's frame.
 
 use glam::{Mat4, Vec3};
+use grasp_scene::GlbWriter;
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
@@ -10,58 +11,7 @@ use grasp_synthesis::{
 };
 use serde_json::{Value, json};
 
-/// glTF's numbers for component types and buffer targets.
-const UNSIGNED_BYTE: u32 = 5121;
-const UNSIGNED_SHORT: u32 = 5123;
-const FLOAT: u32 = 5126;
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
-
-/// The buffer of a GLB file with its views and accessors.
-#[derive(Default)]
-struct Buffer {
-    bytes: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-}
-
-impl Buffer {
-    /// Appends a block and returns the index of its accessor.
-    fn add(
-        &mut self,
-        bytes: &[u8],
-        count: usize,
-        component: u32,
-        kind: &str,
-        target: Option<u32>,
-        bounds: Option<(Vec3, Vec3)>,
-    ) -> usize {
-        let mut view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
-        if let Some(target) = target {
-            view["target"] = json!(target);
-        }
-        self.bytes.extend_from_slice(bytes);
-        // Every block starts at a multiple of four.
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let mut accessor = json!({
-            "bufferView": self.views.len(), "componentType": component, "count": count, "type": kind,
-        });
-        if let Some((min, max)) = bounds {
-            accessor["min"] = json!(min.to_array());
-            accessor["max"] = json!(max.to_array());
-        }
-        self.views.push(view);
-        self.accessors.push(accessor);
-        self.accessors.len() - 1
-    }
-}
-
-/// Little-endian bytes of floats.
-fn float_bytes(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
-    values.into_iter().flat_map(f32::to_le_bytes).collect()
-}
-
-/// The joint that carries a joint, by `OpenXR` index; the wrist is the root.
+/// The parent of a joint, by `OpenXR` index; the wrist is the root.
 fn parent(joint: usize) -> usize {
     if index::FIRST_OF_DIGIT.contains(&joint) {
         index::WRIST
@@ -80,62 +30,24 @@ pub(super) fn hand_glb(name: &str, skin: &Skin) -> Vec<u8> {
         .iter()
         .map(|&p| wrist_from_bind.transform_point(p))
         .collect();
-    let mut buffer = Buffer::default();
-    let bounds = positions
-        .iter()
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
-            (low.min(p), high.max(p))
-        });
-    let count = positions.len();
-    let vec3_bytes = |vectors: &[Vec3]| float_bytes(vectors.iter().flat_map(Vec3::to_array));
-    let mut vertex = |bytes: &[u8], component, kind, bounds| {
-        buffer.add(bytes, count, component, kind, Some(ARRAY_BUFFER), bounds)
-    };
-    let position = vertex(&vec3_bytes(&positions), FLOAT, "VEC3", Some(bounds));
-    let normal = vertex(
-        &vec3_bytes(&vertex_normals(&positions, &skin.triangles)),
-        FLOAT,
-        "VEC3",
-        None,
-    );
+    let mut file = GlbWriter::default();
+    let position = file.positions(&positions);
+    let normal = file.vectors(&vertex_normals(&positions, &skin.triangles));
     // glTF counts the joints of the skin, which start with the wrist.
-    let joint_bytes: Vec<u8> = skin
+    let joint_indices: Vec<[u8; 4]> = skin
         .joint_indices
         .iter()
-        .flatten()
-        .map(|&joint| joint.saturating_sub(1))
+        .map(|joints| joints.map(|joint| joint.saturating_sub(1)))
         .collect();
-    let joints = vertex(&joint_bytes, UNSIGNED_BYTE, "VEC4", None);
-    let weights = vertex(
-        &float_bytes(skin.weights.iter().flatten().copied()),
-        FLOAT,
-        "VEC4",
-        None,
-    );
-    let corners: Vec<u8> = skin
-        .triangles
+    let joints = file.joints(&joint_indices);
+    let weights = file.weights(&skin.weights);
+    let corners: Vec<u16> = skin.triangles.iter().flatten().map(|&v| v as u16).collect();
+    let indices = file.short_indices(&corners);
+    let inverse_bind_matrices: Vec<Mat4> = wrist_from_joint[1..]
         .iter()
-        .flatten()
-        .flat_map(|&v| (v as u16).to_le_bytes())
+        .map(|&pose| inverse_bind(pose))
         .collect();
-    let indices = buffer.add(
-        &corners,
-        3 * skin.triangles.len(),
-        UNSIGNED_SHORT,
-        "SCALAR",
-        Some(ELEMENT_ARRAY_BUFFER),
-        None,
-    );
-    let inverse_binds = buffer.add(
-        &float_bytes(
-            (1..JOINT_COUNT).flat_map(|joint| inverse_bind(wrist_from_joint[joint]).to_cols_array()),
-        ),
-        JOINT_COUNT - 1,
-        FLOAT,
-        "MAT4",
-        None,
-        None,
-    );
+    let inverse_binds = file.matrices(&inverse_bind_matrices);
     let nodes = nodes(name, &wrist_from_joint);
     let document = json!({
         "asset": { "version": "2.0", "generator": "grasp-assets-generator" },
@@ -164,11 +76,8 @@ pub(super) fn hand_glb(name: &str, skin: &Skin) -> Vec<u8> {
                 "baseColorFactor": [0.72, 0.47, 0.36, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.65,
             },
         }],
-        "buffers": [{ "byteLength": buffer.bytes.len() }],
-        "bufferViews": buffer.views,
-        "accessors": buffer.accessors,
     });
-    container(document.to_string().into_bytes(), buffer.bytes)
+    file.finish(document)
 }
 
 /// The nodes: joint n is node n - 1, the skinned mesh comes last.
@@ -219,21 +128,4 @@ fn vertex_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
         .into_iter()
         .map(|normal| (1e6 * normal).normalize_or(Vec3::Z))
         .collect()
-}
-
-/// The GLB container: header, JSON chunk padded with spaces, binary chunk padded with zeros.
-fn container(mut document: Vec<u8>, mut binary: Vec<u8>) -> Vec<u8> {
-    document.resize(document.len().next_multiple_of(4), b' ');
-    binary.resize(binary.len().next_multiple_of(4), 0);
-    let length = 12 + 8 + document.len() + 8 + binary.len();
-    let mut glb = Vec::with_capacity(length);
-    glb.extend_from_slice(b"glTF");
-    glb.extend_from_slice(&2_u32.to_le_bytes());
-    glb.extend_from_slice(&(length as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", document), (b"BIN\0", binary)] {
-        glb.extend_from_slice(&(chunk.len() as u32).to_le_bytes());
-        glb.extend_from_slice(kind);
-        glb.extend_from_slice(&chunk);
-    }
-    glb
 }

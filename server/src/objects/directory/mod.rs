@@ -13,7 +13,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use grasp_assets::obj::ObjLimits;
+use grasp_import::MeshLimits;
 
 use super::{StoredObject, build::build_object, store::is_built_in};
 use crate::{
@@ -89,7 +89,7 @@ fn listed(problems: &[DirectoryProblem]) -> String {
 /// Everything that is wrong, in the order of the file names.
 pub(crate) fn load(
     path: &Path,
-    limits: ObjLimits,
+    limits: MeshLimits,
     store: StoreLimits,
 ) -> Result<Vec<StoredObject>, DirectoryError> {
     let mut problems = Vec::new();
@@ -126,7 +126,7 @@ pub(crate) fn load(
 }
 
 /// Reads one object.
-fn read_pair(path: &Path, pair: &Pair, limits: ObjLimits) -> Result<StoredObject, Vec<DirectoryProblem>> {
+fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<StoredObject, Vec<DirectoryProblem>> {
     let mut problems = Vec::new();
     let mut read = |name: &str, limit| match read_bounded(&path.join(name), limit) {
         Ok(bytes) => Some(bytes),

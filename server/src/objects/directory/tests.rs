@@ -2,7 +2,7 @@ use std::fs;
 
 use super::*;
 
-const LIMITS: ObjLimits = ObjLimits {
+const LIMITS: MeshLimits = MeshLimits {
     bytes: 1000,
     vertices: 10,
     triangles: 10,

@@ -1,0 +1,82 @@
+//! The progress bar of a run.
+
+use std::time::{Duration, Instant};
+
+use grasp_experiment::{atlases::AtlasProgress, run};
+use indicatif::{HumanDuration, ProgressBar};
+
+use crate::progress_bar::bar;
+
+/// How often the message changes at most: grasps can be found by the thousand a second.
+const MESSAGE_EVERY: Duration = Duration::from_millis(50);
+
+/// A bar that counts valid grasps, after one for each atlas that has to grow.
+#[derive(Debug, Default)]
+pub(super) struct RunProgress {
+    atlas: Option<(&'static str, ProgressBar)>,
+    bar: Option<ProgressBar>,
+    last_message: Option<Instant>,
+}
+
+impl RunProgress {
+    /// Shows how far an atlas is.
+    pub(super) fn grow(&mut self, now: &AtlasProgress) {
+        if self
+            .atlas
+            .as_ref()
+            .is_none_or(|(object, _)| *object != now.object)
+        {
+            let bar = bar(now.total, "{human_pos:>6}/{human_len}");
+            self.atlas = Some((now.object, bar));
+        }
+        if let Some((_, bar)) = &self.atlas {
+            let why = now.refused.map_or_else(String::new, |why| {
+                format!("; the one in the folder is not used: {why}")
+            });
+            bar.set_position(now.proposed);
+            bar.set_message(format!("atlas of {}, {} grips{why}", now.object, now.entries));
+        }
+    }
+
+    /// Shows how far the run is.
+    pub(super) fn show(&mut self, now: &run::Progress) {
+        self.atlas = None;
+        let bar = self
+            .bar
+            .get_or_insert_with(|| bar(now.total, "{human_pos:>6}/{human_len}"));
+        let is_due = self
+            .last_message
+            .is_none_or(|last| last.elapsed() >= MESSAGE_EVERY);
+        if !is_due && now.done < now.total {
+            return;
+        }
+        self.last_message = Some(Instant::now());
+        bar.set_position(now.done);
+        let threads = match now.cell.threads {
+            1 => "1 thread".to_owned(),
+            threads => format!("{threads} threads"),
+        };
+        let left = now.left.map_or_else(String::new, |left| {
+            format!(", about {} left", HumanDuration(left))
+        });
+        bar.set_message(format!(
+            "set {} on {}, {threads}{left}",
+            now.cell.set.name(),
+            now.cell.built_in().name
+        ));
+    }
+
+    /// The report is being written.
+    pub(super) fn report(&self) {
+        if let Some(bar) = &self.bar {
+            bar.set_message("writing the report");
+        }
+    }
+
+    /// Makes room for the results.
+    pub(super) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

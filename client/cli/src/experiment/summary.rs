@@ -1,0 +1,97 @@
+//! What a run prints at its end.
+
+use std::{fmt::Write as _, path::Path};
+
+use grasp_experiment::{
+    claims::{self, Verdict},
+    folder::Folder,
+    report::{Report, verdicts_at_a_glance},
+    table::{Table, Value},
+};
+use serde::Serialize;
+use serde_json::{Map, json};
+
+use crate::{failure::Failure, output, output::Output};
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct Results<'a> {
+    folder: &'a Path,
+    report: &'a Path,
+    ladder: Vec<Map<String, serde_json::Value>>,
+    claims: Vec<Map<String, serde_json::Value>>,
+}
+
+pub(super) fn write(folder: &Folder, report: &Report, output: Output) -> Result<(), Failure> {
+    let results = Results {
+        folder: folder.path(),
+        report: &report.page,
+        ladder: rows(&report.ladder),
+        claims: rows(&claims::table(&report.claims)),
+    };
+    output.write(&results, |_| {
+        format!(
+            "{}\n{}{}\nThe report is {}",
+            drawn(&report.ladder),
+            departures(report),
+            verdicts_at_a_glance(&report.claims),
+            report.page.display()
+        )
+    })
+}
+
+/// The rows of a table as objects.
+fn rows(table: &Table) -> Vec<Map<String, serde_json::Value>> {
+    let as_object = |row: &Vec<Value>| {
+        let pairs = table.header.iter().zip(row).map(|(name, value)| {
+            let value = match value {
+                Value::Text(text) => json!(text),
+                Value::Count(count) => json!(count),
+                Value::Number(number, _) => json!(number),
+                Value::Missing => json!(null),
+            };
+            (name.clone(), value)
+        });
+        pairs.collect()
+    };
+    table.rows.iter().map(as_object).collect()
+}
+
+/// A table for the terminal.
+fn drawn(table: &Table) -> String {
+    let header: Vec<_> = table
+        .header
+        .iter()
+        .enumerate()
+        .map(|(column, name)| {
+            if table.is_numeric(column) {
+                format!(">{name}")
+            } else {
+                name.clone()
+            }
+        })
+        .collect();
+    let header: Vec<_> = header.iter().map(String::as_str).collect();
+    let mut drawn = output::table(&header);
+    for row in &table.rows {
+        drawn.add_row(row.iter().map(Value::to_text));
+    }
+    drawn.to_string()
+}
+
+/// The claims that do not come out, a line each.
+fn departures(report: &Report) -> String {
+    let mut text = String::new();
+    for claim in report
+        .claims
+        .iter()
+        .filter(|claim| claim.verdict == Verdict::Differs)
+    {
+        let _ = writeln!(
+            text,
+            "differs ({}): {}; here {}",
+            claim.source, claim.thesis, claim.run
+        );
+    }
+    text
+}

@@ -1,0 +1,203 @@
+//! How commands fail: exit codes, and errors for people or, with `--json`, for scripts.
+
+use std::{error::Error, fmt::Write as _, io, process::ExitCode};
+
+use grasp_client::{BoxError, ClientError, code_name};
+use serde_json::{Value, json};
+
+/// Why a command failed.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The client library refused or could not do something.
+    Client(ClientError),
+    /// The command line asks for something that does not exist or is not understood.
+    Usage(String),
+    /// A result could not be written to standard output.
+    Output(io::Error),
+    /// Anything else: what could not be done, and why.
+    Other(String, BoxError),
+    /// The user pressed Ctrl-C.
+    Interrupted,
+}
+
+impl From<ClientError> for Failure {
+    fn from(error: ClientError) -> Self {
+        Self::Client(error)
+    }
+}
+
+impl Failure {
+    pub(crate) fn other(what: impl Into<String>, why: impl Into<BoxError>) -> Self {
+        Self::Other(what.into(), why.into())
+    }
+
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Client(error) => match error {
+                ClientError::InvalidArgument(_)
+                | ClientError::NotFound(_)
+                | ClientError::AlreadyExists(_) => 4,
+                ClientError::Connect { .. }
+                | ClientError::Unavailable(_)
+                | ClientError::ResourceExhausted(_)
+                | ClientError::DeadlineExceeded(_) => 5,
+                ClientError::Endpoint { .. } => 2,
+                _ => 1,
+            },
+            Self::Usage(_) => 2,
+            // Whoever read the output has seen enough.
+            Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
+            Self::Output(_) | Self::Other(..) => 1,
+            Self::Interrupted => 130,
+        }
+    }
+
+    /// A stable name for scripts.
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Client(error) => match error {
+                ClientError::Endpoint { .. } => "endpoint",
+                ClientError::Connect { .. } => "connect",
+                ClientError::InvalidArgument(_) => "invalid_argument",
+                ClientError::NotFound(_) => "not_found",
+                ClientError::AlreadyExists(_) => "already_exists",
+                ClientError::ResourceExhausted(_) => "resource_exhausted",
+                ClientError::Unavailable(_) => "unavailable",
+                ClientError::DeadlineExceeded(_) => "deadline_exceeded",
+                ClientError::Malformed { .. } => "malformed_answer",
+                _ => "call",
+            },
+            Self::Usage(_) => "usage",
+            Self::Output(_) => "output",
+            Self::Other(..) => "other",
+            Self::Interrupted => "interrupted",
+        }
+    }
+
+    /// What happened, with its causes, in one line.
+    fn message(&self) -> String {
+        match self {
+            Self::Client(error) => match error.call() {
+                // The violations get lines of their own.
+                Some(call) if call.attempts > 1 => {
+                    format!("{} (tried {} times)", call.message, call.attempts)
+                }
+                Some(call) => call.message.clone(),
+                None => with_causes(error),
+            },
+            Self::Usage(message) => message.clone(),
+            Self::Output(error) => format!("cannot write to standard output: {error}"),
+            Self::Other(what, why) => format!("{what}: {}", with_causes(why.as_ref())),
+            Self::Interrupted => "interrupted".to_owned(),
+        }
+    }
+
+    /// Tells the user and gives the exit code.
+    pub(crate) fn report(&self, as_json: bool) -> ExitCode {
+        let code = self.exit_code();
+        if code != 0 {
+            if as_json {
+                write_error(&self.to_json().to_string());
+            } else {
+                write_error(&self.to_text());
+            }
+        }
+        ExitCode::from(code)
+    }
+
+    fn to_text(&self) -> String {
+        let message = self.message();
+        let Self::Client(error) = self else {
+            return format!("error: {message}");
+        };
+        let Some(call) = error.call() else {
+            return format!("error: {message}");
+        };
+        // A message that tells the first violation would only repeat the list below it.
+        let violations = &call.details.field_violations;
+        let repeats = violations
+            .first()
+            .is_some_and(|first| message.contains(&first.description));
+        let mut text = if repeats {
+            format!("error: the request has {} wrong", count_of(violations.len()))
+        } else {
+            format!("error: {message}")
+        };
+        for violation in violations {
+            let _ = write!(text, "\n  {}: {}", violation.field, violation.description);
+        }
+        if let Some(resource) = &call.details.resource
+            && !call.message.contains(&resource.name)
+        {
+            let _ = write!(
+                text,
+                "\n  {} {}: {}",
+                resource.kind, resource.name, resource.description
+            );
+        }
+        if let Some(delay) = call.details.retry_delay {
+            let _ = write!(text, "\n  try again in {delay:?}");
+        }
+        text
+    }
+
+    /// `{"error": {"kind", "message"}}`; errors of calls also have `code`, `attempts`, `reason`, `metadata`,
+    /// `field_violations`, `resource` and `retry_delay_seconds`.
+    fn to_json(&self) -> Value {
+        let mut error = json!({ "kind": self.kind(), "message": self.message() });
+        if let Self::Client(client_error) = self
+            && let Some(call) = client_error.call()
+        {
+            error["code"] = json!(code_name(call.code));
+            error["attempts"] = json!(call.attempts);
+            error["reason"] = json!(call.details.reason);
+            error["metadata"] = json!(call.details.metadata);
+            error["field_violations"] = json!(call.details.field_violations);
+            error["resource"] = json!(call.details.resource);
+            error["retry_delay_seconds"] = json!(call.details.retry_delay.map(|delay| delay.as_secs_f64()));
+        }
+        json!({ "error": error })
+    }
+}
+
+/// Tells what is wrong with the command line, or shows the help or version that was asked for.
+pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
+    let wants_json = std::env::args_os().any(|argument| argument == "--json");
+    if error.use_stderr() && wants_json {
+        let message = error.to_string();
+        // The first paragraph says what is wrong; usage and hints follow.
+        let what = message.split("\n\n").next().unwrap_or_default();
+        let what = what.strip_prefix("error: ").unwrap_or(what).trim_end();
+        return Failure::Usage(what.to_owned()).report(true);
+    }
+    // A closed pipe leaves nobody to tell.
+    let _ = error.print();
+    ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
+}
+
+/// "1 field" or "3 fields".
+fn count_of(fields: usize) -> String {
+    let plural = if fields == 1 { "" } else { "s" };
+    format!("{fields} field{plural}")
+}
+
+/// An error and its causes, separated by colons; causes that repeat the error before are left out.
+fn with_causes(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let message = error.to_string();
+        if !text.ends_with(&message) {
+            text.push_str(": ");
+            text.push_str(&message);
+        }
+        cause = error.source();
+    }
+    text
+}
+
+/// A line on standard error; if that is closed, nobody is left to tell.
+fn write_error(line: &str) {
+    use io::Write as _;
+    let _ = writeln!(io::stderr().lock(), "{line}");
+}

@@ -1,0 +1,273 @@
+//! `grasp find`
+
+mod answer;
+mod constraints;
+
+use std::{
+    io::Read as _,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use clap::{ArgGroup, Args};
+use grasp_client::{AtlasUse, FindAnswer, FindRequest, Outcome, built_in::request_for};
+use serde::Serialize;
+
+use constraints::ConstraintOptions;
+
+use crate::{
+    EXIT_CODES, Ending, blocking,
+    failure::Failure,
+    holdout,
+    output::{Output, write_json},
+    picture::{Model, Picture, write_file},
+    server_options::ServerOptions,
+    values::{
+        BendRatiosName, ChoiceName, HandName, StrategyName, ValidityName, ViewSize, parse_duration,
+        parse_view_size,
+    },
+};
+
+/// The long help: the shapes of requests and answers as JSON.
+const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
+
+The holdout is one of the built-in ones (--holdout) or a JSON file (--request). Such a file has the fields of the
+API's FindGraspRequest; only "object" is required:
+
+  {
+    "object": "objects/remote",
+    "client_from_object": {"position": [0, 1.2, 0.4], "orientation": [0, 0, 0, 1]},
+    "presenting_hand": {"angles": {
+      "rig": "thesis", "handedness": "right",
+      "client_from_wrist": {"position": [0, 1.2, 0.2], "orientation": [0, 0, 0, 1]},
+      "digits": [{"base_yaw": 0, "base_pitch": 0.2, "second_pitch": 0.3, "third_pitch": 0.2}, …five, thumb first]}},
+    "receiving_hand": {"rig": "thesis", "handedness": "right"},
+    "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
+    "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
+    "record_step_times": false, "convention": "openxr", "friction": null,
+    "choice": "first_valid", "atlas": "allowed", "plan_key_frames": false,
+    "constraints": {
+      "receiver_reach": {"client_shoulder": [0.2, 1.4, 1], "reach": 0.7},
+      "approach": {"client_direction": [0, 0, -1], "half_angle": 0.8},
+      "allowed_grasp_types": ["medium_wrap", "tripod"], "excluded_grasp_types": [],
+      "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1}
+  }
+
+Instead of angles, the presenting hand may be the joints of a headset: {"joints": {"handedness": "left",
+"joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}. Metres, radians,
+quaternions x y z w. Options on the command line win over the file. --print-request writes the request instead of
+sending it, as a start for own ones.
+
+With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
+"round_trip_seconds": …} with the fields of the API's FindGraspResponse; durations are numbers of seconds, the seed is
+a string of digits."#;
+
+/// Ask for a grasp on an object that is held out.
+#[derive(Args, Debug)]
+#[command(long_about = ABOUT, after_help = EXIT_CODES)]
+#[command(group(ArgGroup::new("what").required(true).args(["holdout", "request"])))]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "every switch is an option of its own"
+)]
+pub(crate) struct Arguments {
+    /// A built-in holdout, such as remote-hold1.
+    #[arg(long, value_name = "NAME")]
+    holdout: Option<String>,
+    /// A file with a request as JSON; - for standard input.
+    #[arg(long, value_name = "FILE")]
+    request: Option<PathBuf>,
+    /// How to search. Default: the server's.
+    #[arg(long, ignore_case = true)]
+    strategy: Option<StrategyName>,
+    /// What counts as valid. Default: the server's.
+    #[arg(long)]
+    validity: Option<ValidityName>,
+    /// Which bend ratios the fingers try. Default: what the strategy says.
+    #[arg(long)]
+    bend_ratios: Option<BendRatiosName>,
+    /// Which of the valid grasps is wanted. Default: the first.
+    #[arg(long)]
+    choice: Option<ChoiceName>,
+    /// How long to search. Default: the server's.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    budget: Option<Duration>,
+    /// At most this many attempts. Default: as many as the budget allows.
+    #[arg(long, value_name = "N")]
+    max_attempts: Option<u64>,
+    /// Start of every random stream. Default: drawn by the server.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Replay: run this attempt of the seed and no other, without trying known grips before it.
+    #[arg(long, value_name = "N", requires = "seed")]
+    only_attempt: Option<u64>,
+    /// The valid attempt of the lowest index wins, the same for any number of workers.
+    #[arg(long)]
+    reproducible: bool,
+    /// Search afresh: do not try the grips that the server knows of the object already.
+    #[arg(long)]
+    no_atlas: bool,
+    /// The hand to pose. Default: the right one.
+    #[arg(long, value_name = "HAND")]
+    receiving_hand: Option<HandName>,
+    /// The rig of the hand to pose. Default: the server's.
+    #[arg(long, value_name = "RIG")]
+    receiving_rig: Option<String>,
+    /// Coefficient of static friction. Default: the object's.
+    #[arg(long, value_name = "MU")]
+    friction: Option<f32>,
+    /// Record and show the time spent in each step.
+    #[arg(long)]
+    step_times: bool,
+    /// Plan the way to the grasp, too: an open hand away from the object, the same at the object, and the grasp.
+    #[arg(long)]
+    key_frames: bool,
+    /// Write the request as JSON instead of sending it.
+    #[arg(long)]
+    print_request: bool,
+    /// Write a picture of the grasp, if one is found.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
+    png: Option<PathBuf>,
+    /// Write the scene as a binary glTF file, if a grasp is found.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
+    glb: Option<PathBuf>,
+    /// Pixels of each of the picture's two views.
+    #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
+    view_size: ViewSize,
+    /// The object's mesh (OBJ), for pictures of objects that are not built in.
+    #[arg(long, value_name = "FILE")]
+    mesh: Option<PathBuf>,
+    /// Metres per unit of the mesh: 0.001 for millimetres.
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, requires = "mesh")]
+    mesh_unit_metres: f32,
+    #[command(flatten)]
+    constraints: ConstraintOptions,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct TimedAnswer {
+    #[serde(flatten)]
+    answer: FindAnswer,
+    round_trip_seconds: f64,
+}
+
+pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let request = arguments.to_request().await?;
+    if arguments.print_request {
+        write_json(&request)?;
+        return Ok(Ending::Done);
+    }
+    // Before the search, so that a missing mesh is told at once.
+    let picture = arguments.picture(&request)?;
+    let client = arguments.server.connect().await?;
+    let start = Instant::now();
+    let answer = client.find_grasp(&request).await?;
+    let timed = TimedAnswer {
+        answer,
+        round_trip_seconds: start.elapsed().as_secs_f64(),
+    };
+    if let Some(picture) = picture
+        && let Some(grasp) = &timed.answer.grasp
+    {
+        let picture = picture.with_grasp(Some(grasp.clone()));
+        draw(picture, arguments.view_size, arguments.png, arguments.glb).await?;
+    }
+    output.write(&timed, |timed| {
+        answer::describe(&request, &timed.answer, timed.round_trip_seconds)
+    })?;
+    Ok(match timed.answer.outcome {
+        Outcome::Found => Ending::Done,
+        Outcome::BudgetExhausted => Ending::NoGrasp,
+    })
+}
+
+impl Arguments {
+    /// The holdout as it will be drawn, if that was asked for.
+    fn picture(&self, request: &FindRequest) -> Result<Option<Picture>, Failure> {
+        if self.png.is_none() && self.glb.is_none() {
+            return Ok(None);
+        }
+        let model = match &self.mesh {
+            Some(path) => Model::from_file(path, self.mesh_unit_metres)?,
+            None => Model::built_in(&request.object).ok_or_else(|| {
+                Failure::Usage(format!(
+                    "{} is not built in; to draw it, name its mesh with --mesh",
+                    request.object
+                ))
+            })?,
+        };
+        Picture::new(model, request.clone()).map(Some)
+    }
+
+    /// The request of the holdout or the file, with the options laid over it.
+    async fn to_request(&self) -> Result<FindRequest, Failure> {
+        let mut request = match (&self.holdout, &self.request) {
+            (Some(name), _) => request_for(holdout::built_in(name)?),
+            (None, Some(path)) => {
+                let path = path.clone();
+                blocking(move || read_request(&path)).await?
+            }
+            (None, None) => {
+                return Err(Failure::Usage(
+                    "neither --holdout nor --request was given".to_owned(),
+                ));
+            }
+        };
+        request.strategy = self.strategy.map(Into::into).or(request.strategy);
+        request.validity = self.validity.map(Into::into).or(request.validity);
+        request.bend_ratios = self.bend_ratios.map(Into::into).or(request.bend_ratios);
+        request.choice = self.choice.map(Into::into).or(request.choice);
+        request.budget = self.budget.or(request.budget);
+        request.max_attempts = self.max_attempts.or(request.max_attempts);
+        request.seed = self.seed.or(request.seed);
+        request.only_attempt = self.only_attempt.or(request.only_attempt);
+        request.reproducible |= self.reproducible;
+        if self.no_atlas {
+            request.atlas = Some(AtlasUse::None);
+        }
+        request.record_step_times |= self.step_times;
+        request.plan_key_frames |= self.key_frames;
+        request.friction = self.friction.or(request.friction);
+        self.constraints.lay_over(&mut request.constraints);
+        let receiver = &mut request.receiving_hand;
+        receiver.handedness = self.receiving_hand.map(Into::into).or(receiver.handedness);
+        receiver.rig = self.receiving_rig.clone().or(receiver.rig.take());
+        Ok(request)
+    }
+}
+
+/// Writes what was asked for.
+async fn draw(
+    picture: Picture,
+    size: ViewSize,
+    png: Option<PathBuf>,
+    glb: Option<PathBuf>,
+) -> Result<(), Failure> {
+    blocking(move || {
+        if let Some(path) = png {
+            write_file(&path, &picture.draw(size)?.to_png())?;
+        }
+        if let Some(path) = glb {
+            write_file(&path, &picture.to_glb()?)?;
+        }
+        Ok(())
+    })
+    .await
+}
+
+/// Reads a request from a file or, for `-`, from standard input.
+fn read_request(path: &Path) -> Result<FindRequest, Failure> {
+    let cannot_read = |error| Failure::other(format!("cannot read {}", path.display()), error);
+    let text = if path == Path::new("-") {
+        let mut text = String::new();
+        std::io::stdin().read_to_string(&mut text).map_err(cannot_read)?;
+        text
+    } else {
+        std::fs::read_to_string(path).map_err(cannot_read)?
+    };
+    serde_json::from_str(&text)
+        .map_err(|error| Failure::Usage(format!("request {}: {error}", path.display())))
+}

@@ -1,0 +1,144 @@
+//! The command line `grasp`: one module per command, and what the commands share.
+
+mod completions;
+mod demo;
+mod experiment;
+mod failure;
+mod find;
+mod format;
+mod health;
+mod holdout;
+mod objects;
+mod output;
+mod picture;
+mod progress_bar;
+mod server_options;
+mod values;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+use failure::Failure;
+use output::Output;
+
+/// What scripts may rely on, shown at the end of every help page.
+const EXIT_CODES: &str = "\
+Exit codes:
+    0  done; for find: a grasp was found; for health: serving
+    1  anything that is not listed here, such as a file that cannot be read
+    2  usage: unknown options, values or names on the command line, a request file that is not understood
+    3  no grasp within the budget
+    4  refused by the server: invalid, not found, already there
+    5  no answer: the server is not there, not serving, or too late
+  130  interrupted";
+
+/// Asks a grasp server how a virtual character's hand takes an object that a person holds out.
+#[derive(Debug, Parser)]
+#[command(name = "grasp", version, after_help = EXIT_CODES)]
+struct Arguments {
+    /// Write results to standard output and errors to standard error as JSON.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Arguments),
+    Find(Box<find::Arguments>),
+    #[command(subcommand)]
+    Objects(objects::Command),
+    Experiment(experiment::Arguments),
+    Health(health::Arguments),
+    Completions(completions::Arguments),
+}
+
+/// How a command ended that did not fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ending {
+    /// It did what it was asked to do.
+    Done,
+    /// The budget was spent before a grasp was found.
+    NoGrasp,
+    /// The server is up but takes no requests.
+    NotServing,
+}
+
+impl Ending {
+    fn exit_code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::NoGrasp => 3,
+            Self::NotServing => 5,
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return failure::report_usage(&error),
+    };
+    // Quiet unless asked: results and errors are told by the commands themselves.
+    let filter = EnvFilter::try_from_env("GRASP_LOG").unwrap_or_else(|_| EnvFilter::new("off"));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .init();
+    let output = Output::new(arguments.json);
+    match run_until_interrupted(arguments.command, output) {
+        Ok(ending) => ExitCode::from(ending.exit_code()),
+        Err(failure) => failure.report(arguments.json),
+    }
+}
+
+fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Failure> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()
+        .map_err(|error| Failure::other("cannot start the runtime", error))?;
+    let result = runtime.block_on(async {
+        tokio::select! {
+            result = run(command, output) => result,
+            _ = tokio::signal::ctrl_c() => Err(Failure::Interrupted),
+        }
+    });
+    // After an interrupt a picture may still be in the making; nobody waits for it.
+    runtime.shutdown_background();
+    result
+}
+
+async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
+    match command {
+        Command::Demo(arguments) => demo::run(arguments, output).await,
+        Command::Find(arguments) => find::run(*arguments, output).await,
+        Command::Objects(command) => objects::run(command, output).await,
+        Command::Experiment(arguments) => experiment::run(arguments, output).await,
+        Command::Health(arguments) => health::run(arguments, output).await,
+        Command::Completions(arguments) => completions::run(&arguments, output),
+    }
+}
+
+/// Runs what blocks or takes long beside the runtime, so that an interrupt is heard meanwhile.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
+) -> Result<T, Failure> {
+    tokio::task::spawn_blocking(work)
+        .await
+        .map_err(|error| Failure::other("the command broke down", error))?
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+}

@@ -1,0 +1,97 @@
+//! `grasp objects create`
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use glam::Vec3;
+use grasp_client::{ForbiddenSurfaces, NewObject};
+
+use crate::{
+    Ending,
+    failure::Failure,
+    output::Output,
+    server_options::ServerOptions,
+    values::{TriangleRange, parse_triangles, parse_vector},
+};
+
+/// Make an object from an OBJ mesh.
+///
+/// Shows the new object, with --json as `grasp objects get` does.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// The last part of the object's name. Default: the file's name in lower case, with hyphens.
+    id: Option<String>,
+    /// The mesh.
+    #[arg(long, value_name = "FILE")]
+    obj: PathBuf,
+    /// Mass in kilograms.
+    #[arg(long, value_name = "KG")]
+    mass: f32,
+    /// Metres per unit of the mesh: 0.001 for millimetres. Default: 1.
+    #[arg(long, value_name = "METRES")]
+    unit_metres: Option<f32>,
+    /// Centre of mass in metres, after scaling. Default: that of the mesh's volume.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    centre_of_mass: Option<Vec3>,
+    /// Coefficient of static friction between skin and the surface. Default: the server's.
+    #[arg(long, value_name = "MU")]
+    friction: Option<f32>,
+    /// A group, object or material of the file that may not be touched; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    forbidden_group: Vec<String>,
+    /// Triangles that may not be touched: indices and ranges, such as 7,10-20.
+    #[arg(long, value_name = "INDICES", value_parser = parse_triangles, value_delimiter = ',')]
+    forbidden_triangles: Vec<TriangleRange>,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let obj = std::fs::read(&arguments.obj)
+        .map_err(|error| Failure::other(format!("cannot read {}", arguments.obj.display()), error))?;
+    let id = match arguments.id {
+        Some(id) => id,
+        None => id_from_file(&arguments.obj),
+    };
+    let triangles = arguments.forbidden_triangles.iter();
+    let object = NewObject {
+        unit_metres: arguments.unit_metres,
+        centre_of_mass: arguments.centre_of_mass,
+        friction: arguments.friction,
+        forbidden: ForbiddenSurfaces {
+            groups: arguments.forbidden_group,
+            triangles: triangles.flat_map(|range| range.0.clone()).collect(),
+        },
+        ..NewObject::new(id, obj, arguments.mass)
+    };
+    let object = arguments.server.connect().await?.create_object(&object).await?;
+    output.write(&object, super::describe)?;
+    Ok(Ending::Done)
+}
+
+/// The file's name without its extension, in lower case, with a hyphen for every run of other characters.
+fn id_from_file(path: &Path) -> String {
+    let stem = path
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
+    let words: Vec<_> = stem
+        .split(|c: char| !c.is_ascii_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .collect();
+    words.join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_come_from_file_names() {
+        let id = |path: &str| id_from_file(Path::new(path));
+        assert_eq!(id("/tmp/Coffee Mug (v2).obj"), "coffee-mug-v2");
+        assert_eq!(id("osim_banana.obj"), "osim-banana");
+        assert_eq!(id("/"), "");
+    }
+}

@@ -1,0 +1,28 @@
+//! `grasp objects get`
+
+use clap::Args;
+
+use crate::{Ending, failure::Failure, output::Output, server_options::ServerOptions};
+
+const ABOUT: &str = r"Show all about one object but its mesh.
+
+With --json: name, built_in, triangle_count, vertex_count, mass_kg, centre_of_mass, friction, forbidden_triangle_count,
+object_from_box, box_half_extents, content_hash, warnings, atlas (null, or entries, complete, stamp,
+build_time_seconds); metres, kilograms, quaternions x y z w.";
+
+/// Show all about one object but its mesh.
+#[derive(Args, Debug)]
+#[command(long_about = ABOUT)]
+pub(crate) struct Arguments {
+    /// The object's name: "remote" or "objects/remote".
+    name: String,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let client = arguments.server.connect().await?;
+    let object = client.get_object(super::full_name(&arguments.name)).await?;
+    output.write(&object, super::describe)?;
+    Ok(Ending::Done)
+}

@@ -1,0 +1,119 @@
+//! `grasp objects`
+
+mod create;
+mod get;
+mod list;
+
+use clap::Subcommand;
+use glam::Vec3;
+use grasp_client::{AtlasState, Object};
+
+use crate::{
+    Ending,
+    failure::Failure,
+    output::{Output, pairs},
+};
+
+/// List, show and make the objects that can be held out.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    List(list::Arguments),
+    Get(get::Arguments),
+    Create(create::Arguments),
+}
+
+pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
+    match command {
+        Command::List(arguments) => list::run(arguments, output).await,
+        Command::Get(arguments) => get::run(arguments, output).await,
+        Command::Create(arguments) => create::run(arguments, output).await,
+    }
+}
+
+/// The full name of an object: "remote" and "objects/remote" mean the same on the command line.
+pub(crate) fn full_name(name: &str) -> String {
+    if name.starts_with("objects/") {
+        name.to_owned()
+    } else {
+        format!("objects/{name}")
+    }
+}
+
+/// The edge lengths of a box in millimetres, longest first.
+fn size(half_extents: Vec3) -> String {
+    let mut edges = (half_extents * 2000.0).to_array();
+    edges.sort_by(|a, b| b.total_cmp(a));
+    let [long, middle, short] = edges;
+    format!("{long:.0} × {middle:.0} × {short:.0} mm")
+}
+
+/// The state of an atlas: how many grips, and whether there will be more.
+fn atlas(atlas: Option<&AtlasState>) -> String {
+    match atlas {
+        None => "none".to_owned(),
+        Some(atlas) if atlas.complete => format!("{} grips", atlas.entries),
+        Some(atlas) => format!("{} grips so far", atlas.entries),
+    }
+}
+
+/// All about an object for people.
+fn describe(object: &Object) -> String {
+    let com = object.centre_of_mass * 1000.0;
+    let mut lines = vec![
+        ("name", object.name.clone()),
+        ("built in", if object.built_in { "yes" } else { "no" }.to_owned()),
+        (
+            "mesh",
+            format!(
+                "{} triangles, {} vertices",
+                object.triangle_count, object.vertex_count
+            ),
+        ),
+        ("box", size(object.box_half_extents)),
+        ("mass", format!("{:.1} g", object.mass_kg * 1000.0)),
+        (
+            "centre of mass",
+            format!("{:.1}, {:.1}, {:.1} mm", com.x, com.y, com.z),
+        ),
+        ("friction", object.friction.to_string()),
+        (
+            "forbidden",
+            format!("{} triangles", object.forbidden_triangle_count),
+        ),
+        ("atlas", atlas(object.atlas.as_ref())),
+        ("content hash", object.content_hash.clone()),
+    ];
+    lines.extend(object.warnings.iter().map(|warning| ("warning", warning.clone())));
+    pairs(&lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    #[test]
+    fn names_may_leave_out_their_collection() {
+        assert_eq!(full_name("remote"), "objects/remote");
+        assert_eq!(full_name("objects/remote"), "objects/remote");
+    }
+
+    #[test]
+    fn an_atlas_tells_whether_it_grows() {
+        let state = |complete| AtlasState {
+            entries: 120,
+            complete,
+            stamp: "a7".to_owned(),
+            build_time: Duration::ZERO,
+        };
+        assert_eq!(atlas(None), "none");
+        assert_eq!(atlas(Some(&state(false))), "120 grips so far");
+        assert_eq!(atlas(Some(&state(true))), "120 grips");
+    }
+
+    #[test]
+    fn sizes_are_whole_edges_in_millimetres_longest_first() {
+        assert_eq!(size(Vec3::new(0.01, 0.09, 0.02)), "180 × 40 × 20 mm");
+    }
+}

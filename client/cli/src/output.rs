@@ -1,0 +1,85 @@
+//! Results on standard output: text for people, JSON for scripts. A closed pipe is no reason to panic.
+
+use std::io::{self, Write as _};
+
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
+use serde::Serialize;
+
+use crate::failure::Failure;
+
+/// A line below the header and none elsewhere: rows stay together, and the table survives being pasted.
+const LINE_BELOW_HEADER: TableStyle =
+    TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
+
+/// Where results go and in which form.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Output {
+    json: bool,
+}
+
+impl Output {
+    pub(crate) fn new(json: bool) -> Self {
+        Self { json }
+    }
+
+    pub(crate) fn is_json(self) -> bool {
+        self.json
+    }
+
+    /// Writes `value` as JSON or what `text` makes of it.
+    pub(crate) fn write<T: Serialize>(
+        self,
+        value: &T,
+        text: impl FnOnce(&T) -> String,
+    ) -> Result<(), Failure> {
+        if self.json {
+            write_json(value)
+        } else {
+            write_line(&text(value))
+        }
+    }
+}
+
+/// Writes `value` as JSON whatever was asked for.
+pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
+    write_line(&text)
+}
+
+/// Writes raw bytes to standard output.
+pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    out.write_all(bytes)
+        .and_then(|()| out.flush())
+        .map_err(Failure::Output)
+}
+
+fn write_line(text: &str) -> Result<(), Failure> {
+    write_bytes(format!("{text}\n").as_bytes())
+}
+
+/// A table with a header; columns whose header starts with `>` are aligned to the right.
+pub(crate) fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table
+        .load_style(LINE_BELOW_HEADER)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_header(header.iter().map(|name| name.trim_start_matches('>')));
+    for (name, column) in header.iter().zip(table.column_iter_mut()) {
+        if name.starts_with('>') {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
+
+/// Names and values, one pair a line, values aligned.
+pub(crate) fn pairs(pairs: &[(&str, String)]) -> String {
+    let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let lines: Vec<_> = pairs
+        .iter()
+        .map(|(name, value)| format!("{name:width$}  {value}"))
+        .collect();
+    lines.join("\n")
+}

@@ -1,0 +1,123 @@
+//! Pictures and GLB scenes of answers. What they show is what was asked and answered: the hands' skins are posed by the
+//! joints that went over the wire.
+
+mod hands;
+mod model;
+
+use std::path::Path;
+
+use glam::Vec3;
+use grasp_client::{Contact, Convention, Digit, FindRequest, Grasp, Phalanx};
+use grasp_scene::{ContactMark, HandoverScene, Image, PosedHand, RenderOptions, to_glb};
+use grasp_synthesis::model::hand;
+
+use crate::{failure::Failure, values::ViewSize};
+pub(crate) use model::Model;
+
+/// A holdout and, if there is one, the grasp on it.
+#[derive(Clone, Debug)]
+pub(crate) struct Picture {
+    model: Model,
+    request: FindRequest,
+    grasp: Option<Grasp>,
+}
+
+impl Picture {
+    /// The holdout alone; the request must be in `OpenXR` conventions, as the scenes are.
+    pub(crate) fn new(model: Model, request: FindRequest) -> Result<Self, Failure> {
+        if request.convention != Convention::OpenXr {
+            return Err(Failure::Usage(
+                "pictures are drawn of requests in the openxr convention only".to_owned(),
+            ));
+        }
+        Ok(Self {
+            model,
+            request,
+            grasp: None,
+        })
+    }
+
+    /// The holdout with the grasp, if there is one.
+    pub(crate) fn with_grasp(self, grasp: Option<Grasp>) -> Self {
+        Self { grasp, ..self }
+    }
+
+    /// Two views side by side, each of this size.
+    pub(crate) fn draw(&self, size: ViewSize) -> Result<Image, Failure> {
+        Ok(self.scene()?.render(self.options(size)))
+    }
+
+    /// One view of this size, the one that shows most.
+    pub(crate) fn draw_best_view(&self, size: ViewSize) -> Result<Image, Failure> {
+        Ok(self.scene()?.render_best_view(self.options(size)))
+    }
+
+    /// The scene as a binary glTF file.
+    pub(crate) fn to_glb(&self) -> Result<Vec<u8>, Failure> {
+        Ok(to_glb(&self.scene()?.to_scene()))
+    }
+
+    fn options(&self, ViewSize { width, height }: ViewSize) -> RenderOptions {
+        RenderOptions {
+            width,
+            height,
+            up: self.request.up.unwrap_or(Vec3::Y).normalize_or(Vec3::Y),
+            ..RenderOptions::default()
+        }
+    }
+
+    fn scene(&self) -> Result<HandoverScene<'_>, Failure> {
+        let giver = self
+            .request
+            .presenting_hand
+            .as_ref()
+            .map(hands::giver)
+            .transpose()?;
+        let receiver = self.grasp.as_ref().map(hands::receiver).transpose()?;
+        let contacts = self.grasp.iter().flat_map(|grasp| &grasp.contacts);
+        Ok(HandoverScene {
+            forbidden: self.model.forbidden(),
+            object_colour: self.model.colour(),
+            object_finish: self.model.finish(),
+            giver,
+            receiver,
+            contacts: contacts.map(mark).collect(),
+            ..HandoverScene::new(
+                self.model.mesh(),
+                hands::synthesis_pose(self.request.client_from_object),
+            )
+        })
+    }
+}
+
+fn mark(contact: &Contact) -> ContactMark {
+    ContactMark {
+        position: contact.client_position,
+        normal: contact.client_normal,
+        force: contact.client_force,
+        digit: contact.digit.map(|digit| match digit {
+            Digit::Thumb => hand::Digit::Thumb,
+            Digit::Index => hand::Digit::Index,
+            Digit::Middle => hand::Digit::Middle,
+            Digit::Ring => hand::Digit::Ring,
+            Digit::Little => hand::Digit::Little,
+        }),
+        phalanx: contact.phalanx.map(|phalanx| match phalanx {
+            Phalanx::First => hand::Phalanx::First,
+            Phalanx::Second => hand::Phalanx::Second,
+            Phalanx::Third => hand::Phalanx::Third,
+        }),
+    }
+}
+
+/// Writes a file, making its folder if need be.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent
+        .map_or(Ok(()), std::fs::create_dir_all)
+        .and_then(|()| std::fs::write(path, bytes))
+        .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
+}
+
+/// A hand of a scene: a built-in rig's skin on joints.
+type SceneHand = PosedHand<'static>;

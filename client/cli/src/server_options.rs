@@ -1,0 +1,64 @@
+//! Options of all commands that ask a server.
+
+use std::time::Duration;
+
+use clap::Args;
+use grasp_client::{ClientError, GraspClient, RetryPolicy};
+
+use crate::values::parse_duration;
+
+/// Which server to ask and how patiently.
+#[derive(Args, Debug)]
+pub(crate) struct ServerOptions {
+    /// The server's URL.
+    #[arg(
+        long,
+        value_name = "URL",
+        env = "GRASP_SERVER",
+        default_value = "http://[::1]:50051",
+        help_heading = "Server"
+    )]
+    server: String,
+    /// How long a connection may take.
+    #[arg(
+        long,
+        value_name = "DURATION",
+        default_value = "5s",
+        value_parser = parse_duration,
+        help_heading = "Server"
+    )]
+    connect_timeout: Duration,
+    /// How long an answer may take, tries included; a search gets its budget on top.
+    #[arg(
+        long,
+        value_name = "DURATION",
+        default_value = "10s",
+        value_parser = parse_duration,
+        help_heading = "Server"
+    )]
+    timeout: Duration,
+    /// How often to try in all when the server is unavailable.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = RetryPolicy::default().max_attempts,
+        value_parser = clap::value_parser!(u32).range(1..),
+        help_heading = "Server"
+    )]
+    tries: u32,
+}
+
+impl ServerOptions {
+    /// Connects to the server.
+    pub(crate) async fn connect(&self) -> Result<GraspClient, ClientError> {
+        GraspClient::builder(&self.server)
+            .connect_timeout(self.connect_timeout)
+            .call_timeout(self.timeout)
+            .retry(RetryPolicy {
+                max_attempts: self.tries,
+                ..RetryPolicy::default()
+            })
+            .connect()
+            .await
+    }
+}

@@ -1,0 +1,375 @@
+//! Values on the command line.
+
+use std::{sync::LazyLock, time::Duration};
+
+use clap::{ValueEnum, builder::PossibleValue};
+use glam::Vec3;
+use grasp_client::{BendRatios, Choice, Digit, GraspType, Handedness, Strategy, Validity};
+
+use crate::format::name_of;
+
+/// Reads a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
+pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
+    let expected = || format!("{text:?} is no duration; write one like 500ms, 2s or 1m, more than 0");
+    let unit_start = text
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .ok_or_else(expected)?;
+    let (number, unit) = text.split_at(unit_start);
+    let seconds_per_unit = match unit {
+        "us" => 1e-6,
+        "ms" => 1e-3,
+        "s" => 1.0,
+        "m" => 60.0,
+        _ => return Err(expected()),
+    };
+    let seconds = number.parse::<f64>().map_err(|_| expected())? * seconds_per_unit;
+    Duration::try_from_secs_f64(seconds)
+        .ok()
+        .filter(|duration| !duration.is_zero())
+        .ok_or_else(expected)
+}
+
+/// Reads a vector such as `0,0.01,-0.02`.
+pub(crate) fn parse_vector(text: &str) -> Result<Vec3, String> {
+    let expected = || format!("{text:?} is no vector; write three numbers like 0,0.01,-0.02");
+    let numbers: Vec<f32> = text
+        .split(',')
+        .map(|number| number.trim().parse::<f32>())
+        .collect::<Result<_, _>>()
+        .map_err(|_| expected())?;
+    let [x, y, z] = numbers.try_into().map_err(|_| expected())?;
+    Ok(Vec3::new(x, y, z))
+}
+
+/// Directions within an angle of one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Cone {
+    /// The one in the middle, of any length.
+    pub(crate) direction: Vec3,
+    /// How far the others are from it at most.
+    pub(crate) half_angle_degrees: f32,
+}
+
+/// Reads a cone such as `0,0,-1,45`: a vector and degrees.
+pub(crate) fn parse_cone(text: &str) -> Result<Cone, String> {
+    let expected = || format!("{text:?} is no cone; write a direction and degrees like 0,0,-1,45");
+    let (direction, degrees) = text.rsplit_once(',').ok_or_else(expected)?;
+    Ok(Cone {
+        direction: parse_vector(direction).map_err(|_| expected())?,
+        half_angle_degrees: degrees.trim().parse().map_err(|_| expected())?,
+    })
+}
+
+/// Pixels of each of a picture's two views.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ViewSize {
+    /// Pixels in a row.
+    pub(crate) width: u32,
+    /// Rows.
+    pub(crate) height: u32,
+}
+
+/// Reads a size such as `900x700`; each side from 16 to 8192 pixels.
+pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
+    let side = |text: &str| {
+        text.parse::<u32>()
+            .ok()
+            .filter(|pixels| (16..=8192).contains(pixels))
+    };
+    text.split_once('x')
+        .and_then(|(width, height)| {
+            Some(ViewSize {
+                width: side(width)?,
+                height: side(height)?,
+            })
+        })
+        .ok_or_else(|| format!("{text:?} is no size; write one like 900x700, each side from 16 to 8192"))
+}
+
+/// Triangle indices such as `7` or `10-20`, both ends included.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct TriangleRange(pub(crate) std::ops::RangeInclusive<u32>);
+
+/// Reads one index or a range of indices.
+pub(crate) fn parse_triangles(text: &str) -> Result<TriangleRange, String> {
+    let expected = || format!("{text:?} is no triangle index; write one like 7 or a range like 10-20");
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let first: u32 = first.parse().map_err(|_| expected())?;
+    let last: u32 = last.parse().map_err(|_| expected())?;
+    // A typing error must not fill the memory: no mesh that a server takes has this many triangles.
+    if first > last || last - first >= 10_000_000 {
+        return Err(expected());
+    }
+    Ok(TriangleRange(first..=last))
+}
+
+/// The ladder of the thesis' chapter 5, and what goes beyond it.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+#[value(rename_all = "UPPER")]
+pub(crate) enum StrategyName {
+    /// Naive synthesis.
+    A,
+    /// Placement measures relative to the object.
+    B,
+    /// Palm-CoM-palm angle.
+    C,
+    /// Early stop when the thumb has no contact.
+    D,
+    /// One way of choosing the bend ratios.
+    E,
+    /// First sufficient force distribution.
+    F,
+    /// Hands are placed where opposed surfaces suggest it; with physical validity, known grips are tried first.
+    Guided,
+}
+
+impl From<StrategyName> for Strategy {
+    fn from(name: StrategyName) -> Self {
+        match name {
+            StrategyName::A => Self::A,
+            StrategyName::B => Self::B,
+            StrategyName::C => Self::C,
+            StrategyName::D => Self::D,
+            StrategyName::E => Self::E,
+            StrategyName::F => Self::F,
+            StrategyName::Guided => Self::Guided,
+        }
+    }
+}
+
+impl From<StrategyName> for grasp_synthesis::model::strategy::Strategy {
+    fn from(name: StrategyName) -> Self {
+        match name {
+            StrategyName::A => Self::A,
+            StrategyName::B => Self::B,
+            StrategyName::C => Self::C,
+            StrategyName::D => Self::D,
+            StrategyName::E => Self::E,
+            StrategyName::F => Self::F,
+            StrategyName::Guided => Self::Guided,
+        }
+    }
+}
+
+/// Which of the valid grasps is the answer.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ChoiceName {
+    /// The first that is found.
+    First,
+    /// The best of all that are found until the budget ends.
+    Best,
+}
+
+impl From<ChoiceName> for Choice {
+    fn from(name: ChoiceName) -> Self {
+        match name {
+            ChoiceName::First => Self::FirstValid,
+            ChoiceName::Best => Self::BestWithinBudget,
+        }
+    }
+}
+
+/// Which grasps count as valid.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ValidityName {
+    /// As the thesis prints it.
+    Thesis,
+    /// Hands are solid, forces are solved for.
+    Physical,
+}
+
+impl From<ValidityName> for Validity {
+    fn from(name: ValidityName) -> Self {
+        match name {
+            ValidityName::Thesis => Self::Thesis,
+            ValidityName::Physical => Self::Physical,
+        }
+    }
+}
+
+/// The columns of Figure 5.20.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum BendRatiosName {
+    /// 0.7, 1 and 1.42 in turn.
+    All,
+    /// The same, but the fingers skip 0.7.
+    AllFingersWithoutLow,
+    /// One of the three at random.
+    OneRandom,
+    /// The same, but the fingers skip 0.7.
+    OneRandomFingersWithoutLow,
+    /// Only 1.
+    OnlyOne,
+    /// Only 1.42.
+    OnlyHigh,
+}
+
+impl From<BendRatiosName> for BendRatios {
+    fn from(name: BendRatiosName) -> Self {
+        match name {
+            BendRatiosName::All => Self::All,
+            BendRatiosName::AllFingersWithoutLow => Self::AllFingersWithoutLow,
+            BendRatiosName::OneRandom => Self::OneRandom,
+            BendRatiosName::OneRandomFingersWithoutLow => Self::OneRandomFingersWithoutLow,
+            BendRatiosName::OnlyOne => Self::OnlyOne,
+            BendRatiosName::OnlyHigh => Self::OnlyHigh,
+        }
+    }
+}
+
+/// Which hand of a person.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum HandName {
+    /// The left hand.
+    Left,
+    /// The right hand.
+    Right,
+}
+
+impl From<HandName> for Handedness {
+    fn from(name: HandName) -> Self {
+        match name {
+            HandName::Left => Self::Left,
+            HandName::Right => Self::Right,
+        }
+    }
+}
+
+/// A digit of the hand.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum DigitName {
+    /// The thumb.
+    Thumb,
+    /// The index finger.
+    Index,
+    /// The middle finger.
+    Middle,
+    /// The ring finger.
+    Ring,
+    /// The little finger.
+    Little,
+}
+
+impl From<DigitName> for Digit {
+    fn from(name: DigitName) -> Self {
+        match name {
+            DigitName::Thumb => Self::Thumb,
+            DigitName::Index => Self::Index,
+            DigitName::Middle => Self::Middle,
+            DigitName::Ring => Self::Ring,
+            DigitName::Little => Self::Little,
+        }
+    }
+}
+
+/// A type of the taxonomy, by its name with dashes, or with blanks or underscores as in answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct GraspTypeName(pub(crate) GraspType);
+
+impl ValueEnum for GraspTypeName {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<[GraspTypeName; GraspType::ALL.len()]> =
+            LazyLock::new(|| GraspType::ALL.map(GraspTypeName));
+        &*ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let words = name_of(&self.0);
+        let aliases = [words.replace(' ', "_"), words.clone()];
+        Some(PossibleValue::new(words.replace(' ', "-")).aliases(aliases))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grasp_types_are_named_as_in_answers() {
+        for grasp_type in GraspType::ALL {
+            let words = name_of(&grasp_type);
+            for name in [words.replace(' ', "-"), words.replace(' ', "_"), words.clone()] {
+                assert_eq!(
+                    GraspTypeName::from_str(&name, false),
+                    Ok(GraspTypeName(grasp_type))
+                );
+            }
+        }
+        for wrong in ["", "unclassifiable", "medium  wrap", "14"] {
+            assert!(GraspTypeName::from_str(wrong, false).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn durations_have_units_and_are_more_than_nothing() {
+        assert_eq!(parse_duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(parse_duration("1.5s"), Ok(Duration::from_millis(1500)));
+        assert_eq!(parse_duration("250us"), Ok(Duration::from_micros(250)));
+        assert_eq!(parse_duration("2m"), Ok(Duration::from_mins(2)));
+        for wrong in [
+            "",
+            "5",
+            "s",
+            "-1s",
+            "0s",
+            "1h",
+            "1 s",
+            "1e3s",
+            "1..2s",
+            "NaNs",
+            "9999999999999999999999m",
+        ] {
+            assert!(parse_duration(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn vectors_have_three_numbers() {
+        assert_eq!(parse_vector("0, 0.5,-2"), Ok(Vec3::new(0.0, 0.5, -2.0)));
+        for wrong in ["", "1,2", "1,2,3,4", "a,b,c", "1;2;3"] {
+            assert!(parse_vector(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn cones_have_a_direction_and_degrees() {
+        let cone = Cone {
+            direction: Vec3::new(-1.0, 0.5, 0.0),
+            half_angle_degrees: 45.0,
+        };
+        assert_eq!(parse_cone("-1, 0.5,0, 45"), Ok(cone));
+        for wrong in ["", "45", "0,0,1", "0,0,1,", "0,0,1,2,3", "x,0,1,45", "0,0,1,wide"] {
+            assert!(parse_cone(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn sizes_have_two_sides_that_can_be_drawn() {
+        let size = ViewSize {
+            width: 900,
+            height: 700,
+        };
+        assert_eq!(parse_view_size("900x700"), Ok(size));
+        for wrong in [
+            "",
+            "900",
+            "900x",
+            "x700",
+            "15x700",
+            "900x8193",
+            "900x700x3",
+            "-900x700",
+        ] {
+            assert!(parse_view_size(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn triangles_are_indices_or_ranges() {
+        assert_eq!(parse_triangles("7"), Ok(TriangleRange(7..=7)));
+        assert_eq!(parse_triangles("10-20"), Ok(TriangleRange(10..=20)));
+        for wrong in ["", "-", "20-10", "1-", "x", "0-4294967295"] {
+            assert!(parse_triangles(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! The built command line `grasp`, against a scripted and a real server.
+
+mod commands;
+mod experiments;
+mod real_server;
+#[path = "../../../tests/client/scripted.rs"]
+mod scripted;

@@ -1,0 +1,189 @@
+//! Objects and health.
+
+use grasp_proto::v1;
+use tonic_health::pb::{HealthCheckResponse, health_check_response::ServingStatus};
+
+use super::{
+    Malformed, each,
+    geometry_codec::{duration_from_wire, pose_from_wire, vector_from_wire, vector_to_wire},
+    required,
+};
+use crate::object::{AtlasState, Health, NewObject, Object, ObjectPage};
+
+pub(crate) fn new_object_to_wire(object: &NewObject) -> v1::CreateObjectRequest {
+    v1::CreateObjectRequest {
+        object_id: object.id.clone(),
+        obj: object.obj.clone(),
+        unit_metres: object.unit_metres,
+        mass_kg: object.mass_kg,
+        centre_of_mass: object.centre_of_mass.map(vector_to_wire),
+        friction: object.friction,
+        forbidden: Some(v1::ForbiddenSurfaces {
+            groups: object.forbidden.groups.clone(),
+            triangles: object.forbidden.triangles.clone(),
+        }),
+    }
+}
+
+fn object_fields_from_wire(object: v1::Object) -> Result<Object, Malformed> {
+    if object.name.is_empty() {
+        return Err(Malformed::missing("name"));
+    }
+    Ok(Object {
+        name: object.name,
+        built_in: object.built_in,
+        triangle_count: object.triangle_count,
+        vertex_count: object.vertex_count,
+        mass_kg: object.mass_kg,
+        centre_of_mass: vector_from_wire(required("centre_of_mass", object.centre_of_mass)?),
+        friction: object.friction,
+        forbidden_triangle_count: object.forbidden_triangle_count,
+        object_from_box: pose_from_wire(object.object_from_box),
+        box_half_extents: vector_from_wire(required("box_half_extents", object.box_half_extents)?),
+        content_hash: object.content_hash,
+        warnings: object.warnings,
+        atlas: object
+            .atlas
+            .map(atlas_from_wire)
+            .transpose()
+            .map_err(|malformed| malformed.within("atlas"))?,
+    })
+}
+
+fn atlas_from_wire(atlas: v1::AtlasState) -> Result<AtlasState, Malformed> {
+    let build_time = required("build_time", atlas.build_time)?;
+    Ok(AtlasState {
+        entries: atlas.entries,
+        complete: atlas.complete,
+        stamp: atlas.stamp,
+        build_time: duration_from_wire("build_time", build_time)?,
+    })
+}
+
+pub(crate) fn object_from_wire(object: Option<v1::Object>) -> Result<Object, Malformed> {
+    object_fields_from_wire(required("object", object)?).map_err(|malformed| malformed.within("object"))
+}
+
+pub(crate) fn object_page_from_wire(page: v1::ListObjectsResponse) -> Result<ObjectPage, Malformed> {
+    Ok(ObjectPage {
+        objects: each("objects", page.objects, object_fields_from_wire)?,
+        next_page_token: Some(page.next_page_token).filter(|token| !token.is_empty()),
+    })
+}
+
+pub(crate) fn health_from_wire(response: HealthCheckResponse) -> Health {
+    match response.status() {
+        ServingStatus::Serving => Health::Serving,
+        ServingStatus::NotServing => Health::NotServing,
+        ServingStatus::Unknown | ServingStatus::ServiceUnknown => Health::Unknown,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use glam::Vec3;
+
+    use super::*;
+
+    fn wire_object(name: &str) -> v1::Object {
+        v1::Object {
+            name: name.to_owned(),
+            mass_kg: 0.13,
+            centre_of_mass: Some(v1::Vector3 {
+                x: 0.0,
+                y: 0.01,
+                z: 0.0,
+            }),
+            box_half_extents: Some(v1::Vector3 {
+                x: 0.02,
+                y: 0.01,
+                z: 0.09,
+            }),
+            warnings: vec!["12 open edges".to_owned()],
+            ..v1::Object::default()
+        }
+    }
+
+    #[test]
+    fn an_object_keeps_what_it_says() {
+        let object = object_from_wire(Some(wire_object("objects/remote"))).unwrap();
+        assert_eq!(object.name, "objects/remote");
+        assert_eq!(object.centre_of_mass, Vec3::new(0.0, 0.01, 0.0));
+        assert_eq!(object.box_half_extents, Vec3::new(0.02, 0.01, 0.09));
+        assert_eq!(object.warnings, ["12 open edges"]);
+        assert_eq!(object.atlas, None);
+    }
+
+    #[test]
+    fn the_state_of_an_atlas_keeps_what_it_says_and_tells_its_time() {
+        let mut wire = wire_object("objects/remote");
+        wire.atlas = Some(v1::AtlasState {
+            entries: 40,
+            complete: true,
+            stamp: "a7".to_owned(),
+            build_time: Some(prost_types::Duration {
+                seconds: 2,
+                nanos: 500_000_000,
+            }),
+        });
+        let atlas = object_from_wire(Some(wire.clone())).unwrap().atlas.unwrap();
+        let expected = AtlasState {
+            entries: 40,
+            complete: true,
+            stamp: "a7".to_owned(),
+            build_time: Duration::from_millis(2500),
+        };
+        assert_eq!(atlas, expected);
+        wire.atlas.as_mut().unwrap().build_time = None;
+        let error = object_from_wire(Some(wire)).unwrap_err();
+        assert_eq!(error.path, "object.atlas.build_time");
+    }
+
+    #[test]
+    fn a_malformed_object_of_a_page_is_named_by_its_place() {
+        let page = v1::ListObjectsResponse {
+            objects: vec![
+                wire_object("objects/a"),
+                v1::Object {
+                    centre_of_mass: None,
+                    ..wire_object("objects/b")
+                },
+            ],
+            next_page_token: String::new(),
+        };
+        let error = object_page_from_wire(page).unwrap_err();
+        assert_eq!(error.path, "objects[1].centre_of_mass");
+    }
+
+    #[test]
+    fn an_empty_token_ends_the_list() {
+        let page = |token: &str| {
+            object_page_from_wire(v1::ListObjectsResponse {
+                objects: Vec::new(),
+                next_page_token: token.to_owned(),
+            })
+        };
+        assert_eq!(page("").unwrap().next_page_token, None);
+        assert_eq!(page("next").unwrap().next_page_token.as_deref(), Some("next"));
+    }
+
+    #[test]
+    fn a_new_object_keeps_what_it_says() {
+        let mut object = NewObject::new("mug", b"v 0 0 0".as_slice(), 0.3);
+        object.centre_of_mass = Some(Vec3::new(1.0, 2.0, 3.0));
+        object.unit_metres = Some(0.001);
+        object.forbidden.groups = vec!["rim".to_owned()];
+        object.forbidden.triangles = vec![4, 5];
+        let wire = new_object_to_wire(&object);
+        assert_eq!(wire.object_id, "mug");
+        assert_eq!(wire.obj, b"v 0 0 0");
+        assert_eq!(wire.unit_metres, Some(0.001));
+        assert_eq!(wire.friction, None);
+        assert_eq!(wire.centre_of_mass.unwrap().z, 3.0);
+        let forbidden = wire.forbidden.unwrap();
+        assert_eq!(forbidden.groups, ["rim"]);
+        assert_eq!(forbidden.triangles, [4, 5]);
+    }
+}

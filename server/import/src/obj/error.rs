@@ -1,0 +1,151 @@
+//! Why OBJ text is rejected.
+
+use grasp_synthesis::geometry::mesh::MeshError;
+
+use super::MAX_NAMES_PER_LINE;
+use crate::limits::MAX_COORDINATE_METRES;
+
+/// Violations listed before the rest is only counted; bounds the size of the answer.
+const LISTED_ERRORS: usize = 16;
+
+/// Why OBJ text was rejected.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ObjError {
+    /// The unit is not a length.
+    #[error("a unit of {0} m cannot be used; it must be finite and more than 0")]
+    Unit(f32),
+    /// The text is too long.
+    #[error("the text has {bytes} bytes; at most {limit} are allowed")]
+    TooLong {
+        /// Its length.
+        bytes: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// There are too many vertices.
+    #[error("line {line}: the mesh has more than {limit} vertices")]
+    TooManyVertices {
+        /// The line that exceeds the limit, counted from 1.
+        line: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// There are too many triangles.
+    #[error("line {line}: the mesh has more than {limit} triangles")]
+    TooManyTriangles {
+        /// The line that exceeds the limit, counted from 1.
+        line: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// A vertex has too few or too many numbers.
+    #[error(
+        "line {line}: a vertex has {found} numbers; it must have 3, 4 with a weight, 6 or 7 with a colour"
+    )]
+    NumberCount {
+        /// The line, counted from 1.
+        line: usize,
+        /// Their number.
+        found: usize,
+    },
+    /// A coordinate is not a number.
+    #[error("line {line}: {text:?} is not a number")]
+    NotANumber {
+        /// The line, counted from 1.
+        line: usize,
+        /// The text found instead.
+        text: String,
+    },
+    /// A coordinate is NaN or infinite, or the vertex's weight makes it so.
+    #[error("line {line}: {text:?} is not finite or makes the vertex infinite")]
+    NotFinite {
+        /// The line, counted from 1.
+        line: usize,
+        /// The text found instead.
+        text: String,
+    },
+    /// A vertex is too far from the origin.
+    #[error(
+        "line {line}: a coordinate is {metres} m from the origin; it must be at most {MAX_COORDINATE_METRES} m, \
+         is the unit right?"
+    )]
+    TooFar {
+        /// The line, counted from 1.
+        line: usize,
+        /// The largest coordinate.
+        metres: f32,
+    },
+    /// A corner of a face is not a vertex reference.
+    #[error(
+        "line {line}: {text:?} is not a vertex reference; it must be an index, or up to three indices separated by /"
+    )]
+    NotAnIndex {
+        /// The line, counted from 1.
+        line: usize,
+        /// The text found instead.
+        text: String,
+    },
+    /// A face refers to a vertex that does not exist.
+    #[error(
+        "line {line}: vertex {index} does not exist; {vertices} are known, counted from 1 or backward from -1"
+    )]
+    IndexOutOfRange {
+        /// The line, counted from 1.
+        line: usize,
+        /// The index as written.
+        index: i64,
+        /// The number of vertices; for a negative index, of those before the line.
+        vertices: usize,
+    },
+    /// A line has too many group names.
+    #[error("line {line}: {found} group names; at most {MAX_NAMES_PER_LINE} are allowed")]
+    TooManyNames {
+        /// The line, counted from 1.
+        line: usize,
+        /// Their number.
+        found: usize,
+    },
+    /// No triangle is left.
+    #[error("the mesh has no triangles; {dropped} points, lines and faces without area were ignored")]
+    Empty {
+        /// Number of points, lines and faces without area.
+        dropped: usize,
+    },
+    /// The parser rejected what the scan accepted.
+    #[error("the mesh cannot be parsed")]
+    Unreadable(#[source] tobj::LoadError),
+    /// The resulting mesh cannot be used.
+    #[error("the mesh cannot be used")]
+    Unusable(#[source] MeshError),
+    /// Violations beyond those listed.
+    #[error("and {0} more violations")]
+    More(usize),
+}
+
+/// A bounded list of violations.
+#[derive(Debug, Default)]
+pub(super) struct Violations {
+    listed: Vec<ObjError>,
+    more: usize,
+}
+
+impl Violations {
+    pub(super) fn push(&mut self, error: ObjError) {
+        if self.listed.len() < LISTED_ERRORS {
+            self.listed.push(error);
+        } else {
+            self.more += 1;
+        }
+    }
+
+    pub(super) fn into_result(mut self) -> Result<(), Vec<ObjError>> {
+        if self.more > 0 {
+            self.listed.push(ObjError::More(self.more));
+        }
+        if self.listed.is_empty() {
+            Ok(())
+        } else {
+            Err(self.listed)
+        }
+    }
+}

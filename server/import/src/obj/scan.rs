@@ -1,0 +1,337 @@
+//! The first pass over OBJ text: enforces limits, collects violations and groups, writes plain text for `tobj`.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    ops::Range,
+};
+
+use super::{
+    MAX_NAMES_PER_LINE,
+    error::{ObjError, Violations},
+    lines::{Lines, shown, words},
+};
+use crate::limits::{MAX_COORDINATE_METRES, MeshLimits};
+
+/// A face of three or more corners.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Face {
+    /// Its line, counted from 1.
+    pub(super) line: usize,
+    /// Number of corners, at least 3.
+    pub(super) corners: usize,
+    /// Index of its names in [`Scan::name_sets`].
+    names: usize,
+}
+
+/// How often something occurred, and on which line first.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Occurrences {
+    pub(super) count: usize,
+    pub(super) first_line: usize,
+}
+
+impl Occurrences {
+    pub(super) fn note(&mut self, line: usize) {
+        if self.count == 0 {
+            self.first_line = line;
+        }
+        self.count += 1;
+    }
+}
+
+/// Result of the first pass.
+#[derive(Debug, Default)]
+pub(super) struct Scan {
+    /// Text for `tobj`: only `v` with 3 or 4 numbers and `f` with positive vertex indices.
+    pub(super) plain: String,
+    /// The faces of `plain`.
+    pub(super) faces: Vec<Face>,
+    /// Number of triangles of those faces.
+    pub(super) triangles: usize,
+    /// Number of vertices in `plain`.
+    pub(super) vertices: usize,
+    /// Points, lines, and faces with fewer than three corners.
+    pub(super) without_area: Occurrences,
+    /// Lines that start with an unknown keyword.
+    pub(super) unknown: Occurrences,
+    /// Names by index.
+    names: Vec<String>,
+    /// Sets of names shared by faces, as ranges of `listed_names`.
+    name_sets: Vec<Range<usize>>,
+    /// Indices into `names`, set after set.
+    listed_names: Vec<u32>,
+}
+
+impl Scan {
+    /// Scans the text; allocates in proportion to what was read within the limits.
+    pub(super) fn of(text: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<Self, Vec<ObjError>> {
+        let mut scanner = Scanner {
+            unit_metres,
+            limits,
+            scan: Self::default(),
+            violations: Violations::default(),
+            over_limit: false,
+            forward: Vec::new(),
+            names: HashMap::new(),
+            current: Names::default(),
+            names_changed: true,
+        };
+        for (number, line) in Lines::of(text) {
+            scanner.line(number, &line);
+            if scanner.over_limit {
+                break;
+            }
+        }
+        scanner.finish()
+    }
+
+    /// The triangles of each name; `faces[t]` is the face of triangle t.
+    pub(super) fn groups(&self, faces: &[usize]) -> Vec<(String, Vec<u32>)> {
+        let mut groups = BTreeMap::<&str, Vec<u32>>::new();
+        for (triangle, &face) in faces.iter().enumerate() {
+            for &name in &self.listed_names[self.name_sets[self.faces[face].names].clone()] {
+                groups
+                    .entry(&self.names[name as usize])
+                    .or_default()
+                    .push(triangle as u32);
+            }
+        }
+        groups
+            .into_iter()
+            .map(|(name, triangles)| (name.to_owned(), triangles))
+            .collect()
+    }
+}
+
+/// The names in force at a line, as indices.
+#[derive(Debug, Default)]
+struct Names {
+    groups: Vec<u32>,
+    object: Option<u32>,
+    material: Option<u32>,
+}
+
+struct Scanner {
+    unit_metres: f32,
+    limits: MeshLimits,
+    scan: Scan,
+    violations: Violations,
+    /// A limit was exceeded: scanning stopped, and the rest of the text is unknown.
+    over_limit: bool,
+    /// Line and index of corners that refer to a vertex further down.
+    forward: Vec<(usize, usize)>,
+    names: HashMap<String, u32>,
+    current: Names,
+    names_changed: bool,
+}
+
+impl Scanner {
+    fn line(&mut self, number: usize, line: &[u8]) {
+        let mut words = words(line);
+        let Some(keyword) = words.next() else {
+            return;
+        };
+        match keyword {
+            b"v" => self.vertex(number, &words.collect::<Vec<_>>()),
+            b"f" => self.face(number, words),
+            b"p" | b"l" => self.scan.without_area.note(number),
+            b"g" => self.groups(number, words.map(String::from_utf8_lossy)),
+            b"o" => self.current.object = self.rest_of_line(line, keyword),
+            b"usemtl" => self.current.material = self.rest_of_line(line, keyword),
+            // Appearance only.
+            b"vt" | b"vn" | b"s" | b"mtllib" => {}
+            _ => self.scan.unknown.note(number),
+        }
+        self.names_changed |= matches!(keyword, b"g" | b"o" | b"usemtl");
+    }
+
+    fn vertex(&mut self, line: usize, numbers: &[&[u8]]) {
+        if self.scan.vertices == self.limits.vertices {
+            self.over_limit = true;
+            let limit = self.limits.vertices;
+            return self.violations.push(ObjError::TooManyVertices { line, limit });
+        }
+        self.scan.vertices += 1;
+        // Three coordinates, then a weight, a colour or both; the colour is ignored.
+        let read = match numbers.len() {
+            3 | 6 => 3,
+            4 | 7 => 4,
+            found => {
+                return self.violations.push(ObjError::NumberCount { line, found });
+            }
+        };
+        let mut values = [1.0_f32; 4];
+        for (value, word) in values.iter_mut().zip(&numbers[..read]) {
+            let text = || shown(word);
+            match std::str::from_utf8(word)
+                .ok()
+                .and_then(|word| word.parse::<f32>().ok())
+            {
+                Some(number) if number.is_finite() => *value = number,
+                Some(_) => {
+                    return self.violations.push(ObjError::NotFinite { line, text: text() });
+                }
+                None => {
+                    return self.violations.push(ObjError::NotANumber { line, text: text() });
+                }
+            }
+        }
+        let [x, y, z, weight] = values;
+        let largest = [x, y, z]
+            .map(|coordinate| (coordinate / weight * self.unit_metres).abs())
+            .into_iter()
+            .fold(0.0, f32::max);
+        if weight == 0.0 || !largest.is_finite() {
+            let text = shown(numbers[read - 1]);
+            return self.violations.push(ObjError::NotFinite { line, text });
+        }
+        if largest > MAX_COORDINATE_METRES {
+            let metres = largest;
+            return self.violations.push(ObjError::TooFar { line, metres });
+        }
+        self.scan.plain.push('v');
+        self.write_numbers(&numbers[..read]);
+    }
+
+    fn face<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]> + Clone) {
+        let corners = words.clone().count();
+        if corners < 3 {
+            return self.scan.without_area.note(line);
+        }
+        self.scan.triangles += corners - 2;
+        if self.scan.triangles > self.limits.triangles {
+            self.over_limit = true;
+            let limit = self.limits.triangles;
+            return self.violations.push(ObjError::TooManyTriangles { line, limit });
+        }
+        self.scan.plain.push('f');
+        for corner in words {
+            match vertex_index(corner) {
+                None => {
+                    let text = shown(corner);
+                    self.violations.push(ObjError::NotAnIndex { line, text });
+                }
+                Some(index) => self.corner(line, index),
+            }
+        }
+        self.scan.plain.push('\n');
+        if self.names_changed {
+            let Names {
+                groups,
+                object,
+                material,
+            } = &self.current;
+            let mut set: Vec<u32> = groups.iter().chain(object).chain(material).copied().collect();
+            set.sort_unstable();
+            set.dedup();
+            let start = self.scan.listed_names.len();
+            self.scan.listed_names.extend(set);
+            self.scan.name_sets.push(start..self.scan.listed_names.len());
+            self.names_changed = false;
+        }
+        self.scan.faces.push(Face {
+            line,
+            corners,
+            names: self.scan.name_sets.len() - 1,
+        });
+    }
+
+    /// Writes a corner to the plain text, counted from 1.
+    fn corner(&mut self, line: usize, index: i64) {
+        let vertices = self.scan.vertices;
+        let positive = if index < 0 {
+            usize::try_from(index.unsigned_abs())
+                .ok()
+                .and_then(|back| (vertices + 1).checked_sub(back))
+        } else {
+            usize::try_from(index).ok()
+        };
+        let Some(positive) = positive.filter(|&positive| positive > 0) else {
+            return self.violations.push(ObjError::IndexOutOfRange {
+                line,
+                index,
+                vertices,
+            });
+        };
+        if positive > vertices {
+            self.forward.push((line, positive));
+        }
+        self.scan.plain.push(' ');
+        self.scan.plain.push_str(&positive.to_string());
+    }
+
+    fn groups<'a>(&mut self, line: usize, names: impl Iterator<Item = std::borrow::Cow<'a, str>>) {
+        self.current.groups.clear();
+        let mut found = 0;
+        for name in names {
+            found += 1;
+            if found <= MAX_NAMES_PER_LINE {
+                let index = self.intern(&name);
+                self.current.groups.push(index);
+            }
+        }
+        if found > MAX_NAMES_PER_LINE {
+            self.violations.push(ObjError::TooManyNames { line, found });
+        }
+    }
+
+    /// The name after a keyword; it may contain spaces.
+    fn rest_of_line(&mut self, line: &[u8], keyword: &[u8]) -> Option<u32> {
+        let line = line.trim_ascii();
+        let name = String::from_utf8_lossy(line[keyword.len()..].trim_ascii());
+        (!name.is_empty()).then(|| self.intern(&name))
+    }
+
+    fn intern(&mut self, name: &str) -> u32 {
+        if let Some(&index) = self.names.get(name) {
+            return index;
+        }
+        let index = self.names.len() as u32;
+        self.names.insert(name.to_owned(), index);
+        index
+    }
+
+    fn write_numbers(&mut self, numbers: &[&[u8]]) {
+        for number in numbers {
+            self.scan.plain.push(' ');
+            // Parsed as a number, so it is ASCII.
+            self.scan.plain.push_str(&String::from_utf8_lossy(number));
+        }
+        self.scan.plain.push('\n');
+    }
+
+    fn finish(mut self) -> Result<Scan, Vec<ObjError>> {
+        let vertices = self.scan.vertices;
+        if self.over_limit {
+            self.forward.clear();
+        }
+        for &(line, index) in self.forward.iter().filter(|(_, index)| *index > vertices) {
+            let index = i64::try_from(index).unwrap_or(i64::MAX);
+            self.violations.push(ObjError::IndexOutOfRange {
+                line,
+                index,
+                vertices,
+            });
+        }
+        self.violations.into_result()?;
+        self.scan.names = vec![String::new(); self.names.len()];
+        for (name, index) in self.names {
+            self.scan.names[index as usize] = name;
+        }
+        Ok(self.scan)
+    }
+}
+
+/// The vertex index of a corner written as `v`, `v/t`, `v//n` or `v/t/n`; the other indices are only checked.
+fn vertex_index(corner: &[u8]) -> Option<i64> {
+    let mut parts = std::str::from_utf8(corner).ok()?.split('/');
+    let index = parts.next()?.parse().ok()?;
+    let mut others = 0;
+    for part in parts {
+        others += 1;
+        if others > 2 || !(part.is_empty() || part.parse::<i64>().is_ok()) {
+            return None;
+        }
+    }
+    Some(index)
+}

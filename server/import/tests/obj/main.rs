@@ -1,0 +1,38 @@
+//! The OBJ reader: accepted and rejected text, robustness, files from elsewhere.
+
+mod files;
+mod properties;
+mod reading;
+mod reference;
+mod rejecting;
+
+use grasp_import::{
+    MeshLimits,
+    obj::{ObjError, ObjMesh, read_obj},
+};
+
+/// Ample for every file of these tests.
+const LIMITS: MeshLimits = MeshLimits {
+    bytes: 16 << 20,
+    vertices: 100_000,
+    triangles: 100_000,
+};
+
+fn read(text: &str) -> Result<ObjMesh, Vec<ObjError>> {
+    read_obj(text.as_bytes(), 1.0, LIMITS)
+}
+
+/// A cube of 2 m, by quads, wound outward.
+const CUBE: &str = "\
+v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
+f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+/// The volume enclosed by a mesh, by the divergence theorem.
+fn volume(read: &ObjMesh) -> f64 {
+    (0..read.mesh.triangles().len())
+        .map(|triangle| {
+            let [a, b, c] = read.mesh.corners(triangle).map(glam::Vec3::as_dvec3);
+            a.dot(b.cross(c)) / 6.0
+        })
+        .sum()
+}

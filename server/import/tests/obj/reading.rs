@@ -1,0 +1,244 @@
+//! Accepted text, and its warnings.
+
+use glam::Vec3;
+use grasp_import::obj::read_obj;
+
+use crate::{CUBE, LIMITS, read, volume};
+
+#[test]
+fn clean_cube_raises_no_warning() {
+    let cube = read(CUBE).unwrap();
+    assert_eq!(cube.mesh.positions().len(), 8);
+    assert_eq!(cube.mesh.triangles().len(), 12);
+    assert_eq!(cube.warnings, [""; 0]);
+    assert_eq!(cube.groups, []);
+    assert!((volume(&cube) - 8.0).abs() < 1e-9);
+}
+
+#[test]
+fn splits_polygons_into_fans_from_first_corner() {
+    let pentagon = read("v 0 0 0\nv 2 0 0\nv 3 1 0\nv 1 2 0\nv -1 1 0\nf 2 3 4 5 1\n").unwrap();
+    let corner = [(2, 0), (3, 1), (1, 2), (-1, 1), (0, 0)].map(|(x, y)| Vec3::new(x as f32, y as f32, 0.0));
+    let corners: Vec<_> = (0..3).map(|t| pentagon.mesh.corners(t)).collect();
+    assert_eq!(corners, [1, 2, 3].map(|k| [corner[0], corner[k], corner[k + 1]]));
+}
+
+#[test]
+fn scales_coordinates_to_metres() {
+    let cube = read_obj(CUBE.as_bytes(), 0.01, LIMITS).unwrap();
+    assert!((volume(&cube) - 8e-6).abs() < 1e-12);
+}
+
+#[test]
+fn negative_indices_count_back_from_their_line() {
+    let early = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -4 -1 -3\n";
+    let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 0 0 1\nf 1 4 2\n";
+    assert_eq!(read(early).unwrap().mesh, read(plain).unwrap().mesh);
+}
+
+#[test]
+fn accepts_faces_before_their_vertices() {
+    let text: Vec<_> = CUBE.lines().rev().collect();
+    let cube = read(&text.join("\n")).unwrap();
+    // Vertices and faces are reversed, but the indices are not: vertex k became 9 − k, which mirrors the cube in all
+    // three axes and turns it inside out.
+    assert!((volume(&cube).abs() - 8.0).abs() < 1e-9);
+}
+
+#[test]
+fn ignores_line_endings_continuations_and_comments() {
+    let plain = read(CUBE).unwrap().mesh;
+    for text in [
+        CUBE.replace('\n', "\r\n"),
+        CUBE.replace('\n', "\r"),
+        CUBE.replace("f 4 3 2 1", "f 4 3 \\\n2 1"),
+        CUBE.replace("f 4 3 2 1", "f 4 3 \\\r\n2 1 # below"),
+        CUBE.replace("v ", "  v\t"),
+        format!("\u{feff}# a cube\n\n{CUBE}"),
+        CUBE.trim_end().to_owned(),
+    ] {
+        assert_eq!(read(&text).unwrap().mesh, plain, "{text:?}");
+    }
+}
+
+#[test]
+fn replaces_invalid_utf8_in_names() {
+    let mut text = b"# caf\xE9\ng caf\xE9\n".to_vec();
+    text.extend_from_slice(CUBE.as_bytes());
+    let cube = read_obj(&text, 1.0, LIMITS).unwrap();
+    assert_eq!(cube.groups.len(), 1);
+    assert_eq!(cube.groups[0].0, "caf\u{fffd}");
+}
+
+#[test]
+fn divides_by_weights_and_ignores_colours() {
+    let weighted = read("v 0 0 0 2\nv 4 0 0 2\nv 0 2 0\nf 1 2 3\n").unwrap();
+    assert_eq!(weighted.mesh.corners(0)[1], Vec3::new(2.0, 0.0, 0.0));
+    let coloured = read("v 0 0 0 1 0 0\nv 2 0 0 nan nan nan\nv 0 2 0 1 0.5 0.5 0.5\nf 1 2 3\n").unwrap();
+    assert_eq!(coloured.mesh, weighted.mesh);
+}
+
+#[test]
+fn ignores_texture_coordinates_and_normals() {
+    for face in [
+        "f 1/1 2/2 3/3",
+        "f 1//9 2//9 3//9",
+        "f 1/1/1 2/1/1 3/1/1",
+        "f 1// 2// 3//",
+        "f 1/0/-5 2/0/-5 3/0/-5",
+    ] {
+        let text = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt oh no\n{face}\n");
+        assert_eq!(read(&text).unwrap().mesh.triangles(), [[0, 1, 2]], "{face}");
+    }
+}
+
+#[test]
+fn opens_no_material_files() {
+    let cube = read(&format!(
+        "mtllib /etc/passwd\nmtllib ../../x.mtl\nusemtl steel blue\n{CUBE}"
+    ))
+    .unwrap();
+    assert_eq!(cube.warnings, [""; 0]);
+    assert_eq!(cube.groups, [("steel blue".to_owned(), (0..12).collect())]);
+}
+
+#[test]
+fn groups_objects_and_materials_apply_until_replaced() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 1
+        f 1 3 2\ng a b\nf 1 2 4\no thing\nusemtl red\nf 2 3 4\ng\nusemtl blue\no other thing\nf 3 1 4\ng b\nf 3 1 4 5\n";
+    let read = read(text).unwrap();
+    // Triangle 4 of the file repeats triangle 3 and is dropped; 5 becomes 4.
+    let expected = [
+        ("a", vec![1, 2]),
+        ("b", vec![1, 2, 4]),
+        ("blue", vec![3, 4]),
+        ("other thing", vec![3, 4]),
+        ("red", vec![2]),
+        ("thing", vec![2]),
+    ];
+    assert_eq!(
+        read.groups,
+        expected.map(|(name, triangles)| (name.to_owned(), triangles))
+    );
+    assert_eq!(read.places, [0, 1, 2, 3, 5]);
+    assert_eq!(read.places_in_file, 6);
+}
+
+#[test]
+fn welds_equal_positions_including_signed_zeros() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1 0 -0\nv -0 0 -0.0\nv 0 0 1\nf 4 5 6\n";
+    let read = read(text).unwrap();
+    assert_eq!(read.mesh.positions().len(), 4);
+    assert_eq!(read.mesh.triangles(), [[0, 1, 2], [1, 0, 3]]);
+}
+
+#[test]
+fn drops_degenerate_elements_and_reports_their_line() {
+    let text =
+        format!("{CUBE}p 1\nl 1 2\nf 1 2\nf 1\nf 1 1 2\nf 1 2 1\nv 3 3 3\nv 4 4 4\nv 5 5 5\nf 9 10 11\n");
+    let read = read(&text).unwrap();
+    assert_eq!(read.mesh.triangles().len(), 12);
+    assert!(
+        read.warnings.contains(
+            &"4 points, lines and faces with fewer than three corners were dropped; the first is on line 15"
+                .into()
+        )
+    );
+    assert!(
+        read.warnings
+            .contains(&"3 triangles without area were dropped; the first is on line 19".into())
+    );
+}
+
+#[test]
+fn drops_repeated_triangles_but_keeps_back_faces() {
+    let sheet = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 2 3 1\nf 3 2 1\n").unwrap();
+    assert_eq!(sheet.mesh.triangles(), [[0, 1, 2], [2, 1, 0]]);
+    assert_eq!(
+        sheet.warnings,
+        ["1 triangles that repeat an earlier one were dropped; the first is on line 5"]
+    );
+}
+
+#[test]
+fn flips_closed_mesh_that_is_inside_out() {
+    let inverted: String = CUBE
+        .lines()
+        .map(|line| match line.strip_prefix("f ") {
+            Some(corners) => format!("f {}\n", corners.chars().rev().collect::<String>()),
+            None => format!("{line}\n"),
+        })
+        .collect();
+    let cube = read(&inverted).unwrap();
+    assert!((volume(&cube) - 8.0).abs() < 1e-9);
+    assert_eq!(
+        cube.warnings,
+        ["the mesh was inside out; all triangles were turned"]
+    );
+}
+
+#[test]
+fn warns_of_holes_winding_parts_and_unused_vertices() {
+    let warnings = |text: &str| read(text).unwrap().warnings;
+    assert_eq!(
+        warnings(&CUBE.replace("f 5 6 7 8\n", "")),
+        ["4 edges are open: the surface has holes and its volume is an estimate"]
+    );
+    assert_eq!(
+        warnings(&CUBE.replace("f 5 6 7 8\n", "f 8 7 6 5\n")),
+        ["4 edges join triangles that face opposite ways: the winding is inconsistent"]
+    );
+    let far_cube: String = CUBE
+        .lines()
+        .map(|line| match line.strip_prefix("v ") {
+            Some(numbers) => {
+                let (x, rest) = numbers.split_once(' ').unwrap();
+                format!("v {} {rest}\n", x.parse::<f32>().unwrap() + 5.0)
+            }
+            None => format!("f {}\n", shifted(&line[2..], 8)),
+        })
+        .collect();
+    assert_eq!(
+        warnings(&format!("{CUBE}{far_cube}")),
+        ["2 parts are disconnected: they share no vertex"]
+    );
+    assert_eq!(
+        warnings(&format!("{CUBE}v 9 9 9\n")),
+        ["1 vertices are not used by any face"]
+    );
+    assert_eq!(
+        warnings(&format!("{CUBE}curv 0 1\nwhat is this\n")),
+        ["2 lines start with an unknown keyword and were ignored; the first is on line 15"]
+    );
+    let fin = warnings(&format!("{CUBE}v 0 0 9\nf 1 2 9\n"));
+    assert!(
+        fin.contains(&"1 edges join more than two triangles".to_owned()),
+        "{fin:?}"
+    );
+}
+
+fn shifted(corners: &str, by: usize) -> String {
+    let shifted: Vec<_> = corners
+        .split(' ')
+        .map(|corner| (corner.parse::<usize>().unwrap() + by).to_string())
+        .collect();
+    shifted.join(" ")
+}
+
+#[test]
+fn warns_of_polygon_whose_fan_overlaps() {
+    // The second corner from the end is reflex as seen from the first corner.
+    let arrow = "v 0 0 0\nv 4 0 0\nv 1 1 0\nv 0 4 0\n";
+    assert!(
+        read(&format!("{arrow}f 2 3 4 1\n")).unwrap().warnings[0]
+            .starts_with("line 5: a polygon is not convex")
+    );
+    // The same polygon can be a fan from its reflex corner.
+    let from_reflex = read(&format!("{arrow}f 3 4 1 2\n")).unwrap();
+    assert!(
+        !from_reflex
+            .warnings
+            .iter()
+            .any(|warning| warning.contains("convex"))
+    );
+}
