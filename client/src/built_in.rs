@@ -5,7 +5,7 @@ use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
 
 use crate::{DigitAngles, FindRequest, HandAngles, Handedness, Pose, PresentingHand};
 
-/// Asks for a grasp on a built-in holdout, in its world frame, with the server's defaults.
+/// A request for a grasp on a built-in holdout, in its world frame, with the server's defaults.
 pub fn request_for(holdout: &BuiltInHoldout) -> FindRequest {
     FindRequest {
         client_from_object: client_pose(holdout.world_from_object),

@@ -22,17 +22,16 @@ use crate::{
     wire,
 };
 
-/// How long a connection may take to stand, unless the builder says otherwise. Longer helps on slow networks; shorter
-/// tells a game sooner that there is no server.
+/// Default time limit for connecting. Longer helps on slow networks; shorter reports a missing server sooner.
 const DEFAULT_CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// How long a call may take with all its retries, unless the builder says otherwise; a search gets its budget on top.
+/// Default time limit of a call, retries included; a search's budget is added.
 const DEFAULT_CALL_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// How tonic words a deadline that passed: it reports CANCELLED, on either side of the wire.
+/// Message of the CANCELLED status with which tonic reports an expired deadline, on either side.
 const TONIC_TIMEOUT_MESSAGE: &str = "Timeout expired";
 
-/// How a client connects and calls.
+/// Settings of a client.
 #[derive(Clone, Debug)]
 pub struct GraspClientBuilder {
     endpoint: String,
@@ -42,22 +41,22 @@ pub struct GraspClientBuilder {
 }
 
 impl GraspClientBuilder {
-    /// How long a connection may take to stand. Default: 5 s.
+    /// Time limit for connecting. Default: 5 s.
     #[must_use]
     pub fn connect_timeout(mut self, timeout: Duration) -> Self {
         self.connect_timeout = timeout;
         self
     }
 
-    /// How long a call may take with all its retries; a search gets its budget on top. The server is told (header
-    /// `grpc-timeout`), so that it stops working for a caller who is gone. Default: 10 s.
+    /// Time limit of a call, retries included; a search's budget is added. It is sent to the server (header
+    /// `grpc-timeout`), which stops working once it has passed. Default: 10 s.
     #[must_use]
     pub fn call_timeout(mut self, timeout: Duration) -> Self {
         self.call_timeout = timeout;
         self
     }
 
-    /// When calls are tried again. Default: [`RetryPolicy::default`].
+    /// When calls are retried. Default: [`RetryPolicy::default`].
     #[must_use]
     pub fn retry(mut self, policy: RetryPolicy) -> Self {
         self.retry = policy;
@@ -80,8 +79,7 @@ impl GraspClientBuilder {
         Ok(self.over(channel))
     }
 
-    /// Connects when the first call is made, so that the client may start before the server. Must be called inside a
-    /// tokio runtime.
+    /// Connects on the first call: the client may start before the server. Must be called inside a tokio runtime.
     ///
     /// # Errors
     /// [`ClientError::Endpoint`].
@@ -90,7 +88,7 @@ impl GraspClientBuilder {
         Ok(self.over(channel))
     }
 
-    /// Calls over a channel that was made elsewhere, for instance with TLS; its connect timeout is its own.
+    /// Uses an existing channel, for instance one with TLS. The connect timeout does not apply.
     pub fn over(self, channel: Channel) -> GraspClient {
         GraspClient {
             channel,
@@ -111,7 +109,7 @@ impl GraspClientBuilder {
         }
         Ok(endpoint
             .connect_timeout(self.connect_timeout)
-            // A grasp is one small message each way: waiting to fill a packet would only add latency.
+            // Messages are small: waiting to fill a packet would only add latency.
             .tcp_nodelay(true))
     }
 }
@@ -126,7 +124,7 @@ impl GraspClientBuilder {
 /// let client = GraspClient::connect("http://[::1]:50051").await?;
 /// let answer = client.find_grasp(&FindRequest::new("objects/remote")).await?;
 /// match answer.grasp {
-///     Some(grasp) => println!("take it with the wrist at {} m", grasp.client_from_wrist.position),
+///     Some(grasp) => println!("move the wrist to {} m", grasp.client_from_wrist.position),
 ///     None => println!("no grasp in {} attempts", answer.report.attempts),
 /// }
 /// # Ok(())
@@ -148,7 +146,7 @@ impl GraspClient {
         Self::builder(endpoint).connect().await
     }
 
-    /// A client with own settings; `endpoint` is a URL like `http://[::1]:50051`.
+    /// A client with custom settings; `endpoint` is a URL like `http://[::1]:50051`.
     pub fn builder(endpoint: impl Into<String>) -> GraspClientBuilder {
         GraspClientBuilder {
             endpoint: endpoint.into(),
@@ -158,11 +156,11 @@ impl GraspClient {
         }
     }
 
-    /// Asks for a grasp. No grasp within the budget is an answer, not an error. May take the call timeout and the
-    /// request's budget together. Dropping the future stops the server's work.
+    /// Searches for a grasp. Finding none within the budget is an answer, not an error. Takes at most the call timeout
+    /// plus the request's budget. Dropping the future stops the search on the server.
     ///
     /// # Errors
-    /// Any but the errors of connecting; [`ClientError::InvalidArgument`] names all that is wrong with the request.
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
     pub async fn find_grasp(&self, request: &FindRequest) -> Result<FindAnswer, ClientError> {
         let message = wire::find_request_to_wire(request);
         let timeout = self
@@ -176,11 +174,11 @@ impl GraspClient {
         Ok(wire::find_answer_from_wire(answer)?)
     }
 
-    /// One page of the objects, sorted by name; `page_size` 0 leaves the size to the server, `page_token` is none for
-    /// the first page.
+    /// One page of the objects, sorted by name. With `page_size` 0 the server chooses the size; the first page has no
+    /// `page_token`.
     ///
     /// # Errors
-    /// Any but the errors of connecting.
+    /// Any except those of connecting.
     pub async fn list_objects_page(
         &self,
         page_size: u16,
@@ -201,10 +199,10 @@ impl GraspClient {
         Ok(wire::object_page_from_wire(page)?)
     }
 
-    /// All objects, sorted by name, however many pages that takes.
+    /// All objects, sorted by name, from as many pages as needed.
     ///
     /// # Errors
-    /// Any but the errors of connecting.
+    /// Any except those of connecting.
     pub async fn list_objects(&self) -> Result<Vec<Object>, ClientError> {
         let mut objects = Vec::new();
         let mut token = None;
@@ -213,11 +211,11 @@ impl GraspClient {
             objects.extend(page.objects);
             match page.next_page_token {
                 None => return Ok(objects),
-                // A server that repeats itself would keep the loop going for ever.
+                // A repeated token would make this loop endless.
                 next if next == token => {
                     return Err(ClientError::Malformed {
                         field: "next_page_token".to_owned(),
-                        problem: "is the one of the page before".to_owned(),
+                        problem: "repeats the token of the previous page".to_owned(),
                     });
                 }
                 next => token = next,
@@ -228,7 +226,7 @@ impl GraspClient {
     /// One object; `name` is "objects/{object}".
     ///
     /// # Errors
-    /// Any but the errors of connecting; [`ClientError::NotFound`] if there is no such object.
+    /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
     pub async fn get_object(&self, name: impl Into<String>) -> Result<Object, ClientError> {
         let message = v1::GetObjectRequest { name: name.into() };
         let answer = self
@@ -242,11 +240,11 @@ impl GraspClient {
         Ok(wire::object_from_wire(answer.object)?)
     }
 
-    /// Makes an object. The call is tried again like any other; if an answer got lost on the way, the next attempt
-    /// meets its own object and ends with [`ClientError::AlreadyExists`].
+    /// Creates an object. The call is retried like any other: if an answer was lost, the retry finds the object in place
+    /// and ends with [`ClientError::AlreadyExists`].
     ///
     /// # Errors
-    /// Any but the errors of connecting; [`ClientError::InvalidArgument`] names all that is wrong with the object.
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the object.
     pub async fn create_object(&self, object: &NewObject) -> Result<Object, ClientError> {
         let message = wire::new_object_to_wire(object);
         let answer = self
@@ -260,10 +258,10 @@ impl GraspClient {
         Ok(wire::object_from_wire(answer.object)?)
     }
 
-    /// Asks for the health of the whole server.
+    /// Queries the health of the whole server.
     ///
     /// # Errors
-    /// Any but the errors of connecting.
+    /// Any except those of connecting.
     pub async fn health(&self) -> Result<Health, ClientError> {
         let message = HealthCheckRequest::default();
         let answer = self
@@ -277,7 +275,7 @@ impl GraspClient {
         Ok(wire::health_from_wire(answer))
     }
 
-    /// Sends `message` until it is answered, fails for good or `timeout` has passed since the first attempt.
+    /// Sends `message` until it is answered, fails permanently, or `timeout` has passed since the first attempt.
     async fn call<M, T, F>(
         &self,
         method: &'static str,
@@ -307,13 +305,7 @@ impl GraspClient {
             let wait = self.retry.wait_after(attempts, &status);
             match wait.filter(|&wait| start.elapsed() + wait < timeout) {
                 Some(wait) => {
-                    tracing::debug!(
-                        method,
-                        attempts,
-                        ?wait,
-                        message = status.message(),
-                        "trying again"
-                    );
+                    tracing::debug!(method, attempts, ?wait, message = status.message(), "retrying");
                     tokio::time::sleep(wait).await;
                 }
                 None => return Err(ClientError::from_status(&status, attempts)),
@@ -322,7 +314,7 @@ impl GraspClient {
     }
 }
 
-/// True if the status says, in tonic's way, that a deadline passed.
+/// True if the status is tonic's report of an expired deadline.
 fn is_timeout(status: &Status, deadline_passed: bool) -> bool {
     status.code() == Code::Cancelled && (deadline_passed || status.message() == TONIC_TIMEOUT_MESSAGE)
 }

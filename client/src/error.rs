@@ -1,4 +1,4 @@
-//! What can go wrong with a call, with the standard details that the server attached.
+//! Errors of calls, with the standard details that the server attached.
 
 use std::{collections::BTreeMap, fmt, time::Duration};
 
@@ -9,40 +9,39 @@ use tonic_types::StatusExt as _;
 /// An error of a lower layer.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 
-/// What can go wrong.
+/// Why a call or a connection failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClientError {
     /// The endpoint is not a URL.
     #[error("endpoint {endpoint:?} is not a URL like http://[::1]:50051")]
     Endpoint {
-        /// What was given.
+        /// The endpoint as given.
         endpoint: String,
         /// What is wrong with it.
         source: BoxError,
     },
-    /// No connection could be made.
+    /// The connection failed.
     #[error("cannot connect to {endpoint}")]
     Connect {
-        /// Whereto.
+        /// The endpoint as given.
         endpoint: String,
-        /// Why not.
+        /// The cause.
         source: BoxError,
     },
-    /// The request breaks rules; [`ErrorDetails::field_violations`] says which.
+    /// The request is invalid; [`ErrorDetails::field_violations`] lists why.
     #[error("invalid argument: {0}")]
     InvalidArgument(Box<CallError>),
-    /// Something that the request names does not exist; [`ErrorDetails::resource`] says what.
+    /// A resource named in the request does not exist; see [`ErrorDetails::resource`].
     #[error("not found: {0}")]
     NotFound(Box<CallError>),
-    /// Something that the request would make exists. After a retry (see [`CallError::attempts`]) it may be the
-    /// call's own work.
+    /// The resource to create exists. After a retry (see [`CallError::attempts`]), this very call may have created it.
     #[error("already exists: {0}")]
     AlreadyExists(Box<CallError>),
-    /// The server has no room for the request; [`ErrorDetails::retry_delay`] may say when to come back.
+    /// The server has no capacity for the request; [`ErrorDetails::retry_delay`] may say when to retry.
     #[error("resource exhausted: {0}")]
     ResourceExhausted(Box<CallError>),
-    /// The server could not be reached or takes no requests, also after retries.
+    /// The server could not be reached or takes no requests, even after retries.
     #[error("unavailable: {0}")]
     Unavailable(Box<CallError>),
     /// No answer came in time.
@@ -51,7 +50,7 @@ pub enum ClientError {
     /// The call failed in another way; see [`CallError::code`].
     #[error("{name}: {0}", name = code_name(.0.code))]
     Other(Box<CallError>),
-    /// The answer breaks the contract, as one of another service or of a newer server might.
+    /// The answer violates the contract; it may come from another service or a newer server.
     #[error("malformed answer: {field} {problem}")]
     Malformed {
         /// The field's path in the answer.
@@ -68,9 +67,9 @@ pub struct CallError {
     pub code: Code,
     /// The server's message, or the transport's.
     pub message: String,
-    /// How often the call was tried.
+    /// Number of attempts.
     pub attempts: u32,
-    /// What the server attached.
+    /// Details that the server attached.
     pub details: ErrorDetails,
 }
 
@@ -87,34 +86,34 @@ impl fmt::Display for CallError {
     }
 }
 
-/// The standard details of an error (`google.rpc`), as far as the service uses them.
+/// The standard error details (`google.rpc`) that the service uses.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ErrorDetails {
-    /// A stable name of the cause in `UPPER_SNAKE_CASE` (`ErrorInfo.reason`).
+    /// Stable identifier of the cause, in `UPPER_SNAKE_CASE` (`ErrorInfo.reason`).
     pub reason: Option<String>,
     /// Facts about the cause by name (`ErrorInfo.metadata`).
     pub metadata: BTreeMap<String, String>,
-    /// Everything that is wrong with the request (`BadRequest`).
+    /// Everything wrong with the request (`BadRequest`).
     pub field_violations: Vec<FieldViolation>,
-    /// What the error is about (`ResourceInfo`).
+    /// The resource concerned (`ResourceInfo`).
     pub resource: Option<Resource>,
-    /// How long to wait before another try (`RetryInfo`).
+    /// Time to wait before a retry (`RetryInfo`).
     pub retry_delay: Option<Duration>,
 }
 
-/// One thing that is wrong with a request.
+/// One violation in a request.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FieldViolation {
     /// The field's path in the request.
     pub field: String,
-    /// What is wrong with its value and what would be right.
+    /// What is wrong with its value, and what would be right.
     pub description: String,
 }
 
-/// Something that an error is about.
+/// The resource that an error concerns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Resource {
-    /// The kind of thing.
+    /// Type of the resource.
     #[serde(rename = "type")]
     pub kind: String,
     /// Its name.
@@ -138,7 +137,7 @@ impl ClientError {
         }
     }
 
-    /// The error of a call that ended with `status` at its `attempts`th attempt.
+    /// The error of a call whose last attempt, number `attempts`, ended with `status`.
     pub(crate) fn from_status(status: &Status, attempts: u32) -> Self {
         let call = Box::new(CallError {
             code: status.code(),
@@ -168,7 +167,7 @@ impl ClientError {
     }
 }
 
-/// The details of a status; details that cannot be decoded count as absent, since the message still says what is wrong.
+/// The details of a status. Undecodable details count as absent: the message still says what is wrong.
 fn decode_details(status: &Status) -> ErrorDetails {
     let details = status.get_error_details();
     let violations = details.bad_request().map(|bad| bad.field_violations.as_slice());

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A type of the GRASP taxonomy (T. Feix et al., "The GRASP Taxonomy of Human Grasp Types", 2016); its value is its number
-/// there.
+/// A type of the GRASP taxonomy (T. Feix et al., "The GRASP Taxonomy of Human Grasp Types", 2016), with its number there
+/// as value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GraspType {
@@ -13,7 +13,7 @@ pub enum GraspType {
     SmallDiameter = 2,
     /// As [`GraspType::LargeDiameter`], around something between thick and thin.
     MediumWrap = 3,
-    /// Fingers and palm around a handle, the thumb's whole inside along it.
+    /// Fingers and palm around a handle, the thumb adducted along it.
     AdductedThumb = 4,
     /// Fingers and palm around a thin handle, the thumb's tip on it.
     LightTool = 5,
@@ -23,10 +23,10 @@ pub enum GraspType {
     /// The tips of three fingers in a row against the thumb's.
     #[serde(rename = "prismatic_3_finger")]
     Prismatic3Finger = 7,
-    /// The tips of two fingers beside each other against the thumb's.
+    /// The tips of two fingers in a row against the thumb's.
     #[serde(rename = "prismatic_2_finger")]
     Prismatic2Finger = 8,
-    /// The pads of thumb and index finger.
+    /// Between the pads of thumb and index finger.
     PalmarPinch = 9,
     /// The palm on a disk's face, the digits around its rim.
     PowerDisk = 10,
@@ -38,37 +38,37 @@ pub enum GraspType {
     PrecisionSphere = 13,
     /// The tips of thumb, index and middle finger around something round.
     Tripod = 14,
-    /// A handle hangs in the hooked fingers; the thumb has nothing to do.
+    /// A handle hangs in the hooked fingers; the thumb is idle.
     FixedHook = 15,
-    /// The thumb's pad presses something flat onto the side of the index finger.
+    /// The thumb's pad presses something flat against the side of the index finger.
     Lateral = 16,
     /// The index finger stretched along the object, the others close around it.
     IndexFingerExtension = 17,
     /// Stretched fingers against the thumb, on something flat.
     ExtensionType = 18,
-    /// More than the tips of all fingers against the thumb, as in the loops of scissors.
+    /// The distal links of the fingers, not just their tips, against the thumb, as in the loops of scissors.
     DistalType = 19,
     /// Pads of thumb and index finger, and the side of the middle finger, as on a pen.
     WritingTripod = 20,
-    /// As [`GraspType::WritingTripod`], with the ring finger beside the middle one.
+    /// As [`GraspType::WritingTripod`], with the ring finger next to the middle one.
     TripodVariation = 21,
-    /// Stretched fingers and the stretched thumb on both sides of something flat.
+    /// Stretched fingers and stretched thumb on opposite faces of something flat.
     ParallelExtension = 22,
     /// Between the sides of index and middle finger.
     AdductionGrip = 23,
-    /// The very tips of thumb and index finger.
+    /// Between the very tips of thumb and index finger.
     TipPinch = 24,
-    /// As [`GraspType::WritingTripod`], with the thumb flat beside the fingers.
+    /// As [`GraspType::WritingTripod`], with the thumb flat against the fingers' sides.
     LateralTripod = 25,
-    /// More than the tips of three fingers, and the thumb, around a ball.
+    /// Three fingers, more than their tips, and the thumb around a ball.
     #[serde(rename = "sphere_4_finger")]
     Sphere4Finger = 26,
     /// The tips of thumb and three fingers around something round.
     Quadpod = 27,
-    /// More than the tips of two fingers, and the thumb, around a ball. The thesis' figure says "Sphere Finger".
+    /// Two fingers, more than their tips, and the thumb around a ball. The thesis's figure says "Sphere Finger".
     #[serde(rename = "sphere_3_finger")]
     Sphere3Finger = 28,
-    /// As [`GraspType::Lateral`], on a rod that the other fingers' pads steady.
+    /// As [`GraspType::Lateral`], on a rod steadied by the pads of the other fingers.
     Stick = 29,
     /// Stretched fingers press something flat against the palm.
     Palmar = 30,
@@ -76,7 +76,7 @@ pub enum GraspType {
     Ring = 31,
     /// As [`GraspType::Lateral`], on a handle that reaches into the palm.
     Ventral = 32,
-    /// The pads of the stretched index finger and the thumb.
+    /// Between the pads of the stretched index finger and the thumb.
     InferiorPincer = 33,
 }
 

@@ -1,5 +1,5 @@
-//! How durations and seeds are written as JSON: durations as numbers of seconds, seeds as strings of digits, since
-//! 64 bits do not fit into every reader's numbers (as in protobuf's JSON form). Seeds may be read from numbers, too.
+//! JSON forms of durations and seeds. Durations are numbers of seconds. Seeds are strings of digits, as in protobuf's
+//! JSON mapping, since many readers' numbers hold fewer than 64 bits; numbers are accepted, too.
 
 /// A duration as a number of seconds.
 pub(crate) mod seconds {
@@ -13,8 +13,11 @@ pub(crate) mod seconds {
 
     pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
         let seconds = f64::deserialize(deserializer)?;
-        Duration::try_from_secs_f64(seconds)
-            .map_err(|_| D::Error::custom(format!("{seconds} is no number of seconds from 0 up")))
+        Duration::try_from_secs_f64(seconds).map_err(|_| {
+            D::Error::custom(format!(
+                "{seconds} is not a number of seconds; it must be at least 0"
+            ))
+        })
     }
 }
 
@@ -27,10 +30,7 @@ pub(crate) mod optional_seconds {
     #[derive(Serialize, Deserialize)]
     struct Seconds(#[serde(with = "super::seconds")] Duration);
 
-    #[expect(
-        clippy::ref_option,
-        reason = "serde's `with` hands in a reference to the field"
-    )]
+    #[expect(clippy::ref_option, reason = "serde's `with` passes a reference to the field")]
     pub(crate) fn serialize<S: Serializer>(
         duration: &Option<Duration>,
         serializer: S,
@@ -58,7 +58,7 @@ pub(crate) mod seed {
 
     #[expect(
         clippy::trivially_copy_pass_by_ref,
-        reason = "serde's `with` hands in a reference to the field"
+        reason = "serde's `with` passes a reference to the field"
     )]
     pub(crate) fn serialize<S: Serializer>(seed: &u64, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(seed)
@@ -69,7 +69,7 @@ pub(crate) mod seed {
             NumberOrText::Number(seed) => Ok(seed),
             NumberOrText::Text(text) => text
                 .parse()
-                .map_err(|_| D::Error::custom(format!("seed {text:?} is no whole number below 2^64"))),
+                .map_err(|_| D::Error::custom(format!("seed {text:?} is not an integer from 0 to 2^64 - 1"))),
         }
     }
 }
@@ -81,10 +81,7 @@ pub(crate) mod optional_seed {
     #[derive(Serialize, Deserialize)]
     struct Seed(#[serde(with = "super::seed")] u64);
 
-    #[expect(
-        clippy::ref_option,
-        reason = "serde's `with` hands in a reference to the field"
-    )]
+    #[expect(clippy::ref_option, reason = "serde's `with` passes a reference to the field")]
     pub(crate) fn serialize<S: Serializer>(seed: &Option<u64>, serializer: S) -> Result<S::Ok, S::Error> {
         seed.map(Seed).serialize(serializer)
     }
@@ -101,7 +98,7 @@ mod tests {
     use crate::search::FindRequest;
 
     #[test]
-    fn a_seed_survives_json_in_full() {
+    fn seed_round_trips_through_json() {
         let request = FindRequest {
             seed: Some(u64::MAX),
             ..FindRequest::new("objects/remote")
@@ -112,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_may_be_a_number_but_not_a_word() {
+    fn seed_may_be_a_number_but_not_a_word() {
         let read = |seed: &str| {
             serde_json::from_str::<FindRequest>(&format!(r#"{{"object": "objects/x", "seed": {seed}}}"#))
         };
@@ -122,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_budget_is_a_number_of_seconds() {
+    fn budget_is_a_number_of_seconds() {
         let read = |budget: &str| {
             let text = format!(r#"{{"object": "objects/x", "budget_seconds": {budget}}}"#);
             serde_json::from_str::<FindRequest>(&text).map(|request| request.budget)
@@ -135,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_misspelt_field_is_refused() {
+    fn rejects_unknown_fields() {
         let error =
             serde_json::from_str::<FindRequest>(r#"{"object": "objects/x", "budget": 1}"#).unwrap_err();
         assert!(error.to_string().contains("unknown field `budget`"), "{error}");

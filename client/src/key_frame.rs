@@ -1,4 +1,4 @@
-//! The way to a grasp.
+//! The motion to a grasp.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,21 +7,21 @@ use crate::{
     pose::Pose,
 };
 
-/// A stage on the way to a grasp.
+/// A stage of the motion to a grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KeyFrameKind {
-    /// The hand is away from the object, on its way.
+    /// The open hand, drawn back from the object.
     Approach,
-    /// The hand is around the object, open.
+    /// The open hand, at the object.
     PreGrasp,
-    /// The hand has closed: the grasp itself.
+    /// The closed hand: the grasp itself.
     Close,
-    /// A stage that this version of the library does not know.
+    /// A stage unknown to this version of the library.
     Unrecognised,
 }
 
-/// The receiving hand at a stage on the way to a grasp.
+/// The receiving hand at one stage of the motion to a grasp.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeyFrame {
     /// The stage.
@@ -30,6 +30,6 @@ pub struct KeyFrame {
     pub client_from_wrist: Pose,
     /// The digits, thumb first.
     pub digits: [DigitAngles; 5],
-    /// The joints of `XR_EXT_hand_tracking` in the convention's order, in the client's frame.
+    /// The joints of `XR_EXT_hand_tracking`, in the convention's order, in the client's frame.
     pub joints: [JointPose; JOINT_COUNT],
 }

@@ -1,12 +1,13 @@
-//! Asks a grasp server how a virtual character's hand takes an object that a person holds out.
+//! Client of the grasp service: finds hand poses with which a virtual character takes an object that a person holds
+//! out.
 //!
 //! ```no_run
-//! use grasp_client::{FindRequest, GraspClient, Strategy};
+//! use grasp_client::{FindRequest, GraspClient};
 //!
 //! #[tokio::main]
 //! async fn main() -> Result<(), grasp_client::ClientError> {
 //!     let client = GraspClient::connect("http://[::1]:50051").await?;
-//!     let request = FindRequest { strategy: Some(Strategy::F), ..FindRequest::new("objects/remote") };
+//!     let request = FindRequest::new("objects/remote");
 //!     let answer = client.find_grasp(&request).await?;
 //!     println!("{:?} after {} attempts", answer.outcome, answer.report.attempts);
 //!     for joint in answer.grasp.iter().flat_map(|grasp| &grasp.joints) {
@@ -17,16 +18,16 @@
 //! ```
 //!
 //! - [`GraspClient`] connects and calls, with deadlines and retries; it is cheap to clone.
-//! - [`FindRequest`] and [`FindAnswer`] are the question and the answer; [`PresentingHand`] is the giver's hand,
-//!   [`Constraints`] say which grasps will do.
-//! - [`ClientError`] tells failures apart and carries the standard details that the server attached.
+//! - [`FindRequest`] describes the holdout and the search, [`FindAnswer`] the result. [`PresentingHand`] is the giver's
+//!   hand; [`Constraints`] are requirements on the grasp.
+//! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
 //!
-//! Poses are in one frame of the client's choice; a field named `a_from_b` takes points of frame b to frame a. Metres,
-//! kilograms, newtons, radians, unit quaternions, in the axes of the request's [`Convention`]. No type of the wire's
-//! generated code shows here.
+//! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
+//! kilograms, newtons, radians and unit quaternions, in the axes of the request's [`Convention`]. No generated type is
+//! part of this interface.
 //!
-//! The command line `grasp` (feature `cli`, on by default) is built on this library; games build it with
-//! `default-features = false`.
+//! The folder `examples` has complete programs: one search, an own object with a tracked hand, and a game loop. Feature
+//! `built-in` adds the built-in holdouts as requests.
 
 #[cfg(feature = "built-in")]
 pub mod built_in;

@@ -5,22 +5,22 @@ use std::ops::Mul;
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// A rigid transform; a field or variable named `a_from_b` takes points of frame b to frame a.
+/// A rigid transform; a field or variable named `a_from_b` maps points of frame b to frame a.
 ///
-/// As JSON: `{"position": [x, y, z], "orientation": [x, y, z, w]}`; either part may be left out.
+/// In JSON: `{"position": [x, y, z], "orientation": [x, y, z, w]}`; both parts are optional.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
-    /// Where the origin of b lies in a: metres, or centimetres in the Unreal convention.
+    /// Position of b's origin in a: metres, or centimetres in the Unreal convention.
     #[serde(default)]
     pub position: Vec3,
-    /// How b is turned in a: a unit quaternion; the server refuses norms that differ from one by more than 1 %.
+    /// Orientation of b in a: a unit quaternion. The server rejects norms that differ from 1 by more than 1 %.
     #[serde(default)]
     pub orientation: Quat,
 }
 
 impl Pose {
-    /// The transform that leaves everything where it is.
+    /// The identity.
     pub const IDENTITY: Self = Self {
         position: Vec3::ZERO,
         orientation: Quat::IDENTITY,
@@ -44,7 +44,7 @@ impl Pose {
         }
     }
 
-    /// A point of frame b seen from frame a.
+    /// Maps a point of frame b to frame a.
     pub fn transform_point(self, point: Vec3) -> Vec3 {
         self.orientation * point + self.position
     }
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_product_applies_the_right_factor_first() {
+    fn product_applies_right_factor_first() {
         let a_from_b = Pose::new(
             Vec3::new(1.0, 2.0, 3.0),
             Quat::from_rotation_z(std::f32::consts::FRAC_PI_2),
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn the_inverse_leads_back() {
+    fn inverse_undoes_transform() {
         let a_from_b = Pose::new(
             Vec3::new(-0.3, 0.2, 5.0),
             Quat::from_euler(glam::EulerRot::YXZ, 0.3, -1.2, 2.0),
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn json_may_leave_parts_out_but_not_invent_any() {
+    fn json_parts_are_optional_and_unknown_ones_rejected() {
         let pose: Pose = serde_json::from_str(r#"{"position": [1, 2, 3]}"#).unwrap();
         assert_eq!(pose, Pose::new(Vec3::new(1.0, 2.0, 3.0), Quat::IDENTITY));
         assert!(serde_json::from_str::<Pose>(r#"{"rotation": [0, 0, 0, 1]}"#).is_err());

@@ -1,6 +1,6 @@
-//! When a call is tried again: on UNAVAILABLE only, with growing waits, a bounded number of times, and only as long as
-//! the call's deadline allows. The server may ask for a longer wait (`RetryInfo`), set the wait or forbid another try
-//! (trailer `grpc-retry-pushback-ms`, gRPC proposal A6).
+//! Retries: on UNAVAILABLE only, with exponential backoff, a bounded number of times, and within the call's deadline.
+//! The server may ask for a longer wait (`RetryInfo`), set the wait, or forbid a retry (trailer `grpc-retry-pushback-ms`,
+//! gRPC proposal A6).
 
 use std::{
     hash::{BuildHasher as _, RandomState},
@@ -10,28 +10,28 @@ use std::{
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
 
-/// The trailer by which a server steers retries (gRPC proposal A6).
+/// The trailer with which a server controls retries (gRPC proposal A6).
 const PUSHBACK_TRAILER: &str = "grpc-retry-pushback-ms";
 
-/// Waits vary by this share up and down, so that clients that failed together do not come back together. The value is
-/// that of gRPC proposal A6; 0 would keep them in step.
+/// Relative variation of waits in both directions (gRPC proposal A6); keeps clients that failed together from retrying
+/// together.
 const JITTER: f64 = 0.2;
 
-/// How often and after which waits a call is tried again.
+/// How often a call is retried, and after which waits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RetryPolicy {
-    /// How often a call is tried in all, the first time included; 1 switches retries off.
+    /// Largest number of attempts, the first included; 1 disables retries.
     pub max_attempts: u32,
-    /// The wait before the second attempt, give or take a fifth.
+    /// Wait before the second attempt, varied by up to a fifth.
     pub initial_backoff: Duration,
-    /// No wait is longer, unless the server asks for it.
+    /// Longest wait, unless the server asks for more.
     pub max_backoff: Duration,
-    /// Each wait is this many times the one before; at least 1.
+    /// Factor from one wait to the next; at least 1.
     pub multiplier: f64,
 }
 
 impl RetryPolicy {
-    /// Each call is tried once.
+    /// No retries.
     pub const NEVER: Self = Self {
         max_attempts: 1,
         initial_backoff: Duration::ZERO,
@@ -39,7 +39,7 @@ impl RetryPolicy {
         multiplier: 1.0,
     };
 
-    /// How long to wait after `attempts` attempts of which the last ended with `status`; none: give up.
+    /// The wait after `attempts` attempts, the last of which ended with `status`; none: give up.
     pub(crate) fn wait_after(&self, attempts: u32, status: &Status) -> Option<Duration> {
         if status.code() != Code::Unavailable || attempts >= self.max_attempts {
             return None;
@@ -58,9 +58,9 @@ impl RetryPolicy {
         }
     }
 
-    /// The wait after `attempts` attempts; `fraction` from 0 to 1 picks it within the jitter.
+    /// The wait after `attempts` attempts; `fraction`, from 0 to 1, selects it within the jitter.
     fn backoff(&self, attempts: u32, fraction: f64) -> Duration {
-        // The exponent is bounded so that the product stays finite; by then it exceeds any sensible maximum.
+        // The bound on the exponent keeps the product finite; it exceeds any sensible maximum long before.
         let growth = self
             .multiplier
             .max(1.0)
@@ -72,8 +72,7 @@ impl RetryPolicy {
 }
 
 impl Default for RetryPolicy {
-    /// Four attempts with waits of about 0.1 s, 0.2 s and 0.4 s: enough for a server that restarts its listener,
-    /// short enough for a caller that waits.
+    /// Four attempts with waits of about 0.1 s, 0.2 s and 0.4 s: enough for a server that restarts its listener.
     fn default() -> Self {
         Self {
             max_attempts: 4,
@@ -84,7 +83,7 @@ impl Default for RetryPolicy {
     }
 }
 
-/// What the server says about another try.
+/// The server's instruction about retries.
 #[derive(Debug, PartialEq)]
 enum Pushback {
     Absent,
@@ -92,7 +91,7 @@ enum Pushback {
     Stop,
 }
 
-/// Reads the trailer; a negative or unreadable value forbids another try (A6).
+/// Reads the trailer; a negative or unreadable value forbids a retry (A6).
 fn pushback(status: &Status) -> Pushback {
     let Some(value) = status.metadata().get(PUSHBACK_TRAILER) else {
         return Pushback::Absent;
@@ -103,8 +102,7 @@ fn pushback(status: &Status) -> Pushback {
     }
 }
 
-/// A number from 0 up to 1 that differs between processes and calls: the standard library's randomly keyed hasher is
-/// random enough to spread waits.
+/// A number from 0 to 1 that differs between processes and calls, from the standard library's randomly keyed hasher.
 fn random_fraction() -> f64 {
     f64::from((RandomState::new().hash_one(0_u8) >> 32) as u32) / f64::from(u32::MAX)
 }
@@ -126,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn waits_grow_up_to_the_maximum_and_stay_within_the_jitter() {
+    fn waits_grow_to_the_maximum_within_jitter() {
         let policy = RetryPolicy {
             max_attempts: 99,
             ..RetryPolicy::default()
@@ -146,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn only_unavailable_is_tried_again_and_only_so_often() {
+    fn retries_only_unavailable_and_a_bounded_number_of_times() {
         let policy = RetryPolicy::default();
         for code in 0..=16 {
             let status = Status::new(Code::from(code), "");
@@ -159,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn pushback_sets_the_wait_or_stops() {
+    fn pushback_sets_wait_or_stops() {
         let policy = RetryPolicy::default();
         assert_eq!(
             policy.wait_after(1, &with_pushback("30")),
@@ -171,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn retry_info_lengthens_the_wait_but_never_shortens_it() {
+    fn retry_info_only_lengthens_waits() {
         let asking = |delay| {
             let details = tonic_types::ErrorDetails::with_retry_info(Some(delay));
             Status::with_error_details(Code::Unavailable, "busy", details)

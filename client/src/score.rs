@@ -1,23 +1,23 @@
-//! How good a grasp is.
+//! Quality of a grasp.
 
 use serde::{Deserialize, Serialize};
 
-/// How good a valid grasp is.
+/// Quality of a valid grasp.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Score {
-    /// Of all terms together; more is better.
+    /// Weighted mean of the terms; higher is better.
     pub total: f32,
-    /// What it is made of.
+    /// The terms.
     pub terms: Vec<ScoreTerm>,
 }
 
-/// One of the qualities that a score is made of.
+/// One term of a score.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScoreTerm {
-    /// What it rates.
+    /// What the term rates.
     pub name: String,
-    /// From 0 to 1, 1 is best.
+    /// From 0 to 1; 1 is best.
     pub value: f32,
-    /// How much it counts beside the others.
+    /// Weight of the term.
     pub weight: f32,
 }

@@ -1,4 +1,4 @@
-//! What is asked of a search and what it answers.
+//! Requests for grasps and their answers.
 
 use std::time::Duration;
 
@@ -15,12 +15,11 @@ use crate::{
     score::Score,
 };
 
-/// The axes, units and joint order that a client's engine uses. Numbers pass through this library unchanged; the
-/// server converts.
+/// Axes, units and joint order of the client's engine. The server converts; this library passes numbers unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Convention {
-    /// Right-handed, +Y up, metres; also Bevy's and `WebXR`'s.
+    /// Right-handed, +Y up, metres. Also fits Bevy and `WebXR`.
     #[default]
     #[serde(rename = "openxr")]
     OpenXr,
@@ -32,17 +31,17 @@ pub enum Convention {
     Godot,
 }
 
-/// What makes a grasp valid.
+/// The checks that a valid grasp must pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Validity {
-    /// As the thesis prints it (chapters 4 and 5).
+    /// The checks of the thesis, chapters 4 and 5.
     Thesis,
-    /// Hands are solid, and the contacts hold the object by forces within their friction cones and with closure.
+    /// Hands are solid, and the contacts hold the object with forces inside their friction cones and with force closure.
     Physical,
 }
 
-/// How grasps are searched for: the ladder of the thesis' chapter 5, each step on top of the one before.
+/// Search strategy. A to F are the ladder of chapter 5 of the thesis: each adds one step to the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Strategy {
     /// Naive synthesis (5.2).
@@ -51,27 +50,27 @@ pub enum Strategy {
     B,
     /// Palm-CoM-palm angle (5.3).
     C,
-    /// Early stop when the thumb has no contact (5.4).
+    /// Early stop if the thumb has no contact (5.4).
     D,
-    /// One way of choosing the bend ratios (5.4, Figure 5.20).
+    /// Fewer bend ratios per finger (5.4, Figure 5.20).
     E,
     /// First sufficient force distribution (5.6).
     F,
-    /// Beyond the thesis: samples where grasps are and orders the checks as it likes.
+    /// Beyond the thesis: places hands at opposed surfaces and starts from known grasps.
     Guided,
 }
 
-/// Which bend ratios a finger tries: the columns of Figure 5.20.
+/// The bend ratios that a finger tries: the columns of Figure 5.20.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BendRatios {
     /// (a) 0.7, 1 and 1.42 in turn.
     All,
-    /// (b) As (a), but the fingers skip 0.7.
+    /// (b) As (a), but fingers skip 0.7.
     AllFingersWithoutLow,
-    /// (c) One of the three at random.
+    /// (c) One of the three, at random.
     OneRandom,
-    /// (d) As (c), but the fingers skip 0.7.
+    /// (d) As (c), but fingers skip 0.7.
     OneRandomFingersWithoutLow,
     /// (e) Only 1.
     OnlyOne,
@@ -79,98 +78,98 @@ pub enum BendRatios {
     OnlyHigh,
 }
 
-/// Which of the valid grasps is the answer.
+/// Which valid grasp is returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Choice {
-    /// The first that is found.
+    /// The first one found.
     FirstValid,
-    /// The one of the highest score among all that are found until the budget ends. Where none is named and nothing is found
-    /// in the 5 ms that it is then, the first that is found within the server's default budget.
+    /// The one with the highest score among all found within the budget. Without a budget in the request, that is 5 ms; if
+    /// nothing is found by then, the first one found within the server's default budget is returned.
     BestWithinBudget,
 }
 
-/// May the grasps that the server found for the object before, its atlas, be tried before others?
+/// Whether known grasps may be tried first: those of the object's atlas, and those that recent searches found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AtlasUse {
-    /// Yes, if there is an atlas.
+    /// Known grasps are tried first.
     Allowed,
-    /// No: the answer depends on the request alone.
+    /// Known grasps are not used: the answer depends on the request alone.
     None,
 }
 
-/// A holdout and how to search for a grasp on it.
+/// A holdout (an object, its pose and the giver's hand), and how to search for a grasp.
 ///
-/// As JSON the fields keep their names, `budget` becomes `budget_seconds`, and all but `object` may be left out.
+/// In JSON, fields keep their names, except that `budget` is `budget_seconds`; all but `object` are optional.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FindRequest {
-    /// The object that is held out: "objects/{object}".
+    /// Name of the object held out: "objects/{object}".
     pub object: String,
     /// The object's frame in the client's frame.
     #[serde(default)]
     pub client_from_object: Pose,
-    /// The giver's hand; none: the object floats freely.
+    /// The giver's hand; none: nobody holds the object.
     #[serde(default)]
     pub presenting_hand: Option<PresentingHand>,
     /// The hand to pose.
     #[serde(default)]
     pub receiving_hand: ReceivingHand,
-    /// Against gravity, in the client's frame, any length but 0; none: the convention's up axis.
+    /// Direction opposite to gravity, in the client's frame; any length but 0; none: the convention's up axis.
     #[serde(default)]
     pub up: Option<Vec3>,
-    /// How long to search, more than 0; none: the server's default.
+    /// Time limit of the search; more than 0; none: the server's default.
     #[serde(default, rename = "budget_seconds", with = "json::optional_seconds")]
     pub budget: Option<Duration>,
-    /// At most this many attempts, more than 0; none: as many as the budget allows.
+    /// Largest number of attempts; more than 0; none: limited by the budget only.
     #[serde(default)]
     pub max_attempts: Option<u64>,
-    /// How to search; none: the server's default.
+    /// Search strategy; none: the server's default.
     #[serde(default)]
     pub strategy: Option<Strategy>,
-    /// Which bend ratios to try; none: what the strategy says.
+    /// Bend ratios to try; none: the strategy's own.
     #[serde(default)]
     pub bend_ratios: Option<BendRatios>,
-    /// What counts as valid; none: the server's default.
+    /// Checks to pass; none: the server's default.
     #[serde(default)]
     pub validity: Option<Validity>,
-    /// Start of every random stream; none: drawn by the server and told in the report.
+    /// Seed of all random streams; none: drawn by the server. Reported in either case.
     #[serde(default, with = "json::optional_seed")]
     pub seed: Option<u64>,
-    /// Answer with the valid attempt of the lowest index, the same for any number of workers.
+    /// Return the valid attempt with the lowest index: the answer does not depend on the number of workers.
     #[serde(default)]
     pub reproducible: bool,
-    /// Replay: run this attempt of the seed and no other, without trying the atlas' own grips. An attempt that fails by
-    /// itself goes on beside those: with the atlas of the same stamp, or without one, it does the same again.
+    /// Replay: run only this attempt of the seed, without trying known grasps first. An attempt that fails continues near
+    /// grasps of the atlas: it repeats exactly with an atlas of the same stamp, or again without one.
     #[serde(default)]
     pub only_attempt: Option<u64>,
-    /// Record the time spent in each step.
+    /// Report the time spent in each step.
     #[serde(default)]
     pub record_step_times: bool,
     /// Axes, units and joint order of all poses in this request and its answer.
     #[serde(default)]
     pub convention: Convention,
-    /// Static friction coefficient for this request; none: the object's.
+    /// Coefficient of static friction for this request; none: the object's.
     #[serde(default)]
     pub friction: Option<f32>,
-    /// What is demanded of the grasp beyond that it is valid.
+    /// Requirements on the grasp beyond validity.
     #[serde(default)]
     pub constraints: Constraints,
-    /// Which of the valid grasps is wanted; none: the first.
+    /// Which valid grasp to return; none: the first.
     #[serde(default)]
     pub choice: Option<Choice>,
-    /// May the object's atlas be used? None: yes.
+    /// Whether known grasps may be tried first; none: yes.
     #[serde(default)]
     pub atlas: Option<AtlasUse>,
-    /// Plan the way to the grasp, [`Grasp::key_frames`], for who animates the hand. That takes half a millisecond to two,
-    /// sometimes some milliseconds, once the grasp is found; neither budget nor [`SearchReport::search_time`] count it.
+    /// Plan the hand's motion to the grasp for animation: [`Grasp::key_frames`]. Takes 0.5 to 2 ms after the search,
+    /// sometimes longer; counts neither toward the budget nor toward [`SearchReport::search_time`].
     #[serde(default)]
     pub plan_key_frames: bool,
 }
 
 impl FindRequest {
-    /// Asks for a grasp of an object that floats at the client's origin, with the server's defaults.
+    /// A request for an object at the client's origin that nobody holds, with the server's defaults.
     pub fn new(object: impl Into<String>) -> Self {
         Self {
             object: object.into(),
@@ -203,57 +202,56 @@ impl FindRequest {
 pub enum Outcome {
     /// A valid grasp was found.
     Found,
-    /// The budget or the number of attempts was spent first.
+    /// The budget or the attempts ran out first.
     BudgetExhausted,
 }
 
-/// Where the receiving hand touches the object.
+/// A contact between the receiving hand and the object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// The point on the surface, in the client's frame.
+    /// Point on the surface, in the client's frame.
     pub client_position: Vec3,
-    /// The surface's outward unit normal there, in the client's frame; at an edge or a corner, under PHYSICAL validity,
-    /// that of the directions between its faces' normals which points to the bone.
+    /// Outward unit normal of the surface, in the client's frame. At an edge or a corner, under [`Validity::Physical`]: the
+    /// direction between the normals of the adjacent faces that points at the bone.
     pub client_normal: Vec3,
     /// The same point in the object's frame.
     pub object_position: Vec3,
     /// The same normal in the object's frame.
     pub object_normal: Vec3,
-    /// The digit that touches; none for the palm.
+    /// The digit; none for the palm.
     pub digit: Option<Digit>,
-    /// The link of the digit that touches; none for the palm.
+    /// The digit's link; none for the palm.
     pub phalanx: Option<Phalanx>,
     /// Index of the triangle in the object's mesh.
     pub triangle: u32,
-    /// The force that the hand applies on the object here, in newtons, in the client's frame.
+    /// Force that the hand applies to the object, in newtons, in the client's frame.
     pub client_force: Vec3,
-    /// The same force in the object's frame, in newtons.
+    /// The same force in the object's frame.
     pub object_force: Vec3,
-    /// The torsion that the soft fingertip applies here about the surface's inward normal, in newton metres; 0 under
+    /// Torsional moment of the soft fingertip about the surface's inward normal, in newton metres; 0 under
     /// [`Validity::Thesis`].
     pub torsion: f32,
 }
 
-/// By how much a grasp passes the checks of [`Validity::Physical`].
+/// Margins by which a grasp passes the checks of [`Validity::Physical`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhysicalMargins {
-    /// The wrench that the forces leave unbalanced, torque over half the diagonal of the object's box, as a share of the
-    /// weight.
+    /// Unbalanced wrench as a fraction of the weight, with torques divided by half the diagonal of the object's box.
     pub residual: f32,
-    /// Ferrari-Canny epsilon of the contacts as soft fingers, torque over the same length.
+    /// Ferrari-Canny epsilon of the contacts as soft fingers, with torques divided by the same length.
     pub epsilon: f32,
-    /// How deep the hand sinks into the object at its deepest, in metres.
+    /// Deepest penetration of the hand into the object, in metres.
     pub penetration: f32,
-    /// Smallest distance between the receiving hand or forearm and the giver's, in metres; none without a giver.
+    /// Smallest distance of the receiver's hand and forearm from the giver's, in metres; none without a giver.
     pub giver_clearance: Option<f32>,
 }
 
-/// A pose of the receiving hand that takes the object.
+/// A pose of the receiving hand that holds the object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grasp {
     /// Name of the rig.
     pub rig: String,
-    /// Which hand.
+    /// Left or right.
     pub handedness: Handedness,
     /// The wrist's joint frame in the client's frame.
     pub client_from_wrist: Pose,
@@ -261,31 +259,31 @@ pub struct Grasp {
     pub object_from_wrist: Pose,
     /// The digits, thumb first.
     pub digits: [DigitAngles; 5],
-    /// The joints of `XR_EXT_hand_tracking` in the convention's order, in the client's frame.
+    /// The joints of `XR_EXT_hand_tracking`, in the convention's order, in the client's frame.
     pub joints: [JointPose; JOINT_COUNT],
-    /// Where the hand touches the object, thumb first.
+    /// Contacts with the object: thumb first, palm last.
     pub contacts: Vec<Contact>,
-    /// Comfort E of Eq. 4.6: squared distance of the digits' force shares from the comfortable ones; 0 is best.
+    /// Comfort E (Eq. 4.6): squared distance of the digits' force shares from the comfortable ones; 0 is best.
     pub comfort: f32,
-    /// Angle in radians between the sum of the contact wrenches and the wrench that opposes gravity (Eq. 4.5).
+    /// Angle between the sum of the contact wrenches and the wrench that opposes gravity (Eq. 4.5), in radians.
     pub wrench_angle: f32,
-    /// Under [`Validity::Physical`]: by how much the checks are passed.
+    /// Margins of the physical checks; none under [`Validity::Thesis`].
     pub margins: Option<PhysicalMargins>,
-    /// What it is in the GRASP taxonomy; none if it is like none of its types, or like one that is not known here.
+    /// Type in the GRASP taxonomy; none if the grasp matches none, or one unknown to this version of the library.
     #[serde(rename = "type")]
     pub grasp_type: Option<GraspType>,
-    /// How sure the type is, from 0 to 1.
+    /// Confidence of the type, from 0 to 1.
     pub type_confidence: f32,
-    /// How good the grasp is; none if the server did not rate it.
+    /// Quality of the grasp; none if it was not rated.
     #[serde(default)]
     pub score: Option<Score>,
-    /// The way to the grasp, in order, if [`FindRequest::plan_key_frames`] asks for it; empty under [`Validity::Thesis`],
-    /// and if there is no straight way in that is free and along which the constraints let the hand approach.
+    /// The motion to the grasp, in order, if [`FindRequest::plan_key_frames`] is set; empty under [`Validity::Thesis`], and
+    /// if no straight approach is free of collisions and within the constraints.
     #[serde(default)]
     pub key_frames: Vec<KeyFrame>,
 }
 
-/// Why an attempt failed: the names of Table 5.2, and what the request demands beyond them.
+/// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rejection {
@@ -305,40 +303,40 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
-    /// The wrist, the contacts or the grasp are not what the request's constraints ask for.
+    /// The wrist, the contacts or the grasp violate the request's constraints.
     UnmetConstraint,
-    /// A kind that this version of the library does not know.
+    /// A kind unknown to this version of the library.
     Unrecognised,
 }
 
-/// How often a kind of rejection occurred.
+/// Number of rejections of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RejectionCount {
     /// The kind.
     pub rejection: Rejection,
-    /// How many attempts ended so.
+    /// Number of attempts that it ended.
     pub count: u64,
 }
 
-/// A step of Algorithm 1.
+/// A step of Algorithm 1 of the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Step {
-    /// Step 1.
+    /// Step 1: place the wrist.
     WristPlacement,
-    /// Step 2.
+    /// Step 2: close the fingers.
     FingerPosing,
-    /// Step 3.
+    /// Step 3: check for collisions.
     CollisionValidation,
-    /// Step 4.
+    /// Step 4: check the contacts.
     ContactValidation,
-    /// Step 5.
+    /// Step 5: check that the hand holds the object.
     ImmobilityValidation,
-    /// A step that this version of the library does not know.
+    /// A step unknown to this version of the library.
     Unrecognised,
 }
 
-/// The time spent in a step, summed over all workers.
+/// Time spent in one step, summed over all workers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepTime {
     /// The step.
@@ -348,71 +346,71 @@ pub struct StepTime {
     pub time: Duration,
 }
 
-/// The failed attempt that came closest to a grasp.
+/// The failed attempt that came closest to a valid grasp.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NearestMiss {
     /// Why it failed.
     pub rejection: Rejection,
-    /// Its index; replay it with [`FindRequest::only_attempt`].
+    /// Index of the attempt; replay it with [`FindRequest::only_attempt`].
     pub attempt: u64,
-    /// For [`Rejection::NotImmobilizing`]: the smallest wrench angle that was reached, in radians.
+    /// Smallest wrench angle reached, in radians; for [`Rejection::NotImmobilizing`].
     pub wrench_angle: Option<f32>,
     /// The wrist's joint frame in the client's frame.
     pub client_from_wrist: Pose,
 }
 
-/// Where a grasp comes from.
+/// Origin of a grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GraspSource {
-    /// The request's own search.
+    /// This request's search.
     Search,
     /// The object's atlas.
     Atlas,
-    /// An earlier request: what its search found, or which fingers it spared, also holds what is held out now.
+    /// An earlier request: the grasp or the finger subset that it found is valid for this holdout, too.
     Recent,
 }
 
-/// What a search did.
+/// Report of a search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchReport {
-    /// Attempts that were run: accepted placements, as the thesis counts.
+    /// Attempts run, counted as in the thesis: wrist placements that were accepted.
     pub attempts: u64,
-    /// Placements that were drawn and pruned by the placement measures.
+    /// Wrist placements pruned by the placement measures.
     pub pruned_placements: u64,
-    /// Every kind of rejection that occurred.
+    /// Rejections by kind; kinds that did not occur are left out.
     pub rejections: Vec<RejectionCount>,
-    /// Times by step, if they were asked for.
+    /// Time per step, if [`FindRequest::record_step_times`] is set.
     pub step_times: Vec<StepTime>,
-    /// The seed of the search; a string in JSON, since 64 bits do not fit into every reader's numbers.
+    /// Seed of the search; a string in JSON.
     #[serde(with = "json::seed")]
     pub seed: u64,
-    /// The index of the attempt that gave the grasp.
+    /// Index of the attempt that found the grasp; none for known grasps and without a grasp.
     pub attempt: Option<u64>,
-    /// Wall time of the search.
+    /// Wall-clock time of the search.
     #[serde(rename = "search_time_seconds", with = "json::seconds")]
     pub search_time: Duration,
-    /// The budget that was in force after the server's maximum and the call's deadline.
+    /// Budget in force, after the server's maximum and the call's deadline.
     #[serde(rename = "budget_seconds", with = "json::seconds")]
     pub budget: Duration,
-    /// Workers that took part.
+    /// Number of workers.
     pub workers: u32,
-    /// The failed attempt that came closest; none when a grasp was found or nothing was attempted.
+    /// The failed attempt that came closest; none if a grasp was found or nothing was attempted.
     pub nearest_miss: Option<NearestMiss>,
-    /// The strategy that was used; none if this version of the library does not know it.
+    /// Strategy used; none if unknown to this version of the library.
     pub strategy: Option<Strategy>,
-    /// The notion of valid that was used; none if this version of the library does not know it.
+    /// Checks used; none if unknown to this version of the library.
     pub validity: Option<Validity>,
-    /// Valid grasps that were ranked; 0 if the first was taken.
+    /// Number of valid grasps ranked; 0 with [`Choice::FirstValid`].
     #[serde(default)]
     pub candidates: u64,
-    /// Where the grasp comes from; none without one, or if this version of the library does not know it.
+    /// Origin of the grasp; none without one, or if unknown to this version of the library.
     #[serde(default)]
     pub source: Option<GraspSource>,
-    /// Entries of the object's atlas that were there to be tried.
+    /// Number of atlas entries available.
     #[serde(default)]
     pub atlas_entries: u32,
-    /// Which state of the atlas was used, hexadecimal; none if none was.
+    /// Identifies the state of the atlas used, in hexadecimal; none if none was used.
     #[serde(default)]
     pub atlas_stamp: Option<String>,
 }
@@ -422,8 +420,8 @@ pub struct SearchReport {
 pub struct FindAnswer {
     /// How the search ended.
     pub outcome: Outcome,
-    /// The grasp; there is one exactly when the outcome is [`Outcome::Found`].
+    /// The grasp; present exactly if the outcome is [`Outcome::Found`].
     pub grasp: Option<Grasp>,
-    /// What the search did.
+    /// Report of the search.
     pub report: SearchReport,
 }

@@ -1,4 +1,4 @@
-//! How messages become bytes and back.
+//! Encoding of messages.
 
 use std::marker::PhantomData;
 
@@ -11,8 +11,8 @@ use tonic::{
     codec::{Codec, DecodeBuf, Decoder, EncodeBuf, Encoder},
 };
 
-/// Codes messages as `tonic_prost::ProstCodec` does, byte for byte, but from and into plain slices: prost goes through
-/// its buffer for every number, and in the buffers of gRPC each step checks and moves more than the number itself.
+/// Encodes the same bytes as `tonic_prost::ProstCodec`, but from and into plain slices: prost accesses its buffer once
+/// per number, and with gRPC's buffers each access costs more than the number itself.
 #[derive(Debug)]
 pub struct SliceCodec<T, U>(PhantomData<(T, U)>);
 
@@ -68,7 +68,7 @@ impl<U: Message + Default> Decoder for SliceDecoder<U> {
 
     fn decode(&mut self, buffer: &mut DecodeBuf<'_>) -> Result<Option<U>, Status> {
         let bytes = buffer.copy_to_bytes(buffer.remaining());
-        // What cannot be read is the code INTERNAL's by gRPC's own table.
+        // gRPC assigns INTERNAL to messages that cannot be decoded.
         let message = U::decode(&*bytes).map_err(|error| Status::internal(error.to_string()))?;
         Ok(Some(message))
     }

@@ -8,5 +8,5 @@ pub mod v1 {
     tonic::include_proto!("grasp.v1");
 }
 
-/// The descriptor set of `grasp.v1` and what it imports, for server reflection.
+/// The descriptor set of `grasp.v1` and its imports, for server reflection.
 pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/grasp_descriptor.bin"));

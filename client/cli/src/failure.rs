@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 /// Why a command failed.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The client library refused or could not do something.
+    /// An error of the client library.
     Client(ClientError),
-    /// The command line asks for something that does not exist or is not understood.
+    /// An invalid command line or request file.
     Usage(String),
-    /// A result could not be written to standard output.
+    /// Writing to standard output failed.
     Output(io::Error),
     /// Anything else: what could not be done, and why.
     Other(String, BoxError),
@@ -45,14 +45,14 @@ impl Failure {
                 _ => 1,
             },
             Self::Usage(_) => 2,
-            // Whoever read the output has seen enough.
+            // The reader closed the pipe: it has seen enough.
             Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
             Self::Output(_) | Self::Other(..) => 1,
             Self::Interrupted => 130,
         }
     }
 
-    /// A stable name for scripts.
+    /// Stable identifier for scripts.
     fn kind(&self) -> &'static str {
         match self {
             Self::Client(error) => match error {
@@ -78,7 +78,7 @@ impl Failure {
     fn message(&self) -> String {
         match self {
             Self::Client(error) => match error.call() {
-                // The violations get lines of their own.
+                // Violations are listed separately.
                 Some(call) if call.attempts > 1 => {
                     format!("{} (tried {} times)", call.message, call.attempts)
                 }
@@ -92,7 +92,7 @@ impl Failure {
         }
     }
 
-    /// Tells the user and gives the exit code.
+    /// Reports the failure on standard error and returns the exit code.
     pub(crate) fn report(&self, as_json: bool) -> ExitCode {
         let code = self.exit_code();
         if code != 0 {
@@ -113,7 +113,7 @@ impl Failure {
         let Some(call) = error.call() else {
             return format!("error: {message}");
         };
-        // A message that tells the first violation would only repeat the list below it.
+        // A message that contains the first violation would repeat the list below it.
         let violations = &call.details.field_violations;
         let repeats = violations
             .first()
@@ -160,7 +160,7 @@ impl Failure {
     }
 }
 
-/// Tells what is wrong with the command line, or shows the help or version that was asked for.
+/// Reports an invalid command line, or prints help or version.
 pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
     let wants_json = std::env::args_os().any(|argument| argument == "--json");
     if error.use_stderr() && wants_json {
@@ -170,7 +170,7 @@ pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
         let what = what.strip_prefix("error: ").unwrap_or(what).trim_end();
         return Failure::Usage(what.to_owned()).report(true);
     }
-    // A closed pipe leaves nobody to tell.
+    // A closed pipe is not an error here.
     let _ = error.print();
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
@@ -196,7 +196,7 @@ fn with_causes(error: &dyn Error) -> String {
     text
 }
 
-/// A line on standard error; if that is closed, nobody is left to tell.
+/// Writes a line to standard error, if it is open.
 fn write_error(line: &str) {
     use io::Write as _;
     let _ = writeln!(io::stderr().lock(), "{line}");

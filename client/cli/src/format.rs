@@ -1,11 +1,11 @@
-//! Figures and names as people read them.
+//! Times, names and rejections for people.
 
 use std::cmp::Reverse;
 
 use grasp_client::{Grasp, Rejection, SearchReport};
 use serde::Serialize;
 
-/// The name of an enumeration's value as JSON writes it, with blanks.
+/// The JSON name of an enumeration's value, with spaces.
 pub(crate) fn name_of<T: Serialize>(value: &T) -> String {
     match serde_json::to_value(value) {
         Ok(serde_json::Value::String(name)) => name.replace('_', " "),
@@ -13,14 +13,14 @@ pub(crate) fn name_of<T: Serialize>(value: &T) -> String {
     }
 }
 
-/// What a grasp is in the taxonomy, in words.
+/// The taxonomy's name of a grasp.
 pub(crate) fn grasp_type_name(grasp: &Grasp) -> String {
     grasp
         .grasp_type
         .map_or_else(|| "unclassifiable".to_owned(), |grasp_type| name_of(&grasp_type))
 }
 
-/// A time with a unit that fits: microseconds, milliseconds or seconds, with three digits that count.
+/// A time in microseconds, milliseconds or seconds, with three significant digits.
 pub(crate) fn human_time(seconds: f64) -> String {
     let (value, unit) = if seconds < 1e-3 {
         (seconds * 1e6, "µs")
@@ -37,12 +37,12 @@ pub(crate) fn human_time(seconds: f64) -> String {
     format!("{value:.decimals$} {unit}")
 }
 
-/// All rejections with their share of the attempts, most frequent first.
+/// All rejections with their percentage of the attempts, most frequent first.
 pub(crate) fn all_rejections(report: &SearchReport) -> String {
     rejections(report, usize::MAX, |rejection| name_of(&rejection))
 }
 
-/// The three most frequent rejections in few words, with their share of the attempts.
+/// The three most frequent rejections, abbreviated, with their percentage of the attempts.
 pub(crate) fn rejections_at_a_glance(report: &SearchReport) -> String {
     rejections(report, 3, |rejection| {
         match rejection {
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_have_three_digits_and_a_fitting_unit() {
+    fn times_have_three_significant_digits() {
         assert_eq!(human_time(0.0), "0.00 µs");
         assert_eq!(human_time(0.000_012_345), "12.3 µs");
         assert_eq!(human_time(0.001_234_5), "1.23 ms");
@@ -97,13 +97,13 @@ mod tests {
     }
 
     #[test]
-    fn names_are_words() {
+    fn names_have_spaces() {
         assert_eq!(name_of(&Rejection::NoThumbEarlyStop), "no thumb early stop");
         assert_eq!(name_of(&Digit::Little), "little");
     }
 
     #[test]
-    fn the_most_frequent_rejections_come_first() {
+    fn most_frequent_rejections_come_first() {
         let count = |rejection, count| RejectionCount { rejection, count };
         let mut report = SearchReport {
             attempts: 200,

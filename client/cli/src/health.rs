@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use crate::{EXIT_CODES, Ending, failure::Failure, output::Output, server_options::ServerOptions};
 
-const ABOUT: &str = r#"Ask whether the server takes requests; exits with 0 exactly if it does.
+const ABOUT: &str = r#"Check whether the server accepts requests; the exit code is 0 exactly if it does.
 
 With --json: {"health": "serving" | "not_serving" | "unknown"}."#;
 
-/// Ask whether the server takes requests; exits with 0 exactly if it does.
+/// Check whether the server accepts requests; the exit code is 0 exactly if it does.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 pub(crate) struct Arguments {

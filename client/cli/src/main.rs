@@ -23,18 +23,18 @@ use tracing_subscriber::EnvFilter;
 use failure::Failure;
 use output::Output;
 
-/// What scripts may rely on, shown at the end of every help page.
+/// Part of the interface for scripts; shown at the end of help pages.
 const EXIT_CODES: &str = "\
 Exit codes:
     0  done; for find: a grasp was found; for health: serving
-    1  anything that is not listed here, such as a file that cannot be read
-    2  usage: unknown options, values or names on the command line, a request file that is not understood
+    1  any other error, such as a file that cannot be read
+    2  usage: unknown options, values or names, or a malformed request file
     3  no grasp within the budget
-    4  refused by the server: invalid, not found, already there
-    5  no answer: the server is not there, not serving, or too late
+    4  rejected by the server: invalid, not found, or already exists
+    5  no answer: the server is unreachable, not serving, or too slow
   130  interrupted";
 
-/// Asks a grasp server how a virtual character's hand takes an object that a person holds out.
+/// Finds hand poses with which a virtual character takes an object that a person holds out.
 #[derive(Debug, Parser)]
 #[command(name = "grasp", version, after_help = EXIT_CODES)]
 struct Arguments {
@@ -56,14 +56,14 @@ enum Command {
     Completions(completions::Arguments),
 }
 
-/// How a command ended that did not fail.
+/// Outcome of a command that did not fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ending {
-    /// It did what it was asked to do.
+    /// The command did its work.
     Done,
-    /// The budget was spent before a grasp was found.
+    /// No grasp was found within the budget.
     NoGrasp,
-    /// The server is up but takes no requests.
+    /// The server is up but not serving.
     NotServing,
 }
 
@@ -82,7 +82,7 @@ fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return failure::report_usage(&error),
     };
-    // Quiet unless asked: results and errors are told by the commands themselves.
+    // Off by default: commands report results and errors themselves.
     let filter = EnvFilter::try_from_env("GRASP_LOG").unwrap_or_else(|_| EnvFilter::new("off"));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
@@ -106,7 +106,7 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
             _ = tokio::signal::ctrl_c() => Err(Failure::Interrupted),
         }
     });
-    // After an interrupt a picture may still be in the making; nobody waits for it.
+    // Does not wait for blocking work, such as a picture, after an interrupt.
     runtime.shutdown_background();
     result
 }
@@ -122,13 +122,13 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
     }
 }
 
-/// Runs what blocks or takes long beside the runtime, so that an interrupt is heard meanwhile.
+/// Runs blocking work off the runtime, which stays responsive to interrupts.
 async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
 ) -> Result<T, Failure> {
     tokio::task::spawn_blocking(work)
         .await
-        .map_err(|error| Failure::other("the command broke down", error))?
+        .map_err(|error| Failure::other("the command panicked", error))?
 }
 
 #[cfg(test)]
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_command_line_is_consistent() {
+    fn command_line_is_consistent() {
         Arguments::command().debug_assert();
     }
 }

@@ -1,4 +1,4 @@
-//! Results on standard output: text for people, JSON for scripts. A closed pipe is no reason to panic.
+//! Results on standard output: text for people, JSON for scripts. A closed pipe is reported, not a panic.
 
 use std::io::{self, Write as _};
 
@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use crate::failure::Failure;
 
-/// A line below the header and none elsewhere: rows stay together, and the table survives being pasted.
+/// A line below the header only: keeps tables compact and easy to paste.
 const LINE_BELOW_HEADER: TableStyle =
     TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
-/// Where results go and in which form.
+/// The form of results.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Output {
     json: bool,
@@ -26,7 +26,7 @@ impl Output {
         self.json
     }
 
-    /// Writes `value` as JSON or what `text` makes of it.
+    /// Writes `value` as JSON, or as the text that `text` makes of it.
     pub(crate) fn write<T: Serialize>(
         self,
         value: &T,
@@ -40,7 +40,7 @@ impl Output {
     }
 }
 
-/// Writes `value` as JSON whatever was asked for.
+/// Writes `value` as JSON, whatever form is selected.
 pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
@@ -59,7 +59,7 @@ fn write_line(text: &str) -> Result<(), Failure> {
     write_bytes(format!("{text}\n").as_bytes())
 }
 
-/// A table with a header; columns whose header starts with `>` are aligned to the right.
+/// A table with a header; a leading `>` in a header aligns its column to the right.
 pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table
@@ -74,7 +74,7 @@ pub(crate) fn table(header: &[&str]) -> Table {
     table
 }
 
-/// Names and values, one pair a line, values aligned.
+/// Names and values, one pair per line, with aligned values.
 pub(crate) fn pairs(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let lines: Vec<_> = pairs

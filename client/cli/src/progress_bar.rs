@@ -1,14 +1,14 @@
-//! The look of progress bars; hidden where standard error is no terminal, and gone when their command ends, however it
-//! ends.
+//! The style of progress bars: hidden unless standard error is a terminal, and removed when the command ends for any
+//! reason.
 
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 
-/// How often a bar is drawn anew while a step takes long, so that it is seen to live.
+/// Interval at which a bar is redrawn during long steps.
 const TICK: Duration = Duration::from_millis(100);
 
-/// A bar of so many steps; `counts` is how the template of `indicatif` shows where it is.
+/// A bar of `steps` steps; `counts` is the part of `indicatif`'s template that shows the position.
 pub(crate) fn bar(steps: u64, counts: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(&format!("{{bar:32}} {counts} {{elapsed:>4}} {{msg}}"))
         .unwrap_or_else(|_| ProgressStyle::default_bar());

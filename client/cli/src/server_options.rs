@@ -1,4 +1,4 @@
-//! Options of all commands that ask a server.
+//! Options of all commands that call a server.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use grasp_client::{ClientError, GraspClient, RetryPolicy};
 
 use crate::values::parse_duration;
 
-/// Which server to ask and how patiently.
+/// Which server to call, and its time limits.
 #[derive(Args, Debug)]
 pub(crate) struct ServerOptions {
     /// The server's URL.
@@ -19,7 +19,7 @@ pub(crate) struct ServerOptions {
         help_heading = "Server"
     )]
     server: String,
-    /// How long a connection may take.
+    /// Time limit for connecting.
     #[arg(
         long,
         value_name = "DURATION",
@@ -28,7 +28,7 @@ pub(crate) struct ServerOptions {
         help_heading = "Server"
     )]
     connect_timeout: Duration,
-    /// How long an answer may take, tries included; a search gets its budget on top.
+    /// Time limit of a call, retries included; a search's budget is added.
     #[arg(
         long,
         value_name = "DURATION",
@@ -37,7 +37,7 @@ pub(crate) struct ServerOptions {
         help_heading = "Server"
     )]
     timeout: Duration,
-    /// How often to try in all when the server is unavailable.
+    /// Largest number of attempts while the server is unavailable.
     #[arg(
         long,
         value_name = "N",

@@ -1,4 +1,4 @@
-//! Values on the command line.
+//! Values of options.
 
 use std::{sync::LazyLock, time::Duration};
 
@@ -8,9 +8,9 @@ use grasp_client::{BendRatios, Choice, Digit, GraspType, Handedness, Strategy, V
 
 use crate::format::name_of;
 
-/// Reads a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
+/// Parses a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
-    let expected = || format!("{text:?} is no duration; write one like 500ms, 2s or 1m, more than 0");
+    let expected = || format!("{text:?} is not a duration; write for example 500ms, 2s or 1m, more than 0");
     let unit_start = text
         .find(|c: char| !c.is_ascii_digit() && c != '.')
         .ok_or_else(expected)?;
@@ -29,9 +29,9 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
         .ok_or_else(expected)
 }
 
-/// Reads a vector such as `0,0.01,-0.02`.
+/// Parses a vector such as `0,0.01,-0.02`.
 pub(crate) fn parse_vector(text: &str) -> Result<Vec3, String> {
-    let expected = || format!("{text:?} is no vector; write three numbers like 0,0.01,-0.02");
+    let expected = || format!("{text:?} is not a vector; write three numbers, for example 0,0.01,-0.02");
     let numbers: Vec<f32> = text
         .split(',')
         .map(|number| number.trim().parse::<f32>())
@@ -41,18 +41,18 @@ pub(crate) fn parse_vector(text: &str) -> Result<Vec3, String> {
     Ok(Vec3::new(x, y, z))
 }
 
-/// Directions within an angle of one.
+/// A cone of directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cone {
-    /// The one in the middle, of any length.
+    /// The axis, of any length.
     pub(crate) direction: Vec3,
-    /// How far the others are from it at most.
+    /// Largest angle from the axis.
     pub(crate) half_angle_degrees: f32,
 }
 
-/// Reads a cone such as `0,0,-1,45`: a vector and degrees.
+/// Parses a cone such as `0,0,-1,45`: a vector and degrees.
 pub(crate) fn parse_cone(text: &str) -> Result<Cone, String> {
-    let expected = || format!("{text:?} is no cone; write a direction and degrees like 0,0,-1,45");
+    let expected = || format!("{text:?} is not a cone; write a direction and degrees, for example 0,0,-1,45");
     let (direction, degrees) = text.rsplit_once(',').ok_or_else(expected)?;
     Ok(Cone {
         direction: parse_vector(direction).map_err(|_| expected())?,
@@ -63,13 +63,13 @@ pub(crate) fn parse_cone(text: &str) -> Result<Cone, String> {
 /// Pixels of each of a picture's two views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ViewSize {
-    /// Pixels in a row.
+    /// Pixels per row.
     pub(crate) width: u32,
-    /// Rows.
+    /// Number of rows.
     pub(crate) height: u32,
 }
 
-/// Reads a size such as `900x700`; each side from 16 to 8192 pixels.
+/// Parses a size such as `900x700`; each side from 16 to 8192 pixels.
 pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
     let side = |text: &str| {
         text.parse::<u32>()
@@ -83,27 +83,29 @@ pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
                 height: side(height)?,
             })
         })
-        .ok_or_else(|| format!("{text:?} is no size; write one like 900x700, each side from 16 to 8192"))
+        .ok_or_else(|| {
+            format!("{text:?} is not a size; write for example 900x700, each side from 16 to 8192")
+        })
 }
 
 /// Triangle indices such as `7` or `10-20`, both ends included.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct TriangleRange(pub(crate) std::ops::RangeInclusive<u32>);
 
-/// Reads one index or a range of indices.
+/// Parses an index or a range of indices.
 pub(crate) fn parse_triangles(text: &str) -> Result<TriangleRange, String> {
-    let expected = || format!("{text:?} is no triangle index; write one like 7 or a range like 10-20");
+    let expected = || format!("{text:?} is not a triangle index; write for example 7 or the range 10-20");
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let first: u32 = first.parse().map_err(|_| expected())?;
     let last: u32 = last.parse().map_err(|_| expected())?;
-    // A typing error must not fill the memory: no mesh that a server takes has this many triangles.
+    // A typing error must not exhaust memory: no server accepts a mesh this large.
     if first > last || last - first >= 10_000_000 {
         return Err(expected());
     }
     Ok(TriangleRange(first..=last))
 }
 
-/// The ladder of the thesis' chapter 5, and what goes beyond it.
+/// The ladder of chapter 5 of the thesis, and GUIDED.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 #[value(rename_all = "UPPER")]
 pub(crate) enum StrategyName {
@@ -113,13 +115,13 @@ pub(crate) enum StrategyName {
     B,
     /// Palm-CoM-palm angle.
     C,
-    /// Early stop when the thumb has no contact.
+    /// Early stop if the thumb has no contact.
     D,
-    /// One way of choosing the bend ratios.
+    /// Fewer bend ratios per finger.
     E,
     /// First sufficient force distribution.
     F,
-    /// Hands are placed where opposed surfaces suggest it; with physical validity, known grips are tried first.
+    /// Places hands at opposed surfaces; with physical validity, tries known grasps first.
     Guided,
 }
 
@@ -151,12 +153,12 @@ impl From<StrategyName> for grasp_synthesis::model::strategy::Strategy {
     }
 }
 
-/// Which of the valid grasps is the answer.
+/// Which valid grasp is returned.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ChoiceName {
-    /// The first that is found.
+    /// The first one found.
     First,
-    /// The best of all that are found until the budget ends.
+    /// The best one found within the budget.
     Best,
 }
 
@@ -169,12 +171,12 @@ impl From<ChoiceName> for Choice {
     }
 }
 
-/// Which grasps count as valid.
+/// The checks that a valid grasp must pass.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ValidityName {
-    /// As the thesis prints it.
+    /// The checks of the thesis.
     Thesis,
-    /// Hands are solid, forces are solved for.
+    /// Solid hands, and forces that hold the object.
     Physical,
 }
 
@@ -192,11 +194,11 @@ impl From<ValidityName> for Validity {
 pub(crate) enum BendRatiosName {
     /// 0.7, 1 and 1.42 in turn.
     All,
-    /// The same, but the fingers skip 0.7.
+    /// The same, but fingers skip 0.7.
     AllFingersWithoutLow,
-    /// One of the three at random.
+    /// One of the three, at random.
     OneRandom,
-    /// The same, but the fingers skip 0.7.
+    /// The same, but fingers skip 0.7.
     OneRandomFingersWithoutLow,
     /// Only 1.
     OnlyOne,
@@ -217,7 +219,7 @@ impl From<BendRatiosName> for BendRatios {
     }
 }
 
-/// Which hand of a person.
+/// A left or a right hand.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum HandName {
     /// The left hand.
@@ -262,7 +264,7 @@ impl From<DigitName> for Digit {
     }
 }
 
-/// A type of the taxonomy, by its name with dashes, or with blanks or underscores as in answers.
+/// A type of the taxonomy, by its name with hyphens, or with spaces or underscores as in answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct GraspTypeName(pub(crate) GraspType);
 
@@ -285,7 +287,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn grasp_types_are_named_as_in_answers() {
+    fn accepts_grasp_type_names_of_answers() {
         for grasp_type in GraspType::ALL {
             let words = name_of(&grasp_type);
             for name in [words.replace(' ', "-"), words.replace(' ', "_"), words.clone()] {
@@ -301,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn durations_have_units_and_are_more_than_nothing() {
+    fn durations_have_units_and_are_positive() {
         assert_eq!(parse_duration("500ms"), Ok(Duration::from_millis(500)));
         assert_eq!(parse_duration("1.5s"), Ok(Duration::from_millis(1500)));
         assert_eq!(parse_duration("250us"), Ok(Duration::from_micros(250)));
@@ -344,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_have_two_sides_that_can_be_drawn() {
+    fn sizes_have_two_bounded_sides() {
         let size = ViewSize {
             width: 900,
             height: 700,

@@ -1,4 +1,4 @@
-//! What a request demands of its grasp.
+//! Constraints.
 
 use grasp_proto::v1;
 
@@ -8,12 +8,12 @@ use crate::{
     grasp_type::GraspType,
 };
 
-/// Nothing if nothing is demanded.
+/// None without constraints.
 pub(super) fn constraints_to_wire(constraints: &Constraints) -> Option<v1::Constraints> {
     if *constraints == Constraints::default() {
         return None;
     }
-    // The contract numbers types as the taxonomy does.
+    // The contract uses the taxonomy's numbers.
     let types = |types: &[GraspType]| types.iter().map(|&one| one as i32).collect();
     let digits = |digits: &[_]| digits.iter().map(|&digit| digit_to_wire(digit).into()).collect();
     Some(v1::Constraints {
@@ -49,7 +49,7 @@ mod tests {
     use crate::hand::Digit;
 
     #[test]
-    fn what_is_demanded_keeps_its_place() {
+    fn converts_every_constraint() {
         let constraints = Constraints {
             receiver_reach: Some(Reach {
                 client_shoulder: Vec3::new(1.0, 2.0, 3.0),
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn to_demand_nothing_sends_nothing() {
+    fn no_constraints_send_nothing() {
         assert_eq!(constraints_to_wire(&Constraints::default()), None);
         let only_comfort = Constraints {
             max_comfort_e: Some(0.0),

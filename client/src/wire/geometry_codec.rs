@@ -33,7 +33,7 @@ pub(super) fn pose_to_wire(pose: Pose) -> v1::Pose {
     }
 }
 
-/// The contract reads an absent pose, position or orientation as the identity's.
+/// An absent pose, position or orientation is the identity's.
 pub(super) fn pose_from_wire(pose: Option<v1::Pose>) -> Pose {
     let pose = pose.unwrap_or_default();
     Pose {
@@ -44,7 +44,7 @@ pub(super) fn pose_from_wire(pose: Option<v1::Pose>) -> Pose {
     }
 }
 
-/// A duration beyond the wire's range counts as its maximum, which no budget and no deadline comes near.
+/// Saturates at the largest duration of the wire, far beyond any budget or deadline.
 pub(super) fn duration_to_wire(duration: Duration) -> prost_types::Duration {
     prost_types::Duration {
         seconds: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),
@@ -57,7 +57,7 @@ pub(super) fn duration_from_wire(
     duration: prost_types::Duration,
 ) -> Result<Duration, Malformed> {
     Duration::try_from(duration)
-        .map_err(|_| Malformed::new(field, format!("is {duration}, which is no duration from 0 up")))
+        .map_err(|_| Malformed::new(field, format!("is {duration}, which is a negative duration")))
 }
 
 #[cfg(test)]
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pose_keeps_every_component_in_its_place() {
+    fn converts_every_component_of_a_pose() {
         let pose = Pose::new(Vec3::new(1.0, 2.0, 3.0), Quat::from_xyzw(0.1, 0.2, 0.3, 0.9));
         let wire = pose_to_wire(pose);
         let orientation = wire.orientation.unwrap();
@@ -85,13 +85,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_absent_is_the_identity() {
+    fn absent_parts_are_the_identity() {
         assert_eq!(pose_from_wire(None), Pose::IDENTITY);
         assert_eq!(pose_from_wire(Some(v1::Pose::default())), Pose::IDENTITY);
     }
 
     #[test]
-    fn durations_go_there_and_back_and_negative_ones_are_refused() {
+    fn durations_round_trip_and_negative_ones_are_rejected() {
         let duration = Duration::new(3, 250_000_001);
         assert_eq!(
             duration_from_wire("budget", duration_to_wire(duration)),

@@ -138,7 +138,7 @@ mod tests {
     use crate::pose::Pose;
 
     #[test]
-    fn both_forms_of_a_presenting_hand_keep_what_they_say() {
+    fn converts_both_forms_of_presenting_hand() {
         let mut digits = [DigitAngles::default(); 5];
         digits[4] = DigitAngles {
             base_yaw: 0.1,
@@ -179,13 +179,13 @@ mod tests {
     }
 
     #[test]
-    fn a_receiving_hand_that_says_nothing_leaves_all_to_the_server() {
+    fn default_receiving_hand_sends_nothing() {
         let wire = receiving_hand_to_wire(&ReceivingHand::default());
         assert_eq!(wire, v1::ReceivingHand::default());
     }
 
     #[test]
-    fn hands_digits_and_links_that_are_not_known_are_refused() {
+    fn rejects_unknown_hands_digits_and_links() {
         for value in [0, 3, -1] {
             assert!(handedness_from_wire("handedness", value).is_err(), "{value}");
         }

@@ -1,7 +1,7 @@
-//! The one place where the library's types become messages of `grasp.v1` and back.
+//! Conversion between the library's types and messages of `grasp.v1`; generated types are used nowhere else.
 //!
-//! Functions named `*_to_wire` cannot fail: the server judges requests. Functions named `*_from_wire` refuse answers
-//! that break the contract, with the path of the offending field.
+//! Functions named `*_to_wire` cannot fail: the server validates requests. Functions named `*_from_wire` reject answers
+//! that violate the contract, with the path of the field.
 
 mod constraint_codec;
 mod geometry_codec;
@@ -16,7 +16,7 @@ pub(crate) use search_codec::{find_answer_from_wire, find_request_to_wire};
 
 use crate::error::ClientError;
 
-/// A field of an answer that breaks the contract.
+/// A field of an answer that violates the contract.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Malformed {
     path: String,
@@ -39,7 +39,7 @@ impl Malformed {
         Self::new(field, format!("has the unknown value {value}"))
     }
 
-    /// The same seen from the message that holds `parent`.
+    /// The same error with a path that starts at the message containing `parent`.
     fn within(mut self, parent: &str) -> Self {
         self.path = format!("{parent}.{}", self.path);
         self
@@ -55,12 +55,12 @@ impl From<Malformed> for ClientError {
     }
 }
 
-/// The value of a field that must be there.
+/// The value of a required field.
 fn required<T>(field: &str, value: Option<T>) -> Result<T, Malformed> {
     value.ok_or_else(|| Malformed::missing(field))
 }
 
-/// Converts every element of a repeated field, naming the one that is wrong.
+/// Converts every element of a repeated field; the error names the malformed one.
 fn each<T, U>(
     field: &str,
     values: Vec<T>,

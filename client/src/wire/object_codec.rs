@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn an_object_keeps_what_it_says() {
+    fn converts_every_field_of_an_object() {
         let object = object_from_wire(Some(wire_object("objects/remote"))).unwrap();
         assert_eq!(object.name, "objects/remote");
         assert_eq!(object.centre_of_mass, Vec3::new(0.0, 0.01, 0.0));
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn the_state_of_an_atlas_keeps_what_it_says_and_tells_its_time() {
+    fn atlas_state_requires_its_build_time() {
         let mut wire = wire_object("objects/remote");
         wire.atlas = Some(v1::AtlasState {
             entries: 40,
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn a_malformed_object_of_a_page_is_named_by_its_place() {
+    fn malformed_object_of_a_page_is_named_by_index() {
         let page = v1::ListObjectsResponse {
             objects: vec![
                 wire_object("objects/a"),
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_token_ends_the_list() {
+    fn empty_token_ends_the_list() {
         let page = |token: &str| {
             object_page_from_wire(v1::ListObjectsResponse {
                 objects: Vec::new(),
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_object_keeps_what_it_says() {
+    fn converts_every_field_of_a_new_object() {
         let mut object = NewObject::new("mug", b"v 0 0 0".as_slice(), 0.3);
         object.centre_of_mass = Some(Vec3::new(1.0, 2.0, 3.0));
         object.unit_metres = Some(0.001);

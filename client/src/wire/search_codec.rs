@@ -88,7 +88,7 @@ fn strategy_to_wire(strategy: Strategy) -> v1::Strategy {
     }
 }
 
-/// The strategy of a report; a newer server may use one that is not known here.
+/// The strategy of a report; none for one of a newer server.
 fn strategy_from_wire(value: i32) -> Option<Strategy> {
     match v1::Strategy::try_from(value).ok()? {
         v1::Strategy::Unspecified => None,
@@ -128,7 +128,7 @@ fn bend_ratios_to_wire(ratios: BendRatios) -> v1::BendRatios {
     }
 }
 
-/// A newer server may have grasps from elsewhere.
+/// None for an origin of a newer server.
 fn source_from_wire(value: i32) -> Option<GraspSource> {
     match v1::GraspSource::try_from(value).ok()? {
         v1::GraspSource::Unspecified => None,
@@ -177,7 +177,7 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
         (Ok(v1::Outcome::BudgetExhausted), Some(_)) => {
             return Err(Malformed::new(
                 "grasp",
-                "is there although the budget was exhausted",
+                "is present although the budget was exhausted",
             ));
         }
         (Ok(v1::Outcome::Unspecified) | Err(_), _) => {

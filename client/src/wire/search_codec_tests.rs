@@ -12,7 +12,7 @@ fn wire_vector(x: f32) -> v1::Vector3 {
     v1::Vector3 { x, y: 0.0, z: 0.0 }
 }
 
-/// An answer in which every number differs from every other, so that a swap of fields shows.
+/// An answer whose numbers are all different, to detect swapped fields.
 fn wire_answer() -> v1::FindGraspResponse {
     v1::FindGraspResponse {
         outcome: v1::Outcome::Found.into(),
@@ -127,7 +127,7 @@ fn path_of(answer: v1::FindGraspResponse) -> String {
 }
 
 #[test]
-fn an_answer_keeps_every_number_in_its_place() {
+fn converts_every_number_of_an_answer() {
     let answer = find_answer_from_wire(wire_answer()).unwrap();
     let grasp = answer.grasp.unwrap();
     assert_eq!(grasp.handedness, Handedness::Left);
@@ -185,7 +185,7 @@ fn an_answer_keeps_every_number_in_its_place() {
 }
 
 #[test]
-fn what_a_newer_server_reports_is_kept_apart_instead_of_refused() {
+fn accepts_unknown_values_of_newer_servers() {
     let mut wire = wire_answer();
     let report = wire.report.as_mut().unwrap();
     report.strategy = 77;
@@ -208,7 +208,7 @@ fn what_a_newer_server_reports_is_kept_apart_instead_of_refused() {
 }
 
 #[test]
-fn every_rejection_of_the_contract_is_known_by_its_name() {
+fn knows_every_rejection_by_its_name() {
     let known = (1..).map_while(|value| v1::Rejection::try_from(value).ok());
     let mut count = 0;
     for wire in known {
@@ -221,7 +221,7 @@ fn every_rejection_of_the_contract_is_known_by_its_name() {
 }
 
 #[test]
-fn types_keep_their_names() {
+fn grasp_types_keep_their_names() {
     for (number, grasp_type) in (1..).zip(GraspType::ALL) {
         let wire = v1::GraspType::try_from(number).unwrap();
         let name = serde_json::to_value(grasp_type).unwrap();
@@ -233,7 +233,7 @@ fn types_keep_their_names() {
 }
 
 #[test]
-fn outcome_and_grasp_must_agree() {
+fn rejects_grasp_that_contradicts_outcome() {
     let mut without_grasp = wire_answer();
     without_grasp.grasp = None;
     assert_eq!(path_of(without_grasp.clone()), "grasp");
@@ -248,7 +248,7 @@ fn outcome_and_grasp_must_agree() {
 }
 
 #[test]
-fn a_malformed_answer_is_refused_with_the_path_of_the_field() {
+fn malformed_answer_is_rejected_with_field_path() {
     let mut wire = wire_answer();
     wire.report = None;
     assert_eq!(path_of(wire), "report");
@@ -274,7 +274,7 @@ fn a_malformed_answer_is_refused_with_the_path_of_the_field() {
 }
 
 #[test]
-fn a_request_that_says_nothing_leaves_all_to_the_server() {
+fn default_request_leaves_everything_to_the_server() {
     let wire = find_request_to_wire(&FindRequest::new("objects/remote"));
     assert_eq!(wire.object, "objects/remote");
     assert_eq!(wire.strategy(), v1::Strategy::Unspecified);
@@ -289,7 +289,7 @@ fn a_request_that_says_nothing_leaves_all_to_the_server() {
 }
 
 #[test]
-fn a_request_keeps_what_it_says() {
+fn converts_every_field_of_a_request() {
     let request = FindRequest {
         up: Some(Vec3::Z),
         budget: Some(Duration::from_millis(1500)),

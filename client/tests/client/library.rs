@@ -1,4 +1,4 @@
-//! The library against a service that fails as it is told, over real gRPC.
+//! The library against a scripted service.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use tonic_types::{ErrorDetails, StatusExt as _};
 
 use crate::scripted::{Act, Scripted};
 
-/// Retries without noticeable waits.
+/// Retries with negligible waits.
 fn quick() -> RetryPolicy {
     RetryPolicy {
         initial_backoff: Duration::from_millis(1),
@@ -17,7 +17,7 @@ fn quick() -> RetryPolicy {
     }
 }
 
-/// Serves and connects.
+/// Starts the service and connects to it.
 async fn connect(service: &Scripted, call_timeout: Duration) -> GraspClient {
     GraspClient::builder(service.serve().await)
         .call_timeout(call_timeout)
@@ -34,7 +34,7 @@ fn unavailable() -> Act {
 }
 
 #[tokio::test]
-async fn unavailable_is_tried_again_until_it_is_answered() {
+async fn retries_unavailable_until_answered() {
     let service = Scripted::new([unavailable(), unavailable(), Act::Answer]);
     let client = connect(&service, PATIENT).await;
     let answer = client
@@ -47,7 +47,7 @@ async fn unavailable_is_tried_again_until_it_is_answered() {
 }
 
 #[tokio::test]
-async fn retries_are_bounded_and_counted() {
+async fn bounds_and_counts_retries() {
     let service = Scripted::new((0..9).map(|_| unavailable()));
     let client = connect(&service, PATIENT).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
@@ -57,7 +57,7 @@ async fn retries_are_bounded_and_counted() {
 }
 
 #[tokio::test]
-async fn nothing_but_unavailable_is_tried_again() {
+async fn retries_nothing_but_unavailable() {
     for code in [
         Code::InvalidArgument,
         Code::Internal,
@@ -73,7 +73,7 @@ async fn nothing_but_unavailable_is_tried_again() {
 }
 
 #[tokio::test]
-async fn a_server_that_forbids_another_try_is_obeyed() {
+async fn obeys_server_that_forbids_retries() {
     let mut status = Status::unavailable("going away");
     status
         .metadata_mut()
@@ -86,7 +86,7 @@ async fn a_server_that_forbids_another_try_is_obeyed() {
 }
 
 #[tokio::test]
-async fn a_wait_beyond_the_deadline_is_not_begun() {
+async fn does_not_wait_beyond_the_deadline() {
     let details = ErrorDetails::with_retry_info(Some(Duration::from_hours(1)));
     let status = Status::with_error_details(Code::Unavailable, "come back in an hour", details);
     let service = Scripted::new([Act::Fail(status), Act::Answer]);
@@ -100,7 +100,7 @@ async fn a_wait_beyond_the_deadline_is_not_begun() {
 }
 
 #[tokio::test]
-async fn a_server_that_does_not_answer_meets_the_deadline() {
+async fn reports_deadline_exceeded_without_answer() {
     let service = Scripted::new([Act::Hang]);
     let client = connect(&service, Duration::from_millis(50)).await;
     let error = client.get_object("objects/remote").await.unwrap_err();
@@ -108,7 +108,7 @@ async fn a_server_that_does_not_answer_meets_the_deadline() {
 }
 
 #[tokio::test]
-async fn the_server_is_told_the_deadline_with_the_budget_on_top() {
+async fn sends_deadline_plus_budget() {
     let service = Scripted::new([Act::Answer, Act::Answer]);
     let client = connect(&service, Duration::from_mins(1)).await;
     client.get_object("objects/remote").await.unwrap();
@@ -117,7 +117,7 @@ async fn the_server_is_told_the_deadline_with_the_budget_on_top() {
         ..FindRequest::new("objects/remote")
     };
     client.find_grasp(&request).await.unwrap();
-    let told: Vec<f64> = service
+    let sent: Vec<f64> = service
         .grpc_timeouts
         .lock()
         .unwrap()
@@ -134,13 +134,13 @@ async fn the_server_is_told_the_deadline_with_the_budget_on_top() {
             digits.parse::<f64>().unwrap() * seconds_per_unit
         })
         .collect();
-    // Less than a second goes by between the start of a call and its header, and no header tells more than was left.
-    assert!(told[0] > 59.0 && told[0] <= 60.0, "{told:?}");
-    assert!(told[1] > 99.0 && told[1] <= 100.0, "{told:?}");
+    // The header carries the time left, and sending it takes less than a second.
+    assert!(sent[0] > 59.0 && sent[0] <= 60.0, "{sent:?}");
+    assert!(sent[1] > 99.0 && sent[1] <= 100.0, "{sent:?}");
 }
 
 #[tokio::test]
-async fn violations_reach_the_caller() {
+async fn returns_field_violations() {
     let mut details = ErrorDetails::with_bad_request_violation("mass_kg", "is -1; it must be more than 0");
     details.add_bad_request_violation("object_id", "is empty");
     let status = Status::with_error_details(Code::InvalidArgument, "2 violations", details);
@@ -158,7 +158,7 @@ async fn violations_reach_the_caller() {
 }
 
 #[tokio::test]
-async fn all_pages_of_a_list_are_read() {
+async fn reads_all_pages_of_a_list() {
     let service = Scripted::new([Act::Answer, Act::Answer, Act::Answer]);
     let client = connect(&service, PATIENT).await;
     let objects = client.list_objects().await.unwrap();
@@ -167,9 +167,9 @@ async fn all_pages_of_a_list_are_read() {
 }
 
 #[tokio::test]
-async fn a_list_that_repeats_itself_ends_with_an_error() {
+async fn rejects_repeated_page_token() {
     let mut service = Scripted::new((0..9).map(|_| Act::Answer));
-    service.repeats_itself = true;
+    service.repeats_page_token = true;
     let client = connect(&service, PATIENT).await;
     let error = client.list_objects().await.unwrap_err();
     assert!(matches!(error, ClientError::Malformed { .. }), "{error:?}");
@@ -177,13 +177,13 @@ async fn a_list_that_repeats_itself_ends_with_an_error() {
 }
 
 #[tokio::test]
-async fn health_is_told() {
+async fn reports_health() {
     let client = connect(&Scripted::default(), PATIENT).await;
     assert_eq!(client.health().await.unwrap(), Health::Serving);
 }
 
 #[tokio::test]
-async fn a_created_object_comes_back() {
+async fn returns_created_object() {
     let service = Scripted::new([unavailable(), Act::Answer]);
     let client = connect(&service, PATIENT).await;
     let object = client
@@ -194,7 +194,7 @@ async fn a_created_object_comes_back() {
 }
 
 #[tokio::test]
-async fn endpoints_that_are_no_urls_and_ports_nobody_listens_on_are_told_apart() {
+async fn distinguishes_invalid_endpoints_from_closed_ports() {
     for endpoint in ["", "not a url", "localhost:50051", "/path"] {
         let error = GraspClient::connect(endpoint).await.unwrap_err();
         assert!(
@@ -202,13 +202,13 @@ async fn endpoints_that_are_no_urls_and_ports_nobody_listens_on_are_told_apart()
             "{endpoint:?}: {error:?}"
         );
     }
-    // Bound and dropped again, so that nobody listens there.
+    // A port that was just freed.
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let endpoint = format!("http://{}", listener.local_addr().unwrap());
     drop(listener);
     let error = GraspClient::connect(&endpoint).await.unwrap_err();
     assert!(matches!(error, ClientError::Connect { .. }), "{error:?}");
-    // A client that connects lazily meets the same as an unavailable server.
+    // A client that connects lazily reports an unavailable server instead.
     let client = GraspClient::builder(&endpoint)
         .retry(quick())
         .connect_lazy()

@@ -1,4 +1,5 @@
-//! Integration tests of the client, over real gRPC.
+//! Tests of the client library and its examples, over real gRPC.
 
+mod examples;
 mod library;
 mod scripted;

@@ -1,4 +1,4 @@
-//! A tiny service that does as it is told.
+//! A tiny service whose behaviour is scripted, call by call.
 
 use std::{
     collections::VecDeque,
@@ -13,20 +13,20 @@ use grasp_proto::v1::{
 use tokio_stream::wrappers::TcpListenerStream;
 use tonic::{Request, Response, Status, transport::Server};
 
-/// What the service does with one call.
+/// Response to one call.
 pub(crate) enum Act {
     Fail(Status),
     Answer,
     Hang,
 }
 
-/// Acts out a script and keeps the deadlines that it was told.
+/// Follows a script and records the deadlines of calls.
 #[derive(Clone, Default)]
 pub(crate) struct Scripted {
     script: Arc<Mutex<VecDeque<Act>>>,
     pub(crate) grpc_timeouts: Arc<Mutex<Vec<String>>>,
-    /// The second page of objects names itself as the next one.
-    pub(crate) repeats_itself: bool,
+    /// Whether the second page of objects repeats its own token.
+    pub(crate) repeats_page_token: bool,
 }
 
 impl Scripted {
@@ -54,7 +54,7 @@ impl Scripted {
         self.grpc_timeouts.lock().unwrap().len()
     }
 
-    /// Serves on a free port until the test's runtime ends; gives the URL.
+    /// Serves on a free port until the test's runtime ends; returns the URL.
     pub(crate) async fn serve(&self) -> String {
         let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
@@ -123,7 +123,7 @@ impl ObjectService for Scripted {
         }))
     }
 
-    /// Three pages of one object each, named by the token that asked for them.
+    /// Three pages of one object each, named after the page token.
     async fn list_objects(
         &self,
         request: Request<v1::ListObjectsRequest>,
@@ -132,7 +132,7 @@ impl ObjectService for Scripted {
         let token = request.into_inner().page_token;
         let next = match token.as_str() {
             "" => "b",
-            "b" if self.repeats_itself => "b",
+            "b" if self.repeats_page_token => "b",
             "b" => "c",
             "c" => "",
             other => panic!("token {other:?} was never given"),

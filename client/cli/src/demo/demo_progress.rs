@@ -13,13 +13,13 @@ impl DemoProgress {
         Self(bar(steps, "{pos:>2}/{len}"))
     }
 
-    /// The next step begins.
+    /// Starts the next step.
     pub(super) fn step(&self, message: &str) {
         self.0.set_message(message.to_owned());
         self.0.inc(1);
     }
 
-    /// Makes room for the results.
+    /// Removes the bar.
     pub(super) fn finish(&self) {
         self.0.finish_and_clear();
     }

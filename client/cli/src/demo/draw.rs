@@ -13,17 +13,16 @@ use crate::{
     values::ViewSize,
 };
 
-/// Pixels of a view in the overview, unless the pictures themselves are smaller: five of them beside each other fill a
-/// wide screen.
+/// Pixels of a view in the overview, unless the pictures are smaller: a row of five fills a wide screen.
 const SMALL_VIEW: ViewSize = ViewSize {
     width: 480,
     height: 400,
 };
 
-/// Pictures in a row of the overview: as many as the thesis has holdouts for an object, so that each object has a row.
+/// Pictures per row of the overview: the number of holdouts per object, which gives each object a row.
 const COLUMNS: usize = 5;
 
-/// Where everything was written.
+/// The files written.
 #[derive(Debug)]
 pub(super) struct Drawn {
     pub(super) pictures: Vec<PathBuf>,
@@ -31,7 +30,7 @@ pub(super) struct Drawn {
     pub(super) overview: Option<PathBuf>,
 }
 
-/// Writes a picture and a scene of each answer, and one picture with all of them.
+/// Writes a picture and a scene of each answer, and an overview picture.
 pub(super) async fn draw_all(
     asked: &[Asked],
     folder: &Path,

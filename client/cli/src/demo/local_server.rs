@@ -1,4 +1,4 @@
-//! The server inside the process.
+//! The server inside this process.
 
 use std::{net::Ipv4Addr, net::Ipv6Addr, net::SocketAddr, time::Duration};
 
@@ -8,7 +8,7 @@ use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
 use crate::failure::Failure;
 
-/// A running server and a client that is connected to it.
+/// A running server and a connected client.
 #[derive(Debug)]
 pub(super) struct LocalServer {
     pub(super) client: GraspClient,
@@ -16,23 +16,23 @@ pub(super) struct LocalServer {
     serving: JoinHandle<Result<(), ServeError>>,
 }
 
-/// Serves on a free loopback port and connects; searches may take `budget`.
+/// Starts a server on a free loopback port that allows searches of `budget`, and connects to it.
 pub(super) async fn start(budget: Duration) -> Result<LocalServer, Failure> {
     let listener = listen()
         .await
         .map_err(|error| Failure::other("cannot listen on the loopback interface", error))?;
     let address = listener
         .local_addr()
-        .map_err(|error| Failure::other("cannot tell the server's port", error))?;
+        .map_err(|error| Failure::other("cannot determine the server's port", error))?;
     let mut config = Config::default();
     config.budgets.maximum = config.budgets.maximum.max(budget);
     let (stop, stopped) = oneshot::channel();
     let serving = tokio::spawn(grasp_server::run(listener, config, async {
-        // A sender that was dropped stops the server, too.
+        // A dropped sender stops the server, too.
         let _ = stopped.await;
     }));
     let client = GraspClient::connect(format!("http://{address}")).await?;
-    // The first call of a connection exchanges settings; the searches shall be timed without that.
+    // The first call of a connection exchanges settings; keep that out of the measured times.
     client.health().await?;
     Ok(LocalServer {
         client,
@@ -41,7 +41,7 @@ pub(super) async fn start(budget: Duration) -> Result<LocalServer, Failure> {
     })
 }
 
-/// IPv6 first, as the server's own default; containers often have only IPv4.
+/// Prefers IPv6, like the server's default; containers often have IPv4 only.
 async fn listen() -> std::io::Result<TcpListener> {
     match TcpListener::bind(SocketAddr::from((Ipv6Addr::LOCALHOST, 0))).await {
         Ok(listener) => Ok(listener),
@@ -50,7 +50,7 @@ async fn listen() -> std::io::Result<TcpListener> {
 }
 
 impl LocalServer {
-    /// Closes the connection and waits for the server to end.
+    /// Closes the connection and waits until the server has stopped.
     pub(super) async fn stop(self) -> Result<(), Failure> {
         let Self {
             client,
@@ -58,11 +58,11 @@ impl LocalServer {
             serving,
         } = self;
         drop(client);
-        // A server that ended by itself has nobody who listens; its result says why.
+        // Fails if the server stopped by itself; its result says why.
         let _ = stop.send(());
         serving
             .await
-            .map_err(|error| Failure::other("the server broke down", error))?
+            .map_err(|error| Failure::other("the server panicked", error))?
             .map_err(|error| Failure::other("the server failed", error))
     }
 }

@@ -28,15 +28,15 @@ use demo_progress::DemoProgress;
 
 const ABOUT: &str = r#"Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
 
-The server listens on a free port of the loopback interface and is asked over real gRPC. A table tells how each search
-went; the output folder gets a picture (PNG) and a scene (GLB) of each holdout, and overview.png with all of them.
+The server listens on a free port of the loopback interface and answers over real gRPC. A table shows the result of each
+search; the output folder receives a picture (PNG) and a scene (GLB) per holdout, and overview.png with all of them.
 
 With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "outcome", "grasp",
 "report", "round_trip_seconds"}]}, the last four as `grasp find --json` writes them."#;
 
-/// How long the server may take to read what comes with it; some tenths of a second are usual. After that, or without it,
-/// searches start from nothing.
-const READING_TIME: Duration = Duration::from_secs(10);
+/// Time limit for the server to load the built-in atlases, usually done in some tenths of a second. Without them, searches
+/// start from scratch.
+const ATLAS_LOAD_TIME: Duration = Duration::from_secs(10);
 
 /// Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
 #[derive(Args, Debug)]
@@ -45,12 +45,11 @@ pub(crate) struct Arguments {
     /// The folder for pictures and scenes.
     #[arg(long, value_name = "FOLDER", default_value = "target/demo")]
     out: PathBuf,
-    /// Start of every random stream. Each search gives the valid attempt of the lowest index, so the same seed shows the
+    /// Seed of all random streams. Each search returns the valid attempt with the lowest index: the same seed shows the
     /// same grasps.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// How to search: GUIDED as the server does by default, or A to F as in chapter 5, with the thesis' hand and notion of
-    /// valid.
+    /// Search strategy: GUIDED, the server's default, or A to F of chapter 5 with the thesis's hand and checks.
     #[arg(long, ignore_case = true, default_value = "GUIDED")]
     strategy: StrategyName,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
@@ -59,12 +58,12 @@ pub(crate) struct Arguments {
     /// Pixels of each of a picture's two views.
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
-    /// How long each search may take.
+    /// Time limit of each search.
     #[arg(long, value_name = "DURATION", default_value = "20s", value_parser = parse_duration)]
     budget: Duration,
 }
 
-/// What became of one holdout.
+/// The result for one holdout.
 #[derive(Clone, Debug)]
 struct Asked {
     holdout: &'static BuiltInHoldout,
@@ -90,7 +89,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 impl Arguments {
-    /// The thesis' own for its ladder.
+    /// The thesis's checks for the strategies of its ladder.
     fn validity(&self) -> Option<Validity> {
         match self.strategy {
             StrategyName::Guided => None,
@@ -106,21 +105,20 @@ impl Arguments {
     }
 }
 
-/// Waits until the grips that come with the server are read, a moment after its start: so that the same seed always shows
-/// the same grasps.
+/// Waits until the server has loaded the built-in atlases: answers, and so the pictures of a seed, depend on them.
 async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
     let start = Instant::now();
     loop {
         let objects = client.list_objects().await?;
-        let is_read = |object: &Object| object.atlas.as_ref().is_some_and(|atlas| atlas.complete);
-        if objects.iter().all(is_read) || start.elapsed() > READING_TIME {
+        let is_loaded = |object: &Object| object.atlas.as_ref().is_some_and(|atlas| atlas.complete);
+        if objects.iter().all(is_loaded) || start.elapsed() > ATLAS_LOAD_TIME {
             return Ok(());
         }
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
 }
 
-/// Asks for one grasp after the other, so that each search has the machine for itself.
+/// Asks for one grasp at a time: each search has the whole machine.
 async fn ask_all(
     arguments: &Arguments,
     chosen: &[&'static BuiltInHoldout],

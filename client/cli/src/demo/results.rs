@@ -12,7 +12,7 @@ use crate::{
     output::{Output, table},
 };
 
-/// What `--json` writes.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Results<'a> {
     folder: &'a Path,
@@ -58,7 +58,7 @@ pub(super) fn write(folder: &Path, asked: &[Asked], drawn: &Drawn, output: Outpu
     output.write(&results, describe)
 }
 
-/// The holdout's name without its object, which has a column of its own.
+/// The holdout's name without its object, which has its own column.
 fn short_name<'a>(row: &Row<'a>) -> &'a str {
     row.holdout
         .strip_prefix(row.object)
@@ -102,7 +102,7 @@ fn describe(results: &Results<'_>) -> String {
     if let Some(overview) = results.overview {
         let _ = write!(
             text,
-            "; pictures and scenes are in {}, all at once in {}",
+            "; pictures and scenes are in {}, an overview is {}",
             results.folder.display(),
             overview.display()
         );

@@ -25,20 +25,19 @@ use crate::{EXIT_CODES, Ending, blocking, failure::Failure, holdout, output::Out
 use run_progress::RunProgress;
 
 /// The long help.
-const ABOUT: &str = r#"Make the grasp sets of the thesis' chapter 5 again, and report on them.
+const ABOUT: &str = r#"Reproduce the grasp sets of chapter 5 of the thesis, and report on them.
 
-For each set and built-in holdout this searches for valid grasps and keeps the first failed attempts, in this process,
-with the crate that the server searches with. Every grasp and attempt is kept in the output folder with its seed and
-index; a run that was interrupted goes on where it was, and one that is asked for more makes only what is missing. Set
-ATLAS needs the complete atlases of the objects: where they do not come with the objects, they are grown first, which
-takes minutes for each, and kept in the folder. The report has the tables beside the thesis' own figures, every figure
-as a picture and as CSV, what chapter 5 says against what this run shows, and a contact sheet of grasps in the order of
-comfort.
+For each set and built-in holdout, this searches for valid grasps and records the first failed attempts, in this process
+and with the server's search library. The output folder keeps every grasp and attempt with its seed and index: an
+interrupted run resumes, and a run that asks for more adds only what is missing. Set ATLAS needs the complete atlases of
+the objects: any that are not built in are grown first, which takes minutes per object, and kept in the folder. The
+report has tables next to the thesis's figures, every plot as SVG and CSV, the claims of chapter 5 against this run, and
+a contact sheet of grasps ordered by comfort.
 
 With --json: {"folder", "report", "ladder": [{column: value, …}], "claims": [{"source", "thesis", "run", "verdict",
 "why"}]}."#;
 
-/// What a run can make.
+/// A set of grasps.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 #[value(rename_all = "UPPER")]
 enum SetName {
@@ -48,17 +47,17 @@ enum SetName {
     B,
     /// Palm-CoM-palm angle.
     C,
-    /// Early stop when the thumb has no contact.
+    /// Early stop if the thumb has no contact.
     D,
-    /// One way of choosing the bend ratios.
+    /// Fewer bend ratios per finger.
     E,
     /// First sufficient force distribution.
     F,
-    /// Guided search for grasps that are valid as the thesis says.
+    /// Guided search with the thesis's checks.
     Guided,
-    /// Guided search for physically valid grasps, without an atlas.
+    /// Guided search with the physical checks, without an atlas.
     Physical,
-    /// The same with the object's complete atlas, as a server answers by default.
+    /// The same with the object's complete atlas: a server's default.
     Atlas,
 }
 
@@ -78,7 +77,7 @@ impl From<SetName> for Set {
     }
 }
 
-/// Make the grasp sets of the thesis' chapter 5 again, and report on them.
+/// Reproduce the grasp sets of chapter 5 of the thesis, and report on them.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 pub(crate) struct Arguments {
@@ -88,19 +87,19 @@ pub(crate) struct Arguments {
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
-    /// Valid grasps for each set and holdout.
+    /// Valid grasps per set and holdout.
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u64).range(1..=MOST_PER_CELL))]
     valid: u64,
-    /// Failed attempts that are kept for each set and holdout.
+    /// Failed attempts recorded per set and holdout.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=MOST_PER_CELL))]
     invalid: u64,
-    /// Start of all randomness.
+    /// Seed of all random streams.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Search with this many threads too, for the times; 1 for one thread only.
+    /// Also measure times with this many threads; 1 for one thread only.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
     threads: u16,
-    /// Leave out the other ways to choose bend ratios (Figure 5.20).
+    /// Leave out the other choices of bend ratios (Figure 5.20).
     #[arg(long)]
     no_bend_ratio_columns: bool,
     /// The folder of the run.
@@ -109,12 +108,12 @@ pub(crate) struct Arguments {
     /// The folder of the report. Default: `report` in the folder of the run.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
-    /// Forget what the folder has of an earlier run; atlases stay.
+    /// Discard an earlier run in the folder, except for its atlases.
     #[arg(long)]
     fresh: bool,
 }
 
-/// Tells the run to stop when the command does, however it ends: what was made is then in the folder.
+/// Stops the run when the command ends for any reason; the results so far are in the folder.
 struct StopOnDrop(Arc<AtomicBool>);
 
 impl Drop for StopOnDrop {
@@ -136,11 +135,11 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         let atlases = Atlases::complete(&settings, &folder, grasp_assets::atlases::atlas, &stop, |now| {
             progress.grow(&now);
         })
-        .map_err(|error| Failure::other("the atlases cannot be made", error))?
+        .map_err(|error| Failure::other("cannot grow the atlases", error))?
         .ok_or(Failure::Interrupted)?;
         let maker = Maker::new(&settings, atlases).map_err(|error| Failure::other("cannot search", error))?;
         let end = run_missing(&settings, &maker, &mut folder, &stop, |now| progress.show(&now))
-            .map_err(|error| Failure::other("the run cannot go on", error))?;
+            .map_err(|error| Failure::other("the run failed", error))?;
         if end == RunEnd::Stopped {
             return Err(Failure::Interrupted);
         }
@@ -156,9 +155,9 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 
 impl Arguments {
     fn settings(&self) -> Result<Settings, Failure> {
-        let usual = Settings::default();
+        let defaults = Settings::default();
         let asked: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
-        let mut sets = usual.sets;
+        let mut sets = defaults.sets;
         sets.retain(|set| asked.is_empty() || asked.contains(set));
         let mut holdouts = Vec::new();
         for name in &self.holdout {
@@ -176,7 +175,7 @@ impl Arguments {
             invalid: self.invalid,
             sets,
             holdouts: if holdouts.is_empty() {
-                usual.holdouts
+                defaults.holdouts
             } else {
                 holdouts
             },

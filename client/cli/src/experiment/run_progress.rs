@@ -7,10 +7,10 @@ use indicatif::{HumanDuration, ProgressBar};
 
 use crate::progress_bar::bar;
 
-/// How often the message changes at most: grasps can be found by the thousand a second.
-const MESSAGE_EVERY: Duration = Duration::from_millis(50);
+/// Shortest time between messages: thousands of grasps may be found per second.
+const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 
-/// A bar that counts valid grasps, after one for each atlas that has to grow.
+/// A bar for each atlas to grow, then one that counts valid grasps.
 #[derive(Debug, Default)]
 pub(super) struct RunProgress {
     atlas: Option<(&'static str, ProgressBar)>,
@@ -19,7 +19,7 @@ pub(super) struct RunProgress {
 }
 
 impl RunProgress {
-    /// Shows how far an atlas is.
+    /// Shows the progress of an atlas.
     pub(super) fn grow(&mut self, now: &AtlasProgress) {
         if self
             .atlas
@@ -31,14 +31,14 @@ impl RunProgress {
         }
         if let Some((_, bar)) = &self.atlas {
             let why = now.refused.map_or_else(String::new, |why| {
-                format!("; the one in the folder is not used: {why}")
+                format!("; the one in the folder is unusable: {why}")
             });
             bar.set_position(now.proposed);
             bar.set_message(format!("atlas of {}, {} grips{why}", now.object, now.entries));
         }
     }
 
-    /// Shows how far the run is.
+    /// Shows the progress of the run.
     pub(super) fn show(&mut self, now: &run::Progress) {
         self.atlas = None;
         let bar = self
@@ -46,7 +46,7 @@ impl RunProgress {
             .get_or_insert_with(|| bar(now.total, "{human_pos:>6}/{human_len}"));
         let is_due = self
             .last_message
-            .is_none_or(|last| last.elapsed() >= MESSAGE_EVERY);
+            .is_none_or(|last| last.elapsed() >= MESSAGE_INTERVAL);
         if !is_due && now.done < now.total {
             return;
         }
@@ -66,14 +66,14 @@ impl RunProgress {
         ));
     }
 
-    /// The report is being written.
+    /// Announces the report.
     pub(super) fn report(&self) {
         if let Some(bar) = &self.bar {
             bar.set_message("writing the report");
         }
     }
 
-    /// Makes room for the results.
+    /// Removes the bar.
     pub(super) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

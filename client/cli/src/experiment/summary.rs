@@ -1,4 +1,4 @@
-//! What a run prints at its end.
+//! The output of a finished run.
 
 use std::{fmt::Write as _, path::Path};
 
@@ -13,7 +13,7 @@ use serde_json::{Map, json};
 
 use crate::{failure::Failure, output, output::Output};
 
-/// What `--json` writes.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Results<'a> {
     folder: &'a Path,
@@ -32,7 +32,7 @@ pub(super) fn write(folder: &Folder, report: &Report, output: Output) -> Result<
     output.write(&results, |_| {
         format!(
             "{}\n{}{}\nThe report is {}",
-            drawn(&report.ladder),
+            rendered(&report.ladder),
             departures(report),
             verdicts_at_a_glance(&report.claims),
             report.page.display()
@@ -57,8 +57,8 @@ fn rows(table: &Table) -> Vec<Map<String, serde_json::Value>> {
     table.rows.iter().map(as_object).collect()
 }
 
-/// A table for the terminal.
-fn drawn(table: &Table) -> String {
+/// Renders a table for the terminal.
+fn rendered(table: &Table) -> String {
     let header: Vec<_> = table
         .header
         .iter()
@@ -72,14 +72,14 @@ fn drawn(table: &Table) -> String {
         })
         .collect();
     let header: Vec<_> = header.iter().map(String::as_str).collect();
-    let mut drawn = output::table(&header);
+    let mut rendered = output::table(&header);
     for row in &table.rows {
-        drawn.add_row(row.iter().map(Value::to_text));
+        rendered.add_row(row.iter().map(Value::to_text));
     }
-    drawn.to_string()
+    rendered.to_string()
 }
 
-/// The claims that do not come out, a line each.
+/// The claims that this run contradicts, one per line.
 fn departures(report: &Report) -> String {
     let mut text = String::new();
     for claim in report

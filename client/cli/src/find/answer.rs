@@ -9,7 +9,7 @@ use crate::{
     output::{pairs, table},
 };
 
-/// The whole answer.
+/// The whole answer as text.
 pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_seconds: f64) -> String {
     let report = &answer.report;
     let mut lines = vec![
@@ -86,7 +86,7 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
     lines
 }
 
-/// The grasp's type and how sure it is.
+/// The grasp's type and its confidence.
 fn grasp_type(grasp: &Grasp) -> String {
     let name = grasp_type_name(grasp);
     format!("{name}, {:.0} % sure", 100.0 * grasp.type_confidence)

@@ -1,4 +1,4 @@
-//! What is demanded of the grasp, on the command line.
+//! Options for constraints on the grasp.
 
 use clap::Args;
 use glam::Vec3;
@@ -6,18 +6,18 @@ use grasp_client::{ApproachCone, Constraints, Reach};
 
 use crate::values::{Cone, DigitName, GraspTypeName, parse_cone, parse_vector};
 
-/// Options that narrow which grasps will do.
+/// Requirements on the grasp beyond validity.
 #[derive(Args, Debug)]
-#[command(next_help_heading = "What the grasp must be like")]
+#[command(next_help_heading = "Constraints on the grasp")]
 pub(super) struct ConstraintOptions {
-    /// The receiver's shoulder in the client's frame: the wrist must be within --reach of it.
+    /// Position of the receiver's shoulder; the wrist must be within --reach of it.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     #[arg(requires = "reach")]
     shoulder: Option<Vec3>,
-    /// The greatest distance from the shoulder to the wrist.
+    /// Largest distance from shoulder to wrist.
     #[arg(long, value_name = "METRES", requires = "shoulder")]
     reach: Option<f32>,
-    /// The direction in which the hand moves toward the object, and how many degrees it may be off.
+    /// Direction in which the hand moves toward the object, and the largest deviation in degrees.
     #[arg(long, value_name = "X,Y,Z,DEGREES", value_parser = parse_cone, allow_hyphen_values = true)]
     approach: Option<Cone>,
     /// Only grasps of this type of the taxonomy; may be repeated.
@@ -35,17 +35,17 @@ pub(super) struct ConstraintOptions {
     /// Digits that must touch the object, such as thumb,index.
     #[arg(long, value_name = "DIGITS", value_delimiter = ',')]
     must_touch: Vec<DigitName>,
-    /// Digits that may not touch the object.
+    /// Digits that must not touch the object.
     #[arg(long, value_name = "DIGITS", value_delimiter = ',')]
     must_not_touch: Vec<DigitName>,
-    /// The largest comfort E that will do; 0 is best.
+    /// Largest comfort E; 0 is best.
     #[arg(long, value_name = "E")]
     max_comfort_e: Option<f32>,
 }
 
 impl ConstraintOptions {
-    /// Lays the options over what a request demands already; each that is given wins.
-    pub(super) fn lay_over(&self, constraints: &mut Constraints) {
+    /// Overrides constraints of the request with the options that are given.
+    pub(super) fn override_in(&self, constraints: &mut Constraints) {
         if let (Some(client_shoulder), Some(reach)) = (self.shoulder, self.reach) {
             constraints.receiver_reach = Some(Reach {
                 client_shoulder,

@@ -55,8 +55,8 @@ API's FindGraspRequest; only "object" is required:
 
 Instead of angles, the presenting hand may be the joints of a headset: {"joints": {"handedness": "left",
 "joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}. Metres, radians,
-quaternions x y z w. Options on the command line win over the file. --print-request writes the request instead of
-sending it, as a start for own ones.
+quaternions x y z w. Options on the command line override the file. --print-request prints the request instead of
+sending it, as a template.
 
 With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
 "round_trip_seconds": …} with the fields of the API's FindGraspResponse; durations are numbers of seconds, the seed is
@@ -66,48 +66,45 @@ a string of digits."#;
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 #[command(group(ArgGroup::new("what").required(true).args(["holdout", "request"])))]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "every switch is an option of its own"
-)]
+#[expect(clippy::struct_excessive_bools, reason = "every switch is a separate option")]
 pub(crate) struct Arguments {
     /// A built-in holdout, such as remote-hold1.
     #[arg(long, value_name = "NAME")]
     holdout: Option<String>,
-    /// A file with a request as JSON; - for standard input.
+    /// A JSON file with a request; - for standard input.
     #[arg(long, value_name = "FILE")]
     request: Option<PathBuf>,
-    /// How to search. Default: the server's.
+    /// Search strategy. Default: the server's.
     #[arg(long, ignore_case = true)]
     strategy: Option<StrategyName>,
-    /// What counts as valid. Default: the server's.
+    /// Checks that a grasp must pass. Default: the server's.
     #[arg(long)]
     validity: Option<ValidityName>,
-    /// Which bend ratios the fingers try. Default: what the strategy says.
+    /// Bend ratios that fingers try. Default: the strategy's own.
     #[arg(long)]
     bend_ratios: Option<BendRatiosName>,
-    /// Which of the valid grasps is wanted. Default: the first.
+    /// Which valid grasp to return. Default: the first.
     #[arg(long)]
     choice: Option<ChoiceName>,
-    /// How long to search. Default: the server's.
+    /// Time limit of the search. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
-    /// At most this many attempts. Default: as many as the budget allows.
+    /// Largest number of attempts. Default: limited by the budget only.
     #[arg(long, value_name = "N")]
     max_attempts: Option<u64>,
-    /// Start of every random stream. Default: drawn by the server.
+    /// Seed of all random streams. Default: drawn by the server.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Replay: run this attempt of the seed and no other, without trying known grips before it.
+    /// Replay: run only this attempt of the seed, without trying known grasps first.
     #[arg(long, value_name = "N", requires = "seed")]
     only_attempt: Option<u64>,
-    /// The valid attempt of the lowest index wins, the same for any number of workers.
+    /// Return the valid attempt with the lowest index, whatever the number of workers.
     #[arg(long)]
     reproducible: bool,
-    /// Search afresh: do not try the grips that the server knows of the object already.
+    /// Search from scratch, without the object's known grasps.
     #[arg(long)]
     no_atlas: bool,
-    /// The hand to pose. Default: the right one.
+    /// The hand to pose. Default: right.
     #[arg(long, value_name = "HAND")]
     receiving_hand: Option<HandName>,
     /// The rig of the hand to pose. Default: the server's.
@@ -116,13 +113,13 @@ pub(crate) struct Arguments {
     /// Coefficient of static friction. Default: the object's.
     #[arg(long, value_name = "MU")]
     friction: Option<f32>,
-    /// Record and show the time spent in each step.
+    /// Show the time spent in each step.
     #[arg(long)]
     step_times: bool,
-    /// Plan the way to the grasp, too: an open hand away from the object, the same at the object, and the grasp.
+    /// Also plan the motion to the grasp: the open hand drawn back, the open hand at the object, and the grasp.
     #[arg(long)]
     key_frames: bool,
-    /// Write the request as JSON instead of sending it.
+    /// Print the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
     /// Write a picture of the grasp, if one is found.
@@ -134,7 +131,7 @@ pub(crate) struct Arguments {
     /// Pixels of each of the picture's two views.
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
-    /// The object's mesh (OBJ), for pictures of objects that are not built in.
+    /// The object's OBJ mesh, for pictures of objects that are not built in.
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh: 0.001 for millimetres.
@@ -146,7 +143,7 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-/// What `--json` writes.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct TimedAnswer {
     #[serde(flatten)]
@@ -160,7 +157,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         write_json(&request)?;
         return Ok(Ending::Done);
     }
-    // Before the search, so that a missing mesh is told at once.
+    // Reports a missing mesh before the search.
     let picture = arguments.picture(&request)?;
     let client = arguments.server.connect().await?;
     let start = Instant::now();
@@ -185,7 +182,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 impl Arguments {
-    /// The holdout as it will be drawn, if that was asked for.
+    /// The picture to draw, if requested.
     fn picture(&self, request: &FindRequest) -> Result<Option<Picture>, Failure> {
         if self.png.is_none() && self.glb.is_none() {
             return Ok(None);
@@ -194,7 +191,7 @@ impl Arguments {
             Some(path) => Model::from_file(path, self.mesh_unit_metres)?,
             None => Model::built_in(&request.object).ok_or_else(|| {
                 Failure::Usage(format!(
-                    "{} is not built in; to draw it, name its mesh with --mesh",
+                    "{} is not built in; pass its mesh with --mesh to draw it",
                     request.object
                 ))
             })?,
@@ -202,7 +199,7 @@ impl Arguments {
         Picture::new(model, request.clone()).map(Some)
     }
 
-    /// The request of the holdout or the file, with the options laid over it.
+    /// The request of the holdout or the file, overridden by the options.
     async fn to_request(&self) -> Result<FindRequest, Failure> {
         let mut request = match (&self.holdout, &self.request) {
             (Some(name), _) => request_for(holdout::built_in(name)?),
@@ -231,7 +228,7 @@ impl Arguments {
         request.record_step_times |= self.step_times;
         request.plan_key_frames |= self.key_frames;
         request.friction = self.friction.or(request.friction);
-        self.constraints.lay_over(&mut request.constraints);
+        self.constraints.override_in(&mut request.constraints);
         let receiver = &mut request.receiving_hand;
         receiver.handedness = self.receiving_hand.map(Into::into).or(receiver.handedness);
         receiver.rig = self.receiving_rig.clone().or(receiver.rig.take());
@@ -239,7 +236,7 @@ impl Arguments {
     }
 }
 
-/// Writes what was asked for.
+/// Writes the requested files.
 async fn draw(
     picture: Picture,
     size: ViewSize,

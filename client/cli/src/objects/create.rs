@@ -14,12 +14,12 @@ use crate::{
     values::{TriangleRange, parse_triangles, parse_vector},
 };
 
-/// Make an object from an OBJ mesh.
+/// Create an object from an OBJ mesh.
 ///
-/// Shows the new object, with --json as `grasp objects get` does.
+/// Shows the new object, like `grasp objects get`.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The last part of the object's name. Default: the file's name in lower case, with hyphens.
+    /// Last part of the object's name. Default: the file's name in lower case, with hyphens.
     id: Option<String>,
     /// The mesh.
     #[arg(long, value_name = "FILE")]
@@ -30,16 +30,16 @@ pub(crate) struct Arguments {
     /// Metres per unit of the mesh: 0.001 for millimetres. Default: 1.
     #[arg(long, value_name = "METRES")]
     unit_metres: Option<f32>,
-    /// Centre of mass in metres, after scaling. Default: that of the mesh's volume.
+    /// Centre of mass in metres after scaling. Default: that of the mesh's volume.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     centre_of_mass: Option<Vec3>,
-    /// Coefficient of static friction between skin and the surface. Default: the server's.
+    /// Coefficient of static friction between skin and surface. Default: the server's.
     #[arg(long, value_name = "MU")]
     friction: Option<f32>,
-    /// A group, object or material of the file that may not be touched; may be repeated.
+    /// A group, object or material of the file that must not be touched; may be repeated.
     #[arg(long, value_name = "NAME")]
     forbidden_group: Vec<String>,
-    /// Triangles that may not be touched: indices and ranges, such as 7,10-20.
+    /// Triangles that must not be touched: indices and ranges, such as 7,10-20.
     #[arg(long, value_name = "INDICES", value_parser = parse_triangles, value_delimiter = ',')]
     forbidden_triangles: Vec<TriangleRange>,
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     Ok(Ending::Done)
 }
 
-/// The file's name without its extension, in lower case, with a hyphen for every run of other characters.
+/// The file's name without its extension, in lower case, with hyphens for runs of other characters.
 fn id_from_file(path: &Path) -> String {
     let stem = path
         .file_stem()
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ids_come_from_file_names() {
+    fn derives_id_from_file_name() {
         let id = |path: &str| id_from_file(Path::new(path));
         assert_eq!(id("/tmp/Coffee Mug (v2).obj"), "coffee-mug-v2");
         assert_eq!(id("osim_banana.obj"), "osim-banana");

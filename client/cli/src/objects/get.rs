@@ -4,13 +4,13 @@ use clap::Args;
 
 use crate::{Ending, failure::Failure, output::Output, server_options::ServerOptions};
 
-const ABOUT: &str = r"Show all about one object but its mesh.
+const ABOUT: &str = r"Show everything about an object except its mesh.
 
 With --json: name, built_in, triangle_count, vertex_count, mass_kg, centre_of_mass, friction, forbidden_triangle_count,
 object_from_box, box_half_extents, content_hash, warnings, atlas (null, or entries, complete, stamp,
 build_time_seconds); metres, kilograms, quaternions x y z w.";
 
-/// Show all about one object but its mesh.
+/// Show everything about an object except its mesh.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT)]
 pub(crate) struct Arguments {

@@ -11,9 +11,9 @@ use crate::{
     server_options::ServerOptions,
 };
 
-/// List all objects that the server knows.
+/// List all objects of the server.
 ///
-/// With --json: {"objects": […]}, each as `grasp objects get --json` shows it.
+/// With --json: {"objects": […]}, each like the output of `grasp objects get --json`.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]

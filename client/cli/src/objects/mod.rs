@@ -14,7 +14,7 @@ use crate::{
     output::{Output, pairs},
 };
 
-/// List, show and make the objects that can be held out.
+/// List, show and create objects.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     List(list::Arguments),
@@ -30,7 +30,7 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Fail
     }
 }
 
-/// The full name of an object: "remote" and "objects/remote" mean the same on the command line.
+/// The full name of an object; "remote" is short for "objects/remote".
 pub(crate) fn full_name(name: &str) -> String {
     if name.starts_with("objects/") {
         name.to_owned()
@@ -47,7 +47,7 @@ fn size(half_extents: Vec3) -> String {
     format!("{long:.0} × {middle:.0} × {short:.0} mm")
 }
 
-/// The state of an atlas: how many grips, and whether there will be more.
+/// The state of an atlas: its number of grasps, and whether it still grows.
 fn atlas(atlas: Option<&AtlasState>) -> String {
     match atlas {
         None => "none".to_owned(),
@@ -56,7 +56,7 @@ fn atlas(atlas: Option<&AtlasState>) -> String {
     }
 }
 
-/// All about an object for people.
+/// Everything about an object, for people.
 fn describe(object: &Object) -> String {
     let com = object.centre_of_mass * 1000.0;
     let mut lines = vec![
@@ -94,13 +94,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_may_leave_out_their_collection() {
+    fn collection_of_names_is_optional() {
         assert_eq!(full_name("remote"), "objects/remote");
         assert_eq!(full_name("objects/remote"), "objects/remote");
     }
 
     #[test]
-    fn an_atlas_tells_whether_it_grows() {
+    fn atlas_state_shows_growth() {
         let state = |complete| AtlasState {
             entries: 120,
             complete,
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_are_whole_edges_in_millimetres_longest_first() {
+    fn sizes_are_edges_in_millimetres_longest_first() {
         assert_eq!(size(Vec3::new(0.01, 0.09, 0.02)), "180 × 40 × 20 mm");
     }
 }

@@ -1,4 +1,4 @@
-//! The hands of a picture, from requests and answers.
+//! Hands of a picture, from requests and answers.
 
 use grasp_assets::hands::{self, hand};
 use grasp_client::{
@@ -16,7 +16,7 @@ use grasp_synthesis::{
 use super::SceneHand;
 use crate::failure::Failure;
 
-/// The rig whose skin a tracked hand wears, as on the server: it is stretched to the tracked hand's bones and radii.
+/// The rig whose skin is stretched to the bones and radii of tracked hands, as on the server.
 const TRACKED_HAND_RIG: &str = "adult";
 
 pub(super) fn synthesis_pose(pose: Pose) -> pose::Pose {
@@ -34,14 +34,11 @@ pub(crate) fn synthesis_handedness(handedness: Handedness) -> synthesis::Handedn
 }
 
 fn built_in(rig: &str, handedness: Handedness) -> Result<&'static hands::Hand, Failure> {
-    hand(rig, synthesis_handedness(handedness)).ok_or_else(|| {
-        Failure::Usage(format!(
-            "rig {rig:?} is not built in, so its hand cannot be drawn"
-        ))
-    })
+    hand(rig, synthesis_handedness(handedness))
+        .ok_or_else(|| Failure::Usage(format!("rig {rig:?} is not built in; its hand cannot be drawn")))
 }
 
-/// The presenting hand as it was sent.
+/// The presenting hand of a request.
 pub(super) fn giver(hand: &PresentingHand) -> Result<SceneHand, Failure> {
     match hand {
         PresentingHand::Angles(angles) => from_angles(angles),
@@ -49,7 +46,7 @@ pub(super) fn giver(hand: &PresentingHand) -> Result<SceneHand, Failure> {
     }
 }
 
-/// The receiving hand as it was answered.
+/// The receiving hand of an answer.
 pub(super) fn receiver(grasp: &Grasp) -> Result<SceneHand, Failure> {
     let built_in = built_in(&grasp.rig, grasp.handedness)?;
     Ok(PosedHand {
@@ -86,7 +83,7 @@ fn from_tracked(hand: &HandJoints) -> Result<SceneHand, Failure> {
         JointSet::WebXr25 => with_palm(joints),
     };
     let joints: [Joint; JOINT_COUNT] = joints.try_into().map_err(|_| {
-        Failure::Usage("the presenting hand has too few or too many joints to be drawn".to_owned())
+        Failure::Usage("the presenting hand cannot be drawn: it has the wrong number of joints".to_owned())
     })?;
     let handedness = synthesis_handedness(hand.handedness);
     Ok(PosedHand {
@@ -95,10 +92,10 @@ fn from_tracked(hand: &HandJoints) -> Result<SceneHand, Failure> {
     })
 }
 
-/// `WebXR` lists no palm: it is the middle of the middle finger's metacarpal, turned like it.
+/// Adds the palm, which `WebXR` lacks: the middle of the middle finger's metacarpal, with its orientation.
 fn with_palm(mut joints: Vec<Joint>) -> Vec<Joint> {
     let middle = index::FIRST_OF_DIGIT[2];
-    // Without the palm, every joint comes one place earlier.
+    // Without the palm, every index is one less.
     let (Some(&metacarpal), Some(&proximal)) = (joints.get(middle - 1), joints.get(middle)) else {
         return joints;
     };
@@ -128,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_built_in_giver_is_drawn_where_its_holdout_has_it() {
+    fn draws_built_in_giver_at_its_holdout() {
         for holdout in holdouts() {
             let request = grasp_client::built_in::request_for(holdout);
             let drawn = giver(&request.presenting_hand.unwrap()).unwrap();
@@ -142,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_without_a_palm_gets_one_between_its_middle_joints() {
+    fn adds_palm_between_middle_joints() {
         let rig = &hand("adult", synthesis::Handedness::Left).unwrap().rig;
         let pose = HandPose {
             frame_from_wrist: pose::Pose::from_position(Vec3::new(0.1, 0.2, 0.3)),

@@ -1,5 +1,5 @@
-//! Pictures and GLB scenes of answers. What they show is what was asked and answered: the hands' skins are posed by the
-//! joints that went over the wire.
+//! Pictures and GLB scenes of answers. They show the data of request and answer: hands are posed by the joints sent over
+//! the wire.
 
 mod hands;
 mod model;
@@ -14,7 +14,7 @@ use grasp_synthesis::model::hand;
 use crate::{failure::Failure, values::ViewSize};
 pub(crate) use model::Model;
 
-/// A holdout and, if there is one, the grasp on it.
+/// A holdout and, if found, its grasp.
 #[derive(Clone, Debug)]
 pub(crate) struct Picture {
     model: Model,
@@ -23,11 +23,11 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
-    /// The holdout alone; the request must be in `OpenXR` conventions, as the scenes are.
+    /// The holdout alone. The request must use `OpenXR` conventions, like scenes.
     pub(crate) fn new(model: Model, request: FindRequest) -> Result<Self, Failure> {
         if request.convention != Convention::OpenXr {
             return Err(Failure::Usage(
-                "pictures are drawn of requests in the openxr convention only".to_owned(),
+                "pictures require a request in the openxr convention".to_owned(),
             ));
         }
         Ok(Self {
@@ -37,7 +37,7 @@ impl Picture {
         })
     }
 
-    /// The holdout with the grasp, if there is one.
+    /// Adds the grasp, if there is one.
     pub(crate) fn with_grasp(self, grasp: Option<Grasp>) -> Self {
         Self { grasp, ..self }
     }
@@ -47,7 +47,7 @@ impl Picture {
         Ok(self.scene()?.render(self.options(size)))
     }
 
-    /// One view of this size, the one that shows most.
+    /// The most informative view, in this size.
     pub(crate) fn draw_best_view(&self, size: ViewSize) -> Result<Image, Failure> {
         Ok(self.scene()?.render_best_view(self.options(size)))
     }
@@ -110,7 +110,7 @@ fn mark(contact: &Contact) -> ContactMark {
     }
 }
 
-/// Writes a file, making its folder if need be.
+/// Writes a file, creating its folder if necessary.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     parent
@@ -119,5 +119,5 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
 }
 
-/// A hand of a scene: a built-in rig's skin on joints.
+/// A hand of a scene: the skin of a built-in rig, posed by joints.
 type SceneHand = PosedHand<'static>;

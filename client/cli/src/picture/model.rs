@@ -1,4 +1,4 @@
-//! The object of a picture: the server does not give meshes back, so they come from the built-in assets or from a file.
+//! The object of a picture. The server does not return meshes: they come from the built-in assets or from a file.
 
 use std::{path::Path, sync::Arc};
 
@@ -9,14 +9,14 @@ use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
 use crate::failure::Failure;
 
-/// What a mesh file for a picture may hold: room for detailed scans; beyond it, drawing would take minutes.
+/// Limits of a mesh file for a picture: ample for detailed scans; larger ones would take minutes to draw.
 const LIMITS: MeshLimits = MeshLimits {
     bytes: 64 << 20,
     vertices: 1_000_000,
     triangles: 1_000_000,
 };
 
-/// An object's mesh with what is forbidden on it.
+/// An object's mesh and its forbidden triangles.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
     surface: Surface,
@@ -32,7 +32,7 @@ enum Surface {
 }
 
 impl Model {
-    /// A built-in object; `name` may have its collection before it. None if it is not built in.
+    /// A built-in object, by its name with or without the collection; none if it is not built in.
     pub(crate) fn built_in(name: &str) -> Option<Self> {
         let built_in = object(name.strip_prefix("objects/").unwrap_or(name))?;
         let object = Arc::clone(&built_in.object);
@@ -51,7 +51,7 @@ impl Model {
         })
     }
 
-    /// The mesh of an OBJ file; one unit of it is `unit_metres` long.
+    /// The mesh of an OBJ file with units of `unit_metres`.
     pub(crate) fn from_file(path: &Path, unit_metres: f32) -> Result<Self, Failure> {
         let text = std::fs::read(path)
             .map_err(|error| Failure::other(format!("cannot read {}", path.display()), error))?;

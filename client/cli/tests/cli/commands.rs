@@ -1,4 +1,4 @@
-//! The command line as scripts see it: standard output, standard error and exit codes of the built binary.
+//! Standard output, standard error and exit codes of the binary.
 
 use std::{
     io::Write as _,
@@ -12,7 +12,7 @@ use tonic_types::{ErrorDetails, StatusExt as _};
 
 use crate::scripted::{Act, Scripted};
 
-/// A process of the command line that is about to start; its environment names no server.
+/// A command that runs the binary, without variables of the environment that would affect it.
 fn grasp(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_grasp"));
     command
@@ -25,7 +25,7 @@ fn grasp(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs the command line while the test's runtime serves.
+/// Runs the binary while the test's runtime serves.
 pub(crate) fn run(arguments: &[&str]) -> Output {
     run_with_input(arguments, "")
 }
@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &[&str]) -> Output {
 fn run_with_input(arguments: &[&str], input: &str) -> Output {
     tokio::task::block_in_place(|| {
         let mut child = grasp(arguments).spawn().unwrap();
-        // A command that does not read its input may have closed it already.
+        // Fails if the command has closed its input.
         let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
         child.wait_with_output().unwrap()
     })
@@ -51,8 +51,8 @@ pub(crate) fn json(bytes: &[u8]) -> Value {
     serde_json::from_slice(bytes).unwrap_or_else(|error| panic!("{error} in {:?}", text(bytes)))
 }
 
-/// An URL at which nobody listens.
-fn nobody() -> String {
+/// A URL at which no server listens.
+fn closed_port() -> String {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     format!("http://{}", listener.local_addr().unwrap())
 }
@@ -65,7 +65,7 @@ fn invalid() -> Act {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn objects_are_listed_for_people_and_for_scripts() {
+async fn lists_objects_as_table_and_as_json() {
     let service = Scripted::new((0..6).map(|_| Act::Answer));
     let url = service.serve().await;
     let people = run(&["objects", "list", "--server", &url]);
@@ -80,7 +80,7 @@ async fn objects_are_listed_for_people_and_for_scripts() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn one_object_is_shown_by_its_short_name() {
+async fn shows_object_by_short_name() {
     let service = Scripted::new([Act::Answer]);
     let url = service.serve().await;
     let output = run(&["objects", "get", "remote", "--json", "--server", &url]);
@@ -88,10 +88,10 @@ async fn one_object_is_shown_by_its_short_name() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_object_is_made_and_named_after_its_file() {
+async fn names_created_object_after_its_file() {
     let service = Scripted::new([Act::Answer]);
     let url = service.serve().await;
-    let folder = tempfile("an_object_is_made");
+    let folder = empty_folder("created_object");
     let mesh = folder.join("Coffee Mug.obj");
     std::fs::write(&mesh, "v 0 0 0\n").unwrap();
     let mesh = mesh.to_str().unwrap();
@@ -102,8 +102,8 @@ async fn an_object_is_made_and_named_after_its_file() {
     assert_eq!(json(&output.stdout)["name"], "objects/coffee-mug");
 }
 
-/// A fresh folder for one test, below the folder that cargo gives to integration tests.
-pub(crate) fn tempfile(name: &str) -> std::path::PathBuf {
+/// An empty folder for one test, in cargo's folder for integration tests.
+pub(crate) fn empty_folder(name: &str) -> std::path::PathBuf {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
@@ -111,10 +111,10 @@ pub(crate) fn tempfile(name: &str) -> std::path::PathBuf {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_refusal_lists_every_violation_on_its_own_line() {
+async fn lists_each_violation_on_its_own_line() {
     let service = Scripted::new([invalid(), invalid()]);
     let url = service.serve().await;
-    let mesh = tempfile("a_refusal").join("empty.obj");
+    let mesh = empty_folder("violations").join("empty.obj");
     std::fs::write(&mesh, "").unwrap();
     let mesh = mesh.to_str().unwrap();
     let people = run(&[
@@ -152,7 +152,7 @@ async fn a_refusal_lists_every_violation_on_its_own_line() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_message_that_repeats_its_only_violation_is_not_shown_twice() {
+async fn does_not_repeat_single_violation() {
     let details = ErrorDetails::with_bad_request_violation("name", "is \"anvil/1\"");
     let message = "name: is \"anvil/1\"";
     let status = Status::with_error_details(Code::InvalidArgument, message, details);
@@ -165,7 +165,7 @@ async fn a_message_that_repeats_its_only_violation_is_not_shown_twice() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_not_found_exits_with_4() {
+async fn not_found_exits_with_4() {
     let details = ErrorDetails::with_resource_info("grasp.v1.Object", "objects/anvil", "", "does not exist");
     let status = Status::with_error_details(Code::NotFound, "no object is called objects/anvil", details);
     let url = Scripted::new([Act::Fail(status)]).serve().await;
@@ -175,21 +175,21 @@ async fn what_is_not_found_exits_with_4() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_missing_server_exits_with_5() {
-    let people = run(&["health", "--server", &nobody()]);
+async fn unreachable_server_exits_with_5() {
+    let people = run(&["health", "--server", &closed_port()]);
     assert_eq!(code(&people), 5);
     assert!(
         text(&people.stderr).starts_with("error: cannot connect to http://127.0.0.1:"),
         "{}",
         text(&people.stderr)
     );
-    let scripts = run(&["health", "--json", "--server", &nobody()]);
+    let scripts = run(&["health", "--json", "--server", &closed_port()]);
     assert_eq!(code(&scripts), 5);
     assert_eq!(json(&scripts.stderr)["error"]["kind"], "connect");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_server_that_stays_unavailable_exits_with_5() {
+async fn unavailable_server_exits_with_5() {
     let unavailable = (0..2).map(|_| Act::Fail(Status::unavailable("draining")));
     let service = Scripted::new(unavailable);
     let url = service.serve().await;
@@ -222,13 +222,13 @@ async fn no_grasp_within_the_budget_exits_with_3() {
     let answer = json(&scripts.stdout);
     assert_eq!(answer["outcome"], "budget_exhausted");
     assert_eq!(answer["grasp"], Value::Null);
-    // The service answers with the budget that it was sent: the option wins over the file.
+    // The service returns the budget that it received: the option overrides the file.
     assert_eq!(answer["report"]["budget_seconds"], 0.25);
     assert!(answer["round_trip_seconds"].is_f64());
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn usage_errors_exit_with_2_before_any_server_is_asked() {
+async fn usage_errors_exit_with_2_without_a_server() {
     let cases: [(&[&str], &str); 10] = [
         (&[], "Usage"),
         (&["find"], "--holdout"),
@@ -271,7 +271,7 @@ async fn usage_errors_exit_with_2_before_any_server_is_asked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_request_that_is_not_understood_exits_with_2_and_says_where() {
+async fn malformed_request_exits_with_2_and_names_the_line() {
     let output = run_with_input(
         &["find", "--request", "-"],
         "{\n  \"object\": \"objects/remote\",\n  \"budgit\": 1\n}",
@@ -285,7 +285,7 @@ async fn a_request_that_is_not_understood_exits_with_2_and_says_where() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_request_may_be_printed_and_read_again() {
+async fn printed_request_can_be_read_again() {
     let printed = run_with_input(
         &["find", "--request", "-", "--print-request", "--seed", "7"],
         r#"{"object": "objects/remote"}"#,
@@ -300,7 +300,7 @@ async fn a_request_may_be_printed_and_read_again() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_the_grasp_must_be_like_is_laid_over_the_file() {
+async fn options_override_constraints_of_the_file() {
     let file = r#"{"object": "objects/remote",
         "choice": "first_valid", "constraints": {"excluded_grasp_types": ["stick"], "must_touch": ["ring"], "must_not_touch": ["middle"], "max_comfort_e": 0.5}}"#;
     let arguments = [
@@ -353,7 +353,7 @@ async fn what_the_grasp_must_be_like_is_laid_over_the_file() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_grasp_type_that_is_none_is_refused_with_those_that_are() {
+async fn rejects_unknown_grasp_types() {
     for (option, given) in [("--grasp-type", "unclassifiable"), ("--not-grasp-type", "pinch")] {
         let output = run(&[
             "find",
@@ -387,7 +387,7 @@ async fn a_grasp_type_that_is_none_is_refused_with_those_that_are() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn completions_name_the_commands() {
+async fn completions_contain_the_commands() {
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
         let output = run(&["completions", shell]);
         assert_eq!(code(&output), 0);
@@ -399,7 +399,7 @@ async fn completions_name_the_commands() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_closed_pipe_ends_the_command_quietly() {
+async fn closed_pipe_ends_quietly() {
     let url = Scripted::new((0..3).map(|_| Act::Answer)).serve().await;
     for arguments in [
         vec!["completions", "bash"],
@@ -414,7 +414,7 @@ async fn a_closed_pipe_ends_the_command_quietly() {
     }
 }
 
-/// Interrupts a process as Ctrl-C does and waits for its end.
+/// Interrupts a process like Ctrl-C, and waits until it ends.
 #[cfg(unix)]
 fn interrupt(child: Child) -> Output {
     let id = child.id().to_string();
@@ -427,7 +427,7 @@ fn interrupt(child: Child) -> Output {
 
 #[cfg(unix)]
 #[tokio::test(flavor = "multi_thread")]
-async fn an_interrupt_ends_the_command_with_130() {
+async fn interrupt_exits_with_130() {
     let service = Scripted::new([Act::Hang]);
     let url = service.serve().await;
     let child = grasp(&["objects", "get", "remote", "--timeout", "5m", "--server", &url])
@@ -445,12 +445,12 @@ async fn an_interrupt_ends_the_command_with_130() {
 
 #[cfg(unix)]
 #[tokio::test(flavor = "multi_thread")]
-async fn an_interrupt_is_heard_while_the_request_is_typed() {
+async fn interrupt_ends_a_wait_for_input() {
     let mut child = grasp(&["find", "--request", "-"]).spawn().unwrap();
-    // Kept open: the command waits for the rest of the request.
+    // Stays open: the command waits for the rest of the request.
     let mut input = child.stdin.take().unwrap();
     input.write_all(b"{").unwrap();
-    // A process that was not yet ready for the interrupt is ended by it all the same.
+    // Should the process have no handler yet, the interrupt ends it, too.
     tokio::time::sleep(Duration::from_millis(200)).await;
     let output = interrupt(child);
     assert!(!output.status.success());

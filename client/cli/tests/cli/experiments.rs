@@ -1,13 +1,13 @@
-//! `grasp experiment` as scripts see it, and its rows made again by a real server.
+//! `grasp experiment`: its output, and replays of its grasps by a real server.
 
 use std::{collections::HashMap, path::Path};
 
 use crate::{
-    cli::{code, json, run, tempfile, text},
+    commands::{code, empty_folder, json, run, text},
     real_server::real_server,
 };
 
-/// A run that takes seconds, into this folder.
+/// A run of a few seconds into this folder.
 fn small_run(folder: &Path, more: &[&str]) -> std::process::Output {
     let mut arguments = vec![
         "experiment",
@@ -44,14 +44,14 @@ fn rows(path: &Path) -> Vec<HashMap<String, String>> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_listed_grasp_is_made_again_by_the_server() {
-    let folder = tempfile("experiment_rows");
+async fn server_reproduces_every_recorded_grasp() {
+    let folder = empty_folder("experiment_rows");
     let output = small_run(&folder, &["--set", "guided", "--set", "PHYSICAL"]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     assert_eq!(text(&output.stderr), "", "no bar where there is no terminal");
     let url = real_server().await;
     let grasps = rows(&folder.join("grasps.csv"));
-    // Four sets, and the five columns of Figure 5.20 beside D, on two holdouts.
+    // Four sets and the five further columns of Figure 5.20, on two holdouts.
     assert_eq!(grasps.len(), 2 * 2 * (4 + 5));
     for row in &grasps {
         let answer = run(&[
@@ -86,8 +86,8 @@ async fn every_listed_grasp_is_made_again_by_the_server() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_run_reports_its_ladder_and_can_be_asked_again() {
-    let folder = tempfile("experiment_again");
+async fn reports_ladder_and_resumes() {
+    let folder = empty_folder("experiment_again");
     let first = small_run(&folder, &[]);
     assert_eq!(code(&first), 0, "{}", text(&first.stderr));
     let results = json(&first.stdout);
@@ -100,7 +100,7 @@ async fn a_run_reports_its_ladder_and_can_be_asked_again() {
     assert_eq!(sets, ["D", "F"]);
     assert!(results["claims"].as_array().unwrap().len() > 5);
     assert!(Path::new(results["report"].as_str().unwrap()).exists());
-    // Everything is there already: the same grasps with the same measured times.
+    // Nothing is missing: the same grasps with the same measured times.
     let again = small_run(&folder, &[]);
     assert_eq!(json(&again.stdout), results);
     let other = small_run(&folder, &["--seed", "2"]);
@@ -115,8 +115,8 @@ async fn a_run_reports_its_ladder_and_can_be_asked_again() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_run_that_cannot_be_is_refused_before_it_starts() {
-    let folder = tempfile("experiment_refused");
+async fn rejects_invalid_runs_before_they_start() {
+    let folder = empty_folder("experiment_refused");
     for (wrong, named) in [
         (["--valid", "0"], "--valid"),
         (["--invalid", "1000000"], "--invalid"),

@@ -1,13 +1,13 @@
-//! The command line with the real server: the demo, pictures, replays.
+//! The command line with a real server: demo, pictures, replays.
 
-use crate::cli::{code, json, run, tempfile, text};
+use crate::commands::{code, empty_folder, json, run, text};
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_demo_asks_for_every_holdout_and_draws_it() {
-    let folder = tempfile("the_demo").join("pictures");
+async fn demo_draws_every_holdout() {
+    let folder = empty_folder("the_demo").join("pictures");
     let folder = folder.to_str().unwrap();
     let output = run(&["demo", "--json", "--out", folder, "--view-size", "48x40"]);
-    // A slow machine may run out of time for a hard holdout, but not for all of them.
+    // A slow machine may run out of time for a hard holdout, but not for all.
     assert!(matches!(code(&output), 0 | 3), "{}", text(&output.stderr));
     assert_eq!(text(&output.stderr), "");
     let results = json(&output.stdout);
@@ -28,9 +28,9 @@ async fn the_demo_asks_for_every_holdout_and_draws_it() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_demo_shows_a_table_without_a_progress_bar_where_there_is_no_terminal() {
+async fn demo_shows_table_without_progress_bar_unless_on_a_terminal() {
     let holdout = &grasp_assets::holdouts::holdouts()[0];
-    let folder = tempfile("the_demo_of_one");
+    let folder = empty_folder("the_demo_of_one");
     let output = run(&[
         "demo",
         "--holdout",
@@ -44,13 +44,13 @@ async fn the_demo_shows_a_table_without_a_progress_bar_where_there_is_no_termina
     let table = text(&output.stdout);
     let row = table.lines().find(|line| line.contains(&holdout.object)).unwrap();
     let short_name = holdout.name.strip_prefix(&holdout.object).unwrap();
-    // Times are in milliseconds, or below one in microseconds.
+    // Times are in milliseconds or microseconds.
     let has_time = row.contains(" ms ") || row.contains(" µs ");
     assert!(row.contains(&short_name[1..]) && has_time, "{row}");
     assert!(folder.join(format!("{}.glb", holdout.name)).exists());
 }
 
-/// Starts the real server on a free port until the test's runtime ends; gives its URL.
+/// Starts a real server on a free port until the test's runtime ends; returns its URL.
 pub(crate) async fn real_server() -> String {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
@@ -64,9 +64,9 @@ pub(crate) async fn real_server() -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_found_grasp_is_drawn_and_can_be_replayed() {
+async fn found_grasp_is_drawn_and_replayed() {
     let url = real_server().await;
-    let folder = tempfile("a_found_grasp");
+    let folder = empty_folder("a_found_grasp");
     let (png, glb) = (folder.join("grasp.png"), folder.join("grasp.glb"));
     let find = |options: &[&str]| {
         let common = [
@@ -83,7 +83,7 @@ async fn a_found_grasp_is_drawn_and_can_be_replayed() {
         assert_eq!(code(&output), 0, "{}", text(&output.stderr));
         json(&output.stdout)
     };
-    // So that an attempt gives the grasp.
+    // Only grasps of an attempt can be replayed.
     let answer = find(&[
         "--no-atlas",
         "--png",
@@ -114,8 +114,8 @@ async fn a_found_grasp_is_drawn_and_can_be_replayed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_picture_of_an_object_without_a_mesh_is_refused_before_the_search() {
-    let folder = tempfile("a_picture_without_a_mesh");
+async fn rejects_picture_without_mesh_before_the_search() {
+    let folder = empty_folder("a_picture_without_a_mesh");
     let request = folder.join("request.json");
     std::fs::write(&request, r#"{"object": "objects/mug"}"#).unwrap();
     let output = run(&[

@@ -1,0 +1,96 @@
+//! Registers an object from an OBJ file, and asks for a grasp while a tracked hand holds it out.
+//!
+//! Start a server, then run the example; all arguments are optional:
+//!
+//! ```sh
+//! cargo run --release --package grasp-server
+//! cargo run --package grasp-client --example register_object -- http://[::1]:50051 torch.obj tracked_hand.json
+//! ```
+
+use std::{error::Error, fs, path::PathBuf, time::Duration};
+
+use grasp_client::{
+    ClientError, FindRequest, ForbiddenSurfaces, GraspClient, HandJoints, Handedness, NewObject, Object,
+    Pose, PresentingHand, ReceivingHand,
+};
+
+#[tokio::main]
+async fn main() -> Result<(), Box<dyn Error>> {
+    let data = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data"));
+    let mut arguments = std::env::args().skip(1);
+    let url = arguments
+        .next()
+        .unwrap_or_else(|| "http://[::1]:50051".to_owned());
+    let mesh = arguments
+        .next()
+        .map_or_else(|| data.join("torch.obj"), PathBuf::from);
+    let hand = arguments
+        .next()
+        .map_or_else(|| data.join("tracked_hand.json"), PathBuf::from);
+
+    let client = GraspClient::connect(url).await?;
+    let object = register(&client, fs::read(mesh)?).await?;
+    println!(
+        "{}: {} triangles, {:.0} g, friction {}",
+        object.name,
+        object.triangle_count,
+        1000.0 * object.mass_kg,
+        object.friction
+    );
+    for warning in &object.warnings {
+        println!("warning: {warning}");
+    }
+
+    // A game takes these from its headset each frame: 26 joints with radii, in the order of XR_EXT_hand_tracking.
+    let giver: HandJoints = serde_json::from_str(&fs::read_to_string(hand)?)?;
+    let request = FindRequest {
+        client_from_object: Pose::IDENTITY,
+        presenting_hand: Some(PresentingHand::Joints(giver)),
+        receiving_hand: ReceivingHand {
+            rig: None,
+            handedness: Some(Handedness::Right),
+        },
+        // The first search on a new object may take longer: its atlas has only begun to grow.
+        budget: Some(Duration::from_secs(5)),
+        ..FindRequest::new(object.name)
+    };
+    let answer = client.find_grasp(&request).await?;
+    match answer.grasp {
+        Some(grasp) => {
+            println!(
+                "grasp type {:?}, wrist in the object's frame: {:?}",
+                grasp.grasp_type, grasp.object_from_wrist
+            );
+            for contact in &grasp.contacts {
+                println!("{:?} touches triangle {}", contact.digit, contact.triangle);
+            }
+        }
+        None => println!("no grasp in {} attempts", answer.report.attempts),
+    }
+    Ok(())
+}
+
+/// Creates the object, or finds the one that an earlier run created.
+async fn register(client: &GraspClient, obj: Vec<u8>) -> Result<Object, ClientError> {
+    let torch = NewObject {
+        // The file is in centimetres.
+        unit_metres: Some(0.01),
+        friction: Some(0.5),
+        forbidden: ForbiddenSurfaces {
+            groups: vec!["lens".to_owned()],
+            triangles: Vec::new(),
+        },
+        ..NewObject::new("torch", obj, 0.15)
+    };
+    match client.create_object(&torch).await {
+        Err(ClientError::AlreadyExists(_)) => client.get_object("objects/torch").await,
+        // Lists everything wrong with the file, with line numbers.
+        Err(ClientError::InvalidArgument(call)) => {
+            for violation in &call.details.field_violations {
+                eprintln!("{}: {}", violation.field, violation.description);
+            }
+            Err(ClientError::InvalidArgument(call))
+        }
+        result => result,
+    }
+}
