@@ -17,7 +17,7 @@ pub(crate) const NEAR: f32 = 1e-3;
 /// A perspective camera: it looks along its own -z, +x is right and +y is up in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where it stands.
+    /// Pose of the camera.
     pub world_from_camera: Pose,
     /// Vertical opening angle in radians, more than 0 and less than π.
     pub vertical_fov: f32,
@@ -26,7 +26,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The nearest camera that sees all vertices of a scene, looking against `direction` (from the scene to the
+    /// The closest camera that sees all vertices of a scene, looking against `direction` (from the scene to the
     /// camera). `up` is up in the picture, as far as `direction` allows.
     pub fn framing(scene: &Scene, direction: Vec3, up: Vec3, aspect: f32) -> Self {
         Self::framing_points(scene.points(), direction, up, aspect)
@@ -79,21 +79,21 @@ impl Camera {
         Vec2::new(y * self.aspect, y)
     }
 
-    /// Where a point of the world appears: x from 0 (left) to 1 (right), y from 0 (top) to 1 (bottom), z its distance
+    /// The image position of a point of the world: x from 0 (left) to 1 (right), y from 0 (top) to 1 (bottom), z its distance
     /// from the camera's plane in metres. None for points that are not in front of the camera.
     pub fn project(&self, point: Vec3) -> Option<Vec3> {
         let local = self.world_from_camera.inverse().transform_point(point);
         (local.z < -NEAR).then(|| self.project_local(local))
     }
 
-    /// The same for a point in the camera's frame that is in front of it.
+    /// The same for a point in the camera's frame, in front of it.
     pub(crate) fn project_local(&self, local: Vec3) -> Vec3 {
         let depth = -local.z;
         let plane = local.truncate() / (self.tangents() * depth);
         Vec3::new(0.5 + 0.5 * plane.x, 0.5 - 0.5 * plane.y, depth)
     }
 
-    /// The direction, not of unit length, from the camera through a place of the picture (as in
+    /// The direction, not of unit length, from the camera through an image position (as in
     /// [`Camera::project`]): it advances by 1 m along the camera's view.
     pub fn ray(&self, at: Vec2) -> Vec3 {
         let plane = Vec2::new(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0) * self.tangents();
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     fn cloud() -> Vec<Vec3> {
-        // Points on a skewed spiral: nothing about it is symmetric.
+        // Points on a skewed spiral, without any symmetry.
         (0..200_u16)
             .map(|i| {
                 let t = f32::from(i) * 0.1;

@@ -1,9 +1,9 @@
 //! A dot-matrix font for captions, drawn for this project.
 
-/// Dots in a glyph's row.
+/// Dots per row of a glyph.
 const WIDTH: usize = 5;
 
-/// Rows of dots in a glyph; the last two lie below the line.
+/// Rows of a glyph; the last two lie below the baseline.
 pub(crate) const HEIGHT: usize = 9;
 
 /// Dots from one glyph to the next.
@@ -12,7 +12,7 @@ const ADVANCE: usize = WIDTH + 1;
 /// The first character that has a glyph; the others follow in the order of ASCII.
 const FIRST: u8 = b' ';
 
-/// Dots that a text is wide.
+/// Width of a text in dots.
 pub(crate) fn text_width(text: &str) -> usize {
     (text.chars().count() * ADVANCE).saturating_sub(1)
 }
@@ -30,7 +30,7 @@ pub(crate) fn for_each_dot(text: &str, mut draw: impl FnMut(usize, usize)) {
     }
 }
 
-/// The rows of a character, the leftmost dot in the highest bit; those of "?" for one that has none.
+/// The rows of a character, the leftmost dot in the highest bit; "?" stands for characters without a glyph.
 fn glyph(character: char) -> [u8; HEIGHT] {
     let index = |c: u8| usize::from(c).checked_sub(usize::from(FIRST));
     u8::try_from(character)
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_printable_character_has_a_glyph_of_its_own() {
+    fn every_printable_character_has_its_own_glyph() {
         let glyphs: std::collections::HashSet<_> = (FIRST..=b'~').map(|c| glyph(char::from(c))).collect();
         assert_eq!(glyphs.len(), 95);
         assert!(glyphs.iter().flatten().all(|row| *row < 1 << WIDTH));
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn an_l_is_a_stroke_and_a_foot() {
+    fn letter_l_is_a_stroke_and_a_foot() {
         let mut dots = Vec::new();
         for_each_dot(" L", |x, y| dots.push((x, y)));
         let stroke = (0..HEIGHT - 2).map(|y| (ADVANCE, y));

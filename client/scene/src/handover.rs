@@ -21,14 +21,14 @@ use crate::{
     views::choose_views,
 };
 
-/// Radius of a contact's ball in metres, and how far its centre lies in front of the surface.
+/// Radius of a contact's marker, and distance of its centre from the surface, in metres.
 const CONTACT_RADIUS: f32 = 3.0e-3;
 const CONTACT_LIFT: f32 = 0.8e-3;
 
-/// Length of the arrow of the largest force in metres; the others in proportion.
+/// Length of the arrow of the largest force, in metres; others in proportion.
 const LONGEST_ARROW: f32 = 0.05;
 
-/// Arrows are at least this long, in metres, so that a small force can be seen at all.
+/// Shortest arrow, in metres; keeps small forces visible.
 const SHORTEST_ARROW: f32 = 0.006;
 
 /// Forces below this are not drawn, in newtons.
@@ -37,7 +37,7 @@ const SMALLEST_FORCE: f32 = 1e-4;
 /// Radius of an arrow's shaft in metres.
 const ARROW_RADIUS: f32 = 1.3e-3;
 
-/// sRGB of what is not the caller's choice.
+/// sRGB colours that the caller cannot choose.
 const FORBIDDEN: [u8; 3] = [176, 52, 48];
 const CONTACT: [u8; 3] = [255, 196, 0];
 const FORCE: [u8; 3] = [255, 120, 0];
@@ -47,45 +47,45 @@ const RECEIVER_SLEEVE: [u8; 3] = [92, 134, 100];
 /// A hand with its skin.
 #[derive(Clone, Debug)]
 pub struct PosedHand<'a> {
-    /// The skin that is bent.
+    /// The skin to pose.
     pub skin: &'a Skin,
-    /// Where the joints are, in the client's frame.
+    /// The joints, in the client's frame.
     pub joints: HandJoints,
 }
 
-/// Where the receiving hand touches the object.
+/// A contact of the receiving hand with the object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactMark {
-    /// On the surface, in metres, in the client's frame.
+    /// Point on the surface, in metres, in the client's frame.
     pub position: Vec3,
     /// The surface's outward unit normal, in the client's frame.
     pub normal: Vec3,
     /// The force of the hand on the object in newtons, in the client's frame.
     pub force: Vec3,
-    /// The digit that touches; none for the palm.
+    /// The digit; none for the palm.
     pub digit: Option<Digit>,
-    /// The digit's link that touches; none for the palm.
+    /// The digit's link; none for the palm.
     pub phalanx: Option<Phalanx>,
 }
 
-/// A handover to be drawn, in the client's frame: metres, right-handed.
+/// A handover to draw, in the client's frame: metres, right-handed.
 #[derive(Clone, Debug)]
 pub struct HandoverScene<'a> {
     /// The object, in its own frame.
     pub object: &'a TriangleMesh,
-    /// Where the object is.
+    /// Pose of the object.
     pub client_from_object: Pose,
-    /// The object's triangles that may not be touched; drawn red.
+    /// Triangles of the object that must not be touched; drawn red.
     pub forbidden: &'a [u32],
     /// Linear RGB of the object.
     pub object_colour: [f32; 4],
-    /// How the object takes the light.
+    /// Finish of the object.
     pub object_finish: Finish,
     /// The presenting hand.
     pub giver: Option<PosedHand<'a>>,
     /// The receiving hand.
     pub receiver: Option<PosedHand<'a>>,
-    /// Where the receiving hand touches.
+    /// Contacts of the receiving hand.
     pub contacts: Vec<ContactMark>,
 }
 
@@ -125,7 +125,7 @@ impl<'a> HandoverScene<'a> {
         Scene { parts }
     }
 
-    /// The two views that show most, side by side; `options` is for each of them.
+    /// The two most informative views side by side, each drawn with `options`.
     pub fn render(&self, options: RenderOptions) -> Image {
         let scene = self.to_scene();
         let [first, second] = self.views(&scene, options);
@@ -135,7 +135,7 @@ impl<'a> HandoverScene<'a> {
         )
     }
 
-    /// The view that shows most.
+    /// The most informative view.
     pub fn render_best_view(&self, options: RenderOptions) -> Image {
         let scene = self.to_scene();
         let [best, _] = self.views(&scene, options);
@@ -159,7 +159,7 @@ impl<'a> HandoverScene<'a> {
         let mut triangles = self.object.triangles().to_vec();
         let mut vertex_colours = Vec::new();
         if !self.forbidden.is_empty() {
-            // Forbidden triangles get vertices of their own, so that their colour ends sharply.
+            // Separate vertices give the colour of forbidden triangles a sharp border.
             vertex_colours = vec![Vec3::new(r, g, b); positions.len()];
             let [r, g, b, _] = srgb(FORBIDDEN);
             let mut copies = HashMap::new();
@@ -245,8 +245,8 @@ impl ContactMark {
     }
 }
 
-/// How much it matters to see a part: the object, which hands mostly hide, and all contacts together more than the
-/// hands, of which there is always something to see.
+/// Weight of a part's visibility in the choice of views: the object, often hidden by hands, and all contacts together
+/// count more than the hands, which are always visible in part.
 fn importance(part: &Part, contacts: usize) -> f32 {
     match part.name.as_str() {
         "object" => 2.0,
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_named_after_what_they_are() {
+    fn names_parts_by_content() {
         let object = rod();
         let scene = handover(&object).to_scene();
         let names: Vec<&str> = scene.parts.iter().map(|part| part.name.as_str()).collect();
@@ -367,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn the_object_is_where_it_should_be_and_its_forbidden_triangles_are_red() {
+    fn places_object_and_colours_forbidden_triangles_red() {
         let object = rod();
         let scene = handover(&object).to_scene();
         let drawn = part(&scene, "object");
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn sleeves_begin_at_the_wrist_and_lead_away_from_the_fingers() {
+    fn sleeves_start_at_wrist_and_point_away_from_fingers() {
         let object = rod();
         let handover = handover(&object);
         let scene = handover.to_scene();
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn every_finger_has_a_nail_on_its_skin() {
+    fn every_digit_has_a_nail_on_its_skin() {
         let object = rod();
         let handover = handover(&object);
         let scene = handover.to_scene();
@@ -471,7 +471,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_shows_two_views() {
+    fn picture_shows_two_views() {
         let object = rod();
         let options = RenderOptions {
             width: 150,

@@ -1,4 +1,4 @@
-//! Pictures: PNG files, captions and sheets of several.
+//! Images: PNG files, captions and contact sheets.
 
 use crate::font;
 
@@ -6,7 +6,7 @@ use crate::font;
 const PAPER: u8 = 250;
 const INK: u8 = 40;
 
-/// Free pixels between the pictures of a sheet.
+/// Pixels between the pictures of a sheet.
 const GAP: usize = 8;
 
 /// Size of a caption's dots in pixels.
@@ -15,7 +15,7 @@ const CAPTION_SCALE: usize = 2;
 /// Height of the strip that carries a caption, in pixels.
 const CAPTION_HEIGHT: usize = font::HEIGHT * CAPTION_SCALE + 14;
 
-/// A picture in sRGB, 8 bits a channel.
+/// A picture in sRGB, 8 bits per channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     width: usize,
@@ -28,7 +28,7 @@ impl Image {
     /// An image from its pixels: red, green and blue bytes, row by row from the top.
     ///
     /// # Panics
-    /// There are not exactly 3 × width × height bytes, or there are none.
+    /// The number of bytes is not 3 × width × height, or 0.
     pub fn from_rgb(width: usize, height: usize, rgb: Vec<u8>) -> Self {
         assert!(width > 0 && height > 0, "an image has at least one pixel");
         assert_eq!(
@@ -43,12 +43,12 @@ impl Image {
         Self::from_rgb(width, height, vec![PAPER; width * height * 3])
     }
 
-    /// Pixels in a row.
+    /// Pixels per row.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows of pixels.
+    /// Number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
@@ -82,8 +82,7 @@ impl Image {
         bytes
     }
 
-    /// The same image with a line of text below. Characters outside printable ASCII show as "?"; what does not fit is
-    /// cut off.
+    /// The same image with a line of text below. Characters outside printable ASCII show as "?"; excess text is cut.
     #[must_use]
     pub fn with_caption(&self, caption: &str) -> Self {
         let mut image = Self::blank(self.width, self.height + CAPTION_HEIGHT);
@@ -121,7 +120,7 @@ impl Image {
     }
 }
 
-/// Two images beside each other, tops aligned.
+/// Two images side by side, tops aligned.
 pub fn side_by_side(left: &Image, right: &Image) -> Image {
     let mut image = Image::blank(left.width + GAP + right.width, left.height.max(right.height));
     image.paste(left, 0, 0);
@@ -175,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn sheets_have_room_for_every_cell() {
+    fn sheets_fit_every_cell() {
         let images: Vec<_> = (0..5)
             .map(|i| (gradient(40 + i, 30), format!("image {i}")))
             .collect();
@@ -192,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn captions_are_written_below_and_leave_the_picture_alone() {
+    fn captions_are_added_below_an_unchanged_picture() {
         let image = gradient(120, 20);
         let captioned = image.with_caption("|");
         assert_eq!(captioned.height(), 20 + CAPTION_HEIGHT);
@@ -205,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn side_by_side_keeps_both() {
+    fn side_by_side_keeps_both_images() {
         let (a, b) = (gradient(10, 12), gradient(7, 5));
         let both = side_by_side(&a, &b);
         assert_eq!((both.width(), both.height()), (17 + GAP, 12));

@@ -6,9 +6,9 @@ use glam::Vec3;
 
 use crate::scene::Part;
 
-/// For every triangle of a part, the unit normals at its corners: the mean of the normals of all triangles that share
-/// the corner's place and are tilted by no more than the crease angle, weighted by their angle there (Thürmer and
-/// Wüthrich 1998), so that the tessellation does not show.
+/// The unit normals at the corners of every triangle of a part: the mean of the normals of all triangles at the corner's
+/// position that are tilted by no more than the crease angle, weighted by their angle there (Thürmer and Wüthrich 1998),
+/// which makes them independent of the tessellation.
 pub(crate) fn corner_normals(part: &Part) -> Vec<[Vec3; 3]> {
     let places = welded(&part.positions);
     let corners_of = |triangle: &[u32; 3]| triangle.map(|v| part.positions[v as usize]);
@@ -21,7 +21,7 @@ pub(crate) fn corner_normals(part: &Part) -> Vec<[Vec3; 3]> {
         return faces.iter().map(|&normal| [normal; 3]).collect();
     }
 
-    // The corners around each place, as one list with offsets.
+    // The corners at each position, as one list with offsets.
     let mut offsets = vec![0_usize; places.count + 1];
     for vertex in part.triangles.iter().flatten() {
         offsets[places.of_vertex[*vertex as usize] + 1] += 1;
@@ -80,7 +80,7 @@ fn corner_angle(corners: [Vec3; 3], corner: usize) -> f32 {
     one.dot(other).clamp(-1.0, 1.0).acos()
 }
 
-/// Vertices that lie at the same place.
+/// Vertices at the same position.
 struct Places {
     of_vertex: Vec<usize>,
     count: usize,
@@ -92,7 +92,7 @@ fn welded(positions: &[Vec3]) -> Places {
         .iter()
         .map(|position| {
             let next = known.len();
-            // Adding zero makes -0 and 0 the same place.
+            // Adding zero makes -0 and 0 equal in bits.
             let key = (*position + Vec3::ZERO).to_array().map(f32::to_bits);
             *known.entry(key).or_insert(next)
         })
@@ -111,7 +111,7 @@ mod tests {
     use crate::primitives;
 
     #[test]
-    fn a_sphere_gets_the_sphere_s_normals() {
+    fn sphere_has_radial_normals() {
         let part = primitives::sphere("ball", Vec3::new(0.1, 0.2, 0.3), 0.05, [1.0; 4]);
         for (triangle, normals) in part.triangles.iter().zip(corner_normals(&part)) {
             for (&vertex, normal) in triangle.iter().zip(normals) {
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn creases_split_and_smooth_edges_join() {
-        // Two triangles that meet at a right angle along the x axis; the second has vertices of its own.
+        // Two triangles that meet at a right angle along the x axis; the second has separate vertices.
         let mut part = Part::new(
             "fold",
             vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ZERO, Vec3::X, Vec3::NEG_Z],

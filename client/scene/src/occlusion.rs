@@ -1,8 +1,8 @@
-//! Ambient occlusion in screen space: how much of its surroundings a point sees.
+//! Screen-space ambient occlusion.
 //!
-//! Each pixel looks at points of a half ball above its surface (as Shanmugam and Arikan 2007 and Mittring 2007 do) and
-//! counts those that lie behind what the camera sees there. The pattern turns from pixel to pixel in blocks of 4 × 4,
-//! which [`OcclusionMap::openness`] averages out again over neighbours on the same surface.
+//! Each pixel tests points of a hemisphere above its surface (Shanmugam and Arikan 2007, Mittring 2007) and counts those
+//! behind the visible surface. The pattern is rotated per pixel in blocks of 4 × 4; [`OcclusionMap::openness`] averages
+//! it out over neighbours on the same surface.
 
 use std::f32::consts::TAU;
 
@@ -11,16 +11,16 @@ use rayon::prelude::*;
 
 use crate::{camera::Camera, surface::SurfacePoint};
 
-/// Points that each pixel looks at; more is smoother and slower.
+/// Points per pixel; more is smoother and slower.
 const SAMPLES: usize = 20;
 
-/// Pixels along each side of the block over which the pattern turns.
+/// Pixels along each side of a block of rotated patterns.
 const BLOCK: usize = 4;
 
-/// Occlusion counts this much stronger than it was measured: screen space misses what the camera does not see.
+/// Factor on measured occlusion: compensates for occluders that the camera does not see.
 const STRENGTH: f32 = 1.35;
 
-/// How open every pixel is.
+/// The openness of every pixel.
 pub(crate) struct OcclusionMap {
     width: usize,
     height: usize,
@@ -32,7 +32,7 @@ pub(crate) struct OcclusionMap {
 }
 
 impl OcclusionMap {
-    /// Looks around each pixel within `radius` metres. `seen` is what the camera sees in the middle of each pixel.
+    /// Measures occlusion within `radius` metres. `seen` is the surface visible in the middle of each pixel.
     pub(crate) fn new(
         camera: &Camera,
         width: usize,
@@ -62,7 +62,7 @@ impl OcclusionMap {
             let bitangent = point.normal.cross(tangent);
             let x_axis = tangent * turn.1 + bitangent * turn.0;
             let world_from_pattern = Mat3::from_cols(x_axis, point.normal.cross(x_axis), point.normal);
-            // Lifted off the surface, so that its own facets do not count.
+            // Lifted off the surface to ignore its own facets.
             let origin = point.position + point.normal * (radius * 0.02);
             let own_depth = depths[index];
             let mut occluded = 0.0;
@@ -76,7 +76,7 @@ impl OcclusionMap {
                 let surface = depth_at(at.truncate() * size);
                 let behind = at.z - surface;
                 if behind > radius * 0.01 {
-                    // What is far in front is another thing altogether, and hides nothing from this point.
+                    // A surface far in front is unrelated and occludes nothing here.
                     let gap = (own_depth - surface).max(0.0) / radius;
                     occluded += 1.0 / (1.0 + (gap * 0.8).powi(4));
                 }
@@ -97,8 +97,8 @@ impl OcclusionMap {
         }
     }
 
-    /// How open a point is that the camera sees at pixel (x, y), `depth` metres from the camera's plane: the mean over
-    /// a block of neighbours that are about as far away.
+    /// The openness of the point at pixel (x, y), `depth` metres from the camera's plane: the mean over neighbours at
+    /// about the same distance.
     pub(crate) fn openness(&self, x: usize, y: usize, depth: f32) -> f32 {
         let reach = BLOCK / 2;
         let (mut sum, mut total) = (0.0, 0.0);
@@ -117,12 +117,12 @@ impl OcclusionMap {
     }
 }
 
-/// Directions in the half ball around +z, denser around +z and toward the middle, from a golden-angle spiral.
+/// Points in the hemisphere around +z, denser around +z and toward the centre, on a golden-angle spiral.
 fn half_ball() -> [Vec3; SAMPLES] {
     const GOLDEN_TURN: f32 = 0.381_966;
     std::array::from_fn(|i| {
         let share = (i as f32 + 0.5) / SAMPLES as f32;
-        // Cosine-weighted: a disc filled evenly and lifted onto the half ball.
+        // Cosine-weighted: an evenly filled disc, projected onto the hemisphere.
         let radius = share.sqrt();
         let (sin, cos) = (i as f32 * GOLDEN_TURN * TAU).sin_cos();
         let direction = Vec3::new(radius * cos, radius * sin, (1.0 - share).sqrt());
@@ -132,7 +132,7 @@ fn half_ball() -> [Vec3; SAMPLES] {
     })
 }
 
-/// How far the pattern is turned at a pixel, in turns: each of the 16 values once a block, neighbours far apart.
+/// Rotation of the pattern at a pixel, in turns: 16 values, each once per block, with neighbours far apart.
 fn turn_of(x: usize, y: usize) -> f32 {
     const ORDER: [u8; 16] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
     f32::from(ORDER[(y % BLOCK) * BLOCK + x % BLOCK]) / 16.0

@@ -1,4 +1,4 @@
-//! Balls, rods and arrows as parts.
+//! Spheres, rods and arrows as parts.
 
 use std::f32::consts::{PI, TAU};
 
@@ -6,16 +6,16 @@ use glam::{Quat, Vec2, Vec3};
 
 use crate::scene::{DEFAULT_CREASE_ANGLE, Part};
 
-/// Sides of everything round: the outline strays from a circle by 0.2 % of the radius.
+/// Sides of round parts: the outline deviates from a circle by 0.2 % of the radius.
 const SIDES: u32 = 48;
 
-/// Rings of vertices from pole to pole of a ball.
+/// Rings of vertices from pole to pole of a sphere.
 const RINGS: u32 = 24;
 
-/// Share of an arrow's length that is its head, at most.
+/// Largest fraction of an arrow's length taken by its head.
 const HEAD_SHARE: f32 = 0.45;
 
-/// A ball.
+/// A sphere.
 pub fn sphere(name: &str, centre: Vec3, radius: f32, colour: [f32; 4]) -> Part {
     let profile: Vec<Vec2> = (0..=RINGS)
         .map(|i| arc_point(i as f32 / RINGS as f32 * PI) * radius)
@@ -23,7 +23,7 @@ pub fn sphere(name: &str, centre: Vec3, radius: f32, colour: [f32; 4]) -> Part {
     smooth(lathe(name, centre, Vec3::Y, &profile, colour))
 }
 
-/// A rod with round ends between two points: all places up to `radius` from the segment.
+/// A capsule: all points within `radius` of a segment.
 pub fn capsule(name: &str, start: Vec3, end: Vec3, radius: f32, colour: [f32; 4]) -> Part {
     let length = start.distance(end);
     let profile: Vec<Vec2> = (0..=RINGS + 1)
@@ -36,7 +36,7 @@ pub fn capsule(name: &str, start: Vec3, end: Vec3, radius: f32, colour: [f32; 4]
     smooth(lathe(name, start, axis, &profile, colour))
 }
 
-/// A rod with flat ends between two points, with a radius at each.
+/// A rod with flat ends between two points, with a radius at each end.
 pub fn tapered_cylinder(
     name: &str,
     start: Vec3,
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn volumes_are_those_of_the_solids() {
+    fn volumes_match_the_solids() {
         let (a, b) = (Vec3::new(0.3, -0.1, 0.2), Vec3::new(0.5, 0.3, 0.1));
         let length = a.distance(b);
         let ball = |r: f32| 4.0 / 3.0 * PI * r.powi(3);
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn capsule_vertices_are_one_radius_from_the_segment() {
+    fn capsule_vertices_lie_one_radius_from_the_segment() {
         let (a, b) = (Vec3::new(0.3, -0.1, 0.2), Vec3::new(0.5, 0.3, 0.1));
         for &p in &capsule("capsule", a, b, 0.07, [1.0; 4]).positions {
             let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);

@@ -1,15 +1,15 @@
-//! The rasteriser: which triangle is seen at which sample.
+//! The rasteriser: finds the visible triangle at each sample.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// No triangle is seen at a sample.
+/// The id of samples without a triangle.
 pub const NOTHING: u32 = u32::MAX;
 
-/// Rows of samples that one task draws. Fewer balance better over threads, more repeat less work at the borders.
+/// Rows of samples per task. Fewer balance better over threads; more repeat less work at borders.
 const BAND_ROWS: usize = 48;
 
-/// Positions are snapped to 1/256 of a sample, so that edge functions are exact integers: triangles that share an edge
+/// Positions are snapped to 1/256 of a sample. This makes edge functions exact integers: triangles that share an edge
 /// neither overlap nor leave gaps.
 const SUBSAMPLE: f32 = 256.0;
 
@@ -19,28 +19,28 @@ const COORDINATE_LIMIT: f32 = 1.0e6;
 /// A triangle on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScreenTriangle {
-    /// x to the right and y down in samples; z is larger for what is nearer and linear over the screen (such as the
+    /// x to the right and y down in samples; z grows toward the camera and is linear over the screen (such as the
     /// reciprocal of the distance for a perspective camera).
     pub corners: [Vec3; 3],
-    /// What the samples that it covers are marked with; not [`NOTHING`].
+    /// Id of the samples that it covers; not [`NOTHING`].
     pub id: u32,
 }
 
-/// What is seen at every sample, row by row from the top.
+/// The visible triangle at every sample, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coverage {
-    /// Samples in a row.
+    /// Samples per row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
     /// The id of the nearest triangle, or [`NOTHING`].
     pub ids: Vec<u32>,
-    /// Its z at the sample; negative infinity where nothing is.
+    /// Its z at the sample; negative infinity without a triangle.
     pub depths: Vec<f32>,
 }
 
-/// Draws triangles, seen from either side. A sample lies in the middle of its cell. Of two triangles at the same depth
-/// the earlier one is seen. `admits(id, x, y)` can make triangles transparent at some samples.
+/// Draws triangles from either side. A sample lies in the middle of its cell. Of two triangles at the same depth, the
+/// earlier one is visible. `admits(id, x, y)` can make triangles transparent at some samples.
 pub fn rasterise(
     width: usize,
     height: usize,
@@ -112,7 +112,7 @@ impl Prepared {
         if area == 0 {
             return None;
         }
-        // Both sides are drawn: turn those that are seen from behind.
+        // Both sides are drawn: flip triangles seen from behind.
         if area < 0 {
             snapped.swap(1, 2);
             std::mem::swap(&mut b, &mut c);
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_covers_its_area_from_both_sides() {
+    fn triangle_covers_its_area_from_both_sides() {
         let corners = [[12.3_f32, 20.1, 1.0], [480.7, 90.4, 1.0], [200.2, 455.9, 1.0]];
         let [a, b, c] = corners;
         let area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_that_share_edges_leave_no_gap_and_do_not_overlap() {
+    fn shared_edges_leave_no_gaps_or_overlaps() {
         // A fan around an odd centre, square outside; each sample must be taken exactly once.
         let centre = [151.37, 97.83, 1.0];
         let ring: Vec<[f32; 3]> = (0..29_u16)
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearer_triangle_is_seen_whatever_the_order() {
+    fn nearer_triangle_is_visible_in_any_order() {
         // Two triangles that cross: each is in front on one side of x = 50.
         let rising = triangle(0, [[-200.0, 0.0, -4.0], [300.0, 0.0, 6.0], [50.0, 900.0, 1.0]]);
         let falling = triangle(1, [[-200.0, 0.0, 6.0], [300.0, 0.0, -4.0], [50.0, 900.0, 1.0]]);
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_off_the_screen_or_flat_is_not_drawn() {
+    fn ignores_degenerate_and_off_screen_triangles() {
         let off = triangle(0, [[-9.0, -9.0, 1.0], [-1.0, -9.0, 1.0], [-9.0, -1.0, 1.0]]);
         let flat = triangle(1, [[1.0, 1.0, 1.0], [5.0, 5.0, 1.0], [9.0, 9.0, 1.0]]);
         let huge = triangle(2, [[-1e9, -1e9, 1.0], [1e9, -1e9, 1.0], [0.0, 1e9, 1.0]]);

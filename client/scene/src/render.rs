@@ -1,4 +1,4 @@
-//! From a scene to a picture.
+//! Renders scenes to pictures.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -14,28 +14,28 @@ use crate::{
     surface::{SurfacePoint, Triangle, project, triangles_of},
 };
 
-/// Samples along a pixel's side are limited to this: 64 samples a pixel.
+/// Largest number of samples along a pixel's side: 64 samples per pixel.
 const MAX_SUPERSAMPLING: u32 = 8;
 
-/// How strongly a marker shines through what hides it, 0 to 1.
+/// Visibility of markers through other parts, 0 to 1.
 const MARKER_GLOW: f32 = 0.38;
 
-/// What a picture looks like beside the scene and the camera.
+/// Settings of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Pixels in a row, at least 1.
+    /// Pixels per row, at least 1.
     pub width: u32,
-    /// Rows of pixels, at least 1.
+    /// Number of rows, at least 1.
     pub height: u32,
     /// Samples along each side of a pixel, 1 to 8 (others are clamped): 3 is smooth, 4 is smoother and slower.
     pub supersampling: u32,
     /// Linear RGB of the background at its brightest.
     pub background: Vec3,
-    /// The direction away from gravity, a unit vector: where the ceiling is, and the ground is opposite.
+    /// Unit vector opposite to gravity: points to the ceiling, away from the ground.
     pub up: Vec3,
-    /// Draw a soft shadow on the ground below?
+    /// Whether to draw a soft shadow on the ground.
     pub ground_shadow: bool,
-    /// How far things darken each other's corners, in metres: about a finger's width for hands.
+    /// Radius of ambient occlusion, in metres: about a finger's width for hands.
     pub occlusion_radius: f32,
 }
 
@@ -68,7 +68,7 @@ pub fn render(scene: &Scene, camera: &Camera, options: RenderOptions) -> Image {
     let solid = frame.coverage(|t| t.finish != Finish::Marker);
     let markers = frame.coverage(|t| t.finish == Finish::Marker);
 
-    // What is in the middle of every pixel, for the occlusion.
+    // The surface in the middle of every pixel, for ambient occlusion.
     let middle = grid / 2;
     let seen: Vec<Option<SurfacePoint>> = (0..width * height)
         .into_par_iter()
@@ -109,7 +109,7 @@ pub fn render_png(scene: &Scene, direction: Vec3, options: RenderOptions) -> Vec
     render(scene, &camera, options).to_png()
 }
 
-/// What a pixel's colour depends on beside the triangles.
+/// Everything but the triangles that a pixel's colour depends on.
 struct Lighting {
     studio: Studio,
     shadow: Option<ShadowMap>,
@@ -127,12 +127,12 @@ struct Frame<'a> {
     triangles: &'a [Triangle],
 }
 
-/// The samples of one pixel that see the same triangle.
+/// The samples of one pixel that show the same triangle.
 #[derive(Clone, Copy)]
 struct Patch {
     id: u32,
     count: f32,
-    /// Sum of the samples' places.
+    /// Sum of the samples' positions.
     sum: Vec2,
 }
 
@@ -147,11 +147,11 @@ impl Frame<'_> {
         raster::rasterise(width, height, &screen, admits)
     }
 
-    /// Is a transparent triangle drawn at a sample of its pixel? Each part takes as many of the pixel's samples as its
-    /// alpha says, starting with another one, so that transparent parts do not hide each other.
+    /// Whether a transparent triangle is drawn at a sample of its pixel. Each part takes a fraction of the samples given by
+    /// its alpha, and starts at a different sample: transparent parts do not hide each other.
     fn shows(&self, triangle: &Triangle, x: usize, y: usize) -> bool {
         let count = self.grid * self.grid;
-        // A stride without common divisor spreads the samples over the pixel.
+        // A stride coprime to the number of samples spreads them over the pixel.
         let stride = if count.is_multiple_of(5) { 7 } else { 5 };
         let rank = ((y * self.grid + x) * stride + triangle.part as usize) % count;
         (rank as f32) + 0.5 < triangle.alpha * count as f32
@@ -167,7 +167,7 @@ impl Frame<'_> {
         self.triangles[id as usize].seen_from(eye, self.ray(sample))
     }
 
-    /// The display colour of a pixel: each triangle in it is shaded once, in the middle of the samples that see it.
+    /// The display colour of a pixel: each triangle in it is shaded once, in the middle of its samples.
     fn pixel(&self, x: usize, y: usize, solid: &Coverage, markers: &Coverage, light: &Lighting) -> Vec3 {
         let samples = (self.grid * self.grid) as f32;
         let mut colour = Vec3::ZERO;
@@ -200,7 +200,7 @@ impl Frame<'_> {
         if self.sees_nothing(x, y, markers) {
             return colour;
         }
-        // Markers on top: full where they are in front, a glow where they are hidden.
+        // Markers on top: opaque in front, a faint glow where hidden.
         let mut covered = 0.0;
         let mut marked = Vec3::ZERO;
         let lit = KeyArrival {

@@ -1,23 +1,23 @@
-//! What a picture or a GLB file shows: parts with a colour and a finish.
+//! The content of a picture or a GLB file: parts with a colour and a finish.
 
 use glam::Vec3;
 
 /// Smooth normals across edges flatter than this, in radians (40°): rounds tessellated curves, keeps box edges sharp.
 pub const DEFAULT_CREASE_ANGLE: f32 = 0.7;
 
-/// How a surface takes the light.
+/// Reflective finish of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
     /// Plastic with a soft highlight.
     #[default]
     Satin,
-    /// Brushed metal: the colour is that of its reflections.
+    /// Brushed metal: colours its reflections.
     Metal,
-    /// Skin: light bleeds past the terminator, reddish.
+    /// Skin: reddish light bleeds past the terminator.
     Skin,
     /// Fabric: no highlight, brighter toward the outline.
     Cloth,
-    /// A contact or a force: evenly lit, and shining faintly through what hides it.
+    /// A contact or a force: evenly lit, and faintly visible through other parts.
     Marker,
 }
 
@@ -30,16 +30,16 @@ pub struct Part {
     pub positions: Vec<Vec3>,
     /// Triangles, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Linear RGBA, each 0 to 1. Alpha below 1 is drawn in steps of one sample of the anti-aliasing grid.
+    /// Linear RGBA, each 0 to 1. Alpha is quantised to samples of the anti-aliasing grid.
     pub colour: [f32; 4],
-    /// Linear RGB of each vertex instead of that in `colour`; empty: `colour` everywhere.
+    /// Linear RGB per vertex, overriding `colour`; empty: `colour` everywhere.
     pub vertex_colours: Vec<Vec3>,
     /// Smooth normals across edges flatter than this angle in radians; 0 shades every triangle flat. Vertices at the
-    /// same place count as one, so seams of a file do not show.
+    /// same position count as one, which hides seams of the file.
     pub crease_angle: f32,
-    /// How it takes the light.
+    /// Finish.
     pub finish: Finish,
-    /// What the GLB node carries as `extras`.
+    /// The `extras` of the GLB node.
     pub extras: Option<serde_json::Value>,
 }
 
@@ -79,10 +79,10 @@ impl Part {
     }
 }
 
-/// Parts that are seen together.
+/// Parts shown together.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// What is in it.
+    /// The parts.
     pub parts: Vec<Part>,
 }
 
@@ -100,7 +100,7 @@ impl Scene {
     }
 }
 
-/// Linear RGBA of an opaque sRGB colour as graphics programs show it, 0 to 255 a channel.
+/// Linear RGBA of an opaque sRGB colour, 0 to 255 per channel.
 pub fn linear_from_srgb(red: u8, green: u8, blue: u8) -> [f32; 4] {
     // IEC 61966-2-1.
     let channel = |value: u8| {

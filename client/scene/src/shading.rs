@@ -1,16 +1,16 @@
-//! The studio: lights, finishes and the film.
+//! Shading: lights, finishes and tone mapping.
 //!
-//! Lights hang relative to the camera, so that every view is lit well; only the sky knows which way is up. Light is
-//! linear; a white diffuse surface that faces a light of strength 1 has brightness 1.
+//! Lights are fixed relative to the camera, which lights every view well; only the sky depends on the up direction.
+//! Light is linear; a white diffuse surface that faces a light of strength 1 has brightness 1.
 
 use glam::Vec3;
 
 use crate::{camera::Camera, scene::Finish, surface::SurfacePoint};
 
-/// A light far away.
+/// A directional light.
 #[derive(Clone, Copy, Debug)]
 struct Light {
-    /// Unit vector to it.
+    /// Unit vector to the light.
     direction: Vec3,
     /// Linear RGB strength.
     strength: Vec3,
@@ -29,9 +29,9 @@ pub(crate) struct Studio {
 /// How much of the key light arrives at a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct KeyArrival {
-    /// Share that arrives past opaque things, 0 to 1.
+    /// Fraction not blocked by opaque parts, 0 to 1.
     pub(crate) lit: f32,
-    /// How much matter lies between the point and the light, in metres.
+    /// Thickness of the matter between the point and the light, in metres.
     pub(crate) thickness: f32,
 }
 
@@ -39,19 +39,19 @@ pub(crate) struct KeyArrival {
 const CEILING: Vec3 = Vec3::new(0.50, 0.52, 0.56);
 const FLOOR: Vec3 = Vec3::new(0.27, 0.25, 0.235);
 
-/// How far skin lets light bleed past the terminator, as the share w of (n·l + w) / (1 + w): red goes farthest.
+/// Wrap of light past the terminator on skin, the w of (n·l + w) / (1 + w): red reaches farthest.
 const SKIN_WRAP: Vec3 = Vec3::new(0.38, 0.20, 0.14);
 
-/// Mean free path of light in skin in metres, widened a little for the look: what makes thin parts glow red.
+/// Mean free path of light in skin, in metres, slightly exaggerated: makes thin parts glow red.
 const SKIN_FREE_PATH: Vec3 = Vec3::new(3.0e-3, 1.1e-3, 0.7e-3);
 
-/// What a finish does with light.
+/// Reflective properties of a finish.
 struct Response {
     /// Reflectance at normal incidence; for metal a factor on the colour.
     reflectance: f32,
     /// Blinn-Phong exponent: higher is glossier.
     exponent: f32,
-    /// Strength of the mirrored studio, 0 to 1.
+    /// Strength of reflections of the studio, 0 to 1.
     mirror: f32,
     /// Reflectance at grazing incidence: rough surfaces stay far below the 1 of a mirror.
     grazing: f32,
@@ -96,12 +96,12 @@ impl Studio {
         self.key.direction
     }
 
-    /// The linear RGB light that a point sends to the camera. `openness` is the share of its surroundings that
-    /// nothing close hides, 0 to 1.
+    /// The linear RGB light from a point to the camera. `openness` is the fraction of the point's surroundings that
+    /// nothing close blocks, 0 to 1.
     pub(crate) fn shade(&self, point: &SurfacePoint, key: KeyArrival, openness: f32) -> Vec3 {
         let normal = point.normal;
         if point.finish == Finish::Marker {
-            // Nearly even, with just enough shape to see a ball as a ball.
+            // Nearly flat, with just enough shading to show the shape.
             return point.colour * (0.72 + 0.28 * normal.dot(point.to_camera).max(0.0));
         }
         let Response {
@@ -120,7 +120,7 @@ impl Studio {
         let facing = normal.dot(point.to_camera).clamp(0.0, 1.0);
 
         let arrival = key_colour(point.finish, key);
-        // Close surroundings take a part of the direct light too: most of it comes from softboxes, not from points.
+        // Occlusion also dims direct light, most of which comes from soft boxes.
         let softened = 0.55 + 0.45 * openness;
         let mut diffuse = Vec3::ZERO;
         let mut specular = Vec3::ZERO;
@@ -152,7 +152,7 @@ impl Studio {
         FLOOR.lerp(CEILING, 0.5 + 0.5 * normal.dot(self.up))
     }
 
-    /// What a smooth surface mirrors: a bright ceiling with soft borders, a dim horizon and a floor.
+    /// The environment that smooth surfaces reflect: a bright ceiling with soft borders, a dim horizon, a floor.
     fn mirrored(&self, direction: Vec3) -> Vec3 {
         let height = direction.dot(self.up);
         let ceiling = smoothstep(0.15, 0.75, height);
@@ -165,7 +165,7 @@ impl Studio {
     }
 }
 
-/// The key light's colour after what lies in its way: nothing gets through opaque things, some red through skin.
+/// The key light after occlusion: none passes opaque parts, some red passes skin.
 fn key_colour(finish: Finish, key: KeyArrival) -> Vec3 {
     if finish == Finish::Skin {
         let through = SKIN_FREE_PATH.map(|path| (-key.thickness / path).exp());
@@ -184,7 +184,7 @@ fn wrapped(finish: Finish, cosine: f32) -> Vec3 {
     }
 }
 
-/// What is left of the sky in a corner; light between skin and skin turns red instead of grey.
+/// Ambient light left in a corner; between skin and skin it turns red instead of grey.
 fn occlusion_tint(finish: Finish, openness: f32) -> Vec3 {
     if finish == Finish::Skin {
         Vec3::new(openness.powf(0.8), openness.powf(1.1), openness.powf(1.25))
@@ -204,18 +204,18 @@ pub(crate) fn smoothstep(from: f32, to: f32, value: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Exposure: the factor between light and film. More is brighter and loses white objects to the background.
+/// Exposure, a factor on light. More is brighter and makes white objects vanish in the background.
 const EXPOSURE: f32 = 0.88;
 
-/// Film shows light up to here as it is and compresses what is brighter.
+/// Light up to here is kept; brighter light is compressed.
 const COMPRESSION_START: f32 = 0.62;
 
 /// How fast compressed colours fade to white.
 const FADE_TO_WHITE: f32 = 0.25;
 
-/// The film: linear light of any strength to linear display light between 0 and 1. Dark and middle colours stay what
-/// they are; bright ones roll off to white without a change of hue (the shoulder of the Khronos PBR Neutral tone
-/// mapper of 2024, which starts later, without its toe, which makes skin orange).
+/// Tone mapping: linear light to linear display light between 0 and 1. Dark and middle colours are kept; bright ones
+/// roll off to white without a change of hue (the shoulder of the Khronos PBR Neutral tone mapper of 2024, starting
+/// earlier, and without its toe, which turns skin orange).
 pub(crate) fn develop(light: Vec3) -> Vec3 {
     let colour = light.max(Vec3::ZERO) * EXPOSURE;
     let peak = colour.max_element();

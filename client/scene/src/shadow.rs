@@ -1,4 +1,4 @@
-//! Shadows: of the key light on everything, and a soft one on the ground.
+//! Shadows: of the key light on all parts, and a soft one on the ground.
 
 use glam::{Mat3, Vec2, Vec3};
 
@@ -9,19 +9,19 @@ use crate::{
     surface::{SurfacePoint, Triangle},
 };
 
-/// Texels along each side of the key light's map. A handover is about half a metre across: half a millimetre a texel.
+/// Texels along each side of the key light's map: about half a millimetre per texel for a handover.
 const MAP_SIZE: usize = 1024;
 
-/// Half width of the filter that softens shadow borders, in metres; more is softer and loses thin shadows.
+/// Half width of the filter that softens shadow borders, in metres; more is softer but loses thin shadows.
 const SOFTNESS: f32 = 2.2e-3;
 
-/// Most texels of the filter's half width: bounds the work for small scenes.
+/// Largest half width of the filter, in texels; bounds the work for small scenes.
 const MAX_FILTER_TEXELS: i32 = 4;
 
-/// How far a surface is moved to the light before it is compared, in metres: hides the map's steps.
+/// Bias toward the light in depth comparisons, in metres; hides the map's steps.
 const BIAS: f32 = 0.7e-3;
 
-/// Thickness beyond this does not matter: skin lets no light through, in metres.
+/// Thickness beyond which skin is opaque, in metres.
 const MAX_THICKNESS: f32 = 20e-3;
 
 /// The key light's view of the scene.
@@ -39,8 +39,8 @@ fn axes_along(direction: Vec3) -> Mat3 {
     Mat3::from_cols(x, direction.cross(x), direction).transpose()
 }
 
-/// The triangles that cast shadows, seen along z of `axes` on a square of `size` texels that fits all of them with a
-/// border. Returns the square's origin and texels per metre too.
+/// The triangles that cast shadows, projected along z of `axes` onto a square of `size` texels that fits all of them
+/// with a border; also the square's origin and its texels per metre.
 fn seen_along(
     triangles: &[Triangle],
     axes: Mat3,
@@ -81,14 +81,14 @@ impl ShadowMap {
         })
     }
 
-    /// How much of the light arrives at a point: the map compared under a soft square around the point, each texel
-    /// against the point's tangent plane, so that slanted surfaces do not shade themselves.
+    /// The light that arrives at a point: depth comparisons under a soft square around the point, each texel against the
+    /// point's tangent plane, which keeps slanted surfaces from shading themselves.
     pub(crate) fn arrival(&self, point: &SurfacePoint) -> KeyArrival {
         let face = self.light_from_world * point.face;
         let local = self.light_from_world * (point.position + point.face * BIAS);
         let at = (local.truncate() - self.origin) * self.texels_per_metre;
         let depth = local.z + BIAS;
-        // The plane's change of depth for one texel; bounded, since it grows without end for grazing light.
+        // The plane's change of depth per texel; bounded, as it is infinite for grazing light.
         let slope = if face.z.abs() > 1e-3 {
             -face.truncate() / (face.z * self.texels_per_metre)
         } else {
@@ -105,7 +105,7 @@ impl ShadowMap {
             for dx in -reach..=reach {
                 let texel = centre + Vec2::new(dx as f32, dy as f32);
                 let offset = texel + 0.5 - at;
-                // A tent, so that borders fade without steps.
+                // A tent filter: borders fade without steps.
                 let tent = (1.0 - offset.abs() / (radius + 0.5)).max(Vec2::ZERO);
                 let weight = tent.x * tent.y;
                 let expected = depth + slope.dot(offset);
@@ -136,7 +136,7 @@ impl ShadowMap {
 /// Texels along each side of the ground's shadow, which is blurred anyway.
 const GROUND_SIZE: usize = 256;
 
-/// Free border around the blurred shadow, as a share of the scene's width.
+/// Border around the blurred shadow, as a fraction of the scene's width.
 const GROUND_BORDER: f32 = 0.45;
 
 /// Passes of the box blur; three are close to a Gaussian.
@@ -160,7 +160,7 @@ pub(crate) struct GroundShadow {
 }
 
 impl GroundShadow {
-    /// The shadow of all that casts one; none if nothing does.
+    /// The shadow of all parts that cast one; none without such parts.
     pub(crate) fn new(triangles: &[Triangle], up: Vec3) -> Option<Self> {
         let axes = axes_along(up);
         let (origin, texels_per_metre, screen) = seen_along(triangles, axes, GROUND_SIZE, GROUND_BORDER)?;
@@ -177,7 +177,7 @@ impl GroundShadow {
                 if id == NOTHING {
                     0.0
                 } else {
-                    // What hangs high shades less.
+                    // Higher parts shade less.
                     GROUND_DARKNESS * (1.0 - 0.6 * (depth - low) / (high - low).max(1e-6))
                 }
             })

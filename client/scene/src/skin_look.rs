@@ -1,4 +1,4 @@
-//! What makes a skinned mesh look like a hand: a paler palm, flushed tips and knuckles, fingernails.
+//! Details of hands: a paler palm, flushed tips and knuckles, fingernails.
 
 use glam::{Vec2, Vec3};
 use grasp_synthesis::model::hand::{joints::index, skin::Skin};
@@ -41,17 +41,17 @@ impl Complexion {
 const NAIL_ROWS: usize = 10;
 const NAIL_COLUMNS: usize = 9;
 
-/// Half of a nail's length and width as shares of the fingertip's radius.
+/// Half a nail's length and width, in units of the fingertip's radius.
 const NAIL_HALF_LENGTH: f32 = 0.78;
 const NAIL_HALF_WIDTH: f32 = 0.72;
 
-/// From the skin's end to the nail's free edge, as a share of the fingertip's radius.
+/// Distance from the skin's end to the nail's free edge, in units of the fingertip's radius.
 const NAIL_SETBACK: f32 = 0.22;
 
-/// How round a nail's corners are: 0 is a rectangle, 1 an ellipse.
+/// Roundness of a nail's corners: 0 for a rectangle, 1 for an ellipse.
 const NAIL_ROUNDNESS: f32 = 0.75;
 
-/// How far a nail's middle stands out from the skin, in metres; its rim is sunk as deep.
+/// Height of a nail's middle over the skin, in metres; its rim is sunk as deep.
 const NAIL_LIFT: f32 = 0.35e-3;
 
 /// The skin and the nails of a posed hand, named `{who}_hand` and `{who}_nails`.
@@ -94,7 +94,7 @@ fn colour_at(skin: &Skin, vertex: usize, normal: Vec3, complexion: Complexion) -
     let mut flushed = 0.0_f32;
     for (&joint, &weight) in skin.joint_indices[vertex].iter().zip(&skin.weights[vertex]) {
         let pose = skin.bind.joints[usize::from(joint)].pose;
-        // +Y leads out of the back of the hand.
+        // +Y points out of the back of the hand.
         palmar -= weight * normal.dot(pose.transform_vector(Vec3::Y));
     }
     for digit in 0..5 {
@@ -121,7 +121,7 @@ fn colour_at(skin: &Skin, vertex: usize, normal: Vec3, complexion: Complexion) -
         .lerp(flush, flushed)
 }
 
-/// Fingernails: small shields that lie on the skin's back of each fingertip and follow it.
+/// Fingernails: small patches on the back of each fingertip that follow the skin.
 fn nails(who: &str, skin: &Skin, hand: &Part, complexion: Complexion) -> Option<Part> {
     let posed_normals = vertex_normals(hand);
     let mut positions = Vec::new();
@@ -165,14 +165,14 @@ fn nails(who: &str, skin: &Skin, hand: &Part, complexion: Complexion) -> Option<
     })
 }
 
-/// A place on the skin: a triangle and the shares of its second and third corner.
+/// A point on the skin: a triangle and the barycentric coordinates of its second and third corner.
 #[derive(Clone, Copy)]
 struct Place {
     triangle: usize,
     share: Vec2,
 }
 
-/// The places of a nail's grid in the bind pose, row by row from the root; none if the skin is not found there.
+/// The points of a nail's grid in the bind pose, row by row from the root; none if there is no skin.
 fn nail_places(skin: &Skin, tip: usize) -> Option<Vec<Place>> {
     let distal = skin.bind.joints[tip - 1].pose;
     let radius = skin.bind.joints[tip].radius;
@@ -198,7 +198,7 @@ fn nail_places(skin: &Skin, tip: usize) -> Option<Vec<Place>> {
             (i, local)
         })
         .collect();
-    // The distal frame's -z leads to the tip.
+    // The distal frame's -z points to the tip.
     let skin_end = near
         .iter()
         .flat_map(|(_, corners)| corners)
@@ -213,7 +213,7 @@ fn nail_places(skin: &Skin, tip: usize) -> Option<Vec<Place>> {
                 from_minus_to_plus(column, NAIL_COLUMNS),
                 from_minus_to_plus(row, NAIL_ROWS),
             );
-            // The square drawn in toward an ellipse.
+            // The square, blended toward an ellipse.
             let across = u * (1.0 - NAIL_ROUNDNESS * v * v * 0.5).sqrt();
             let along = v * (1.0 - NAIL_ROUNDNESS * u * u * 0.5).sqrt();
             let at = centre + radius * Vec2::new(NAIL_HALF_WIDTH * across, -NAIL_HALF_LENGTH * along);
@@ -223,7 +223,7 @@ fn nail_places(skin: &Skin, tip: usize) -> Option<Vec<Place>> {
     Some(places)
 }
 
-/// The highest (+y) of the triangles above a place of the x-z plane.
+/// The highest (+y) of the triangles above a point of the x-z plane.
 fn highest_hit(triangles: &[(usize, [Vec3; 3])], at: Vec2) -> Option<Place> {
     let mut highest = f32::NEG_INFINITY;
     let mut place = None;

@@ -1,4 +1,4 @@
-//! Sleeves: they say whose hand it is and where its forearm runs.
+//! Sleeves: show whose hand it is and where its forearm runs.
 
 use glam::{Vec2, Vec3};
 use grasp_synthesis::model::hand::joints::{HandJoints, index};
@@ -8,29 +8,29 @@ use crate::{
     scene::{Finish, Part},
 };
 
-/// Length of the sleeve in metres: long enough to leave the picture, as an arm does.
+/// Length of the sleeve, in metres; long enough to leave the picture.
 const LENGTH: f32 = 0.17;
 
-/// From the wrist joint to the cuff's edge, away from the hand, in metres.
+/// Distance of the cuff's edge from the wrist joint, away from the hand, in metres.
 const CUFF_START: f32 = 0.006;
 
-/// Free space between wrist and cuff, in metres.
+/// Gap between wrist and cuff, in metres.
 const CLEARANCE: f32 = 0.003;
 
-/// Width of the cuff along the arm and how far it stands out from the sleeve, in metres.
+/// Width of the cuff along the arm, and its thickness over the sleeve, in metres.
 const CUFF_WIDTH: f32 = 0.020;
 const CUFF_THICKNESS: f32 = 0.0022;
 
-/// How much wider the sleeve is at its end than at the cuff.
+/// Ratio of the sleeve's widths at its end and at the cuff.
 const WIDENING: f32 = 1.28;
 
-/// Skin counts as the wrist's this close to the joint along the arm, in metres.
+/// Skin within this distance of the joint along the arm belongs to the wrist, in metres.
 const WRIST_BAND: f32 = 0.012;
 
-/// Widest wrist that is believed, in metres from the joint: what is farther out belongs to a curled finger.
+/// Skin farther from the joint than this belongs to a curled finger, not to the wrist, in metres.
 const WIDEST_WRIST: f32 = 0.055;
 
-/// A sleeve that begins at the wrist and leads away from the hand. `skin` is the posed skin around the joints.
+/// A sleeve from the wrist away from the hand. `skin` is the posed skin around the joints.
 pub(crate) fn sleeve(name: &str, joints: &HandJoints, skin: &[Vec3], colour: [f32; 4]) -> Part {
     let wrist = joints.joints[index::WRIST];
     let (centre, half_widths) = wrist_section(joints, skin);
@@ -58,7 +58,7 @@ pub(crate) fn sleeve(name: &str, joints: &HandJoints, skin: &[Vec3], colour: [f3
     let stretch = (outer / mean).extend(1.0);
     let offset = centre.extend(CUFF_START);
     for position in &mut part.positions {
-        // The joint's +z leads away from the fingertips.
+        // The joint's +z points away from the fingertips.
         *position = wrist.pose.transform_point(*position * stretch + offset);
     }
     part

@@ -1,4 +1,4 @@
-//! A scene's triangles as the renderer wants them, and where a ray meets one.
+//! A scene's triangles in the renderer's form, and their intersection with rays.
 
 use glam::{Vec2, Vec3};
 
@@ -12,10 +12,10 @@ use crate::{
 /// Pieces along each edge of a curved triangle: 3 make outlines of hands of 5000 triangles smooth.
 const PIECES: u32 = 3;
 
-/// How far a curved triangle bends, 0 (flat) to 1; 3/4 as the authors of the method recommend.
+/// Curvature of curved triangles, from 0 (flat) to 1; 3/4 as the method's authors recommend.
 const CURVATURE: f32 = 0.75;
 
-/// A triangle with what its corners carry.
+/// A triangle with attributes of its corners.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Triangle {
     /// In the world, in metres.
@@ -26,13 +26,13 @@ pub(crate) struct Triangle {
     pub(crate) colours: [Vec3; 3],
     /// 0 to 1.
     pub(crate) alpha: f32,
-    /// How it takes the light.
+    /// Finish.
     pub(crate) finish: Finish,
     /// Index of its part.
     pub(crate) part: u32,
 }
 
-/// A point of a surface as seen by the camera.
+/// A surface point seen by the camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfacePoint {
     /// In the world, in metres.
@@ -45,11 +45,11 @@ pub(crate) struct SurfacePoint {
     pub(crate) to_camera: Vec3,
     /// Linear RGB.
     pub(crate) colour: Vec3,
-    /// How it takes the light.
+    /// Finish.
     pub(crate) finish: Finish,
 }
 
-/// All triangles of a scene, part by part, as they are: for judging views.
+/// All triangles of a scene, part by part, unchanged: for the choice of views.
 pub(crate) fn flat_triangles_of(scene: &Scene) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for (index, part) in scene.parts.iter().enumerate() {
@@ -71,7 +71,7 @@ pub(crate) fn flat_triangles_of(scene: &Scene) -> Vec<Triangle> {
     triangles
 }
 
-/// All triangles of a scene, part by part, those of skin curved: for pictures.
+/// All triangles of a scene, part by part, with skin curved: for pictures.
 pub(crate) fn triangles_of(scene: &Scene) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for triangle in flat_triangles_of(scene) {
@@ -85,7 +85,7 @@ pub(crate) fn triangles_of(scene: &Scene) -> Vec<Triangle> {
 }
 
 /// A point of a triangle bent toward the tangent planes at its corners (Phong tessellation, Boubekeur and Alexa 2008),
-/// given by the shares of its corners. Along an edge it depends on the edge's ends alone, so neighbours stay joined.
+/// given by its barycentric coordinates. Along an edge it depends only on the edge's ends: neighbours stay joined.
 pub(crate) fn curved_point(corners: [Vec3; 3], normals: [Vec3; 3], shares: Vec3) -> Vec3 {
     let flat = mix(corners, shares);
     let onto_plane = |i: usize| flat - normals[i] * (flat - corners[i]).dot(normals[i]);
@@ -129,7 +129,7 @@ impl Triangle {
         }
     }
 
-    /// What a ray from the camera meets. The ray is taken to hit the triangle: places outside are moved to its rim.
+    /// The point where a ray from the camera meets the triangle; misses are moved to its border.
     pub(crate) fn seen_from(&self, camera: Vec3, ray: Vec3) -> SurfacePoint {
         let [a, b, c] = self.corners;
         // Möller and Trumbore 1997.
@@ -162,7 +162,7 @@ impl Triangle {
     }
 }
 
-/// The triangles on a screen of `width` × `height` samples, cut off at the camera; ids are their indices.
+/// The triangles on a screen of `width` × `height` samples, clipped at the camera; ids are their indices.
 pub(crate) fn project(
     triangles: &[Triangle],
     camera: &Camera,
@@ -193,7 +193,7 @@ pub(crate) fn project(
     projected
 }
 
-/// The part of a triangle in front of the camera (Sutherland and Hodgman 1974): its corners and how many there are.
+/// The part of a triangle in front of the camera (Sutherland and Hodgman 1974): its corners and their number.
 fn clipped_near(corners: [Vec3; 3]) -> ([Vec3; 4], usize) {
     let mut polygon = [Vec3::ZERO; 4];
     let mut count = 0;
@@ -220,7 +220,7 @@ mod tests {
     use crate::scene::Part;
 
     #[test]
-    fn curved_skin_is_closed_and_nearer_to_the_true_shape() {
+    fn curved_skin_is_closed_and_closer_to_the_true_shape() {
         // A ball of 6 × 4 faces: its flat triangles reach deep below the ball's surface.
         let mut coarse = Part::new("ball", Vec::new(), Vec::new(), [1.0; 4]).with_finish(Finish::Skin);
         coarse.crease_angle = std::f32::consts::PI;
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn clipping_keeps_what_is_in_front() {
+    fn clipping_keeps_the_part_in_front() {
         let behind = Vec3::new(0.0, 1.0, 1.0);
         let front = [Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 0.0, -1.0)];
         let (polygon, count) = clipped_near([front[0], front[1], behind]);

@@ -1,4 +1,4 @@
-//! Where to look from: the directions from which most of what matters is visible.
+//! The choice of views: directions from which the important parts are most visible.
 
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
@@ -10,21 +10,21 @@ use crate::{
     surface::{Triangle, flat_triangles_of, project},
 };
 
-/// Candidate directions: so many around the vertical …
+/// Candidate directions: their number around the vertical …
 const AZIMUTHS: u32 = 12;
 
-/// … at each of these elevations in radians, with how welcome such a view is: people look slightly down at hands.
+/// … at each of these elevations in radians, with a weight: people look slightly down at hands.
 const ELEVATIONS: [(f32, f32); 3] = [(-0.15, 0.88), (0.35, 1.0), (0.85, 0.93)];
 
-/// Pixels in a row of the trial pictures that candidates are judged by.
+/// Pixels per row of the trial pictures of candidates.
 const TRIAL_WIDTH: usize = 160;
 
 /// Smallest angle between the two views, in radians (70°).
 pub const MIN_ANGLE_BETWEEN_VIEWS: f32 = 1.222;
 
-/// Two cameras that frame all parts of some importance: from the direction that shows most, and from the best one at least
-/// [`MIN_ANGLE_BETWEEN_VIEWS`] away from it. `importance` says how much it matters to see a part; what counts is the
-/// part's visible area compared with the largest that any candidate shows of it.
+/// Two cameras that frame all parts of some importance: the best direction, and the best one at least
+/// [`MIN_ANGLE_BETWEEN_VIEWS`] away from it. `importance` weights parts; a part counts by its visible area relative to
+/// the largest that any candidate shows.
 pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, aspect: f32) -> [Camera; 2] {
     let triangles = flat_triangles_of(scene);
     let importances: Vec<f32> = scene.parts.iter().map(importance).collect();
@@ -46,8 +46,8 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
         }
     }
 
-    // Every candidate fills its picture, so that pixels are compared as the area that they stand for in the scene:
-    // else the short end of a long thing, seen from near, would count as much as its side.
+    // Candidates fill their pictures: pixels are converted to area in the scene. Otherwise the short end of a long object,
+    // seen from close up, would count as much as its side.
     let areas: Vec<Vec<f32>> = directions
         .par_iter()
         .map(|&(direction, _)| {
@@ -66,7 +66,7 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
     let score = |candidate: usize| {
         let shown = |part: usize| {
             if largest[part] > 0.0 {
-                // The root values the first glimpse of a part more than its last corner.
+                // The root favours showing a little of every part over all of one.
                 importances[part] * (areas[candidate][part] / largest[part]).sqrt()
             } else {
                 0.0
@@ -75,7 +75,7 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
         directions[candidate].1 * (0..scene.parts.len()).map(shown).sum::<f32>()
     };
     let best_of = |candidates: &mut dyn Iterator<Item = usize>| {
-        // The first of equals.
+        // Ties go to the first.
         candidates.fold(None, |best: Option<(usize, f32)>, candidate| {
             let value = score(candidate);
             match best {
@@ -93,7 +93,7 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
     [first, second].map(|candidate| frame(directions[candidate].0))
 }
 
-/// The pixels of a trial picture that each part shows. Markers do not hide anything.
+/// The visible pixels of each part in a trial picture. Markers hide nothing.
 fn visible_areas(triangles: &[Triangle], parts: usize, camera: &Camera) -> Vec<f32> {
     let height = ((TRIAL_WIDTH as f32 / camera.aspect) as usize).max(1);
     let draw = |markers: bool| {
@@ -120,7 +120,7 @@ mod tests {
     use crate::primitives::{capsule, sphere};
 
     #[test]
-    fn long_things_are_seen_from_the_side() {
+    fn shows_long_objects_from_the_side() {
         let rod = capsule(
             "rod",
             Vec3::new(-0.2, 0.0, 0.0),
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_view_looks_at_what_the_wall_does_not_hide() {
+    fn first_view_avoids_occluding_wall() {
         let wall = Part::new(
             "wall",
             vec![

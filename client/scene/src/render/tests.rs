@@ -33,7 +33,7 @@ fn scene(parts: impl IntoIterator<Item = Part>) -> Scene {
 }
 
 #[test]
-fn a_sphere_covers_the_area_of_its_outline() {
+fn sphere_covers_the_area_of_its_outline() {
     let (radius, distance) = (0.1, 0.7);
     let camera = looking_along_minus_z(distance);
     let triangles = triangles_of(&scene([sphere("ball", Vec3::ZERO, radius, RED)]));
@@ -59,7 +59,7 @@ fn a_sphere_covers_the_area_of_its_outline() {
 }
 
 #[test]
-fn what_is_nearer_hides_what_is_behind() {
+fn nearer_parts_hide_farther_ones() {
     let front = sphere("front", Vec3::new(0.0, 0.0, 0.1), 0.05, RED);
     let back = sphere("back", Vec3::new(0.0, 0.0, -0.1), 0.05, BLUE);
     for parts in [[front.clone(), back.clone()], [back, front]] {
@@ -73,7 +73,7 @@ fn what_is_nearer_hides_what_is_behind() {
 }
 
 #[test]
-fn a_surface_looks_the_same_whichever_way_it_is_wound() {
+fn winding_does_not_change_the_picture() {
     let corners = vec![
         Vec3::new(-0.1, -0.1, 0.0),
         Vec3::new(0.1, -0.1, 0.02),
@@ -95,7 +95,7 @@ fn a_surface_looks_the_same_whichever_way_it_is_wound() {
 }
 
 #[test]
-fn any_number_of_threads_draws_the_same_bytes() {
+fn number_of_threads_does_not_change_the_bytes() {
     let scene = scene([
         sphere("ball", Vec3::ZERO, 0.05, RED).with_finish(Finish::Metal),
         capsule(
@@ -127,7 +127,7 @@ fn any_number_of_threads_draws_the_same_bytes() {
 }
 
 #[test]
-fn half_transparent_is_half_way() {
+fn half_transparency_is_the_mean_of_both_colours() {
     let camera = looking_along_minus_z(0.5);
     let behind = sphere("behind", Vec3::new(0.0, 0.0, -0.3), 0.15, BLUE).with_finish(Finish::Marker);
     let pane = |alpha: f32| {
@@ -157,7 +157,7 @@ fn half_transparent_is_half_way() {
 }
 
 #[test]
-fn hidden_markers_shine_through_faintly() {
+fn hidden_markers_are_faintly_visible() {
     let camera = looking_along_minus_z(0.5);
     let ball = sphere("ball", Vec3::ZERO, 0.05, BLUE);
     let mark = |z: f32| sphere("mark", Vec3::new(0.0, 0.0, z), 0.01, RED).with_finish(Finish::Marker);
@@ -172,7 +172,7 @@ fn hidden_markers_shine_through_faintly() {
 }
 
 #[test]
-fn things_cast_shadows_and_darken_corners() {
+fn parts_cast_shadows_and_occlude_corners() {
     // A ball above a slab, seen from above; the light comes from the picture's upper left.
     let slab = Part::new(
         "slab",
@@ -201,7 +201,7 @@ fn things_cast_shadows_and_darken_corners() {
 }
 
 #[test]
-fn the_ground_is_darker_under_things() {
+fn ground_is_darker_below_parts() {
     let scene = scene([sphere("ball", Vec3::ZERO, 0.05, RED)]);
     let mut camera = Camera::framing(&scene, Vec3::new(0.0, 0.7, 1.0), Vec3::Y, 4.0 / 3.0);
     camera.vertical_fov *= 2.0;
@@ -221,7 +221,7 @@ fn the_ground_is_darker_under_things() {
 }
 
 #[test]
-fn nothing_to_draw_is_a_backdrop() {
+fn empty_scene_is_a_backdrop() {
     let image = render(&Scene::default(), &looking_along_minus_z(1.0), options());
     assert_eq!((image.width(), image.height()), (120, 90));
     assert!(image.rgb().iter().all(|&value| value > 200));
