@@ -178,7 +178,7 @@ impl Server {
         let shared = Shared {
             atlases: Atlases::start(
                 config.builder_threads,
-                Arc::clone(&objects),
+                &objects,
                 executor.clone(),
                 files,
                 config.default_rig.clone(),

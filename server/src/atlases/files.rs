@@ -328,8 +328,9 @@ mod tests {
         assert_eq!(files.read(&object, adult()).as_ref(), Some(&*grown));
         assert!(files.read(&other, adult()).is_none());
         let names = folder.names();
-        assert!(names.len() == 1 && names[0].ends_with(".atlas"), "{names:?}");
+        assert_eq!(names.len(), 1, "{names:?}");
         let path = folder.0.join(&names[0]);
+        assert_eq!(path.extension(), Some(EXTENSION.as_ref()));
         let whole = fs::read(&path).unwrap();
         for broken in [&whole[..whole.len() / 2], b"", &[&whole[..], b"more"].concat()] {
             fs::write(&path, broken).unwrap();

@@ -64,12 +64,12 @@ impl Atlases {
     /// The threads cannot be started.
     pub(crate) fn start(
         threads: usize,
-        objects: Arc<ObjectStore>,
+        objects: &Arc<ObjectStore>,
         executor: SearchExecutor,
         files: Option<AtlasFiles>,
         default_rig: String,
     ) -> std::io::Result<Self> {
-        let builders = Arc::new(Builders::new(Arc::clone(&objects), executor, files, default_rig));
+        let builders = Arc::new(Builders::new(Arc::clone(objects), executor, files, default_rig));
         let atlases = Self(Arc::clone(&builders));
         for number in 0..threads {
             builders::start_thread(number, &builders)?;

@@ -56,7 +56,7 @@ fn store(objects: usize, bytes: usize) -> Arc<ObjectStore> {
 
 fn start(threads: usize, store: &Arc<ObjectStore>) -> Atlases {
     let executor = SearchExecutor::new(1, 1).unwrap();
-    Atlases::start(threads, Arc::clone(store), executor, None, "adult".to_owned()).unwrap()
+    Atlases::start(threads, store, executor, None, "adult".to_owned()).unwrap()
 }
 
 fn until(what: &str, condition: impl Fn() -> bool) {
