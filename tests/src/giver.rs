@@ -1,8 +1,8 @@
-//! Places a recorded hand on an object so that it holds it, as a giver would.
+//! Places a recorded hand on an object as a giver would hold it.
 //!
-//! A seeded random search followed by a pattern search over the wrist's pose: the hand is the solids of its skin, palm,
-//! wrist and forearm among them, and the cost asks that digits and palm touch the surface, that nothing sinks in, and
-//! that the hand stays near one end, so that a receiver finds room at the other.
+//! A seeded random search, then a pattern search over the wrist's pose. The hand is a set of solids, palm, wrist and
+//! forearm included. The cost favours digits and palm that touch the surface without sinking in; the hand starts near one
+//! end of the object, which leaves the other to a receiver.
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
@@ -21,7 +21,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 pub struct GiverPlacement {
     /// The wrist's `OpenXR` frame in the object's frame.
     pub object_from_wrist: Pose,
-    /// How deep the skin of hand or forearm is in the object at worst, in metres.
+    /// Greatest depth of hand or forearm in the object, in metres.
     pub penetration: f32,
     /// How many digits come within [`TOUCH`] of the surface.
     pub touching_digits: usize,
@@ -30,10 +30,10 @@ pub struct GiverPlacement {
 /// Skin closer to the surface than this counts as touching, in metres.
 pub const TOUCH: f32 = 0.004;
 
-/// Gaps from here on are all the same, in metres: half a hand away.
+/// Gaps are cut off here, in metres: half a hand away.
 const FAR: f32 = 0.05;
 
-/// What a solid of the hand belongs to.
+/// The part of the hand that a solid belongs to.
 #[derive(Clone, Copy)]
 enum Owner {
     /// 0 to 4.
@@ -55,14 +55,14 @@ fn parts(joints: &HandJoints) -> Vec<(TaperedCapsule, Owner)> {
     of_digits.chain(of_palm).chain(of_forearm).collect()
 }
 
-/// The gap between a solid and an object in metres, negative where they overlap; at most [`FAR`].
+/// The gap between a solid and an object in metres, negative where they overlap, and cut off at [`FAR`].
 fn gap(object: &GraspObject, solid: &TaperedCapsule, object_from_wrist: Pose) -> f32 {
     let placed = TaperedCapsule {
         start: object_from_wrist.transform_point(solid.start),
         end: object_from_wrist.transform_point(solid.end),
         ..*solid
     };
-    // No point of it is farther from its middle than that.
+    // Farthest point of the solid from its middle.
     let reach = 0.5 * solid.start.distance(solid.end) + solid.start_radius.max(solid.end_radius);
     if object.bounding_box.distance(placed.start.midpoint(placed.end)) > reach + FAR {
         return FAR;
@@ -99,7 +99,7 @@ fn judge(object: &GraspObject, parts: &[(TaperedCapsule, Owner)], object_from_wr
     let reach = away(gap_of_digit[0]) + away(fingers[0]) + 0.5 * away(fingers[1]) + 0.1 * away(palm_gap);
     let touching_digits = gap_of_digit.iter().filter(|&&gap| gap < TOUCH).count();
     Judged {
-        // 1 mm of gap weighs as much as 1 mm of depth of ten solids.
+        // 1 mm of gap weighs as much as 1 mm of depth in ten solids.
         cost: reach + 100.0 * sunk,
         placement: GiverPlacement {
             object_from_wrist,
@@ -109,14 +109,14 @@ fn judge(object: &GraspObject, parts: &[(TaperedCapsule, Owner)], object_from_wr
     }
 }
 
-/// The best placement that the search finds; the same for the same arguments.
+/// The best placement found; equal for equal arguments.
 pub fn place_giver(object: &GraspObject, joints: &HandJoints, seed: u64) -> GiverPlacement {
-    const STARTS: usize = 1500;
+    const SEEDS: usize = 1500;
     const REFINED: usize = 12;
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let parts = parts(joints);
     let position = |i: usize| joints.joints[i].pose.position;
-    // Where things are held: between the thumb's tip and those of index and middle finger.
+    // Objects are held between the tips of the thumb and of index and middle finger.
     let grip = (2.0 * position(index::TIP_OF_DIGIT[0])
         + position(index::TIP_OF_DIGIT[1])
         + position(index::TIP_OF_DIGIT[2]))
@@ -130,7 +130,7 @@ pub fn place_giver(object: &GraspObject, joints: &HandJoints, seed: u64) -> Give
         Vec3::Z
     };
     let end = if random.random::<bool>() { 1.0 } else { -1.0 };
-    let mut starts: Vec<Judged> = (0..STARTS)
+    let mut seeds: Vec<Judged> = (0..SEEDS)
         .map(|_| {
             let mut unit = || random.random::<f32>();
             let along = end * (0.3 + 0.5 * unit()) * half.dot(long_axis);
@@ -147,20 +147,20 @@ pub fn place_giver(object: &GraspObject, joints: &HandJoints, seed: u64) -> Give
             )
         })
         .collect();
-    starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    starts
+    seeds.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    seeds
         .into_iter()
         .take(REFINED)
-        .map(|start| refine(object, &parts, start))
+        .map(|seed| refine(object, &parts, seed))
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
-        .expect("there are starts")
+        .expect("there are seeds")
         .placement
 }
 
 /// Pattern search: steps along and about each axis, halved when none helps.
-fn refine(object: &GraspObject, parts: &[(TaperedCapsule, Owner)], start: Judged) -> Judged {
-    let mut best = start;
-    // Turned about the middle of the hand, not about the wrist.
+fn refine(object: &GraspObject, parts: &[(TaperedCapsule, Owner)], seed: Judged) -> Judged {
+    let mut best = seed;
+    // Turns are about the middle of the hand, not about the wrist.
     let of_hand = parts.iter().filter(|(_, owner)| !matches!(owner, Owner::Forearm));
     let middles: Vec<Vec3> = of_hand
         .map(|(solid, _)| solid.start.midpoint(solid.end))

@@ -1,4 +1,4 @@
-//! A server inside the test, on a port of its own.
+//! A server inside the test, on its own port.
 
 use std::net::{Ipv6Addr, SocketAddr};
 
@@ -9,10 +9,10 @@ use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tonic::transport::{Channel, Endpoint};
 
-/// Workers of a test's server: enough to race, few enough for tests that run side by side.
+/// Workers of a test's server: enough to race, few enough for tests that run in parallel.
 const WORKERS: usize = 2;
 
-/// A running server. Dropped, it is told to stop; [`TestServer::stop`] waits until it has.
+/// A running server. Dropping it begins the shutdown; [`TestServer::stop`] waits for its end.
 #[derive(Debug)]
 pub struct TestServer {
     address: SocketAddr,
@@ -51,17 +51,17 @@ impl TestServer {
         }
     }
 
-    /// Where it listens.
+    /// The address it listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Where it listens, as clients write it.
+    /// The address as a client's endpoint.
     pub fn endpoint(&self) -> String {
         format!("http://{}", self.address)
     }
 
-    /// What it is doing.
+    /// Its gauges.
     pub fn gauges(&self) -> &Gauges {
         &self.gauges
     }
@@ -92,13 +92,13 @@ impl TestServer {
         ObjectServiceClient::new(self.channel().await)
     }
 
-    /// The generated client of `ObjectService`, on a connection that is made by its first call.
+    /// The generated client of `ObjectService`, which connects on its first call.
     pub fn objects_lazily(&self) -> ObjectServiceClient<Channel> {
         let endpoint = Endpoint::from_shared(self.endpoint()).expect("an address makes an endpoint");
         ObjectServiceClient::new(endpoint.connect_lazy())
     }
 
-    /// Tells the server to stop, without waiting for it.
+    /// Begins the shutdown without waiting for it.
     pub fn begin_stop(self) -> StoppingServer {
         drop(self.stop);
         StoppingServer {
@@ -107,13 +107,13 @@ impl TestServer {
         }
     }
 
-    /// Tells the server to stop and waits until it has.
+    /// Shuts the server down and waits for its end.
     pub async fn stop(self) {
         self.begin_stop().stopped().await;
     }
 }
 
-/// A server that was told to stop.
+/// A server that is shutting down.
 #[derive(Debug)]
 pub struct StoppingServer {
     gauges: Gauges,
@@ -121,12 +121,12 @@ pub struct StoppingServer {
 }
 
 impl StoppingServer {
-    /// What it is doing.
+    /// Its gauges.
     pub fn gauges(&self) -> &Gauges {
         &self.gauges
     }
 
-    /// Waits until it has stopped.
+    /// Waits for the end of the shutdown.
     pub async fn stopped(self) {
         self.serving
             .await

@@ -1,5 +1,5 @@
-//! What the integration tests, experiments and benches share: a server inside the process, recorded hands, the placing
-//! of givers and random holdouts.
+//! Shared by integration tests and benches: a server inside the process, recorded hands, placed givers and random
+//! holdouts.
 
 pub mod giver;
 mod harness;

@@ -1,7 +1,7 @@
-//! Random holdouts: recorded hands on an object, placed as givers would, under gravity from anywhere.
+//! Random holdouts: recorded hands, placed on an object as givers, under gravity from any direction.
 //!
-//! Placing a hand takes a fifth of a second, so it is done some dozens of times an object ([`place`]); a holdout then draws
-//! one of these givers and how the two are turned in the client's frame ([`Givers::draw`]). Everything follows from its seed.
+//! Placing a hand takes a fifth of a second, so there are some dozens of placements per object ([`place`]). A holdout draws
+//! one of these givers and a rotation in the client's frame ([`Givers::draw`]). Everything follows from the seed.
 
 use std::{collections::HashMap, path::Path, sync::Arc};
 
@@ -32,7 +32,7 @@ use crate::{
     wire_pose,
 };
 
-/// Recorded poses in which a hand can hold something; the judge of quality takes the same.
+/// Recorded poses in which a hand can hold something; the quality judge uses the same ones.
 const HOLDING: [&str; 18] = [
     "Cup",
     "Grip",
@@ -57,29 +57,28 @@ const HOLDING: [&str; 18] = [
 /// Files of recorded poses.
 const POSE_FILES: [&str; 2] = ["godot_xr_tools_poses.json", "handy-work_poses.json"];
 
-/// How deep a giver's skin may be in the object, in metres: flesh gives way by that much. Deeper ones are placed anew.
+/// How deep a giver's skin may be in the object, in metres, as flesh gives way. Deeper ones are placed again.
 const GIVER_DEPTH: f32 = 0.004;
 
 /// Digits that must touch: fewer hold nothing.
 const TOUCHING_DIGITS: usize = 2;
 
-/// How often a hand is placed anew until it holds well; then the shallowest is taken.
+/// Placements tried until a hand holds well; then the shallowest counts.
 const PLACEMENTS: u64 = 6;
 
-/// Where the object is in the client's frame, in metres: not at its origin, so that nobody can take the one frame for
-/// the other.
+/// Position of the object in the client's frame, in metres. It is off the origin, so that confusing the two frames shows.
 const CLIENT_POSITION: Vec3 = Vec3::new(0.0, 1.2, 0.3);
 
 /// A hand that can hold something.
 #[derive(Clone, Debug)]
 pub struct GivingHand {
-    /// Names it among all of [`giving_hands`].
+    /// Its name, unique among [`giving_hands`].
     pub name: String,
     /// Its joints, in the wrist's `OpenXR` frame.
     pub joints: HandJoints,
 }
 
-/// Recorded hands that hold something; without the recorded data, those of the built-in holdouts.
+/// Recorded hands in holding poses; without the recorded data, the givers of the built-in holdouts.
 pub fn giving_hands() -> Vec<GivingHand> {
     data_folder().map_or_else(built_in_hands, |folder| recorded_hands(&folder))
 }
@@ -128,7 +127,7 @@ fn built_in_hands() -> Vec<GivingHand> {
     holdouts().iter().map(of_holdout).collect()
 }
 
-/// Where one of [`giving_hands`] holds an object.
+/// One of [`giving_hands`] on an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlacedGiver {
     /// The hand's name.
@@ -137,7 +136,7 @@ pub struct PlacedGiver {
     pub object_from_wrist: Pose,
 }
 
-/// Places one of `hands`, which are not none, on an object: a fifth of a second of work, the same for the same arguments.
+/// Places one of `hands`, which must not be empty, on an object. Takes a fifth of a second; equal for equal arguments.
 pub fn place(object: &GraspObject, hands: &[GivingHand], seed: u64) -> PlacedGiver {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     let hand = &hands[random.random_range(0..hands.len())];
@@ -166,7 +165,7 @@ pub struct Givers {
 }
 
 impl Givers {
-    /// The givers that are placed so. None if there are none, or if one has a hand that is not among `hands`.
+    /// The placed givers; none if there are none, or if a giver's hand is not among `hands`.
     pub fn new(hands: &[GivingHand], placed: &[PlacedGiver]) -> Option<Self> {
         let by_name: HashMap<_, _> = hands.iter().map(|hand| (&hand.name, &hand.joints)).collect();
         let joints = placed
@@ -176,7 +175,7 @@ impl Givers {
         (!joints.is_empty()).then_some(Self { joints })
     }
 
-    /// One of the givers with the object, turned at random.
+    /// A random giver with the object, in a random rotation.
     pub fn draw(&self, random: &mut Xoshiro256PlusPlus) -> ClientHoldout {
         let giver = &self.joints[random.random_range(0..self.joints.len())];
         let client_from_object = Pose::new(CLIENT_POSITION, random_rotation(random).normalize());
@@ -197,7 +196,7 @@ pub struct ClientHoldout {
 }
 
 impl ClientHoldout {
-    /// A built-in one, in its world.
+    /// A built-in holdout in its world.
     pub fn of_built_in(holdout: &BuiltInHoldout) -> Self {
         let rig = &hand(&holdout.giver_rig, holdout.giver_handedness)
             .expect("the rigs of built-in holdouts are built in")
@@ -209,7 +208,7 @@ impl ClientHoldout {
         }
     }
 
-    /// The same in the object's frame, ready to be searched under `PHYSICAL` validity.
+    /// The holdout in the object's frame, for searches under `PHYSICAL` validity.
     pub fn holdout(&self, object: Arc<GraspObject>) -> Holdout {
         let object_from_client = self.client_from_object.inverse();
         Holdout {
@@ -221,7 +220,7 @@ impl ClientHoldout {
         }
     }
 
-    /// Asks for a grasp of `object` ("objects/{object}") with the server's defaults.
+    /// A request for a grasp of `object` ("objects/…") with the server's defaults.
     pub fn request(&self, object: &str) -> v1::FindGraspRequest {
         let handedness = match self.giver.handedness {
             Handedness::Left => v1::Handedness::Left,
@@ -255,7 +254,7 @@ mod tests {
         remote.object.clone()
     }
 
-    /// Points of an object's surface, at most a millimetre apart.
+    /// Points of an object's surface, no more than a millimetre apart.
     fn surface_points(object: &GraspObject) -> Vec<Vec3> {
         const APART: f32 = 1e-3;
         let mesh = object.surface.mesh();
@@ -273,8 +272,7 @@ mod tests {
         points
     }
 
-    /// How deep points are below the skin of a hand that is as thick as its joints say, from the wrist to the last joint of
-    /// each digit.
+    /// Greatest depth of points below the skin of a hand that is as thick as its joints, from the wrist to each digit's tip.
     fn depth_in_hand(joints: &HandJoints, points: &[Vec3]) -> f32 {
         let mut deepest: f32 = 0.0;
         for digit in 0..5 {
@@ -294,8 +292,8 @@ mod tests {
     }
 
     #[test]
-    fn placed_givers_hold_objects_from_outside() {
-        // A palm's flesh is flatter than a ball of what its joints tell, by up to some millimetres.
+    fn placed_givers_touch_without_sinking_in() {
+        // A palm's flesh is flatter than its joints' radii, by up to some millimetres.
         const DEEPEST: f32 = GIVER_DEPTH + 0.003;
         let hands = giving_hands();
         for name in ["remote", "scalpel", "scissors"] {
@@ -304,11 +302,7 @@ mod tests {
             let points = surface_points(&object);
             for seed in 0..6 {
                 let placed = place(&object, &hands, seed);
-                assert_eq!(
-                    placed,
-                    place(&object, &hands, seed),
-                    "a seed places once and for all"
-                );
+                assert_eq!(placed, place(&object, &hands, seed), "the seed decides");
                 let hand = hands
                     .iter()
                     .find(|hand| hand.name == placed.hand)
@@ -334,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drawn_holdout_is_the_same_for_the_core_and_on_the_wire_under_any_gravity() {
+    fn drawn_holdouts_agree_between_core_and_wire_under_random_gravity() {
         const DRAWN: usize = 2000;
         let (object, hands) = (remote(), giving_hands());
         let placed = PlacedGiver {
@@ -360,7 +354,7 @@ mod tests {
             let at = at.expect("a joint has a place");
             let client = request.client_from_object.expect("the object has a pose");
             let (p, q) = (client.position.unwrap(), client.orientation.unwrap());
-            // Turned and moved by hand: what the giver was placed at must come of it.
+            // Transformed by hand, it must give the placement.
             let object_from_client =
                 glam::Mat3::from_quat(glam::Quat::from_xyzw(q.x, q.y, q.z, q.w)).transpose();
             let in_object = object_from_client * Vec3::new(at.x - p.x, at.y - p.y, at.z - p.z);
@@ -379,10 +373,10 @@ mod tests {
     }
 
     #[test]
-    fn givers_of_hands_that_are_not_there_are_none() {
+    fn unknown_hands_and_no_placements_give_no_givers() {
         let hands = giving_hands();
         let unknown = PlacedGiver {
-            hand: "nobody's".to_owned(),
+            hand: "unknown".to_owned(),
             object_from_wrist: Pose::IDENTITY,
         };
         assert!(Givers::new(&hands, &[unknown]).is_none());

@@ -1,7 +1,7 @@
-//! Meshes and hand poses that nobody of this project made, used where they are and never copied.
+//! Meshes and hand poses from third parties, used in place and never copied.
 //!
-//! They lie in the folder that `GRASP_TEST_DATA` names, else in `../shared/data` beside the repository. Tests that
-//! need them say aloud that they were skipped when they are absent.
+//! They are in the folder that `GRASP_TEST_DATA` names, or else in `../shared/data` next to the repository. Tests that need
+//! them print that they are skipped when they are absent.
 
 use std::{
     collections::BTreeMap,
@@ -22,7 +22,7 @@ use grasp_synthesis::{
 };
 use serde::Deserialize;
 
-/// The folder with the recorded data, if it is there.
+/// The folder of the recorded data, if it exists.
 pub fn data_folder() -> Option<PathBuf> {
     let folder = std::env::var_os("GRASP_TEST_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
@@ -31,7 +31,7 @@ pub fn data_folder() -> Option<PathBuf> {
     folder.join("poses").is_dir().then_some(folder)
 }
 
-/// The folder with the recorded data; says aloud that `test` is skipped when it is absent.
+/// The folder of the recorded data; prints that `test` is skipped if it is absent.
 pub fn data_folder_or_skip(test: &str) -> Option<PathBuf> {
     let folder = data_folder();
     if folder.is_none() {
@@ -40,8 +40,8 @@ pub fn data_folder_or_skip(test: &str) -> Option<PathBuf> {
     folder
 }
 
-/// An object of OBJ text in metres, with the mesh as the server reads it and the centre of mass at its origin: enough to
-/// place givers on. `mass` is in kilograms.
+/// An object from OBJ text in metres, with its mesh as the server reads it and its centre of mass at the origin, which is
+/// enough to place givers. `mass` is in kilograms.
 pub fn object_of(obj: &[u8], mass: f32) -> GraspObject {
     let limits = MeshLimits {
         bytes: 1 << 24,
@@ -52,10 +52,10 @@ pub fn object_of(obj: &[u8], mass: f32) -> GraspObject {
     GraspObject::new(read.mesh, mass, Vec3::ZERO, None, &[]).expect("the object is sound")
 }
 
-/// A hand pose that was recorded from a person or made by an artist.
+/// A hand pose, recorded from a person or made by an artist.
 #[derive(Clone, Debug)]
 pub struct RecordedPose {
-    /// What the source calls it.
+    /// Its name in the source.
     pub name: String,
     /// Its joints in the wrist's `OpenXR` frame; the palm joint is derived.
     pub joints: HandJoints,
@@ -79,8 +79,8 @@ struct JointEntry {
     orientation_xyzw: Quat,
 }
 
-/// All poses of a file such as `poses/handy-work_poses.json`. The files carry no radii: they are given by `radii`, in
-/// metres, in `OpenXR` order.
+/// All poses of a file such as `poses/handy-work_poses.json`. The files have no radii; `radii` provides them, in metres and
+/// `OpenXR` order.
 pub fn read_poses(file: &Path, radii: &[f32; JOINT_COUNT]) -> Vec<RecordedPose> {
     let text = std::fs::read_to_string(file).expect("the pose file can be read");
     let file: PoseFile = serde_json::from_str(&text).expect("the pose file has the documented form");

@@ -1,4 +1,4 @@
-//! Searches on the built-in holdouts without a server in between, for benches and figures.
+//! Searches on the built-in holdouts without a server, for benches and figures.
 
 use std::{
     sync::atomic::AtomicBool,
@@ -38,7 +38,7 @@ impl Clock for MonotonicClock {
     }
 }
 
-/// What the searches need: the fifteen holdouts, the thesis' right hand and a pool of workers.
+/// The fifteen holdouts, the thesis' right hand and a pool of workers.
 pub struct Bench {
     /// The holdouts, ready to be searched, with their descriptions.
     pub holdouts: Vec<(&'static BuiltInHoldout, Holdout)>,
@@ -67,13 +67,12 @@ impl Bench {
             pool: rayon::ThreadPoolBuilder::new()
                 .num_threads(workers)
                 .build()
-                .expect("threads can be had"),
+                .expect("threads can be started"),
             workers,
         }
     }
 
-    /// Searches holdout number `holdout` for a valid grasp among `max_attempts` attempts of `seed` from
-    /// `first_attempt` on.
+    /// Searches holdout number `holdout` for a valid grasp, in `max_attempts` attempts of `seed` starting at `first_attempt`.
     pub fn search(
         &self,
         holdout: usize,
@@ -91,7 +90,7 @@ impl Bench {
         )
     }
 
-    /// The same on any holdout.
+    /// [`Self::search`] on any holdout.
     pub fn search_on(
         &self,
         holdout: &Holdout,
@@ -131,13 +130,10 @@ impl Bench {
         )
     }
 
-    /// Runs exactly `attempts` attempts of one worker on a holdout, going on after each valid grasp; returns how many
-    /// were valid.
+    /// Runs exactly `attempts` attempts of one worker on a holdout, continuing after each valid grasp; returns the number of
+    /// valid ones.
     pub fn run_attempts(&self, holdout: usize, strategy: Strategy, seed: u64, attempts: u64) -> u64 {
-        assert_eq!(
-            self.workers, 1,
-            "attempt indices are run in order by one worker only"
-        );
+        assert_eq!(self.workers, 1, "only one worker runs attempts in order");
         let (mut next, mut valid) = (0, 0);
         while next < attempts {
             let outcome = self.search(holdout, strategy, seed, next, attempts - next);
@@ -151,4 +147,39 @@ impl Bench {
         }
         valid
     }
+}
+
+/// A reproducible default search by one worker, without known grips, whose attempts are seeded by `seeds`.
+pub fn search_from(
+    seeds: SeedSource,
+    holdout: &Holdout,
+    rig: &Rig,
+    seed: u64,
+    max_attempts: u64,
+) -> SearchOutcome {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("threads can be started");
+    let settings = SearchSettings {
+        seed,
+        strategy: Strategy::Guided,
+        validity: Validity::Physical,
+        bend_ratios: Strategy::Guided.default_bend_ratios(),
+        friction: holdout.object.friction_under(Validity::Physical),
+        constraints: Constraints::default(),
+        choice: Choice::FirstValid,
+        atlas: None,
+        starts: seeds,
+        recent: RecentGrips::default(),
+        known_tried: 0,
+        reproducible: true,
+        first_attempt: 0,
+        max_attempts,
+        deadline: None,
+        workers: 1,
+        record_step_times: false,
+    };
+    let clock = MonotonicClock::default();
+    find_grasp(&pool, holdout, rig, &settings, &clock, &AtomicBool::new(false))
 }

@@ -1,10 +1,12 @@
-//! What a new server knows before it serves. A process of its own, as one that asks a hand has things found out for all.
+//! A new server derives search data of its hands before it serves.
+//!
+//! It runs in its own process: any other test that searches derives the data first, for the whole process.
 
 use grasp_assets::hands::{RIG_NAMES, hand};
 use grasp_synthesis::model::hand::{Handedness, rig::RigGuide};
 use grasp_tests::TestServer;
 
-/// What search derives of each built-in hand.
+/// The derived data of each built-in hand.
 fn guides() -> impl Iterator<Item = &'static RigGuide> {
     let rigs = RIG_NAMES.into_iter();
     rigs.flat_map(|rig| {
@@ -14,7 +16,7 @@ fn guides() -> impl Iterator<Item = &'static RigGuide> {
 }
 
 #[tokio::test]
-async fn no_call_waits_for_what_search_derives_of_a_hand() {
+async fn hands_are_prepared_before_the_server_serves() {
     assert_eq!(guides().filter(|guide| guide.is_derived()).count(), 0);
     let server = TestServer::start().await;
     for guide in guides() {

@@ -1,4 +1,4 @@
-//! Atlases: they grow in the background, are told, used, kept on disk, and end with the server.
+//! Atlases: they grow in the background, are reported, used and kept on disk, and stop growing with the server.
 
 use std::{fs, path::PathBuf};
 
@@ -11,37 +11,21 @@ use grasp_synthesis::{
 };
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 
-use crate::support::{bounded, box_request, seconds, until};
+use crate::fixtures::{Folder, bounded, box_request, seconds, until};
 
-/// Grips that an atlas has when it is published first, at least, if its object is easy to hold.
+/// Least number of grips in a first published atlas of an object that is easy to hold.
 const FIRST: u32 = 100;
 
-/// A folder of its own for a test, removed at its end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Self {
-        Self(std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id())))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // A folder that stays in the temporary directory harms nobody.
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// A server that builds atlases, kept in a folder.
+/// A server that builds atlases and keeps them in a folder.
 async fn start(folder: &Folder) -> TestServer {
     TestServer::start_with(|config| {
         config.builder_threads = 1;
-        config.atlas_directory = Some(folder.0.clone());
+        config.atlas_directory = Some(folder.path().to_owned());
     })
     .await
 }
 
-/// The state of an object's atlas as soon as it has `least` grips.
+/// Waits until an object's atlas has `least` grips, and returns its state.
 pub(crate) async fn state(server: &TestServer, name: &str, least: u32) -> v1::AtlasState {
     let mut client = server.objects().await;
     bounded("the growth of an atlas", async {
@@ -70,8 +54,8 @@ async fn create_box(server: &TestServer) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_atlas_grows_answers_and_outlives_its_server() {
-    let folder = Folder::new("atlases");
+async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
+    let folder = Folder::absent("atlases");
     let server = start(&folder).await;
     create_box(&server).await;
     let first = state(&server, "objects/block", FIRST).await;
@@ -102,14 +86,14 @@ async fn an_atlas_grows_answers_and_outlives_its_server() {
     assert_eq!(report.source(), v1::GraspSource::Search);
     server.stop().await;
 
-    // What the next server knows first is what the last one knew, not what can be found anew.
+    // The next server starts with the grips that the last one knew.
     let server = start(&folder).await;
     create_box(&server).await;
     let read = state(&server, "objects/block", 1).await;
     assert!(read.entries >= second.entries, "{read:?} after {second:?}");
     server.stop().await;
 
-    // Damaged files are built again, and replaced before that is told.
+    // Damaged files are built again, and replaced before the new atlas is reported.
     let damaged = damage(&folder);
     let server = start(&folder).await;
     create_box(&server).await;
@@ -120,8 +104,8 @@ async fn an_atlas_grows_answers_and_outlives_its_server() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_a_search_found_answers_the_next_request() {
-    let folder = Folder::new("recent");
+async fn a_recently_found_grip_answers_the_next_request() {
+    let folder = Folder::absent("recent");
     let server = start(&folder).await;
     create_box(&server).await;
     let ask = async |request: v1::FindGraspRequest| {
@@ -131,7 +115,7 @@ async fn what_a_search_found_answers_the_next_request() {
         (answer.grasp.expect("a box can be held"), report)
     };
     let mut kept = 0;
-    // For hands that no atlas is made for before somebody asks.
+    // For hands whose atlases are built on first request.
     for (rig, handedness) in [
         ("thesis", v1::Handedness::Left),
         ("thesis", v1::Handedness::Right),
@@ -148,7 +132,7 @@ async fn what_a_search_found_answers_the_next_request() {
         let (first, report) = ask(request.clone()).await;
         assert_eq!(report.source(), v1::GraspSource::Search);
         let (again, report) = ask(request.clone()).await;
-        // Unless the atlas was quicker.
+        // Unless the atlas was faster.
         if report.source() == v1::GraspSource::Recent {
             kept += 1;
             assert_eq!(again, first);
@@ -176,8 +160,8 @@ async fn what_a_search_found_answers_the_next_request() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn which_fingers_can_be_spared_is_found_out_once() {
-    let folder = Folder::new("sparing");
+async fn finger_subsets_are_searched_once_and_then_answered_as_recent() {
+    let folder = Folder::absent("sparing");
     let server = start(&folder).await;
     state(&server, "objects/scalpel", FIRST).await;
     let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
@@ -190,7 +174,7 @@ async fn which_fingers_can_be_spared_is_found_out_once() {
         let report = answer.report.expect("every answer has a report");
         (report.source(), answer.grasp)
     };
-    let mut subset_grasp = 0;
+    let mut subsets = 0;
     for giver in atlas.entries() {
         let holdout = ClientHoldout {
             client_from_object: Pose::IDENTITY,
@@ -205,26 +189,26 @@ async fn which_fingers_can_be_spared_is_found_out_once() {
         if first.0 != v1::GraspSource::Atlas {
             continue;
         }
-        // A whole grip of the atlas comes of the atlas again.
+        // A whole grip comes from the atlas again.
         let second = ask(&request).await;
         assert_eq!(second.1, first.1);
         if second.0 == v1::GraspSource::Recent {
             assert_eq!(ask(&request).await, second);
-            subset_grasp += 1;
+            subsets += 1;
         } else {
             assert_eq!(second.0, v1::GraspSource::Atlas);
         }
-        if subset_grasp == 2 {
+        if subsets == 2 {
             break;
         }
     }
-    assert_eq!(subset_grasp, 2, "no giver leaves but a grip without some fingers");
+    assert_eq!(subsets, 2, "too few givers leave only a finger subset");
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_atlas_answers_with_types_that_are_asked_for() {
-    let folder = Folder::new("types");
+async fn an_atlas_answers_with_requested_types() {
+    let folder = Folder::absent("types");
     let server = start(&folder).await;
     create_box(&server).await;
     state(&server, "objects/block", FIRST).await;
@@ -241,7 +225,7 @@ async fn an_atlas_answers_with_types_that_are_asked_for() {
         assert_eq!(report.source(), v1::GraspSource::Atlas, "{report:?}");
         answer.grasp.expect("one from the atlas").r#type
     };
-    // Without what has come already, until there are three types.
+    // Excluding earlier answers, until there are three types.
     let mut seen: Vec<i32> = Vec::new();
     while seen.len() < 3 {
         let next = ask(v1::Constraints {
@@ -263,9 +247,9 @@ async fn an_atlas_answers_with_types_that_are_asked_for() {
     server.stop().await;
 }
 
-/// Flips a bit of every atlas of a folder, and gives what is there now.
+/// Flips a bit in every atlas of a folder; returns the damaged files.
 fn damage(folder: &Folder) -> Vec<(PathBuf, Vec<u8>)> {
-    let files = fs::read_dir(&folder.0).expect("there is a folder");
+    let files = fs::read_dir(folder.path()).expect("there is a folder");
     let damage = |path: PathBuf| {
         let mut bytes = fs::read(&path).expect("it is there");
         let middle = bytes.len() / 2;
@@ -279,7 +263,7 @@ fn damage(folder: &Folder) -> Vec<(PathBuf, Vec<u8>)> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn builders_end_with_their_server() {
+async fn builders_stop_with_their_server() {
     let server = TestServer::start_with(|config| config.builder_threads = 2).await;
     let gauges = server.gauges().clone();
     assert_eq!(gauges.builders(), 2);
@@ -288,7 +272,7 @@ async fn builders_end_with_their_server() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_server_without_builders_tells_of_no_atlas() {
+async fn a_server_without_builders_reports_no_atlas() {
     let server = TestServer::start().await;
     let mut client = server.objects().await;
     let listed = client.list_objects(v1::ListObjectsRequest::default());
@@ -298,12 +282,12 @@ async fn a_server_without_builders_tells_of_no_atlas() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_made_is_told() {
-    let folder = Folder::new("no-folder");
-    fs::write(&folder.0, "a file").expect("the temporary directory can be written to");
+fn an_atlas_directory_that_cannot_be_made_is_reported() {
+    let folder = Folder::absent("no-folder");
+    fs::write(folder.path(), "a file").expect("the temporary directory can be written to");
     let config = grasp_server::Config {
         builder_threads: 1,
-        atlas_directory: Some(folder.0.join("below")),
+        atlas_directory: Some(folder.path().join("below")),
         ..Default::default()
     };
     let text = grasp_server::Server::new(config)
@@ -313,5 +297,5 @@ fn a_folder_that_cannot_be_made_is_told() {
         text.starts_with("atlas_directory is ") && text.contains("below"),
         "{text}"
     );
-    fs::remove_file(&folder.0).expect("it is there");
+    fs::remove_file(folder.path()).expect("it is there");
 }

@@ -1,4 +1,4 @@
-//! Budgets, deadlines and calls that are dropped.
+//! Budgets, deadlines and dropped calls.
 
 use std::time::Duration;
 
@@ -6,14 +6,14 @@ use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::Request;
 
-use crate::support::{bounded, floating_remote, impossible, milliseconds, seconds, until};
+use crate::fixtures::{bounded, floating_remote, impossible, milliseconds, seconds, until};
 
 fn sum_of_rejections(report: &v1::SearchReport) -> u64 {
     report.rejections.iter().map(|rejection| rejection.count).sum()
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_exhausted_number_of_attempts_is_an_answer_with_a_report() {
+async fn exhausted_attempts_are_an_answer_with_a_report() {
     let server = TestServer::start().await;
     let request = v1::FindGraspRequest {
         max_attempts: Some(300),
@@ -87,7 +87,7 @@ async fn the_servers_default_and_maximum_bound_the_budget() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_first_grasp_is_looked_for_on_where_the_best_is_not_found_and_no_budget_is_named() {
+async fn without_a_budget_a_search_for_the_best_continues_for_the_first() {
     let server = TestServer::start_with(|config| config.budgets.default = Duration::from_millis(200)).await;
     let request = v1::FindGraspRequest {
         choice: v1::Choice::BestWithinBudget.into(),
@@ -95,15 +95,15 @@ async fn the_first_grasp_is_looked_for_on_where_the_best_is_not_found_and_no_bud
     };
     let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
     let report = answer.unwrap().into_inner().report.unwrap();
-    // What the best is chosen in is told, and the default was searched.
+    // The report names the budget for the best, but the default budget was searched.
     assert_eq!(report.budget, Some(milliseconds(5)));
-    let took = report.search_time.expect("it is always told");
+    let took = report.search_time.expect("it is always reported");
     assert!(took.seconds > 0 || took.nanos >= 190_000_000, "{took:?}");
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_calls_deadline_less_the_reserve_bounds_the_budget() {
+async fn the_deadline_less_the_reserve_bounds_the_budget() {
     let server = TestServer::start_with(|config| config.budgets.reserve = Duration::from_millis(1400)).await;
     let mut request = Request::new(v1::FindGraspRequest {
         budget: Some(seconds(10)),
@@ -113,7 +113,7 @@ async fn the_calls_deadline_less_the_reserve_bounds_the_budget() {
     let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
     let answer = answer.expect("the answer comes before the deadline").into_inner();
     assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
-    // Half of what is left when the reserve would take more.
+    // Half of the remaining time, as the reserve would take more.
     assert_eq!(answer.report.unwrap().budget, Some(seconds(1)));
     server.stop().await;
 }
@@ -129,15 +129,15 @@ async fn a_dropped_call_stops_the_work() {
     let call = tokio::spawn(async move { client.find_grasp(request).await });
     until("the search", || server.gauges().searches() == 1).await;
     call.abort();
-    // Within the test's patience of a minute, but its budget alone would have ended it within 10 s: what is checked
-    // is the order of events, with the clock left to the search.
+    // The budget alone would end the search within 10 s, well before these waits time out: the gauges show the order of
+    // events.
     until("the end of the search", || server.gauges().searches() == 0).await;
     until("the end of the call", || server.gauges().calls() == 0).await;
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_found_grasp_is_complete() {
+async fn a_found_grasp_has_all_its_parts() {
     let server = TestServer::start().await;
     let answer = server
         .grasps()
@@ -153,14 +153,14 @@ async fn a_found_grasp_is_complete() {
         ("adult", v1::Handedness::Right)
     );
     assert_eq!((grasp.digits.len(), grasp.joints.len()), (5, 26));
-    // Without a pose of the object, both frames are one; the wrist is the second joint.
+    // Without an object pose, both frames are the same; the wrist is the second joint.
     let [in_client, in_object] = [grasp.client_from_wrist, grasp.object_from_wrist].map(|pose| {
         let pose = pose.expect("every grasp has a wrist");
         let q = pose.orientation.expect("every pose has an orientation");
         (pose.position, [q.x, q.y, q.z, q.w])
     });
     assert_eq!(in_client.0, in_object.0);
-    // A product of rotations is normalised again.
+    // A product of rotations is renormalised.
     let parts = in_client.1.iter().zip(in_object.1);
     assert!(parts.into_iter().all(|(a, b)| (a - b).abs() < 1e-6));
     assert_eq!(grasp.joints[1].client_from_joint, grasp.client_from_wrist);

@@ -1,9 +1,9 @@
-//! What a request may demand of its grasp, and that it is not ignored.
+//! Constraints of a request are validated and met.
 
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
-use crate::support::{assert_blamed, floating_remote};
+use crate::fixtures::{assert_blamed, floating_remote};
 
 type Change = fn(&mut v1::Constraints);
 
@@ -11,8 +11,8 @@ fn vector(x: f32) -> v1::Vector3 {
     v1::Vector3 { x, y: 0.0, z: 0.0 }
 }
 
-/// Demands that are right, to be made wrong one by one.
-fn demands() -> v1::Constraints {
+/// Valid constraints, to be broken one by one.
+fn valid_constraints() -> v1::Constraints {
     v1::Constraints {
         receiver_reach: Some(v1::Reach {
             client_shoulder: Some(vector(1.0)),
@@ -30,8 +30,8 @@ fn demands() -> v1::Constraints {
     }
 }
 
-fn with_demands(change: impl FnOnce(&mut v1::Constraints)) -> v1::FindGraspRequest {
-    let mut constraints = demands();
+fn with_constraints(change: impl FnOnce(&mut v1::Constraints)) -> v1::FindGraspRequest {
+    let mut constraints = valid_constraints();
     change(&mut constraints);
     v1::FindGraspRequest {
         constraints: Some(constraints),
@@ -48,7 +48,7 @@ fn approach(constraints: &mut v1::Constraints) -> &mut v1::ApproachCone {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_demand_is_checked() {
+async fn every_constraint_is_validated() {
     let server = TestServer::start().await;
     let table: &[(&str, Change)] = &[
         ("receiver_reach.client_shoulder", |c| {
@@ -98,7 +98,12 @@ async fn every_demand_is_checked() {
         ("max_comfort_e", |c| c.max_comfort_e = Some(f32::INFINITY)),
     ];
     for (field, change) in table {
-        assert_blamed(&server, with_demands(change), &[&format!("constraints.{field}")]).await;
+        assert_blamed(
+            &server,
+            with_constraints(change),
+            &[&format!("constraints.{field}")],
+        )
+        .await;
     }
     server.stop().await;
 }
@@ -109,8 +114,8 @@ fn touching(grasp: &v1::Grasp) -> Vec<v1::Digit> {
     grasp.contacts.iter().map(v1::Contact::digit).collect()
 }
 
-/// Answers to some seeds by a search without an atlas, each with the type of its grasp. The hand knows no primitives, which
-/// searches would start from by what is wanted of them: all start alike.
+/// Answers for some seeds without an atlas, each with the type of its grasp. For the thesis hand there are no transferred
+/// grips, which would depend on the constraints: all searches start alike.
 async fn typed_answers(
     server: &TestServer,
     validity: v1::Validity,
@@ -156,10 +161,10 @@ fn unmet(report: &v1::SearchReport) -> u64 {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn types_are_allowed_and_excluded() {
+async fn answers_respect_allowed_and_excluded_types() {
     use v1::GraspType::{PalmarPinch, Prismatic2Finger, Unspecified};
     let server = TestServer::start().await;
-    // Types that come up, or what follows would show nothing.
+    // Types that occur, or the rest would prove nothing.
     let common = [
         (v1::Validity::Physical, Prismatic2Finger),
         (v1::Validity::Thesis, PalmarPinch),
@@ -169,8 +174,8 @@ async fn types_are_allowed_and_excluded() {
         assert!(any.iter().all(|(_, report)| unmet(report) == 0));
         let types: Vec<_> = any.iter().map(|(one, _)| *one).collect();
         let is_other = |one: &v1::GraspType| ![common, Unspecified].contains(one);
-        for comes_up in [common, Unspecified] {
-            assert!(types.contains(&comes_up), "{validity:?}: {types:?}");
+        for expected in [common, Unspecified] {
+            assert!(types.contains(&expected), "{validity:?}: {types:?}");
         }
 
         let allowed = typed_answers(&server, validity, &[common], &[]).await;
@@ -178,12 +183,12 @@ async fn types_are_allowed_and_excluded() {
             allowed.iter().all(|(one, _)| *one == common),
             "{validity:?}: {allowed:?}"
         );
-        // Where the first valid grasp was another, it was turned down.
+        // Where the first valid grasp was of another type, it was rejected.
         for (free, (_, report)) in types.iter().zip(&allowed) {
             assert!(*free == common || unmet(report) > 0, "{free:?}: {report:?}");
         }
 
-        // Grasps like no type stay.
+        // Grasps of no type remain.
         let excluded = typed_answers(&server, validity, &[], &[common]).await;
         let types: Vec<_> = excluded.iter().map(|(one, _)| *one).collect();
         assert!(!types.contains(&common), "{validity:?}: {types:?}");
@@ -193,10 +198,10 @@ async fn types_are_allowed_and_excluded() {
             .map(|number| v1::GraspType::try_from(number).expect("a type"))
             .filter(is_other)
             .collect();
-        let natural = typed_answers(&server, validity, &others, &[]).await;
+        let of_others = typed_answers(&server, validity, &others, &[]).await;
         assert!(
-            natural.iter().all(|(one, _)| is_other(one)),
-            "{validity:?}: {natural:?}"
+            of_others.iter().all(|(one, _)| is_other(one)),
+            "{validity:?}: {of_others:?}"
         );
     }
     server.stop().await;
@@ -208,9 +213,9 @@ fn wrist(grasp: &v1::Grasp) -> glam::Vec3 {
     glam::Vec3::new(p.x, p.y, p.z)
 }
 
-/// Each demand alone, with what every grasp must then be.
+/// Each alone, with a check of every grasp.
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_demanded_is_met() {
+async fn each_constraint_is_met() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
     let table: [(Change, Check); 5] = [
@@ -248,7 +253,7 @@ async fn what_is_demanded_is_met() {
                 });
             },
             |grasp| {
-                // Halfway between the forearm and the way that the palm faces, in OpenXR axes.
+                // Halfway between the fingers and the palm's direction, in OpenXR axes.
                 let o = grasp.client_from_wrist.as_ref().unwrap().orientation.unwrap();
                 let turn = glam::Quat::from_xyzw(o.x, o.y, o.z, o.w);
                 let way = turn * (glam::Vec3::NEG_Z + glam::Vec3::NEG_Y);
@@ -256,7 +261,7 @@ async fn what_is_demanded_is_met() {
             },
         ),
     ];
-    for (row, (demand, is_met)) in table.into_iter().enumerate() {
+    for (row, (constrain, is_met)) in table.into_iter().enumerate() {
         for seed in 0..3 {
             let request = v1::FindGraspRequest {
                 seed: Some(seed),
@@ -264,9 +269,9 @@ async fn what_is_demanded_is_met() {
                     seconds: 10,
                     nanos: 0,
                 }),
-                ..with_demands(|constraints| {
+                ..with_constraints(|constraints| {
                     *constraints = v1::Constraints::default();
-                    demand(constraints);
+                    constrain(constraints);
                 })
             };
             let answer = client.find_grasp(request).await.unwrap().into_inner();

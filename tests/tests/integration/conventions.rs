@@ -1,13 +1,13 @@
 //! The same holdout in an engine's convention gets the same grasp in that convention.
 //!
-//! The conversions here are written down a second time, from the engines' tables, and as matrices where the server
-//! works with quaternions' components.
+//! The conversions are written independently from the engines' tables, with matrices where the server uses quaternion
+//! components.
 
 use glam::{Mat3, Quat, Vec3};
 use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_tests::{TestServer, wire_pose};
 
-use crate::support::held_remote;
+use crate::fixtures::held_remote;
 
 /// An engine's axes (columns: where `OpenXR`'s x, y and z go), its unit, and the turn of its hand joints.
 struct Engine {
@@ -100,7 +100,7 @@ impl Engine {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_same_holdout_gets_the_same_grasp() {
+async fn a_holdout_gets_the_same_grasp_in_every_convention() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
     let request = v1::FindGraspRequest {
@@ -178,7 +178,7 @@ async fn the_same_holdout_gets_the_same_grasp() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn gravity_follows_the_conventions_up_axis() {
+async fn gravity_defaults_to_the_conventions_up_axis() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
     for (convention, [x, y, z]) in [
@@ -190,9 +190,9 @@ async fn gravity_follows_the_conventions_up_axis() {
         let implied = v1::FindGraspRequest {
             convention: convention.into(),
             reproducible: true,
-            ..crate::support::floating_remote()
+            ..crate::fixtures::floating_remote()
         };
-        let said = v1::FindGraspRequest {
+        let explicit = v1::FindGraspRequest {
             up: Some(v1::Vector3 {
                 x: 3.0 * x,
                 y: 3.0 * y,
@@ -201,9 +201,9 @@ async fn gravity_follows_the_conventions_up_axis() {
             ..implied.clone()
         };
         let implied = client.find_grasp(implied).await.unwrap().into_inner();
-        let said = client.find_grasp(said).await.unwrap().into_inner();
+        let explicit = client.find_grasp(explicit).await.unwrap().into_inner();
         assert!(implied.grasp.is_some());
-        assert_eq!(implied.grasp, said.grasp, "{convention:?}");
+        assert_eq!(implied.grasp, explicit.grasp, "{convention:?}");
     }
     server.stop().await;
 }

@@ -6,10 +6,10 @@ use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
 
-use crate::support::bounded;
+use crate::fixtures::bounded;
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_server_and_each_service_say_that_they_serve() {
+async fn the_server_and_each_service_report_serving() {
     let server = TestServer::start().await;
     let mut client = HealthClient::new(server.channel().await);
     for service in ["", "grasp.v1.GraspService", "grasp.v1.ObjectService"] {
@@ -27,7 +27,7 @@ async fn the_server_and_each_service_say_that_they_serve() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_watcher_is_told_of_the_end_and_does_not_delay_it() {
+async fn a_watcher_sees_the_shutdown_and_does_not_delay_it() {
     let server = TestServer::start().await;
     let mut client = HealthClient::new(server.channel().await);
     let request = HealthCheckRequest {

@@ -1,10 +1,10 @@
-//! Requests that break the contract: each is refused with every field that is wrong, and nothing breaks.
+//! Requests that break the contract are rejected with every wrong field, and the server stays up.
 
 use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::support::{assert_blamed, blamed_fields, floating_remote, held_remote};
+use crate::fixtures::{assert_blamed, blamed_fields, floating_remote, held_remote};
 
 type Mutation = fn(&mut v1::FindGraspRequest);
 
@@ -79,7 +79,7 @@ fn with_joints(change: impl FnOnce(&mut v1::HandJoints)) -> v1::FindGraspRequest
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_field_of_a_search_is_checked() {
+async fn every_field_of_a_search_is_validated() {
     let server = TestServer::start().await;
     let table: &[(Mutation, &str)] = &[
         (|r| r.object = String::new(), "object"),
@@ -120,9 +120,9 @@ async fn every_field_of_a_search_is_checked() {
         (|r| r.max_attempts = Some(0), "max_attempts"),
         (|r| r.only_attempt = Some(u64::MAX), "only_attempt"),
         (|r| r.strategy = 99, "strategy"),
-        // Not searched with yet.
+        // A choice that is not supported yet.
         (|r| r.choice = 3, "choice"),
-        // Not searched for yet.
+        // A combination that is not supported yet.
         (
             |r| {
                 r.choice = v1::Choice::BestWithinBudget.into();
@@ -169,7 +169,7 @@ async fn every_field_of_a_search_is_checked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_field_of_a_hand_given_by_angles_is_checked() {
+async fn every_field_of_a_hand_by_angles_is_validated() {
     let server = TestServer::start().await;
     let table: &[(Mutation, &str)] = &[
         (|r| angles(r).rig = "robot".into(), "presenting_hand.angles.rig"),
@@ -208,7 +208,7 @@ async fn every_field_of_a_hand_given_by_angles_is_checked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_field_of_a_tracked_hand_is_checked() {
+async fn every_field_of_a_tracked_hand_is_validated() {
     let server = TestServer::start().await;
     let answer = server.grasps().await.find_grasp(with_joints(|_| {})).await;
     assert!(answer.is_ok(), "the unchanged hand is accepted: {answer:?}");
@@ -244,7 +244,7 @@ async fn every_field_of_a_tracked_hand_is_checked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn all_violations_are_told_at_once() {
+async fn all_violations_are_reported_at_once() {
     let server = TestServer::start().await;
     let mut request = held_remote();
     request.object = "objects/nothing".into();
@@ -286,12 +286,12 @@ async fn all_violations_are_told_at_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_field_of_a_new_object_is_checked() {
+async fn every_field_of_a_new_object_is_validated() {
     let server = TestServer::start().await;
     let mut client = server.objects().await;
     let request = v1::CreateObjectRequest {
         object_id: "Bad Name".into(),
-        obj: crate::support::BOX_OBJ.as_bytes().to_vec(),
+        obj: crate::fixtures::BOX_OBJ.as_bytes().to_vec(),
         unit_metres: Some(-1.0),
         mass_kg: f32::NAN,
         centre_of_mass: Some(vector(f32::INFINITY)),
@@ -321,7 +321,7 @@ async fn every_field_of_a_new_object_is_checked() {
     ] {
         let request = v1::CreateObjectRequest {
             obj: obj.as_bytes().to_vec(),
-            ..crate::support::box_request("broken")
+            ..crate::fixtures::box_request("broken")
         };
         let status = client.create_object(request).await.unwrap_err();
         assert_eq!(status.code(), Code::InvalidArgument, "{obj:?}: {status}");
@@ -330,10 +330,10 @@ async fn every_field_of_a_new_object_is_checked() {
             "{obj:?}: {status}"
         );
     }
-    // Millimetres taken for metres.
+    // Millimetres mistaken for metres.
     let request = v1::CreateObjectRequest {
         unit_metres: Some(1000.0),
-        ..crate::support::box_request("tower")
+        ..crate::fixtures::box_request("tower")
     };
     let status = client.create_object(request).await.unwrap_err();
     assert_eq!(blamed_fields(&status), ["obj"]);
@@ -342,7 +342,7 @@ async fn every_field_of_a_new_object_is_checked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn names_and_pages_are_checked() {
+async fn names_and_pages_are_validated() {
     let server = TestServer::start().await;
     let mut client = server.objects().await;
     let status = client

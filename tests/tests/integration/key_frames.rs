@@ -1,4 +1,4 @@
-//! The score and the way to a grasp over the wire.
+//! Scores and key frames over the wire.
 
 use std::time::Duration;
 
@@ -9,14 +9,14 @@ use grasp_client::{
 };
 use grasp_tests::TestServer;
 
-/// Holdouts of which a grasp is found soon.
+/// Holdouts that are answered quickly.
 const HOLDOUTS: [&str; 3] = ["remote-genhold3", "scissors-hold1", "scissors-genhold1"];
 
 async fn ask(server: &TestServer, name: &str, validity: Validity, convention: Convention) -> Grasp {
     ask_from(server, name, validity, convention, None).await
 }
 
-/// The same with a hand that comes from a cone, if there is one.
+/// [`ask`] with an approach cone, if there is one.
 async fn ask_from(
     server: &TestServer,
     name: &str,
@@ -78,7 +78,7 @@ async fn a_score_is_the_weighted_mean_of_its_terms() {
             weights += term.weight;
         }
         assert!((score.total - sum / weights).abs() < 1e-5, "{name}: {score:?}");
-        // Comfort is rated by E alone, closeness by the clearance that is told.
+        // Comfort is rated by E alone, closeness by the reported clearance.
         let value = |wanted: &str| {
             let term = score.terms.iter().find(|term| term.name == wanted);
             term.expect("named above").value
@@ -94,7 +94,7 @@ async fn a_score_is_the_weighted_mean_of_its_terms() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_way_ends_in_the_grasp() {
+async fn key_frames_end_in_the_grasp() {
     let server = TestServer::start().await;
     for name in HOLDOUTS {
         for (convention, per_metre) in [(Convention::OpenXr, 1.0), (Convention::Unreal, 100.0)] {
@@ -115,7 +115,7 @@ async fn the_way_ends_in_the_grasp() {
             let [from, to] = [approach, pre_grasp].map(|frame| frame.client_from_wrist.position);
             let way = from.distance(to) / per_metre;
             assert!((way - 0.12).abs() < 1e-4, "{name}: {way} m");
-            // Joints are where the wrist is: the second of OpenXR's, the first of Unreal's hand.
+            // One of the joints is the wrist, in either convention.
             for frame in &grasp.key_frames {
                 let wrist = frame.client_from_wrist.position;
                 let nearest = frame
@@ -130,7 +130,7 @@ async fn the_way_ends_in_the_grasp() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_way_is_one_that_the_hand_may_come() {
+async fn key_frames_approach_within_the_allowed_cone() {
     let server = TestServer::start().await;
     let half_angle = 0.7;
     let mut ways = 0;
@@ -159,7 +159,7 @@ async fn the_way_is_one_that_the_hand_may_come() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn no_way_is_planned_unless_it_is_asked_for() {
+async fn key_frames_are_planned_only_on_request() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let mut request = FindRequest {
@@ -173,7 +173,7 @@ async fn no_way_is_planned_unless_it_is_asked_for() {
     let with = client.find_grasp(&request).await.expect("a valid request");
     let [mut without, mut with] = [without, with].map(|answer| answer.grasp.expect("a grasp"));
     assert_eq!((without.key_frames.len(), with.key_frames.len()), (0, 3));
-    // It is the same grasp.
+    // The grasp is the same.
     for grasp in [&mut without, &mut with] {
         grasp.key_frames.clear();
     }
@@ -181,7 +181,7 @@ async fn no_way_is_planned_unless_it_is_asked_for() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_thesis_neither_rates_nor_approaches() {
+async fn thesis_grasps_have_no_score_and_no_key_frames() {
     let server = TestServer::start().await;
     let grasp = ask(&server, "remote-genhold3", Validity::Thesis, Convention::OpenXr).await;
     assert_eq!(grasp.score, None);

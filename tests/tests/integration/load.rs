@@ -1,4 +1,4 @@
-//! Many calls at once, and more than fit.
+//! Concurrent calls, up to the limits and beyond.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use grasp_tests::TestServer;
 use tonic::Code;
 use tonic_types::StatusExt as _;
 
-use crate::support::{bounded, floating_remote, impossible, milliseconds, reason, seconds, until};
+use crate::fixtures::{bounded, floating_remote, impossible, milliseconds, reason, seconds, until};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn concurrent_calls_are_all_answered() {
@@ -62,7 +62,7 @@ async fn a_long_search_does_not_block_others() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_search_too_many_is_turned_away_with_a_hint() {
+async fn searches_beyond_the_limit_are_rejected_with_a_retry_delay() {
     let server = TestServer::start_with(|config| config.maximum_searches = 1.try_into().unwrap()).await;
     let request = v1::FindGraspRequest {
         budget: Some(seconds(10)),
@@ -98,7 +98,7 @@ async fn a_search_too_many_is_turned_away_with_a_hint() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_connection_too_many_waits_for_its_place() {
+async fn connections_beyond_the_limit_wait() {
     let server = TestServer::start_with(|config| config.maximum_connections = 1.try_into().unwrap()).await;
     let mut first = server.objects().await;
     let list = v1::ListObjectsRequest::default;
@@ -116,7 +116,7 @@ async fn a_connection_too_many_waits_for_its_place() {
     }
     assert!(
         !waiting.is_finished(),
-        "the second connection was served beside the first"
+        "the second connection was served along with the first"
     );
     drop(first);
     bounded("the second connection's answer", waiting)

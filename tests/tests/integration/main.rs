@@ -1,9 +1,10 @@
-//! The server over real gRPC. One binary, so that it is linked once.
+//! The server over real gRPC, in one binary that is linked once.
 
 mod atlases;
 mod budget;
 mod constraints;
 mod conventions;
+mod fixtures;
 mod health;
 mod invalid;
 mod key_frames;
@@ -15,4 +16,3 @@ mod real_input;
 mod reflection;
 mod reproducible;
 mod shutdown;
-mod support;

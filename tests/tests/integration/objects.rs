@@ -5,7 +5,7 @@ use grasp_tests::{TestServer, recorded::data_folder_or_skip};
 use tonic::{Code, Request};
 use tonic_types::StatusExt as _;
 
-use crate::support::{BOX_OBJ, bounded, box_request, reason};
+use crate::fixtures::{BOX_OBJ, bounded, box_request, reason};
 
 async fn get(server: &TestServer, name: &str) -> Result<v1::Object, tonic::Status> {
     let request = v1::GetObjectRequest {
@@ -34,7 +34,7 @@ async fn all_names(server: &TestServer, page_size: i32) -> Vec<String> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_built_in_objects_are_there() {
+async fn lists_and_describes_the_built_in_objects() {
     let server = TestServer::start().await;
     assert_eq!(
         all_names(&server, 0).await,
@@ -51,7 +51,7 @@ async fn the_built_in_objects_are_there() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_created_object_is_what_was_sent() {
+async fn a_created_object_matches_its_request() {
     let server = TestServer::start().await;
     let request = v1::CreateObjectRequest {
         forbidden: Some(v1::ForbiddenSurfaces {
@@ -91,7 +91,7 @@ async fn a_created_object_is_what_was_sent() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_name_is_given_once() {
+async fn rejects_a_name_that_is_taken() {
     let server = TestServer::start().await;
     let mut client = server.objects().await;
     client.create_object(box_request("crate")).await.unwrap();
@@ -111,7 +111,7 @@ async fn a_name_is_given_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_does_not_exist_is_not_found() {
+async fn an_unknown_object_is_not_found() {
     let server = TestServer::start().await;
     let status = get(&server, "objects/nothing").await.unwrap_err();
     assert_eq!(
@@ -130,7 +130,7 @@ async fn what_does_not_exist_is_not_found() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_evicted_object_is_told_apart() {
+async fn an_evicted_object_is_reported_as_evicted() {
     let server = TestServer::start_with(|config| config.store.objects = 2).await;
     let mut client = server.objects().await;
     for id in ["a", "b", "c"] {
@@ -151,7 +151,7 @@ async fn an_evicted_object_is_told_apart() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_mesh_above_the_limits_is_refused() {
+async fn rejects_meshes_above_the_limits() {
     let server = TestServer::start_with(|config| {
         config.maximum_object_bytes = 4096.try_into().unwrap();
         config.maximum_object_triangles = 10.try_into().unwrap();
@@ -166,15 +166,15 @@ async fn a_mesh_above_the_limits_is_refused() {
     };
     let status = client.create_object(padded(8192)).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument, "{status}");
-    // Beyond what the transport accepts at all.
+    // Beyond the transport's limit.
     let status = client.create_object(padded(4 << 20)).await.unwrap_err();
     assert_eq!(status.code(), Code::OutOfRange, "{status}");
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn no_file_breaks_the_server() {
-    let Some(folder) = data_folder_or_skip("no_file_breaks_the_server") else {
+async fn broken_files_do_not_break_the_server() {
+    let Some(folder) = data_folder_or_skip("broken_files_do_not_break_the_server") else {
         return;
     };
     let server = TestServer::start().await;
@@ -202,6 +202,6 @@ async fn no_file_breaks_the_server() {
     client
         .create_object(box_request("after"))
         .await
-        .expect("the server is in order");
+        .expect("the server still works");
     server.stop().await;
 }

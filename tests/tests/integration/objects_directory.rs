@@ -1,6 +1,6 @@
-//! A folder of objects that the server starts with.
+//! The folder of objects that the server loads at start.
 
-use std::{fs, path::PathBuf};
+use std::fs;
 
 use grasp_assets::objects::{BuiltInObject, Manifest, object};
 use grasp_proto::v1;
@@ -8,33 +8,17 @@ use grasp_server::{Config, Server};
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::support::{box_request, held_remote};
+use crate::fixtures::{Folder, box_request, held_remote};
 
-/// A folder of its own for a test, removed at its end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id()));
-        fs::create_dir_all(&path).expect("the temporary directory can be written to");
-        Self(path)
-    }
-
-    /// Writes an object's two files.
-    fn add(&self, name: &str, obj: &str, manifest: &str) {
-        fs::write(self.0.join(format!("{name}.obj")), obj).expect("a file can be written");
-        fs::write(self.0.join(format!("{name}.toml")), manifest).expect("a file can be written");
+/// Writes an object's two files.
+fn add(folder: &Folder, name: &str, obj: &str, manifest: &str) {
+    for (extension, text) in [("obj", obj), ("toml", manifest)] {
+        let file = folder.path().join(format!("{name}.{extension}"));
+        fs::write(file, text).expect("a file can be written");
     }
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // A folder that stays in the temporary directory harms nobody.
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// What the built-in object is, in the words of a manifest.
+/// A manifest of the built-in object.
 fn manifest_of(built_in: &BuiltInObject) -> String {
     let about = Manifest::parse(built_in.manifest).expect("it is part of the program");
     let [x, y, z] = about.centre_of_mass_m.to_array();
@@ -45,11 +29,12 @@ fn manifest_of(built_in: &BuiltInObject) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_built_in_object_read_from_a_folder_is_grasped_alike() {
-    let folder = Folder::new("alike");
+async fn a_built_in_object_from_the_folder_gets_the_same_grasp() {
+    let folder = Folder::empty("alike");
     let remote = object("remote").expect("it is built in");
-    folder.add("my-remote", remote.obj, &manifest_of(remote));
-    let server = TestServer::start_with(|config| config.objects_directory = Some(folder.0.clone())).await;
+    add(&folder, "my-remote", remote.obj, &manifest_of(remote));
+    let server =
+        TestServer::start_with(|config| config.objects_directory = Some(folder.path().to_owned())).await;
     let mut objects = server.objects().await;
     let mut get = async |name: &str| {
         let request = v1::GetObjectRequest {
@@ -71,7 +56,7 @@ async fn a_built_in_object_read_from_a_folder_is_grasped_alike() {
         let request = v1::FindGraspRequest {
             object,
             reproducible: true,
-            // The manifest of the folder names one, the built-in object has none of its own.
+            // The folder's manifest sets it, while the built-in object has no friction of its own.
             friction: Some(0.5),
             ..held_remote()
         };
@@ -83,16 +68,17 @@ async fn a_built_in_object_read_from_a_folder_is_grasped_alike() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn objects_of_the_folder_stay_when_others_are_evicted() {
-    let folder = Folder::new("stay");
+async fn objects_of_the_folder_are_never_evicted() {
+    let folder = Folder::empty("stay");
     let shelf = box_request("any");
-    folder.add(
+    add(
+        &folder,
         "shelf",
         std::str::from_utf8(&shelf.obj).unwrap(),
         "mass_kg = 0.1\n",
     );
     let server = TestServer::start_with(|config| {
-        config.objects_directory = Some(folder.0.clone());
+        config.objects_directory = Some(folder.path().to_owned());
         config.store.objects = 1;
     })
     .await;
@@ -113,12 +99,12 @@ async fn objects_of_the_folder_stay_when_others_are_evicted() {
 }
 
 #[test]
-fn a_broken_folder_is_no_server() {
-    let folder = Folder::new("broken");
-    folder.add("mug", "v 0 0 0\n", "mass_kg = -1\n");
-    folder.add("scissors", "v 0 0 0\n", "mass_kg = 1\n");
+fn a_broken_folder_keeps_the_server_from_starting() {
+    let folder = Folder::empty("broken");
+    add(&folder, "mug", "v 0 0 0\n", "mass_kg = -1\n");
+    add(&folder, "scissors", "v 0 0 0\n", "mass_kg = 1\n");
     let config = Config {
-        objects_directory: Some(folder.0.clone()),
+        objects_directory: Some(folder.path().to_owned()),
         ..Config::default()
     };
     let text = Server::new(config).expect_err("the folder is broken").to_string();

@@ -1,5 +1,4 @@
-//! `PHYSICAL` validity over the wire, judged from the answers alone: by what a contact, a balance and a solid are, with
-//! code that the search does not use.
+//! `PHYSICAL` validity over the wire, judged from the answers alone with code that the search does not use.
 
 use glam::{DVec3, Vec3};
 use grasp_assets::{holdouts::holdout, objects::object};
@@ -7,7 +6,7 @@ use grasp_client::{FindAnswer, FindRequest, GraspClient, Outcome, Validity, buil
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 use grasp_tests::TestServer;
 
-/// Holdouts of each object that are answered soon.
+/// Holdouts that are answered quickly.
 const HOLDOUTS: [&str; 4] = [
     "remote-genhold3",
     "scalpel-hold2",
@@ -15,13 +14,13 @@ const HOLDOUTS: [&str; 4] = [
     "scissors-genhold1",
 ];
 
-/// Skin friction where nothing else is said, as the contract has it.
+/// The contract's default friction.
 const FRICTION: f64 = 0.6;
 
 const GRAVITY: f64 = 9.81;
 
-/// How deep the surface may be below the skin that the answered joints and radii tell, in metres: the search keeps to
-/// 2 mm of flesh that is slimmer beside the knuckles than a cone between them.
+/// How deep the surface may be below the skin around the answered joints, in metres. The search allows 2 mm, but its flesh
+/// is slimmer near the knuckles than a cone between them.
 const DEEPEST: f64 = 0.003;
 
 async fn ask(client: &GraspClient, name: &str, seed: u64) -> FindAnswer {
@@ -34,7 +33,7 @@ async fn ask(client: &GraspClient, name: &str, seed: u64) -> FindAnswer {
     client.find_grasp(&request).await.expect("a valid request")
 }
 
-/// The distance of a point from a mesh by looking at every triangle.
+/// The distance of a point from a mesh, over all triangles.
 fn distance_to_mesh(mesh: &TriangleMesh, point: DVec3) -> f64 {
     (0..mesh.triangles().len())
         .map(|triangle| distance_to_triangle(mesh.corners(triangle).map(Vec3::as_dvec3), point))
@@ -58,7 +57,7 @@ fn distance_to_triangle([a, b, c]: [DVec3; 3], point: DVec3) -> f64 {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn forces_hold_the_weight_inside_of_their_cones() {
+async fn forces_inside_their_cones_hold_the_weight() {
     let server = TestServer::start().await;
     let client = server.client().await;
     for name in HOLDOUTS {
@@ -69,7 +68,7 @@ async fn forces_hold_the_weight_inside_of_their_cones() {
         let margins = grasp.margins.expect("margins of a physical grasp");
         let built_in = holdout(name).expect("a built-in holdout");
         let about = &object(&built_in.object).expect("a built-in object").object;
-        // Closure: 0.02, or for what is too thin for that a quarter of what friction can do at its surface.
+        // Closure: 0.02, or for objects too thin for that, a quarter of what friction can do at the surface.
         let half = about.bounding_box.half_extents;
         let thickness = 0.5 * (half.x + half.y + half.z - half.max_element());
         let reachable = 0.25 * about.friction.unwrap_or(0.6) * thickness / half.length();
@@ -86,7 +85,7 @@ async fn forces_hold_the_weight_inside_of_their_cones() {
             let normal = contact.object_normal.as_dvec3();
             let pressing = -pushes.dot(normal);
             let rubbing = (pushes + normal * pressing).length();
-            // A contact that is not needed rests on the object without force.
+            // A contact that is not needed carries no force.
             assert!(
                 pressing >= 0.0 && pushes.length() <= 27.0 + 1e-3,
                 "{name}: {pushes}"
@@ -114,7 +113,7 @@ async fn forces_hold_the_weight_inside_of_their_cones() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn no_bone_comes_nearer_to_the_object_than_flesh_gives_way() {
+async fn bones_stay_their_radius_less_soft_flesh_away_from_the_object() {
     let server = TestServer::start().await;
     let client = server.client().await;
     for name in HOLDOUTS {
@@ -141,7 +140,7 @@ async fn no_bone_comes_nearer_to_the_object_than_flesh_gives_way() {
                         .lerp(bone[1].client_from_joint.position, share);
                     let radius = bone[0].radius + (bone[1].radius - bone[0].radius) * share;
                     let distance = distance_to_mesh(mesh, object_from_world.transform_point(at).as_dvec3());
-                    // The last millimetres of a tip are rounder than the cone between its joints' radii.
+                    // The last millimetres of a tip are rounder than a cone.
                     let is_tip = std::ptr::eq(bone[1], joints[joints.len() - 1]) && step > 6;
                     assert!(
                         is_tip || distance >= f64::from(radius) - DEEPEST,
@@ -155,7 +154,7 @@ async fn no_bone_comes_nearer_to_the_object_than_flesh_gives_way() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_physical_grasp_can_be_replayed() {
+async fn a_physical_grasp_is_replayed_by_seed_and_attempt() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = ask(&client, "scissors-hold1", 3).await;
@@ -170,7 +169,7 @@ async fn a_physical_grasp_can_be_replayed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn any_number_of_workers_gives_the_same_grasp() {
+async fn any_number_of_workers_gives_the_same_physical_grasp() {
     let mut grasps = Vec::new();
     for workers in [1, 3] {
         let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;

@@ -1,7 +1,7 @@
 //! Real meshes, held by recorded hands, over real gRPC.
 //!
-//! Every request is kept as JSON in cargo's folder for temporary test files, so that a person can look at the answers:
-//! create the object with `grasp objects create`, then `grasp find --request FILE --mesh FILE.obj --png FILE`.
+//! Every request is kept as JSON in cargo's folder for temporary test files, for a look at its answer: create the object
+//! with `grasp objects create`, then `grasp find --request FILE --mesh FILE.obj --png FILE`.
 
 use std::{path::Path, time::Duration};
 
@@ -18,7 +18,7 @@ use grasp_tests::{
     recorded::{RecordedPose, data_folder_or_skip, object_of, read_poses},
 };
 
-/// Files of `objects/` with typical masses in kilograms of such things.
+/// Files of `objects/` with typical masses in kilograms.
 const OBJECTS: [(&str, f32); 11] = [
     ("osim_banana", 0.12),
     ("osim_hammer", 0.5),
@@ -42,7 +42,7 @@ const POSES: [(&str, &str, Handedness); 5] = [
     ("godot_xr_tools_poses.json", "Cup", Handedness::Left),
 ];
 
-/// At least this many of the poses must be answered with a grasp, for every object.
+/// Least number of poses with a grasp, per object.
 const ANSWERED_AT_LEAST: usize = 3;
 
 fn recorded_poses(folder: &Path) -> Vec<RecordedPose> {
@@ -58,7 +58,7 @@ fn recorded_poses(folder: &Path) -> Vec<RecordedPose> {
         .collect()
 }
 
-/// The giver stands at -Z, the forearm comes from there and slightly from below: the object's pose that makes it so.
+/// The pose of the object for a giver at -Z, whose forearm comes from there and slightly from below.
 fn client_from_object(placement: &GiverPlacement) -> Pose {
     let forearm = placement.object_from_wrist.transform_vector(Vec3::Z);
     let orientation = Quat::from_rotation_arc(forearm, Vec3::new(0.0, -0.3, -1.0).normalize_or(Vec3::NEG_Z));
@@ -92,7 +92,7 @@ fn webxr_joints(pose: &RecordedPose, placement: &GiverPlacement, client_from_obj
     }
 }
 
-/// Asks with strategy F, then with D where F finds nothing in its time.
+/// Asks with strategy F, then with D where F finds nothing in time.
 async fn ask(
     client: &GraspClient,
     object: &str,
@@ -112,12 +112,12 @@ async fn ask(
         request.strategy = Some(Strategy::D);
         answer = client.find_grasp(&request).await.expect("the request is valid");
     }
-    // A replay of the winning attempt gives the same grasp again.
+    // A replay of the winning attempt gives the same grasp.
     request.only_attempt = answer.report.attempt;
     (request, answer)
 }
 
-/// Keeps a request where a person can find it.
+/// Saves a request for people to look at.
 fn keep(name: &str, request: &FindRequest) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("real-input");
     std::fs::create_dir_all(&folder).expect("the folder for temporary files can be written");
@@ -126,8 +126,8 @@ fn keep(name: &str, request: &FindRequest) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_real_mesh_is_grasped_from_recorded_givers() {
-    let Some(folder) = data_folder_or_skip("every_real_mesh_is_grasped_from_recorded_givers") else {
+async fn every_real_mesh_is_received_from_recorded_givers() {
+    let Some(folder) = data_folder_or_skip("every_real_mesh_is_received_from_recorded_givers") else {
         return;
     };
     let server = TestServer::start().await;

@@ -1,21 +1,21 @@
-//! Reflection, in the version that tools ask for today and in the one that many still ask for.
+//! Reflection, in the current version and in the older one that many tools still use.
 
 use grasp_tests::TestServer;
 use prost::Message as _;
 use tokio_stream::once;
 
-/// Services that have to be listed.
+/// Services that must be listed.
 const SERVICES: [&str; 3] = [
     "grasp.v1.GraspService",
     "grasp.v1.ObjectService",
     "grpc.health.v1.Health",
 ];
 
-/// A test of one version of the protocol; both have the same messages, in different packages.
+/// Tests one version of the protocol; both have the same messages, in different packages.
 macro_rules! reflection_test {
-    ($version:ident) => {
+    ($test:ident, $version:ident) => {
         #[tokio::test(flavor = "multi_thread")]
-        async fn $version() {
+        async fn $test() {
             use tonic_reflection::pb::$version::{
                 ServerReflectionRequest, server_reflection_client::ServerReflectionClient,
                 server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
@@ -69,5 +69,5 @@ macro_rules! reflection_test {
     };
 }
 
-reflection_test!(v1);
-reflection_test!(v1alpha);
+reflection_test!(lists_and_describes_services_by_v1, v1);
+reflection_test!(lists_and_describes_services_by_v1alpha, v1alpha);

@@ -1,26 +1,20 @@
-//! The same question gets the same answer, whoever asks whomever.
+//! The same request gets the same answer from any server with any number of workers.
 
-use std::sync::{Arc, atomic::AtomicBool};
+use std::sync::Arc;
 
 use grasp_assets::{atlases::atlas, hands::hand, objects::object, primitives::held_primitives};
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
-    known::{codec::decode, recent_grips::RecentGrips, seed_source::SeedSource, transferred_grips::Borrowed},
-    base::mechanisms::Mechanisms,
-    model::{
-        constraints::Constraints,
-        hand::{Handedness, joints::HandJoints},
-        strategy::{Choice, Strategy, Validity},
-    },
-    search::{find_grasp, settings::SearchSettings},
+    known::{codec::decode, seed_source::SeedSource, transferred_grips::Borrowed},
+    model::hand::{Handedness, joints::HandJoints},
 };
-use grasp_tests::{TestServer, random_holdouts::ClientHoldout, searches::MonotonicClock};
+use grasp_tests::{TestServer, random_holdouts::ClientHoldout, searches::search_from};
 use prost::Message as _;
 
 use crate::{
     atlases::state,
-    support::{floating_remote, held_remote, impossible, seconds},
+    fixtures::{floating_remote, held_remote, impossible, seconds},
 };
 
 async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
@@ -33,7 +27,7 @@ async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGras
         .into_inner()
 }
 
-/// What has to be the same for any number of workers.
+/// The part of an answer that must not depend on the number of workers.
 fn unchanging(answer: v1::FindGraspResponse) -> Vec<u8> {
     let report = answer.report.expect("every answer has a report");
     v1::FindGraspResponse {
@@ -48,28 +42,28 @@ fn unchanging(answer: v1::FindGraspResponse) -> Vec<u8> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_first_grasp_of_the_search_is_the_answer_unless_said_otherwise() {
+async fn the_default_answer_is_the_first_grasp_and_may_use_an_atlas() {
     let server = TestServer::start().await;
-    let unsaid = v1::FindGraspRequest {
+    let defaults = v1::FindGraspRequest {
         reproducible: true,
         ..floating_remote()
     };
-    let answer = ask(&server, unsaid.clone()).await;
+    let answer = ask(&server, defaults.clone()).await;
     let expected = unchanging(answer);
-    let said = |atlas: v1::AtlasUse| v1::FindGraspRequest {
+    let explicit = |atlas: v1::AtlasUse| v1::FindGraspRequest {
         choice: v1::Choice::FirstValid.into(),
         atlas: atlas.into(),
-        ..unsaid.clone()
+        ..defaults.clone()
     };
-    let allowed = ask(&server, said(v1::AtlasUse::Allowed)).await;
+    let allowed = ask(&server, explicit(v1::AtlasUse::Allowed)).await;
     assert_eq!(unchanging(allowed), expected);
-    // Without the atlas, it is the search's own.
-    let fresh = ask(&server, said(v1::AtlasUse::None)).await;
+    // Without an atlas, the search answers.
+    let fresh = ask(&server, explicit(v1::AtlasUse::None)).await;
     let report = fresh.report.as_ref().expect("every answer has a report");
     assert_eq!(report.source(), v1::GraspSource::Search);
     assert_eq!((report.candidates, report.atlas_entries), (1, 0));
     assert_eq!(report.atlas_stamp, "");
-    let again = ask(&server, said(v1::AtlasUse::None)).await;
+    let again = ask(&server, explicit(v1::AtlasUse::None)).await;
     assert_eq!(unchanging(again), unchanging(fresh));
     server.stop().await;
 }
@@ -94,7 +88,7 @@ async fn any_number_of_workers_gives_the_same_bytes() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn any_number_of_workers_comes_as_close() {
+async fn any_number_of_workers_gives_the_same_nearest_miss() {
     let mut answers = Vec::new();
     for workers in [1, 3] {
         let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
@@ -111,7 +105,7 @@ async fn any_number_of_workers_comes_as_close() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_told_seed_and_attempt_replay_the_grasp() {
+async fn the_reported_seed_and_attempt_replay_the_grasp() {
     let server = TestServer::start().await;
     let first = ask(
         &server,
@@ -134,7 +128,7 @@ async fn the_told_seed_and_attempt_replay_the_grasp() {
     server.stop().await;
 }
 
-/// The scissors in the hands of known grips, as if those were givers': some leave no known grip.
+/// The scissors with known grips as givers: some leave no known grip.
 fn givers_of_the_scissors() -> impl Iterator<Item = ClientHoldout> {
     let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
     let scissors = &object("scissors").expect("they are built in").object;
@@ -148,7 +142,7 @@ fn givers_of_the_scissors() -> impl Iterator<Item = ClientHoldout> {
         })
 }
 
-/// A search with them, the same whenever it is asked for.
+/// A reproducible search with such a giver.
 fn reproducible_search(holdout: &ClientHoldout) -> v1::FindGraspRequest {
     v1::FindGraspRequest {
         budget: Some(seconds(10)),
@@ -160,61 +154,28 @@ fn reproducible_search(holdout: &ClientHoldout) -> v1::FindGraspRequest {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn without_an_atlas_searches_start_from_what_the_object_borrows() {
+async fn without_an_atlas_transferred_grips_seed_the_search() {
     let server = TestServer::start().await;
     let scissors = &object("scissors").expect("they are built in").object;
     let (hand, held) = held_primitives()
         .iter()
         .find(|(hand, _)| hand.rig.handedness == Handedness::Right)
-        .expect("the right hand knows primitives");
-    let borrowed = Arc::new(Borrowed::of(scissors, held));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a thread");
-    let search = |holdout: &ClientHoldout, starts: SeedSource| {
+        .expect("there are grips for the right hand");
+    let transferred = Arc::new(Borrowed::of(scissors, held));
+    let search = |holdout: &ClientHoldout, seeds: SeedSource| {
         let holdout = holdout.holdout(Arc::clone(scissors));
-        let settings = SearchSettings {
-            seed: 7,
-            strategy: Strategy::Guided,
-            validity: Validity::Physical,
-            bend_ratios: Strategy::Guided.default_bend_ratios(),
-            friction: scissors.friction_under(Validity::Physical),
-            constraints: Constraints::default(),
-            choice: Choice::FirstValid,
-            atlas: None,
-            starts,
-            recent: RecentGrips::default(),
-            known_tried: 0,
-            reproducible: true,
-            first_attempt: 0,
-            max_attempts: 400,
-            deadline: None,
-            workers: 1,
-            record_step_times: false,
-            mechanisms: Mechanisms::ALL,
-        };
-        let clock = MonotonicClock::default();
-        let found = find_grasp(
-            &pool,
-            &holdout,
-            &hand.rig,
-            &settings,
-            &clock,
-            &AtomicBool::new(false),
-        );
-        found.report.attempt
+        search_from(seeds, &holdout, &hand.rig, 7, 400).report.attempt
     };
-    let mut otherwise = 0;
+    let mut differing = 0;
     for holdout in givers_of_the_scissors().step_by(40).take(12) {
         let request = reproducible_search(&holdout);
         let answer = ask(&server, request.clone()).await;
         let report = answer.report.expect("every answer has a report");
-        let expected = search(&holdout, SeedSource::Borrowed(Arc::clone(&borrowed)));
+        let expected = search(&holdout, SeedSource::Borrowed(Arc::clone(&transferred)));
         assert_eq!(report.attempt, expected);
         assert_eq!(report.atlas_stamp, "");
-        otherwise += usize::from(search(&holdout, SeedSource::Nothing) != expected);
-        // The attempt alone does the same again.
+        differing += usize::from(search(&holdout, SeedSource::Nothing) != expected);
+        // The attempt alone gives the same grasp.
         let replay = v1::FindGraspRequest {
             only_attempt: report.attempt,
             max_attempts: None,
@@ -224,12 +185,15 @@ async fn without_an_atlas_searches_start_from_what_the_object_borrows() {
             assert_eq!(ask(&server, replay).await.grasp, answer.grasp);
         }
     }
-    assert!(otherwise >= 3, "{otherwise} of 12 are found by what was borrowed");
+    assert!(
+        differing >= 3,
+        "transferred grips change {differing} of 12 answers"
+    );
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_grasp_beside_a_known_one_is_replayed_with_the_same_atlas() {
+async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     state(&server, "objects/scissors", 1000).await;
     let replay_of = |request: &v1::FindGraspRequest, report: &v1::SearchReport, atlas: v1::AtlasUse| {
@@ -255,7 +219,7 @@ async fn a_grasp_beside_a_known_one_is_replayed_with_the_same_atlas() {
         assert_eq!((replay.attempts, replay.atlas_entries), (1, 0));
         assert_eq!(replay.atlas_stamp, report.atlas_stamp);
         assert!(!replay.atlas_stamp.is_empty());
-        // Without the atlas, that attempt gives another grasp or, mostly, none.
+        // Without the atlas, that attempt gives another grasp or, usually, none.
         let without = ask(&server, replay_of(&request, report, v1::AtlasUse::None)).await;
         replayed += usize::from(without.grasp.is_none());
         if replayed == 2 {
@@ -267,7 +231,7 @@ async fn a_grasp_beside_a_known_one_is_replayed_with_the_same_atlas() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_absent_seed_is_drawn_anew() {
+async fn an_absent_seed_is_drawn_per_request() {
     let server = TestServer::start().await;
     let request = v1::FindGraspRequest {
         seed: None,

@@ -1,4 +1,4 @@
-//! The end of a server: quick when idle, patient with running calls, but not for ever.
+//! Shutdown: immediate when idle, and after a bounded drain of running calls.
 
 use std::time::Duration;
 
@@ -7,10 +7,10 @@ use grasp_tests::TestServer;
 use tokio::{io::AsyncReadExt as _, net::TcpStream};
 use tonic::Code;
 
-use crate::support::{bounded, impossible, milliseconds, seconds, until};
+use crate::fixtures::{bounded, impossible, milliseconds, seconds, until};
 
 #[tokio::test(flavor = "multi_thread")]
-async fn idle_connections_do_not_keep_the_server() {
+async fn idle_connections_do_not_delay_shutdown() {
     let server = TestServer::start_with(|config| config.drain = Duration::from_hours(1)).await;
     let mut silent = TcpStream::connect(server.address()).await.unwrap();
     let mut idle = server.objects().await;
@@ -28,7 +28,7 @@ async fn idle_connections_do_not_keep_the_server() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn running_calls_are_answered() {
+async fn running_calls_are_answered_during_the_drain() {
     let server = TestServer::start().await;
     let request = v1::FindGraspRequest {
         budget: Some(milliseconds(700)),
@@ -47,7 +47,7 @@ async fn running_calls_are_answered() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn calls_that_outlast_the_drain_are_cut() {
+async fn calls_that_outlast_the_drain_are_cancelled() {
     let server = TestServer::start_with(|config| {
         config.drain = Duration::from_millis(50);
         config.budgets.maximum = Duration::from_mins(10);

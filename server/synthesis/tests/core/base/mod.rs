@@ -1,0 +1,3 @@
+//! The random streams of attempts.
+
+mod attempt_streams;

@@ -1,0 +1,346 @@
+//! Tapered capsules as sets of balls: against each other and against meshes.
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    base::pose::Pose,
+    geometry::{mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
+    physical::solids::{clearance, closest, comes_within},
+};
+
+use crate::fixtures::{data, meshes, random::Random};
+
+/// Points of the axis that brute force tries.
+const SAMPLES: u16 = 1000;
+
+/// Rounding, in metres.
+const ROUNDING: f32 = 2e-6;
+
+/// Accuracy of gaps to meshes, in metres, with rounding.
+const ACCURACY: f32 = 1e-5 + ROUNDING;
+
+fn shares() -> impl Iterator<Item = f32> {
+    (0..=SAMPLES).map(|i| f32::from(i) / f32::from(SAMPLES))
+}
+
+/// Error of brute force: half a step along the axis, and the change of the radius over it.
+fn brute_slack(capsule: &TaperedCapsule) -> f32 {
+    let change = capsule.length() + (capsule.end_radius - capsule.start_radius).abs();
+    0.5 * change / f32::from(SAMPLES) + ROUNDING
+}
+
+/// Capsules of every kind: phalanges, cones, balls, balls within balls, needles.
+fn capsule(random: &mut Random, near: Vec3) -> TaperedCapsule {
+    let start = near + random.direction() * random.between(0.0, 0.03);
+    let direction = random.direction();
+    let radius = random.between(0.003, 0.016);
+    let (length, end_radius) = match random.index(6) {
+        0 => (random.between(0.01, 0.06), radius),
+        1 => (0.0, radius),
+        2 => (0.01, radius + 0.02),
+        3 => (random.between(0.01, 0.06), 0.0),
+        _ => (random.between(0.01, 0.06), radius * random.between(0.5, 1.5)),
+    };
+    TaperedCapsule::new(start, start + direction * length, radius, end_radius)
+}
+
+#[test]
+fn point_distances_match_the_nearest_ball() {
+    let mut random = Random::new(11);
+    for i in 0..2000 {
+        let capsule = capsule(&mut random, Vec3::ZERO);
+        let point = random.in_cube() * 0.08;
+        let expected = shares()
+            .map(|t| capsule.at(t).distance(point) - capsule.radius_at(t))
+            .fold(f32::INFINITY, f32::min);
+        let distance = capsule.signed_distance(point);
+        assert!(
+            distance <= expected + ROUNDING && distance >= expected - brute_slack(&capsule),
+            "{i}: {distance}, brute force says {expected} for {capsule:?} and {point}"
+        );
+    }
+}
+
+#[test]
+fn capsule_distances_match_the_nearest_balls() {
+    let mut random = Random::new(12);
+    for i in 0..3000 {
+        let a = capsule(&mut random, Vec3::ZERO);
+        let near = random.in_cube() * 0.03;
+        let b = match random.index(4) {
+            // Parallel and collinear ones have many nearest points.
+            0 => TaperedCapsule::new(a.start + near, a.end + near, 0.008, 0.006),
+            1 => TaperedCapsule::new(a.end, a.end + (a.end - a.start), 0.008, 0.008),
+            _ => capsule(&mut random, near),
+        };
+        let expected = shares()
+            .map(|t| b.signed_distance(a.at(t)) - a.radius_at(t))
+            .fold(f32::INFINITY, f32::min);
+        let distance = a.distance(&b);
+        assert!(
+            distance <= expected + ROUNDING && distance >= expected - brute_slack(&a),
+            "{i}: {distance}, brute force says {expected} for {a:?} and {b:?}"
+        );
+        assert!(
+            (b.distance(&a) - distance).abs() <= ROUNDING,
+            "{i}: not symmetric"
+        );
+        let frame = Pose::new(random.in_cube(), random.rotation());
+        let moved = a.transformed(frame).distance(&b.transformed(frame));
+        assert!(
+            (moved - distance).abs() <= ROUNDING,
+            "{i}: {distance} moves to {moved}"
+        );
+    }
+}
+
+#[test]
+fn distances_match_closed_forms() {
+    let along_x = TaperedCapsule::new(Vec3::X * -0.02, Vec3::X * 0.02, 0.01, 0.01);
+    let near = |value: f32, expected: f32| {
+        assert!((value - expected).abs() < 1e-6, "{value} instead of {expected}");
+    };
+    let shifted = |offset: Vec3| along_x.transformed(Pose::from_position(offset));
+    near(along_x.distance(&shifted(Vec3::Y * 0.03)), 0.01);
+    near(along_x.distance(&shifted(Vec3::X * 0.07)), 0.01);
+    near(along_x.distance(&shifted(Vec3::Y * 0.015)), -0.005);
+    let across = TaperedCapsule::new(
+        Vec3::new(0.0, -0.02, 0.025),
+        Vec3::new(0.0, 0.02, 0.025),
+        0.01,
+        0.01,
+    );
+    near(along_x.distance(&across), 0.005);
+    // A cone with a half angle of 30 degrees: along its side, the radius grows by 1/2 per unit.
+    let cone = TaperedCapsule::new(Vec3::ZERO, Vec3::X * 0.04, 0.0, 0.02);
+    let normal = Vec3::new(-0.5, 0.75_f32.sqrt(), 0.0);
+    near(cone.signed_distance(Vec3::X * 0.015 + normal * 0.03), 0.0225);
+}
+
+/// Compares the gap to a mesh's surface with the balls' gaps.
+fn compare(name: &str, surface: &MeshBvh, count: usize) {
+    let mut random = Random::new(13);
+    let part = |odd: usize| surface.mesh().part(|triangle| triangle % 2 == odd);
+    let parts: Vec<MeshBvh> = [part(0), part(1)]
+        .into_iter()
+        .flatten()
+        .map(MeshBvh::build_quick)
+        .collect();
+    for i in 0..count {
+        let (near, _) = random.on_surface(surface.mesh());
+        let capsule = capsule(&mut random, near);
+        let within = [f32::INFINITY, 0.005, -0.001][random.index(3)];
+        let expected = shares()
+            .map(|t| {
+                let closest = surface
+                    .closest_point_within(capsule.at(t), f32::INFINITY)
+                    .expect("there is a surface");
+                closest.distance - capsule.radius_at(t)
+            })
+            .fold(f32::INFINITY, f32::min);
+        if (expected - within).abs() > brute_slack(&capsule) {
+            let comes_within = surface.comes_within(&capsule, within);
+            // A part of the surface and the rest of it are all of it.
+            assert_eq!(
+                parts.iter().any(|part| part.comes_within(&capsule, within)),
+                comes_within,
+                "{name} {i}"
+            );
+            assert_eq!(
+                comes_within,
+                expected < within,
+                "{name} {i}: {expected}, {within}"
+            );
+        }
+        let Some(gap) = surface.closest_to_capsule(&capsule, within) else {
+            assert!(
+                expected > within - ROUNDING,
+                "{name} {i}: {expected}, within {within}: {capsule:?}"
+            );
+            continue;
+        };
+        assert!(gap.gap <= within, "{name} {i}: {gap:?} is not within {within}");
+        assert!(
+            gap.gap <= expected + ACCURACY && gap.gap >= expected - brute_slack(&capsule),
+            "{name} {i}: {gap:?}, brute force says {expected} for {capsule:?}"
+        );
+        let way = capsule.at(gap.along).distance(gap.position) - capsule.radius_at(gap.along);
+        assert!(
+            (way - gap.gap).abs() <= ROUNDING,
+            "{name} {i}: {gap:?} is {way} away"
+        );
+    }
+}
+
+#[test]
+fn gaps_to_meshes_match_the_nearest_balls() {
+    for (name, mesh) in meshes::all() {
+        compare(name, &MeshBvh::build(mesh), 300);
+    }
+}
+
+#[test]
+fn gaps_to_real_objects_match_the_nearest_balls() {
+    for (name, mesh) in data::real_objects() {
+        compare(&name, &MeshBvh::build(mesh), 30);
+    }
+}
+
+/// Compares the clearance with the least signed distance of the axis less the radius.
+#[test]
+fn clearances_from_solids_match_the_nearest_or_deepest_balls() {
+    for (name, mesh) in meshes::solids() {
+        let surface = MeshBvh::build(mesh);
+        let mut random = Random::new(14);
+        let mut deep = 0;
+        for i in 0..300 {
+            let (near, _) = random.on_surface(surface.mesh());
+            let capsule = capsule(&mut random, near);
+            let mut is_inside = false;
+            let mut expected = f32::INFINITY;
+            for t in shares() {
+                let point = capsule.at(t);
+                let closest = surface
+                    .closest_point_within(point, f32::INFINITY)
+                    .expect("there is a surface");
+                let inside = surface.contains(point);
+                is_inside |= inside;
+                let signed = if inside {
+                    -closest.distance
+                } else {
+                    closest.distance
+                };
+                expected = expected.min(signed - capsule.radius_at(t));
+            }
+            deep += usize::from(is_inside);
+            let tolerance = brute_slack(&capsule) + if is_inside { 1e-3 } else { ACCURACY };
+            let found = clearance(&capsule, &surface, 0.1);
+            assert!(
+                (found - expected.min(0.1)).abs() <= tolerance,
+                "{name} {i}: {found}, brute force says {expected} for {capsule:?}, inside: {is_inside}"
+            );
+            if let Some(touch) = closest(&capsule, &surface, 0.1) {
+                assert_eq!(touch.clearance, found, "{name} {i}");
+            }
+            if (expected + 0.002).abs() > brute_slack(&capsule) {
+                let sinks = comes_within(&capsule, &surface, -0.002);
+                assert_eq!(sinks, expected < -0.002, "{name} {i}: {expected} for {capsule:?}");
+            }
+        }
+        assert!(
+            (10..290).contains(&deep) || name == "needle" || name == "plate",
+            "{name}: {deep} axes enter it"
+        );
+    }
+}
+
+#[test]
+fn clearances_from_boxes_match_closed_forms() {
+    let half = Vec3::new(0.1, 0.1, 0.02);
+    let solid = MeshBvh::build(meshes::cuboid(half, 7));
+    let sheet = MeshBvh::build(meshes::cuboid(Vec3::new(0.1, 0.1, 0.00025), 7));
+    let near = |value: f32, expected: f32, tolerance: f32| {
+        assert!(
+            (value - expected).abs() <= tolerance,
+            "{value} instead of {expected}"
+        );
+    };
+    // A finger over the top face, tilted, so that its thin end is the nearest: its height less the end's radius.
+    for height in [0.03, 0.025, 0.021] {
+        let finger = TaperedCapsule::new(
+            Vec3::new(0.003, 0.002, height + 0.02),
+            Vec3::new(0.03, 0.01, height),
+            0.009,
+            0.007,
+        );
+        near(clearance(&finger, &solid, 1.0), height - 0.02 - 0.007, ROUNDING);
+        let touch = closest(&finger, &solid, 1.0).expect("it is within a metre");
+        assert!(
+            touch.point.distance(Vec3::new(0.03, 0.01, 0.02)) < 1e-5,
+            "{touch:?}"
+        );
+        assert_eq!(touch.normal, Vec3::Z);
+        near(touch.along, 1.0, 1e-6);
+        // Beyond the limit, the limit is returned.
+        assert_eq!(clearance(&finger, &solid, height - 0.03), height - 0.03);
+    }
+    // In the middle of the box: half its thickness and the radius.
+    let inside = TaperedCapsule::new(Vec3::X * -0.02, Vec3::X * 0.02, 0.008, 0.008);
+    near(clearance(&inside, &solid, 1.0), -0.028, 1e-3);
+    // A sheet across a finger is as deep as the finger is thick there; off its axis, less by the offset.
+    let across = TaperedCapsule::new(Vec3::Z * -0.02, Vec3::Z * 0.02, 0.01, 0.006);
+    near(clearance(&across, &sheet, 1.0), -0.008, 1e-3);
+    let off_axis = TaperedCapsule::new(
+        Vec3::new(-0.02, 0.0, 0.00325),
+        Vec3::new(0.02, 0.0, 0.00325),
+        0.008,
+        0.008,
+    );
+    near(clearance(&off_axis, &sheet, 1.0), -0.005, ROUNDING);
+    // It grazes the sheet's edge with its skin.
+    let grazing = TaperedCapsule::new(
+        Vec3::new(0.108, -0.02, 0.0),
+        Vec3::new(0.108, 0.02, 0.0),
+        0.008,
+        0.008,
+    );
+    near(clearance(&grazing, &sheet, 1.0), 0.0, ROUNDING);
+}
+
+#[test]
+fn clearances_do_not_depend_on_the_frame() {
+    let mesh = meshes::torus(0.05, 0.015, 24);
+    let surface = MeshBvh::build(mesh.clone());
+    let frame = Pose::new(
+        Vec3::new(0.2, -0.1, 0.4),
+        Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.1),
+    );
+    let moved = MeshBvh::build(meshes::moved(&mesh, frame.orientation, frame.position));
+    let mut random = Random::new(15);
+    for i in 0..1000 {
+        let (near, _) = random.on_surface(surface.mesh());
+        let capsule = capsule(&mut random, near);
+        let here = surface.closest_to_capsule(&capsule, 1.0).expect("it is near").gap;
+        let there = moved
+            .closest_to_capsule(&capsule.transformed(frame), 1.0)
+            .expect("it is near")
+            .gap;
+        assert!((here - there).abs() <= ACCURACY, "{i}: {here} and {there}");
+    }
+}
+
+#[test]
+fn capsules_that_are_not_finite_are_near_nothing() {
+    let surface = MeshBvh::build(meshes::cuboid(Vec3::splat(0.02), 3));
+    for broken in [f32::NAN, f32::INFINITY] {
+        for capsule in [
+            TaperedCapsule::new(Vec3::splat(broken), Vec3::ZERO, 0.01, 0.01),
+            TaperedCapsule::new(Vec3::X, Vec3::Y * broken, 0.01, 0.01),
+        ] {
+            assert_eq!(surface.closest_to_capsule(&capsule, f32::INFINITY), None);
+            assert!(!surface.comes_within(&capsule, 0.01));
+        }
+    }
+}
+
+#[test]
+fn lower_bounds_of_gaps_never_exceed_the_gaps() {
+    let mut random = Random::new(17);
+    let mut positive = 0;
+    for (name, mesh) in meshes::all() {
+        let prepared = MeshBvh::build(mesh.clone());
+        // Without a distance field, every answer comes from the triangles.
+        let exact = MeshBvh::build_quick(mesh.clone());
+        for i in 0..400 {
+            let near = random.near(&mesh, 0.1);
+            let capsule = capsule(&mut random, near);
+            let bound = prepared.least_gap(&capsule);
+            let gap = exact.closest_to_capsule(&capsule, 1.0).map_or(1.0, |gap| gap.gap);
+            assert!(
+                bound <= gap + ACCURACY,
+                "{name} {i}: bound {bound}, gap {gap} of {capsule:?}"
+            );
+            positive += u32::from(bound > 0.0);
+        }
+    }
+    assert!(positive > 500, "{positive} positive bounds");
+}

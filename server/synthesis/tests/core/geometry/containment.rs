@@ -1,0 +1,121 @@
+//! Containment against winding numbers.
+
+use glam::Vec3;
+use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh};
+
+use crate::fixtures::{data, meshes, oracle, random::Random};
+
+/// Compares containment with the winding number; returns how many points were inside.
+fn compare(name: &str, mesh: &TriangleMesh, count: usize) -> usize {
+    let bvhs = [MeshBvh::build(mesh.clone()), MeshBvh::build_quick(mesh.clone())];
+    let mut random = Random::new(4);
+    let mut inside = 0;
+    for i in 0..count {
+        let point = if random.index(3) == 0 {
+            let (surface, triangle) = random.on_surface(mesh);
+            surface + mesh.normal(triangle) * random.between(-1e-3, 1e-3)
+        } else {
+            random.near(mesh, 0.002)
+        };
+        if oracle::distance_to_mesh(mesh, point) < 1e-6 {
+            continue;
+        }
+        let winding = oracle::winding_number(mesh, point);
+        if (winding.abs() - 0.5).abs() < 1e-4 {
+            continue;
+        }
+        let expected = winding.abs() > 0.5 && mesh.aabb().contains(point);
+        for bvh in &bvhs {
+            assert_eq!(
+                bvh.contains(point),
+                expected,
+                "{name} {i}: {point} has winding number {winding}"
+            );
+        }
+        inside += usize::from(expected);
+    }
+    inside
+}
+
+#[test]
+fn containment_matches_the_winding_number() {
+    for (name, mesh) in meshes::all() {
+        let inside = compare(name, &mesh, 5_000);
+        assert!(
+            inside > 50 || name == "soup",
+            "{name}: only {inside} points are inside"
+        );
+    }
+}
+
+#[test]
+fn containment_in_real_objects_matches_the_winding_number() {
+    for (name, mesh) in data::real_objects() {
+        let inside = compare(&name, &mesh, 400);
+        assert!(inside > 10, "{name}: only {inside} points are inside");
+    }
+}
+
+/// Independent of the oracle, which might share a mistake with the crate.
+#[test]
+fn chosen_points_are_inside_or_outside_as_constructed() {
+    let hollow = MeshBvh::build(meshes::hollow_sphere());
+    assert!(hollow.contains(Vec3::new(0.04, 0.0, 0.0)));
+    assert!(!hollow.contains(Vec3::ZERO), "the cavity is not inside");
+
+    let overlapping = MeshBvh::build(meshes::overlapping_boxes());
+    assert!(
+        overlapping.contains(Vec3::new(0.03, 0.02, 0.01)),
+        "the common part is inside"
+    );
+    assert!(overlapping.contains(Vec3::new(-0.035, 0.0, 0.0)));
+    assert!(overlapping.contains(Vec3::new(0.055, 0.045, 0.035)));
+    assert!(!overlapping.contains(Vec3::new(-0.035, 0.045, 0.0)));
+
+    let torus = MeshBvh::build(meshes::torus(0.05, 0.015, 24));
+    assert!(!torus.contains(Vec3::ZERO), "the hole is not inside");
+    assert!(torus.contains(Vec3::new(0.05, 0.0, 0.0)));
+
+    let inside_out = MeshBvh::build(meshes::inside_out_sphere());
+    assert!(inside_out.contains(Vec3::new(0.01, 0.0, 0.0)));
+
+    let open = MeshBvh::build(meshes::open_box());
+    assert!(open.contains(Vec3::new(0.0, 0.0, -0.02)), "deep in the open box");
+    assert!(
+        !open.contains(Vec3::new(0.0, 0.0, 0.051)),
+        "above the rim of the open box"
+    );
+}
+
+/// Points on a grid line up with edges and vertices in as many directions as possible.
+#[test]
+fn points_in_line_with_vertices_are_classified_correctly() {
+    let half = Vec3::new(0.0625, 0.031_25, 0.015_625);
+    let mesh = meshes::cuboid(half, 8);
+    let bvh = MeshBvh::build(mesh);
+    for x in -10..=10 {
+        for y in -10..=10 {
+            for z in -10..=10 {
+                let share = Vec3::new(x as f32, y as f32, z as f32) / 8.0;
+                if share.abs().max_element() == 1.0 {
+                    continue;
+                }
+                assert_eq!(
+                    bvh.contains(share * half),
+                    share.abs().max_element() < 1.0,
+                    "{share}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_segment_inside_touches_without_crossing() {
+    let bvh = MeshBvh::build(meshes::cuboid(Vec3::splat(0.05), 3));
+    let inside = Segment::new(Vec3::splat(-0.01), Vec3::splat(0.02));
+    assert!(!bvh.is_crossed_by(inside));
+    assert!(bvh.touches(inside));
+    assert!(bvh.touches(Segment::new(Vec3::ZERO, Vec3::X)));
+    assert!(!bvh.touches(Segment::new(Vec3::X, Vec3::Y)));
+}

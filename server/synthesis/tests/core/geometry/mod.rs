@@ -1,0 +1,8 @@
+//! Geometry against brute force in double precision.
+
+mod capsule;
+mod closest_point;
+mod containment;
+mod crossing;
+mod oriented_box;
+mod triangle_mesh;

@@ -1,0 +1,9 @@
+//! Atlases of the built-in objects and hands: their files, their order and what a giver excludes.
+
+mod codec;
+mod exclusion;
+mod finger_subsets;
+mod palm_contacts;
+mod recent_grips;
+mod seeds;
+mod shortlist;

@@ -1,0 +1,202 @@
+//! The shortlist of grips tried first, against comparing hands one by one.
+
+use std::sync::Arc;
+
+use grasp_synthesis::{
+    known::{
+        atlas::{Atlas, Listed},
+        gravity::direction,
+        grips::Grips,
+        recheck::Recheck,
+        subset_grasps::subset_grasp,
+    },
+    model::{hand::joints::HandJoints, holdout::Holdout, strategy::Choice},
+    physical::{
+        grip::{GIVER_CLEARANCE, Gripper},
+        scene::Presented,
+        solids::{PreparedHand, TrackedSolids},
+    },
+    search::{GraspSource, SearchOutcome},
+};
+
+use crate::fixtures::{
+    atlases::{grown, growth, scissors_held_by, shipped_atlas},
+    hands::right,
+    holdouts::{UP, floating},
+    objects::{OBJECT_NAMES, object},
+    proposals::{object_scene, surroundings},
+    searches::Search,
+};
+
+/// Givers per object; with 40, chance decides the result.
+const GIVERS: usize = 240;
+
+/// Index of the direction against gravity.
+const DIRECTION: usize = 20;
+
+#[test]
+fn the_shortlist_serves_more_givers_than_the_best_scored_grips() {
+    let rig = right();
+    for name in OBJECT_NAMES {
+        let atlas = shipped_atlas(name);
+        let entries = atlas.entries();
+        let up = direction(DIRECTION);
+        let score = |&entry: &u16| entries[usize::from(entry)].scores[DIRECTION];
+        let listed = |listed: &Listed| listed.entry;
+        let list: Vec<u16> = atlas.shortlist(up).iter().map(listed).collect();
+        assert!(list.is_sorted_by(|a, b| score(a) >= score(b)), "{name}");
+        let holding = atlas.holding_under(up);
+        assert!(list.iter().all(|entry| holding.contains(entry)), "{name}");
+
+        // The list was made with every sixteenth grip; these are others.
+        let (mut by_list, mut by_score, mut by_any) = (0, 0, 0);
+        let (mut listed_scores, mut best_scores) = (0, 0);
+        for giver in entries.iter().skip(7).step_by(entries.len() / GIVERS) {
+            let joints = HandJoints::of_pose(rig, &giver.grip.pose);
+            let hand = PreparedHand::new(&TrackedSolids::of_joints(&joints));
+            let keeps_clear = |entry: &&u16| {
+                let solids = entries[usize::from(**entry)].solids(rig);
+                !hand.is_neared_by(solids.iter(), GIVER_CLEARANCE)
+            };
+            let listed = list.iter().find(keeps_clear);
+            let best = holding.iter().find(keeps_clear);
+            by_list += usize::from(listed.is_some());
+            by_score += usize::from(holding[..list.len()].iter().any(|entry| keeps_clear(&entry)));
+            by_any += usize::from(best.is_some());
+            if let (Some(listed), Some(best)) = (listed, best) {
+                listed_scores += u32::from(score(listed));
+                best_scores += u32::from(score(best));
+            }
+        }
+        // Of the givers that leave any grip, far fewer leave none of the list than none of the best.
+        assert!(
+            3 * (by_any - by_list) <= by_any - by_score,
+            "{name}: {by_list} and {by_score} of {by_any}"
+        );
+        assert!(
+            5 * by_list >= 4 * by_any,
+            "{name}: {by_list} of {by_any} leave one of the list"
+        );
+        // The first grip found must be nearly as good as the best one.
+        assert!(
+            listed_scores >= best_scores * 19 / 20,
+            "{name}: {listed_scores} instead of {best_scores}"
+        );
+    }
+}
+
+#[test]
+fn a_growing_atlas_has_its_own_shortlist() {
+    let rig = right();
+    let object = object("remote");
+    let atlas = grown(growth(object, rig), 40).atlas;
+    let up = direction(DIRECTION);
+    let list = atlas.shortlist(up);
+    assert!(!list.is_empty());
+    let mut once: Vec<u16> = list.iter().map(|listed| listed.entry).collect();
+    once.sort_unstable();
+    once.dedup();
+    assert_eq!(once.len(), list.len(), "a grip is listed once");
+    let empty = Atlas::new(object, rig, Grips::default(), false);
+    for atlas in [empty, Atlas::default()] {
+        assert!(atlas.shortlist(up).is_empty());
+    }
+}
+
+/// The outcome of trying the known grips alone.
+fn of_known_grips(holdout: &Holdout, known: &Arc<Atlas>, choice: Choice) -> SearchOutcome {
+    let search = Search {
+        choice,
+        atlas: Some(Arc::clone(known)),
+        reproducible: choice == Choice::FirstValid,
+        ..Search::guided(holdout, right())
+    };
+    search.run()
+}
+
+/// For each known grip, whether it holds as a whole, and whether it holds without the fingers that the giver blocks.
+fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<[bool; 2]> {
+    let rig = right();
+    let scene = object_scene(&holdout.object);
+    let presented = Presented::of(holdout);
+    let asked = Recheck::new(&scene, rig, &presented);
+    let around = surroundings(&holdout.object, &presented, rig);
+    let mut gripper = Gripper::default();
+    let entries = known.entries().iter();
+    entries
+        .map(|entry| {
+            let whole = asked.hold(entry, &entry.tracked_solids(rig), &mut gripper);
+            let giver = presented.giver.as_ref();
+            let by_subset = giver.and_then(|giver| subset_grasp(entry, &around, giver, &mut gripper));
+            [whole.is_some(), by_subset.is_some()]
+        })
+        .collect()
+}
+
+#[test]
+fn the_first_answer_is_the_first_holding_grip_of_the_shortlist() {
+    let known = shipped_atlas("scissors");
+    let by_score = known.by_score(UP);
+    let listed: Vec<u16> = known.shortlist(UP).iter().map(|listed| listed.entry).collect();
+    let (mut on_list, mut beyond) = (0, 0);
+    for giver in (0..known.entries().len()).step_by(450) {
+        let holdout = scissors_held_by(&known, giver);
+        let holds = which_hold(&holdout, &known);
+        let holds_whole = |entry: &&u16| holds[usize::from(**entry)][0];
+        let holds_by_subset = |entry: &&u16| holds[usize::from(**entry)][1];
+        let first = listed.iter().chain(by_score).find(holds_whole).copied();
+        let Some(first) = first else {
+            // Only then are finger subsets tried.
+            let first = by_score.iter().find(holds_by_subset);
+            let found = of_known_grips(&holdout, &known, Choice::FirstValid);
+            assert_eq!(
+                found.report.source,
+                first.copied().map(GraspSource::Atlas),
+                "giver {giver}"
+            );
+            continue;
+        };
+        let found = of_known_grips(&holdout, &known, Choice::FirstValid);
+        assert_eq!(
+            found.report.source,
+            Some(GraspSource::Atlas(first)),
+            "giver {giver}"
+        );
+        // Where both orders begin alike, they cannot be distinguished.
+        if Some(&first) != by_score.iter().find(holds_whole) {
+            on_list += 1;
+        }
+        beyond += usize::from(!listed.contains(&first));
+    }
+    assert!(on_list >= 3, "{on_list} differ from the first by score");
+    assert!(beyond >= 1, "none needs more than the list");
+}
+
+#[test]
+fn without_a_giver_grips_are_tried_by_score_and_the_best_counts_each_once() {
+    let known = shipped_atlas("scissors");
+    let afloat = floating(Arc::clone(object("scissors")));
+    let holds = which_hold(&afloat, &known);
+    let first = known
+        .by_score(UP)
+        .iter()
+        .find(|&&entry| holds[usize::from(entry)][0]);
+    let found = of_known_grips(&afloat, &known, Choice::FirstValid);
+    assert_eq!(found.report.source, first.copied().map(GraspSource::Atlas));
+
+    let holdout = scissors_held_by(&known, 450);
+    let holds = which_hold(&holdout, &known);
+    let best = of_known_grips(&holdout, &known, Choice::BestWithinBudget);
+    let count = |which: [bool; 2]| holds.iter().filter(|holds| **holds == which).count();
+    let (whole, by_subset) = (count([true, false]), count([false, true]));
+    assert!(
+        whole > 0 && by_subset > 0,
+        "the giver leaves {whole} and {by_subset}"
+    );
+    assert_eq!(count([true, true]), 0, "no subset is tried of a grip that holds");
+    assert_eq!(
+        best.report.candidates,
+        (whole + by_subset) as u64,
+        "each valid grip counts once"
+    );
+}

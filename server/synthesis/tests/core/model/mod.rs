@@ -1,0 +1,10 @@
+//! Hands, objects, holdouts and constraints.
+
+mod constraints;
+mod forbidden_surfaces;
+mod holdout;
+mod kinematics;
+mod openxr_frames;
+mod posed_skin;
+mod recorded_hands;
+mod rig_description;

@@ -1,0 +1,406 @@
+//! Force balance against closed forms, and its limits over many random grasps.
+
+use glam::Vec3;
+use grasp_synthesis::{
+    model::hand::Digit,
+    physical::immobility::{
+        BALANCE_TOLERANCE, Balance, Buffers, FrictionUse, Load, MAX_CONTACT_FORCE, SoftContact, balance,
+        balance_with,
+    },
+    rating::comfort::comfort,
+};
+
+use crate::fixtures::{
+    contacts::{contacts_at, load, moved, scaled},
+    random::Random,
+};
+
+fn solve(contacts: &[SoftContact], load: &Load) -> Option<Balance> {
+    balance(contacts, load, &mut Buffers::default())
+}
+
+/// The unbalanced share of the weight, computed from the answer alone.
+fn residual(contacts: &[SoftContact], load: &Load, balance: &Balance) -> f32 {
+    let weight = load.mass * 9.81;
+    let mut force = load.up * -weight;
+    let mut torque = Vec3::ZERO;
+    for ((contact, &push), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
+        force += push;
+        torque += (contact.position - load.centre_of_mass).cross(push) - contact.normal * torsion;
+    }
+    (force.length_squared() + (torque / load.characteristic_length).length_squared()).sqrt() / weight
+}
+
+fn assert_sound(contacts: &[SoftContact], load: &Load, balance: &Balance, what: &str) {
+    let left = residual(contacts, load, balance);
+    assert!(
+        left <= BALANCE_TOLERANCE * 1.001,
+        "{what}: {left} is left unbalanced"
+    );
+    assert!(
+        (left - balance.residual).abs() < 1e-4,
+        "{what}: {left}, not {}",
+        balance.residual
+    );
+    for ((contact, &force), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
+        assert!(
+            force.length() <= MAX_CONTACT_FORCE,
+            "{what}: {} N",
+            force.length()
+        );
+        let normal = -force.dot(contact.normal);
+        let across = (force + contact.normal * normal).length();
+        assert!(normal >= -1e-5, "{what}: a contact pulls with {normal} N");
+        let slipping = across / contact.friction;
+        let twisting = if torsion == 0.0 {
+            0.0
+        } else {
+            torsion / contact.torsion_radius
+        };
+        let used = (slipping * slipping + twisting * twisting).sqrt();
+        assert!(
+            used <= normal * 1.000_001 + 1e-5,
+            "{what}: {used} of {normal} N used"
+        );
+    }
+}
+
+/// Two opposed contacts carry a weight if and only if each can push with half of it along the edge of its cone.
+#[test]
+fn a_pinch_holds_exactly_what_friction_carries() {
+    let places = [(Vec3::X * 0.03, Vec3::X), (Vec3::NEG_X * 0.03, Vec3::NEG_X)];
+    for friction in [0.34_f32, 0.5, 1.0] {
+        let contacts = contacts_at(&places, friction, 0.004);
+        // Half the weight across, half the weight over friction along the normal.
+        let greatest = 2.0 * MAX_CONTACT_FORCE / (1.0 + 1.0 / (friction * friction)).sqrt() / 9.81;
+        for share in [0.01, 0.2, 0.5, 0.9, 0.99] {
+            let load = load(share * greatest, Vec3::Y, 0.04);
+            let found =
+                solve(&contacts, &load).unwrap_or_else(|| panic!("friction {friction}, share {share}"));
+            assert_sound(&contacts, &load, &found, "pinch");
+            for force in &found.forces {
+                let half = load.mass * 9.81 / 2.0;
+                assert!(
+                    force.x.abs() >= half / friction * (1.0 - 0.05),
+                    "friction {friction}: {force}"
+                );
+                assert!(
+                    (force.y - half).abs() <= half * 0.05,
+                    "friction {friction}: {force}"
+                );
+            }
+        }
+        for share in [1.05, 2.0, 20.0] {
+            assert_eq!(
+                solve(&contacts, &load(share * greatest, Vec3::Y, 0.04)),
+                None,
+                "share {share}"
+            );
+        }
+    }
+}
+
+/// More firmly than friction requires: together, both press with 8 N and five times the least that holds, but neither
+/// with more than half of its strength.
+#[test]
+fn a_pinch_holds_a_light_object_firmly() {
+    let places = [(Vec3::X * 0.03, Vec3::X), (Vec3::NEG_X * 0.03, Vec3::NEG_X)];
+    for friction in [0.34_f32, 0.6, 1.0] {
+        let contacts = contacts_at(&places, friction, 0.004);
+        let found = solve(&contacts, &load(0.1, Vec3::Y, 0.04)).expect("it is light");
+        for force in &found.forces {
+            let firm = (0.5 * (8.0 + 5.0 * 0.1 * 9.81 / friction)).min(13.5);
+            assert!(
+                (force.x.abs() / firm - 1.0).abs() < 0.1,
+                "{force}, not {firm} N across, at friction {friction}"
+            );
+        }
+    }
+}
+
+/// Sum of the normal forces in newtons, and the largest share of friction and torsion that a contact uses.
+fn pressing(contacts: &[SoftContact], balance: &Balance) -> (f32, f32) {
+    let mut sum = 0.0;
+    let mut used = 0.0_f32;
+    for ((contact, &force), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
+        let normal = -force.dot(contact.normal);
+        let rubbing = (force + contact.normal * normal).length() / contact.friction;
+        sum += normal;
+        if normal > 0.01 {
+            used = used.max(rubbing.hypot(torsion / contact.torsion_radius) / normal);
+        }
+    }
+    (sum, used)
+}
+
+/// Here the middle finger may bear no more than a fifteenth of the index finger's force.
+#[test]
+fn digits_press_firmly_even_with_uncomfortable_shares() {
+    let places = [
+        (Vec3::new(-0.003, 0.0, 0.0), Vec3::NEG_X),
+        (Vec3::new(0.003, 0.0, 0.002), Vec3::X),
+        (Vec3::new(0.003, 0.0, -0.03), Vec3::X),
+    ];
+    for mass in [0.02_f32, 0.1] {
+        let contacts = contacts_at(&places, 0.6, 0.0033);
+        let load = load(mass, Vec3::Y, 0.05);
+        let found = solve(&contacts, &load).expect("a pinch holds it");
+        assert_sound(&contacts, &load, &found, "uneven");
+        let (sum, _) = pressing(&contacts, &found);
+        let firm = 8.0 + 5.0 * mass * 9.81 / 0.6;
+        assert!(sum > 0.5 * firm, "{sum} of {firm} N at {mass} kg");
+    }
+}
+
+/// Of 45 %, 70 % and all of friction, the least that allows a firm hold. Fingertips on a wedge need the tangent of half its
+/// angle.
+#[test]
+fn uses_no_more_friction_than_a_firm_hold_needs() {
+    for (degrees, least, most) in [(5.0_f32, 0.0, 0.45), (19.0, 0.45, 0.7), (27.0, 0.7, 1.0)] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let places = [
+            (Vec3::X * 0.01, Vec3::new(cos, 0.0, sin)),
+            (Vec3::NEG_X * 0.01, Vec3::new(-cos, 0.0, sin)),
+        ];
+        let contacts = contacts_at(&places, 0.6, 0.0033);
+        let load = load(0.02, Vec3::Y, 0.05);
+        let found = solve(&contacts, &load).expect("friction is enough");
+        assert_sound(&contacts, &load, &found, "wedge");
+        let (sum, used) = pressing(&contacts, &found);
+        assert!(
+            sum > 0.5 * (8.0 + 5.0 * 0.02 * 9.81 / 0.6),
+            "{sum} N at {degrees} degrees"
+        );
+        assert!(
+            (least..most + 1e-3).contains(&used),
+            "{used} of friction at {degrees} degrees"
+        );
+    }
+}
+
+/// Of weight times lever, which the pads must be wide enough for.
+#[test]
+fn a_pinch_off_the_centre_of_mass_needs_torsion() {
+    let places = [
+        (Vec3::new(0.03, 0.0, 0.01), Vec3::X),
+        (Vec3::new(-0.03, 0.0, 0.01), Vec3::NEG_X),
+    ];
+    let load = load(0.2, Vec3::Y, 0.05);
+    assert_eq!(solve(&contacts_at(&places, 0.6, 0.0), &load), None);
+    let contacts = contacts_at(&places, 0.6, 0.006);
+    let found = solve(&contacts, &load).expect("wide pads hold it");
+    assert_sound(&contacts, &load, &found, "off centre");
+    // About +x: the torsions about the inward normals -x and +x.
+    let about_x = found.torsions[1] - found.torsions[0];
+    let needed = -0.01 * 0.2 * 9.81;
+    assert!((about_x + needed).abs() < 0.1 * needed.abs() || (about_x - needed).abs() < 0.1 * needed.abs());
+}
+
+/// 27 N per contact.
+#[test]
+fn a_tray_holds_up_to_the_force_limit() {
+    let places = [(Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y)];
+    let contacts = contacts_at(&places, 0.5, 0.004);
+    let found = solve(&contacts, &load(2.7, Vec3::Y, 0.04)).expect("26.5 N are possible");
+    assert!((found.forces[0].y - 2.7 * 9.81).abs() < 0.6);
+    assert_eq!(solve(&contacts, &load(2.85, Vec3::Y, 0.04)), None);
+    assert_eq!(solve(&contacts, &load(0.1, Vec3::X, 0.04)), None);
+    assert_eq!(solve(&contacts, &load(0.1, Vec3::NEG_Y, 0.04)), None);
+    assert_eq!(solve(&[], &load(0.1, Vec3::Y, 0.04)), None);
+}
+
+/// Where balance leaves a choice.
+#[test]
+fn forces_take_the_comfortable_shares_of_touching_digits() {
+    // Five contacts below a tray, all at the same place: any distribution balances.
+    let below = (Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y);
+    let contacts = contacts_at(&[below; 5], 0.5, 0.004);
+    let load = load(0.5, Vec3::Y, 0.04);
+    let found = solve(&contacts, &load).expect("a tray holds");
+    let total: f32 = found.forces.iter().map(|force| force.length()).sum();
+    for (force, share) in found.forces.iter().zip([0.25, 0.25, 0.25, 0.125, 0.125]) {
+        assert!(
+            (force.length() / total - share).abs() < 0.02,
+            "{force} of {total}"
+        );
+    }
+    // A thumb against two fingers carries as much as both, and they share evenly.
+    let against = [
+        (Vec3::X * 0.03, Vec3::X),
+        (Vec3::new(-0.03, 0.0, 0.02), Vec3::NEG_X),
+        (Vec3::new(-0.03, 0.0, -0.02), Vec3::NEG_X),
+    ];
+    let contacts = contacts_at(&against, 0.6, 0.004);
+    let found = solve(&contacts, &load).expect("three digits hold it");
+    assert_sound(&contacts, &load, &found, "three");
+    let total: f32 = found.forces.iter().map(|force| force.length()).sum();
+    for (force, share) in found.forces.iter().zip([0.5, 0.25, 0.25]) {
+        assert!(
+            (force.length() / total - share).abs() < 0.03,
+            "{force} of {total}"
+        );
+    }
+}
+
+/// And the residual is that of the answer.
+#[test]
+fn forces_of_random_grasps_keep_every_limit() {
+    let mut random = Random::new(3);
+    let mut buffers = Buffers::default();
+    let (mut held, mut limited) = (0, 0);
+    for case in 0..4000 {
+        let contacts = random.contacts(1 + case % 10);
+        let load = load(random.between(0.02, 4.0), random.direction(), 0.04);
+        let Some(found) = balance(&contacts, &load, &mut buffers) else {
+            continue;
+        };
+        held += 1;
+        limited += u32::from(
+            found
+                .forces
+                .iter()
+                .any(|force| force.length() > 0.99 * MAX_CONTACT_FORCE),
+        );
+        assert_sound(&contacts, &load, &found, &format!("case {case}"));
+    }
+    assert!(held > 800, "only {held} grasps hold");
+    assert!(limited > 20, "only {limited} grasps come to a limit");
+}
+
+/// A search that starts at the friction use of the answer finds the same forces; one that starts above it finds sound
+/// forces, if any hold.
+#[test]
+fn starting_at_a_known_friction_use_changes_no_forces() {
+    let mut random = Random::new(12);
+    let mut buffers = Buffers::default();
+    let mut counts = [0; 3];
+    for case in 0..3000 {
+        let contacts = random.contacts(2 + case % 9);
+        let load = load(random.between(0.02, 2.0), random.direction(), 0.04);
+        let found = balance(&contacts, &load, &mut buffers);
+        for least_use in FrictionUse::ALL {
+            let again = balance_with(&contacts, &load, least_use, &mut buffers);
+            assert_eq!(again.is_some(), found.is_some(), "case {case}, {least_use:?}");
+            let (Some(found), Some(again)) = (&found, again) else {
+                continue;
+            };
+            if least_use <= found.friction_use {
+                assert_eq!(&again, found, "case {case}, {least_use:?}");
+            } else {
+                assert!(again.friction_use >= least_use, "case {case}, {least_use:?}");
+                assert_sound(&contacts, &load, &again, &format!("case {case}, {least_use:?}"));
+            }
+        }
+        if let Some(found) = found {
+            counts[found.friction_use as usize] += 1;
+        }
+    }
+    assert!(counts.iter().all(|&count| count > 30), "{counts:?}");
+}
+
+/// Contacts push at random inside their limits, and gravity balances their sum.
+#[test]
+fn finds_a_balance_where_one_exists_by_construction() {
+    let mut random = Random::new(4);
+    let mut constructed = 0;
+    for case in 0..40_000 {
+        let contacts = random.contacts(2 + case % 7);
+        let mut force = Vec3::ZERO;
+        let mut torque = Vec3::ZERO;
+        for contact in &contacts {
+            let size = random.between(0.0, 5.0);
+            let across = random.direction().reject_from_normalized(contact.normal);
+            let push = (across * contact.friction * random.between(0.0, 0.95) - contact.normal) * size;
+            force += push;
+            torque += contact.position.cross(push);
+        }
+        let weight = force.length();
+        if weight < 0.5 {
+            continue;
+        }
+        // Only a force without torque along it can act through a centre of mass.
+        let up = force / weight;
+        let lever = 0.04;
+        if torque.dot(up).abs() / lever > 0.005 * weight {
+            continue;
+        }
+        let load = Load {
+            mass: weight / 9.81,
+            centre_of_mass: force.cross(torque) / (weight * weight),
+            up,
+            characteristic_length: lever,
+        };
+        constructed += 1;
+        let found = solve(&contacts, &load);
+        assert!(
+            found.is_some(),
+            "case {case}: {} contacts, {weight} N",
+            contacts.len()
+        );
+    }
+    assert!(constructed > 200, "only {constructed} balances");
+}
+
+/// Both whether forces exist and how comfortable they are.
+#[test]
+fn is_invariant_to_rotation_scale_and_order() {
+    let mut random = Random::new(5);
+    let (mut held, mut differing) = (0, 0);
+    for case in 0..3000 {
+        let contacts = random.contacts(3 + case % 5);
+        let load = load(random.between(0.05, 0.6), random.direction(), 0.04);
+        let found = solve(&contacts, &load);
+        let (turned, turned_load) = moved(&contacts, &load, random.rotation(), random.direction());
+        let (larger, larger_load) = scaled(&contacts, &load, 3.0);
+        let mut permuted = contacts.clone();
+        permuted.reverse();
+        let others = [
+            solve(&turned, &turned_load),
+            solve(&larger, &larger_load),
+            solve(&permuted, &load),
+        ];
+        for (other, of) in others.iter().zip([&turned, &larger, &permuted]) {
+            match (&found, other) {
+                (Some(a), Some(b)) => {
+                    let (a, b) = (discomfort(&contacts, a), discomfort(of, b));
+                    assert!((a - b).abs() < 0.02, "case {case}: {a} and {b}");
+                }
+                (None, None) => {}
+                _ => differing += 1,
+            }
+        }
+        held += u32::from(found.is_some());
+    }
+    assert!(held > 500, "only {held} grasps hold");
+    // At the edge of the tolerance, rounding decides.
+    assert!(differing <= 3, "{differing} differ");
+}
+
+fn discomfort(contacts: &[SoftContact], balance: &Balance) -> f32 {
+    let mut totals = [0.0; 5];
+    for (contact, force) in contacts.iter().zip(&balance.forces) {
+        if let Some(digit) = contact.digit {
+            totals[digit.index()] += force.length();
+        }
+    }
+    comfort(totals)
+}
+
+/// It has no comfortable share.
+#[test]
+fn the_palm_carries_what_digits_cannot() {
+    let mut contacts = contacts_at(
+        &[
+            (Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y),
+            (Vec3::new(0.0, 0.02, 0.0), Vec3::Y),
+        ],
+        0.5,
+        0.004,
+    );
+    contacts[0].digit = None;
+    contacts[1].digit = Some(Digit::Index);
+    let load = load(1.0, Vec3::Y, 0.04);
+    let found = solve(&contacts, &load).expect("it lies on the palm");
+    assert_sound(&contacts, &load, &found, "palm");
+    assert!(found.forces[0].y > 9.6);
+}

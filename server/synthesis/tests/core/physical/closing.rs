@@ -1,0 +1,302 @@
+//! The closing of digits, against a plane's closed form and against very small steps.
+
+use glam::Vec3;
+use grasp_synthesis::{
+    base::pose::Pose,
+    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh},
+    model::hand::{
+        DigitAngles,
+        kinematics::{DigitPlane, digit_frames},
+        rig::{AngleRange, DigitLimits, DigitRig},
+    },
+    physical::{
+        closing::{Closing, TOUCH_DEPTH},
+        flexing::Flexing,
+        obstacle::Obstacle,
+        solids::{SOFT_CONTACT, TaperedCapsule, clearance, link_solids},
+    },
+};
+
+use crate::fixtures::random::Random;
+
+const RADII: [f32; 4] = [0.010, 0.009, 0.008, 0.006];
+
+/// How far a touch may be from [`TOUCH_DEPTH`], in metres.
+const TOLERANCE: f32 = 0.0003;
+
+/// A finger of 9 cm along +y whose pad faces +z.
+fn finger() -> DigitRig {
+    DigitRig {
+        wrist_from_base: Pose::IDENTITY,
+        yaw_sign: 1.0,
+        lengths: [0.045, 0.025, 0.020],
+        diameters: [0.020, 0.017, 0.014],
+        limits: DigitLimits {
+            base_yaw: AngleRange::from_degrees(-10.0, 10.0),
+            base_pitch: AngleRange::from_degrees(0.0, 90.0),
+            second_pitch: AngleRange::from_degrees(0.0, 100.0),
+            third_pitch: AngleRange::from_degrees(0.0, 80.0),
+        },
+    }
+}
+
+fn cuboid(low: Vec3, high: Vec3) -> MeshBvh {
+    let corner = |i: u32| {
+        let pick = |bit: u32, low: f32, high: f32| if i >> bit & 1 == 0 { low } else { high };
+        Vec3::new(
+            pick(0, low.x, high.x),
+            pick(1, low.y, high.y),
+            pick(2, low.z, high.z),
+        )
+    };
+    let faces = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let triangles = faces
+        .iter()
+        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+        .collect();
+    let mesh = TriangleMesh::new((0..8).map(corner).collect(), triangles).expect("a box is a mesh");
+    MeshBvh::build(mesh)
+}
+
+fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Closing<'a> {
+    Closing {
+        surface,
+        flexing: Flexing {
+            digit,
+            base_yaw: 0.0,
+            bend_ratio,
+        },
+        radii: RADII,
+        plane: DigitPlane::new(digit, Pose::IDENTITY, 0.0),
+        preshape: 0.0,
+        obstacles: &[],
+    }
+}
+
+/// The ends of the links' balls, with their radii, at some angles.
+fn balls(digit: &DigitRig, wrist: Pose, angles: DigitAngles) -> Vec<(Vec3, f32)> {
+    let frames = digit_frames(digit, wrist, angles);
+    let [a, b, c] = frames.links.map(|link| link.position);
+    link_solids([a, b, c, frames.tip], RADII)
+        .iter()
+        .flat_map(|link| [(link.start, link.start_radius), (link.end, link.end_radius)])
+        .collect()
+}
+
+#[test]
+fn the_tip_meets_a_plane_where_the_closed_form_does() {
+    let digit = finger();
+    for height in [0.02, 0.035, 0.05] {
+        // So large that only its lower face can be met.
+        let plate = cuboid(Vec3::new(-0.5, -0.5, height), Vec3::new(0.5, 0.5, height + 0.05));
+        for ratio in [0.7, 1.0, 1.42] {
+            let closed = closing(&plate, &digit, ratio)
+                .close()
+                .expect("the finger starts free");
+            assert!(closed.touches[2], "{closed:?}");
+            // Depth of the deepest ball past the plane at an angle of the sweep.
+            let depth = |way: f32| {
+                let second = (ratio * way).min(digit.limits.second_pitch.max);
+                let third = (ratio * way * DigitAngles::THIRD_PITCH_SHARE).min(digit.limits.third_pitch.max);
+                let angles = DigitAngles {
+                    base_yaw: 0.0,
+                    base_pitch: way,
+                    second_pitch: second,
+                    third_pitch: third,
+                };
+                let deepest = balls(&digit, Pose::IDENTITY, angles)
+                    .into_iter()
+                    .map(|(centre, radius)| centre.z + radius - height);
+                deepest.fold(f32::NEG_INFINITY, f32::max)
+            };
+            let mut way = 0.0;
+            while depth(way) < TOUCH_DEPTH {
+                way += 1e-4;
+            }
+            // A fifth of a millimetre is 0.2° at the finger's length.
+            assert!(
+                (closed.angles.base_pitch - way).abs() < 0.005,
+                "{} at {way}",
+                closed.angles.base_pitch
+            );
+        }
+    }
+}
+
+#[test]
+fn joints_beyond_a_touching_link_keep_closing() {
+    let digit = finger();
+    // A bar across the first link: the others wrap around it.
+    let bar = cuboid(Vec3::new(-0.1, 0.015, 0.014), Vec3::new(0.1, 0.030, 0.029));
+    let closed = closing(&bar, &digit, 1.0)
+        .close()
+        .expect("the finger starts free");
+    assert!(closed.touches[0]);
+    let angles = closed.angles;
+    assert!(angles.base_pitch < 0.3, "the first joint is held: {angles:?}");
+    assert!(
+        closed.touches[1] || closed.touches[2] || angles.second_pitch > 1.7,
+        "the others close until they touch or reach their limits: {angles:?}"
+    );
+    assert!(angles.second_pitch > angles.base_pitch + 0.3, "{angles:?}");
+}
+
+#[test]
+fn a_digit_that_starts_inside_does_not_close() {
+    let digit = finger();
+    let around_the_tip = cuboid(Vec3::new(-0.02, 0.07, -0.02), Vec3::new(0.02, 0.12, 0.02));
+    assert!(closing(&around_the_tip, &digit, 1.0).close().is_none());
+    // Nor where a sheet thinner than the finger cuts through it.
+    let sheet = cuboid(Vec3::new(-0.05, 0.05, -0.05), Vec3::new(0.05, 0.0505, 0.05));
+    assert!(closing(&sheet, &digit, 1.0).close().is_none());
+}
+
+#[test]
+fn a_relaxed_digit_bends_as_far_as_requested_and_stays_clear() {
+    let digit = finger();
+    let far = cuboid(Vec3::splat(0.5), Vec3::splat(0.6));
+    let free = closing(&far, &digit, 1.0).relax(1.15);
+    assert!((free.flexion() - 1.15).abs() < 1e-3, "{}", free.flexion());
+    let plate = cuboid(Vec3::new(-0.5, -0.5, 0.02), Vec3::new(0.5, 0.5, 0.07));
+    let blocked = closing(&plate, &digit, 1.0).relax(1.15);
+    assert!(blocked.flexion() < 1.0);
+    let nearest = blocked
+        .links
+        .iter()
+        .map(|link| clearance(link, &plate, 1.0))
+        .fold(1.0, f32::min);
+    assert!((0.0005..0.0015).contains(&nearest), "{nearest} m of room");
+}
+
+#[test]
+fn closing_passes_through_nothing() {
+    let digit = finger();
+    let mut random = Random::new(20);
+    let mut closed_count = 0;
+    for _ in 0..200 {
+        let half = Vec3::new(
+            random.between(0.002, 0.02),
+            random.between(0.002, 0.02),
+            random.between(0.0005, 0.02),
+        );
+        let box_mesh = cuboid(-half, half);
+        let wrist = Pose {
+            position: random.direction() * random.between(0.03, 0.08),
+            orientation: random.rotation(),
+        };
+        let ratio = [0.7, 1.0, 1.42][random.index(3)];
+        let closing = Closing {
+            plane: DigitPlane::new(&digit, wrist, 0.0),
+            ..closing(&box_mesh, &digit, ratio)
+        };
+        let Some(closed) = closing.close() else { continue };
+        closed_count += 1;
+        let deepest = |links: &[_]| {
+            let clearances = links.iter().map(|link| clearance(link, &box_mesh, 1.0));
+            clearances.fold(1.0, f32::min)
+        };
+        assert!(deepest(&closed.links) > -(TOUCH_DEPTH + TOLERANCE), "{closed:?}");
+        // Until the first joint stops, all three move together: there must be room at every step.
+        let steps = (closed.angles.base_pitch / 0.01) as usize;
+        for step in 0..steps {
+            let way = step as f32 * 0.01;
+            let angles = DigitAngles {
+                base_yaw: 0.0,
+                base_pitch: way,
+                second_pitch: (ratio * way).min(digit.limits.second_pitch.max),
+                third_pitch: (ratio * way * DigitAngles::THIRD_PITCH_SHARE).min(digit.limits.third_pitch.max),
+            };
+            let frames = digit_frames(&digit, wrist, angles);
+            let [a, b, c] = frames.links.map(|link| link.position);
+            let links = link_solids([a, b, c, frames.tip], RADII);
+            assert!(
+                deepest(&links) > -(TOUCH_DEPTH + TOLERANCE),
+                "passed at {way}: {closed:?}"
+            );
+        }
+        for (touches, link) in closed.touches.iter().zip(&closed.links) {
+            let gap = clearance(link, &box_mesh, 1.0);
+            assert!(!touches || gap < TOLERANCE, "a touch {gap} m away");
+        }
+    }
+    assert!(closed_count > 100, "{closed_count} closed");
+}
+
+/// The distance between two capsules' skins by brute force: the closest pair of many balls on both.
+fn distance_by_balls(a: &TaperedCapsule, b: &TaperedCapsule) -> f32 {
+    const SPHERES: usize = 60;
+    let shares = || (0..=SPHERES).map(|i| i as f32 / SPHERES as f32);
+    shares()
+        .flat_map(|s| shares().map(move |t| (s, t)))
+        .map(|(s, t)| a.at(s).distance(b.at(t)) - a.radius_at(s) - b.radius_at(t))
+        .fold(f32::INFINITY, f32::min)
+}
+
+#[test]
+fn a_digit_stops_at_other_parts_of_the_hand() {
+    let digit = finger();
+    let far = cuboid(Vec3::splat(0.5), Vec3::splat(0.6));
+    let free = closing(&far, &digit, 1.0).close().expect("nothing is near");
+    let mut random = Random::new(31);
+    let mut stopped = 0;
+    for _ in 0..200 {
+        let middle = Vec3::new(
+            random.between(-0.02, 0.02),
+            random.between(0.0, 0.09),
+            random.between(0.02, 0.09),
+        );
+        let half = random.direction() * random.between(0.005, 0.03);
+        let part = TaperedCapsule::new(middle - half, middle + half, 0.009, 0.007);
+        let first_link = random.index(2);
+        let obstacles = [Obstacle::new(part, first_link)];
+        let closing = Closing {
+            obstacles: &obstacles,
+            ..closing(&far, &digit, 1.0)
+        };
+        let Some(closed) = closing.close() else { continue };
+        assert_eq!(closed.touches, [false; 3], "the object is far away");
+        let nearest = closed.links[first_link..]
+            .iter()
+            .map(|link| distance_by_balls(link, &part))
+            .fold(f32::INFINITY, f32::min);
+        assert!(
+            nearest >= -SOFT_CONTACT,
+            "{nearest} m from {part:?}, at {:?}",
+            closed.angles
+        );
+        // A digit that stops short must be touching its obstacle.
+        if closed.flexion() < free.flexion() - 0.01 {
+            stopped += 1;
+            assert!(nearest < 0.0005, "{nearest} m from {part:?}");
+        }
+    }
+    assert!(stopped > 50, "{stopped}");
+}
+
+#[test]
+fn a_preshaped_digit_avoids_what_an_open_one_would_meet() {
+    let digit = finger();
+    let around_the_tip = cuboid(Vec3::new(-0.02, 0.08, -0.02), Vec3::new(0.02, 0.12, 0.02));
+    let opened = closing(&around_the_tip, &digit, 1.0);
+    assert!(opened.close().is_none());
+    let preshaped = Closing {
+        preshape: 0.4,
+        ..opened
+    };
+    let closed = preshaped.close().expect("the tip is clear of it");
+    assert!(closed.flexion() >= opened.flexing.closed_by(0.4).base_pitch);
+    assert!(
+        opened
+            .relax(0.3)
+            .links
+            .iter()
+            .all(|link| clearance(link, &around_the_tip, 1.0) > 0.0)
+    );
+}

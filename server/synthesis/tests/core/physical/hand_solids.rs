@@ -1,0 +1,354 @@
+//! Hands as solids against the built-in skins, and tracked hands against their joints.
+
+use glam::{Quat, Vec3};
+use grasp_assets::hands::Hand;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        DigitAngles, HandPose, Handedness,
+        joints::{HandJoints, Joint, index},
+    },
+    physical::{
+        grip::GIVER_CLEARANCE,
+        solids::{
+            HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, TrackedPalm, TrackedSolids,
+            self_clearance,
+        },
+    },
+};
+
+use crate::fixtures::{
+    hands::{all_hands, built_in_hand},
+    random::Random,
+};
+
+/// Below this height, in metres from the wrist's crease, the skin of the forearm ends in a rounded stump.
+const STUMP: f32 = -0.012;
+
+fn posed(digits: [DigitAngles; 5]) -> HandPose {
+    HandPose {
+        frame_from_wrist: Pose::IDENTITY,
+        digits,
+    }
+}
+
+/// A hand about to take something: fingers bent increasingly from index to little finger, thumb abducted.
+fn relaxed() -> [DigitAngles; 5] {
+    [0.0_f32, 15.0, 20.0, 25.0, 30.0].map(|bend| {
+        if bend == 0.0 {
+            DigitAngles::coupled(35_f32.to_radians(), 0.0, 20_f32.to_radians())
+        } else {
+            DigitAngles::coupled(0.0, bend.to_radians(), bend.to_radians())
+        }
+    })
+}
+
+/// Evenly spread directions on a Fibonacci lattice.
+fn directions() -> impl Iterator<Item = Vec3> {
+    const COUNT: usize = 300;
+    const GOLDEN_ANGLE: f32 = 2.399_963;
+    (0..COUNT).map(|i| {
+        let z = 1.0 - (2 * i + 1) as f32 / COUNT as f32;
+        let (sine, cosine) = (GOLDEN_ANGLE * i as f32).sin_cos();
+        (1.0 - z * z).sqrt() * Vec3::new(cosine, sine, 0.0) + Vec3::Z * z
+    })
+}
+
+fn signed_distance(solids: &HandSolids, point: Vec3) -> f32 {
+    let distances = solids.iter().map(|solid| solid.signed_distance(point));
+    distances.fold(f32::INFINITY, f32::min)
+}
+
+/// The 95th percentile of the distances between skin and solids, in metres, over the vertices of a part.
+fn misfit(hand: &Hand, digits: [DigitAngles; 5], is_of: impl Fn(usize, Vec3) -> bool) -> f32 {
+    let pose = posed(digits);
+    let solids = HandSolids::of_pose(&hand.rig, &pose);
+    let skin = hand.skin.posed(&HandJoints::of_pose(&hand.rig, &pose));
+    let mut distances: Vec<f32> = skin
+        .iter()
+        .enumerate()
+        .filter(|&(vertex, &point)| point.y > STUMP && is_of(vertex, point))
+        .map(|(_, &point)| signed_distance(&solids, point).abs())
+        .collect();
+    assert!(distances.len() > 300, "only {} vertices", distances.len());
+    distances.sort_by(f32::total_cmp);
+    distances[distances.len() * 95 / 100]
+}
+
+/// The palm's share of a vertex' weights.
+fn palm_share(hand: &Hand, vertex: usize) -> f32 {
+    let rows = hand.skin.joint_indices[vertex]
+        .iter()
+        .zip(hand.skin.weights[vertex]);
+    rows.filter(|&(&joint, _)| joint < 3 || index::FIRST_OF_DIGIT.contains(&usize::from(joint)))
+        .map(|(_, weight)| weight)
+        .sum()
+}
+
+#[test]
+fn solids_end_at_the_skin() {
+    for hand in all_hands() {
+        // A millimetre of an adult's hand at the scale of this one.
+        let mm = 1e-3 * hand.rig.reach / 0.19;
+        for digits in [hand.rig.stretched(), relaxed()] {
+            let whole = misfit(hand, digits, |_, _| true);
+            assert!(whole < 1.9 * mm, "{}: {} mm", hand.rig.name, whole / mm);
+            let palm = misfit(hand, digits, |vertex, point| {
+                point.z > 0.002 && palm_share(hand, vertex) > 0.5
+            });
+            assert!(palm < 2.3 * mm, "{}: {} mm at the palm", hand.rig.name, palm / mm);
+        }
+    }
+}
+
+#[test]
+fn solids_of_joints_match_those_of_the_pose() {
+    let hand = built_in_hand("adult", Handedness::Left);
+    let pose = HandPose {
+        frame_from_wrist: Pose::new(Vec3::new(0.1, 0.2, -0.3), Quat::from_rotation_x(1.0)),
+        digits: relaxed(),
+    };
+    let of_pose = HandSolids::of_pose(&hand.rig, &pose);
+    let elsewhere = Pose::new(Vec3::new(-0.4, 0.0, 0.2), Quat::from_rotation_y(2.0));
+    let joints = HandJoints::of_pose(&hand.rig, &pose).transformed(elsewhere);
+    let of_joints = HandSolids::of_joints(&joints);
+    for (expected, found) in of_pose.iter().zip(of_joints.iter()) {
+        let expected = expected.transformed(elsewhere);
+        assert!(
+            expected.start.distance(found.start) < 1e-6,
+            "{expected:?} {found:?}"
+        );
+        assert!(expected.end.distance(found.end) < 1e-6, "{expected:?} {found:?}");
+        let radii = [
+            expected.start_radius - found.start_radius,
+            expected.end_radius - found.end_radius,
+        ];
+        assert!(radii.iter().all(|off| off.abs() < 1e-6), "{expected:?} {found:?}");
+    }
+}
+
+/// Except for a dip between the bases of neighbouring metacarpals that is shallower than the clearance kept from a giver,
+/// and nowhere thinner than fitted.
+#[test]
+fn tracked_hand_solids_are_as_thick_as_the_joints_report() {
+    let hand = built_in_hand("adult", Handedness::Right);
+    for more in [0.0, 0.004, 0.02] {
+        let mut joints = HandJoints::of_pose(&hand.rig, &posed(relaxed()));
+        for joint in &mut joints.joints {
+            joint.radius += more;
+        }
+        let fitted = HandSolids::of_joints(&joints);
+        let tracked = TrackedSolids::of_joints(&joints);
+        let solids: Vec<TaperedCapsule> = tracked.iter().copied().collect();
+        // The deepest dip below the balls swept from joint to joint.
+        let dip = |[a, b]: [Joint; 2]| {
+            let mut deepest = f32::NEG_INFINITY;
+            for step in 0..=10 {
+                let along = step as f32 / 10.0;
+                let place = a.pose.position.lerp(b.pose.position, along);
+                let radius = a.radius + (b.radius - a.radius) * along;
+                for out in directions() {
+                    let skin = place + out * radius;
+                    let distances = solids.iter().map(|solid| solid.signed_distance(skin));
+                    deepest = deepest.max(distances.fold(f32::INFINITY, f32::min));
+                }
+            }
+            deepest
+        };
+        let bone = |pair: [usize; 2]| pair.map(|joint| joints.joints[joint]);
+        // OpenXR's metacarpals of the four fingers; from knuckle to knuckle; from the wrist to the metacarpals' bases.
+        let along = [[6, 7], [11, 12], [16, 17], [21, 22]];
+        let knuckles = [[7, 12], [12, 17], [17, 22]];
+        let from_wrist = [[1, 2], [1, 6], [1, 11], [1, 16], [1, 21]];
+        for pair in along.into_iter().chain(knuckles).chain(from_wrist) {
+            let dip = dip(bone(pair));
+            assert!(dip < 1e-5, "{more} more, {pair:?}: {dip}");
+        }
+        for pair in [[6, 11], [11, 16], [16, 21]] {
+            let dip = dip(bone(pair));
+            assert!(dip < 0.8 * GIVER_CLEARANCE, "{more} more, {pair:?}: {dip}");
+        }
+        // OpenXR's z of the wrist points away from the fingers.
+        let wrist = joints.joints[index::WRIST];
+        let mut behind = wrist;
+        behind.pose.position += wrist.pose.orientation * Vec3::Z * 0.25;
+        let dip = dip([wrist, behind]);
+        assert!(dip < 1e-5, "{more} more, forearm: {dip}");
+
+        for solid in &fitted.palm {
+            for along in [0.0, 0.3, 1.0] {
+                let (middle, radius) = (solid.at(along), solid.radius_at(along));
+                let depths = tracked.palm.iter().map(|solid| -solid.signed_distance(middle));
+                assert!(depths.fold(f32::NEG_INFINITY, f32::max) >= radius - 1e-6);
+            }
+        }
+        assert_eq!(tracked.hand, fitted);
+    }
+}
+
+/// A receiver is as thick as a giver with the same joints.
+#[test]
+fn tracked_hand_solids_of_a_rig_match_those_of_its_joints() {
+    for hand in all_hands() {
+        let pose = HandPose {
+            frame_from_wrist: Pose::new(Vec3::new(0.1, 0.2, -0.3), Quat::from_rotation_x(1.0)),
+            digits: relaxed(),
+        };
+        let fitted = HandSolids::of_pose(&hand.rig, &pose);
+        let way = Vec3::new(0.01, -0.02, 0.03);
+        let of_rig = TrackedSolids::of_rig(&hand.rig, pose.frame_from_wrist, &fitted).moved(way);
+        let elsewhere = HandPose {
+            frame_from_wrist: Pose::new(
+                pose.frame_from_wrist.position + way,
+                pose.frame_from_wrist.orientation,
+            ),
+            ..pose
+        };
+        let of_joints = TrackedSolids::of_joints(&HandJoints::of_pose(&hand.rig, &elsewhere));
+        assert_eq!(of_rig.iter().count(), of_joints.iter().count());
+        for (ours, theirs) in of_rig.iter().zip(of_joints.iter()) {
+            assert!(ours.start.distance(theirs.start) < 1e-6, "{ours:?} {theirs:?}");
+            assert!(ours.end.distance(theirs.end) < 1e-6, "{ours:?} {theirs:?}");
+            let off =
+                (ours.start_radius - theirs.start_radius).abs() + (ours.end_radius - theirs.end_radius).abs();
+            assert!(off < 1e-6, "{ours:?} {theirs:?}");
+        }
+    }
+}
+
+/// The palm's skin is swept by balls from joint to joint, with the joints' radii.
+#[test]
+fn distances_to_a_tracked_palm_match_its_swept_balls() {
+    const STEPS: usize = 200;
+    let hand = built_in_hand("adult", Handedness::Right);
+    let joints = HandJoints::of_pose(&hand.rig, &posed(relaxed()));
+    let metacarpals = [(6, 7), (11, 12), (16, 17), (21, 22)];
+    let across = [(6, 11), (11, 16), (16, 21), (7, 12), (12, 17), (17, 22)];
+    let from_wrist = [(1, 2), (1, 6), (1, 11), (1, 16), (1, 21)];
+    let bones = metacarpals.iter().chain(&across).chain(&from_wrist);
+    let balls: Vec<(Vec3, f32)> = bones
+        .flat_map(|&(a, b)| {
+            let [a, b] = [a, b].map(|joint| joints.joints[joint]);
+            (0..=STEPS).map(move |step| {
+                let along = step as f32 / STEPS as f32;
+                (
+                    a.pose.position.lerp(b.pose.position, along),
+                    a.radius + (b.radius - a.radius) * along,
+                )
+            })
+        })
+        .collect();
+    let mut random = Random::new(31);
+    let middle = joints.joints[11].pose.position;
+    for _ in 0..300 {
+        let point = middle + 0.08 * random.in_cube();
+        let expected = balls
+            .iter()
+            .map(|(ball, radius)| ball.distance(point) - radius)
+            .fold(f32::INFINITY, f32::min);
+        let found = TrackedPalm::of_joints(&joints).distance_of_skin(point);
+        assert!(
+            (found - expected.abs()).abs() < 3e-4,
+            "{point}: {found}, not {expected}"
+        );
+    }
+}
+
+#[test]
+fn solids_of_left_hands_mirror_those_of_right_hands() {
+    let flip = |point: Vec3| point * Vec3::new(-1.0, 1.0, 1.0);
+    for rig in ["thesis", "adult"] {
+        let [left, right] = [Handedness::Left, Handedness::Right]
+            .map(|side| HandSolids::of_pose(&built_in_hand(rig, side).rig, &posed(relaxed())));
+        let mut mirrored: Vec<TaperedCapsule> = right.iter().copied().collect();
+        for solid in &mut mirrored {
+            (solid.start, solid.end) = (flip(solid.start), flip(solid.end));
+        }
+        // The forearm's two solids change sides.
+        let forearm = mirrored.len() - 2;
+        mirrored.swap(forearm, forearm + 1);
+        for (expected, found) in mirrored.iter().zip(left.iter()) {
+            assert!(
+                expected.start.distance(found.start) < 1e-5,
+                "{expected:?} {found:?}"
+            );
+            assert!(expected.end.distance(found.end) < 1e-5, "{expected:?} {found:?}");
+        }
+    }
+}
+
+#[test]
+fn relaxed_hands_do_not_touch_themselves() {
+    for hand in all_hands() {
+        for digits in [hand.rig.stretched(), relaxed()] {
+            let solids = HandSolids::of_pose(&hand.rig, &posed(digits));
+            let clearance = self_clearance(&solids);
+            assert!(clearance > 0.0, "{}: {clearance}", hand.rig.name);
+        }
+    }
+}
+
+#[test]
+fn fingers_through_fingers_or_the_palm_are_detected() {
+    let hand = built_in_hand("adult", Handedness::Right);
+    let clearance_of = |digits| self_clearance(&HandSolids::of_pose(&hand.rig, &posed(digits)));
+    let mut crossed = hand.rig.stretched();
+    crossed[1].base_yaw = 20_f32.to_radians();
+    crossed[2].base_yaw = -20_f32.to_radians();
+    assert!(clearance_of(crossed) < -0.005);
+    let mut thumb_through = hand.rig.stretched();
+    // Beyond its limits: across the palm at the height of the metacarpals.
+    thumb_through[0] = DigitAngles::coupled(0.0, 60_f32.to_radians(), 40_f32.to_radians());
+    assert!(clearance_of(thumb_through) < -0.005);
+    // As deep as the deepest pair, less the soft flesh.
+    let mut solids = HandSolids::of_pose(&hand.rig, &posed(crossed));
+    for [first, ..] in &mut solids.phalanges[1..] {
+        // A knuckle shares its flesh with its neighbour: it counts as 3 % thicker than the finger's end.
+        assert!(first.start_radius > 1.1 * first.end_radius);
+        first.start_radius = 1.03 * first.end_radius;
+    }
+    let deepest = solids.phalanges[1]
+        .iter()
+        .flat_map(|a| solids.phalanges[2].iter().map(|b| a.distance(b)))
+        .fold(f32::INFINITY, f32::min);
+    assert!((clearance_of(crossed) - deepest - SOFT_CONTACT).abs() < 1e-6);
+}
+
+#[test]
+fn distances_between_hands_match_all_pairs() {
+    let (adult, thesis) = (
+        &built_in_hand("adult", Handedness::Right).rig,
+        &built_in_hand("thesis", Handedness::Left).rig,
+    );
+    let mut random = Random::new(9);
+    for i in 0..300 {
+        let ours = posed(random.angles(adult));
+        let (place, turn) = (0.25 * random.in_cube(), random.rotation());
+        let theirs = HandPose {
+            frame_from_wrist: Pose::new(place, turn),
+            digits: random.angles(thesis),
+        };
+        for [(rig, pose), (giver_rig, giver_pose)] in [
+            [(adult, &ours), (thesis, &theirs)],
+            [(thesis, &theirs), (adult, &ours)],
+        ] {
+            let receiver = HandSolids::of_pose(rig, pose);
+            let receiver = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &receiver);
+            let giver = TrackedSolids::of_joints(&HandJoints::of_pose(giver_rig, giver_pose));
+            let brute = receiver
+                .iter()
+                .flat_map(|a| giver.iter().map(|b| a.distance(b)))
+                .fold(f32::INFINITY, f32::min);
+            let giver = PreparedHand::new(&giver);
+            let clearance = giver.clearance(&receiver, f32::NEG_INFINITY);
+            let least = giver.least_distance(receiver.iter(), 0.001, f32::NEG_INFINITY);
+            for (found, expected) in [(clearance, brute), (least, brute.min(0.001))] {
+                let found = found.expect("nothing is required");
+                assert!(
+                    (found - expected).abs() < 1e-6,
+                    "{i}: {found} instead of {expected}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Physical validity: closing digits, hands as solids, force balance and closure.
+
+mod balance;
+mod closing;
+mod closure;
+mod hand_solids;
+mod prepared_hand;

@@ -1,0 +1,6 @@
+//! Where hands are placed.
+
+mod oppositions;
+mod placement_cache;
+mod success_prior;
+mod transferred_grips;

@@ -1,0 +1,141 @@
+//! Hands made to be of a type, and implausible hands.
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::{
+        grasp::Contact,
+        grasp_type::{GraspType, LEAST_CONFIDENCE},
+        hand::{Digit, HandPart, Phalanx},
+    },
+};
+use proptest::prelude::*;
+
+use super::{
+    cases::{THUMB_BELOW_TIPS, alike, cases, pads, rod, v},
+    made_grasps::{MIDDLE, Shape, held},
+};
+use Digit::{Index, Little, Middle, Ring, Thumb};
+use Phalanx::Third;
+
+#[test]
+fn canonical_grasps_get_their_types() {
+    let mut named = Vec::new();
+    for (expected, held) in cases() {
+        let found = held.classify();
+        assert_eq!(found.grasp_type, Some(expected), "{found:?}");
+        assert!(found.confidence >= LEAST_CONFIDENCE, "{expected:?}: {found:?}");
+        named.push(expected);
+    }
+    named.sort();
+    assert_eq!(named, GraspType::ALL);
+}
+
+#[test]
+fn types_do_not_depend_on_side_size_or_pose_of_the_hand() {
+    let turned = Pose::new(
+        Vec3::new(0.3, -1.2, 0.7),
+        Quat::from_axis_angle(Vec3::new(0.48, 0.6, 0.64), 2.2),
+    );
+    for (expected, held) in cases() {
+        for (how, other) in [
+            ("mirrored", held.mirrored()),
+            ("larger", held.scaled(1.4)),
+            ("smaller", held.scaled(0.6)),
+            ("moved", held.moved(turned)),
+            ("all", held.scaled(1.2).mirrored().moved(turned)),
+        ] {
+            let found = other.classify();
+            assert_eq!(found.grasp_type, Some(expected), "{how}: {found:?}");
+            let change = found.confidence - held.classify().confidence;
+            assert!(change.abs() < 1e-2, "{expected:?} {how}: {change}");
+        }
+    }
+}
+
+#[test]
+fn an_index_finger_that_only_points_is_no_extension_grip() {
+    let along = cases()
+        .into_iter()
+        .find(|(expected, _)| *expected == GraspType::IndexFingerExtension);
+    let (_, mut held) = along.expect("every type has a case");
+    held.contacts
+        .retain(|contact| contact.part.digit() != Some(Index));
+    let found = held.classify();
+    assert_ne!(
+        found.grasp_type,
+        Some(GraspType::IndexFingerExtension),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn implausible_grasps_have_no_type() {
+    let pinch = [0.0, 55.0, 45.0, 20.0];
+    let thumb = (Thumb, Third, MIDDLE);
+    let with = |fingers: &[Digit]| {
+        let fingers = fingers.iter().map(|&digit| (digit, Third, MIDDLE));
+        let touching: Vec<_> = std::iter::once(thumb).chain(fingers).collect();
+        held(
+            alike(THUMB_BELOW_TIPS, pinch),
+            rod(100.0, 57.0, 5.0),
+            &touching,
+            None,
+        )
+    };
+    // With neighbouring fingers, the same hand has a type.
+    assert_eq!(
+        with(&[Index, Middle]).classify().grasp_type,
+        Some(GraspType::Prismatic2Finger)
+    );
+    for fingers in [&[][..], &[Ring], &[Little], &[Ring, Little], &[Index, Little]] {
+        let found = with(fingers).classify();
+        assert_eq!(found.grasp_type, None, "{fingers:?}: {found:?}");
+    }
+    // Skipping a finger costs confidence.
+    for (skipping, whole) in [
+        (&[Index, Ring][..], &[Index, Middle][..]),
+        (&[Index, Ring, Little], &[Index, Middle, Ring]),
+    ] {
+        let [skipping, whole] = [skipping, whole].map(|fingers| with(fingers).classify().confidence);
+        assert!(skipping < 0.5 * whole, "{skipping}, {whole}");
+    }
+
+    let mut no_thumb = with(&[Index, Middle]);
+    no_thumb.contacts.remove(0);
+    assert_eq!(no_thumb.classify().grasp_type, None);
+
+    // Thumb and fingers push the same way on one side of a plate.
+    let plate = Shape::Plate(v(0.0, 40.0, 0.0), Vec3::Y, 2.0);
+    let same_side = held(alike(THUMB_BELOW_TIPS, pinch), plate, &pads(4), None);
+    assert_eq!(same_side.classify().grasp_type, None);
+
+    let nothing = held(alike(THUMB_BELOW_TIPS, pinch), plate, &[], None).classify();
+    assert_eq!((nothing.grasp_type, nothing.confidence), (None, 0.0));
+}
+
+proptest! {
+    /// For random angles and contacts.
+    #[test]
+    fn confidence_is_a_share_and_decides_whether_there_is_a_type(
+        angles in prop::array::uniform5(prop::array::uniform4(-90.0..120.0_f32)),
+        touches in prop::collection::vec((0..16_usize, prop::array::uniform6(-0.2..0.2_f32)), 0..20),
+    ) {
+        let mut held = held(angles, rod(0.0, 0.0, 1.0), &[], None);
+        held.contacts = touches
+            .into_iter()
+            .map(|(part, [x, y, z, nx, ny, nz])| Contact {
+                position: Vec3::new(x, y, z),
+                normal: Vec3::new(nx, ny, nz).normalize_or(Vec3::Z),
+                triangle: 0,
+                part: match part {
+                    15 => HandPart::Palm,
+                    link => HandPart::Phalanx(Digit::ALL[link / 3], Phalanx::ALL[link % 3]),
+                },
+            })
+            .collect();
+        let found = held.classify();
+        prop_assert!((0.0..=1.0).contains(&found.confidence), "{found:?}");
+        prop_assert_eq!(found.grasp_type.is_some(), found.confidence >= LEAST_CONFIDENCE);
+    }
+}

@@ -1,0 +1,4 @@
+//! Grasp types, and how far a held object gives way.
+
+mod grasp_types;
+mod stiffness;

@@ -1,0 +1,392 @@
+//! The ways to grasps on the built-in objects, checked at many moments of the motion.
+
+use std::sync::{Arc, LazyLock};
+
+use glam::Vec3;
+use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
+use grasp_synthesis::{
+    base::pose::Pose,
+    known::{growth::Growth, recheck::Recheck},
+    model::{
+        constraints::ApproachCone,
+        grasp::{Grasp, KeyFrame, Stage},
+        hand::{DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
+        holdout::Holdout,
+        object::GraspObject,
+    },
+    physical::{
+        grip::{DEEPEST, GIVER_CLEARANCE, Gripper},
+        scene::Presented,
+        solids::{HandSolids, TrackedSolids, clearance, self_clearance},
+    },
+    search::key_frames::{APPROACH_DISTANCE, OPEN_CLEARANCE, key_frames},
+};
+
+use crate::fixtures::{
+    atlases::grown_to,
+    hands::{adult, right},
+    holdouts::floating,
+    meshes,
+    objects::{OBJECT_NAMES, object_of},
+    proposals::object_scene,
+};
+
+/// Rounding of distances, in metres, and the accuracy of a way.
+const TOLERANCE: f32 = 0.00015;
+
+/// Grips tried per object.
+const GRIPS: usize = 120;
+
+/// Moments checked per motion: fingertips move about half a millimetre between them.
+const MOMENTS: usize = 120;
+
+/// Ways followed moment by moment per holdout: following takes far longer than planning.
+const FOLLOWED: usize = 4;
+
+/// A grasp on a holdout, and the way to it.
+struct Planned {
+    name: String,
+    holdout: Holdout,
+    grasp: Grasp,
+    way: Option<[KeyFrame; 3]>,
+}
+
+/// Grasps on a holdout, and their ways.
+fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Planned> {
+    let scene = object_scene(&holdout.object);
+    let presented = Presented::of(holdout);
+    let mut gripper = Gripper::default();
+    let atlas = grips.atlas();
+    let asked = Recheck::new(&scene, rig, &presented);
+    let grasps = atlas
+        .entries()
+        .iter()
+        .filter_map(|entry| asked.hold(entry, &entry.tracked_solids(rig), &mut gripper));
+    grasps
+        .map(|grasp| Planned {
+            name: name.to_owned(),
+            holdout: holdout.clone(),
+            way: key_frames(&scene, &presented, rig, None, &grasp),
+            grasp,
+        })
+        .collect()
+}
+
+/// Grasps on the built-in holdouts, and on the same objects floating freely.
+static PLANNED: LazyLock<Vec<Planned>> = LazyLock::new(|| {
+    let rig = right();
+    let mut planned = Vec::new();
+    for object in OBJECT_NAMES {
+        let held = |holdout: &&BuiltInHoldout| holdout.object == object;
+        let first = holdouts().iter().find(held).expect("every object has holdouts");
+        let first = first.to_holdout().expect("the built-in holdout is sound");
+        let grips = grown_to(&first.object, rig, GRIPS);
+        for holdout in holdouts().iter().filter(held) {
+            let name = &holdout.name;
+            let holdout = holdout.to_holdout().expect("the built-in holdout is sound");
+            planned.extend(plan(name, &holdout, &grips, rig));
+        }
+        let free = Holdout {
+            presenting_hand: None,
+            ..first.clone()
+        };
+        planned.extend(plan(object, &free, &grips, rig));
+    }
+    planned
+});
+
+/// The first ways of each holdout.
+fn followed() -> impl Iterator<Item = (&'static Planned, &'static [KeyFrame; 3])> {
+    let mut last = ("", 0);
+    PLANNED
+        .iter()
+        .filter_map(|planned| Some((planned, planned.way.as_ref()?)))
+        .filter(move |(planned, _)| {
+            last = if planned.name == last.0 {
+                (last.0, last.1 + 1)
+            } else {
+                (&planned.name, 0)
+            };
+            last.1 < FOLLOWED
+        })
+}
+
+/// Signed distance of the hand from the object, negative inside, and its distance from the giver.
+fn gaps(planned: &Planned, pose: &HandPose) -> (f32, f32) {
+    let rig = right();
+    let solids = HandSolids::of_pose(rig, pose);
+    let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+    let surface = &planned.holdout.object.surface;
+    let object = solids
+        .iter()
+        .map(|solid| clearance(solid, surface, 0.01))
+        .fold(f32::INFINITY, f32::min);
+    let giver = planned.holdout.presenting_hand.as_ref();
+    let theirs = giver.map(|giver| TrackedSolids::of_joints(&giver.joints));
+    let giver = theirs.iter().flat_map(TrackedSolids::iter).flat_map(|their| {
+        let distances = tracked.iter().map(|our| our.distance(their));
+        distances.collect::<Vec<_>>()
+    });
+    (object, giver.fold(f32::INFINITY, f32::min))
+}
+
+/// The hand between two frames: the wrist moves straight without turning, and angles change linearly.
+fn at(from: &HandPose, to: &HandPose, share: f32) -> HandPose {
+    let mix = |a: f32, b: f32| a * (1.0 - share) + b * share;
+    HandPose {
+        frame_from_wrist: Pose::new(
+            from.frame_from_wrist.position * (1.0 - share) + to.frame_from_wrist.position * share,
+            from.frame_from_wrist.orientation,
+        ),
+        digits: std::array::from_fn(|digit| {
+            let (a, b) = (from.digits[digit], to.digits[digit]);
+            DigitAngles {
+                base_yaw: mix(a.base_yaw, b.base_yaw),
+                base_pitch: mix(a.base_pitch, b.base_pitch),
+                second_pitch: mix(a.second_pitch, b.second_pitch),
+                third_pitch: mix(a.third_pitch, b.third_pitch),
+            }
+        }),
+    }
+}
+
+fn moments(from: &KeyFrame, to: &KeyFrame) -> impl Iterator<Item = HandPose> {
+    (0..=MOMENTS).map(|moment| at(&from.pose, &to.pose, moment as f32 / MOMENTS as f32))
+}
+
+#[test]
+fn nearly_every_grasp_has_a_way() {
+    let without = PLANNED.iter().filter(|planned| planned.way.is_none()).count();
+    assert!(PLANNED.len() > 300, "{} grasps", PLANNED.len());
+    assert!(
+        20 * without < PLANNED.len(),
+        "{without} of {} grasps have none",
+        PLANNED.len()
+    );
+}
+
+#[test]
+fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
+    let rig = right();
+    let mut widened = Vec::new();
+    for planned in PLANNED.iter() {
+        let Some([approach, pre_grasp, close]) = &planned.way else {
+            continue;
+        };
+        let stages = [approach.stage, pre_grasp.stage, close.stage];
+        assert_eq!(stages, [Stage::Approach, Stage::PreGrasp, Stage::Close]);
+        assert_eq!(close.pose, planned.grasp.pose);
+        assert_eq!(approach.pose.digits, pre_grasp.pose.digits);
+        let [far, near, there] = [approach, pre_grasp, close].map(|frame| frame.pose.frame_from_wrist);
+        assert_eq!(far.orientation, there.orientation);
+        assert_eq!(near.orientation, there.orientation);
+        let way = near.position - far.position;
+        assert!((way.length() - APPROACH_DISTANCE).abs() < 1e-5, "{way}");
+        // The last stretch, if there is one, keeps the direction.
+        let last = there.position - near.position;
+        assert!(last.length() < 0.026 && last.angle_between(way).abs() < 0.01 || last == Vec3::ZERO);
+        let limits = rig.digits.map(|digit| digit.limits);
+        for ((open, closed), limits) in pre_grasp.pose.digits.iter().zip(&close.pose.digits).zip(limits) {
+            assert_eq!(open.base_yaw, closed.base_yaw);
+            for (open, closed, range) in [
+                (open.base_pitch, closed.base_pitch, limits.base_pitch),
+                (open.second_pitch, closed.second_pitch, limits.second_pitch),
+                (open.third_pitch, closed.third_pitch, limits.third_pitch),
+            ] {
+                assert!(open <= closed + 1e-6, "{}: joints bend to close", planned.name);
+                assert!(
+                    range.contains(open, 1e-5),
+                    "{}: {open} in {range:?}",
+                    planned.name
+                );
+            }
+        }
+        let aperture = |pose: &HandPose| {
+            let [thumb, index] = [0, 1]
+                .map(|digit| digit_frames(&rig.digits[digit], pose.frame_from_wrist, pose.digits[digit]));
+            thumb.tip.distance(index.tip)
+        };
+        widened.push(aperture(&pre_grasp.pose) - aperture(&close.pose));
+    }
+    // As with people, thumb and index finger are some centimetres farther apart than in the grasp, except where the thumb
+    // lies across a finger.
+    let mean = widened.iter().sum::<f32>() / widened.len() as f32;
+    assert!((0.02..0.06).contains(&mean), "{mean} m");
+    let wider = widened.iter().filter(|&&by| by > 0.01).count();
+    assert!(10 * wider > 9 * widened.len(), "{wider} of {}", widened.len());
+}
+
+#[test]
+fn the_open_hand_is_clear_of_everything() {
+    let mut count = 0;
+    for (planned, [approach, pre_grasp, _]) in followed() {
+        for frame in [approach, pre_grasp] {
+            let solids = HandSolids::of_pose(right(), &frame.pose);
+            let (object, giver) = gaps(planned, &frame.pose);
+            assert!(
+                object >= OPEN_CLEARANCE - TOLERANCE,
+                "{}: {object} m",
+                planned.name
+            );
+            // At the approach, only the way must be free.
+            let least = if frame.stage == Stage::PreGrasp {
+                GIVER_CLEARANCE
+            } else {
+                0.0
+            };
+            assert!(giver >= least - 1e-6, "{}: {giver} m", planned.name);
+            assert!(self_clearance(&solids) >= 0.0, "{}", planned.name);
+        }
+        count += 1;
+    }
+    assert!(count > 30, "{count} ways");
+}
+
+#[test]
+fn the_approach_touches_nothing() {
+    for (planned, [approach, pre_grasp, _]) in followed() {
+        for (moment, pose) in moments(approach, pre_grasp).enumerate() {
+            let (object, giver) = gaps(planned, &pose);
+            assert!(
+                object > 0.0 && giver > 0.0,
+                "{} at {moment}: {object} m, {giver} m",
+                planned.name
+            );
+        }
+    }
+}
+
+#[test]
+fn closing_stays_within_the_grasps_depth_and_off_forbidden_surfaces() {
+    for (planned, [_, pre_grasp, close]) in followed() {
+        let object = &planned.holdout.object;
+        for (moment, pose) in moments(pre_grasp, close).enumerate() {
+            let (depth, giver) = gaps(planned, &pose);
+            assert!(
+                depth >= -DEEPEST - TOLERANCE && giver > 0.0,
+                "{} at {moment}: {depth} m, {giver} m",
+                planned.name
+            );
+            let solids = HandSolids::of_pose(right(), &pose);
+            let touches = solids.iter().any(|solid| object.is_forbidden_within(solid, 0.0));
+            assert!(!touches, "{} at {moment}", planned.name);
+        }
+    }
+}
+
+/// The direction of approach.
+fn direction_of(way: &[KeyFrame; 3]) -> Vec3 {
+    let [from, to] = [&way[0], &way[1]].map(|frame| frame.pose.frame_from_wrist.position);
+    (to - from).normalize_or_zero()
+}
+
+/// The natural direction of approach, halfway between fingers and palm.
+fn natural(grasp: &Grasp) -> Vec3 {
+    (grasp.pose.frame_from_wrist.orientation * (Vec3::Y + Vec3::Z)).normalize_or_zero()
+}
+
+/// The way to a planned grasp within an approach cone.
+fn way_from(planned: &Planned, axis: Vec3, half_angle: f32) -> Option<[KeyFrame; 3]> {
+    let object = &planned.holdout.object;
+    let scene = object_scene(object);
+    let presented = Presented::of(&planned.holdout);
+    let cone = ApproachCone { axis, half_angle };
+    key_frames(&scene, &presented, right(), Some(cone), &planned.grasp)
+}
+
+#[test]
+fn hands_approach_only_within_the_allowed_cone() {
+    let (mut natural_ways, mut blocked, mut others) = (0, 0, 0);
+    for (number, planned) in PLANNED.iter().enumerate() {
+        let Some(way) = &planned.way else { continue };
+        let (free, natural) = (direction_of(way), natural(&planned.grasp));
+        // Of all directions tried, only the natural one is within 10° of itself. As it is tried first, a way from elsewhere
+        // means that it is blocked.
+        let only = way_from(planned, natural, 10_f32.to_radians());
+        if free.angle_between(natural) < 0.01 {
+            assert_eq!(only.as_ref(), Some(way), "{}", planned.name);
+            natural_ways += 1;
+        } else {
+            assert_eq!(only, None, "{}", planned.name);
+            blocked += 1;
+        }
+        // All directions tried are within 80° of the natural one, so none is within 57° of its opposite.
+        assert_eq!(way_from(planned, -natural, 1.0), None, "{}", planned.name);
+        // A cone without the free choice: another way, or none.
+        let side = free.any_orthonormal_vector();
+        let side = if number % 2 == 0 { side } else { -side };
+        let axis = (free * 0.5 + side).normalize_or_zero();
+        let half_angle = 50_f32.to_radians();
+        if let Some(other) = way_from(planned, axis, half_angle) {
+            let angle = direction_of(&other).angle_between(axis);
+            assert!(angle <= half_angle + 1e-3, "{}: {angle}", planned.name);
+            others += 1;
+        }
+    }
+    assert!(
+        natural_ways > 20 && blocked > 10 && others > 20,
+        "{natural_ways} natural, {blocked} blocked, {others} from the side"
+    );
+}
+
+/// A box around the origin, by its half edges.
+fn cuboid(half: Vec3) -> Arc<GraspObject> {
+    Arc::new(object_of(meshes::cuboid(half, 1), &[]))
+}
+
+#[test]
+fn the_other_hand_takes_the_mirrored_way() {
+    let object = cuboid(Vec3::new(0.02, 0.06, 0.015));
+    let holdout = floating(Arc::clone(&object));
+    let (right, left) = (right(), adult(Handedness::Left));
+    let planned = plan("box", &holdout, &grown_to(&object, right, GRIPS), right);
+    let scene = object_scene(&object);
+    let mut count = 0;
+    for planned in planned.iter().take(50) {
+        let mut grasp = planned.grasp.clone();
+        grasp.pose.frame_from_wrist = grasp.pose.frame_from_wrist.mirrored_x();
+        let mirrored = key_frames(&scene, &Presented::of(&holdout), left, None, &grasp);
+        assert_eq!(mirrored.is_some(), planned.way.is_some());
+        for (ours, theirs) in planned.way.iter().flatten().zip(mirrored.iter().flatten()) {
+            let expected = ours.pose.frame_from_wrist.mirrored_x().position;
+            let there = theirs.pose.frame_from_wrist.position;
+            assert!(expected.distance(there) < 1e-5, "{expected} and {there}");
+            for (ours, theirs) in ours.pose.digits.iter().zip(&theirs.pose.digits) {
+                assert!((ours.base_pitch - theirs.base_pitch).abs() < 1e-4);
+                assert!((ours.second_pitch - theirs.second_pitch).abs() < 1e-4);
+            }
+            count += 1;
+        }
+    }
+    assert!(count > 60, "{count} frames");
+}
+
+#[test]
+fn a_hand_inside_a_block_has_no_way() {
+    let object = cuboid(Vec3::new(0.02, 0.06, 0.015));
+    let rig = right();
+    let free = plan(
+        "box",
+        &floating(Arc::clone(&object)),
+        &grown_to(&object, rig, GRIPS),
+        rig,
+    );
+    let grasp = &free
+        .iter()
+        .find(|planned| planned.way.is_some())
+        .expect("a way")
+        .grasp;
+    // The same hand inside a block.
+    let block = cuboid(Vec3::splat(0.6));
+    let scene = object_scene(&block);
+    assert_eq!(
+        key_frames(
+            &scene,
+            &Presented::of(&floating(Arc::clone(&block))),
+            rig,
+            None,
+            grasp
+        ),
+        None
+    );
+}

@@ -1,0 +1,101 @@
+//! Look-ups of known grips that are cut short and resumed.
+
+use std::{sync::Arc, time::Duration};
+
+use grasp_synthesis::search::{GraspSource, LookUp};
+
+use crate::fixtures::{
+    atlases::{scissors_held_by, shipped_atlas, sparse},
+    clocks::FakeClock,
+    hands::right,
+    searches::{Search, pool},
+};
+
+/// A look-up under a clock that advances by a microsecond per reading.
+fn look_up(search: &Search<'_>, within: Duration) -> LookUp {
+    search.look_up(&FakeClock::ticking(1_000), within)
+}
+
+#[test]
+fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
+    let known = shipped_atlas("scissors");
+    let pool = pool(1);
+    let few = sparse(&known);
+    let (mut cut, mut subset_grasp, mut nothing) = (0, 0, 0);
+    let of_all = (0..known.entries().len())
+        .step_by(71)
+        .map(|giver| (giver, &known));
+    let of_few = (0..known.entries().len()).step_by(4).map(|giver| (giver, &few));
+    for (giver, atlas) in of_all.chain(of_few) {
+        let holdout = scissors_held_by(&known, giver);
+        let mut search = Search {
+            atlas: Some(Arc::clone(atlas)),
+            reproducible: false,
+            ..Search::guided(&holdout, right())
+        };
+        let whole = look_up(&search, Duration::from_secs(1));
+        let mut last = None;
+        let in_parts = loop {
+            match look_up(&search, Duration::from_micros(3)) {
+                LookUp::Found(outcome) => break Some(outcome),
+                LookUp::NotFound { tried } => {
+                    if last == Some(tried) {
+                        break None;
+                    }
+                    assert!(tried > last.unwrap_or(0), "giver {giver}: {tried} after {last:?}");
+                    // A search resumes there, too.
+                    search.known_tried = tried;
+                    last = Some(tried);
+                }
+            }
+        };
+        let by_search = search.run_on(&pool);
+        match (whole.clone().found(), in_parts) {
+            (Some(whole), Some(in_parts)) => {
+                assert_eq!(
+                    (whole.grasp.as_ref(), whole.report.source),
+                    (in_parts.grasp.as_ref(), in_parts.report.source)
+                );
+                assert_eq!(
+                    (by_search.grasp, by_search.report.source),
+                    (whole.grasp, whole.report.source)
+                );
+                cut += usize::from(last.is_some());
+                subset_grasp += usize::from(matches!(whole.report.source, Some(GraspSource::Spared(_))));
+            }
+            (None, None) => {
+                assert_eq!(by_search.grasp, None);
+                let LookUp::NotFound { tried } = whole else {
+                    unreachable!("nothing was found")
+                };
+                assert_eq!(last, Some(tried));
+                nothing += 1;
+            }
+            (whole, in_parts) => panic!("giver {giver}: {whole:?}, in parts {in_parts:?}"),
+        }
+    }
+    assert!(
+        cut >= 10 && subset_grasp >= 3 && nothing >= 3,
+        "{cut} look-ups were cut short, {subset_grasp} ended with a finger subset, {nothing} with nothing"
+    );
+}
+
+#[test]
+fn reproducible_look_ups_and_those_without_an_atlas_try_nothing() {
+    let known = shipped_atlas("scissors");
+    let holdout = scissors_held_by(&known, 0);
+    let without = Search {
+        reproducible: false,
+        ..Search::guided(&holdout, right())
+    };
+    let reproducible = Search {
+        atlas: Some(Arc::clone(&known)),
+        ..Search::guided(&holdout, right())
+    };
+    for search in [without, reproducible] {
+        let LookUp::NotFound { tried } = look_up(&search, Duration::from_secs(1)) else {
+            panic!("there is nothing to look up");
+        };
+        assert_eq!(tried, 0);
+    }
+}

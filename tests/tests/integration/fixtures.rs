@@ -1,0 +1,210 @@
+//! Fixtures: requests, and ways to wait for and check answers.
+
+use std::{
+    fs,
+    future::Future,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use glam::{Quat, Vec3};
+use grasp_proto::v1;
+use grasp_synthesis::base::pose::Pose;
+use grasp_tests::{TestServer, wire_pose};
+use tonic::{Code, Status};
+use tonic_types::StatusExt as _;
+
+/// Longest wait in a test, reached only if something hangs.
+const HANGS_AFTER: Duration = Duration::from_mins(1);
+
+/// A closed box of 4 cm by 3 cm by 2 cm, as OBJ text with one group.
+pub(crate) const BOX_OBJ: &str = "\
+g shell
+v -0.02 -0.015 -0.01
+v 0.02 -0.015 -0.01
+v 0.02 0.015 -0.01
+v -0.02 0.015 -0.01
+v -0.02 -0.015 0.01
+v 0.02 -0.015 0.01
+v 0.02 0.015 0.01
+v -0.02 0.015 0.01
+f 1 4 3 2
+f 5 6 7 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+";
+
+/// A request to create the box under an id.
+pub(crate) fn box_request(id: &str) -> v1::CreateObjectRequest {
+    v1::CreateObjectRequest {
+        object_id: id.to_owned(),
+        obj: BOX_OBJ.as_bytes().to_vec(),
+        mass_kg: 0.1,
+        ..Default::default()
+    }
+}
+
+/// A request for the built-in remote, floating freely.
+pub(crate) fn floating_remote() -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
+        object: "objects/remote".to_owned(),
+        seed: Some(7),
+        budget: Some(seconds(10)),
+        ..Default::default()
+    }
+}
+
+/// Creates a box whose whole surface is forbidden, and returns a request that no attempt can satisfy.
+pub(crate) async fn impossible(server: &TestServer) -> v1::FindGraspRequest {
+    let create = v1::CreateObjectRequest {
+        forbidden: Some(v1::ForbiddenSurfaces {
+            groups: vec!["shell".to_owned()],
+            triangles: Vec::new(),
+        }),
+        ..box_request("untouchable")
+    };
+    server
+        .objects()
+        .await
+        .create_object(create)
+        .await
+        .expect("the box can be created");
+    v1::FindGraspRequest {
+        object: "objects/untouchable".to_owned(),
+        seed: Some(7),
+        ..Default::default()
+    }
+}
+
+/// The built-in remote 5 cm above the open hand of a giver, palm up.
+pub(crate) fn held_remote() -> v1::FindGraspRequest {
+    let pose = |position: Vec3, orientation: Quat| {
+        wire_pose(Pose {
+            position,
+            orientation,
+        })
+    };
+    let angles = v1::HandAngles {
+        rig: "thesis".to_owned(),
+        handedness: v1::Handedness::Left.into(),
+        // Half a turn about x points the fingers from -z to +z, and the back of the hand from up to down.
+        client_from_wrist: Some(pose(
+            Vec3::new(0.3, 1.15, -0.12),
+            Quat::from_rotation_x(std::f32::consts::PI),
+        )),
+        digits: (0..5)
+            .map(|_| v1::DigitAngles {
+                base_yaw: 0.0,
+                base_pitch: 0.1,
+                second_pitch: 0.1,
+                third_pitch: None,
+            })
+            .collect(),
+    };
+    v1::FindGraspRequest {
+        client_from_object: Some(pose(Vec3::new(0.3, 1.2, 0.0), Quat::from_rotation_y(0.4))),
+        presenting_hand: Some(v1::PresentingHand {
+            form: Some(v1::presenting_hand::Form::Angles(angles)),
+        }),
+        ..floating_remote()
+    }
+}
+
+pub(crate) fn seconds(seconds: i64) -> prost_types::Duration {
+    prost_types::Duration { seconds, nanos: 0 }
+}
+
+pub(crate) fn milliseconds(milliseconds: i32) -> prost_types::Duration {
+    prost_types::Duration {
+        seconds: 0,
+        nanos: milliseconds * 1_000_000,
+    }
+}
+
+/// The fields that a status blames, in order.
+pub(crate) fn blamed_fields(status: &Status) -> Vec<String> {
+    let details = status.get_error_details();
+    details
+        .bad_request()
+        .map(|bad| bad.field_violations.iter().map(|v| v.field.clone()).collect())
+        .unwrap_or_default()
+}
+
+/// Sends a request that must be rejected for these fields, in order, each with a description in house style.
+pub(crate) async fn assert_blamed(server: &TestServer, request: v1::FindGraspRequest, fields: &[&str]) {
+    let text = format!("{request:?}");
+    let status = server
+        .grasps()
+        .await
+        .find_grasp(request)
+        .await
+        .expect_err("an invalid request is rejected");
+    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
+    assert_eq!(blamed_fields(&status), fields, "{text}");
+    let details = status.get_error_details();
+    for violation in &details.bad_request().unwrap().field_violations {
+        let first = violation.description.chars().next().unwrap();
+        assert!(
+            !first.is_uppercase() && !violation.description.ends_with('.'),
+            "{}",
+            violation.description
+        );
+    }
+}
+
+/// The reason in a status' `ErrorInfo`.
+pub(crate) fn reason(status: &Status) -> String {
+    let details = status.get_error_details();
+    details
+        .error_info()
+        .expect("every status has an ErrorInfo")
+        .reason
+        .clone()
+}
+
+/// Waits until `condition` holds.
+pub(crate) async fn until(what: &str, condition: impl Fn() -> bool) {
+    bounded(what, async {
+        while !condition() {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    })
+    .await;
+}
+
+/// Waits for `future` up to a limit.
+pub(crate) async fn bounded<T>(what: &str, future: impl Future<Output = T>) -> T {
+    tokio::time::timeout(HANGS_AFTER, future)
+        .await
+        .unwrap_or_else(|_| panic!("{what} did not happen within {HANGS_AFTER:?}"))
+}
+
+/// A test's own folder, removed at its end.
+pub(crate) struct Folder(PathBuf);
+
+impl Folder {
+    /// A folder that does not exist yet.
+    pub(crate) fn absent(test: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("grasp-{test}-{}", std::process::id())))
+    }
+
+    /// An empty folder.
+    pub(crate) fn empty(test: &str) -> Self {
+        let folder = Self::absent(test);
+        fs::create_dir_all(folder.path()).expect("the temporary directory can be written to");
+        folder
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder left in the temporary directory does no harm.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
