@@ -1,7 +1,7 @@
 //! Time per query, in batches of fixed random queries: divide by the batch, or read the throughput.
 //!
-//! "Mixed" segments lie anywhere in a box 5 cm larger than the object, as those of a hand that is being placed; "near"
-//! ones start within 15 mm of the surface, as those of a finger that is closing. Both are as long as a phalanx.
+//! "Mixed" segments lie anywhere in a box 5 cm larger than the object, like those of a hand being placed; "near" ones
+//! start within 15 mm of the surface, like those of a closing finger. Both are as long as a phalanx.
 
 use std::{f32::consts::TAU, hint::black_box, time::Duration};
 
@@ -11,7 +11,7 @@ use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Queries in a batch: more than branch predictors learn by heart.
+/// Queries per batch: more than branch predictors can memorise.
 const BATCH: usize = 8192;
 
 /// A closed grid of rows × columns quads, wrapped like a torus.
@@ -78,7 +78,7 @@ fn remote(n: u32) -> TriangleMesh {
 struct Queries {
     mixed: Vec<Segment>,
     near: Vec<Segment>,
-    /// Within 8 cm or so of the surface.
+    /// Within about 8 cm of the surface.
     points: Vec<Vec3>,
     /// In the object's box.
     points_in_box: Vec<Vec3>,

@@ -1,5 +1,5 @@
-//! Time per grip: to hold one of the atlas out of a giver's hand, to find the first that holds, to close a proposed hand,
-//! and to find an entry of an atlas. In batches of fixed queries: divide by the batch, or read the throughput.
+//! Time per grip: to check one of an atlas against a giver, to find the first that holds, to close a proposed hand, and to
+//! find an entry of an atlas. In batches of fixed queries: divide by the batch, or read the throughput.
 
 use std::hint::black_box;
 
@@ -21,16 +21,16 @@ use grasp_synthesis::{
     propose::proposal::{Place, propose},
 };
 
-/// The built-in objects: a light one that is thin everywhere, and a box.
+/// Built-in objects: a light, thin one, and a box.
 const OBJECTS: [&str; 2] = ["scissors", "remote"];
 
-/// Entries of the atlases that are searched.
+/// Entries of the searched atlases.
 const ENTRIES: usize = 400;
 
-/// Entries for which an atlas is grown again and again.
+/// Entries of the atlas grown in each iteration.
 const GROWN: usize = 20;
 
-/// Proposals in a batch.
+/// Proposals per batch.
 const PROPOSALS: u64 = 1000;
 
 fn rig() -> &'static Rig {

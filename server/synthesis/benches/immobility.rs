@@ -1,4 +1,4 @@
-//! What the questions about immobility cost, over random grasps of a body of hand size.
+//! Time of force balance and closure, over random grasps of a hand-sized body.
 
 use std::{hint::black_box, time::Duration};
 
@@ -11,13 +11,13 @@ use grasp_synthesis::{
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Grasps in a batch: more than branch predictors learn by heart.
+/// Grasps per batch: more than branch predictors can memorise.
 const BATCH: usize = 512;
 
-/// Epsilon that a grasp should have.
+/// Required epsilon.
 const REQUIRED: f32 = 0.03;
 
-/// Contacts of a thumb opposed to fingers and palm on a bottle-like ellipsoid, as scattered as posed hands leave them.
+/// Contacts of a thumb opposed to fingers and palm on a bottle-like ellipsoid, scattered like those of posed hands.
 fn grasps(count: usize) -> Vec<(Vec<SoftContact>, Load)> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(count as u64);
     let half = Vec3::new(0.03, 0.03, 0.09);

@@ -1,7 +1,7 @@
 //! Time per query of hands as solids, in batches of fixed random queries: divide by the batch, or read the throughput.
 //!
-//! "Touching" capsules are as close to the surface as those of a closed finger, "near" ones within 3 cm, "deep" ones
-//! start in the volume.
+//! "Touching" capsules are as close to the surface as those of a closed finger, "near" ones are within 3 cm, and "deep" ones
+//! start inside the volume.
 
 use std::hint::black_box;
 
@@ -14,7 +14,7 @@ use grasp_synthesis::{
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Queries in a batch: more than branch predictors learn by heart.
+/// Queries per batch: more than branch predictors can memorise.
 const BATCH: usize = 4096;
 
 /// A bar of 5 × 18 × 2.4 cm, like a remote control, with 2,400 triangles.
@@ -78,18 +78,18 @@ fn clearances(criterion: &mut Criterion) {
     let surface = MeshBvh::build(bar());
     let mut group = criterion.benchmark_group("clearance");
     group.throughput(Throughput::Elements(BATCH as u64));
-    for (name, gaps, deep, at_least) in [
+    for (name, gaps, deep, limit) in [
         ("touching", [-0.002, 0.002], false, 1.0),
-        ("touching, asked for 2 mm", [-0.002, 0.002], false, 0.002),
+        ("touching, limit 2 mm", [-0.002, 0.002], false, 0.002),
         ("near", [0.002, 0.03], false, 1.0),
-        ("near, asked for 2 mm", [0.002, 0.03], false, 0.002),
+        ("near, limit 2 mm", [0.002, 0.03], false, 0.002),
         ("deep", [0.0, 0.0], true, 1.0),
     ] {
         let capsules = random_capsules(&surface, gaps, deep);
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 for capsule in &capsules {
-                    black_box(clearance(black_box(capsule), &surface, at_least));
+                    black_box(clearance(black_box(capsule), &surface, limit));
                 }
             });
         });

@@ -1,8 +1,8 @@
-//! The complete atlases of the objects, which the sets with an atlas answer from.
+//! Complete atlases of the objects, for the sets that answer from an atlas.
 //!
-//! An atlas takes minutes to grow. Those that do not come with the objects are therefore grown before anything is
-//! searched for, so that they disturb no time, and are kept in the run's folder, also while they grow: a run that goes on
-//! finds them there. They hang on object and hand alone and not on a run's seed, so that a fresh start keeps them.
+//! An atlas takes minutes to grow. Atlases that do not come with the objects grow before the first search, where they
+//! disturb no measured time, and are saved in the run's folder, even partly grown: a resumed run finds them there. They
+//! depend on object and hand but not on a run's seed, so a fresh start keeps them.
 
 use std::{
     collections::HashMap,
@@ -35,29 +35,29 @@ use crate::{
     plan::{Cell, Set, Settings},
 };
 
-/// The folder of the atlases in that of a run.
+/// The folder of the atlases in a run's folder.
 const FOLDER: &str = "atlases";
 
-/// How often an atlas is kept while it grows. Longer loses more when a run is killed; shorter takes more of the time for
-/// sorting and writing, some 30 ms each.
+/// How often a growing atlas is saved. Longer loses more when a run is killed; shorter spends more time on saving, some
+/// 30 ms each.
 const KEEP_EVERY: Duration = Duration::from_secs(10);
 
-/// How far an atlas is.
+/// Progress of an atlas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AtlasProgress {
     /// Its object.
     pub object: &'static str,
-    /// Grips that were found, in this run or before.
+    /// Grips found, in this run or before.
     pub entries: u64,
-    /// Proposals that were tried for them.
+    /// Proposals tried.
     pub proposed: u64,
-    /// Proposals after which it is complete at the latest; earlier if it has all the grips that it may have.
+    /// Largest number of proposals; it is complete earlier if it reaches its largest number of grips.
     pub total: u64,
-    /// Why the one in the run's folder is grown again.
+    /// Why the atlas in the run's folder cannot be used and grows again.
     pub refused: Option<AtlasError>,
 }
 
-/// Where atlases that need not be grown come from: the bytes of an object's and a hand's, if there are any.
+/// A source of shipped atlases: the bytes of an object's and a hand's atlas, if there is one.
 pub type Shipped = fn(&str, &Rig) -> Option<&'static [u8]>;
 
 /// Complete atlases by their objects.
@@ -65,9 +65,9 @@ pub type Shipped = fn(&str, &Rig) -> Option<&'static [u8]>;
 pub struct Atlases(HashMap<&'static str, Arc<Atlas>>);
 
 impl Atlases {
-    /// The atlases that the settings and what a folder has ask for: read from the folder if they are there, so that a run
-    /// goes on with what it began with, or `shipped`, or else grown to the end. None if it was told to stop; what has grown
-    /// by then is in the folder.
+    /// The atlases that the settings and the folder's records need: from the folder, so that a run continues with the
+    /// atlases it began with, or from `shipped`, or else grown to the end. None if stopped; what has grown by then is in the
+    /// folder.
     ///
     /// # Errors
     /// An atlas in the folder cannot be read, or none can be written.
@@ -90,7 +90,7 @@ impl Atlases {
         let folder = folder.path().join(FOLDER);
         let mut atlases = Self::default();
         for name in objects {
-            // Built-in holdouts hold built-in objects out, and a set's hand is built in.
+            // Objects of built-in holdouts and hands of sets are built in.
             let Some((object, hand)) = object(name).zip(receiving_hand(Set::ATLAS)) else {
                 continue;
             };
@@ -102,14 +102,14 @@ impl Atlases {
         Ok(Some(atlases))
     }
 
-    /// The atlas for a cell; none if its set has none.
+    /// The atlas of a cell; none if its set uses none.
     pub(crate) fn of(&self, cell: &Cell) -> Option<&Arc<Atlas>> {
         let object = cell.built_in().object.as_str();
         cell.set.atlas.then(|| self.0.get(object)).flatten()
     }
 }
 
-/// An object's atlas, none if it was told to stop.
+/// An object's complete atlas; none if stopped.
 fn complete(
     object: &'static BuiltInObject,
     rig: &Rig,
@@ -157,7 +157,7 @@ fn complete(
     Ok(Some(grown.atlas))
 }
 
-/// What the folder has; none if it has nothing.
+/// The folder's atlas, if there is one.
 fn read(
     path: &Path,
     object: &BuiltInObject,
@@ -170,7 +170,7 @@ fn read(
     }
 }
 
-/// Keeps an atlas. It is renamed when it is whole, so that no run finds half of one.
+/// Saves an atlas, under a temporary name until it is complete, so that no run reads half of one.
 fn write(path: &Path, object: &BuiltInObject, rig: &Rig, grown: &Grown) -> Result<(), FolderError> {
     let parent = path.parent().unwrap_or(Path::new(""));
     fs::create_dir_all(parent).map_err(failed_to("make", parent))?;

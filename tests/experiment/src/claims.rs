@@ -1,4 +1,4 @@
-//! What chapter 5 says, against a run: does it come out?
+//! The statements of chapter 5 against a run.
 
 mod open;
 mod placement;
@@ -12,40 +12,40 @@ use crate::{
     types::SetTypes,
 };
 
-/// Does a run bear out what the thesis says?
+/// Whether a run confirms the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// Yes.
     Agrees,
-    /// In direction, but not in size.
+    /// In direction only, not in size.
     InPart,
     /// No.
     Differs,
-    /// The thesis asks; this is a first figure.
+    /// The thesis leaves it open; this is a first figure.
     Answered,
 }
 
-/// How many claims have a verdict.
+/// Counts the claims with a verdict.
 pub fn count(claims: &[Claim], verdict: Verdict) -> usize {
     claims.iter().filter(|claim| claim.verdict == verdict).count()
 }
 
-/// A statement of the thesis and what a run has to say to it.
+/// A statement of the thesis and the run's answer.
 #[derive(Clone, Debug)]
 pub struct Claim {
-    /// Where the thesis says it.
+    /// The place in the thesis.
     pub source: &'static str,
-    /// What it says, with its figures.
+    /// The statement, with its figures.
     pub thesis: &'static str,
-    /// What the run shows.
+    /// The run's result.
     pub run: String,
-    /// Is it the same?
+    /// Whether they agree.
     pub verdict: Verdict,
-    /// Why the two may differ; shown where they do.
+    /// Why they may differ; shown where they do.
     pub why: &'static str,
 }
 
-/// All claims that the run has records for, in the thesis' order.
+/// All claims with records in the run, in the thesis' order.
 pub fn claims(data: &Data<'_>, types: &[SetTypes]) -> Vec<Claim> {
     let all = [
         steps::naive(data),
@@ -83,11 +83,10 @@ pub fn table(claims: &[Claim]) -> Table {
     table
 }
 
-/// A ratio that should be about as large as the thesis' one: within a factor of 1.5 it agrees; on the same side of 1 it
-/// agrees in part.
+/// A ratio agrees with the thesis' one within a factor of 1.5, and in part on the same side of 1.
 fn verdict_of_ratio(ours: f64, thesis: f64) -> Verdict {
-    let off = (ours / thesis).max(thesis / ours);
-    if off <= 1.5 {
+    let factor = (ours / thesis).max(thesis / ours);
+    if factor <= 1.5 {
         Verdict::Agrees
     } else if (ours > 1.0) == (thesis > 1.0) {
         Verdict::InPart
@@ -114,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn reasons_are_given_where_the_two_differ() {
+    fn reasons_are_shown_only_where_results_differ() {
         let claim = |verdict| Claim {
             source: "5.2",
             thesis: "a",

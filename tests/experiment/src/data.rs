@@ -1,4 +1,4 @@
-//! A run's records, as the figures ask for them.
+//! A run's records as figures and tables need them.
 
 use grasp_synthesis::model::strategy::Strategy;
 
@@ -7,19 +7,19 @@ use crate::{
     record::{Details, Record, SearchFigures, Source},
 };
 
-/// The records that were asked for: a folder can have more.
+/// The requested records; a folder may have more.
 #[derive(Clone, Debug)]
 pub struct Data<'a> {
-    /// What was asked for.
+    /// The request.
     pub settings: &'a Settings,
     records: Vec<&'a Record>,
 }
 
 impl<'a> Data<'a> {
-    /// Chooses.
+    /// Selects the requested records.
     pub fn new(settings: &'a Settings, records: &'a [Record]) -> Self {
         let cells = settings.cells();
-        let is_asked = |record: &&Record| {
+        let is_requested = |record: &&Record| {
             let limit = if record.rejection.is_some() {
                 settings.invalid_of(&record.cell)
             } else {
@@ -27,28 +27,28 @@ impl<'a> Data<'a> {
             };
             record.number < limit && cells.contains(&record.cell)
         };
-        let mut records: Vec<_> = records.iter().filter(is_asked).collect();
+        let mut records: Vec<_> = records.iter().filter(is_requested).collect();
         let place = |record: &Record| cells.iter().position(|cell| *cell == record.cell);
         records.sort_by_key(|record| (place(record), record.rejection.is_some(), record.number));
         Self { settings, records }
     }
 
-    /// All records: cell by cell, valid ones first, by number.
+    /// All records by cell, valid ones first, then by number.
     pub fn records(&self) -> impl Iterator<Item = &'a Record> {
         self.records.iter().copied()
     }
 
-    /// The sets that were asked for.
+    /// The requested sets.
     pub fn sets(&self) -> impl Iterator<Item = Set> + use<'a> {
         self.settings.sets.iter().copied()
     }
 
-    /// The strategies of those of them that the thesis has: A to F.
+    /// The requested strategies of the thesis, A to F.
     pub fn ladder(&self) -> impl Iterator<Item = Strategy> + use<'a> {
         self.sets().filter(|set| set.is_ladder()).map(|set| set.strategy)
     }
 
-    /// The most threads that were asked for, if that is more than one.
+    /// The largest requested number of threads, if it is more than one.
     pub fn more_threads(&self) -> Option<usize> {
         self.settings
             .threads
@@ -79,8 +79,7 @@ impl<'a> Data<'a> {
             .filter(move |record| record.cell.set == set && record.cell.threads == 1)
     }
 
-    /// What the searches of a cell took; nothing if one of them gave up, because those that did not say nothing then of
-    /// what a grasp takes.
+    /// Effort of a cell's searches. Empty if one of them gave up: the others would then underestimate the effort.
     pub fn searches(&self, cell: Cell) -> Vec<SearchFigures> {
         let own = || self.records().filter(|record| record.cell == cell);
         if own().any(|record| record.source == Source::Nowhere) {
@@ -89,7 +88,7 @@ impl<'a> Data<'a> {
         own().filter_map(|record| record.search).collect()
     }
 
-    /// The holdouts in which a search of a set gave up, on whatever number of threads.
+    /// Holdouts where a search of a set gave up, on any number of threads.
     pub fn given_up(&self, set: Set) -> Vec<&'static str> {
         let gave_up = |record: &&Record| record.cell.set == set && record.source == Source::Nowhere;
         let mut names: Vec<_> = self
@@ -102,7 +101,7 @@ impl<'a> Data<'a> {
         names
     }
 
-    /// What the searches of a set took, holdout by holdout; nothing where one gave up.
+    /// Effort of a set's searches by holdout; empty where one gave up.
     pub fn searches_by_holdout(&self, set: Set, threads: usize) -> Vec<Vec<SearchFigures>> {
         let of_holdout = |&holdout: &usize| {
             self.searches(Cell {
@@ -115,12 +114,12 @@ impl<'a> Data<'a> {
     }
 }
 
-/// Attempts of some searches.
+/// Attempts of searches.
 pub fn attempts(searches: &[SearchFigures]) -> Vec<f64> {
     searches.iter().map(|search| search.attempts as f64).collect()
 }
 
-/// Times of some searches in milliseconds.
+/// Times of searches in milliseconds.
 pub fn milliseconds(searches: &[SearchFigures]) -> Vec<f64> {
     searches
         .iter()

@@ -18,21 +18,21 @@ use crate::{
 /// A picture of a figure of the thesis.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// Name of its file, without the ending.
+    /// File name without extension.
     pub file: &'static str,
-    /// What it shows, with the thesis' number.
+    /// Title, with the thesis' number.
     pub title: &'static str,
-    /// Name of the CSV file with what is drawn, without the ending.
+    /// File name of the CSV with its data, without extension.
     pub data: &'static str,
     /// Its charts.
     pub panels: Vec<Panel>,
-    /// Charts beside each other.
+    /// Charts per row.
     pub columns: usize,
 }
 
-/// All figures for which there is something to draw, in the thesis' order.
+/// All figures with data, in the thesis' order.
 pub fn figures(data: &Data<'_>) -> Vec<Figure> {
-    let has = |strategy| data.ladder().any(|asked| asked == strategy);
+    let has = |strategy| data.ladder().any(|requested| requested == strategy);
     let mut figures = vec![
         ladder::ladder(data),
         outputs::output_types(data),

@@ -1,7 +1,7 @@
-//! The folder of a run: what was made so far, so that a run that was cut short goes on where it was.
+//! The folder of a run, with everything made so far: an interrupted run resumes from it.
 //!
-//! `manifest.json` says what all records have in common; `records.jsonl` has a record a line, each written at once. A
-//! last line that was cut off is dropped. `atlases/` has the atlases ([`crate::atlases`]).
+//! `manifest.json` describes all records; `records.jsonl` has one record per line, each written at once. A truncated last
+//! line is dropped. `atlases/` has the atlases ([`crate::atlases`]).
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -17,17 +17,17 @@ use crate::{
     record::{Record, Source},
 };
 
-/// The layout of the records. It grows when what is recorded changes. From 2 on there may be records of sets that are
-/// valid otherwise than the thesis says, or come of an atlas; those of 1 read as before.
+/// Format of the records, incremented when they change. Since 2, records may be of sets under another validity or with an
+/// atlas; records of 1 are still read.
 const FORMAT: u32 = 2;
 
-/// The oldest layout that is still read.
+/// The oldest format that is still read.
 const OLDEST_FORMAT: u32 = 1;
 
 const MANIFEST: &str = "manifest.json";
 const RECORDS: &str = "records.jsonl";
 
-/// What all records of a folder have in common.
+/// Properties shared by all records of a folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     format: u32,
@@ -35,12 +35,12 @@ pub struct Manifest {
     pub seed: u64,
     /// The receiving hand of the sets under the thesis' validity.
     pub rig: String,
-    /// Where it was measured.
+    /// The machine it was measured on.
     pub machine: Machine,
 }
 
 impl Manifest {
-    /// That of a run on this machine.
+    /// The manifest of a run on this machine.
     pub fn new(seed: u64) -> Self {
         Self {
             format: FORMAT,
@@ -50,7 +50,7 @@ impl Manifest {
         }
     }
 
-    /// What keeps records of `self`, an earlier one, and of `other` from standing in one table.
+    /// Differences to a later manifest that keep their records out of one table.
     fn differences(&self, other: &Self) -> Vec<String> {
         let mut differences = Vec::new();
         if !(OLDEST_FORMAT..=other.format).contains(&self.format) {
@@ -88,7 +88,7 @@ pub enum FolderError {
         /// Why.
         source: io::Error,
     },
-    /// A file has something else in it.
+    /// A file has other contents.
     #[error("{} is not what a run writes (line {line}); give another folder, or start afresh", path.display())]
     Malformed {
         /// The file.
@@ -98,7 +98,7 @@ pub enum FolderError {
         /// Why.
         source: serde_json::Error,
     },
-    /// There are records, and nothing says what they are.
+    /// There are records without a manifest.
     #[error("{} has {RECORDS} but no {MANIFEST}; give another folder, or start afresh", .0.display())]
     NoManifest(PathBuf),
     /// The folder is another run's.
@@ -113,12 +113,12 @@ pub enum FolderError {
         /// All that differs.
         differences: Vec<String>,
     },
-    /// Somebody else writes here.
+    /// Another process writes here.
     #[error("another run is writing to {}", .0.display())]
     Busy(PathBuf),
-    /// The algorithm is no longer the one that made the records.
+    /// Another version of the algorithm made the records.
     #[error(
-        "{hand} on {holdout}, seed {seed}, in {} ends otherwise than recorded: the search has changed since; give \
+        "{hand} on {holdout}, seed {seed}, in {} ends differently than recorded: the search has changed since; give \
          another folder, or start afresh",
         path.display()
     )]
@@ -138,7 +138,7 @@ pub enum FolderError {
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
-    /// What all records have in common.
+    /// Properties shared by all records.
     pub manifest: Manifest,
     records: Vec<Record>,
     /// Locked while the folder is open.
@@ -146,10 +146,10 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Opens a run's folder, or begins one. With `fresh`, what is there is forgotten, atlases aside.
+    /// Opens a run's folder, or begins one. With `fresh`, existing records are discarded, but not atlases.
     ///
     /// # Errors
-    /// The folder cannot be written, is in use, or has another run in it.
+    /// The folder cannot be written, is in use, or belongs to another run.
     pub fn open(path: &Path, manifest: Manifest, fresh: bool) -> Result<Self, FolderError> {
         fs::create_dir_all(path).map_err(failed_to("make", path))?;
         let records_path = path.join(RECORDS);
@@ -199,7 +199,7 @@ impl Folder {
             .and_then(|()| file.seek(io::SeekFrom::End(0)))
             .map_err(failed_to("continue", &records_path))?;
         if earlier.format < FORMAT {
-            // From now on there may be records that earlier versions would misread: they refuse the folder.
+            // Earlier versions would misread records added from now on: the new format makes them reject the folder.
             earlier.format = FORMAT;
             write_manifest(&manifest_path, &earlier)?;
         }
@@ -211,7 +211,7 @@ impl Folder {
         })
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -221,7 +221,7 @@ impl Folder {
         &self.records
     }
 
-    /// Keeps records. After this they are in the file.
+    /// Adds records, which are in the file afterwards.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -264,7 +264,7 @@ fn read_manifest(path: &Path) -> Result<Option<Manifest>, FolderError> {
     }
 }
 
-/// The records, and the bytes that they take without a line that was cut off.
+/// The records and their length in bytes, without a truncated last line.
 fn read_records(path: &Path, file: &File) -> Result<(Vec<Record>, u64), FolderError> {
     let mut reader = BufReader::new(file);
     let mut records = Vec::new();

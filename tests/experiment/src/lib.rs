@@ -1,4 +1,4 @@
-//! The experiments of the thesis' chapter 5, on the crate that the server searches with.
+//! The experiments of the thesis' chapter 5, run on the server's core.
 
 pub mod atlases;
 pub mod claims;

@@ -1,28 +1,28 @@
-//! What the times were measured on.
+//! The machine that times were measured on.
 
 use std::{fmt, num::NonZeroUsize, time::Instant};
 
 use serde::{Deserialize, Serialize};
 
-/// Clock readings that are averaged. More take longer.
+/// Clock readings to average.
 const CLOCK_READINGS: u32 = 100_000;
 
 /// A machine and a build.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
-    /// The processor's name, where the system tells.
+    /// The processor's name, where the system provides it.
     pub processor: Option<String>,
-    /// Threads that run at once.
+    /// Hardware threads.
     pub threads: usize,
     /// "linux" and so on.
     pub operating_system: String,
     /// "aarch64" and so on.
     pub architecture: String,
-    /// Of the instruction sets that matter, those that the build uses.
+    /// Relevant instruction sets that the build uses.
     pub target_features: Vec<String>,
-    /// Was it built with optimisation?
+    /// Whether the build is optimised.
     pub optimised: bool,
-    /// What reading the clock costs. A step's time contains about one reading.
+    /// Time of one clock reading, of which a step's time contains about one.
     pub clock_nanoseconds: f64,
 }
 
@@ -52,12 +52,12 @@ impl Machine {
             architecture: std::env::consts::ARCH.to_owned(),
             target_features,
             optimised: !cfg!(debug_assertions),
-            // With one decimal: more would only look exact.
+            // One decimal: more would suggest false precision.
             clock_nanoseconds: (clock_nanoseconds * 10.0).round() / 10.0,
         }
     }
 
-    /// True if times of the two may stand in one table.
+    /// Whether times of both machines may be compared.
     pub fn is_like(&self, other: &Self) -> bool {
         Self {
             clock_nanoseconds: other.clock_nanoseconds,
@@ -84,7 +84,7 @@ impl fmt::Display for Machine {
     }
 }
 
-/// Linux tells in a file; elsewhere the architecture has to do.
+/// Linux names it in a file; elsewhere the architecture stands in.
 fn processor() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;

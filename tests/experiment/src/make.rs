@@ -1,4 +1,4 @@
-//! Makes records: searches with the crate that the server searches with, and looks closely at single attempts.
+//! Makes records: runs searches, and examines single attempts.
 
 mod details;
 
@@ -41,7 +41,7 @@ use crate::{
     record::{AtlasFigures, Record, SearchFigures, Source},
 };
 
-/// The hand that a set poses: the right one of its rig.
+/// The receiving hand of a set: the right hand of its rig.
 pub fn receiving_hand(set: Set) -> Option<&'static Hand> {
     hand(set.rig_name(), Handedness::Right)
 }
@@ -55,7 +55,7 @@ impl Clock for MonotonicClock {
     }
 }
 
-/// Why nothing can be made.
+/// Why no records can be made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {
     /// A built-in holdout is broken.
@@ -64,15 +64,15 @@ pub enum MakeError {
     /// A built-in rig is missing.
     #[error("the rig {0:?} is not built in")]
     Rig(&'static str),
-    /// A set asks for an atlas that is not there.
+    /// The atlas of a set is missing.
     #[error("there is no atlas of {0}")]
     Atlas(&'static str),
-    /// The system gives no threads.
+    /// The system provides no threads.
     #[error("cannot start {0} threads")]
     Threads(usize, #[source] rayon::ThreadPoolBuildError),
 }
 
-/// The holdouts, ready to be searched, and the threads to do it.
+/// Prepared holdouts, and threads to search them with.
 pub struct Maker {
     holdouts: Vec<Holdout>,
     thesis_rig: &'static Rig,
@@ -83,10 +83,10 @@ pub struct Maker {
 }
 
 impl Maker {
-    /// Gets everything ready that the settings need.
+    /// Prepares everything that the settings need.
     ///
     /// # Errors
-    /// A built-in holdout or hand is broken, an atlas is missing that a set asks for, or there are no threads to be had.
+    /// A built-in holdout or hand is broken, a set's atlas is missing, or no threads can be started.
     pub fn new(settings: &Settings, atlases: Atlases) -> Result<Self, MakeError> {
         let mut cells = settings.cells().into_iter().filter(|cell| cell.set.atlas);
         if let Some(cell) = cells.find(|cell| atlases.of(cell).is_none()) {
@@ -122,8 +122,7 @@ impl Maker {
         })
     }
 
-    /// Searches for the valid grasp number `number` of a cell; the record may say that it gave up. None if it was told to
-    /// stop.
+    /// Searches for valid grasp number `number` of a cell; the record may report that the search gave up. None if stopped.
     pub fn valid(&self, settings: &Settings, cell: &Cell, number: u64, stop: &AtomicBool) -> Option<Record> {
         let seed = settings.seed_of_valid(cell, number);
         let holdout = &self.holdouts[cell.holdout];
@@ -152,7 +151,7 @@ impl Maker {
             mechanisms: Mechanisms::ALL,
         };
         let (_, pool) = self.pools.iter().find(|(threads, _)| *threads == cell.threads)?;
-        // From inside the pool, so that waking a thread is not measured where one thread is asked for.
+        // From inside the pool, so that searches on one thread do not include waking it.
         let (outcome, took) = pool.install(|| {
             let start = self.clock.now();
             let outcome = find_grasp(pool, holdout, self.rig(cell.set), &search, &self.clock, stop);
@@ -164,13 +163,11 @@ impl Maker {
             SearchEnd::AttemptsExhausted => Source::Nowhere,
             SearchEnd::DeadlinePassed | SearchEnd::Stopped => return None,
         };
-        let is_looked_at = cell.threads == 1 && source != Source::Nowhere;
-        let closer = is_looked_at
-            .then(|| self.closer_look(cell, seed, source))
-            .flatten();
+        let is_examined = cell.threads == 1 && source != Source::Nowhere;
+        let closer = is_examined.then(|| self.examine(cell, seed, source)).flatten();
         let is_valid = |closer: &Closer| matches!(closer.end, AttemptEnd::Valid(_));
         debug_assert!(
-            !is_looked_at || closer.as_ref().is_some_and(is_valid),
+            !is_examined || closer.as_ref().is_some_and(is_valid),
             "{source} is not valid again"
         );
         Some(Record {
@@ -193,8 +190,7 @@ impl Maker {
         })
     }
 
-    /// The invalid attempts from number `from` to `until` of a cell: the first ones of their seed, starting at attempt
-    /// `first_attempt`.
+    /// The invalid attempts of a cell with these numbers: the first failures of their seed from `first_attempt` on.
     pub fn invalid(
         &self,
         settings: &Settings,
@@ -225,13 +221,13 @@ impl Maker {
         records
     }
 
-    /// Looks at a record's attempt or grip again. True if it ends as recorded, with the same wrist and digits, and of a
-    /// search that gave up, which would take as long again.
-    pub fn comes_out_again(&self, record: &Record) -> bool {
+    /// Repeats a record's attempt or grip. True if it ends as recorded, with the same wrist and digits. A search that gave
+    /// up is not repeated, as it would take as long again, and counts as true.
+    pub fn is_reproducible(&self, record: &Record) -> bool {
         if record.source == Source::Nowhere {
             return true;
         }
-        let Some(closer) = self.closer_look(&record.cell, record.seed, record.source) else {
+        let Some(closer) = self.examine(&record.cell, record.seed, record.source) else {
             return false;
         };
         let rejection = match closer.end {
@@ -245,7 +241,7 @@ impl Maker {
             })
     }
 
-    /// The valid grasp of a record, made again.
+    /// Reproduces the valid grasp of a record.
     pub fn grasp_of(&self, record: &Record) -> Option<Box<Grasp>> {
         let index = match record.source {
             Source::Attempt(index) => index,
@@ -261,7 +257,7 @@ impl Maker {
         }
     }
 
-    /// A grip of the atlas as it holds the cell's holdout; none if it does not, or if there is no such grip.
+    /// A grip of the atlas on the cell's holdout; none if it does not hold, or does not exist.
     fn grip(&self, cell: &Cell, entry: u16) -> Option<Box<Grasp>> {
         let scene = self.scene(cell);
         let (object, presented) = scene.physical()?;
@@ -288,7 +284,7 @@ impl Maker {
     }
 }
 
-/// A duration as it is recorded; a search of more than 584 years counts as that long.
+/// A duration as recorded, saturating at 584 years.
 fn nanoseconds(duration: Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }

@@ -1,4 +1,4 @@
-//! What a run makes: sets of grasps, cell by cell.
+//! The plan of a run: sets of grasps, cell by cell.
 
 use std::ops::Not;
 
@@ -9,34 +9,33 @@ use grasp_synthesis::model::{
 };
 use serde::{Deserialize, Serialize};
 
-/// The receiving hand under the thesis' validity: the thesis' own.
+/// The receiving hand under the thesis' validity.
 pub const THESIS_RIG: &str = "thesis";
 
-/// The receiving hand under `PHYSICAL` validity: the one that a server poses by default.
+/// The receiving hand under `PHYSICAL` validity: the server's default.
 pub const PHYSICAL_RIG: &str = "adult";
 
-/// Distance between the seeds of two holdouts, and with it one more than the most grasps that a cell can have.
+/// Distance between the seeds of two holdouts: one more than the largest number of grasps per cell.
 const SEEDS_PER_HOLDOUT: u64 = 1_000_000;
 
-/// The most grasps, and the most invalid attempts, of a cell: far more than there is time for.
+/// Largest number of grasps, and of invalid attempts, per cell: far more than there is time for.
 pub const MOST_PER_CELL: u64 = SEEDS_PER_HOLDOUT - 1;
 
-/// Attempts after which a search of a set beyond A to F gives up: not every holdout leaves a physical grasp. More take
-/// longer, up to a minute each, before that is accepted; fewer give up on holdouts that leave few. The worst holdout that
-/// leaves any takes 6,000 on average.
+/// Attempts after which a search of a set beyond A to F gives up, as not every holdout leaves a physical grasp. More take
+/// up to a minute each; the worst holdout with a grasp takes 6,000 on average.
 const MOST_ATTEMPTS: u64 = 1_000_000;
 
-/// A way to synthesize: one grasp set of the thesis, or a column beside them.
+/// A way to synthesize: a grasp set of the thesis, or one beyond them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Set {
     /// How grasps are searched for.
     pub strategy: Strategy,
     /// Which bend ratios a digit tries.
     pub bend_ratios: BendRatioChoice,
-    /// Which grasps count as valid. Records of the thesis' own validity do not say it.
+    /// Which grasps count as valid. Omitted in records under the thesis' validity.
     #[serde(default, skip_serializing_if = "is_of_thesis")]
     pub validity: Validity,
-    /// Are the grips of the object's complete atlas tried first? Records of sets without do not say it.
+    /// Whether the grips of the object's complete atlas are tried first. Omitted in records of sets without an atlas.
     #[serde(default, skip_serializing_if = "Not::not")]
     pub atlas: bool,
 }
@@ -52,22 +51,22 @@ impl Set {
         Self::of_thesis(strategy, strategy.default_bend_ratios())
     }
 
-    /// Another search for the same grasps: GUIDED, with the hand and the validity of the thesis.
+    /// GUIDED search with the hand and the validity of the thesis.
     pub const GUIDED: Self = Self::of_thesis(Strategy::Guided, BendRatioChoice::OneRandom);
 
-    /// GUIDED for the grasps that a server gives by default, found afresh.
+    /// GUIDED search for the server's default grasps, without known grips.
     pub const PHYSICAL: Self = Self {
         validity: Validity::Physical,
         ..Self::GUIDED
     };
 
-    /// The same with the object's complete atlas: as a server answers by default.
+    /// [`Self::PHYSICAL`] with the object's complete atlas, as a server answers by default.
     pub const ATLAS: Self = Self {
         atlas: true,
         ..Self::PHYSICAL
     };
 
-    /// Everything that is compared: sets A to F, and what goes beyond them.
+    /// All compared sets: A to F, and those beyond.
     pub const ALL: [Self; 9] = [
         Self::of_thesis(Strategy::A, BendRatioChoice::All),
         Self::of_thesis(Strategy::B, BendRatioChoice::All),
@@ -105,7 +104,7 @@ impl Set {
         Strategy::LADDER.contains(&self.strategy) && self == Self::ladder(self.strategy)
     }
 
-    /// Attempts after which a search gives up; those of A to F never do.
+    /// Attempts after which a search gives up; searches of A to F never do.
     pub fn most_attempts(self) -> u64 {
         if self == Self::GUIDED || self.validity == Validity::Physical {
             MOST_ATTEMPTS
@@ -114,7 +113,7 @@ impl Set {
         }
     }
 
-    /// The rig of the receiving hand, as a server chooses it by default.
+    /// The rig of the receiving hand: the server's default.
     pub fn rig_name(self) -> &'static str {
         match self.validity {
             Validity::Thesis => THESIS_RIG,
@@ -134,7 +133,7 @@ impl Set {
     }
 }
 
-/// What Figure 5.20 calls a choice of bend ratios, in short.
+/// Short form of Figure 5.20's name of a choice of bend ratios.
 pub fn choice_name(choice: BendRatioChoice) -> &'static str {
     match choice {
         BendRatioChoice::All => "all",
@@ -154,7 +153,7 @@ pub struct Cell {
     pub set: Set,
     /// Workers that race.
     pub threads: usize,
-    /// Index among the built-in holdouts; written as its name.
+    /// Index among the built-in holdouts, serialized as the name.
     #[serde(with = "holdout_name")]
     pub holdout: usize,
 }
@@ -185,22 +184,22 @@ mod holdout_name {
     }
 }
 
-/// What is asked for.
+/// The request of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Start of all randomness.
     pub seed: u64,
-    /// Valid grasps of each cell; the thesis made 25.
+    /// Valid grasps per cell; the thesis made 25.
     pub valid: u64,
-    /// Invalid attempts of each set and holdout; the thesis kept 100.
+    /// Invalid attempts per set and holdout; the thesis kept 100.
     pub invalid: u64,
     /// The sets, in the order of [`Set::ALL`].
     pub sets: Vec<Set>,
     /// The holdouts, as indices.
     pub holdouts: Vec<usize>,
-    /// Also the columns of Figure 5.20?
+    /// Whether the columns of Figure 5.20 are included.
     pub bend_ratio_columns: bool,
-    /// Numbers of threads with which the sets are run; the first is the one that all but the times is taken from.
+    /// Numbers of threads to run the sets with; everything but times is taken from the first.
     pub threads: Vec<usize>,
 }
 
@@ -221,8 +220,7 @@ impl Default for Settings {
 impl Settings {
     /// The cells in the order in which they are made.
     ///
-    /// Sets come before each other as the ladder has them, so that what a holdout took in one set tells how long it
-    /// will take in the next.
+    /// Sets are in the ladder's order, so that a holdout's time in one set predicts its time in the next.
     pub fn cells(&self) -> Vec<Cell> {
         let mut runs: Vec<(Set, usize)> = Vec::new();
         for &set in &self.sets {
@@ -245,8 +243,8 @@ impl Settings {
         cells
     }
 
-    /// How many invalid attempts a cell keeps: on one thread, in the sets that were asked for. Where an atlas answers,
-    /// attempts are those of the same set without.
+    /// Number of invalid attempts that a cell keeps: on one thread, in the requested sets without an atlas, as an atlas does
+    /// not change attempts.
     pub fn invalid_of(&self, cell: &Cell) -> u64 {
         if self.sets.contains(&cell.set) && !cell.set.atlas && cell.threads == 1 {
             self.invalid
@@ -255,8 +253,7 @@ impl Settings {
         }
     }
 
-    /// The seed of a cell's grasp. It is the same in all sets: what differs between two sets is then the way to
-    /// synthesize and not luck as well.
+    /// The seed of a cell's grasp. It is the same in all sets, so two sets differ in how they synthesize and not in luck.
     pub fn seed_of_valid(&self, cell: &Cell, number: u64) -> u64 {
         debug_assert!(number < MOST_PER_CELL, "grasp {number} of a cell");
         self.seed_of_holdout(cell).wrapping_add(number)
@@ -282,13 +279,13 @@ mod tests {
     #[test]
     fn every_cell_is_made_once() {
         let cells = Settings::default().cells();
-        // Nine sets on one and two threads, and four columns of Figure 5.20 that are no set of their own.
+        // Nine sets on one and two threads, and four columns of Figure 5.20 that are not among the sets.
         assert_eq!(cells.len(), (9 * 2 + 4) * 15);
         assert_eq!(cells.iter().collect::<HashSet<_>>().len(), cells.len());
     }
 
     #[test]
-    fn the_columns_are_those_of_the_thesis() {
+    fn bend_ratio_columns_match_the_thesis() {
         let names = Set::BEND_RATIO_COLUMNS.map(Set::name);
         assert_eq!(names[0], "D");
         assert_eq!(names[2], "E");
@@ -308,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_of_earlier_versions_are_read_and_written_as_they_were() {
+    fn cells_of_earlier_versions_round_trip() {
         let earlier = r#"{"strategy":"B","bend_ratios":"all","threads":1,"holdout":"scissors-hold1"}"#;
         let cell: Cell = serde_json::from_str(earlier).expect("a cell");
         assert_eq!(cell.set, Set::ladder(Strategy::B));
@@ -324,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn no_two_searches_of_a_set_share_a_seed() {
+    fn searches_of_a_set_have_distinct_seeds() {
         let settings = Settings::default();
         let mut seeds = HashSet::new();
         for cell in settings
@@ -341,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_attempts_are_kept_of_sets_that_were_asked_for() {
+    fn invalid_attempts_are_kept_of_requested_sets_on_one_thread() {
         let settings = Settings {
             sets: vec![Set::ladder(Strategy::F), Set::PHYSICAL, Set::ATLAS],
             ..Settings::default()

@@ -1,4 +1,4 @@
-//! What is kept of a grasp or a failed attempt.
+//! Records of grasps and failed attempts.
 
 use std::fmt;
 
@@ -9,33 +9,32 @@ use serde::{Deserialize, Serialize};
 
 use crate::plan::Cell;
 
-/// One attempt: the last one of a search, valid, or one of those that failed. Or the grip of an atlas that ended a
-/// search, or that a search gave up.
+/// The valid attempt or the grip of an atlas that ended a search, a search that gave up, or a failed attempt.
 ///
-/// Set, holdout, seed and attempt make an attempt again:
-/// `grasp find --holdout H --validity V --strategy S --bend-ratios R --seed N --only-attempt I`. A grip of an atlas is
-/// what a server whose atlas is complete answers to `grasp find --holdout H --reproducible`.
+/// Set, holdout, seed and attempt reproduce an attempt:
+/// `grasp find --holdout H --validity V --strategy S --bend-ratios R --seed N --only-attempt I`. With a complete atlas, a
+/// server answers `grasp find --holdout H --reproducible` with the same grip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Where it belongs.
+    /// Its cell.
     #[serde(flatten)]
     pub cell: Cell,
-    /// Counts the valid ones of the cell, and the invalid ones for themselves, from 0.
+    /// Number from 0 among the cell's valid or invalid records.
     pub number: u64,
     /// The seed of its search.
     pub seed: u64,
-    /// Which attempt of the seed it is, or which grip.
+    /// The attempt of the seed, or the grip.
     #[serde(flatten)]
     pub source: Source,
-    /// Why it failed; none if it is valid, or if a search gave up.
+    /// Why it failed; none if it is valid or the search gave up.
     pub rejection: Option<Rejection>,
-    /// What the search took that ended with it; none for a failed attempt.
+    /// Effort of its search; none for a failed attempt.
     pub search: Option<SearchFigures>,
-    /// Its details; none of searches on more than one thread, which are made for their times, or that gave up.
+    /// Its details; none for searches on more than one thread, which serve for times only, or that gave up.
     pub details: Option<Details>,
 }
 
-/// Where a record's hand came from.
+/// Source of a record's hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
@@ -43,12 +42,12 @@ pub enum Source {
     Attempt(u64),
     /// The grip of this index of the object's complete atlas.
     AtlasEntry(u16),
-    /// There is none: the search gave up.
+    /// None: the search gave up.
     Nowhere,
 }
 
 impl Source {
-    /// Where a grasp came from; none if it was known from an earlier search, which experiments do not let happen.
+    /// The source of a grasp; none for recent grips, which experiments do not use.
     pub fn of(source: GraspSource) -> Option<Self> {
         match source {
             GraspSource::Attempt(index) => Some(Self::Attempt(index)),
@@ -76,13 +75,12 @@ impl fmt::Display for Source {
     }
 }
 
-/// What it took to find a valid grasp.
+/// Effort of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SearchFigures {
-    /// Attempts, the valid one included: accepted placements, as the thesis counts. None where a grip of an atlas was
-    /// found first.
+    /// Attempts, the valid one included: accepted placements, as in the thesis; 0 if a grip of the atlas is the answer.
     pub attempts: u64,
-    /// Placements that the measures pruned.
+    /// Placements pruned by the measures.
     pub pruned_placements: u64,
     /// Failed attempts by kind, in the order of [`Rejection::OF_THESIS`]: the experiments set no constraints.
     pub rejections: [u64; 8],
@@ -93,28 +91,27 @@ pub struct SearchFigures {
     pub atlas: Option<AtlasFigures>,
 }
 
-/// What a search that may answer from an atlas reports of it.
+/// A search's report on its atlas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AtlasFigures {
-    /// Grips that there were to try.
+    /// Grips to try.
     pub entries: u64,
-    /// Valid grasps that were found by the end.
+    /// Valid grasps found.
     pub candidates: u64,
 }
 
-/// What an attempt was like.
+/// Details of an attempt.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Details {
-    /// Of its wrist placement; under `PHYSICAL` validity that of a valid grasp is where the wrist came to be. None of an
-    /// attempt at which guided search found no place.
+    /// Measures of its wrist placement, for valid physical grasps that of the final wrist; none where guided search found no
+    /// place.
     pub measures: Option<Measures>,
-    /// The digits that were posed, thumb first; none of failed attempts under `PHYSICAL` validity, where what the digits
-    /// touch is not known.
+    /// The posed digits, thumb first; none for failed attempts under `PHYSICAL` validity, whose contacts are unknown.
     pub digits: Vec<DigitFigures>,
-    /// Median time of each step in nanoseconds over some replays, in the order of [`STEP_NAMES`]; none of a grip of an
-    /// atlas, which takes no steps.
+    /// Median time of each step over some replays, in nanoseconds and the order of [`STEP_NAMES`]; none for grips of an
+    /// atlas, which take no steps.
     pub step_nanoseconds: Option<[u64; 5]>,
-    /// Of a valid grasp.
+    /// Figures of a valid grasp.
     pub grasp: Option<GraspFigures>,
 }
 
@@ -161,28 +158,28 @@ pub struct DigitFigures {
     pub yaw_degrees: f32,
     /// θ1: the bend angle.
     pub bend_degrees: f32,
-    /// With which it touches; none if it does not.
+    /// The ratio with which it touches, if it does.
     pub bend_ratio: Option<f32>,
     /// Links that touch.
     pub contacts: u32,
-    /// If it touches as in the thesis: does it also with 0.7, 1 and 1.42 alone, at the same wrist and yaw (Figure 5.19)?
+    /// For a touching digit under the thesis' validity: whether it touches with 0.7, 1 and 1.42 alone, at the same wrist and
+    /// yaw (Figure 5.19).
     pub touches_with: Option<[bool; 3]>,
 }
 
-/// What only a valid grasp has.
+/// Figures that only valid grasps have.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspFigures {
     /// Angle of Eq. 4.5.
     pub wrench_angle_degrees: f32,
     /// E of Eq. 4.6.
     pub comfort: f32,
-    /// How many of 100 further random force distributions oppose gravity (5.6); none under `PHYSICAL` validity, where
-    /// forces are solved for and not drawn.
+    /// How many of 100 further random force distributions oppose gravity (5.6); none under `PHYSICAL` validity, where forces
+    /// are solved, not drawn.
     pub sufficient_distributions: Option<u32>,
-    /// E again for the same contacts, each from force distributions drawn anew. Empty if none sufficed, or if none are
-    /// drawn.
+    /// E for the same contacts with other draws of force distributions. Empty if none sufficed, or if none are drawn.
     pub comfort_again: Vec<f32>,
-    /// Contacts of the palm, which there are under `PHYSICAL` validity only.
+    /// Contacts of the palm, only under `PHYSICAL` validity.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub palm_contacts: u32,
 }
@@ -198,13 +195,13 @@ impl Record {
         self.rejection.is_none() && self.source != Source::Nowhere
     }
 
-    /// The details, of which every record on one thread has some.
+    /// Figures of a valid grasp, which every valid record on one thread has.
     pub fn grasp(&self) -> Option<&GraspFigures> {
         self.details.as_ref()?.grasp.as_ref()
     }
 }
 
-/// The name of an output type as Table 5.2 has it, or would.
+/// The name of an output type, in the style of Table 5.2.
 pub fn output_type(rejection: Option<Rejection>) -> &'static str {
     match rejection {
         Some(Rejection::NoContacts) => "NoContacts",

@@ -1,4 +1,4 @@
-//! The report of a run: a page, its pictures, and every table as CSV.
+//! The report of a run: a page, its pictures and all tables as CSV.
 
 use std::{
     fmt::Write as _,
@@ -24,14 +24,14 @@ const PAGE: &str = "README.md";
 const SHEET: &str = "comfort.png";
 const CSV_FOLDER: &str = "csv";
 
-/// A report that was written.
+/// A written report.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// The page.
     pub page: PathBuf,
     /// Attempts and time per valid grasp.
     pub ladder: Table,
-    /// What chapter 5 says, and what the run shows.
+    /// The claims of chapter 5 with the run's results.
     pub claims: Vec<Claim>,
 }
 
@@ -45,8 +45,8 @@ pub struct ReportError {
     pub source: io::Error,
 }
 
-/// Writes the report of what a folder has: the page with its pictures and tables to `target`, and the lists of all
-/// grasps and attempts to the folder itself.
+/// Writes the report of a folder's records: the page with its pictures and tables to `target`, and the lists of all grasps
+/// and attempts to the folder itself.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -75,7 +75,7 @@ pub fn write(
         let svg = figure(drawn.title, &drawn.panels, drawn.columns);
         write_file(&target.join(format!("{}.svg", drawn.file)), svg.as_bytes())?;
     }
-    // The question is the thesis' own (6.1).
+    // The thesis asks this (6.1).
     let sheet_set = data.ladder().last().map(Set::ladder).or(data.sets().last());
     let sheet = sheet_set.and_then(|set| Some((set, comfort_sheet(&data, maker, set)?)));
     if let Some((_, image)) = &sheet {
@@ -97,7 +97,7 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
         })
 }
 
-/// A part of the page.
+/// A section of the page.
 struct Section {
     title: &'static str,
     text: String,
@@ -106,7 +106,7 @@ struct Section {
 }
 
 impl Section {
-    /// A part without figures.
+    /// A section without figures.
     fn new(title: &'static str, text: impl Into<String>, tables: Vec<Table>) -> Self {
         Self {
             title,
@@ -117,7 +117,7 @@ impl Section {
     }
 }
 
-/// The page without what stands around it. Figures go to the section that has the table they are drawn from.
+/// The sections of the page. Figures go to the section with the table they are drawn from.
 fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table, types: &[SetTypes]) -> Vec<Section> {
     let mut sections = vec![
         Section::new(
@@ -210,7 +210,7 @@ fn sections(data: &Data<'_>, claims: &[Claim], ladder: &Table, types: &[SetTypes
     sections
 }
 
-/// What is to be said of the sets beside A to F.
+/// Notes on the sets beyond A to F.
 fn beyond_the_ladder(data: &Data<'_>) -> String {
     if data.sets().all(Set::is_ladder) {
         return String::new();
@@ -283,7 +283,7 @@ fn page_text(data: &Data<'_>, folder: &Folder, sections: &[Section], sheet: Opti
     text
 }
 
-/// The command that gives this run, without what is as always.
+/// The command line of a run, without default values.
 pub fn command_line(settings: &Settings) -> String {
     let usual = Settings::default();
     let mut text = "grasp experiment".to_owned();

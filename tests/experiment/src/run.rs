@@ -1,4 +1,4 @@
-//! Runs what is missing.
+//! Makes missing records.
 
 use std::{
     collections::HashMap,
@@ -14,43 +14,43 @@ use crate::{
     record::{Record, Source},
 };
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// Valid grasps that were made, in this run or before, or that were given up.
+    /// Valid grasps made, in this run or before, or given up.
     pub done: u64,
-    /// All valid grasps that were asked for.
+    /// All requested valid grasps.
     pub total: u64,
-    /// What is being made.
+    /// The current cell.
     pub cell: Cell,
-    /// About how long it will take from here; none before anything is known.
+    /// Estimated remaining time, once there is a basis.
     pub left: Option<Duration>,
 }
 
-/// How a run ended that did not fail.
+/// How a successful run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunEnd {
-    /// Everything that was asked for is in the folder.
+    /// The folder has everything requested.
     Complete,
-    /// It was told to stop; what was made is in the folder.
+    /// It was stopped; the folder has what was made.
     Stopped,
 }
 
-/// What a folder has of one cell.
+/// A folder's records of one cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Made {
     valid: u64,
     invalid: u64,
     next_invalid_attempt: u64,
     nanoseconds: u64,
-    /// A search gave up: others would, too.
+    /// A search gave up; others would, too.
     gave_up: bool,
 }
 
-/// Makes what the folder does not have yet.
+/// Makes the records that the folder lacks.
 ///
 /// # Errors
-/// The folder cannot be written, or its records were made by another algorithm.
+/// The folder cannot be written, or another version of the algorithm made its records.
 pub fn run(
     settings: &Settings,
     maker: &Maker,
@@ -90,7 +90,7 @@ pub fn run(
     Ok(RunEnd::Complete)
 }
 
-/// What is made at once.
+/// Records made in one step.
 enum Part {
     /// Some failed attempts.
     Invalid { numbers: Range<u64>, first_attempt: u64 },
@@ -98,7 +98,7 @@ enum Part {
     Valid { number: u64 },
 }
 
-/// What a cell lacks first.
+/// The next missing part of a cell.
 fn missing(settings: &Settings, cell: &Cell, made: Option<&Made>) -> Option<Part> {
     let made = made.copied().unwrap_or_default();
     let invalid = settings.invalid_of(cell);
@@ -126,7 +126,7 @@ impl Made {
         }
     }
 
-    /// Valid grasps that are still to be made.
+    /// Valid grasps still to be made.
     fn valid_left(&self, settings: &Settings) -> u64 {
         if self.gave_up {
             0
@@ -141,8 +141,7 @@ impl Made {
     }
 }
 
-/// Records that an earlier run made are made again, the first and the last of each cell: what the search does may have
-/// changed since.
+/// Reproduces the first and the last record of each cell, as the search may have changed since an earlier run.
 fn check_earlier_records(maker: &Maker, folder: &Folder) -> Result<(), FolderError> {
     let mut ends: HashMap<(Cell, bool), [&Record; 2]> = HashMap::new();
     for record in folder.records() {
@@ -150,9 +149,9 @@ fn check_earlier_records(maker: &Maker, folder: &Folder) -> Result<(), FolderErr
         ends.entry(key).or_insert([record; 2])[1] = record;
     }
     let mut checked: Vec<_> = ends.into_values().flatten().collect();
-    // Always the same one is named, whatever order the map had.
+    // Sorted, so that errors do not depend on the map's order.
     checked.sort_by_key(|record| (record.cell.holdout, record.seed, record.source));
-    match checked.into_iter().find(|record| !maker.comes_out_again(record)) {
+    match checked.into_iter().find(|record| !maker.is_reproducible(record)) {
         None => Ok(()),
         Some(record) => Err(FolderError::Outdated {
             path: folder.path().to_owned(),
@@ -176,8 +175,8 @@ fn progress_at(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>, 
     }
 }
 
-/// A cell takes as long a grasp as it took so far; if it has none, as long as its holdout took in the latest cell that
-/// has some; if there is none, as long as all took on average.
+/// A grasp is expected to take as long as its cell's grasps so far, or else as its holdout's in the latest cell with some,
+/// or else the overall average.
 fn time_left(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>) -> Option<Duration> {
     let means: Vec<_> = cells.iter().filter_map(|cell| made.get(cell)?.mean()).collect();
     if means.is_empty() {

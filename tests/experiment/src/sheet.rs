@@ -1,4 +1,4 @@
-//! A contact sheet of valid grasps in the order of comfort E (thesis 4.6 and 6.1: would a person rank them so?).
+//! A contact sheet of valid grasps in the order of comfort E (thesis 4.6 and 6.1: would a person agree with it?).
 
 use glam::Vec3;
 use grasp_assets::hands::hand;
@@ -13,17 +13,17 @@ use crate::{
     tables::valid_with_figures,
 };
 
-/// Grasps of each object on the sheet. More make it harder to look at, fewer show less of the order.
+/// Grasps per object on the sheet. More are harder to look at, fewer show less of the order.
 const GRASPS_PER_OBJECT: usize = 12;
 
-/// Grasps beside each other.
+/// Grasps per row.
 const COLUMNS: usize = 6;
 
-/// Pixels of a picture.
+/// Width and height of a picture in pixels.
 const SIZE: [u32; 2] = [330, 280];
 
-/// Grasps of a set, object by object, each row from the most comfortable to the least; the grasps are spread evenly over
-/// the ranks. None if the set has no grasps.
+/// Grasps of a set by object, from the most comfortable to the least and spread evenly over the ranks. None if the set has
+/// no grasps.
 pub fn comfort_sheet(data: &Data<'_>, maker: &Maker, set: Set) -> Option<Image> {
     let mut grasps: Vec<_> = valid_with_figures(data, set)
         .map(|(record, _, figures)| (record, figures.comfort))
@@ -51,7 +51,7 @@ pub fn comfort_sheet(data: &Data<'_>, maker: &Maker, set: Set) -> Option<Image> 
     contact_sheet(&pictures, COLUMNS)
 }
 
-/// So many places among `count`, evenly from the first to the last.
+/// Up to `places` indices below `count`, evenly from the first to the last.
 fn evenly(count: usize, places: usize) -> Vec<usize> {
     if count <= places {
         return (0..count).collect();
@@ -61,7 +61,7 @@ fn evenly(count: usize, places: usize) -> Vec<usize> {
         .collect()
 }
 
-/// A grasp, made again and drawn in the world, where gravity is downward.
+/// A reproduced grasp, drawn in the world, with gravity downward.
 fn picture(maker: &Maker, record: &Record) -> Option<Image> {
     let grasp = maker.grasp_of(record)?;
     let built_in = record.cell.built_in();
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_spread_from_the_first_to_the_last() {
+    fn indices_are_spread_from_the_first_to_the_last() {
         assert_eq!(evenly(3, 12), [0, 1, 2]);
         assert_eq!(evenly(100, 4), [0, 33, 66, 99]);
         assert!(evenly(0, 12).is_empty());

@@ -1,11 +1,11 @@
 //! Means, medians and ranks.
 
-/// Mean; none of nothing.
+/// Mean; none without values.
 pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The value below which a share from 0 to 1 of the values lies, linear between two of them.
+/// The quantile at a share from 0 to 1, with linear interpolation.
 pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -14,14 +14,14 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     Some(sorted[below] + (sorted[above] - sorted[below]) * place.fract())
 }
 
-/// Variance of what the values are a sample of; none of fewer than two.
+/// Sample variance; none for fewer than two values.
 pub fn variance(values: &[f64]) -> Option<f64> {
     let centre = mean(values)?;
     let squares: f64 = values.iter().map(|value| (value - centre).powi(2)).sum();
     (values.len() > 1).then(|| squares / (values.len() - 1) as f64)
 }
 
-/// Standard error of a mean of means: each group counts the same, whatever it varies.
+/// Standard error of a mean of group means, in which each group counts the same.
 pub fn standard_error_of_group_means(groups: &[Vec<f64>]) -> Option<f64> {
     let mut sum = 0.0;
     for group in groups {
@@ -30,7 +30,7 @@ pub fn standard_error_of_group_means(groups: &[Vec<f64>]) -> Option<f64> {
     (!groups.is_empty()).then(|| sum.sqrt() / groups.len() as f64)
 }
 
-/// Spearman's rank correlation of pairs; none of fewer than three or where one side is always the same.
+/// Spearman's rank correlation of pairs; none for fewer than three, or where one side is constant.
 pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     if pairs.len() < 3 {
         return None;
@@ -59,8 +59,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     values.iter().map(rank).collect()
 }
 
-/// How much larger the largest difference is between two distributions, the values' and one that is uniform from `min`
-/// to `max`, than chance allows: the Kolmogorov-Smirnov distance.
+/// The Kolmogorov-Smirnov distance of the values from a uniform distribution from `min` to `max`.
 pub fn distance_from_uniform(values: &[f64], min: f64, max: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -78,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn means_and_quantiles_are_those_of_the_textbook() {
+    fn means_quantiles_and_variances_match_hand_computed_values() {
         let values = [4.0, 1.0, 3.0, 2.0];
         assert_eq!(mean(&values), Some(2.5));
         assert_eq!(quantile(&values, 0.5), Some(2.5));
@@ -91,19 +90,19 @@ mod tests {
     }
 
     #[test]
-    fn ranks_correlate_whatever_the_scale() {
+    fn rank_correlation_does_not_depend_on_scale() {
         let pairs = [(1.0, 10.0), (2.0, 1000.0), (3.0, 1001.0), (4.0, 1e9)];
         assert_eq!(rank_correlation(&pairs), Some(1.0));
         let falling = pairs.map(|(x, y)| (x, -y));
         assert_eq!(rank_correlation(&falling), Some(-1.0));
-        // Worked by hand: ranks 1 2 3 4 against 2 1 4 3, 1 - 6 Σd² / (n (n² - 1)) = 1 - 24 / 60.
+        // By hand: ranks 1 2 3 4 against 2 1 4 3, 1 - 6 Σd² / (n (n² - 1)) = 1 - 24 / 60.
         let mixed = [(1.0, 2.0), (2.0, 1.0), (3.0, 4.0), (4.0, 3.0)];
         assert!((rank_correlation(&mixed).expect("four pairs") - 0.6).abs() < 1e-12);
         assert_eq!(rank_correlation(&[(1.0, 1.0), (2.0, 1.0), (3.0, 1.0)]), None);
     }
 
     #[test]
-    fn the_error_of_a_mean_of_means_is_that_of_independent_groups() {
+    fn the_error_of_a_mean_of_means_treats_groups_as_independent() {
         // Two groups with variances 2 and 0: (2/2 + 0/2) summed, root, halved.
         let groups = [vec![1.0, 3.0], vec![5.0, 5.0]];
         assert_eq!(standard_error_of_group_means(&groups), Some(0.5));

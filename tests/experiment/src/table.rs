@@ -1,15 +1,15 @@
-//! Tables: as Markdown for pages, as CSV for everything else.
+//! Tables, as Markdown for pages and as CSV for programs.
 
-/// What stands in a cell.
+/// The value of a table cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Words.
+    /// Text.
     Text(String),
     /// A whole number.
     Count(u64),
-    /// A number, and how many decimals people should read.
+    /// A number with its decimals for people.
     Number(f64, usize),
-    /// Nothing is known.
+    /// No value.
     Missing,
 }
 
@@ -32,8 +32,7 @@ impl From<u64> for Value {
 }
 
 impl Value {
-    /// A number with as many decimals as leave it three digits or so, a plain 0 if it is nothing; missing if there is
-    /// none.
+    /// A number with about three digits, or a plain 0; missing if there is none.
     pub fn number(value: impl Into<Option<f64>>) -> Self {
         let Some(value) = value.into().filter(|value| value.is_finite()) else {
             return Self::Missing;
@@ -48,7 +47,7 @@ impl Value {
         Self::Number(value, decimals)
     }
 
-    /// A number with these decimals; missing if there is none.
+    /// A number with fixed decimals; missing if there is none.
     pub fn decimals(value: impl Into<Option<f64>>, decimals: usize) -> Self {
         match value.into().filter(|value| value.is_finite()) {
             Some(value) => Self::Number(value, decimals),
@@ -90,7 +89,7 @@ impl Value {
     }
 }
 
-/// A number as CSV has it: six digits that count are more than anything here is measured to.
+/// A number for CSV with six significant digits, more than any measurement here has.
 pub fn csv_number(value: f64) -> String {
     if !value.is_finite() {
         return String::new();
@@ -125,9 +124,9 @@ pub fn with_separators(number: &str) -> String {
 /// A table with a name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Name of its CSV file, without the ending.
+    /// Name of its CSV file, without extension.
     pub file: &'static str,
-    /// What it shows.
+    /// Title.
     pub title: String,
     /// Names of the columns.
     pub header: Vec<String>,
@@ -156,14 +155,14 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// True if all that a column says are numbers.
+    /// Whether a column has only numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
-        let mut said = self
+        let mut values = self
             .rows
             .iter()
             .map(|row| &row[column])
             .filter(|value| **value != Value::Missing);
-        said.all(Value::is_number)
+        values.all(Value::is_number)
     }
 
     /// As Markdown, without the title.
@@ -214,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn people_read_separators_and_few_digits() {
+    fn text_has_separators_and_few_digits() {
         assert_eq!(Value::Count(456_287).to_text(), "456,287");
         assert_eq!(Value::Number(-1_234_567.891, 1).to_text(), "-1,234,567.9");
         assert_eq!(Value::number(12.345).to_text(), "12.3");
@@ -226,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn programs_read_plain_numbers() {
+    fn csv_has_plain_numbers() {
         assert_eq!(csv_number(456_287.0), "456287");
         assert_eq!(csv_number(0.000_123_456_78), "0.000123457");
         assert_eq!(csv_number(-2.5), "-2.5");
@@ -235,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_comes_back() {
+    fn csv_round_trips() {
         let text = table().to_csv();
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         assert_eq!(

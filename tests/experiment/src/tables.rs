@@ -1,4 +1,4 @@
-//! The tables of chapter 5 from a run's records, beside the thesis' own figures.
+//! The tables of chapter 5 from a run's records, next to the thesis' figures.
 
 mod atlas;
 mod bend_ratios;

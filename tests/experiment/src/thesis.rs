@@ -1,7 +1,7 @@
-//! What the thesis measured, on one thread of an Intel Core i7-5700HQ in Unity (5.1).
+//! The thesis' measurements, on one thread of an Intel Core i7-5700HQ in Unity (5.1).
 //!
-//! Figures by holdout are in the order of the built-in holdouts: remote, scalpel and scissors, of each `GenHold1` to 3 and
-//! `Hold1` to 2.
+//! Figures by holdout are in the order of the built-in holdouts: remote, scalpel and scissors, each with `GenHold1` to 3
+//! and `Hold1` to 2.
 
 use grasp_synthesis::model::strategy::Strategy;
 
@@ -59,7 +59,7 @@ pub const SET_D: [PerGrasp; 15] = [
     per_grasp(2_433.0, 1_086.0),
 ];
 
-/// Figure 5.20, last row. Column (a) as it stands; the others as their difference from it.
+/// Figure 5.20, last row: column (a), and the differences of the others from it.
 pub const BEND_RATIO_COLUMNS: [PerGrasp; 6] = [
     per_grasp(18_122.0, 12_939.0),
     per_grasp(-2_071.0, -4_133.0),
@@ -69,8 +69,8 @@ pub const BEND_RATIO_COLUMNS: [PerGrasp; 6] = [
     per_grasp(-2_593.0, -7_028.0),
 ];
 
-/// Mean of all holdouts for a set of the ladder: the last rows of Figures 5.5a and 5.16a, and what the text says of the
-/// others (5.3, 5.4; E is column (c) of Figure 5.20). None for what the thesis does not have.
+/// Mean over all holdouts for a set of the ladder: the last rows of Figures 5.5a and 5.16a, and the text for the others
+/// (5.3, 5.4; E is column (c) of Figure 5.20). None for sets beyond the thesis.
 pub const fn ladder(strategy: Strategy) -> Option<PerGrasp> {
     Some(match strategy {
         Strategy::A => per_grasp(456_287.0, 137_138.0),
@@ -113,9 +113,9 @@ pub const MOST_CONTACTS: u32 = 6;
 mod tests {
     use super::*;
 
-    /// The thesis prints the means of its tables; copied figures must give them.
+    /// Guards against errors in copied figures.
     #[test]
-    fn the_means_of_the_holdouts_are_the_printed_ones() {
+    fn means_over_the_holdouts_match_the_printed_ones() {
         for (set, strategy) in [(SET_A, Strategy::A), (SET_D, Strategy::D)] {
             let mean = |of: fn(&PerGrasp) -> f64| set.iter().map(of).sum::<f64>() / 15.0;
             let printed = ladder(strategy).expect("the thesis has it");
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn set_e_is_column_c() {
+    fn set_e_matches_column_c() {
         let [a, _, c, ..] = BEND_RATIO_COLUMNS;
         let set = ladder(Strategy::E).expect("the thesis has it");
         assert_eq!(a.attempts + c.attempts, set.attempts);

@@ -1,7 +1,7 @@
-//! The grasp types of a run's valid grasps: what the thesis calls false valid are those without one (5.2, 6.1).
+//! Grasp types of a run's valid grasps; the thesis calls grasps without a type false valid (5.2, 6.1).
 //!
-//! They are not recorded but looked at when a report is made, on grasps that are made again from their seeds and atlases: a run that
-//! was made before types were told has them too, and all are told by the same rules.
+//! Types are not recorded but determined for reports, on grasps reproduced from their seeds and atlases, so all are
+//! classified by the same rules.
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,7 @@ use crate::{
     tables::{different_grasps, mean_of_means},
 };
 
-/// Standard errors to either side of a mean that hold it with 95 %.
+/// Half the width of a 95 % interval, in standard errors.
 const STANDARD_ERRORS: f64 = 1.96;
 
 /// The types of a positive grasp set.
@@ -23,9 +23,9 @@ const STANDARD_ERRORS: f64 = 1.96;
 pub struct SetTypes {
     /// The set.
     pub set: Set,
-    /// Of each grasp, holdout by holdout in the order of the settings; none for an unclassifiable one.
+    /// Type of each grasp, by holdout in the order of the settings; none for unclassifiable grasps.
     pub by_holdout: Vec<Vec<Option<GraspType>>>,
-    /// How many of the grasps are different ones.
+    /// Number of distinct grasps.
     pub different: u64,
 }
 
@@ -35,13 +35,13 @@ impl SetTypes {
         self.by_holdout.iter().map(Vec::len).sum()
     }
 
-    /// Share of the grasps that are of a type, or of none, from 0 to 1: each holdout counts the same.
+    /// Share of the grasps of a type, or of none, from 0 to 1; each holdout counts the same.
     pub fn share(&self, of: Option<GraspType>) -> Option<f64> {
         mean_of_means(&self.is(of))
     }
 
-    /// Half of the 95 % interval of the share of unclassifiable grasps. None if some grasps are the same: how they vary is
-    /// then not how grasps do.
+    /// Half of the 95 % interval of the share of unclassifiable grasps. None if grasps repeat, as they then do not vary like
+    /// independent ones.
     pub fn margin(&self) -> Option<f64> {
         if self.different < self.count() as u64 {
             return None;
@@ -57,7 +57,7 @@ impl SetTypes {
     }
 }
 
-/// The types of the positive sets that were asked for, on one thread.
+/// The types of the requested positive sets, on one thread.
 pub fn set_types(data: &Data<'_>, maker: &Maker) -> Vec<SetTypes> {
     let of_set = |set| {
         let of_holdout = |&holdout: &usize| {
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn grasps_that_are_the_same_have_no_interval() {
+    fn repeated_grasps_have_no_interval() {
         let ring = Some(GraspType::Ring);
         let types = SetTypes {
             set: Set::ATLAS,

@@ -1,4 +1,4 @@
-//! Questions that the thesis leaves open (6.1), with first figures.
+//! Open questions of the thesis (6.1), with first figures.
 
 use super::{Claim, Verdict};
 use crate::{
@@ -68,7 +68,7 @@ fn unclassifiable(types: &[SetTypes]) -> Option<Claim> {
     let first = ladder.next()?;
     let last = ladder.next_back()?;
     let (before, after) = (first.share(None)?, last.share(None)?);
-    // Of a difference of two means.
+    // The interval of a difference of two means.
     let margin = first.margin()?.hypot(last.margin()?);
     let shares = format!(
         "{:.1} % in set {}, {:.1} % in set {}",

@@ -12,7 +12,7 @@ use crate::{
     tables::{MEASURES, column_means, negative_counts, share_in_range, valid_values},
 };
 
-/// The angle that the thesis calls sharp below, in degrees.
+/// Below this, the thesis calls an angle sharp, in degrees.
 const BLUNT_DEGREES: f64 = 90.0;
 
 pub(super) fn claims(data: &Data<'_>) -> Vec<Claim> {

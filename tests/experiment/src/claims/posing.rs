@@ -15,7 +15,7 @@ use crate::{
     tables::{bend_angle_bins, column_means, lost, negative_counts, touching_yaws, yaw_distance},
 };
 
-/// As a quantile of the Kolmogorov distribution: 19 of 20 samples of this size are nearer.
+/// 95 % quantile of the Kolmogorov distribution.
 const CHANCE: f64 = 1.36;
 
 pub(super) fn claims(data: &Data<'_>) -> Vec<Claim> {
@@ -99,7 +99,7 @@ fn bend_angles(data: &Data<'_>) -> Vec<Claim> {
         .flat_map(|(_, sums)| sums)
         .filter(|sum| **sum == 0)
         .count();
-    // Of the range that touches, the share of the touching fingers in its upper half.
+    // The share of touching fingers in the upper half of the range that touches.
     let upper = counts[1..].iter().map(|(_, sums)| {
         let total: u64 = sums.iter().sum();
         let upper: u64 = sums[sums.len() / 2..].iter().sum();

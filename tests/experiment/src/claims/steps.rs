@@ -1,4 +1,4 @@
-//! How the naive synthesis ends and what its steps take (5.2), and Immobility Validation (5.5, 5.6).
+//! How naive synthesis ends and how long its steps take (5.2), and Immobility Validation (5.5, 5.6).
 
 use grasp_synthesis::{
     base::rejection::Rejection,
@@ -102,7 +102,7 @@ fn order_of_objects(data: &Data<'_>, strategy: Strategy) -> Option<Claim> {
     })
 }
 
-/// Not said by the thesis, but what its table says.
+/// Not in the thesis' text, but in its table.
 fn order_of_holdouts(data: &Data<'_>, strategy: Strategy) -> Option<Claim> {
     let pairs: Vec<_> = holdout_means(data, Set::ladder(strategy))
         .into_iter()
@@ -143,7 +143,7 @@ pub(super) fn immobility(data: &Data<'_>) -> Vec<Claim> {
                   returns at the first contact), so that a finger can have two or three contacts",
         });
     }
-    // Algorithm 9 is what the thesis looked at: the sets before F.
+    // The thesis examined Algorithm 9: the sets before F.
     let best_of_hundred = strategies.iter().copied().filter(|strategy| *strategy < F);
     let sufficient: Vec<_> = best_of_hundred
         .flat_map(|strategy| valid_with_figures(data, Set::ladder(strategy)))

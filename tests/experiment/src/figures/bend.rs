@@ -110,7 +110,7 @@ pub(super) fn ratios_used(data: &Data<'_>) -> Figure {
     }
 }
 
-/// Figure 5.19: lost contacts by the new ratio, in percent of those that were there, beside the thesis' numbers.
+/// Figure 5.19: lost contacts by the new ratio, next to the thesis' numbers.
 pub(super) fn lost_contacts(data: &Data<'_>) -> Figure {
     let on_new = |counts: [[[u64; 3]; 3]; 5]| {
         [0, 1, 2].map(|new| {

@@ -10,7 +10,7 @@ use crate::{
     thesis::{self, PerGrasp},
 };
 
-/// Both benchmarks beside the thesis'.
+/// Both benchmarks next to the thesis'.
 pub(super) fn ladder(data: &Data<'_>) -> Figure {
     let panel = |title: &str,
                  label: &str,
@@ -77,7 +77,7 @@ pub(super) fn ladder(data: &Data<'_>) -> Figure {
                 true,
             ),
         ],
-        // More sets than those of the ladder have names that need the whole width.
+        // With sets beyond the ladder, names need the whole width.
         columns: if data.sets().all(Set::is_ladder) { 2 } else { 1 },
     }
 }

@@ -1,4 +1,4 @@
-//! How attempts end and what they take.
+//! How attempts end, and how long they take.
 
 use grasp_synthesis::{base::rejection::Rejection, model::strategy::Strategy};
 
@@ -59,7 +59,7 @@ pub(super) fn totals(data: &Data<'_>) -> Figure {
     }
 }
 
-/// Figures 5.6 and 5.22. Types of which there is no attempt are left out.
+/// Figures 5.6 and 5.22, without types that have no attempts.
 pub(super) fn steps(data: &Data<'_>, strategy: Strategy, file: &'static str, title: &'static str) -> Figure {
     let set = Set::ladder(strategy);
     let rows: Vec<_> = KINDS
@@ -97,7 +97,7 @@ fn steps_of(values: impl Fn(usize) -> Vec<f64>) -> Vec<Series<f64>> {
         .collect()
 }
 
-/// The sets of which there are failed attempts.
+/// The sets with failed attempts.
 fn negative_sets(data: &Data<'_>) -> impl Iterator<Item = Set> {
     data.sets().filter(|set| data.invalid(*set).next().is_some())
 }

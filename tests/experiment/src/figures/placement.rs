@@ -11,12 +11,11 @@ use crate::{
     tables::{MEASURES, PALM_ANGLE_BIN_DEGREES, palm_angle_counts},
 };
 
-/// The most failed attempts that are drawn for each set, as many as the thesis had: more would hide each other. Tables
-/// and CSV have all.
+/// Largest number of failed attempts drawn per set, as in the thesis: more would hide each other. Tables and CSV have all.
 const MOST_DOTS: usize = 1500;
 
-/// Ends of the axes: wrists are placed at most one reach, 22 cm, from the box, which is a little further from the object
-/// in it, and palms lie a palm's length further out; angles are what they can be.
+/// Ends of the axes: wrists are placed within a reach of 22 cm of the box, which is a little farther from the object, and
+/// palms lie up to a palm's length farther out.
 const WRIST_DISTANCE_AXIS_CM: f64 = 26.0;
 const PALM_DISTANCE_AXIS_CM: f64 = 36.0;
 
@@ -33,7 +32,8 @@ fn axis(measure: usize) -> Axis {
     }
 }
 
-/// Placements of a set with their output type: all valid ones, and so many failed ones, evenly over the holdouts.
+/// Placements of a set with their output type: all valid ones, and up to [`MOST_DOTS`] failed ones, evenly over the
+/// holdouts.
 fn placements<'a>(data: &Data<'a>, set: Set) -> Vec<(Option<Rejection>, &'a Measures)> {
     let limit = (MOST_DOTS / data.settings.holdouts.len().max(1)) as u64;
     data.both(set)

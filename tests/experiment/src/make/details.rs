@@ -1,4 +1,4 @@
-//! A closer look at one attempt, or at one grip of an atlas.
+//! Details of one attempt, or of one grip of an atlas.
 
 use grasp_synthesis::{
     base::{
@@ -33,27 +33,26 @@ use crate::{
     record::{Details, DigitFigures, GraspFigures, Measures, Source},
 };
 
-/// Runs of an attempt of which the median time is taken: the first ones find nothing in the processor's caches, and
-/// some are interrupted by the machine's other work. More take longer.
+/// Runs per attempt for the median of its times: the first ones have cold caches, and other work interrupts some.
 const REPLAYS: usize = 5;
 
-/// How often Immobility Validation is repeated with new draws for each valid grasp, to see how much of E is the draw.
-/// More give a better estimate of the spread and make longer records.
+/// Repetitions of Immobility Validation with new draws per valid grasp, to see how much of E is due to the draw. More give
+/// a better estimate and longer records.
 pub(crate) const COMFORT_REPEATS: u64 = 8;
 
-/// Added to a seed for what is drawn about a grasp after it was found, so that it has nothing to do with how it was
-/// found. Any number that is far from those of other seeds will do.
+/// Added to a seed for draws after a grasp was found, so that they are independent of the search. Any number far from
+/// other seeds works.
 const SEED_OF_AFTERTHOUGHTS: u64 = 1 << 60;
 
-/// An attempt or a grip that was looked at.
+/// An examined attempt or grip.
 pub(super) struct Closer {
     pub(super) end: AttemptEnd,
     pub(super) details: Details,
 }
 
 impl Maker {
-    /// Everything about an attempt or a grip; none if there is no such hand or if the grip does not hold.
-    pub(super) fn closer_look(&self, cell: &Cell, seed: u64, source: Source) -> Option<Closer> {
+    /// Details of an attempt or a grip; none if it does not exist, or if the grip does not hold.
+    pub(super) fn examine(&self, cell: &Cell, seed: u64, source: Source) -> Option<Closer> {
         match source {
             Source::Attempt(index) => Some(self.look_at_attempt(cell, seed, index)),
             Source::AtlasEntry(entry) => {
@@ -71,7 +70,7 @@ impl Maker {
         }
     }
 
-    /// Runs an attempt some times for its times, and tells everything about it.
+    /// Details of an attempt, with times from repeated runs.
     pub(super) fn look_at_attempt(&self, cell: &Cell, seed: u64, index: u64) -> Closer {
         let scene = self.scene(cell);
         let mut attempt = Attempt::default();
@@ -129,7 +128,7 @@ impl Maker {
         let object = &self.holdouts[cell.holdout].object;
         let motions = hand_motion(self.rig(cell.set));
         let touches_with = |digit: usize, posed: &PosedDigit| {
-            // Figure 5.19: wrist and yaw are kept, and the digit closes with each ratio alone.
+            // Figure 5.19: with the same wrist and yaw, the digit closes with each ratio alone.
             std::array::from_fn(|ratio| {
                 let yaw = posed.angles.base_yaw;
                 close_digit(object, attempt.wrist(), &motions[digit], yaw, &[ratio]).touches()
@@ -147,7 +146,7 @@ impl Maker {
             .collect()
     }
 
-    /// What there is to tell of a grasp under the thesis' validity, with force distributions for its contacts drawn anew.
+    /// Figures of a grasp under the thesis' validity, with new force distributions for its contacts.
     fn drawn_figures(&self, cell: &Cell, grasp: &Grasp, seed: u64, index: u64) -> GraspFigures {
         let contacts = &grasp.contacts;
         let holdout = &self.holdouts[cell.holdout];
@@ -184,7 +183,7 @@ impl Maker {
     }
 }
 
-/// What there is to tell of a grasp whose forces were solved for.
+/// Figures of a grasp with solved forces.
 fn solved_figures(grasp: &Grasp) -> GraspFigures {
     GraspFigures {
         wrench_angle_degrees: grasp.wrench_angle.to_degrees(),

@@ -1,4 +1,4 @@
-//! What all kinds of charts have: a height, a legend, a drawing.
+//! Height, legend and drawing of all kinds of charts.
 
 use super::{
     Chart, Series, grouped_bars, histogram,
@@ -10,7 +10,7 @@ use super::{
 /// Below the rows of a chart, for its axis, in pixels.
 const BELOW_ROWS: f64 = 54.0;
 
-/// Its height without title and legend when it is so wide, in pixels.
+/// Height without title and legend at a width, in pixels.
 pub(super) fn height(chart: &Chart, width: f64) -> f64 {
     match chart {
         Chart::Scatter { .. } => (0.78 * width).clamp(200.0, 440.0),
@@ -21,7 +21,7 @@ pub(super) fn height(chart: &Chart, width: f64) -> f64 {
     }
 }
 
-/// What its legend says. Strips have none, as they bear their names.
+/// Entries of the legend. Strips have none, as they show their names.
 pub(super) fn legend(chart: &Chart) -> Vec<Entry<'_>> {
     match chart {
         Chart::Scatter { series, .. } => entries(series),
@@ -39,7 +39,7 @@ fn entries<T>(series: &[Series<T>]) -> Vec<Entry<'_>> {
         .collect()
 }
 
-/// Draws it without title and legend, and returns where its plot begins and ends from left to right, in pixels.
+/// Draws the chart without title and legend; returns the left and right ends of its plot, in pixels.
 pub(super) fn draw(area: &Area<'_>, chart: &Chart) -> Drawn<(f64, f64)> {
     match chart {
         Chart::Scatter { x, y, series } => scatter::draw(area, x, y, series),

@@ -1,4 +1,4 @@
-//! Dots that let their density show.
+//! Dots that show their density.
 
 use std::collections::BTreeSet;
 
@@ -20,13 +20,12 @@ use super::{
 
 /// A dot's radius, in pixels.
 pub(super) const RADIUS: f64 = 1.8;
-/// The opacity of a series' dots, from 0 to 1, if they are few and if they are many: few hardly overlap, and would be
-/// pale.
+/// Opacities of a series' dots, from 0 to 1, if they are few and if they are many: few hardly overlap and would look pale.
 const OPACITIES: (f64, f64) = (0.8, 0.5);
-/// How many are many.
+/// Least number of dots that counts as many.
 const MANY: usize = 250;
 
-/// Draws dots of one colour, of those on the same pixel the first only.
+/// Draws dots of one colour, only the first on each pixel.
 pub(super) fn draw(
     plot: &mut Plot<'_, '_>,
     dots: impl IntoIterator<Item = (f64, f64)>,
@@ -50,13 +49,13 @@ pub(super) fn draw(
     Ok(())
 }
 
-/// True if the axis reaches to the value.
+/// Whether the axis covers the value.
 pub(super) fn is_on(axis: &Axis, value: f64) -> bool {
     let (low, high) = numbers::ends(axis.min, axis.max);
     (low..=high).contains(&value)
 }
 
-/// Says above the upper right corner of the plot how many finite values lie beyond the axes, if any do.
+/// Notes the number of finite values beyond the axes, if any, above the plot's upper right corner.
 pub(super) fn note_missing(area: &Area<'_>, plot: &Plot<'_, '_>, missing: usize) -> Drawn {
     if missing == 0 {
         return Ok(());
@@ -71,7 +70,7 @@ pub(super) fn note_missing(area: &Area<'_>, plot: &Plot<'_, '_>, missing: usize)
     words::write(area, &text, (right, top), style)
 }
 
-/// As plotters has it.
+/// The colour for plotters.
 pub(super) fn rgb(colour: Colour) -> RGBColor {
     RGBColor(colour.0, colour.1, colour.2)
 }

@@ -29,30 +29,30 @@ const HAIRLINE: u32 = 10;
 const AXIS: RGBColor = RGBColor(90, 90, 90);
 /// The grid's colour.
 const GRID: RGBColor = RGBColor(226, 226, 226);
-/// Above the plot, for a note and for the upper half of the side's last tick's text, in pixels.
+/// Space above the plot for a note and for the upper half of the last tick's text, in pixels.
 const TOP: f64 = 13.0;
 /// Least space between the texts of two ticks along the bottom, in pixels.
 const TICK_GAP: f64 = 14.0;
-/// The most ticks that the bottom has room for, however wide it is: more would be a comb.
+/// Largest number of ticks along the bottom, however wide it is.
 const MOST_TICKS: f64 = 14.0;
 /// Least distance between two ticks along the side, in pixels.
 const TICK_PITCH: f64 = 28.0;
-/// Axes' labels that are too long are written in text of this height at least, in pixels, and then shortened.
+/// Long axis labels shrink to this height, in pixels, before they are shortened.
 const LEAST_LABEL: f64 = 9.5;
-/// What names of rows may take at most of a chart's width.
+/// Largest share of a chart's width for names of rows.
 const NAMES_SHARE: f64 = 0.4;
 
-/// What an axis' ticks say.
+/// Texts of an axis' ticks.
 pub(super) enum Marks {
     /// Numbers.
     Numbers,
     /// Whole numbers.
     Counts,
-    /// The powers of ten, of which the axis' units are the exponents.
+    /// Powers of ten, with the axis' units as exponents.
     Decades,
-    /// Names, each in the middle of a unit, from the axis' upper end down; with lines of the grid or without.
+    /// Names, each in the middle of a unit, from the axis' upper end down; with or without grid lines.
     Names(Vec<String>, bool),
-    /// Nothing: the chart writes below the axis itself, in so many pixels.
+    /// None: the chart writes below the axis itself, in this many pixels.
     Own(f64),
 }
 
@@ -60,7 +60,7 @@ pub(super) enum Marks {
 pub(super) struct Side {
     /// Outside the ticks' texts; may be empty.
     pub label: String,
-    /// Its ends, finite and apart.
+    /// Its ends, finite and distinct.
     pub ends: (f64, f64),
     /// Its ticks.
     pub marks: Marks,
@@ -76,7 +76,7 @@ impl Side {
         }
     }
 
-    /// An axis of rows' names from the top, with lines of the grid or without.
+    /// An axis of row names from the top, with or without grid lines.
     pub(super) fn names(names: Vec<String>, grid: bool) -> Self {
         Self {
             label: String::new(),
@@ -107,7 +107,7 @@ pub(super) fn size(area: &Area<'_>) -> (f64, f64) {
     )
 }
 
-/// What the axis along the bottom takes below the plot, in pixels.
+/// Height of the bottom axis below the plot, in pixels.
 pub(super) fn bottom(x: &Side) -> f64 {
     let texts = if let Marks::Own(room) = x.marks {
         room
@@ -122,7 +122,7 @@ pub(super) fn plot_height(height: f64, x: &Side) -> f64 {
     (height - TOP - bottom(x)).max(1.0)
 }
 
-/// Draws axes, ticks and grid, and returns the plot between them. `right` pixels stay free to the right of it.
+/// Draws axes, ticks and grid, and returns the plot between them, with `right` free pixels to its right.
 pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -> Drawn<Plot<'a, 'b>> {
     let (width, height) = size(area);
     let high = plot_height(height, x);
@@ -133,7 +133,7 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
         .fold(0.0, f64::max);
     let left = widest + 2.0 * TICK + 2.0 + y.label_height();
     let x_ticks = bottom_ticks(x, width - left - right);
-    // Half of the last tick's text may stick out to the right.
+    // Half of the last tick's text may extend to the right.
     let half = x_ticks
         .last()
         .map_or(0.0, |tick| words::width(&tick.text, words::BODY) / 2.0);
@@ -169,7 +169,7 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
     Ok(plot)
 }
 
-/// Where the plot's left and right ends lie in the area that it was made in, in pixels.
+/// Left and right ends of the plot in its area, in pixels.
 pub(super) fn span(area: &Area<'_>, plot: &Plot<'_, '_>) -> (f64, f64) {
     let across = plot.plotting_area().get_x_axis_pixel_range();
     let left = area.get_base_pixel().0;
@@ -179,7 +179,7 @@ pub(super) fn span(area: &Area<'_>, plot: &Plot<'_, '_>) -> (f64, f64) {
     )
 }
 
-/// The place of a point of the plot in the area that the plot was made in, in tenths of a pixel.
+/// Position of a point of the plot in its area, in tenths of a pixel.
 pub(super) fn place(area: &Area<'_>, plot: &Plot<'_, '_>, point: (f64, f64)) -> (i32, i32) {
     let (x, y) = plot.plotting_area().map_coordinate(&point);
     let (left, top) = area.get_base_pixel();

@@ -1,4 +1,4 @@
-//! Bars beside each other, on a logarithmic axis.
+//! Groups of bars on a logarithmic axis.
 
 use plotters::{
     element::Rectangle,
@@ -16,13 +16,13 @@ use super::{
     words,
 };
 
-/// What the bars take of their group's width.
+/// Share of a group's width that its bars fill.
 const FILLED: f64 = 0.82;
 /// Free space between a bar and its value, in pixels.
 const PADDING: f64 = 3.0;
-/// The foot of the axis lies at a power of ten that is at least so many decades below the lowest bar's top.
+/// The axis starts at a power of ten at least this many decades below the lowest bar's top.
 const LEAST: f64 = 0.15;
-/// What the side's axis takes at about, in pixels: more than enough for 1,000,000 and a label.
+/// Approximate width of the side axis, in pixels: enough for 1,000,000 and a label.
 const SIDE: f64 = 90.0;
 
 /// How values are written over their bars.
@@ -33,7 +33,7 @@ enum Values {
     None,
 }
 
-/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+/// Draws the chart; returns the left and right ends of its plot, in pixels.
 pub(super) fn draw(
     area: &Area<'_>,
     label: &str,
@@ -119,8 +119,8 @@ pub(super) fn draw(
     Ok(frame::span(area, &plot))
 }
 
-/// The groups' names in lines that are no wider than `room` pixels, and the height of their text: less than the usual
-/// where a word would be cut otherwise.
+/// The groups' names in lines no wider than `room` pixels, and the height of their text, reduced where a word would
+/// otherwise be cut.
 fn names(groups: &[String], room: f64) -> (Vec<Vec<String>>, f64) {
     let words = groups.iter().flat_map(|name| name.split_whitespace());
     let height = words
@@ -140,12 +140,12 @@ fn value_style(across: HPos, upright: VPos) -> TextStyle<'static> {
     words::style(words::SMALL, words::INK, across, upright)
 }
 
-/// The power of ten that a bar reaches to, if there is a bar.
+/// The logarithm of a bar's height, if there is a bar.
 fn exponent(value: f64) -> Option<f64> {
     (value.is_finite() && value > 0.0).then(|| value.log10())
 }
 
-/// The axis' ends as powers of ten, of which the share `head` at the top stays free of bars.
+/// The axis' ends as powers of ten, with the share `head` at the top free of bars.
 fn decades(tops: impl Iterator<Item = f64>, head: f64) -> (f64, f64) {
     let (low, high) = tops.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), top| {
         (low.min(top), high.max(top))

@@ -1,4 +1,4 @@
-//! Counts in bins, the series on top of each other.
+//! Counts in bins, with stacked series.
 
 use plotters::{element::Rectangle, style::Color};
 
@@ -9,12 +9,12 @@ use super::{
     svg::{Area, Drawn},
 };
 
-/// What a bar takes of its bin.
+/// Share of a bin's width that its bar fills.
 const FILLED: f64 = 0.96;
-/// How much higher than the highest bar the plot is.
+/// Height of the plot relative to the highest bar.
 const HEADROOM: f64 = 1.05;
 
-/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+/// Draws the chart; returns the left and right ends of its plot, in pixels.
 pub(super) fn draw(
     area: &Area<'_>,
     label: &str,
@@ -23,7 +23,7 @@ pub(super) fn draw(
 ) -> Drawn<(f64, f64)> {
     let bins = series.iter().map(|series| series.values.len()).max().unwrap_or(0);
     let end = |start: f64, width: f64| start + width * bins.max(1) as f64;
-    // Bins that an axis cannot show are numbered.
+    // Bins that an axis cannot show get numbers.
     let can_be_shown = width > 0.0 && numbers::ends(start, end(start, width)) == (start, end(start, width));
     let (start, width) = if can_be_shown { (start, width) } else { (0.0, 1.0) };
     let count = |series: &Series<u64>, bin: usize| series.values.get(bin).map_or(0.0, |count| *count as f64);

@@ -12,19 +12,19 @@ use super::{
 const WIDTH: f64 = 900.0;
 /// Around everything, in pixels.
 const MARGIN: f64 = 14.0;
-/// Between panels beside each other, in pixels.
+/// Between panels of a row, in pixels.
 const GUTTER: f64 = 24.0;
-/// Between panels below each other, in pixels.
+/// Between rows of panels, in pixels.
 const BETWEEN_ROWS: f64 = 16.0;
-/// Between the figure's title and what it stands above, in pixels.
+/// Below the figure's title, in pixels.
 const BELOW_HEADING: f64 = 7.0;
 
-/// How much wider than regular text bold text is.
+/// Width of bold text relative to regular text.
 const BOLD: f64 = 1.08;
-/// Panels beside each other at most: more would be too narrow for their words.
+/// Largest number of panels per row: more would be too narrow for their words.
 const MOST_COLUMNS: usize = 4;
 
-/// Where a panel lies and how it is divided, in pixels.
+/// Position and layout of a panel, in pixels.
 struct Cell<'a> {
     panel: &'a Panel,
     left: f64,
@@ -34,11 +34,10 @@ struct Cell<'a> {
     chart_height: f64,
 }
 
-/// One picture, 900 pixels wide, of panels in a grid of so many columns (1 to 4; other numbers are taken as the nearest of
-/// these), row by row.
+/// One picture, 900 pixels wide, of panels in a grid of 1 to 4 columns, row by row; other numbers are clamped.
 ///
-/// Panels that have the same legend share one below all of them. The picture is SVG that needs nothing besides itself;
-/// the same panels give the same bytes.
+/// If all panels have the same legend, they share one at the bottom. The picture is self-contained SVG; the same panels
+/// give the same bytes.
 pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
     let columns = columns.clamp(1, panels.len().clamp(1, MOST_COLUMNS));
     let room = WIDTH - 2.0 * MARGIN;
@@ -60,7 +59,7 @@ pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
             .iter()
             .map(|panel| words::lines(&panel.title, words::SUBHEADING, wide / BOLD))
             .collect();
-        // Titles and charts of a row take what the highest of them takes, so that the axes are in line.
+        // Titles and charts of a row have equal heights, so that the axes line up.
         let title_heights = titles.iter().map(|title| title_height(title, words::SUBHEADING));
         let title_height = title_heights.fold(0.0, f64::max);
         let chart_height = row
@@ -119,8 +118,8 @@ fn draw_cell(area: &Area<'_>, cell: &Cell<'_>, wide: f64, shared_legend: bool) -
     let (left, right) = chart::draw(&chart_area, &cell.panel.chart)?;
     let middle = left.midpoint(right);
 
-    // A title of fewer lines than its neighbour's stands at the bottom of the titles' row. It is centred on the plot as
-    // far as it then stays inside the panel.
+    // A title with fewer lines than its neighbour's is aligned to the bottom, and centred on the plot as far as it stays
+    // inside the panel.
     let unused = cell.title_height - title_height(&cell.title, words::SUBHEADING);
     let long = cell
         .title

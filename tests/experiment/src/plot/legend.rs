@@ -1,4 +1,4 @@
-//! The legend: which colour means what, below the plot.
+//! The legend below a plot: the meaning of its colours.
 
 use plotters::{
     element::Rectangle,
@@ -29,7 +29,7 @@ const PITCH: f64 = 18.0;
 /// Above the first line, in pixels.
 const ABOVE: f64 = 6.0;
 
-/// Its height in so much width, in pixels.
+/// Its height at a width, in pixels.
 pub(super) fn height(entries: &[Entry<'_>], room: f64) -> f64 {
     if entries.is_empty() {
         0.0
@@ -67,7 +67,7 @@ pub(super) fn draw(area: &Area<'_>, entries: &[Entry<'_>], centre: f64) -> Drawn
 /// The entries in as few lines as fit, of about the same length.
 fn lines<'e, 'n>(entries: &'e [Entry<'n>], room: f64) -> Vec<&'e [Entry<'n>]> {
     let fewest = filled(entries, room, room).len();
-    // The shortest length that needs no more lines; a line is as long as some run of entries.
+    // The shortest line length that needs no more lines; a line is as long as some run of entries.
     let mut lengths: Vec<f64> = (0..entries.len())
         .flat_map(|first| (first + 1..=entries.len()).map(move |end| length(&entries[first..end], room)))
         .filter(|length| *length <= room)
@@ -80,7 +80,7 @@ fn lines<'e, 'n>(entries: &'e [Entry<'n>], room: f64) -> Vec<&'e [Entry<'n>]> {
     even.unwrap_or_else(|| filled(entries, room, room))
 }
 
-/// The entries in lines each of which takes as many as stay within `longest` pixels, but at least one.
+/// The entries in lines of up to `longest` pixels, but at least one entry each.
 fn filled<'e, 'n>(entries: &'e [Entry<'n>], longest: f64, room: f64) -> Vec<&'e [Entry<'n>]> {
     let mut lines = Vec::new();
     let mut rest = entries;

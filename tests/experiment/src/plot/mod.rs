@@ -1,7 +1,7 @@
-//! Charts as SVG: [`figure`] lays panels out in a grid and returns one picture that stands by itself.
+//! Charts as SVG: [`figure`] lays panels out in a grid and returns one self-contained picture.
 //!
-//! The data says what is shown. Each kind of chart has a file that draws it, and all share the frame with its ticks, the
-//! legend, the sizes of words and the spelling of numbers. The same data gives the same bytes.
+//! Each kind of chart has its own file; all share the frame with its ticks, the legend, text sizes and number formats. The
+//! same data gives the same bytes.
 
 mod chart;
 mod dots;
@@ -28,26 +28,26 @@ pub struct Colour(pub u8, pub u8, pub u8);
 /// Dots or counts of one kind.
 #[derive(Clone, Debug)]
 pub struct Series<T> {
-    /// What the legend says.
+    /// Name in the legend.
     pub name: String,
-    /// Of its dots or bars.
+    /// Colour of its dots or bars.
     pub colour: Colour,
     /// Its values.
     pub values: Vec<T>,
 }
 
-/// An axis. Dots beyond its ends are left out, and a note above the chart's corner says how many.
+/// An axis. Dots beyond its ends are left out and counted in a note above the chart.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with the unit.
+    /// Label, with the unit.
     pub label: String,
-    /// Its lower end. An axis whose ends are the same is widened, one whose ends are swapped is turned round.
+    /// Its lower end. Equal ends are widened, swapped ends reversed.
     pub min: f64,
     /// Its upper end.
     pub max: f64,
 }
 
-/// One chart. Values that are not finite are left out, and so is whatever they would have drawn.
+/// One chart. Values that are not finite are left out.
 #[derive(Clone, Debug)]
 pub enum Chart {
     /// Dots; series that come later lie on top.
@@ -59,17 +59,17 @@ pub enum Chart {
         /// Dots as (x, y).
         series: Vec<Series<(f64, f64)>>,
     },
-    /// Values of each series as dots in a strip of its own, the strips below each other, the dots spread across their
-    /// strip so that their density shows. The number of values stands at the end of each strip.
+    /// Values of each series as dots in their own strip, spread across it to show their density, with the number of values
+    /// at the strip's end.
     Strips {
         /// Along the bottom.
         x: Axis,
-        /// One strip each, from the top.
+        /// One strip per series, from the top.
         series: Vec<Series<f64>>,
     },
-    /// Counts in bins of one width, the series on top of each other.
+    /// Counts in bins of equal width, with stacked series.
     Histogram {
-        /// What is binned, with the unit.
+        /// Label of the binned values, with the unit.
         label: String,
         /// Lower end of the first bin.
         start: f64,
@@ -78,23 +78,23 @@ pub enum Chart {
         /// Counts, bin by bin.
         series: Vec<Series<u64>>,
     },
-    /// A horizontal bar for each row, made of a part for each series. A part that is wide enough bears its value; rows
-    /// that differ in length bear their sum at the end.
+    /// A horizontal bar per row with a part per series. Wide enough parts show their value; rows of different lengths show
+    /// their sum at the end.
     StackedBars {
-        /// What the length of a bar means, with the unit.
+        /// Label of the bars' lengths, with the unit.
         label: String,
         /// The rows' names, from the top.
         rows: Vec<String>,
-        /// Parts, row by row; those that are not more than 0 are left out.
+        /// Parts by row; only those above 0 are drawn.
         series: Vec<Series<f64>>,
     },
-    /// For each group a bar beside the other for each series, on a logarithmic axis; a value that is missing is NaN.
+    /// Per group, one bar for each series on a logarithmic axis; missing values are NaN.
     GroupedBars {
-        /// What the height of a bar means, with the unit.
+        /// Label of the bars' heights, with the unit.
         label: String,
         /// The groups' names.
         groups: Vec<String>,
-        /// Heights, group by group; more than 0.
+        /// Heights by group, above 0.
         series: Vec<Series<f64>>,
     },
 }

@@ -1,25 +1,25 @@
-//! How numbers are spelled, and where an axis has its ticks.
+//! Number formats, and the ticks of axes.
 
 use std::ops::RangeInclusive;
 
-/// Sizes from here on are taken as infinite.
+/// Sizes from here on count as infinite.
 const LARGEST: f64 = 1e300;
 
-/// A tick: where, and what it says.
+/// A tick with its text.
 #[derive(Clone, Debug)]
 pub(super) struct Tick {
     /// In the axis' units.
     pub at: f64,
-    /// Beside the tick.
+    /// Text at the tick.
     pub text: String,
 }
 
-/// Sizes from here on are spelled with a power of ten.
+/// Sizes from here on are written with a power of ten.
 const LONGEST: f64 = 1e9;
-/// Sizes below are spelled with a power of ten where digits count.
+/// Smaller sizes are written with a power of ten where digits count.
 const SHORTEST: f64 = 1e-8;
 
-/// With so many decimals, and with commas between groups of three digits: 456,287.
+/// A number with fixed decimals and commas between groups of three digits: 456,287.
 pub(super) fn spelled(value: f64, decimals: usize) -> String {
     if value.abs() >= LONGEST {
         return scientific(value);
@@ -37,7 +37,7 @@ pub(super) fn spelled(value: f64, decimals: usize) -> String {
     spelled + fraction
 }
 
-/// With three significant digits, or as a whole number from 100 on: 456,287, 28.4, 5.2, 0.05.
+/// A number with three significant digits, or a whole number from 100 on: 456,287, 28.4, 5.2, 0.05.
 pub(super) fn significant(value: f64) -> String {
     let size = value.abs();
     if size > 0.0 && size < SHORTEST {
@@ -52,7 +52,7 @@ pub(super) fn significant(value: f64) -> String {
     }
 }
 
-/// With three significant digits at most and a power of ten: 4.56e12.
+/// A number with up to three significant digits and a power of ten: 4.56e12.
 fn scientific(value: f64) -> String {
     let text = format!("{value:.2e}").replace('-', "−");
     let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
@@ -68,18 +68,18 @@ fn without_zeros(text: &str) -> &str {
     }
 }
 
-/// True for numbers that can be drawn: finite, and so far from the largest number that sums stay finite.
+/// Whether a number can be drawn: finite, and small enough that sums stay finite.
 pub(super) fn is_drawable(value: f64) -> bool {
     value.abs() < LARGEST
 }
 
-/// The ends of an axis in order, drawable and apart.
+/// The ends of an axis, drawable, in order and distinct.
 pub(super) fn ends(min: f64, max: f64) -> (f64, f64) {
     if !(is_drawable(min) && is_drawable(max)) {
         return (0.0, 1.0);
     }
     let (low, high) = (min.min(max), min.max(max));
-    // Ends that only rounding keeps apart leave no room for ticks between them.
+    // Ends that differ only by rounding leave no room for ticks between them.
     let slack = 1e-9 * low.abs().max(high.abs());
     if high - low > slack {
         (low, high)
@@ -89,10 +89,10 @@ pub(super) fn ends(min: f64, max: f64) -> (f64, f64) {
     }
 }
 
-/// Ticks at multiples of 1, 2 or 5 times a power of ten: the narrowest step that `fits` accepts, given the ticks and
-/// the distance between them.
+/// Ticks at multiples of 1, 2 or 5 times a power of ten, with the narrowest step that `fits` accepts, given the ticks and
+/// their distance.
 pub(super) fn ticks(low: f64, high: f64, fits: impl Fn(&[Tick], f64) -> bool) -> Vec<Tick> {
-    // The finest step to try has at most about a hundred ticks, the coarsest at most one.
+    // The finest step has up to about a hundred ticks, the coarsest up to one.
     let finest = ((high - low) / 100.0).log10().floor() as i32;
     let steps = (finest..=finest + 3).flat_map(|power| [(1.0, power), (2.0, power), (5.0, power)]);
     for (factor, power) in steps {
@@ -111,8 +111,8 @@ pub(super) fn ticks(low: f64, high: f64, fits: impl Fn(&[Tick], f64) -> bool) ->
     Vec::new()
 }
 
-/// The decimals with which to spell values that stand beside each other, the largest of which is `largest`: none for
-/// whole numbers, else three digits for the largest, but at least one decimal.
+/// Common decimals of adjacent values up to `largest`: none for whole numbers, or else three digits for the largest, but at
+/// least one decimal.
 pub(super) fn common_decimals(mut values: impl Iterator<Item = f64>, largest: f64) -> usize {
     if values.all(|value| value.fract() == 0.0) || largest >= 1000.0 {
         return 0;
@@ -120,10 +120,10 @@ pub(super) fn common_decimals(mut values: impl Iterator<Item = f64>, largest: f6
     (2 - magnitude(largest)).clamp(1, 10) as usize
 }
 
-/// Ticks at powers of ten, at most so many. `low` and `high` are exponents, and so are the places of the ticks.
-pub(super) fn decades(low: f64, high: f64, at_most: usize) -> Vec<Tick> {
+/// Up to `limit` ticks at powers of ten. `low`, `high` and the ticks' places are exponents.
+pub(super) fn decades(low: f64, high: f64, limit: usize) -> Vec<Tick> {
     let exponents: RangeInclusive<i32> = low.ceil() as i32..=high.floor() as i32;
-    let stride = exponents.clone().count().div_ceil(at_most.max(1)).max(1);
+    let stride = exponents.clone().count().div_ceil(limit.max(1)).max(1);
     exponents
         .step_by(stride)
         .map(|exponent| Tick {
@@ -133,7 +133,7 @@ pub(super) fn decades(low: f64, high: f64, at_most: usize) -> Vec<Tick> {
         .collect()
 }
 
-/// The power of ten of the first digit of a size.
+/// Power of ten of a size's first digit.
 fn magnitude(size: f64) -> i32 {
     if size > 0.0 {
         size.log10().floor() as i32
@@ -142,7 +142,7 @@ fn magnitude(size: f64) -> i32 {
     }
 }
 
-/// The whole numbers whose `step`-fold lies between the ends, which count as between.
+/// The whole numbers whose multiple of `step` lies between the ends, inclusive.
 fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
     let slack = 1e-9;
     let first = (low / step - slack).ceil();
@@ -156,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_spelled_with_commas_and_a_true_minus() {
+    fn numbers_have_commas_and_a_true_minus_sign() {
         for (value, decimals, text) in [
             (456_287.0, 0, "456,287"),
             (1_000_000.0, 0, "1,000,000"),
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn values_beside_each_other_have_the_same_decimals() {
+    fn adjacent_values_have_the_same_decimals() {
         for (values, decimals) in [
             (vec![1425.0, 3.0], 0),
             (vec![74.81, 2.0], 1),
@@ -213,8 +213,8 @@ mod tests {
 
     #[test]
     fn powers_of_ten_are_thinned_out() {
-        let texts = |at_most| {
-            decades(-2.0, 6.3, at_most)
+        let texts = |limit| {
+            decades(-2.0, 6.3, limit)
                 .into_iter()
                 .map(|tick| tick.text)
                 .collect::<Vec<_>>()
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_an_axis_are_in_order_and_apart() {
+    fn ends_of_an_axis_are_in_order_and_distinct() {
         assert_eq!(ends(1.0, 3.0), (1.0, 3.0));
         assert_eq!(ends(3.0, 1.0), (1.0, 3.0));
         assert_eq!(ends(2.0, 2.0), (1.5, 2.5));

@@ -1,5 +1,5 @@
-//! Colours that people with protanopia, deuteranopia or tritanopia can tell apart: any two of a set are at least 15
-//! apart in CIELAB for each of them, and for everybody else.
+//! Colours that people with protanopia, deuteranopia or tritanopia can distinguish: any two of a set are at least 15 apart
+//! in CIELAB for each of them, and for everyone else.
 //!
 //! Most are from the palette of Okabe and Ito ("Color Universal Design", 2008), some from the muted and bright schemes
 //! of Tol ("Colour Schemes", SRON/EPS/TN/09-002, 2021).
@@ -10,8 +10,8 @@ use super::Colour;
 pub const VALID: Colour = Colour(0, 158, 115);
 
 /// The rejections in the order of the thesis' Table 5.2: `NoContacts`, `NoThumb`, `NoThumbEarlyStop`, `NoFingers`,
-/// `PalmCollision`, `FingerCollision`, `UnwantedContact`, `NotImmobilizing`. Beside [`VALID`] they make nine kinds of
-/// output.
+/// `PalmCollision`, `FingerCollision`, `UnwantedContact`, `NotImmobilizing`. With [`VALID`], these are the nine output
+/// types.
 pub const REJECTIONS: [Colour; 8] = [
     Colour(230, 159, 0),
     Colour(86, 180, 233),
@@ -26,7 +26,7 @@ pub const REJECTIONS: [Colour; 8] = [
 /// Orange: grasps without contacts where all other rejections are one kind (Figure 5.10).
 pub const NO_CONTACTS: Colour = REJECTIONS[0];
 
-/// Dark blue: the rejections but `NoContacts`, as one kind (Figure 5.10).
+/// Dark blue: the rejections except `NoContacts`, as one kind (Figure 5.10).
 pub const OTHER_REJECTIONS: Colour = Colour(28, 40, 110);
 
 /// The steps of an attempt: wrist placement, finger posing, collision validation, contact validation, immobility
@@ -42,11 +42,11 @@ pub const STEPS: [Colour; 5] = [
 /// The bend ratios 0.7, 1 and 1.42: purple, green and blue, as in the thesis (Figure 5.15), apart in lightness too.
 pub const BEND_RATIOS: [Colour; 3] = [Colour(93, 26, 117), Colour(34, 136, 51), Colour(86, 180, 233)];
 
-/// Blue: what was measured here, beside [`THESIS`].
+/// Blue: measured here, next to [`THESIS`].
 pub const HERE: Colour = Colour(0, 114, 178);
 
-/// Grey: what the thesis measured.
+/// Grey: measured by the thesis.
 pub const THESIS: Colour = Colour(187, 187, 187);
 
-/// Dark blue: what was measured here on more threads than one.
+/// Dark blue: measured here on more than one thread.
 pub const HERE_ON_MORE_THREADS: Colour = Colour(28, 40, 110);

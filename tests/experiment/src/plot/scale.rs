@@ -1,4 +1,4 @@
-//! A linear axis whose ticks are given, with what they say.
+//! A linear axis with given ticks and texts.
 
 use std::ops::Range;
 
@@ -34,7 +34,7 @@ impl Ranged for Scale {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        // Light points are lines of the grid between the ticks.
+        // Light points are grid lines between the ticks.
         if hint.weight().allow_light_points() {
             Vec::new()
         } else {

@@ -6,7 +6,7 @@ use super::{
     svg::{Area, Drawn},
 };
 
-/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+/// Draws the chart; returns the left and right ends of its plot, in pixels.
 pub(super) fn draw(area: &Area<'_>, x: &Axis, y: &Axis, series: &[Series<(f64, f64)>]) -> Drawn<(f64, f64)> {
     let mut plot = frame::draw(area, &Side::numbers(x), &Side::numbers(y), 0.0)?;
     let mut missing = 0;

@@ -1,4 +1,4 @@
-//! Horizontal bars made of parts.
+//! Stacked horizontal bars.
 
 use plotters::{
     element::Rectangle,
@@ -16,17 +16,17 @@ use super::{
     words,
 };
 
-/// What a bar takes of its row.
+/// Share of a row's height that its bar fills.
 const FILLED: f64 = 0.72;
 /// Height of a row, in pixels.
 pub(super) const ROW: f64 = 30.0;
-/// Free space beside a value inside its part, in pixels.
+/// Free space around a value inside its part, in pixels.
 const PADDING: f64 = 3.0;
-/// Parts that are darker than this (relative luminance, WCAG 2) bear white text. Black and white have the same contrast
-/// by that formula at 0.18; saturated greens and reds just above it are yet read more easily with white.
+/// Darker parts (relative luminance, WCAG 2) get white text. Black and white have equal contrast at 0.18 by that formula,
+/// but saturated greens and reds just above it are easier to read with white.
 const DARK: f64 = 0.275;
 
-/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+/// Draws the chart; returns the left and right ends of its plot, in pixels.
 pub(super) fn draw(
     area: &Area<'_>,
     label: &str,
@@ -38,7 +38,7 @@ pub(super) fn draw(
         .collect();
     let longest = sums.iter().copied().fold(0.0, f64::max);
     let longest = if longest > 0.0 { longest } else { 1.0 };
-    // Sums that are all the same say nothing, and a single series' parts are the sums.
+    // Equal sums carry no information, and with a single series the parts are the sums.
     let differ = sums.iter().any(|sum| (sum - longest).abs() > 1e-9 * longest);
     let decimals = numbers::common_decimals(
         series

@@ -1,4 +1,4 @@
-//! The values of each series in a strip of its own.
+//! The values of each series in their own strip.
 
 use std::collections::BTreeMap;
 
@@ -12,12 +12,12 @@ use super::{
     words,
 };
 
-/// What the dots may take of the strips' height.
+/// Share of a strip's height that dots may fill.
 const FILLED: f64 = 0.8;
 /// Height of a strip, in pixels.
 pub(super) const STRIP: f64 = 27.0;
 
-/// Draws the chart and returns where its plot begins and ends from left to right, in pixels.
+/// Draws the chart; returns the left and right ends of its plot, in pixels.
 pub(super) fn draw(area: &Area<'_>, x: &Axis, series: &[Series<f64>]) -> Drawn<(f64, f64)> {
     let counts: Vec<_> = series
         .iter()
@@ -53,9 +53,9 @@ pub(super) fn draw(area: &Area<'_>, x: &Axis, series: &[Series<f64>]) -> Drawn<(
     Ok(frame::span(area, &plot))
 }
 
-/// Values with places across their strip: those that lie within a dot's width of each other are set apart, alternately
-/// above and below the middle, by a distance at which the densest part of the strip fills it. A strip is thus wider
-/// where it has more values.
+/// Values with their places across the strip. Values within a dot's width of each other are spread alternately above and
+/// below the middle, at a distance at which the densest part fills the strip, so the strip is wider where values are
+/// denser.
 fn spread(plot: &Plot<'_, '_>, values: &[f64], middle: f64) -> Vec<(f64, f64)> {
     let bin = |value: f64| {
         let (along, _) = plot.plotting_area().map_coordinate(&(value, middle));
@@ -69,7 +69,7 @@ fn spread(plot: &Plot<'_, '_>, values: &[f64], middle: f64) -> Vec<(f64, f64)> {
     let strip = plot.plotting_area().get_y_axis_pixel_range();
     let rows = plot.plotting_area().get_y_range().end;
     let pixels = f64::from((strip.end - strip.start).abs()) / f64::from(PIXEL) / rows;
-    // In rows: a dot's width, or less where the strip is too narrow for that.
+    // In rows a dot's width apart, or less where the strip is too narrow.
     let apart =
         (2.0 * dots::RADIUS / pixels).min((FILLED - 2.0 * dots::RADIUS / pixels) / densest.max(2) as f64);
 

@@ -1,8 +1,8 @@
-//! The picture: plotters' SVG backend, drawn to in tenths of a pixel, and its output made short.
+//! The picture: plotters' SVG backend, in tenths of a pixel, with compacted output.
 //!
-//! Plotters knows whole units only. A picture drawn in tenths of a pixel and shown at a tenth of its size has dots
-//! where they belong and thin lines. Plotters repeats each element's colours; [`compact`] says them once for all
-//! elements in a row that share them.
+//! Plotters only supports whole units. Drawing in tenths of a pixel, shown at a tenth of the size, places dots exactly and
+//! allows thin lines. Plotters repeats each element's colours; [`compact`] writes them once for consecutive elements that
+//! share them.
 
 use std::{fmt::Write, io};
 
@@ -16,16 +16,16 @@ use plotters::{
 /// A part of the picture; its coordinates are tenths of a pixel from its upper left corner.
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// What drawing returns.
+/// Result of drawing.
 pub(super) type Drawn<T = ()> = Result<T, DrawingAreaErrorKind<io::Error>>;
 
 /// Units of the drawing in a pixel.
 pub(super) const PIXEL: i32 = 10;
 
-/// Typefaces by preference; the estimates of widths are Helvetica's.
+/// Typefaces by preference; estimated widths are Helvetica's.
 const TYPEFACES: &str = "Helvetica, Arial, 'Liberation Sans', sans-serif";
 
-/// Attributes that say where an element lies; the others say what it looks like.
+/// Attributes of an element's geometry; the others are its looks.
 const GEOMETRY: [&str; 13] = [
     "cx", "cy", "dy", "height", "points", "r", "width", "x", "x1", "x2", "y", "y1", "y2",
 ];
@@ -35,7 +35,7 @@ pub(super) fn px(pixels: f64) -> i32 {
     (pixels * f64::from(PIXEL)).round() as i32
 }
 
-/// A white picture of so many pixels with what `draw` draws.
+/// A white picture of a size in pixels, drawn on by `draw`.
 pub(super) fn picture((width, height): (u32, u32), draw: impl FnOnce(&Area<'_>) -> Drawn) -> Drawn<String> {
     let mut drawing = String::new();
     {
@@ -48,14 +48,14 @@ pub(super) fn picture((width, height): (u32, u32), draw: impl FnOnce(&Area<'_>) 
     Ok(compact(&drawing, (width, height)))
 }
 
-/// An element without content, as plotters writes it: on a line of its own.
+/// An element without content, on its own line, as plotters writes it.
 struct Element<'a> {
     tag: &'a str,
     attributes: Vec<(&'a str, &'a str)>,
 }
 
 impl<'a> Element<'a> {
-    /// From `<tag key="value" …` without what closes it. Plotters escapes quotes in values.
+    /// From `<tag key="value" …` without the closing part. Plotters escapes quotes in values.
     fn parse(opening: &'a str) -> Option<Self> {
         let inner = opening.strip_prefix('<')?;
         let (tag, mut rest) = inner.split_once(' ').unwrap_or((inner, ""));
@@ -75,7 +75,7 @@ impl<'a> Element<'a> {
             .map(|(_, value)| *value)
     }
 
-    /// Where it lies.
+    /// Its geometry.
     fn geometry(&self) -> String {
         let mut text = String::new();
         for (key, value) in &self.attributes {
@@ -86,8 +86,8 @@ impl<'a> Element<'a> {
         text
     }
 
-    /// What it looks like, in attributes that a group can hand down: the opacity of a group is another thing than
-    /// that of its elements, but the opacity of fills and strokes is not.
+    /// Its looks, in attributes that it can inherit from a group. A group's opacity differs from its elements' opacity, but
+    /// the opacity of fills and strokes is inherited.
     fn looks(&self) -> String {
         let mut text = String::new();
         let filled = self.get("fill").is_some_and(|fill| fill != "none");
@@ -104,7 +104,7 @@ impl<'a> Element<'a> {
                     );
                 }
                 ("font-size", size) => {
-                    // Plotters scales it there and back, with an error in the last digit.
+                    // Plotters scales the size back and forth, with an error in the last digit.
                     let size = size
                         .parse::<f64>()
                         .map_or_else(|_| size.to_owned(), |size| format!("{}", size.round()));
@@ -115,7 +115,7 @@ impl<'a> Element<'a> {
             }
         }
         if matches!(self.tag, "rect" | "line" | "polyline") {
-            // Lines and bars are upright: on whole pixels they are sharp and bars leave no seams.
+            // Lines and bars are upright: on whole pixels they are sharp, without seams between bars.
             push_attribute(&mut text, "shape-rendering", "crispEdges");
         }
         text
@@ -127,7 +127,7 @@ fn push_attribute(text: &mut String, key: &str, value: &str) {
     let _ = write!(text, " {key}=\"{value}\"");
 }
 
-/// The elements in a row that look the same.
+/// Consecutive elements with the same looks.
 #[derive(Default)]
 struct Run {
     looks: String,
@@ -149,7 +149,7 @@ impl Run {
     }
 }
 
-/// What plotters drew, said shorter and shown at a tenth of its size, which is `width` × `height` pixels.
+/// Compacts plotters' drawing and shows it at a tenth of its size, as `width` × `height` pixels.
 fn compact(drawing: &str, (width, height): (u32, u32)) -> String {
     let mut out = String::with_capacity(drawing.len() / 2);
     let mut run = Run::default();
@@ -178,7 +178,7 @@ fn compact(drawing: &str, (width, height): (u32, u32)) -> String {
             Some(element) if element.tag == "text" => {
                 let _ = write!(out, "<text{}{}>", element.geometry(), element.looks());
             }
-            // Ends of elements, and the words between them.
+            // Closing tags, and text between tags.
             _ if line.starts_with("</") => {
                 out.push_str(line);
                 out.push('\n');

@@ -1,7 +1,7 @@
-//! Text: its sizes, and how it is broken, shortened and drawn.
+//! Text: its sizes, and how it is wrapped, shortened and drawn.
 //!
-//! There are no fonts at hand, so that widths are estimates: those of Helvetica, which Arial, Liberation Sans and most
-//! readers' default come close to.
+//! Without fonts, widths are estimates: those of Helvetica, which Arial, Liberation Sans and most viewers' defaults
+//! resemble.
 
 use plotters::{
     element::Text,
@@ -19,9 +19,9 @@ pub(super) const HEADING: f64 = 16.0;
 pub(super) const SUBHEADING: f64 = 13.0;
 /// Height of axes' and legends' text, in pixels.
 pub(super) const BODY: f64 = 12.0;
-/// Height of the values that bars bear, in pixels.
+/// Height of values on bars, in pixels.
 pub(super) const SMALL: f64 = 10.0;
-/// Distance between the feet of two lines, in heights of the text.
+/// Distance between baselines, in text heights.
 pub(super) const LINE: f64 = 1.3;
 
 /// The text's colour.
@@ -29,9 +29,9 @@ pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
 /// The colour of remarks.
 pub(super) const FAINT: RGBColor = RGBColor(110, 110, 110);
 
-/// What plotters' SVG divides the size of a font by.
+/// Plotters' SVG divides font sizes by this.
 const PLOTTERS_FONT_SCALE: f64 = 1.24;
-/// Estimated widths are taken so much wider, for fonts that are wider than Helvetica.
+/// Factor on estimated widths for fonts that are wider than Helvetica.
 const SAFETY: f64 = 1.06;
 
 /// The estimated width of text of this height, in pixels.
@@ -46,7 +46,7 @@ pub(super) fn width(text: &str, height: f64) -> f64 {
             'm' | 'M' | 'w' => 0.83,
             '%' | '@' | 'W' | '—' | '…' => 1.0,
             'A'..='Z' => 0.7,
-            // Letters, digits, and what lies beyond ASCII but is not wide.
+            // Letters, digits, and narrow characters beyond ASCII.
             ' '..='\u{1fff}' | '\u{2000}'..='\u{2bff}' => 0.56,
             _ => 1.0,
         })
@@ -54,7 +54,7 @@ pub(super) fn width(text: &str, height: f64) -> f64 {
     ems * height * SAFETY
 }
 
-/// The text in lines no wider than `room` pixels, broken at spaces; a word that is wider is shortened.
+/// The text in lines no wider than `room` pixels, broken at spaces; wider words are shortened.
 pub(super) fn lines(text: &str, height: f64, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -69,7 +69,7 @@ pub(super) fn lines(text: &str, height: f64, room: f64) -> Vec<String> {
     lines
 }
 
-/// The text, or as much of its beginning as fits into `room` pixels with an ellipsis.
+/// The text, cut to fit into `room` pixels with an ellipsis if it is wider.
 pub(super) fn shortened(text: &str, height: f64, room: f64) -> String {
     if width(text, height) <= room {
         return text.to_owned();
@@ -79,7 +79,7 @@ pub(super) fn shortened(text: &str, height: f64, room: f64) -> String {
     kept + "…"
 }
 
-/// The height, in pixels and at most `height`, at which the text is no wider than `room` pixels.
+/// The largest height up to `height` at which the text is no wider than `room`, all in pixels.
 pub(super) fn height_that_fits(text: &str, height: f64, room: f64) -> f64 {
     let wide = width(text, height);
     if wide > room {
@@ -89,7 +89,7 @@ pub(super) fn height_that_fits(text: &str, height: f64, room: f64) -> f64 {
     }
 }
 
-/// Text of this height (pixels) that is anchored in this way.
+/// Style of text with a height in pixels and an anchor.
 pub(super) fn style(height: f64, colour: RGBColor, across: HPos, upright: VPos) -> TextStyle<'static> {
     let size = height * f64::from(PIXEL) * PLOTTERS_FONT_SCALE;
     let mut style =
@@ -98,7 +98,7 @@ pub(super) fn style(height: f64, colour: RGBColor, across: HPos, upright: VPos) 
     style
 }
 
-/// As [`style`], in bold.
+/// [`style`] in bold.
 pub(super) fn bold(height: f64, across: HPos, upright: VPos) -> TextStyle<'static> {
     let mut style = style(height, INK, across, upright);
     style.font = style.font.style(FontStyle::Bold);
@@ -129,7 +129,7 @@ pub(super) fn write_lines(
     Ok(())
 }
 
-/// The text with spaces for the characters that no XML may hold.
+/// The text with spaces for characters that XML forbids.
 pub(super) fn drawable(text: &str) -> String {
     text.chars()
         .map(|letter| {

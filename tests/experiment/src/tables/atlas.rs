@@ -1,4 +1,4 @@
-//! What the objects' atlases answer.
+//! Answers from the objects' atlases.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use crate::{
     table::{Table, Value},
 };
 
-/// A row for each holdout of the set that answers from atlases, beside the times of the set that does not.
+/// A row per holdout of the set with atlases, next to the times of the same set without.
 pub fn atlas_answers(data: &Data<'_>) -> Table {
     let mut table = Table::new(
         "atlas",
@@ -69,7 +69,7 @@ pub fn atlas_answers(data: &Data<'_>) -> Table {
     table
 }
 
-/// Times of some searches in microseconds.
+/// Times of searches in microseconds.
 fn microseconds(searches: &[SearchFigures]) -> Vec<f64> {
     searches
         .iter()
@@ -77,7 +77,7 @@ fn microseconds(searches: &[SearchFigures]) -> Vec<f64> {
         .collect()
 }
 
-/// How many different grasps some valid records have: an atlas answers the same holdout with the same grip again.
+/// Number of distinct grasps in valid records: an atlas answers a holdout with the same grip every time.
 pub(crate) fn different_grasps<'a>(records: impl Iterator<Item = &'a Record>) -> u64 {
     let grasps: BTreeSet<_> = records
         .map(|record| {

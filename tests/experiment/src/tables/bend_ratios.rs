@@ -11,7 +11,7 @@ use crate::{
     thesis,
 };
 
-/// Degrees of a bin of Figure 5.17, as there.
+/// Width of a bin of Figure 5.17, in degrees.
 pub(crate) const BEND_BIN_DEGREES: f64 = 10.0;
 
 /// The digits of grasp set C that touch, valid or not.
@@ -21,13 +21,13 @@ fn touching<'a>(data: &Data<'a>, digit: Digit) -> impl Iterator<Item = &'a Digit
         .filter(|posed| posed.bend_ratio.is_some())
 }
 
-/// Which of the three ratios it is.
+/// Index among the three ratios.
 fn ratio_index(ratio: f32) -> Option<usize> {
     BEND_RATIOS.iter().position(|known| *known == ratio)
 }
 
-/// Figure 5.17: the bend angles with which a digit touches in set C, in bins that start at the multiple of ten degrees
-/// returned first: for each ratio, bin by bin.
+/// Figure 5.17: bend angles of a touching digit in set C. Returns the start of the first bin in degrees, and the counts by
+/// ratio and bin.
 pub(crate) fn bend_angle_bins(data: &Data<'_>, digit: Digit) -> (f64, [Vec<u64>; 3]) {
     let bin_of = |posed: &DigitFigures| (f64::from(posed.bend_degrees) / BEND_BIN_DEGREES).floor() as i64;
     let bins: Vec<_> = touching(data, digit)
@@ -95,8 +95,8 @@ fn row(name: String, counts: [u64; 3]) -> Vec<Value> {
         .collect()
 }
 
-/// The contacts of set C+ that are lost when a digit that touched with the first ratio closes with the second alone, at
-/// the same wrist and yaw; and how many touched with the first.
+/// Contacts of positive set C that are lost when a digit that touched with the first ratio closes with the second alone, at
+/// the same wrist and yaw; and the number that touched with the first.
 pub(crate) fn lost(data: &Data<'_>, digit: Digit) -> ([[u64; 3]; 3], [u64; 3]) {
     let mut lost = [[0; 3]; 3];
     let mut touching = [0; 3];
@@ -115,7 +115,7 @@ pub(crate) fn lost(data: &Data<'_>, digit: Digit) -> ([[u64; 3]; 3], [u64; 3]) {
     (lost, touching)
 }
 
-/// Figure 5.19, beside the thesis'.
+/// Figure 5.19, next to the thesis' numbers.
 pub fn lost_contacts(data: &Data<'_>) -> Table {
     let mut table = Table::new(
         "lost-contacts",
@@ -181,7 +181,7 @@ pub(crate) fn column_means(data: &Data<'_>, set: Set) -> Option<(f64, f64)> {
     mean_of_means(&attempts).zip(mean_of_means(&times))
 }
 
-/// Figure 5.20: ways to choose the bend ratios, as the difference from trying all, beside the thesis'.
+/// Figure 5.20: choices of bend ratios as differences from trying all, next to the thesis' numbers.
 pub fn columns(data: &Data<'_>) -> Table {
     let mut table = Table::new(
         "bend-ratio-choices",

@@ -10,7 +10,7 @@ use crate::{
     thesis,
 };
 
-/// Contacts and force distributions of valid grasps, by set.
+/// Contacts and force distributions of valid grasps by set.
 pub fn contact_counts(data: &Data<'_>) -> Table {
     let mut table = Table::new(
         "contacts",
@@ -62,10 +62,10 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
     table
 }
 
-/// What E varies with: the draw of the force distribution, or the grasp?
+/// Whether E varies with the draw of the force distribution or with the grasp.
 ///
-/// "By the draw" is the share of E's variance that is left when the grasp stays the same and the force distributions
-/// are drawn anew (one-way random effects). What is left of it is all that E can tell of grasps.
+/// "By the draw" is the share of E's variance that remains when only the force distributions of the same grasp are drawn
+/// again (one-way random effects). Only the rest depends on the grasp.
 pub fn comfort_spread(data: &Data<'_>) -> Table {
     let mut table = Table::new(
         "comfort",
@@ -111,7 +111,7 @@ pub fn comfort_spread(data: &Data<'_>) -> Table {
     table
 }
 
-/// The share of E's variance in a positive set that is the draw of the force distribution.
+/// The share of E's variance in a positive set that is due to the draw of the force distribution.
 pub(crate) fn comfort_share_by_draw(data: &Data<'_>, set: Set) -> Option<f64> {
     let drawn: Vec<_> = valid_with_figures(data, set)
         .map(|(.., grasp)| draws(grasp))
@@ -119,7 +119,7 @@ pub(crate) fn comfort_share_by_draw(data: &Data<'_>, set: Set) -> Option<f64> {
     share_by_draw(&drawn)
 }
 
-/// E as it was found and as it was drawn again.
+/// E as found, and with repeated draws.
 fn draws(grasp: &GraspFigures) -> Vec<f64> {
     std::iter::once(&grasp.comfort)
         .chain(&grasp.comfort_again)
@@ -127,8 +127,8 @@ fn draws(grasp: &GraspFigures) -> Vec<f64> {
         .collect()
 }
 
-/// The share of the variance within groups in all of it: mean variance within, against that plus the variance of what
-/// the groups' means would be without it (analysis of variance for random effects).
+/// The share of variance within groups: mean variance within, over that plus the variance of the groups' true means
+/// (analysis of variance for random effects).
 fn share_by_draw(groups: &[Vec<f64>]) -> Option<f64> {
     let drawn: Vec<_> = groups.iter().filter(|group| group.len() > 1).collect();
     let within = mean(
@@ -159,7 +159,7 @@ pub(crate) fn valid_with_figures<'a>(
     })
 }
 
-/// Links that touch, and contacts of the palm.
+/// Touching links and contacts of the palm.
 pub(crate) fn contacts_of(details: &Details) -> f64 {
     let palm = details.grasp.as_ref().map_or(0, |grasp| grasp.palm_contacts);
     f64::from(palm + details.digits.iter().map(|digit| digit.contacts).sum::<u32>())
@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn variance_is_put_down_to_what_makes_it() {
+    fn variance_is_attributed_to_grasps_and_draws() {
         // The grasp alone: every draw gives the same.
         let by_grasp = [vec![1.0, 1.0], vec![2.0, 2.0], vec![3.0, 3.0]];
         assert_eq!(share_by_draw(&by_grasp), Some(0.0));

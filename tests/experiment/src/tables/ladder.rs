@@ -9,10 +9,10 @@ use crate::{
     thesis,
 };
 
-/// Half the width of an interval that has the true mean in it 19 times of 20, in standard errors.
+/// Half the width of a 95 % interval, in standard errors.
 const STANDARD_ERRORS: f64 = 1.96;
 
-/// One row for each set: means over the holdouts, each of which counts the same.
+/// A row per set: means over the holdouts, each of which counts the same.
 pub fn ladder(data: &Data<'_>) -> Table {
     let more = data.more_threads();
     let mut header = vec![
@@ -72,13 +72,13 @@ pub fn ladder(data: &Data<'_>) -> Table {
     table
 }
 
-/// Mean over the holdouts of their means, without those that have nothing; none if all have nothing.
+/// Mean of the groups' means, without empty groups; none if all are empty.
 pub(crate) fn mean_of_means(groups: &[Vec<f64>]) -> Option<f64> {
     let means: Vec<_> = groups.iter().filter_map(|group| mean(group)).collect();
     mean(&means)
 }
 
-/// A row for each holdout and for each object, a pair of columns for each set, and the thesis' where it has them.
+/// A row per holdout and object, a pair of columns per set, and the thesis' columns where it has them.
 pub fn per_holdout(data: &Data<'_>) -> Table {
     let mut columns = Vec::new();
     for set in data.sets() {
@@ -130,7 +130,7 @@ pub(crate) fn column_letter(index: usize) -> char {
     char::from(b'a' + index as u8)
 }
 
-/// A pair of columns: values for each holdout.
+/// A pair of columns, by holdout.
 struct Columns {
     name: String,
     attempts: Vec<f64>,
@@ -194,7 +194,7 @@ fn by_holdout(data: &Data<'_>, file: &'static str, title: &str, columns: &[Colum
     table
 }
 
-/// Mean attempts of each holdout that has grasps, with the holdout's index.
+/// Index and mean attempts of each holdout with grasps.
 pub(crate) fn holdout_means(data: &Data<'_>, set: Set) -> Vec<(usize, f64)> {
     let searches = data.searches_by_holdout(set, 1);
     let means = searches.iter().map(|own| mean(&attempts(own)));

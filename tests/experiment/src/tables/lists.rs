@@ -1,4 +1,4 @@
-//! Everything, row by row: what the figures are drawn from, and what makes every row again.
+//! Lists of all grasps and attempts: the data of the figures, with what reproduces each row.
 
 use grasp_synthesis::{base::rejection::Rejection, model::hand::Digit};
 use serde::Serialize;
@@ -25,8 +25,8 @@ const ORIGIN: [&str; 10] = [
     "atlas_entry",
 ];
 
-/// All valid grasps, also those of more threads and of Figure 5.20's columns. `atlas` says whether an atlas was asked;
-/// `attempt` or `atlas_entry`, what gave the grasp.
+/// All valid grasps, including those on more threads and of Figure 5.20's columns. `atlas` says whether an atlas was used,
+/// and `attempt` or `atlas_entry` where the grasp came from.
 pub fn grasp_list(data: &Data<'_>) -> Table {
     let mut header: Vec<_> = ORIGIN.to_vec();
     header.extend(["attempts", "prunes", "milliseconds"]);
@@ -65,7 +65,7 @@ pub fn grasp_list(data: &Data<'_>) -> Table {
     table
 }
 
-/// All attempts that were looked at closely: the positive and the negative sets on one thread.
+/// All examined attempts: the positive and the negative sets on one thread.
 pub fn attempt_list(data: &Data<'_>) -> Table {
     let mut header: Vec<_> = ORIGIN.map(str::to_owned).to_vec();
     header.extend(
@@ -98,7 +98,7 @@ pub fn attempt_list(data: &Data<'_>) -> Table {
     table
 }
 
-/// What makes a record again.
+/// The columns that reproduce a record.
 fn origin(record: &Record) -> Vec<Value> {
     let Cell { set, threads, .. } = record.cell;
     let or_missing = |index: Option<u64>| index.map_or(Value::Missing, Value::from);
@@ -120,7 +120,7 @@ fn origin(record: &Record) -> Vec<Value> {
     ]
 }
 
-/// A choice as the command line spells it.
+/// A choice as on the command line.
 fn spelled(choice: impl Serialize) -> Value {
     let name = serde_json::to_value(choice);
     let name = name.ok().and_then(|name| name.as_str().map(str::to_owned));

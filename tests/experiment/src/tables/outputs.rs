@@ -1,4 +1,4 @@
-//! How attempts end, and what they take until then (Figures 5.5b to 5.7, 5.12b, 5.14b, 5.16b, 5.21b, 5.22).
+//! How attempts end, and how long they take (Figures 5.5b to 5.7, 5.12b, 5.14b, 5.16b, 5.21b, 5.22).
 
 use grasp_synthesis::base::rejection::Rejection;
 
@@ -9,8 +9,8 @@ use crate::{
     table::{Table, Value},
 };
 
-/// How many attempts of each negative grasp set ended how; and for comparison the shares of all failed attempts that
-/// the searches for the positive set made, holdout by holdout, each of which counts the same.
+/// Output types of each negative set, and for comparison their shares in all failed attempts of the searches for the
+/// positive set, in which each holdout counts the same.
 pub fn output_types(data: &Data<'_>) -> Table {
     let mut header = vec!["set".to_owned(), "attempts".to_owned()];
     for rejection in Rejection::OF_THESIS {
@@ -66,8 +66,7 @@ fn shares_of_all(data: &Data<'_>, set: Set) -> [f64; 8] {
     shares
 }
 
-/// Mean time of each step by set and output type. A type of which there are fewer than ten is shown all the same: its
-/// number says how far to trust it.
+/// Mean time of each step by set and output type. Rare types are shown as well: their numbers show how reliable they are.
 pub fn step_times(data: &Data<'_>) -> Table {
     let mut header = vec!["set".to_owned(), "output type".to_owned(), "attempts".to_owned()];
     header.extend(STEP_NAMES.map(|name| format!("{name}, µs")));
@@ -88,7 +87,7 @@ pub fn step_times(data: &Data<'_>) -> Table {
     table
 }
 
-/// How many attempts of a set ended in one way, and the mean time of their steps in microseconds.
+/// Number of attempts of a set with one output type, and the mean times of their steps in microseconds.
 pub(crate) fn mean_step_times(data: &Data<'_>, set: Set, kind: Option<Rejection>) -> (u64, [f64; 5]) {
     let of_kind = data.both(set).filter(|(record, _)| record.rejection == kind);
     let (count, sums) = sum_steps(of_kind.map(|(_, details)| details));
@@ -107,7 +106,7 @@ fn sum_steps<'a>(details: impl Iterator<Item = &'a Details>) -> (u64, [f64; 5]) 
     (count, sums)
 }
 
-/// The time that the negative sets took in all, by step (Figure 5.7).
+/// Total time of the negative sets by step (Figure 5.7).
 pub fn step_totals(data: &Data<'_>) -> Table {
     let mut header = vec!["set".to_owned(), "attempts".to_owned(), "together, ms".to_owned()];
     header.extend(STEP_NAMES.map(|name| format!("{name}, %")));
@@ -124,7 +123,7 @@ pub fn step_totals(data: &Data<'_>) -> Table {
     table
 }
 
-/// Of a negative set: its attempts, the share of each step in its time, and that time in nanoseconds.
+/// Attempts of a negative set, the share of each step in their time, and that time in nanoseconds.
 pub(crate) fn step_shares(data: &Data<'_>, set: Set) -> (u64, [f64; 5], f64) {
     let invalid = data.invalid(set).filter_map(|record| record.details.as_ref());
     let (count, sums) = sum_steps(invalid);

@@ -20,10 +20,10 @@ use crate::{
     table::{Table, Value},
 };
 
-/// Degrees of a bin of Figure 5.13.
+/// Width of a bin of Figure 5.13, in degrees.
 pub(crate) const PALM_ANGLE_BIN_DEGREES: f64 = 10.0;
 
-/// A measure by name, with how to get it and what Table 5.3 allows, in centimetres and degrees.
+/// A named measure with its range in Table 5.3, in centimetres and degrees.
 pub(crate) struct Measure {
     pub(crate) name: &'static str,
     pub(crate) of: fn(&Measures) -> Option<f64>,
@@ -86,16 +86,16 @@ pub(crate) fn valid_values(data: &Data<'_>, set: Set, measure: &Measure) -> Vec<
         .collect()
 }
 
-/// Share of the values that Table 5.3 allows.
+/// Share of the values within Table 5.3.
 pub(crate) fn share_in_range(values: &[f64], allowed: MeasureRange) -> Option<f64> {
-    // The measures are kept with rounding; a value on the boundary is in.
+    // Recorded measures are rounded; a value on the boundary counts.
     const SLACK: f64 = 1e-3;
     let is_in =
         |value: &&f64| **value >= f64::from(allowed.min) - SLACK && **value <= f64::from(allowed.max) + SLACK;
     (!values.is_empty()).then(|| values.iter().filter(is_in).count() as f64 / values.len() as f64)
 }
 
-/// Where valid grasps have their measures, beside Table 5.3.
+/// Measures of valid grasps, next to Table 5.3.
 pub fn measure_ranges(data: &Data<'_>) -> Table {
     let header = [
         "set",
@@ -128,7 +128,7 @@ pub fn measure_ranges(data: &Data<'_>) -> Table {
     table
 }
 
-/// Figure 5.13: how many valid grasps of set B have which palm-CoM-palm angle.
+/// Figure 5.13: valid grasps of set B by palm-CoM-palm angle.
 pub fn palm_angle_bins(data: &Data<'_>) -> Table {
     let mut table = Table::new(
         "palm-com-palm",
@@ -174,7 +174,7 @@ pub fn yaw_spread(data: &Data<'_>) -> Table {
     );
     for digit in Digit::ALL {
         let yaws = touching_yaws(data, digit);
-        // Quantile of the Kolmogorov distribution; holds from some 35 values on.
+        // Quantile of the Kolmogorov distribution, for some 35 values or more.
         let by_chance = 1.36 / (yaws.len() as f64).sqrt();
         let distance = yaw_distance(data, digit);
         table.push(vec![
@@ -201,7 +201,7 @@ pub(crate) fn yaw_distance(data: &Data<'_>, digit: Digit) -> Option<f64> {
     distance_from_uniform(&touching_yaws(data, digit), min, max)
 }
 
-/// Yaw angles in degrees with which a digit touches in the positive set D.
+/// Yaw angles of a touching digit in the positive set D, in degrees.
 pub(crate) fn touching_yaws(data: &Data<'_>, digit: Digit) -> Vec<f64> {
     let details = data
         .valid(Set::ladder(Strategy::D))

@@ -137,7 +137,7 @@ fn sets_without_an_atlas_are_valid_by_their_own_notion_and_hand() {
         assert_eq!(records.len(), 2 * (3 * 2 + 20));
         for record in &records {
             let attempt = record.source.attempt().expect("an attempt");
-            assert!(maker.comes_out_again(record), "{record:?}");
+            assert!(maker.is_reproducible(record), "{record:?}");
             if record.rejection.is_some() {
                 continue;
             }
