@@ -1,8 +1,8 @@
 //! Places a recorded hand on an object as a giver would hold it.
 //!
 //! A seeded random search, then a pattern search over the wrist's pose. The hand is a set of solids, palm, wrist and
-//! forearm included. The cost favours digits and palm that touch the surface without sinking in; the hand starts near one
-//! end of the object, which leaves the other to a receiver.
+//! forearm included. The cost favours digits and palm that touch the surface without sinking in; the hand starts near
+//! one end of the object, which leaves the other to a receiver.
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{

@@ -1,7 +1,7 @@
 //! Random holdouts: recorded hands, placed on an object as givers, under gravity from any direction.
 //!
-//! Placing a hand takes a fifth of a second, so there are some dozens of placements per object ([`place`]). A holdout draws
-//! one of these givers and a rotation in the client's frame ([`Givers::draw`]). Everything follows from the seed.
+//! Placing a hand takes a fifth of a second, so there are some dozens of placements per object ([`place`]). A holdout
+//! draws one of these givers and a rotation in the client's frame ([`Givers::draw`]). Everything follows from the seed.
 
 use std::{collections::HashMap, path::Path, sync::Arc};
 
@@ -66,7 +66,8 @@ const TOUCHING_DIGITS: usize = 2;
 /// Placements tried until a hand holds well; then the shallowest counts.
 const PLACEMENTS: u64 = 6;
 
-/// Position of the object in the client's frame, in metres. It is off the origin, so that confusing the two frames shows.
+/// Position of the object in the client's frame, in metres. It is off the origin, so that confusing the two frames
+/// shows.
 const CLIENT_POSITION: Vec3 = Vec3::new(0.0, 1.2, 0.3);
 
 /// A hand that can hold something.
@@ -272,7 +273,8 @@ mod tests {
         points
     }
 
-    /// Greatest depth of points below the skin of a hand that is as thick as its joints, from the wrist to each digit's tip.
+    /// Greatest depth of points below the skin of a hand that is as thick as its joints, from the wrist to each digit's
+    /// tip.
     fn depth_in_hand(joints: &HandJoints, points: &[Vec3]) -> f32 {
         let mut deepest: f32 = 0.0;
         for digit in 0..5 {

@@ -1,7 +1,7 @@
 //! Meshes and hand poses from third parties, used in place and never copied.
 //!
-//! They are in the folder that `GRASP_TEST_DATA` names, or else in `../shared/data` next to the repository. Tests that need
-//! them print that they are skipped when they are absent.
+//! They are in the folder that `GRASP_TEST_DATA` names, or else in `../shared/data` next to the repository. Tests that
+//! need them print that they are skipped when they are absent.
 
 use std::{
     collections::BTreeMap,
@@ -40,8 +40,8 @@ pub fn data_folder_or_skip(test: &str) -> Option<PathBuf> {
     folder
 }
 
-/// An object from OBJ text in metres, with its mesh as the server reads it and its centre of mass at the origin, which is
-/// enough to place givers. `mass` is in kilograms.
+/// An object from OBJ text in metres, with its mesh as the server reads it and its centre of mass at the origin, which
+/// is enough to place givers. `mass` is in kilograms.
 pub fn object_of(obj: &[u8], mass: f32) -> GraspObject {
     let limits = MeshLimits {
         bytes: 1 << 24,
@@ -79,7 +79,8 @@ struct JointEntry {
     orientation_xyzw: Quat,
 }
 
-/// All poses of a file such as `poses/handy-work_poses.json`. The files have no radii; `radii` provides them, in metres and
+/// All poses of a file such as `poses/handy-work_poses.json`. The files have no radii; `radii` provides them, in metres
+/// and
 /// `OpenXR` order.
 pub fn read_poses(file: &Path, radii: &[f32; JOINT_COUNT]) -> Vec<RecordedPose> {
     let text = std::fs::read_to_string(file).expect("the pose file can be read");

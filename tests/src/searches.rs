@@ -72,7 +72,8 @@ impl Bench {
         }
     }
 
-    /// Searches holdout number `holdout` for a valid grasp, in `max_attempts` attempts of `seed` starting at `first_attempt`.
+    /// Searches holdout number `holdout` for a valid grasp, in `max_attempts` attempts of `seed` starting at
+    /// `first_attempt`.
     pub fn search(
         &self,
         holdout: usize,
@@ -130,8 +131,8 @@ impl Bench {
         )
     }
 
-    /// Runs exactly `attempts` attempts of one worker on a holdout, continuing after each valid grasp; returns the number of
-    /// valid ones.
+    /// Runs exactly `attempts` attempts of one worker on a holdout, continuing after each valid grasp; returns the
+    /// number of valid ones.
     pub fn run_attempts(&self, holdout: usize, strategy: Strategy, seed: u64, attempts: u64) -> u64 {
         assert_eq!(self.workers, 1, "only one worker runs attempts in order");
         let (mut next, mut valid) = (0, 0);

@@ -192,7 +192,8 @@ fn fingers_fit_through_the_scissors_rings() {
     let scissors = mesh(object("scissors").unwrap());
     let mut holes = Vec::new();
     for side in [-1.0_f32, 1.0] {
-        // The middle of the hole: the point of a 1 mm grid, behind the middle, that is farthest from everything along z.
+        // The middle of the hole: the point of a 1 mm grid, behind the middle, that is farthest from everything along
+        // z.
         let best = (0..36)
             .flat_map(|i| (0..40).map(move |j| (i, j)))
             .map(|(i, j)| Vec3::new(side * 0.001 * i as f32, -0.0395 - 0.001 * j as f32, 0.0))

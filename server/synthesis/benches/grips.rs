@@ -1,5 +1,5 @@
-//! Time per grip: to check one of an atlas against a giver, to find the first that holds, to close a proposed hand, and to
-//! find an entry of an atlas. In batches of fixed queries: divide by the batch, or read the throughput.
+//! Time per grip: to check one of an atlas against a giver, to find the first that holds, to close a proposed hand, and
+//! to find an entry of an atlas. In batches of fixed queries: divide by the batch, or read the throughput.
 
 use std::hint::black_box;
 

@@ -1,7 +1,7 @@
 //! Time per query of hands as solids, in batches of fixed random queries: divide by the batch, or read the throughput.
 //!
-//! "Touching" capsules are as close to the surface as those of a closed finger, "near" ones are within 3 cm, and "deep" ones
-//! start inside the volume.
+//! "Touching" capsules are as close to the surface as those of a closed finger, "near" ones are within 3 cm, and "deep"
+//! ones start inside the volume.
 
 use std::hint::black_box;
 

@@ -66,8 +66,8 @@ pub struct Atlases(HashMap<&'static str, Arc<Atlas>>);
 
 impl Atlases {
     /// The atlases that the settings and the folder's records need: from the folder, so that a run continues with the
-    /// atlases it began with, or from `shipped`, or else grown to the end. None if stopped; what has grown by then is in the
-    /// folder.
+    /// atlases it began with, or from `shipped`, or else grown to the end. None if stopped; what has grown by then is
+    /// in the folder.
     ///
     /// # Errors
     /// An atlas in the folder cannot be read, or none can be written.

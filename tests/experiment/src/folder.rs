@@ -17,8 +17,8 @@ use crate::{
     record::{Record, Source},
 };
 
-/// Format of the records, incremented when they change. Since 2, records may be of sets under another validity or with an
-/// atlas; records of 1 are still read.
+/// Format of the records, incremented when they change. Since 2, records may be of sets under another validity or with
+/// an atlas; records of 1 are still read.
 const FORMAT: u32 = 2;
 
 /// The oldest format that is still read.

@@ -122,7 +122,8 @@ impl Maker {
         })
     }
 
-    /// Searches for valid grasp number `number` of a cell; the record may report that the search gave up. None if stopped.
+    /// Searches for valid grasp number `number` of a cell; the record may report that the search gave up. None if
+    /// stopped.
     pub fn valid(&self, settings: &Settings, cell: &Cell, number: u64, stop: &AtomicBool) -> Option<Record> {
         let seed = settings.seed_of_valid(cell, number);
         let holdout = &self.holdouts[cell.holdout];
@@ -221,8 +222,8 @@ impl Maker {
         records
     }
 
-    /// Repeats a record's attempt or grip. True if it ends as recorded, with the same wrist and digits. A search that gave
-    /// up is not repeated, as it would take as long again, and counts as true.
+    /// Repeats a record's attempt or grip. True if it ends as recorded, with the same wrist and digits. A search that
+    /// gave up is not repeated, as it would take as long again, and counts as true.
     pub fn is_reproducible(&self, record: &Record) -> bool {
         if record.source == Source::Nowhere {
             return true;

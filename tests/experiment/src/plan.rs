@@ -21,8 +21,8 @@ const SEEDS_PER_HOLDOUT: u64 = 1_000_000;
 /// Largest number of grasps, and of invalid attempts, per cell: far more than there is time for.
 pub const MOST_PER_CELL: u64 = SEEDS_PER_HOLDOUT - 1;
 
-/// Attempts after which a search of a set beyond A to F gives up, as not every holdout leaves a physical grasp. More take
-/// up to a minute each; the worst holdout with a grasp takes 6,000 on average.
+/// Attempts after which a search of a set beyond A to F gives up, as not every holdout leaves a physical grasp. More
+/// take up to a minute each; the worst holdout with a grasp takes 6,000 on average.
 const MOST_ATTEMPTS: u64 = 1_000_000;
 
 /// A way to synthesize: a grasp set of the thesis, or one beyond them.
@@ -243,8 +243,8 @@ impl Settings {
         cells
     }
 
-    /// Number of invalid attempts that a cell keeps: on one thread, in the requested sets without an atlas, as an atlas does
-    /// not change attempts.
+    /// Number of invalid attempts that a cell keeps: on one thread, in the requested sets without an atlas, as an atlas
+    /// does not change attempts.
     pub fn invalid_of(&self, cell: &Cell) -> u64 {
         if self.sets.contains(&cell.set) && !cell.set.atlas && cell.threads == 1 {
             self.invalid
@@ -253,7 +253,8 @@ impl Settings {
         }
     }
 
-    /// The seed of a cell's grasp. It is the same in all sets, so two sets differ in how they synthesize and not in luck.
+    /// The seed of a cell's grasp. It is the same in all sets, so two sets differ in how they synthesize and not in
+    /// luck.
     pub fn seed_of_valid(&self, cell: &Cell, number: u64) -> u64 {
         debug_assert!(number < MOST_PER_CELL, "grasp {number} of a cell");
         self.seed_of_holdout(cell).wrapping_add(number)

@@ -103,8 +103,8 @@ pub struct AtlasFigures {
 /// Details of an attempt.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Details {
-    /// Measures of its wrist placement, for valid physical grasps that of the final wrist; none where guided search found no
-    /// place.
+    /// Measures of its wrist placement, for valid physical grasps that of the final wrist; none where guided search
+    /// found no place.
     pub measures: Option<Measures>,
     /// The posed digits, thumb first; none for failed attempts under `PHYSICAL` validity, whose contacts are unknown.
     pub digits: Vec<DigitFigures>,
@@ -162,8 +162,8 @@ pub struct DigitFigures {
     pub bend_ratio: Option<f32>,
     /// Links that touch.
     pub contacts: u32,
-    /// For a touching digit under the thesis' validity: whether it touches with 0.7, 1 and 1.42 alone, at the same wrist and
-    /// yaw (Figure 5.19).
+    /// For a touching digit under the thesis' validity: whether it touches with 0.7, 1 and 1.42 alone, at the same
+    /// wrist and yaw (Figure 5.19).
     pub touches_with: Option<[bool; 3]>,
 }
 
@@ -174,8 +174,8 @@ pub struct GraspFigures {
     pub wrench_angle_degrees: f32,
     /// E of Eq. 4.6.
     pub comfort: f32,
-    /// How many of 100 further random force distributions oppose gravity (5.6); none under `PHYSICAL` validity, where forces
-    /// are solved, not drawn.
+    /// How many of 100 further random force distributions oppose gravity (5.6); none under `PHYSICAL` validity, where
+    /// forces are solved, not drawn.
     pub sufficient_distributions: Option<u32>,
     /// E for the same contacts with other draws of force distributions. Empty if none sufficed, or if none are drawn.
     pub comfort_again: Vec<f32>,

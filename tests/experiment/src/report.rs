@@ -45,8 +45,8 @@ pub struct ReportError {
     pub source: io::Error,
 }
 
-/// Writes the report of a folder's records: the page with its pictures and tables to `target`, and the lists of all grasps
-/// and attempts to the folder itself.
+/// Writes the report of a folder's records: the page with its pictures and tables to `target`, and the lists of all
+/// grasps and attempts to the folder itself.
 ///
 /// # Errors
 /// A file cannot be written.

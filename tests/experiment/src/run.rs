@@ -175,8 +175,8 @@ fn progress_at(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>, 
     }
 }
 
-/// A grasp is expected to take as long as its cell's grasps so far, or else as its holdout's in the latest cell with some,
-/// or else the overall average.
+/// A grasp is expected to take as long as its cell's grasps so far, or else as its holdout's in the latest cell with
+/// some, or else the overall average.
 fn time_left(settings: &Settings, cells: &[Cell], made: &HashMap<Cell, Made>) -> Option<Duration> {
     let means: Vec<_> = cells.iter().filter_map(|cell| made.get(cell)?.mean()).collect();
     if means.is_empty() {

@@ -22,8 +22,8 @@ const COLUMNS: usize = 6;
 /// Width and height of a picture in pixels.
 const SIZE: [u32; 2] = [330, 280];
 
-/// Grasps of a set by object, from the most comfortable to the least and spread evenly over the ranks. None if the set has
-/// no grasps.
+/// Grasps of a set by object, from the most comfortable to the least and spread evenly over the ranks. None if the set
+/// has no grasps.
 pub fn comfort_sheet(data: &Data<'_>, maker: &Maker, set: Set) -> Option<Image> {
     let mut grasps: Vec<_> = valid_with_figures(data, set)
         .map(|(record, _, figures)| (record, figures.comfort))

@@ -1,7 +1,7 @@
 //! The thesis' measurements, on one thread of an Intel Core i7-5700HQ in Unity (5.1).
 //!
-//! Figures by holdout are in the order of the built-in holdouts: remote, scalpel and scissors, each with `GenHold1` to 3
-//! and `Hold1` to 2.
+//! Figures by holdout are in the order of the built-in holdouts: remote, scalpel and scissors, each with `GenHold1` to
+//! 3 and `Hold1` to 2.
 
 use grasp_synthesis::model::strategy::Strategy;
 

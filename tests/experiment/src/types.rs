@@ -40,8 +40,8 @@ impl SetTypes {
         mean_of_means(&self.is(of))
     }
 
-    /// Half of the 95 % interval of the share of unclassifiable grasps. None if grasps repeat, as they then do not vary like
-    /// independent ones.
+    /// Half of the 95 % interval of the share of unclassifiable grasps. None if grasps repeat, as they then do not vary
+    /// like independent ones.
     pub fn margin(&self) -> Option<f64> {
         if self.different < self.count() as u64 {
             return None;

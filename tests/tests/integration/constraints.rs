@@ -114,8 +114,8 @@ fn touching(grasp: &v1::Grasp) -> Vec<v1::Digit> {
     grasp.contacts.iter().map(v1::Contact::digit).collect()
 }
 
-/// Answers for some seeds without an atlas, each with the type of its grasp. For the thesis hand there are no transferred
-/// grips, which would depend on the constraints: all searches start alike.
+/// Answers for some seeds without an atlas, each with the type of its grasp. For the thesis hand there are no
+/// transferred grips, which would depend on the constraints: all searches start alike.
 async fn typed_answers(
     server: &TestServer,
     validity: v1::Validity,

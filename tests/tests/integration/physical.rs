@@ -19,8 +19,8 @@ const FRICTION: f64 = 0.6;
 
 const GRAVITY: f64 = 9.81;
 
-/// How deep the surface may be below the skin around the answered joints, in metres. The search allows 2 mm, but its flesh
-/// is slimmer near the knuckles than a cone between them.
+/// How deep the surface may be below the skin around the answered joints, in metres. The search allows 2 mm, but its
+/// flesh is slimmer near the knuckles than a cone between them.
 const DEEPEST: f64 = 0.003;
 
 async fn ask(client: &GraspClient, name: &str, seed: u64) -> FindAnswer {

@@ -50,8 +50,8 @@ fn posed(digits: [&DigitRig; 2], shares: &[f32; 8], coupled: bool) -> [DigitAngl
     })
 }
 
-/// Distance in metres and facing of the pads where the distance plus a penalty of 15 mm for pads at right angles is least,
-/// by random descent.
+/// Distance in metres and facing of the pads where the distance plus a penalty of 15 mm for pads at right angles is
+/// least, by random descent.
 fn closest(digits: [&DigitRig; 2], coupled: bool) -> (f32, f32) {
     let mut numbers = Numbers(7);
     let cost = |shares: &[f32; 8]| {

@@ -41,7 +41,8 @@ fn threads(data: &Data<'_>, set: Set) -> Option<Claim> {
     })
 }
 
-/// "We are interested in seeing whether this evaluation measure would rank a false valid grasp after a true valid grasp."
+/// "We are interested in seeing whether this evaluation measure would rank a false valid grasp after a true valid
+/// grasp."
 fn comfort(data: &Data<'_>, set: Set) -> Option<Claim> {
     let by_draw = comfort_share_by_draw(data, set)?;
     let pairs: Vec<_> = valid_with_figures(data, set)

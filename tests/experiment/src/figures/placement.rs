@@ -11,11 +11,12 @@ use crate::{
     tables::{MEASURES, PALM_ANGLE_BIN_DEGREES, palm_angle_counts},
 };
 
-/// Largest number of failed attempts drawn per set, as in the thesis: more would hide each other. Tables and CSV have all.
+/// Largest number of failed attempts drawn per set, as in the thesis: more would hide each other. Tables and CSV have
+/// all.
 const MOST_DOTS: usize = 1500;
 
-/// Ends of the axes: wrists are placed within a reach of 22 cm of the box, which is a little farther from the object, and
-/// palms lie up to a palm's length farther out.
+/// Ends of the axes: wrists are placed within a reach of 22 cm of the box, which is a little farther from the object,
+/// and palms lie up to a palm's length farther out.
 const WRIST_DISTANCE_AXIS_CM: f64 = 26.0;
 const PALM_DISTANCE_AXIS_CM: f64 = 36.0;
 

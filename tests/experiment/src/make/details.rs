@@ -36,8 +36,8 @@ use crate::{
 /// Runs per attempt for the median of its times: the first ones have cold caches, and other work interrupts some.
 const REPLAYS: usize = 5;
 
-/// Repetitions of Immobility Validation with new draws per valid grasp, to see how much of E is due to the draw. More give
-/// a better estimate and longer records.
+/// Repetitions of Immobility Validation with new draws per valid grasp, to see how much of E is due to the draw. More
+/// give a better estimate and longer records.
 pub(crate) const COMFORT_REPEATS: u64 = 8;
 
 /// Added to a seed for draws after a grasp was found, so that they are independent of the search. Any number far from

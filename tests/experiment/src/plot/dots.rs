@@ -20,7 +20,8 @@ use super::{
 
 /// A dot's radius, in pixels.
 pub(super) const RADIUS: f64 = 1.8;
-/// Opacities of a series' dots, from 0 to 1, if they are few and if they are many: few hardly overlap and would look pale.
+/// Opacities of a series' dots, from 0 to 1, if they are few and if they are many: few hardly overlap and would look
+/// pale.
 const OPACITIES: (f64, f64) = (0.8, 0.5);
 /// Least number of dots that counts as many.
 const MANY: usize = 250;

@@ -118,8 +118,8 @@ fn draw_cell(area: &Area<'_>, cell: &Cell<'_>, wide: f64, shared_legend: bool) -
     let (left, right) = chart::draw(&chart_area, &cell.panel.chart)?;
     let middle = left.midpoint(right);
 
-    // A title with fewer lines than its neighbour's is aligned to the bottom, and centred on the plot as far as it stays
-    // inside the panel.
+    // A title with fewer lines than its neighbour's is aligned to the bottom, and centred on the plot as far as it
+    // stays inside the panel.
     let unused = cell.title_height - title_height(&cell.title, words::SUBHEADING);
     let long = cell
         .title

@@ -1,7 +1,7 @@
 //! Charts as SVG: [`figure`] lays panels out in a grid and returns one self-contained picture.
 //!
-//! Each kind of chart has its own file; all share the frame with its ticks, the legend, text sizes and number formats. The
-//! same data gives the same bytes.
+//! Each kind of chart has its own file; all share the frame with its ticks, the legend, text sizes and number formats.
+//! The same data gives the same bytes.
 
 mod chart;
 mod dots;
@@ -59,8 +59,8 @@ pub enum Chart {
         /// Dots as (x, y).
         series: Vec<Series<(f64, f64)>>,
     },
-    /// Values of each series as dots in their own strip, spread across it to show their density, with the number of values
-    /// at the strip's end.
+    /// Values of each series as dots in their own strip, spread across it to show their density, with the number of
+    /// values at the strip's end.
     Strips {
         /// Along the bottom.
         x: Axis,
@@ -78,8 +78,8 @@ pub enum Chart {
         /// Counts, bin by bin.
         series: Vec<Series<u64>>,
     },
-    /// A horizontal bar per row with a part per series. Wide enough parts show their value; rows of different lengths show
-    /// their sum at the end.
+    /// A horizontal bar per row with a part per series. Wide enough parts show their value; rows of different lengths
+    /// show their sum at the end.
     StackedBars {
         /// Label of the bars' lengths, with the unit.
         label: String,

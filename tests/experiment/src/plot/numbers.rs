@@ -89,8 +89,8 @@ pub(super) fn ends(min: f64, max: f64) -> (f64, f64) {
     }
 }
 
-/// Ticks at multiples of 1, 2 or 5 times a power of ten, with the narrowest step that `fits` accepts, given the ticks and
-/// their distance.
+/// Ticks at multiples of 1, 2 or 5 times a power of ten, with the narrowest step that `fits` accepts, given the ticks
+/// and their distance.
 pub(super) fn ticks(low: f64, high: f64, fits: impl Fn(&[Tick], f64) -> bool) -> Vec<Tick> {
     // The finest step has up to about a hundred ticks, the coarsest up to one.
     let finest = ((high - low) / 100.0).log10().floor() as i32;
@@ -111,8 +111,8 @@ pub(super) fn ticks(low: f64, high: f64, fits: impl Fn(&[Tick], f64) -> bool) ->
     Vec::new()
 }
 
-/// Common decimals of adjacent values up to `largest`: none for whole numbers, or else three digits for the largest, but at
-/// least one decimal.
+/// Common decimals of adjacent values up to `largest`: none for whole numbers, or else three digits for the largest,
+/// but at least one decimal.
 pub(super) fn common_decimals(mut values: impl Iterator<Item = f64>, largest: f64) -> usize {
     if values.all(|value| value.fract() == 0.0) || largest >= 1000.0 {
         return 0;

@@ -1,5 +1,5 @@
-//! Colours that people with protanopia, deuteranopia or tritanopia can distinguish: any two of a set are at least 15 apart
-//! in CIELAB for each of them, and for everyone else.
+//! Colours that people with protanopia, deuteranopia or tritanopia can distinguish: any two of a set are at least 15
+//! apart in CIELAB for each of them, and for everyone else.
 //!
 //! Most are from the palette of Okabe and Ito ("Color Universal Design", 2008), some from the muted and bright schemes
 //! of Tol ("Colour Schemes", SRON/EPS/TN/09-002, 2021).

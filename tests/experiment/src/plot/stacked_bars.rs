@@ -22,8 +22,8 @@ const FILLED: f64 = 0.72;
 pub(super) const ROW: f64 = 30.0;
 /// Free space around a value inside its part, in pixels.
 const PADDING: f64 = 3.0;
-/// Darker parts (relative luminance, WCAG 2) get white text. Black and white have equal contrast at 0.18 by that formula,
-/// but saturated greens and reds just above it are easier to read with white.
+/// Darker parts (relative luminance, WCAG 2) get white text. Black and white have equal contrast at 0.18 by that
+/// formula, but saturated greens and reds just above it are easier to read with white.
 const DARK: f64 = 0.275;
 
 /// Draws the chart; returns the left and right ends of its plot, in pixels.

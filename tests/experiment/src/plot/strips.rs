@@ -53,9 +53,9 @@ pub(super) fn draw(area: &Area<'_>, x: &Axis, series: &[Series<f64>]) -> Drawn<(
     Ok(frame::span(area, &plot))
 }
 
-/// Values with their places across the strip. Values within a dot's width of each other are spread alternately above and
-/// below the middle, at a distance at which the densest part fills the strip, so the strip is wider where values are
-/// denser.
+/// Values with their places across the strip. Values within a dot's width of each other are spread alternately above
+/// and below the middle, at a distance at which the densest part fills the strip, so the strip is wider where values
+/// are denser.
 fn spread(plot: &Plot<'_, '_>, values: &[f64], middle: f64) -> Vec<(f64, f64)> {
     let bin = |value: f64| {
         let (along, _) = plot.plotting_area().map_coordinate(&(value, middle));

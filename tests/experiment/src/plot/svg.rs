@@ -1,8 +1,8 @@
 //! The picture: plotters' SVG backend, in tenths of a pixel, with compacted output.
 //!
-//! Plotters only supports whole units. Drawing in tenths of a pixel, shown at a tenth of the size, places dots exactly and
-//! allows thin lines. Plotters repeats each element's colours; [`compact`] writes them once for consecutive elements that
-//! share them.
+//! Plotters only supports whole units. Drawing in tenths of a pixel, shown at a tenth of the size, places dots exactly
+//! and allows thin lines. Plotters repeats each element's colours; [`compact`] writes them once for consecutive
+//! elements that share them.
 
 use std::{fmt::Write, io};
 
@@ -86,8 +86,8 @@ impl<'a> Element<'a> {
         text
     }
 
-    /// Its looks, in attributes that it can inherit from a group. A group's opacity differs from its elements' opacity, but
-    /// the opacity of fills and strokes is inherited.
+    /// Its looks, in attributes that it can inherit from a group. A group's opacity differs from its elements' opacity,
+    /// but the opacity of fills and strokes is inherited.
     fn looks(&self) -> String {
         let mut text = String::new();
         let filled = self.get("fill").is_some_and(|fill| fill != "none");

@@ -26,8 +26,8 @@ fn ratio_index(ratio: f32) -> Option<usize> {
     BEND_RATIOS.iter().position(|known| *known == ratio)
 }
 
-/// Figure 5.17: bend angles of a touching digit in set C. Returns the start of the first bin in degrees, and the counts by
-/// ratio and bin.
+/// Figure 5.17: bend angles of a touching digit in set C. Returns the start of the first bin in degrees, and the counts
+/// by ratio and bin.
 pub(crate) fn bend_angle_bins(data: &Data<'_>, digit: Digit) -> (f64, [Vec<u64>; 3]) {
     let bin_of = |posed: &DigitFigures| (f64::from(posed.bend_degrees) / BEND_BIN_DEGREES).floor() as i64;
     let bins: Vec<_> = touching(data, digit)
@@ -95,8 +95,8 @@ fn row(name: String, counts: [u64; 3]) -> Vec<Value> {
         .collect()
 }
 
-/// Contacts of positive set C that are lost when a digit that touched with the first ratio closes with the second alone, at
-/// the same wrist and yaw; and the number that touched with the first.
+/// Contacts of positive set C that are lost when a digit that touched with the first ratio closes with the second
+/// alone, at the same wrist and yaw; and the number that touched with the first.
 pub(crate) fn lost(data: &Data<'_>, digit: Digit) -> ([[u64; 3]; 3], [u64; 3]) {
     let mut lost = [[0; 3]; 3];
     let mut touching = [0; 3];

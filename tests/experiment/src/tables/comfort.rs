@@ -64,8 +64,8 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
 
 /// Whether E varies with the draw of the force distribution or with the grasp.
 ///
-/// "By the draw" is the share of E's variance that remains when only the force distributions of the same grasp are drawn
-/// again (one-way random effects). Only the rest depends on the grasp.
+/// "By the draw" is the share of E's variance that remains when only the force distributions of the same grasp are
+/// drawn again (one-way random effects). Only the rest depends on the grasp.
 pub fn comfort_spread(data: &Data<'_>) -> Table {
     let mut table = Table::new(
         "comfort",

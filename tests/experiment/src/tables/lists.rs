@@ -25,8 +25,8 @@ const ORIGIN: [&str; 10] = [
     "atlas_entry",
 ];
 
-/// All valid grasps, including those on more threads and of Figure 5.20's columns. `atlas` says whether an atlas was used,
-/// and `attempt` or `atlas_entry` where the grasp came from.
+/// All valid grasps, including those on more threads and of Figure 5.20's columns. `atlas` says whether an atlas was
+/// used, and `attempt` or `atlas_entry` where the grasp came from.
 pub fn grasp_list(data: &Data<'_>) -> Table {
     let mut header: Vec<_> = ORIGIN.to_vec();
     header.extend(["attempts", "prunes", "milliseconds"]);

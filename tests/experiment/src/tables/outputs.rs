@@ -66,7 +66,8 @@ fn shares_of_all(data: &Data<'_>, set: Set) -> [f64; 8] {
     shares
 }
 
-/// Mean time of each step by set and output type. Rare types are shown as well: their numbers show how reliable they are.
+/// Mean time of each step by set and output type. Rare types are shown as well: their numbers show how reliable they
+/// are.
 pub fn step_times(data: &Data<'_>) -> Table {
     let mut header = vec!["set".to_owned(), "output type".to_owned(), "attempts".to_owned()];
     header.extend(STEP_NAMES.map(|name| format!("{name}, µs")));

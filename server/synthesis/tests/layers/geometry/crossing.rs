@@ -58,8 +58,8 @@ fn both(mesh: &TriangleMesh) -> [MeshBvh; 2] {
 fn crossings_match_brute_force() {
     for (seed, (name, mesh)) in meshes::all().into_iter().enumerate() {
         let (crossed, doubtful) = compare(name, &mesh, &both(&mesh), 10_000, seed as u64);
-        // Else the comparison proves nothing. Segments on vertices, on the surface or without length, about half, are too
-        // close to call.
+        // Else the comparison proves nothing. Segments on vertices, on the surface or without length, about half, are
+        // too close to call.
         assert!(crossed > 500, "{name}: only {crossed} segments cross");
         assert!(
             doubtful < 6_500,

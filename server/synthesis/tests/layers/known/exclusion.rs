@@ -42,8 +42,8 @@ fn excluded_grips_meet_the_giver() {
         let object = object(name);
         let atlas = grown(growth(object, rig), 120).atlas;
         let (mut meeting, mut excluded, mut free) = (0, 0, 0);
-        // Known grips as givers, in place and backed off, so that the object lies between two hands. It takes hundreds among
-        // a thousand grips to measure how many are excluded.
+        // Known grips as givers, in place and backed off, so that the object lies between two hands. It takes hundreds
+        // among a thousand grips to measure how many are excluded.
         for (turn, giver) in atlas.entries().iter().step_by(4).enumerate() {
             let mut pose = giver.grip.pose;
             let off = 0.01 * (turn % 6) as f32;
@@ -117,7 +117,8 @@ fn a_shipped_atlas_excludes_only_meeting_grips_and_lists_the_best_first() {
                 excluded += usize::from(is_excluded);
             }
         }
-        // So many hands fill more cells than are kept; those that few hands fill are dropped, which excludes little less.
+        // So many hands fill more cells than are kept; those that few hands fill are dropped, which excludes little
+        // less.
         assert!(
             3 * excluded > meeting,
             "{name}: {excluded} of {meeting} are excluded"

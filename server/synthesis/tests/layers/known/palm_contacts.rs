@@ -54,8 +54,8 @@ fn normals_near(triangles: &[Triangle], point: Vec3, distance: f32) -> Vec<Vec3>
     near.map(|triangle| triangle.surface.mesh().normal(0)).collect()
 }
 
-/// Distance of a unit vector from the cone spanned by some normals, by projecting onto one after the other until nothing
-/// changes.
+/// Distance of a unit vector from the cone spanned by some normals, by projecting onto one after the other until
+/// nothing changes.
 fn distance_from_cone(normals: &[Vec3], direction: Vec3) -> f32 {
     let mut weights = vec![0.0_f32; normals.len()];
     let mut rest = direction;

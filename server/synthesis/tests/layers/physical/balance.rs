@@ -152,8 +152,8 @@ fn digits_press_firmly_even_with_uncomfortable_shares() {
     }
 }
 
-/// Of 45 %, 70 % and all of friction, the least that allows a firm hold. Fingertips on a wedge need the tangent of half its
-/// angle.
+/// Of 45 %, 70 % and all of friction, the least that allows a firm hold. Fingertips on a wedge need the tangent of half
+/// its angle.
 #[test]
 fn uses_no_more_friction_than_a_firm_hold_needs() {
     for (degrees, least, most) in [(5.0_f32, 0.0, 0.45), (19.0, 0.45, 0.7), (27.0, 0.7, 1.0)] {

@@ -57,8 +57,8 @@ fn opposed_soft_contacts_have_the_epsilon_of_their_weakest_direction() {
     }
 }
 
-/// Two point contacts cannot resist twist about their line, whatever their friction; one contact or contacts that all push
-/// one way have no closure either.
+/// Two point contacts cannot resist twist about their line, whatever their friction; one contact or contacts that all
+/// push one way have no closure either.
 #[test]
 fn grasps_without_closure_have_epsilon_zero() {
     let load = load(0.2, Vec3::Y, 0.04);
@@ -232,8 +232,8 @@ fn sets_of_six(count: usize) -> impl Iterator<Item = u32> {
     .take_while(move |&set| set < 1 << count)
 }
 
-/// Unit normal of the plane through six points, perpendicular to their five edges, by elimination with full pivoting; none
-/// if they span no plane.
+/// Unit normal of the plane through six points, perpendicular to their five edges, by elimination with full pivoting;
+/// none if they span no plane.
 fn normal_of_plane(points: &[[f64; 6]]) -> Option<[f64; 6]> {
     let mut rows: [[f64; 6]; 5] =
         std::array::from_fn(|k| std::array::from_fn(|i| points[k + 1][i] - points[0][i]));
@@ -271,8 +271,8 @@ fn normal_of_plane(points: &[[f64; 6]]) -> Option<[f64; 6]> {
     Some(unit(normal))
 }
 
-/// From below, all facets of a pyramid of a few pushes inside each contact's curved limits; from above, the reach of any
-/// direction, where the least resisted of many are followed downhill.
+/// From below, all facets of a pyramid of a few pushes inside each contact's curved limits; from above, the reach of
+/// any direction, where the least resisted of many are followed downhill.
 #[test]
 fn lies_between_an_inner_pyramid_and_the_reach_of_any_direction() {
     let mut random = Random::new(7);

@@ -127,8 +127,8 @@ fn solids_of_joints_match_those_of_the_pose() {
     }
 }
 
-/// Except for a dip between the bases of neighbouring metacarpals that is shallower than the clearance kept from a giver,
-/// and nowhere thinner than fitted.
+/// Except for a dip between the bases of neighbouring metacarpals that is shallower than the clearance kept from a
+/// giver, and nowhere thinner than fitted.
 #[test]
 fn tracked_hand_solids_are_as_thick_as_the_joints_report() {
     let hand = built_in_hand("adult", Handedness::Right);

@@ -82,7 +82,8 @@ fn a_primitive_gets_its_own_grips_in_all_its_turns() {
     };
     let all = 4 * held.grips.entries().iter().filter(by_thumb_and_finger).count();
     assert_eq!(transferred.len(), all.min(1024));
-    // All of them hold the box, but the closure screen drops contacts on edges, whose normals are those of neither face.
+    // All of them hold the box, but the closure screen drops contacts on edges, whose normals are those of neither
+    // face.
     let passing = transferred.passing();
     assert!(4 * passing > 3 * transferred.len(), "{passing} of {all}");
     let grips = unconstrained(&transferred);

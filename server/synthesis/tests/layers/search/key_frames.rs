@@ -208,8 +208,8 @@ fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
         };
         widened.push(aperture(&pre_grasp.pose) - aperture(&close.pose));
     }
-    // As with people, thumb and index finger are some centimetres farther apart than in the grasp, except where the thumb
-    // lies across a finger.
+    // As with people, thumb and index finger are some centimetres farther apart than in the grasp, except where the
+    // thumb lies across a finger.
     let mean = widened.iter().sum::<f32>() / widened.len() as f32;
     assert!((0.02..0.06).contains(&mean), "{mean} m");
     let wider = widened.iter().filter(|&&by| by > 0.01).count();
@@ -300,8 +300,8 @@ fn hands_approach_only_within_the_allowed_cone() {
     for (number, planned) in PLANNED.iter().enumerate() {
         let Some(way) = &planned.way else { continue };
         let (free, natural) = (direction_of(way), natural(&planned.grasp));
-        // Of all directions tried, only the natural one is within 10° of itself. As it is tried first, a way from elsewhere
-        // means that it is blocked.
+        // Of all directions tried, only the natural one is within 10° of itself. As it is tried first, a way from
+        // elsewhere means that it is blocked.
         let only = way_from(planned, natural, 10_f32.to_radians());
         if free.angle_between(natural) < 0.01 {
             assert_eq!(only.as_ref(), Some(way), "{}", planned.name);

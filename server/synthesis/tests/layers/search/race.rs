@@ -73,8 +73,8 @@ fn numbers(grasp: &Grasp) -> Vec<f32> {
     numbers
 }
 
-/// The answers of the searches in [`reproducible_searches_match_for_any_number_of_workers`], bit for bit. It changes with
-/// every change of a draw or a rounding.
+/// The answers of the searches in [`reproducible_searches_match_for_any_number_of_workers`], bit for bit. It changes
+/// with every change of a draw or a rounding.
 const GOLDEN: u64 = 0x1594_CA74_F345_7B4E;
 
 /// Grasp and report are the same for 1, 2, 4 and 7 workers on any pool, and match the golden result.

@@ -246,8 +246,8 @@ fn each_strategy_rejects_for_its_own_reasons() {
     }
 }
 
-/// D stops early exactly where C rejects for the thumb, and both find the same first grasp, since the draws of a rejected
-/// attempt do not affect later ones.
+/// D stops early exactly where C rejects for the thumb, and both find the same first grasp, since the draws of a
+/// rejected attempt do not affect later ones.
 #[test]
 fn the_early_stop_changes_no_verdict() {
     let holdout = held(plate());

@@ -13,8 +13,8 @@ use grasp_synthesis::{
 
 use crate::fixtures::hands::right;
 
-/// A held shape in millimetres, in the wrist frame of a right hand: +x to the thumb, +y along the fingers, +z out of the
-/// palm.
+/// A held shape in millimetres, in the wrist frame of a right hand: +x to the thumb, +y along the fingers, +z out of
+/// the palm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Shape {
     /// Centre and radius.

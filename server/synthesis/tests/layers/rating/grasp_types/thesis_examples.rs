@@ -60,11 +60,11 @@ fn contacts(holdout: &BuiltInHoldout) -> (HandPose, Vec<Contact>) {
     (pose, contacts)
 }
 
-/// Holdouts classified as captioned; the thresholds were set with these in view. Of the others, the thumb's place turns a
-/// Small Diameter into a Light Tool (scalpel-genhold2) and an Adducted Thumb into a Small Diameter (scissors-hold2): their
-/// thumbs are within 8 mm of the same height. The remote's rounded edges look like a ball (remote-genhold1, Precision
-/// Sphere), a middle finger touches with its pad instead of its side (scissors-genhold3, Prismatic 2 Finger), and pads that
-/// press on a rod at right angles oppose nothing (scalpel-hold1, no type).
+/// Holdouts classified as captioned; the thresholds were set with these in view. Of the others, the thumb's place turns
+/// a Small Diameter into a Light Tool (scalpel-genhold2) and an Adducted Thumb into a Small Diameter (scissors-hold2):
+/// their thumbs are within 8 mm of the same height. The remote's rounded edges look like a ball (remote-genhold1,
+/// Precision Sphere), a middle finger touches with its pad instead of its side (scissors-genhold3, Prismatic 2 Finger),
+/// and pads that press on a rod at right angles oppose nothing (scalpel-hold1, no type).
 const AGREED: [(&str, &str); 10] = [
     ("remote-genhold2", "Medium Wrap"),
     ("remote-genhold3", "Ring"),
