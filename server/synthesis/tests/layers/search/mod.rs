@@ -3,6 +3,7 @@
 mod built_in_holdouts;
 mod key_frames;
 mod look_up;
+mod mechanisms;
 mod race;
 mod refinement;
 mod stopping;
