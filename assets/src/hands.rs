@@ -12,6 +12,7 @@ use grasp_synthesis::{
         rig::Rig,
         skin::Skin,
     },
+    propose::prepared::PreparedRig,
 };
 
 /// The names of the built-in rigs.
@@ -21,7 +22,7 @@ pub const RIG_NAMES: [&str; 2] = ["thesis", "adult"];
 #[derive(Clone, Debug)]
 pub struct Hand {
     /// Bones, limits, widths and collision segments.
-    pub rig: Rig,
+    pub rig: PreparedRig,
     /// The skin in the wrist frame, bound to the 26 joints of a relaxed, slightly spread hand.
     pub skin: Skin,
     /// The same hand as a GLB file with `WebXR` joint names, in the `OpenXR` frame of the wrist.
@@ -61,7 +62,11 @@ const FILES: [(&str, &[u8]); 4] = [
 fn built_in(json: &str, glb: &'static [u8]) -> Hand {
     let rig = read_rig(json).expect("an embedded rig is valid");
     let skin = read_skin(glb, &rig).expect("an embedded skin is valid");
-    Hand { rig, skin, glb }
+    Hand {
+        rig: PreparedRig::new(rig),
+        skin,
+        glb,
+    }
 }
 
 /// Why a rig or a skin was refused.

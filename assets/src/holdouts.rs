@@ -32,6 +32,7 @@ use grasp_synthesis::{
         holdout::{Holdout, PresentingHand, PresentingHandError},
         strategy::Strategy,
     },
+    propose::prepared::PreparedObject,
 };
 use serde::{Deserialize, Serialize};
 
@@ -106,6 +107,15 @@ impl BuiltInHoldout {
             frame_from_wrist: self.world_from_giver_wrist,
             digits: self.giver_digits,
         }
+    }
+
+    /// The object, with what proposals derive from it.
+    ///
+    /// # Panics
+    /// The holdout names an object that is not built in; none of [`holdouts`] does.
+    pub fn prepared_object(&self) -> &'static PreparedObject {
+        let object = objects::object(&self.object).expect("built-in holdouts name built-in objects");
+        &object.prepared
     }
 
     /// The holdout in the object's frame, ready to be searched.

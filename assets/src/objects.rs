@@ -7,7 +7,7 @@ use grasp_import::{
     MeshLimits,
     obj::{ObjMesh, read_obj},
 };
-use grasp_synthesis::model::object::GraspObject;
+use grasp_synthesis::{model::object::GraspObject, propose::prepared::PreparedObject};
 use serde::{Deserialize, Serialize};
 
 /// A built-in object.
@@ -23,8 +23,10 @@ pub struct BuiltInObject {
     pub description: String,
     /// The names of the mesh's groups with their triangles, ascending; sorted by name.
     pub groups: Vec<(String, Vec<u32>)>,
-    /// Ready to be grasped.
+    /// The object.
     pub object: Arc<GraspObject>,
+    /// The same, with what proposals derive from it.
+    pub prepared: Arc<PreparedObject>,
 }
 
 /// What the file beside a mesh says about the object.
@@ -142,12 +144,14 @@ fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> Built
         &forbidden,
     )
     .unwrap_or_else(|errors| panic!("the built-in {name} is broken: {errors:?}"));
+    let object = Arc::new(object);
     BuiltInObject {
         name,
         obj,
         manifest,
         description: about.description,
         groups,
-        object: Arc::new(object),
+        prepared: Arc::new(PreparedObject::new(Arc::clone(&object))),
+        object,
     }
 }

@@ -251,14 +251,14 @@ fn report(
             })
             .collect(),
         step_times: report.step_times.as_ref().map(step_times).unwrap_or_default(),
-        seed: settings.seed,
+        seed: settings.run.seed,
         attempt: report.attempt,
         search_time: Some(wire_duration(circumstances.search_time)),
         budget: Some(wire_duration(circumstances.budget)),
-        workers: u32::try_from(settings.workers).unwrap_or(u32::MAX),
+        workers: u32::try_from(settings.run.workers).unwrap_or(u32::MAX),
         nearest_miss: report.nearest_miss.as_ref().map(|miss| nearest_miss(miss, frame)),
-        strategy: wire_strategy(settings.strategy).into(),
-        validity: wire_validity(settings.validity).into(),
+        strategy: wire_strategy(settings.query.strategy).into(),
+        validity: wire_validity(settings.query.validity).into(),
         candidates: report.candidates,
         source: match report.source {
             Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
@@ -269,7 +269,8 @@ fn report(
         .into(),
         atlas_entries: u32::try_from(report.known_grips).unwrap_or(u32::MAX),
         atlas_stamp: settings
-            .starts
+            .known
+            .seeds
             .atlas()
             .map(|atlas| atlas_stamp(atlas))
             .unwrap_or_default(),

@@ -1,7 +1,7 @@
 //! Searches on the built-in holdouts without a server, for benches and figures.
 
 use std::{
-    sync::atomic::AtomicBool,
+    sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
@@ -11,16 +11,19 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::clock::Clock,
-    known::{recent_grips::RecentGrips, seed_source::SeedSource},
-    base::mechanisms::Mechanisms,
+    known::seed_source::SeedSource,
     model::{
-        constraints::Constraints,
-        hand::{Handedness, rig::Rig},
+        hand::Handedness,
         holdout::Holdout,
-        object::THESIS_FRICTION,
-        strategy::{Choice, Strategy, Validity},
+        object::{GraspObject, THESIS_FRICTION},
+        strategy::{Strategy, Validity},
     },
-    search::{SearchOutcome, find_grasp, settings::SearchSettings},
+    propose::prepared::{PreparedObject, PreparedRig},
+    search::{
+        SearchOutcome, find_grasp,
+        scene::Task,
+        settings::{Known, Query, Run, SearchSettings},
+    },
 };
 
 /// The machine's monotonic clock.
@@ -43,7 +46,7 @@ pub struct Bench {
     /// The holdouts, ready to be searched, with their descriptions.
     pub holdouts: Vec<(&'static BuiltInHoldout, Holdout)>,
     /// The receiving hand.
-    pub rig: &'static Rig,
+    pub rig: &'static PreparedRig,
     pool: rayon::ThreadPool,
     workers: usize,
 }
@@ -101,34 +104,29 @@ impl Bench {
         max_attempts: u64,
     ) -> SearchOutcome {
         let settings = SearchSettings {
-            seed,
-            strategy,
-            bend_ratios: strategy.default_bend_ratios(),
-            validity: Validity::Thesis,
-            friction: THESIS_FRICTION,
-            reproducible: false,
-            first_attempt,
-            max_attempts,
-            deadline: None,
-            workers: self.workers,
-            record_step_times: false,
-            mechanisms: Mechanisms::ALL,
-            constraints: Constraints::default(),
-            choice: Choice::FirstValid,
-            atlas: None,
-            starts: SeedSource::Nothing,
-            recent: RecentGrips::default(),
-            known_tried: 0,
+            query: Query {
+                strategy,
+                validity: Validity::Thesis,
+                bend_ratios: strategy.default_bend_ratios(),
+                friction: Some(THESIS_FRICTION),
+                ..Query::default()
+            },
+            run: Run {
+                seed,
+                first_attempt,
+                max_attempts,
+                workers: self.workers,
+                ..Run::default()
+            },
+            ..SearchSettings::default()
         };
         let clock = MonotonicClock::default();
-        find_grasp(
-            &self.pool,
+        let task = Task {
             holdout,
-            self.rig,
-            &settings,
-            &clock,
-            &AtomicBool::new(false),
-        )
+            object: &prepared(&holdout.object),
+            rig: self.rig,
+        };
+        find_grasp(&self.pool, task, &settings, &clock, &AtomicBool::new(false))
     }
 
     /// Runs exactly `attempts` attempts of one worker on a holdout, continuing after each valid grasp; returns the
@@ -154,7 +152,7 @@ impl Bench {
 pub fn search_from(
     seeds: SeedSource,
     holdout: &Holdout,
-    rig: &Rig,
+    rig: &PreparedRig,
     seed: u64,
     max_attempts: u64,
 ) -> SearchOutcome {
@@ -163,24 +161,35 @@ pub fn search_from(
         .build()
         .expect("threads can be started");
     let settings = SearchSettings {
-        seed,
-        strategy: Strategy::Guided,
-        validity: Validity::Physical,
-        bend_ratios: Strategy::Guided.default_bend_ratios(),
-        friction: holdout.object.friction_under(Validity::Physical),
-        constraints: Constraints::default(),
-        choice: Choice::FirstValid,
-        atlas: None,
-        starts: seeds,
-        recent: RecentGrips::default(),
-        known_tried: 0,
-        reproducible: true,
-        first_attempt: 0,
-        max_attempts,
-        deadline: None,
-        workers: 1,
-        record_step_times: false,
+        known: Known {
+            seeds,
+            ..Known::default()
+        },
+        run: Run {
+            seed,
+            reproducible: true,
+            max_attempts,
+            ..Run::default()
+        },
+        ..SearchSettings::default()
     };
     let clock = MonotonicClock::default();
-    find_grasp(&pool, holdout, rig, &settings, &clock, &AtomicBool::new(false))
+    let task = Task {
+        holdout,
+        object: &prepared(&holdout.object),
+        rig,
+    };
+    find_grasp(&pool, task, &settings, &clock, &AtomicBool::new(false))
+}
+
+/// An object with what proposals derive from it, derived once for all that ask.
+pub fn prepared(object: &Arc<GraspObject>) -> Arc<PreparedObject> {
+    static PREPARED: Mutex<Vec<Arc<PreparedObject>>> = Mutex::new(Vec::new());
+    let mut all = PREPARED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = all.iter().find(|known| Arc::ptr_eq(known.object(), object)) {
+        return Arc::clone(known);
+    }
+    let new = Arc::new(PreparedObject::new(Arc::clone(object)));
+    all.push(Arc::clone(&new));
+    new
 }

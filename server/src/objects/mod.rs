@@ -18,9 +18,10 @@ use grasp_assets::{
 use grasp_proto::v1;
 use grasp_synthesis::{
     geometry::mesh::TriangleMesh,
-    known::transferred_grips::Borrowed,
+    known::transferred_grips::TransferredGrips,
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     propose::placement_cache::PlacementCaches,
+    propose::prepared::PreparedObject,
 };
 use sha2::{Digest as _, Sha256};
 
@@ -41,7 +42,7 @@ pub(crate) struct StoredObject {
     /// True if it is part of the server.
     pub built_in: bool,
     /// The object in the form that searches use; every search holds a clone.
-    pub object: Arc<GraspObject>,
+    pub object: Arc<PreparedObject>,
     /// SHA-256 of vertices, triangles and forbidden set, in hexadecimal.
     pub content_hash: String,
     /// Oddities of its mesh.
@@ -49,7 +50,7 @@ pub(crate) struct StoredObject {
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
     /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
-    transferred_grips: Vec<OnceLock<Arc<Borrowed>>>,
+    transferred_grips: Vec<OnceLock<Arc<TransferredGrips>>>,
 }
 
 impl StoredObject {
@@ -59,7 +60,7 @@ impl StoredObject {
             id,
             built_in,
             content_hash: content_hash(&object),
-            object,
+            object: Arc::new(PreparedObject::new(object)),
             warnings,
             atlas_slots: AtlasSlots::default(),
             transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
@@ -71,7 +72,7 @@ impl StoredObject {
     pub(crate) fn prepare(&self, rig: &str) {
         let prepare_hand = |handedness| {
             if let Some(hand) = hand(rig, handedness) {
-                self.object.repertoire(&hand.rig);
+                self.object.placement_cache(&hand.rig);
                 self.transferred_grips(hand);
             }
         };
@@ -86,10 +87,10 @@ impl StoredObject {
 
     /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if there
     /// are no primitives for the hand or none of their grips fits.
-    pub(crate) fn transferred_grips(&self, hand: &'static Hand) -> Option<Arc<Borrowed>> {
+    pub(crate) fn transferred_grips(&self, hand: &'static Hand) -> Option<Arc<TransferredGrips>> {
         let mut all = held_primitives().iter().zip(&self.transferred_grips);
         let ((_, held), grips) = all.find(|((of, _), _)| std::ptr::eq(*of, hand))?;
-        let grips = grips.get_or_init(|| Arc::new(Borrowed::of(&self.object, held)));
+        let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
         (!grips.is_empty()).then(|| Arc::clone(grips))
     }
 
@@ -116,9 +117,9 @@ impl StoredObject {
                 .forbidden_surface()
                 .map_or(0, |surface| of_mesh(surface.mesh()))
             + self.object.surface.field_bytes()
-            + self.object.surface_pairs.bytes()
+            + self.object.surface_pairs().bytes()
             + PlacementCaches::MOST_BYTES
-            + self.transferred_grips.len() * Borrowed::MOST_BYTES
+            + self.transferred_grips.len() * TransferredGrips::MOST_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()
     }
 

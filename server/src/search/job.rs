@@ -7,17 +7,18 @@ use std::{
 
 use grasp_proto::v1;
 use grasp_synthesis::{
-    base::clock::Clock,
+    base::{clock::Clock, mechanisms::Mechanisms},
     known::{entry::Entry, recent_grips::RecentGrips, seed_source::SeedSource},
-    base::mechanisms::Mechanisms,
     model::{
         holdout::{Holdout, PresentingHand},
-        object::GraspObject,
         strategy::{Choice, Validity},
     },
+    propose::prepared::PreparedObject,
     search::{
-        GraspSource, LookUp, SearchOutcome, find_known_grasp, key_frames::plan_way, settings::SearchSettings,
-        uses_atlas,
+        GraspSource, LookUp, SearchOutcome, find_known_grasp,
+        key_frames::plan_way,
+        scene::Task,
+        settings::{Known, Query, Run, SearchSettings},
     },
 };
 use rayon::ThreadPool;
@@ -38,7 +39,7 @@ pub(crate) struct FindJob {
     /// The request.
     pub query: FindQuery,
     /// The object. Holding this reference keeps it from being evicted.
-    pub object: Arc<GraspObject>,
+    pub object: Arc<PreparedObject>,
     /// The same object as stored, for its transferred grips.
     pub stored: Arc<StoredObject>,
     /// The request's seed, or a drawn one.
@@ -70,6 +71,7 @@ pub(crate) struct Answered {
 #[derive(Debug)]
 struct PreparedJob {
     query: FindQuery,
+    object: Arc<PreparedObject>,
     holdout: Holdout,
     settings: SearchSettings,
     clock: SinceArrival,
@@ -144,7 +146,7 @@ impl FindJob {
             ),
         };
         let holdout = Holdout {
-            object: self.object,
+            object: Arc::clone(self.object.object()),
             presenting_hand,
             up: object_from_client.transform_vector(query.up),
         };
@@ -153,43 +155,48 @@ impl FindJob {
             .known
             .atlas
             .filter(|atlas| !query.reproducible || atlas.is_complete());
-        let starts = match &atlas {
+        let seeds = match &atlas {
             Some(atlas) => SeedSource::Atlas(Arc::clone(atlas)),
-            None if uses_atlas(query.strategy, query.validity) => {
+            None if query.strategy.uses_known_grips(query.validity) => {
                 let transferred = self.stored.transferred_grips(query.receiving_hand);
-                transferred.map_or(SeedSource::Nothing, SeedSource::Borrowed)
+                transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)
             }
             None => SeedSource::Nothing,
         };
         let settings = SearchSettings {
-            seed: self.seed,
-            strategy: query.strategy,
-            validity: query.validity,
-            bend_ratios: query.bend_ratios,
-            friction: query
-                .friction
-                .unwrap_or_else(|| holdout.object.friction_under(query.validity)),
-            constraints: query.constraints.transformed(object_from_client),
-            choice: query.choice,
-            // A replay runs one attempt and tries no known grips.
-            atlas: atlas.filter(|_| !query.is_replay),
-            starts,
-            recent: if query.is_replay {
-                RecentGrips::default()
-            } else {
-                self.known.recent
+            query: Query {
+                strategy: query.strategy,
+                validity: query.validity,
+                bend_ratios: query.bend_ratios,
+                friction: query.friction,
+                constraints: query.constraints.transformed(object_from_client),
+                choice: query.choice,
             },
-            known_tried: 0,
-            reproducible: query.reproducible,
-            first_attempt: query.first_attempt,
-            max_attempts: query.max_attempts,
-            deadline: Some(self.budget),
-            workers: self.workers,
-            record_step_times: query.record_step_times,
-            mechanisms: self.mechanisms,
+            known: Known {
+                // A replay runs one attempt and tries no known grips.
+                atlas: atlas.filter(|_| !query.is_replay),
+                seeds,
+                recent: if query.is_replay {
+                    RecentGrips::default()
+                } else {
+                    self.known.recent
+                },
+                tried: 0,
+            },
+            run: Run {
+                seed: self.seed,
+                reproducible: query.reproducible,
+                first_attempt: query.first_attempt,
+                max_attempts: query.max_attempts,
+                deadline: Some(self.budget),
+                workers: self.workers,
+                record_step_times: query.record_step_times,
+                mechanisms: self.mechanisms,
+            },
         };
         Ok(PreparedJob {
             query,
+            object: self.object,
             holdout,
             settings,
             clock: SinceArrival(self.arrived),
@@ -203,11 +210,10 @@ impl FindJob {
 impl PreparedJob {
     /// Answers with a known grip if one is found quickly; otherwise [`PreparedJob::run`] continues where this stopped.
     fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
-        let rig = &self.query.receiving_hand.rig;
-        match find_known_grasp(&self.holdout, rig, &self.settings, &self.clock, LOOK_UP_TIME) {
+        match find_known_grasp(self.task(), &self.settings, &self.clock, LOOK_UP_TIME) {
             LookUp::Found(outcome) => Some(self.answer(*outcome)),
             LookUp::NotFound { tried } => {
-                self.settings.known_tried = tried;
+                self.settings.known.tried = tried;
                 None
             }
         }
@@ -218,18 +224,32 @@ impl PreparedJob {
     /// # Errors
     /// The search was stopped.
     fn run(&self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Answered, ServiceError> {
-        let rig = &self.query.receiving_hand.rig;
-        let (holdout, settings) = (&self.holdout, &self.settings);
-        let outcome = search_in_slices(pool, holdout, rig, settings, self.patience, &self.clock, stop);
+        let outcome = search_in_slices(
+            pool,
+            self.task(),
+            &self.settings,
+            self.patience,
+            &self.clock,
+            stop,
+        );
         self.answer(outcome)
+    }
+
+    fn task(&self) -> Task<'_> {
+        Task {
+            holdout: &self.holdout,
+            object: &self.object,
+            rig: &self.query.receiving_hand.rig,
+        }
     }
 
     fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
         let search_time = self.start.elapsed();
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
-            let approach = self.settings.constraints.approach;
-            plan_way(&self.holdout, rig, self.settings.friction, approach, grasp);
+            let approach = self.settings.query.constraints.approach;
+            let friction = self.settings.query.friction_on(&self.holdout.object);
+            plan_way(&self.holdout, rig, friction, approach, grasp);
         }
         let frame = ClientFrame {
             convention: self.query.convention,
@@ -254,7 +274,7 @@ impl PreparedJob {
             Some(GraspSource::Attempt(_) | GraspSource::Spared(_))
         );
         let grasp = outcome.grasp.as_ref()?;
-        (is_new && self.settings.friction == own_friction)
+        (is_new && self.settings.query.friction_on(&self.holdout.object) == own_friction)
             .then(|| Entry::of_grasp(grasp))
             .flatten()
     }

@@ -12,8 +12,10 @@ use std::{
 use grasp_synthesis::{
     base::clock::Clock,
     known::recent_grips::RecentGrips,
-    model::{grasp::Grasp, hand::rig::Rig, holdout::Holdout, strategy::Choice},
-    search::{SearchEnd, SearchOutcome, SearchReport, find_grasp_in, prepare, settings::SearchSettings},
+    model::{grasp::Grasp, strategy::Choice},
+    search::{
+        SearchEnd, SearchOutcome, SearchReport, find_grasp_in, prepare, scene::Task, settings::SearchSettings,
+    },
 };
 use rayon::ThreadPool;
 
@@ -31,28 +33,27 @@ const MOST_ATTEMPTS_PER_WORKER: u64 = 8192;
 /// takes the first valid grasp.
 pub(super) fn search_in_slices(
     pool: &ThreadPool,
-    holdout: &Holdout,
-    rig: &Rig,
+    task: Task<'_>,
     settings: &SearchSettings,
     patience: Duration,
     clock: &dyn Clock,
     stop: &AtomicBool,
 ) -> SearchOutcome {
-    let scene = prepare(holdout, rig, settings);
-    let workers = settings.workers as u64;
+    let scene = prepare(task, settings);
+    let workers = settings.run.workers as u64;
     let mut total = SearchReport::default();
     let mut slice = settings.clone();
-    let mut left = settings.max_attempts;
+    let mut left = settings.run.max_attempts;
     let mut per_worker = FIRST_ATTEMPTS_PER_WORKER;
     let mut best: Option<(Grasp, f32)> = None;
     loop {
-        slice.max_attempts = left.min(per_worker.saturating_mul(workers));
+        slice.run.max_attempts = left.min(per_worker.saturating_mul(workers));
         let start = clock.now();
         let outcome = find_grasp_in(pool, &scene, &slice, clock, stop);
         // The first slice tries all known grips.
-        slice.atlas = None;
-        slice.recent = RecentGrips::default();
-        left -= slice.max_attempts;
+        slice.known.atlas = None;
+        slice.known.recent = RecentGrips::default();
+        left -= slice.run.max_attempts;
         let is_better =
             outcome.grasp.is_some() && best.as_ref().is_none_or(|(_, value)| outcome.value > *value);
         total.merge(outcome.report, is_better);
@@ -60,16 +61,16 @@ pub(super) fn search_in_slices(
             best = outcome.grasp.map(|grasp| (grasp, outcome.value));
         }
         // The first valid grasp ends the search unless the best is wanted.
-        let is_enough = best.is_some() && slice.choice == Choice::FirstValid;
+        let is_enough = best.is_some() && slice.query.choice == Choice::FirstValid;
         let is_stopped = outcome.end == SearchEnd::Stopped || stop.load(Ordering::Relaxed);
-        let is_late = outcome.end == SearchEnd::DeadlinePassed || has_passed(slice.deadline, clock);
-        let goes_on = best.is_none() && slice.deadline < Some(patience);
+        let is_late = outcome.end == SearchEnd::DeadlinePassed || has_passed(slice.run.deadline, clock);
+        let goes_on = best.is_none() && slice.run.deadline < Some(patience);
         if is_late && goes_on && !is_stopped && left > 0 {
-            slice.choice = Choice::FirstValid;
-            slice.deadline = Some(patience);
+            slice.query.choice = Choice::FirstValid;
+            slice.run.deadline = Some(patience);
             // If the search waited for workers until its deadline, it has not tried known grips yet.
-            slice.atlas.clone_from(&settings.atlas);
-            slice.recent.clone_from(&settings.recent);
+            slice.known.atlas.clone_from(&settings.known.atlas);
+            slice.known.recent.clone_from(&settings.known.recent);
         } else if is_enough || is_stopped || is_late || left == 0 {
             if best.is_some() {
                 // The nearest miss is reported only if there is no grasp.
@@ -87,7 +88,7 @@ pub(super) fn search_in_slices(
                 report: total,
             };
         }
-        slice.first_attempt += slice.max_attempts;
+        slice.run.first_attempt += slice.run.max_attempts;
         per_worker = next_size(per_worker, clock.now().saturating_sub(start));
     }
 }

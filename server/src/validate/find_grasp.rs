@@ -12,7 +12,6 @@ use grasp_synthesis::{
         constraints::Constraints,
         strategy::{Choice, Strategy, Validity},
     },
-    search::uses_atlas,
 };
 
 use super::{
@@ -90,7 +89,7 @@ pub(crate) struct FindQuery {
 impl FindQuery {
     /// True if the search uses known grips.
     pub(crate) fn uses_atlas(&self) -> bool {
-        self.allows_atlas && uses_atlas(self.strategy, self.validity)
+        self.allows_atlas && self.strategy.uses_known_grips(self.validity)
     }
 }
 

@@ -6,9 +6,9 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
+    base::mechanisms::Mechanisms,
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::Recheck},
-    base::mechanisms::Mechanisms,
     model::{
         hand::{Handedness, rig::Rig},
         object::GraspObject,

@@ -18,8 +18,8 @@ use std::{
 
 use grasp_assets::primitives::held_primitives;
 use grasp_synthesis::{
-    known::{atlas::Atlas, transferred_grips::Borrowed},
     base::mechanisms::{Mechanism, Mechanisms},
+    known::{atlas::Atlas, transferred_grips::TransferredGrips},
     model::{
         hand::{Handedness, rig::Rig},
         holdout::Holdout,
@@ -291,7 +291,7 @@ fn classes(setting: &Setting, things: &[Thing]) -> Vec<(Class, Vec<Case>)> {
             let atlas = core.atlas(thing.id(), &setting.atlases(), &thing.object);
             let atlas = atlas.expect("built-in objects come with an atlas");
             assert!(atlas.is_complete(), "the atlas of {} still grows", thing.id());
-            (thing, atlas, Arc::new(Borrowed::of(&thing.object, held)))
+            (thing, atlas, Arc::new(TransferredGrips::of(&thing.object, held)))
         })
         .collect();
     let case = |id: &str, holdout: &grasp_tests::random_holdouts::ClientHoldout| {

@@ -9,11 +9,11 @@ use std::{
 
 use grasp_assets::atlases::atlas;
 use grasp_synthesis::{
+    base::mechanisms::Mechanisms,
     known::{
         atlas::Atlas, codec::decode, recent_grips::RecentGrips, seed_source::SeedSource,
-        transferred_grips::Borrowed,
+        transferred_grips::TransferredGrips,
     },
-    base::mechanisms::Mechanisms,
     model::{
         constraints::Constraints,
         hand::{Handedness, rig::Rig},
@@ -127,28 +127,22 @@ pub(crate) enum Known<'a> {
 pub(crate) fn settings(holdout: &Holdout, known: Known<'_>, seed: u64) -> SearchSettings {
     let (atlas, starts) = match known {
         Known::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
-        Known::Boxes(Some(borrowed)) => (None, SeedSource::Borrowed(Arc::clone(borrowed))),
+        Known::Boxes(Some(borrowed)) => (None, SeedSource::Transferred(Arc::clone(borrowed))),
         Known::Boxes(None) => (None, SeedSource::Nothing),
     };
     SearchSettings {
-        seed,
-        strategy: Strategy::Guided,
-        validity: Validity::Physical,
-        bend_ratios: Strategy::Guided.default_bend_ratios(),
-        friction: holdout.object.friction_under(Validity::Physical),
-        constraints: Constraints::default(),
-        choice: Choice::FirstValid,
-        atlas,
-        starts,
-        recent: RecentGrips::default(),
-        known_tried: 0,
-        reproducible: false,
-        first_attempt: 0,
-        max_attempts: u64::MAX,
-        deadline: Some(ANSWERED_WITHIN),
-        workers: WORKERS,
-        record_step_times: false,
-        mechanisms: Mechanisms::ALL,
+        known: Known {
+            atlas,
+            seeds: starts,
+            ..Known::default()
+        },
+        run: Run {
+            seed,
+            deadline: Some(ANSWERED_WITHIN),
+            workers: WORKERS,
+            ..Run::default()
+        },
+        ..SearchSettings::default()
     }
 }
 

@@ -14,8 +14,8 @@ use grasp_assets::{
 };
 use grasp_proto::v1;
 use grasp_synthesis::{
-    known::key::key,
     base::mechanisms::Mechanisms,
+    known::key::key,
     model::{hand::Handedness, object::GraspObject},
 };
 use grasp_tests::{

@@ -27,6 +27,7 @@ use grasp_synthesis::{
     },
     model::hand::rig::Rig,
     physical::grip::Gripper,
+    propose::prepared::PreparedRig,
 };
 
 use crate::{
@@ -112,7 +113,7 @@ impl Atlases {
 /// An object's complete atlas; none if stopped.
 fn complete(
     object: &'static BuiltInObject,
-    rig: &Rig,
+    rig: &PreparedRig,
     folder: &Path,
     shipped: Shipped,
     stop: &AtomicBool,
@@ -129,8 +130,8 @@ fn complete(
         return Ok(Some(shipped.atlas));
     }
     let mut growth = match &known {
-        Some(known) => Growth::resume(&object.object, rig, known),
-        None => Growth::new(&object.object, rig),
+        Some(known) => Growth::resume(&object.prepared, rig, known),
+        None => Growth::new(&object.prepared, rig),
     };
     let mut gripper = Gripper::default();
     let mut kept = Instant::now();

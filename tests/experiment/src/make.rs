@@ -15,22 +15,16 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::NoStopwatch},
-    known::{recent_grips::RecentGrips, recheck::Recheck, seed_source::SeedSource},
-    base::mechanisms::Mechanisms,
-    model::{
-        constraints::Constraints,
-        grasp::Grasp,
-        hand::{Handedness, rig::Rig},
-        holdout::Holdout,
-        strategy::{Choice, Validity},
-    },
+    known::{recheck::Recheck, seed_source::SeedSource},
+    model::{grasp::Grasp, hand::Handedness, holdout::Holdout, strategy::Validity},
     physical::grip::Gripper,
+    propose::prepared::PreparedRig,
     search::{
         SearchEnd,
         attempt::{Attempt, AttemptEnd},
         find_grasp,
-        scene::Scene,
-        settings::SearchSettings,
+        scene::{Scene, Task},
+        settings::{Known, Query, Run, SearchSettings},
     },
 };
 
@@ -75,8 +69,8 @@ pub enum MakeError {
 /// Prepared holdouts, and threads to search them with.
 pub struct Maker {
     holdouts: Vec<Holdout>,
-    thesis_rig: &'static Rig,
-    physical_rig: &'static Rig,
+    thesis_rig: &'static PreparedRig,
+    physical_rig: &'static PreparedRig,
     atlases: Atlases,
     pools: Vec<(usize, rayon::ThreadPool)>,
     clock: MonotonicClock,
@@ -126,36 +120,29 @@ impl Maker {
     /// stopped.
     pub fn valid(&self, settings: &Settings, cell: &Cell, number: u64, stop: &AtomicBool) -> Option<Record> {
         let seed = settings.seed_of_valid(cell, number);
-        let holdout = &self.holdouts[cell.holdout];
         let search = SearchSettings {
-            seed,
-            strategy: cell.set.strategy,
-            bend_ratios: cell.set.bend_ratios,
-            validity: cell.set.validity,
-            friction: holdout.object.friction_under(cell.set.validity),
-            constraints: Constraints::default(),
-            choice: Choice::FirstValid,
-            atlas: self.atlases.of(cell).cloned(),
-            starts: self
-                .atlases
-                .of(cell)
-                .cloned()
-                .map_or(SeedSource::Nothing, SeedSource::Atlas),
-            recent: RecentGrips::default(),
-            known_tried: 0,
-            reproducible: false,
-            first_attempt: 0,
-            max_attempts: cell.set.most_attempts(),
-            deadline: None,
-            workers: cell.threads,
-            record_step_times: false,
-            mechanisms: Mechanisms::ALL,
+            query: query(cell.set),
+            known: Known {
+                atlas: self.atlases.of(cell).cloned(),
+                seeds: self
+                    .atlases
+                    .of(cell)
+                    .cloned()
+                    .map_or(SeedSource::Nothing, SeedSource::Atlas),
+                ..Known::default()
+            },
+            run: Run {
+                seed,
+                max_attempts: cell.set.most_attempts(),
+                workers: cell.threads,
+                ..Run::default()
+            },
         };
         let (_, pool) = self.pools.iter().find(|(threads, _)| *threads == cell.threads)?;
         // From inside the pool, so that searches on one thread do not include waking it.
         let (outcome, took) = pool.install(|| {
             let start = self.clock.now();
-            let outcome = find_grasp(pool, holdout, self.rig(cell.set), &search, &self.clock, stop);
+            let outcome = find_grasp(pool, self.task(cell), &search, &self.clock, stop);
             (outcome, self.clock.now().saturating_sub(start))
         });
         let report = outcome.report;
@@ -251,7 +238,7 @@ impl Maker {
         };
         let scene = self.scene(&record.cell);
         let mut stream = AttemptStream::new(record.seed, index);
-        let end = Attempt::default().try_synthesize_grasp(&scene, &mut stream, &mut NoStopwatch, &|| false);
+        let end = Attempt::default().run(&scene, &mut stream, &mut NoStopwatch, &|| false);
         match end {
             AttemptEnd::Valid(grasp) => Some(grasp),
             AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
@@ -269,19 +256,37 @@ impl Maker {
         Some(Box::new(grasp))
     }
 
-    fn rig(&self, set: Set) -> &'static Rig {
+    fn rig(&self, set: Set) -> &'static PreparedRig {
         match set.validity {
             Validity::Thesis => self.thesis_rig,
             Validity::Physical => self.physical_rig,
         }
     }
 
+    fn task(&self, cell: &Cell) -> Task<'_> {
+        Task {
+            holdout: &self.holdouts[cell.holdout],
+            object: cell.built_in().prepared_object(),
+            rig: self.rig(cell.set),
+        }
+    }
+
     fn scene(&self, cell: &Cell) -> Scene<'_> {
-        let holdout = &self.holdouts[cell.holdout];
-        let set = cell.set;
-        let friction = holdout.object.friction_under(set.validity);
-        Scene::new(holdout, self.rig(set), set.strategy, set.bend_ratios, friction)
-            .with_validity(set.validity)
+        let settings = SearchSettings {
+            query: query(cell.set),
+            ..SearchSettings::default()
+        };
+        Scene::new(self.task(cell), &settings)
+    }
+}
+
+/// What a set asks of a search.
+fn query(set: Set) -> Query {
+    Query {
+        strategy: set.strategy,
+        validity: set.validity,
+        bend_ratios: set.bend_ratios,
+        ..Query::default()
     }
 }
 

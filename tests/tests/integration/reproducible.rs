@@ -6,7 +6,7 @@ use grasp_assets::{atlases::atlas, hands::hand, objects::object, primitives::hel
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
-    known::{codec::decode, seed_source::SeedSource, transferred_grips::Borrowed},
+    known::{codec::decode, seed_source::SeedSource, transferred_grips::TransferredGrips},
     model::hand::{Handedness, joints::HandJoints},
 };
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout, searches::search_from};
@@ -161,7 +161,7 @@ async fn without_an_atlas_transferred_grips_seed_the_search() {
         .iter()
         .find(|(hand, _)| hand.rig.handedness == Handedness::Right)
         .expect("there are grips for the right hand");
-    let transferred = Arc::new(Borrowed::of(scissors, held));
+    let transferred = Arc::new(TransferredGrips::of(scissors, held));
     let search = |holdout: &ClientHoldout, seeds: SeedSource| {
         let holdout = holdout.holdout(Arc::clone(scissors));
         search_from(seeds, &holdout, &hand.rig, 7, 400).report.attempt
@@ -171,7 +171,7 @@ async fn without_an_atlas_transferred_grips_seed_the_search() {
         let request = reproducible_search(&holdout);
         let answer = ask(&server, request.clone()).await;
         let report = answer.report.expect("every answer has a report");
-        let expected = search(&holdout, SeedSource::Borrowed(Arc::clone(&transferred)));
+        let expected = search(&holdout, SeedSource::Transferred(Arc::clone(&transferred)));
         assert_eq!(report.attempt, expected);
         assert_eq!(report.atlas_stamp, "");
         differing += usize::from(search(&holdout, SeedSource::Nothing) != expected);

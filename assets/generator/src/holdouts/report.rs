@@ -7,8 +7,8 @@ use grasp_assets::{
     holdouts::BuiltInHoldout,
 };
 use grasp_synthesis::{
-    known::{recent_grips::RecentGrips, seed_source::SeedSource},
     base::mechanisms::Mechanisms,
+    known::{recent_grips::RecentGrips, seed_source::SeedSource},
     model::{
         constraints::Constraints,
         hand::{Digit, HandPose, Handedness, Phalanx},

@@ -14,9 +14,9 @@ use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
     base::clock::Clock,
+    base::mechanisms::Mechanisms,
     geometry::mesh_bvh::MeshBvh,
     known::{recent_grips::RecentGrips, seed_source::SeedSource},
-    base::mechanisms::Mechanisms,
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
     base::mechanisms::Mechanisms,
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
     model::{
         constraints::Constraints,
         hand::{HandPose, joints::HandJoints, rig::Rig},

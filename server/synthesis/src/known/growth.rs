@@ -19,8 +19,8 @@ use super::{
     spread::{Cell, Room, Spread, worth},
 };
 use crate::{
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
     base::mechanisms::Mechanisms,
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
     model::{
         hand::{joints::HandJoints, rig::Rig},
         object::GraspObject,

@@ -13,8 +13,8 @@ use super::{
     inner_spheres::{farthest_by_second, first_of_digits, first_spheres, second_of_digits, second_spheres},
 };
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
     base::mechanisms::{Mechanism, Mechanisms},
+    base::{pose::Pose, random::AttemptStream},
     model::{grasp::Contact, hand::rig::Rig, object::GraspObject},
     physical::{
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},

@@ -5,8 +5,8 @@ use super::{
     inner_spheres::{in_way_by_second, second_spheres},
 };
 use crate::{
-    base::stopwatch::NoStopwatch,
     base::mechanisms::{Mechanism, Mechanisms},
+    base::stopwatch::NoStopwatch,
     model::grasp::Grasp,
     physical::{
         finger_subset::WholeGrip,

@@ -65,6 +65,11 @@ impl Strategy {
         self >= Self::D
     }
 
+    /// Are known grips tried, and hands perturbed near them? They are kept for what is valid under `PHYSICAL`.
+    pub fn uses_known_grips(self, validity: Validity) -> bool {
+        self == Self::Guided && validity == Validity::Physical
+    }
+
     /// The bend ratios that chapter 5 uses at this step of the ladder.
     pub fn default_bend_ratios(self) -> BendRatioChoice {
         if self >= Self::E {

@@ -12,8 +12,8 @@ use super::{
     surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
 };
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
     base::mechanisms::{Mechanism, Mechanisms},
+    base::{pose::Pose, random::AttemptStream},
     model::object::GraspObject,
     physical::{
         grip::DEEPEST,

@@ -11,13 +11,13 @@ use std::{
 
 use super::{report::GraspSource, scene::Scene, settings::SearchSettings};
 use crate::{
+    base::mechanisms::{Mechanism, Mechanisms},
     known::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
         recheck::Recheck,
         subset_grasps::spared_with,
     },
-    base::mechanisms::{Mechanism, Mechanisms},
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
     physical::{
         grip::Gripper,

@@ -19,8 +19,8 @@ use super::{
     tally::{Record, Tally},
 };
 use crate::{
-    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
     base::mechanisms::Mechanism,
+    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
     model::{grasp::Grasp, strategy::Choice},
     physical::grip::Gripper,
 };

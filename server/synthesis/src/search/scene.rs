@@ -4,13 +4,13 @@ use std::sync::{Arc, OnceLock};
 
 use super::settings::SearchSettings;
 use crate::{
+    base::mechanisms::{Mechanism, Mechanisms},
     base::random::AttemptStream,
     known::{
         entry::Entry,
         seed_source::{Demand, SeedSets, SeedSource},
         seeds::Seeds,
     },
-    base::mechanisms::{Mechanism, Mechanisms},
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,

@@ -57,7 +57,7 @@ impl Default for Query {
 impl Query {
     /// True if known grips may answer it.
     pub fn uses_known_grips(&self) -> bool {
-        self.strategy == Strategy::Guided && self.validity == Validity::Physical
+        self.strategy.uses_known_grips(self.validity)
     }
 
     /// The coefficient of friction that grasps on an object are judged by.

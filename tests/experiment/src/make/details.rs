@@ -79,7 +79,7 @@ impl Maker {
         for _ in 0..REPLAYS {
             let mut stopwatch = StepStopwatch::new(&self.clock);
             let mut stream = AttemptStream::new(seed, index);
-            end = attempt.try_synthesize_grasp(&scene, &mut stream, &mut stopwatch, &|| false);
+            end = attempt.run(&scene, &mut stream, &mut stopwatch, &|| false);
             times.extend(stopwatch.times().map(in_order));
         }
         let valid = match &end {
@@ -90,7 +90,7 @@ impl Maker {
             (_, Some(grasp)) => Some(grasp.pose.frame_from_wrist),
             // Guided search had no proposal.
             (AttemptEnd::Rejected { rejection, .. }, _)
-                if *rejection == Rejection::NoContacts && attempt.posed_digits().is_empty() =>
+                if *rejection == Rejection::NoContacts && attempt.is_unposed() =>
             {
                 None
             }

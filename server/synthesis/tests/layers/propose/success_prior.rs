@@ -2,9 +2,9 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
+    base::mechanisms::Mechanisms,
     base::{pose::Pose, random::AttemptStream},
     geometry::mesh::TriangleMesh,
-    base::mechanisms::Mechanisms,
     model::{
         hand::{HandPose, joints::HandJoints},
         object::GraspObject,

@@ -37,7 +37,7 @@ fn primitives_of_the_right_hand() -> &'static Arc<[HeldPrimitive]> {
 
 /// What an object takes over from the primitives of the right hand.
 fn transferred_to(object: &GraspObject) -> Borrowed {
-    Borrowed::of(object, primitives_of_the_right_hand())
+    TransferredGrips::of(object, primitives_of_the_right_hand())
 }
 
 /// All transferred grips, without a giver.
@@ -69,7 +69,7 @@ fn primitives_are_named_by_their_edges_in_millimetres() {
 fn a_primitive_gets_its_own_grips_in_all_its_turns() {
     let held = &primitives_of_the_right_hand()[3];
     let own: Arc<[HeldPrimitive]> = [held.clone()].into();
-    let transferred = Borrowed::of(&held.primitive.object(), &own);
+    let transferred = TransferredGrips::of(&held.primitive.object(), &own);
     // All four turns of a box fit it. The few grips by palm and fingers, or by thumb and palm, are not transferred.
     let by_thumb_and_finger = |entry: &&Entry| {
         let touches = |digit: Digit| {
@@ -197,7 +197,7 @@ fn an_object_like_no_primitive_gets_no_grips() {
     assert!(transferred.is_empty(), "{}", transferred.len());
     assert!(unconstrained(&transferred).is_empty());
     let nothing: Arc<[HeldPrimitive]> = [].into();
-    assert!(Borrowed::of(object("remote"), &nothing).is_empty());
+    assert!(TransferredGrips::of(object("remote"), &nothing).is_empty());
 }
 
 #[test]
@@ -262,7 +262,7 @@ fn transferred_grips_halve_the_attempts_and_keep_searches_reproducible() {
     for holdout in tracked_holdouts() {
         let transferred = Arc::new(transferred_to(&holdout.object));
         for seed in 0..3 {
-            let from_transferred = || SeedSource::Borrowed(Arc::clone(&transferred));
+            let from_transferred = || SeedSource::Transferred(Arc::clone(&transferred));
             let one = search(&holdout, from_transferred(), seed, 1);
             let three = search(&holdout, from_transferred(), seed, 3);
             assert_eq!(one.grasp, three.grasp);

@@ -8,7 +8,8 @@ use std::{
 use grasp_assets::{atlases, objects, primitives::held_primitives};
 use grasp_synthesis::{
     known::{
-        atlas::Atlas, codec::decode, grips::Grips, seed_source::SeedSource, transferred_grips::Borrowed,
+        atlas::Atlas, codec::decode, grips::Grips, seed_source::SeedSource,
+        transferred_grips::TransferredGrips,
     },
     mechanisms::{Mechanism, Mechanisms},
     model::{
@@ -100,7 +101,7 @@ fn asked() -> (Holdout, TrackedSolids, [(&'static str, SearchSettings); 3]) {
         ..reproducible(&holdout)
     };
     let of_boxes = SearchSettings {
-        starts: SeedSource::Borrowed(Arc::new(Borrowed::of(&remote(), held))),
+        starts: SeedSource::Transferred(Arc::new(TransferredGrips::of(&remote(), held))),
         ..reproducible(&holdout)
     };
     let settings = [
