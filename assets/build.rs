@@ -1,4 +1,4 @@
-//! Embeds the atlases and the grips at primitives that are there, under the names of their files.
+//! Embeds the shipped grips of objects and primitives under the names of their files.
 
 use std::{env, error::Error, fmt::Write as _, fs, path::Path};
 
@@ -7,12 +7,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     embed("primitives")
 }
 
-/// Writes the table of a folder's files.
+/// Writes a table of the folder's files.
 fn embed(name: &str) -> Result<(), Box<dyn Error>> {
     let folder = Path::new(&env::var("CARGO_MANIFEST_DIR")?).join(name);
     println!("cargo::rerun-if-changed={}", folder.display());
     let mut paths = Vec::new();
-    // Without the folder, there is nothing to embed: a server builds its own atlases, and searches without primitives.
+    // Without the folder there is nothing to embed: servers grow all atlases, and searches do without primitives.
     if folder.is_dir() {
         for file in fs::read_dir(&folder)? {
             paths.push(file?.path());

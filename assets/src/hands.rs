@@ -29,7 +29,7 @@ pub struct Hand {
     pub glb: &'static [u8],
 }
 
-/// A built-in hand, parsed once.
+/// A built-in hand; parsed on first use.
 pub fn hand(rig: &str, handedness: Handedness) -> Option<&'static Hand> {
     static HANDS: LazyLock<[Hand; 4]> = LazyLock::new(|| FILES.map(|(json, glb)| built_in(json, glb)));
     HANDS
@@ -57,8 +57,8 @@ const FILES: [(&str, &[u8]); 4] = [
     ),
 ];
 
-/// What the embedded files say. They are made by the generator and read by the tests, so that they cannot be broken
-/// in a build that passed.
+/// Parses the embedded files. The generator writes them and the tests read them, so they are valid in any build that
+/// passed.
 fn built_in(json: &str, glb: &'static [u8]) -> Hand {
     let rig = read_rig(json).expect("an embedded rig is valid");
     let skin = read_skin(glb, &rig).expect("an embedded skin is valid");
@@ -69,19 +69,19 @@ fn built_in(json: &str, glb: &'static [u8]) -> Hand {
     }
 }
 
-/// Why a rig or a skin was refused.
+/// Why a rig or a skin was rejected.
 #[derive(Debug, thiserror::Error)]
 pub enum HandError {
     /// The description is not JSON of the right form.
     #[error("the rig description cannot be read: {0}")]
     Json(#[from] serde_json::Error),
-    /// The description says something that no hand can be.
+    /// The description breaks a rule for rigs.
     #[error("the rig description is invalid: {}", list(.0))]
     Rig(Vec<RigViolation>),
     /// The file is not glTF.
     #[error("the skin cannot be read: {0}")]
     Gltf(#[from] gltf::Error),
-    /// Something that a skinned hand needs is not in the file.
+    /// The file lacks a part of a skinned hand.
     #[error("the skin has no {0}")]
     Missing(&'static str),
     /// A joint of the hand is not among the skin's joints.
@@ -103,15 +103,15 @@ fn list(violations: &[RigViolation]) -> String {
 /// A rig from its description.
 ///
 /// # Errors
-/// The text is not such a description, or it is invalid; then with all violations.
+/// The text is not a rig description, or it is invalid: the error then lists all violations.
 pub fn read_rig(json: &str) -> Result<Rig, HandError> {
     serde_json::from_str::<RigDescription>(json)?
         .to_rig()
         .map_err(HandError::Rig)
 }
 
-/// The skin of a rig from a GLB file with `WebXR` joint names, brought into the wrist frame of the thesis. The joints
-/// may have any order; those with other names are not used. The radii are those of the rig.
+/// Reads the skin of a rig from a GLB file with `WebXR` joint names and converts it to the thesis' wrist frame. The joints
+/// may come in any order; joints with other names are ignored. The radii are the rig's.
 ///
 /// # Errors
 /// The file is not a GLB with one skinned mesh, or a joint is missing.
@@ -151,7 +151,7 @@ pub fn read_skin(glb: &[u8], rig: &Rig) -> Result<Skin, HandError> {
         .map(|columns| Mat4::from_cols_array_2d(&columns))
         .collect();
 
-    // From the file's order of joints to that of OpenXR, by name.
+    // Maps the file's joint order to OpenXR's by name.
     let openxr_index: Vec<Option<usize>> = skin
         .joints()
         .map(|joint| {
@@ -172,7 +172,7 @@ pub fn read_skin(glb: &[u8], rig: &Rig) -> Result<Skin, HandError> {
         .zip(&weights)
         .map(|(joints, weights)| vertex_joints(*joints, *weights, &openxr_index))
         .collect::<Result<_, _>>()?;
-    // The file is in the OpenXR frame of the wrist; the skin is wanted in the thesis' frame of the same place.
+    // The file uses the OpenXR frame of the wrist; the skin uses the thesis' frame at the same place.
     let wrist_from_file = openxr_from_thesis_frame(Pose::IDENTITY) * wrist_in_file(&bind).inverse();
     Ok(Skin {
         positions: positions
@@ -190,7 +190,7 @@ fn wrist_in_file(bind: &HandJoints) -> Pose {
     bind.joints[index::WRIST].pose
 }
 
-/// The `OpenXR` indices of a vertex's joints; those without weight may be anything.
+/// The `OpenXR` indices of a vertex's joints; the index of a joint without weight is ignored.
 fn vertex_joints(
     joints: [u16; 4],
     weights: [f32; 4],
@@ -206,7 +206,7 @@ fn vertex_joints(
     Ok(found)
 }
 
-/// The joints in the bind pose, in the file's frame. The file has no palm joint: it is the middle of the middle
+/// The joints in the bind pose, in the file's frame. The file has no palm joint, which is the centre of the middle
 /// metacarpal.
 fn bind_joints(
     rig: &Rig,

@@ -1,8 +1,7 @@
 //! The 15 built-in holdouts, named as in the thesis (Figures 5.2 to 5.4).
 //!
-//! Each is one JSON file under `holdouts/`, written by `grasp-assets-generator`; its fields are those of
-//! [`BuiltInHoldout`]. Lengths are in metres, angles in radians, quaternions in the order x y z w, and transforms
-//! read `a_from_b`:
+//! Each is one JSON file under `holdouts/`, written by `grasp-assets-generator`, with the fields of [`BuiltInHoldout`].
+//! Lengths are in metres, angles in radians, quaternions in the order x y z w, and transforms read `a_from_b`:
 //!
 //! ```json
 //! {
@@ -19,7 +18,7 @@
 //! }
 //! ```
 //!
-//! `origin` is `"manual"` for the Holds. The digits run from the thumb to the little finger.
+//! `origin` is `"manual"` for the Holds. Digits run from the thumb to the little finger.
 
 use std::sync::LazyLock;
 
@@ -38,14 +37,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::{hands, objects};
 
-/// How a holdout came to be.
+/// How a holdout was made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
     /// Posed by hand after a real-world hold.
     Manual,
-    /// Found by the project's own synthesis on the free object, with the giver's rig: what attempt `attempt` of the
-    /// search below returns.
+    /// Found by the project's own synthesis on the free object, with the giver's rig: the result of attempt `attempt` of
+    /// this search.
     Synthesized {
         /// The seed of the search.
         seed: u64,
@@ -53,11 +52,11 @@ pub enum Origin {
         attempt: u64,
         /// The step of the ladder.
         strategy: Strategy,
-        /// Which bend ratios a digit tried.
+        /// The bend ratios that each digit tried.
         bend_ratios: BendRatioChoice,
         /// Coefficient of static friction.
         friction: f32,
-        /// Against gravity, in the object's frame: a unit vector.
+        /// Unit vector against gravity, in the object's frame.
         up: Vec3,
     },
 }
@@ -72,7 +71,7 @@ pub struct BuiltInHoldout {
     pub object: String,
     /// The giver's grasp type in the taxonomy of Feix et al., as the thesis' captions classify it.
     pub grasp_type: String,
-    /// How it came to be.
+    /// How it was made.
     pub origin: Origin,
     /// The object in the world: +Y up, metres. The giver stands at -Z and holds the object out toward +Z.
     pub world_from_object: Pose,
@@ -86,7 +85,7 @@ pub struct BuiltInHoldout {
     pub giver_digits: [DigitAngles; 5],
 }
 
-/// Why a holdout cannot be made ready.
+/// Why a holdout cannot be prepared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HoldoutError {
     /// The object is not a built-in one.
@@ -118,11 +117,10 @@ impl BuiltInHoldout {
         &object.prepared
     }
 
-    /// The holdout in the object's frame, ready to be searched.
+    /// The holdout in the object's frame, ready for a search.
     ///
     /// # Errors
-    /// The object or the rig is not built in, or the giver's pose collapses the skin. Never for one of
-    /// [`holdouts`].
+    /// The object or the rig is not built in, or the giver's pose collapses the skin. Never happens for [`holdouts`].
     pub fn to_holdout(&self) -> Result<Holdout, HoldoutError> {
         let built_in =
             objects::object(&self.object).ok_or_else(|| HoldoutError::UnknownObject(self.object.clone()))?;
@@ -161,7 +159,7 @@ const FILES: [&str; 15] = [
     include_str!("../holdouts/scissors-hold2.json"),
 ];
 
-/// All built-in holdouts, by object and then by name, parsed once.
+/// All built-in holdouts, by object and then by name; parsed on first use.
 pub fn holdouts() -> &'static [BuiltInHoldout] {
     static HOLDOUTS: LazyLock<Vec<BuiltInHoldout>> = LazyLock::new(|| {
         FILES

@@ -1,7 +1,8 @@
 //! The built-in objects, hands and holdouts, embedded so that a server or a test runs from anywhere.
 //!
-//! The files beside this crate are made by `grasp-assets-generator`; see `PROVENANCE.md`.
+//! `grasp-assets-generator` makes the files in this folder; see `PROVENANCE.md`.
 
+pub mod atlas_folder;
 pub mod atlases;
 pub mod hands;
 pub mod holdouts;

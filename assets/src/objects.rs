@@ -19,25 +19,25 @@ pub struct BuiltInObject {
     pub obj: &'static str,
     /// Its manifest as JSON text; see [`Manifest`].
     pub manifest: &'static str,
-    /// What it is, for a person to read.
+    /// A description for people.
     pub description: String,
-    /// The names of the mesh's groups with their triangles, ascending; sorted by name.
+    /// The mesh's groups, sorted by name, with their triangles in ascending order.
     pub groups: Vec<(String, Vec<u32>)>,
-    /// The object.
+    /// The object as searches use it.
     pub object: Arc<GraspObject>,
     /// The same, with what proposals derive from it.
     pub prepared: Arc<PreparedObject>,
 }
 
-/// What the file beside a mesh says about the object.
+/// The contents of the JSON file next to a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// The object's name.
     pub name: String,
-    /// What it is, for a person to read.
+    /// A description for people.
     pub description: String,
-    /// How the object lies in its frame.
+    /// How the object is placed in its frame.
     pub frame: String,
     /// In kilograms.
     pub mass_kg: f32,
@@ -53,9 +53,9 @@ pub struct Manifest {
     pub triangles: usize,
     /// Vertices of the mesh.
     pub vertices: usize,
-    /// Where mesh and figures come from.
+    /// Sources of the mesh and the figures.
     pub source: String,
-    /// Under which terms they may be used, as an SPDX expression.
+    /// Their licence, as an SPDX expression.
     pub licence: String,
 }
 
@@ -65,9 +65,9 @@ pub struct Manifest {
 pub struct ManifestBox {
     /// Its centre, in metres.
     pub centre_m: Vec3,
-    /// How its axes are turned in the object's frame: a unit quaternion x, y, z, w.
+    /// Orientation of its axes in the object's frame: a unit quaternion x, y, z, w.
     pub orientation: Quat,
-    /// Half of its edge lengths along its own axes, in metres.
+    /// Half its edge lengths along its own axes, in metres.
     pub half_extents_m: Vec3,
 }
 
@@ -75,7 +75,7 @@ impl Manifest {
     /// Reads a manifest.
     ///
     /// # Errors
-    /// The text is not JSON, lacks something, or says something unknown.
+    /// The text is not JSON, or a field is missing or unknown.
     pub fn parse(json: &str) -> Result<Self, serde_json::Error> {
         serde_json::from_str(json)
     }
@@ -100,7 +100,7 @@ const FILES: [[&str; 3]; 3] = [
     ],
 ];
 
-/// The built-in meshes are small and known; this only keeps a slip of the generator from going unnoticed.
+/// The built-in meshes are small and known; these limits only catch mistakes of the generator.
 const LIMITS: MeshLimits = MeshLimits {
     bytes: 1 << 20,
     vertices: 10_000,
@@ -113,7 +113,7 @@ static OBJECTS: LazyLock<Vec<BuiltInObject>> = LazyLock::new(|| {
         .into()
 });
 
-/// All built-in objects, sorted by name, parsed once.
+/// All built-in objects, sorted by name; parsed on first use.
 pub fn objects() -> &'static [BuiltInObject] {
     &OBJECTS
 }
@@ -123,7 +123,7 @@ pub fn object(name: &str) -> Option<&'static BuiltInObject> {
     objects().iter().find(|object| object.name == name)
 }
 
-/// Parses embedded files. They are part of the program: if they are wrong, so is the program.
+/// Parses embedded files. They are part of the program, so an error in them is a bug.
 fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> BuiltInObject {
     let about = Manifest::parse(manifest)
         .unwrap_or_else(|error| panic!("the manifest of the built-in {name} is broken: {error}"));
@@ -139,7 +139,7 @@ fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> Built
         mesh,
         about.mass_kg,
         about.centre_of_mass_m,
-        // The manifest's is the thesis' own; whoever judges otherwise assumes otherwise.
+        // The manifest's friction is the thesis' value; other validities assume their own.
         None,
         &forbidden,
     )

@@ -18,16 +18,16 @@ use crate::{
     hands::{Hand, hand},
 };
 
-/// The rig whose hands know the primitives.
+/// The rig whose hands have grips at primitives.
 const RIG: &str = "adult";
 
 /// The files by name.
 const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/primitives.rs"));
 
-/// A hand, and what it knows.
+/// A hand with its grips at primitives.
 type Known = (&'static Hand, Arc<[HeldPrimitive]>);
 
-/// The hands that know primitives, and how they hold them: read when they are first asked for, some tens of milliseconds.
+/// The hands that have grips at primitives, and the grips. Reading them on first use takes some tens of milliseconds.
 pub fn held_primitives() -> &'static [Known] {
     static HELD: LazyLock<Vec<Known>> = LazyLock::new(|| {
         let hands = [Handedness::Left, Handedness::Right].map(|side| hand(RIG, side));
@@ -36,7 +36,7 @@ pub fn held_primitives() -> &'static [Known] {
             .flatten()
             .map(|hand| (hand, Vec::new()))
             .collect();
-        // One box at a time: its search structures take more than its grips.
+        // One box at a time: its search structures are larger than its grips.
         for primitive in Primitive::ALL {
             let object = primitive.object();
             for (hand, held) in &mut held {
@@ -57,8 +57,8 @@ pub fn grips(primitive: Primitive, rig: &Rig) -> Option<&'static [u8]> {
         .map(|(_, bytes)| *bytes)
 }
 
-/// What is there of a primitive and was made by this program's algorithm: a primitive less is no error, only fewer starts. The
-/// generator's check tells what is missing.
+/// A primitive's grips, if they are there and current. A missing primitive is no error: searches only have fewer seeds.
+/// The generator's check reports it.
 fn held_by(rig: &Rig, primitive: Primitive, object: &GraspObject) -> Option<HeldPrimitive> {
     let grips = decode_grips(grips(primitive, rig)?, object, rig).ok()?;
     Some(HeldPrimitive { primitive, grips })

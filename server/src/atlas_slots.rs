@@ -25,16 +25,45 @@ pub(crate) enum BuildState {
 pub(crate) struct Slot {
     /// State of the build.
     pub state: BuildState,
-    /// The atlas as last published.
+    /// The grips that requests are answered from.
     pub grown: Option<Arc<Grown>>,
+    /// The atlas from which growth resumes. It is `grown` itself, unless `grown` holds shipped grips: those stay until
+    /// this atlas is complete.
+    pub growing: Option<Arc<Grown>>,
     /// Grips that searches found recently.
     pub recent: RecentGrips,
-    /// Size of `grown` in bytes.
+    /// Size of `grown` and `growing` in bytes.
     pub bytes: usize,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
     /// Time of the last request, counted in requests for any atlas.
     pub last_used: u64,
+}
+
+/// What replaces the atlas in a slot.
+#[derive(Clone, Debug)]
+pub(crate) struct Update {
+    /// The new [`Slot::grown`].
+    pub grown: Arc<Grown>,
+    /// The new [`Slot::growing`]; none if growth has yet to start.
+    pub growing: Option<Arc<Grown>>,
+}
+
+impl Update {
+    /// An atlas that answers requests while it grows.
+    pub(crate) fn of(grown: Arc<Grown>) -> Self {
+        Self {
+            growing: Some(Arc::clone(&grown)),
+            grown,
+        }
+    }
+
+    /// Its size in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        let separate = self.growing.as_ref();
+        let separate = separate.filter(|growing| !Arc::ptr_eq(growing, &self.grown));
+        self.grown.bytes() + separate.map_or(0, |growing| growing.bytes())
+    }
 }
 
 /// The slots of one object, for each hand that was requested.
@@ -62,10 +91,11 @@ impl AtlasSlots {
     }
 
     /// Replaces the atlas; `spent` is the work done on it since the last time.
-    pub(crate) fn publish(&self, hand: &'static Hand, grown: Arc<Grown>, bytes: usize, spent: Duration) {
+    pub(crate) fn publish(&self, hand: &'static Hand, update: Update, spent: Duration) {
         self.with(hand, |slot| {
-            slot.grown = Some(grown);
-            slot.bytes = bytes;
+            slot.bytes = update.bytes();
+            slot.grown = Some(update.grown);
+            slot.growing = update.growing;
             slot.build_time += spent;
         });
     }

@@ -7,11 +7,15 @@ use std::time::Duration;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_synthesis::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
-    model::{object::THESIS_FRICTION, strategy::Strategy},
+    model::strategy::{Strategy, Validity},
     rating::taxonomy::classify,
-    search::{attempt::Attempt, scene::Scene},
+    search::{
+        attempt::Attempt,
+        scene::{Scene, Task},
+        settings::{Query, SearchSettings},
+    },
 };
-use grasp_tests::searches::Bench;
+use grasp_tests::searches::{Bench, prepared};
 
 /// Seed of every search here.
 const SEED: u64 = 20_180_612;
@@ -22,11 +26,29 @@ fn attempt(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("attempt");
     group.throughput(Throughput::Elements(1));
     for strategy in Strategy::LADDER {
-        let ratios = strategy.default_bend_ratios();
+        let settings = SearchSettings {
+            query: Query {
+                strategy,
+                validity: Validity::Thesis,
+                bend_ratios: strategy.default_bend_ratios(),
+                ..Query::default()
+            },
+            ..SearchSettings::default()
+        };
+        let holdouts = bench.holdouts.iter();
+        let objects: Vec<_> = holdouts.map(|(_, holdout)| prepared(&holdout.object)).collect();
         let scenes: Vec<Scene<'_>> = bench
             .holdouts
             .iter()
-            .map(|(_, holdout)| Scene::new(holdout, bench.rig, strategy, ratios, THESIS_FRICTION))
+            .zip(&objects)
+            .map(|((_, holdout), object)| {
+                let task = Task {
+                    holdout,
+                    object,
+                    rig: bench.rig,
+                };
+                Scene::new(task, &settings)
+            })
             .collect();
         let mut attempt = Attempt::default();
         let mut index = 0;
@@ -35,7 +57,7 @@ fn attempt(criterion: &mut Criterion) {
                 let scene = &scenes[index as usize % scenes.len()];
                 index += 1;
                 let mut stream = AttemptStream::new(SEED, index);
-                attempt.try_synthesize_grasp(scene, &mut stream, &mut NoStopwatch, &|| false)
+                attempt.run(scene, &mut stream, &mut NoStopwatch, &|| false)
             });
         });
     }

@@ -17,7 +17,8 @@ sys.path.insert(0, str(ROOT / "target" / "foreign"))
 def start_server(*arguments):
     """Starts the release binary, which should listen on port 0; returns the process and its host:port."""
     process = subprocess.Popen(
-        [ROOT / "target/release/grasp-server", *arguments],
+        # Complete atlases are grown once and shared with the Rust tests and benches.
+        [ROOT / "target/release/grasp-server", "--atlas-directory", ROOT / "target/atlases", *arguments],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

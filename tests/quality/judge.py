@@ -144,6 +144,8 @@ def collect(names, options):
     rows, replies, drawn = [], {}, collections.Counter()
     share = -(-options.pictures // len(names))
     with Service(options.workers) as service, open(options.out / "replies.jsonl", "w") as file:
+        if not options.no_atlas:
+            service.wait_for_atlases(name for name in names if name in holdouts.BUILT_IN)
         for name in pool.Progress("objects requested").over(names):
             mesh_file = None if name in holdouts.BUILT_IN else holdouts.mesh_file(name)
             for label, request, scene in cases(name, service, options, givers):

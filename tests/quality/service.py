@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import threading
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # Exit code of `grasp find` when it found no grasp within the budget.
@@ -18,6 +19,8 @@ class Service:
 
     def __init__(self, workers=None):
         command = [ROOT / "target/release/grasp-server", "--listen", "127.0.0.1:0", "--log", "grasp_server=info"]
+        # Complete atlases are grown once and shared with the Rust tests and benches.
+        command += ["--atlas-directory", ROOT / "target/atlases"]
         if workers:
             command += ["--workers", str(workers)]
         self.process = subprocess.Popen(
@@ -62,6 +65,15 @@ class Service:
     def object(self, name):
         """The server's description of an object."""
         return self._client("objects", "get", name)
+
+    def wait_for_atlases(self, names, seconds=600):
+        """Returns once the atlases of some objects are complete, which takes a minute or two the first time."""
+        deadline = time.monotonic() + seconds
+        for name in names:
+            while not self.object(name)["atlas"]["complete"]:
+                if time.monotonic() > deadline:
+                    raise RuntimeError(f"the atlas of {name} is not complete after {seconds} s")
+                time.sleep(0.2)
 
     def find(self, request, choice=None, no_atlas=False, picture=None, mesh=None):
         """The answer to a request given as JSON for `grasp find --request`."""

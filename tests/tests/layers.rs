@@ -29,6 +29,23 @@ const SERVER: &[&[&str]] = &[
     &["serve"],
 ];
 
+/// The core's layers, as documented in its `lib.rs`.
+const CORE: &[&[&str]] = &[
+    &["base"],
+    &["geometry"],
+    &["model"],
+    &["thesis", "physical"],
+    &["rating"],
+    &["propose"],
+    &["known"],
+    &["search"],
+];
+
+#[test]
+fn core_layers_import_only_earlier_ones() {
+    assert_layered("server/synthesis/src", CORE);
+}
+
 #[test]
 fn server_modules_import_only_earlier_layers() {
     assert_layered("server/src", SERVER);

@@ -1,6 +1,7 @@
-//! The atlases of the built-in objects for both hands of the rig `adult`, and of primitives the grips of their lists.
+//! The grips that ship with the server: those on the shortlists of complete atlases, of the built-in objects and of the
+//! primitives, for both hands of the rig `adult`.
 
-use std::{fs, path::Path, sync::Arc};
+use std::{fs, io, path::Path, sync::Arc};
 
 use grasp_assets::{
     atlases::file_name,
@@ -11,28 +12,26 @@ use grasp_synthesis::{
     known::{
         atlas::Atlas,
         codec::{AtlasError, decode, encode},
-        growth::{EARLY_PROPOSALS, Growth, MOST_PROPOSALS},
+        growth::{EARLY_PROPOSALS, Grown, Growth, MOST_PROPOSALS},
+        key,
         primitives::Primitive,
     },
-    model::{
-        hand::{Handedness, rig::Rig},
-        object::GraspObject,
-        strategy::Validity,
-    },
+    model::{hand::Handedness, strategy::Validity},
     physical::{grip::Gripper, scene::ObjectScene},
+    propose::prepared::{PreparedObject, PreparedRig},
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use crate::AssetFile;
 
-/// The rig whose atlases come with the server: its default one.
+/// The rig whose grips ship with the server: its default one.
 const RIG: &str = "adult";
 
-/// Bytes of a file at most. More make the program larger, by six times as much.
-const MOST_BYTES: usize = 2_200_000;
+/// Largest file, in bytes. All files together are embedded, thirty times as much.
+const MOST_BYTES: usize = 150_000;
 
-/// Grips of a file that are assessed anew: some tenths of a second. More notice rarer differences.
+/// Grips per file that the check assesses again: some tenths of a second. More catch rarer differences.
 const CHECKED: usize = 200;
 
 /// Why a file is not what would be made now.
@@ -40,54 +39,57 @@ const CHECKED: usize = 200;
 enum Difference {
     #[error("{0}")]
     Unreadable(#[from] AtlasError),
-    #[error("it is not complete")]
-    Incomplete,
+    #[error("it is not an excerpt of a complete atlas")]
+    NotAnExcerpt,
     #[error("it has {0} bytes, more than {MOST_BYTES}")]
     TooLarge(usize),
-    #[error(
-        "grips are found differently now: make them again, and raise ALGORITHM of grasp_synthesis::known::key"
-    )]
+    #[error("growth finds other grips: run `grasp-assets-generator algorithm`, then make the files again")]
     OtherGrips,
     #[error(
-        "grip {0} is worth something else now: make them again, and raise ALGORITHM of grasp_synthesis::known::key"
+        "grip {0} is assessed differently: run `grasp-assets-generator algorithm`, then make the files again"
     )]
-    OtherWorth(usize),
+    OtherAssessment(usize),
 }
 
-/// What is made of an atlas.
+/// Objects whose grips are shipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kept {
-    /// All its grips: for the built-in objects.
-    All,
-    /// Those of its lists: for the primitives.
-    Listed,
+pub(crate) enum Collection {
+    /// The built-in objects.
+    Objects,
+    /// The primitives.
+    Primitives,
 }
 
 /// A file to be made.
-struct Making {
+struct Excerpt {
     name: String,
-    object: Arc<GraspObject>,
-    rig: &'static Rig,
+    object: Arc<PreparedObject>,
+    rig: &'static PreparedRig,
 }
 
-impl Kept {
+impl Collection {
     /// The folder of the files, below the assets'.
     const fn folder(self) -> &'static str {
         match self {
-            Self::All => "atlases",
-            Self::Listed => "primitives",
+            Self::Objects => "atlases",
+            Self::Primitives => "primitives",
         }
     }
 
-    /// Everything to be held with every hand.
-    fn makings(self) -> Vec<Making> {
-        let held: Vec<(String, Arc<GraspObject>)> = match self {
-            Self::All => {
-                let named = |object: &BuiltInObject| (object.name.to_owned(), Arc::clone(&object.object));
+    /// Every object with every hand.
+    fn excerpts(self) -> Vec<Excerpt> {
+        let named: Vec<(String, Arc<PreparedObject>)> = match self {
+            Self::Objects => {
+                let named = |object: &BuiltInObject| (object.name.to_owned(), Arc::clone(&object.prepared));
                 objects().iter().map(named).collect()
             }
-            Self::Listed => {
-                let named = |primitive: Primitive| (primitive.name(), Arc::new(primitive.object()));
+            Self::Primitives => {
+                let named = |primitive: Primitive| {
+                    (
+                        primitive.name(),
+                        Arc::new(PreparedObject::new(Arc::new(primitive.object()))),
+                    )
+                };
                 Primitive::ALL.map(named).into()
             }
         };
@@ -95,56 +97,57 @@ impl Kept {
             let hand = hand(RIG, side).expect("the rig is built in");
             &hand.rig
         });
-        let each = |(name, object): (String, Arc<GraspObject>)| {
-            hands.map(|rig| Making {
+        let each = |(name, object): (String, Arc<PreparedObject>)| {
+            hands.map(|rig| Excerpt {
                 name: file_name(&name, rig),
                 object: Arc::clone(&object),
                 rig,
             })
         };
-        held.into_iter().flat_map(each).collect()
+        named.into_iter().flat_map(each).collect()
     }
 
-    /// Builds all of them: minutes.
-    pub(crate) fn generate(self) -> Vec<AssetFile> {
+    /// Grows all atlases, which takes minutes. If `complete` is a folder, the complete atlases are written there, under the
+    /// names that a server looks for in its `atlas_directory`.
+    ///
+    /// # Errors
+    /// The folder of the complete atlases cannot be written.
+    pub(crate) fn generate(self, complete: Option<&Path>) -> io::Result<Vec<AssetFile>> {
         let bars = MultiProgress::new();
         let style = ProgressStyle::with_template("{msg:28} {bar:40} {pos}/{len} proposals, {elapsed}")
             .expect("the template is right");
-        self.makings()
+        if let Some(folder) = complete {
+            fs::create_dir_all(folder)?;
+        }
+        self.excerpts()
             .par_iter()
-            .map(|making| {
+            .map(|excerpt| {
+                let Excerpt { name, object, rig } = excerpt;
                 let bar = bars.add(ProgressBar::new(MOST_PROPOSALS).with_style(style.clone()));
-                bar.set_message(making.name.clone());
-                (self.path(&making.name), self.make(making, &bar))
+                bar.set_message(name.clone());
+                let grown = grow(object, rig, &bar);
+                if let Some(folder) = complete {
+                    fs::write(
+                        folder.join(key::file_name(object, rig)),
+                        encode(&grown, object, rig),
+                    )?;
+                }
+                let bytes = encode(&grown.listed(object, rig), object, rig);
+                Ok((self.path(name), bytes))
             })
             .collect()
     }
 
-    fn make(self, Making { object, rig, .. }: &Making, bar: &ProgressBar) -> Vec<u8> {
-        let mut growth = Growth::new(object, rig);
-        let mut gripper = Gripper::default();
-        while !growth.is_complete() {
-            growth.round(&mut gripper);
-            bar.set_position(growth.proposed());
-        }
-        bar.abandon();
-        let grown = match self {
-            Self::All => growth.grown(),
-            Self::Listed => growth.grown().listed(object, rig),
-        };
-        encode(&grown, object, rig)
-    }
-
-    /// Says of every file below `folder` that is missing or not what would be made now why; true if there is none. Without
-    /// any, a server builds its own atlases and does without primitives.
+    /// Prints why each file below `folder` that is missing or not what would be made now differs; true if none is. Without
+    /// any file, a server starts without grips and grows its atlases.
     pub(crate) fn check(self, folder: &Path) -> bool {
         if !folder.join(self.folder()).is_dir() {
             return true;
         }
         let complaints: Vec<String> = self
-            .makings()
+            .excerpts()
             .par_iter()
-            .filter_map(|Making { name, object, rig }| {
+            .filter_map(|Excerpt { name, object, rig }| {
                 let path = self.path(name);
                 let complaint = match fs::read(folder.join(&path)) {
                     Err(error) => format!("cannot be read: {error}"),
@@ -164,35 +167,49 @@ impl Kept {
     }
 }
 
-/// Compares an atlas with what would be made now.
-fn compare(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<(), Difference> {
-    let made = decode(bytes, object, rig)?;
-    if !made.atlas.is_complete() {
-        return Err(Difference::Incomplete);
+fn grow(object: &PreparedObject, rig: &PreparedRig, bar: &ProgressBar) -> Grown {
+    let mut growth = Growth::new(object, rig);
+    let mut gripper = Gripper::default();
+    while !growth.is_complete() {
+        growth.round(&mut gripper);
+        bar.set_position(growth.proposed());
+    }
+    bar.abandon();
+    growth.grown()
+}
+
+/// Compares an excerpt with what would be made now.
+fn compare(bytes: &[u8], object: &PreparedObject, rig: &PreparedRig) -> Result<(), Difference> {
+    let shipped = decode(bytes, object, rig)?;
+    if shipped.atlas.is_complete() || shipped.proposed() > 0 || shipped.atlas.entries().is_empty() {
+        return Err(Difference::NotAnExcerpt);
     }
     if bytes.len() > MOST_BYTES {
         return Err(Difference::TooLarge(bytes.len()));
     }
-    if made.early_stamp() != early_stamp(object, rig) {
+    if shipped.early_stamp() != early_stamp(object, rig) {
         return Err(Difference::OtherGrips);
     }
-    first_difference(&made.atlas, object, rig).map_or(Ok(()), |place| Err(Difference::OtherWorth(place)))
+    match first_difference(&shipped.atlas, object, rig) {
+        Some(place) => Err(Difference::OtherAssessment(place)),
+        None => Ok(()),
+    }
 }
 
-/// The first grip of an atlas, of [`CHECKED`] from all over it, that is worth something else now.
-fn first_difference(made: &Atlas, object: &GraspObject, rig: &Rig) -> Option<usize> {
+/// The first of [`CHECKED`] grips from all over an atlas that is assessed differently now.
+fn first_difference(shipped: &Atlas, object: &PreparedObject, rig: &PreparedRig) -> Option<usize> {
     let scene = ObjectScene::new(object, object.friction_under(Validity::Physical));
     let mut gripper = Gripper::default();
-    let entries = made.entries();
-    let apart = entries.len().div_ceil(CHECKED).max(1);
-    (0..entries.len()).step_by(apart).find(|&place| {
+    let entries = shipped.entries();
+    let step = entries.len().div_ceil(CHECKED).max(1);
+    (0..entries.len()).step_by(step).find(|&place| {
         let entry = &entries[place];
         entry.reassessed(&scene, rig, &mut gripper).as_ref() != Some(entry)
     })
 }
 
-/// The stamp that an atlas has now after its first proposals: a second of work.
-fn early_stamp(object: &GraspObject, rig: &Rig) -> u64 {
+/// The stamp that growth has now after its first proposals: a second of work.
+fn early_stamp(object: &PreparedObject, rig: &PreparedRig) -> u64 {
     let mut growth = Growth::new(object, rig);
     let mut gripper = Gripper::default();
     while growth.proposed() < EARLY_PROPOSALS {
@@ -210,9 +227,19 @@ mod tests {
 
     use super::*;
 
+    /// What grows until there are so many grips.
+    fn grown(entries: usize, object: &PreparedObject, rig: &PreparedRig) -> Grown {
+        let mut growth = Growth::new(object, rig);
+        let mut gripper = Gripper::default();
+        while growth.len() < entries {
+            growth.round(&mut gripper);
+        }
+        growth.grown()
+    }
+
     #[test]
-    fn the_early_stamp_is_that_of_the_first_proposals() {
-        let [Making { object, rig, .. }, other, ..] = &Kept::All.makings()[..] else {
+    fn early_stamp_is_that_of_the_first_proposals() {
+        let [Excerpt { object, rig, .. }, other, ..] = &Collection::Objects.excerpts()[..] else {
             panic!("there are objects and hands");
         };
         let mut growth = Growth::new(object, rig);
@@ -227,21 +254,46 @@ mod tests {
         assert_ne!(later.atlas.stamp(), early);
         assert_eq!(later.early_stamp(), early);
         assert_eq!(early_stamp(object, rig), early);
-        let read = decode(&encode(&later, object, rig), object, rig).expect("it was just written");
-        assert_eq!(read.early_stamp(), early);
-        // The other hand's is another: the stamp tells growth apart.
+        for kept in [&later, &later.listed(object, rig)] {
+            let read = decode(&encode(kept, object, rig), object, rig).expect("it was just written");
+            assert_eq!(read.early_stamp(), early);
+        }
+        // The other hand's differs: the stamp distinguishes growths.
         assert_ne!(early_stamp(object, other.rig), early);
     }
 
+    /// Bytes of the files below a folder that have one of these extensions.
+    fn bytes_below(folder: &Path, extensions: &[&str]) -> u64 {
+        let files = fs::read_dir(folder).expect("the folder can be read");
+        files
+            .map(|file| {
+                let path = file.expect("the folder can be listed").path();
+                if path.is_dir() {
+                    return bytes_below(&path, extensions);
+                }
+                let extension = path.extension().and_then(|extension| extension.to_str());
+                if extension.is_some_and(|extension| extensions.contains(&extension)) {
+                    fs::metadata(&path).expect("the file is there").len()
+                } else {
+                    0
+                }
+            })
+            .sum()
+    }
+
     #[test]
-    fn a_grip_that_is_worth_something_else_is_named() {
-        let Making { object, rig, .. } = &Kept::All.makings()[0];
-        let mut growth = Growth::new(object, rig);
-        let mut gripper = Gripper::default();
-        while growth.len() < 20 {
-            growth.round(&mut gripper);
-        }
-        let made = growth.atlas();
+    fn generated_binaries_take_less_than_four_megabytes() {
+        let assets = Path::new(crate::ASSETS);
+        let extensions = ["atlas", "glb", "png"];
+        let folders = ["atlases", "hands", "pictures", "primitives", "../tests/results"];
+        let bytes = folders.map(|folder| bytes_below(&assets.join(folder), &extensions));
+        assert!(bytes.iter().sum::<u64>() < 4_000_000, "{folders:?}: {bytes:?}");
+    }
+
+    #[test]
+    fn reports_grip_that_is_assessed_differently() {
+        let Excerpt { object, rig, .. } = &Collection::Objects.excerpts()[0];
+        let made = grown(20, object, rig).atlas;
         assert_eq!(first_difference(&made, object, rig), None);
         let changed = |change: fn(&mut Entry)| {
             let mut entries = made.entries().to_vec();
@@ -266,12 +318,17 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_complete_is_told() {
-        let Making { object, rig, .. } = &Kept::All.makings()[0];
-        let bytes = encode(&Growth::new(object, rig).grown(), object, rig);
-        assert_eq!(compare(&bytes, object, rig), Err(Difference::Incomplete));
+    fn reports_files_that_are_no_excerpts() {
+        let Excerpt { object, rig, .. } = &Collection::Objects.excerpts()[0];
+        let whole = grown(20, object, rig);
+        for not_listed in [&Growth::new(object, rig).grown(), &whole] {
+            let bytes = encode(not_listed, object, rig);
+            assert_eq!(compare(&bytes, object, rig), Err(Difference::NotAnExcerpt));
+        }
+        let listed = encode(&whole.listed(object, rig), object, rig);
+        assert_eq!(compare(&listed, object, rig), Err(Difference::OtherGrips));
         assert_eq!(
-            compare(&bytes[..bytes.len() - 1], object, rig),
+            compare(&listed[..listed.len() - 1], object, rig),
             Err(Difference::Unreadable(AtlasError::Damaged))
         );
     }

@@ -5,7 +5,7 @@ mod field;
 mod glb;
 mod polygonise;
 mod remesh;
-mod rig;
+mod right_rig;
 mod weights;
 
 use glam::Vec3;
@@ -22,7 +22,7 @@ use grasp_synthesis::{
     },
 };
 
-use self::{field::HandField, rig::RigKind};
+use self::{field::HandField, right_rig::RigKind};
 use crate::AssetFile;
 
 /// Width of the grid on which the surface is first found, in millimetres of the figures. Finer grids find smaller
@@ -76,7 +76,7 @@ fn bind_angles() -> [DigitAngles; 5] {
 
 /// The rig with its palm segments, and its skin.
 fn right_hand(kind: RigKind) -> (Rig, Skin) {
-    let mut rig = rig::right_rig(kind);
+    let mut rig = right_rig::right_rig(kind);
     let mm = kind.metres_per_mm();
     let angles = bind_angles();
     let field = HandField::new(&rig, &angles, mm);
@@ -132,7 +132,7 @@ fn nearest(skin: &[Vec3], joint: Vec3) -> f32 {
     (1e4 * distance).round() / 1e4
 }
 
-/// The wanted edge length at a point: short on the digits, longer on the palm and longest on the forearm.
+/// The target edge length at a point: short on the digits, longer on the palm, longest on the forearm.
 fn edge_mm(bind: &HandJoints, p: Vec3, mm: f32) -> f32 {
     let digits = (0..5)
         .map(|digit| weights::distance_over_skin(bind, digit, p))
@@ -168,7 +168,7 @@ fn palm_segments(rig: &Rig, field: &HandField, mm: f32) -> [Segment; 10] {
             start = rig.finger_metacarpals[0].lerp(end, 0.45);
         }
         let (start, end) = (start + direction * over(start), end + direction * over(end));
-        // A straight line under a round skin: half of what it lies too deep in the middle, at most 2 mm, is taken off
+        // A straight line under a round skin lies too deep in the middle: half of that error, up to 2 mm, is taken off
         // its whole length.
         let lift = (0.5 * over(start.midpoint(end))).clamp(0.0, 2.0 * mm);
         Segment::new(start + direction * lift, end + direction * lift)

@@ -1,19 +1,19 @@
-//! The 15 holdouts: six Holds that are posed after an author's intent, nine `GenHolds` that the synthesis found.
+//! The 15 holdouts: six Holds posed as their author describes them, nine `GenHolds` found by the synthesis.
 //!
-//! The normal run poses the Holds and replays the recorded attempts of the `GenHolds`; `--search` looks for better
-//! attempts and writes the record; `--report` measures what is there.
+//! A normal run poses the Holds and replays the recorded attempts of the `GenHolds`; `--search` looks for better attempts
+//! and records them; `--report` measures the holdouts.
 
+mod attempt_search;
+mod giver_orientation;
+mod grasp_template;
 mod halton;
-mod judge;
+mod hand_capsules;
+mod hold_figures;
 mod least_squares;
 mod pictures;
 mod posing;
 mod report;
-mod search;
-mod solids;
 mod specs;
-mod stance;
-mod wish;
 
 use std::{io, path::Path};
 
@@ -31,10 +31,10 @@ use grasp_synthesis::{
 use crate::AssetFile;
 use specs::{HoldSpec, Selected, Target, hold_specs, selection, targets, write_selection};
 
-/// The rig of every giver: the thesis held its objects out with the hand that it also posed.
+/// The rig of every giver: in the thesis, givers and receivers have the same hand.
 const GIVER_RIG: &str = "thesis";
 
-/// Every giver holds out with the right hand.
+/// Every giver uses the right hand.
 const GIVER_HANDEDNESS: Handedness = Handedness::Right;
 
 /// The holdouts' files.
@@ -63,13 +63,13 @@ fn make(only: &str) -> Vec<BuiltInHoldout> {
     holdouts
 }
 
-/// Searches for the `GenHolds` whose names contain `only` with `seeds` seeds, and records what was chosen.
+/// Searches for the `GenHolds` whose names contain `only` with `seeds` seeds, and records the best attempts.
 ///
 /// # Errors
 /// The record cannot be written.
 pub(crate) fn search(seeds: u64, only: &str) -> io::Result<()> {
     let mut selection = selection();
-    for found in search::search(giver(), &targets(), seeds, only) {
+    for found in attempt_search::search(giver(), &targets(), seeds, only) {
         selection.retain(|old| old.name != found.name);
         selection.push(found);
     }
@@ -123,9 +123,9 @@ fn replayed(giver: &Hand, targets: &[Target], selected: &Selected) -> BuiltInHol
         .find(|target| target.name == selected.name)
         .expect("every selected holdout is a target");
     let up = selected.world_from_object.conjugate() * Vec3::Y;
-    let grasp = search::replay(
-        &search::single_thread(),
-        &built_in(&target.object).object,
+    let grasp = attempt_search::replay(
+        &attempt_search::single_thread(),
+        &built_in(&target.object).prepared,
         &giver.rig,
         up,
         selected.seed,
@@ -140,9 +140,9 @@ fn replayed(giver: &Hand, targets: &[Target], selected: &Selected) -> BuiltInHol
     let origin = Origin::Synthesized {
         seed: selected.seed,
         attempt: selected.attempt,
-        strategy: search::STRATEGY,
-        bend_ratios: search::BEND_RATIOS,
-        friction: search::FRICTION,
+        strategy: attempt_search::STRATEGY,
+        bend_ratios: attempt_search::BEND_RATIOS,
+        friction: attempt_search::FRICTION,
         up,
     };
     in_world(

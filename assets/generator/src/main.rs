@@ -1,10 +1,11 @@
-//! Makes the built-in objects, hands, holdouts, atlases and grips of primitives. A rerun gives identical bytes.
+//! Makes the built-in objects, hands and holdouts, and the grips that ship with the server. A rerun gives identical bytes.
 
+mod algorithm;
 mod atlases;
 mod hands;
 mod holdouts;
 mod objects;
-mod prospects;
+mod success_prior;
 
 use std::{
     fs, io,
@@ -12,7 +13,7 @@ use std::{
     process::ExitCode,
 };
 
-use atlases::Kept;
+use atlases::Collection;
 use clap::{Parser, ValueEnum};
 
 /// A file of the assets: its path below the assets folder, with `/` between the parts, and its bytes.
@@ -37,6 +38,10 @@ struct Arguments {
     /// The folder to write to or to compare with.
     #[arg(long, value_name = "DIR", default_value = ASSETS)]
     out: PathBuf,
+
+    /// With atlases: also writes the complete atlases into this folder, which a server accepts as `atlas_directory`.
+    #[arg(long, value_name = "DIR", conflicts_with = "check")]
+    complete: Option<PathBuf>,
 
     /// Writes nothing; compares with the files that are there and exits with 1 if any differs.
     #[arg(long)]
@@ -69,33 +74,51 @@ enum Section {
     Hands,
     /// The 15 holdouts; made with the objects and hands that are embedded in this program.
     Holdouts,
-    /// Atlases of the objects for both hands of the rig adult; minutes of work. With --check, they are read and some of
-    /// their grips found again.
+    /// The number that names how atlases grow, which is part of `grasp-synthesis`. Where it changes, atlases and primitives
+    /// must be made again.
+    Algorithm,
+    /// The grips of the objects that ship with the server, for both hands of the rig adult; takes minutes. With --check,
+    /// the start of growth and some grips are compared.
     Atlases,
-    /// Grips of the primitives for both hands of the rig adult, for objects without an atlas; minutes of work, and checked
-    /// likewise.
+    /// Grips of the primitives for both hands of the rig adult, for objects without an atlas; takes minutes, and is
+    /// checked in the same way.
     Primitives,
-    /// The numbers by which GUIDED search prefers hands that are likely to hold, which are part of `grasp-synthesis`;
-    /// minutes of work.
-    Prospects,
-    /// Objects, hands and holdouts; with --check, atlases and primitives too.
+    /// The network by which GUIDED search prefers hands that are likely to hold, which is part of `grasp-synthesis`;
+    /// takes minutes.
+    SuccessPrior,
+    /// Objects, hands and holdouts; with --check, the algorithm, atlases and primitives too.
     All,
 }
 
 impl Section {
-    /// Makes the section's files in memory.
-    fn generate(self) -> Vec<AssetFile> {
+    /// Makes the section's files in memory. Complete atlases go into the folder `complete` if there is one.
+    fn generate(self, complete: Option<&Path>) -> io::Result<Vec<AssetFile>> {
+        match self {
+            Self::Atlases => Collection::Objects.generate(complete),
+            Self::Primitives => Collection::Primitives.generate(None),
+            _ => Ok(self.compared_files()),
+        }
+    }
+
+    /// Makes the files that a check compares byte by byte.
+    fn compared_files(self) -> Vec<AssetFile> {
         match self {
             Self::Objects => objects::generate(),
             Self::Hands => hands::generate(),
             Self::Holdouts => holdouts::generate(),
-            Self::Atlases => Kept::All.generate(),
-            Self::Primitives => Kept::Listed.generate(),
-            Self::Prospects => prospects::generate(),
-            Self::All => [Self::Objects, Self::Hands, Self::Holdouts]
-                .into_iter()
-                .flat_map(Self::generate)
-                .collect(),
+            Self::Algorithm => algorithm::generate(),
+            Self::SuccessPrior => success_prior::generate(),
+            Self::All => [objects::generate(), hands::generate(), holdouts::generate()].concat(),
+            Self::Atlases | Self::Primitives => Vec::new(),
+        }
+    }
+
+    /// Does growth decide what the section comes to?
+    fn depends_on_growth(self, is_check: bool) -> bool {
+        match self {
+            Self::Algorithm | Self::Atlases | Self::Primitives => true,
+            Self::All => is_check,
+            Self::Objects | Self::Hands | Self::Holdouts | Self::SuccessPrior => false,
         }
     }
 }
@@ -112,23 +135,35 @@ fn main() -> ExitCode {
     if let Some(folder) = &arguments.pictures {
         return exit_code("the pictures", holdouts::pictures(folder, &arguments.only));
     }
-    let grips = match arguments.section {
-        Section::Atlases | Section::Primitives => true,
-        Section::All => arguments.check,
-        Section::Objects | Section::Hands | Section::Holdouts | Section::Prospects => false,
-    };
-    if grips && FUSES {
+    let section = arguments.section;
+    if section.depends_on_growth(arguments.check) && FUSES {
         eprintln!(
-            "grips: this build fuses multiplications with additions, rounds otherwise and finds other grips than one \
-             for any processor of the architecture, whose grips the shipped atlases are: build without target-cpu and \
+            "this build fuses multiplications with additions, so it rounds differently and finds other grips than the \
+             shipped ones, which a build for any processor of the architecture finds: build without target-cpu and \
              target-feature"
         );
         return ExitCode::FAILURE;
     }
-    if arguments.check {
-        return check(&arguments.out, arguments.section);
+    if arguments.complete.is_some() && section != Section::Atlases {
+        eprintln!("--complete is an option of the section atlases");
+        return ExitCode::FAILURE;
     }
-    let files = arguments.section.generate();
+    if arguments.check {
+        return check(&arguments.out, section);
+    }
+    if matches!(section, Section::Atlases | Section::Primitives) && !algorithm::is_current() {
+        eprintln!(
+            "atlases grow differently than the algorithm's number says: run the section algorithm first"
+        );
+        return ExitCode::FAILURE;
+    }
+    let files = match section.generate(arguments.complete.as_deref()) {
+        Ok(files) => files,
+        Err(error) => {
+            eprintln!("the complete atlases cannot be written: {error}");
+            return ExitCode::FAILURE;
+        }
+    };
     for (path, bytes) in &files {
         if let Err(error) = write(&arguments.out.join(path), bytes) {
             eprintln!("{path}: cannot be written: {error}");
@@ -158,36 +193,38 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::write(path, bytes)
 }
 
-/// Names every file of a section below `folder` that is missing or not what is made now.
+/// Prints every file of a section below `folder` that is missing or not what is made now.
 fn check(folder: &Path, section: Section) -> ExitCode {
-    let mut code = ExitCode::SUCCESS;
-    let grips: &[Kept] = match section {
-        Section::Atlases => &[Kept::All],
-        Section::Primitives => &[Kept::Listed],
-        Section::All => &[Kept::All, Kept::Listed],
-        Section::Objects | Section::Hands | Section::Holdouts | Section::Prospects => &[],
+    let collections: &[Collection] = match section {
+        Section::Atlases => &[Collection::Objects],
+        Section::Primitives => &[Collection::Primitives],
+        Section::All => &[Collection::Objects, Collection::Primitives],
+        _ => &[],
     };
-    for kept in grips {
-        if !kept.check(folder) {
-            code = ExitCode::FAILURE;
-        }
+    let mut is_current = true;
+    for collection in collections {
+        is_current &= collection.check(folder);
     }
-    let files = match section {
-        Section::Atlases | Section::Primitives => Vec::new(),
-        section => section.generate(),
-    };
+    let mut files = section.compared_files();
+    if section == Section::All {
+        files.extend(algorithm::generate());
+    }
     for (path, bytes) in files {
         match fs::read(folder.join(&path)) {
             Ok(found) if found == bytes => {}
             Ok(_) => {
                 println!("{path}: differs");
-                code = ExitCode::FAILURE;
+                is_current = false;
             }
             Err(error) => {
                 println!("{path}: cannot be read: {error}");
-                code = ExitCode::FAILURE;
+                is_current = false;
             }
         }
     }
-    code
+    if is_current {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
 }

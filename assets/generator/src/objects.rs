@@ -14,7 +14,7 @@ use grasp_synthesis::{geometry::oriented_box::OrientedBox, model::object::THESIS
 use crate::AssetFile;
 use builder::Shape;
 
-/// What cannot be read off a mesh.
+/// Properties that do not follow from a mesh.
 struct About {
     name: &'static str,
     build: fn() -> Shape,
@@ -92,7 +92,7 @@ fn files(about: &About) -> [AssetFile; 2] {
     ]
 }
 
-/// The snug box, rounded like the mesh so that the last bits of the fit do not show.
+/// The snug box, rounded like the mesh which hides the last bits of the fit.
 fn oriented_box(shape: &Shape) -> ManifestBox {
     const PER_METRE: f32 = 1e6;
     // Adding zero turns −0 into 0.

@@ -12,7 +12,7 @@ use std::{
 };
 
 use grasp_assets::{
-    atlases::atlas,
+    atlases::shipped_atlas,
     hands::{Hand, hand},
 };
 use grasp_synthesis::{
@@ -32,6 +32,7 @@ use super::{
     remembered::RememberedGrips,
 };
 use crate::{
+    atlas_slots::Update,
     executor::SearchExecutor,
     objects::{StoredObject, store::ObjectStore},
 };
@@ -53,6 +54,9 @@ const TURN: Duration = Duration::from_secs(2);
 
 /// Pause while searches run, in multiples of the time just worked: with 9, a builder works a tenth of the time.
 const PAUSE_PER_WORK: u32 = 9;
+
+/// Work that reading an atlas counts as. It is not zero, so that builders read all new atlases before they grow any.
+const READ_WORK: Duration = Duration::from_millis(1);
 
 /// How often a pausing builder checks whether searches still run.
 const PAUSE_CHECK: Duration = Duration::from_millis(1);
@@ -133,7 +137,9 @@ impl Drop for RunningThread<'_> {
 }
 
 /// How a turn ended.
-enum Turn {
+pub(super) enum Turn {
+    /// Grips were read that requests can use, and the atlas can still grow.
+    Read,
     /// The atlas can still grow; with the work done in this turn.
     More(Duration),
     /// The atlas is complete or has no room to grow.
@@ -185,7 +191,21 @@ fn work(builders: &Builders, job: BuildJob) {
     };
     // A panic costs only this atlas: the state that it could leave inconsistent is local to the turn.
     let turn = catch_unwind(AssertUnwindSafe(|| turn(builders, &object, &job)));
+    let request_left = || {
+        let first = builders.default_hand(Handedness::Right);
+        if first.is_some_and(|first| std::ptr::eq(first, job.hand)) {
+            builders.request(&object, builders.default_hand(Handedness::Left));
+        }
+    };
     match turn {
+        Ok(Turn::Read) => {
+            // Before the job goes back: both hands' atlases are read before either grows.
+            request_left();
+            builders.queue.push(BuildJob {
+                worked: job.worked + READ_WORK,
+                ..job
+            });
+        }
         Ok(Turn::More(worked)) => builders.queue.push(BuildJob {
             worked: job.worked + worked,
             ..job
@@ -193,10 +213,7 @@ fn work(builders: &Builders, job: BuildJob) {
         Ok(Turn::Dropped) => {}
         Ok(Turn::Finished) => {
             object.atlas_slots.finish(job.hand);
-            let first = builders.default_hand(Handedness::Right);
-            if first.is_some_and(|first| std::ptr::eq(first, job.hand)) {
-                builders.request(&object, builders.default_hand(Handedness::Left));
-            }
+            request_left();
         }
         Err(_) => {
             tracing::error!(object = object.name(), hand = %hand_label(job.hand), "building an atlas panicked");
@@ -205,33 +222,32 @@ fn work(builders: &Builders, job: BuildJob) {
     }
 }
 
-/// Grows an atlas and publishes it.
-fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
+/// Reads an atlas or grows it, and publishes it.
+pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
     let start = Instant::now();
     let hand = job.hand;
-    let loaded = object.atlas_slots.get(hand).and_then(|slot| slot.grown);
-    let known = match loaded {
-        Some(loaded) => Some(loaded),
-        None => match read(builders, object, hand) {
-            Some(read) => {
-                let publish = |grown| builders.loaded.publish(object, hand, grown, start.elapsed());
-                if !publish(Arc::clone(&read)) {
-                    return Turn::Finished;
-                }
-                Some(read)
-            }
-            None => None,
-        },
-    };
-    let mut growth = match &known {
-        Some(known) => Growth::resume(&object.object, &hand.rig, known),
+    let slot = object.atlas_slots.get(hand).unwrap_or_default();
+    if slot.grown.is_none()
+        && let Some(read) = read(builders, object, hand)
+    {
+        let is_complete = read.grown.atlas.is_complete();
+        let has_room = builders.loaded.publish(object, hand, read, start.elapsed());
+        return if is_complete || !has_room {
+            Turn::Finished
+        } else {
+            Turn::Read
+        };
+    }
+    let shipped = slot.grown.filter(|grown| is_shipped(grown));
+    let mut growth = match &slot.growing {
+        Some(growing) => Growth::resume(&object.object, &hand.rig, growing),
         None => Growth::new(&object.object, &hand.rig),
     };
     let published = growth.len();
     if growth.is_complete() {
         return Turn::Finished;
     }
-    // Not before reading: built-in atlases must be there soon after the start, however busy the machine is.
+    // Not before reading: shipped grips must be there soon after the start, however busy the machine is.
     lower_priority();
     let enough = USEFUL.max(published + published / GROWTH_PER_PUBLISH);
     let mut gripper = Gripper::default();
@@ -257,9 +273,24 @@ fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn
     {
         files.write(object, hand, &grown);
     }
-    let has_room = builders.loaded.publish(object, hand, Arc::clone(&grown), worked);
-    if has_room {
+    let update = match shipped {
+        Some(shipped) if !grown.atlas.is_complete() => Update {
+            grown: shipped,
+            growing: Some(Arc::clone(&grown)),
+        },
+        _ => Update::of(Arc::clone(&grown)),
+    };
+    let is_used = Arc::ptr_eq(&update.grown, &grown);
+    let has_room = builders.loaded.publish(object, hand, update, worked);
+    if has_room && is_used {
         log_progress(object, hand, &grown, published);
+    } else if has_room {
+        tracing::debug!(
+            object = object.name(),
+            hand = %hand_label(hand),
+            entries = growth.len(),
+            "an atlas grows while shipped grips answer"
+        );
     } else {
         tracing::debug!(
             object = object.name(),
@@ -275,23 +306,45 @@ fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn
     }
 }
 
-/// The built-in atlas of an object and a hand, or else the one on disk.
-fn read(builders: &Builders, object: &StoredObject, hand: &'static Hand) -> Option<Arc<Grown>> {
-    let on_disk = || builders.files.as_ref()?.read(object, hand);
-    let read = Arc::new(built_in(object, hand).or_else(on_disk)?);
+/// The atlas on disk. Unless it is complete, shipped grips answer requests and growth resumes from it.
+fn read(builders: &Builders, object: &StoredObject, hand: &'static Hand) -> Option<Update> {
+    let on_disk = builders.files.as_ref().and_then(|files| files.read(object, hand));
+    let on_disk = on_disk.map(Arc::new);
+    let is_complete = on_disk.as_ref().is_some_and(|read| read.atlas.is_complete());
+    let shipped = if is_complete {
+        None
+    } else {
+        shipped_grips(object, hand)
+    };
+    let read = match (shipped, on_disk) {
+        (Some(shipped), growing) => Update {
+            grown: Arc::new(shipped),
+            growing,
+        },
+        (None, Some(on_disk)) => Update::of(on_disk),
+        (None, None) => return None,
+    };
     tracing::info!(
         object = object.name(),
         hand = %hand_label(hand),
-        entries = read.atlas.entries().len(),
-        complete = read.atlas.is_complete(),
+        entries = read.grown.atlas.entries().len(),
+        complete = read.grown.atlas.is_complete(),
         "read an atlas"
     );
     Some(read)
 }
 
-/// The built-in atlas of an object and a hand.
-fn built_in(object: &StoredObject, hand: &'static Hand) -> Option<Grown> {
-    let bytes = object.built_in.then(|| atlas(&object.id, &hand.rig)).flatten()?;
+/// True for shipped grips: no proposals were tried for them, and no atlas can grow from them.
+fn is_shipped(grown: &Grown) -> bool {
+    grown.proposed() == 0
+}
+
+/// The grips that ship with the server for an object and a hand.
+fn shipped_grips(object: &StoredObject, hand: &'static Hand) -> Option<Grown> {
+    let bytes = object
+        .built_in
+        .then(|| shipped_atlas(&object.id, &hand.rig))
+        .flatten()?;
     match decode(bytes, &object.object, &hand.rig) {
         Ok(grown) => Some(grown),
         Err(error) => {
@@ -299,7 +352,7 @@ fn built_in(object: &StoredObject, hand: &'static Hand) -> Option<Grown> {
                 object = object.name(),
                 hand = %hand_label(hand),
                 %error,
-                "rebuilding a built-in atlas that cannot be read"
+                "cannot read the shipped grips"
             );
             None
         }

@@ -6,7 +6,6 @@
 
 use std::{
     collections::BTreeSet,
-    fmt::Write as _,
     fs::{self, File},
     io::{self, Read as _},
     path::{Path, PathBuf},
@@ -21,7 +20,7 @@ use grasp_assets::hands::Hand;
 use grasp_synthesis::known::{
     codec::{decode, encode},
     growth::Grown,
-    key::key,
+    key::file_name,
 };
 
 use super::hand_label;
@@ -40,8 +39,8 @@ const EXTENSION: &str = "atlas";
 /// Extension of an unfinished file.
 const PART_EXTENSION: &str = "part";
 
-/// Bytes of the hash in a file's name: 128 bits, which do not collide by chance.
-const NAME_BYTES: usize = 16;
+/// Hexadecimal digits in a file's name, which [`file_name`] takes from the key.
+const KEY_DIGITS: usize = 32;
 
 /// A folder of atlases.
 #[derive(Debug)]
@@ -151,12 +150,7 @@ impl AtlasFiles {
     }
 
     fn path(&self, object: &StoredObject, hand: &Hand) -> PathBuf {
-        let mut name = String::with_capacity(2 * NAME_BYTES);
-        for byte in &key(&object.object, &hand.rig)[..NAME_BYTES] {
-            // Writing to a string cannot fail.
-            let _ = write!(name, "{byte:02x}");
-        }
-        self.folder.join(name).with_extension(EXTENSION)
+        self.folder.join(file_name(&object.object, &hand.rig))
     }
 }
 
@@ -211,7 +205,7 @@ fn is_part_file(path: &Path) -> bool {
         return false;
     };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    key.len() == 2 * NAME_BYTES
+    key.len() == KEY_DIGITS
         && key.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
         && writer
             .split_once('-')
@@ -265,7 +259,7 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::time::Duration;
 
     use glam::Vec3;
@@ -274,16 +268,16 @@ mod tests {
     use crate::atlases::tests::{adult, cuboid, grown, small};
 
     /// A test's own folder, removed at its end.
-    struct Folder(PathBuf);
+    pub(crate) struct Folder(PathBuf);
 
     impl Folder {
-        fn new(test: &str) -> Self {
+        pub(crate) fn new(test: &str) -> Self {
             let path = std::env::temp_dir().join(format!("grasp-atlases-{test}-{}", std::process::id()));
             fs::create_dir_all(&path).unwrap();
             Self(path)
         }
 
-        fn open(&self) -> AtlasFiles {
+        pub(crate) fn open(&self) -> AtlasFiles {
             AtlasFiles::open(self.0.clone()).unwrap()
         }
 
@@ -331,6 +325,8 @@ mod tests {
         assert_eq!(names.len(), 1, "{names:?}");
         let path = folder.0.join(&names[0]);
         assert_eq!(path.extension(), Some(EXTENSION.as_ref()));
+        let part = PartFile::of(&path);
+        assert!(is_part_file(&part.path), "{:?}", part.path);
         let whole = fs::read(&path).unwrap();
         for broken in [&whole[..whole.len() / 2], b"", &[&whole[..], b"more"].concat()] {
             fs::write(&path, broken).unwrap();

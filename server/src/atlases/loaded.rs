@@ -6,10 +6,12 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::known::growth::Grown;
 
 use super::hand_label;
-use crate::objects::{StoredObject, store::ObjectStore};
+use crate::{
+    atlas_slots::Update,
+    objects::{StoredObject, store::ObjectStore},
+};
 
 /// The owner of an atlas: an object and a hand.
 type Owner = (Weak<StoredObject>, &'static Hand);
@@ -36,10 +38,10 @@ impl LoadedAtlases {
         &self,
         object: &Arc<StoredObject>,
         hand: &'static Hand,
-        grown: Arc<Grown>,
+        update: Update,
         spent: Duration,
     ) -> bool {
-        let bytes = grown.bytes();
+        let bytes = update.bytes();
         let mut owners = self.owners();
         let is_same = |(other, its_hand): &Owner| {
             std::ptr::eq(other.as_ptr(), Arc::as_ptr(object)) && std::ptr::eq(*its_hand, hand)
@@ -49,7 +51,7 @@ impl LoadedAtlases {
         let room = self.objects.room();
         let fits = bytes <= room && make_room(&mut owners, room - bytes, slot.last_used);
         if fits {
-            object.atlas_slots.publish(hand, grown, bytes, spent);
+            object.atlas_slots.publish(hand, update, spent);
         }
         if fits || slot.grown.is_some() {
             owners.push((Arc::downgrade(object), hand));

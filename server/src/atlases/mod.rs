@@ -5,6 +5,9 @@
 //! [`builders`] take atlases from the [`build_queue`] and grow them on low-priority threads, at a tenth of the time
 //! while searches run; [`files`] keeps them on disk if there is a folder for them.
 //!
+//! For the built-in objects, a few hundred grips per hand ship with the server and answer requests from its start. The
+//! full atlas grows meanwhile and replaces them once it is complete: it then has the same grips and more.
+//!
 //! Atlases take what created objects leave of `cache_bytes`: [`loaded`] evicts the least recently used ones, which are
 //! built or read again when they are requested. [`remembered`] keeps grips that searches found.
 

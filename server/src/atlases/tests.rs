@@ -1,4 +1,4 @@
-//! Atlases without a server: eviction, remembered grips, and the end of builders.
+//! Atlases without a server: eviction, remembered grips, shipped grips, and the end of builders.
 
 use std::time::{Duration, Instant};
 
@@ -6,14 +6,16 @@ use glam::Vec3;
 use grasp_assets::hands::hand;
 use grasp_synthesis::{
     known::{
-        growth::{Grown, Growth},
+        codec::{decode, encode},
+        growth::{Grown, Growth, MOST_PROPOSALS, ROUND},
         primitives::Primitive,
     },
     physical::grip::Gripper,
 };
+use sha2::{Digest as _, Sha256};
 
-use super::*;
-use crate::limits::StoreLimits;
+use super::{build_queue::BuildJob, builders::Turn, files::tests::Folder, *};
+use crate::{atlas_slots::Update, limits::StoreLimits};
 
 /// Longest wait for any event; reached only if something hangs.
 const HANGS_AFTER: Duration = Duration::from_mins(1);
@@ -74,10 +76,8 @@ fn evicts_least_recently_used() {
     // Without threads, only this test publishes.
     let atlases = start(0, &store(10, 2 * grown.bytes() + 10));
     let publish = |object: &Arc<StoredObject>| {
-        let builders = &atlases.0;
-        builders
-            .loaded
-            .publish(object, adult(), Arc::clone(&grown), Duration::ZERO)
+        let update = Update::of(Arc::clone(&grown));
+        atlases.0.loaded.publish(object, adult(), update, Duration::ZERO)
     };
     let is_there = |object: &Arc<StoredObject>| object.atlas_slots.get(adult()).unwrap().grown.is_some();
     for object in [&a, &b, &c] {
@@ -175,6 +175,80 @@ fn rebuilds_an_evicted_atlas_on_request() {
     let slot = object.atlas_slots.get(adult()).unwrap();
     assert_eq!((slot.state, slot.bytes), (BuildState::Absent, 0));
     until("the second atlas", is_there);
+}
+
+/// An atlas whose next round is its last: the number of proposals in its encoding is set to one round below the bound.
+fn nearly_complete(object: &StoredObject) -> Grown {
+    const PROPOSED: std::ops::Range<usize> = 47..55;
+    const CHECKSUM_BYTES: usize = 32;
+    let mut bytes = encode(&grown(object), &object.object, &adult().rig);
+    bytes[PROPOSED].copy_from_slice(&(MOST_PROPOSALS - ROUND).to_be_bytes());
+    let content = bytes.len() - CHECKSUM_BYTES;
+    let checksum = Sha256::digest(&bytes[..content]);
+    bytes[content..].copy_from_slice(&checksum);
+    decode(&bytes, &object.object, &adult().rig).expect("the checksum is right")
+}
+
+#[test]
+fn complete_atlas_replaces_shipped_grips() {
+    let remote = Arc::clone(&grasp_assets::objects::object("remote").unwrap().object);
+    let object = Arc::new(StoredObject::new("remote".to_owned(), true, remote, Vec::new()));
+    let atlases = start(0, &store(10, 1 << 30));
+    let job = BuildJob {
+        object: Arc::downgrade(&object),
+        hand: adult(),
+        worked: Duration::ZERO,
+    };
+    let turn = || builders::turn(&atlases.0, &object, &job);
+    let slot = || object.atlas_slots.get(adult()).unwrap();
+    // A builder drops the job if it holds the last reference.
+    let _second_reference = Arc::clone(&object);
+
+    assert!(matches!(turn(), Turn::Read));
+    let shipped = slot().grown.expect("grips ship with the server");
+    assert!(!shipped.atlas.is_complete() && shipped.atlas.entries().len() >= 50);
+    assert!(slot().growing.is_none());
+
+    // The growing atlas is kept, but requests still get the shipped grips.
+    assert!(matches!(turn(), Turn::More(_)));
+    let growing = slot().growing.expect("it grows");
+    assert!(growing.proposed() > 0 && !growing.atlas.entries().is_empty());
+    assert!(Arc::ptr_eq(&slot().grown.unwrap(), &shipped));
+    assert_eq!(slot().bytes, shipped.bytes() + growing.bytes());
+    assert!(matches!(turn(), Turn::More(_)));
+    assert!(slot().growing.unwrap().proposed() > growing.proposed());
+
+    let update = Update {
+        grown: shipped,
+        growing: Some(Arc::new(nearly_complete(&object))),
+    };
+    object.atlas_slots.publish(adult(), update, Duration::ZERO);
+    assert!(matches!(turn(), Turn::Finished));
+    let complete = slot().grown.expect("it is complete");
+    assert!(complete.atlas.is_complete());
+    assert!(Arc::ptr_eq(&complete, &slot().growing.unwrap()));
+    assert_eq!(slot().bytes, complete.bytes());
+}
+
+#[test]
+fn complete_file_is_used_instead_of_shipped_grips() {
+    let folder = Folder::new("complete");
+    let store = store(10, 1 << 30);
+    let remote = store.pinned().find(|object| object.id == "remote");
+    let object = Arc::clone(remote.expect("it is built in"));
+    let files = folder.open();
+    let mut growth = Growth::resume(&object.object, &adult().rig, &nearly_complete(&object));
+    growth.round(&mut Gripper::default());
+    let complete = growth.grown();
+    assert!(complete.atlas.is_complete());
+    files.write(&object, adult(), &complete);
+    let executor = SearchExecutor::new(1, 1).unwrap();
+    let _atlases = Atlases::start(1, &store, executor, Some(files), "adult".to_owned()).unwrap();
+    until("reading the file", || {
+        let slot = object.atlas_slots.get(adult());
+        slot.is_some_and(|slot| slot.state == BuildState::Finished)
+    });
+    assert_eq!(*object.atlas_slots.get(adult()).unwrap().grown.unwrap(), complete);
 }
 
 #[test]

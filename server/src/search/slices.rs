@@ -113,13 +113,8 @@ mod tests {
     use glam::Vec3;
     use grasp_assets::{hands::hand, objects::object};
     use grasp_synthesis::{
-        known::seed_source::SeedSource,
-        model::{
-            bend_ratios::BendRatioChoice,
-            constraints::Constraints,
-            hand::Handedness,
-            strategy::{Strategy, Validity},
-        },
+        model::{hand::Handedness, holdout::Holdout},
+        search::settings::{Query, Run},
     };
 
     use super::*;
@@ -137,26 +132,25 @@ mod tests {
     /// A search by one worker, with the number of times that it read the clock; times in clock readings.
     fn search_within(choice: Choice, deadline: u64, patience: u64) -> (SearchOutcome, u64) {
         let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
-        let object = &object("remote").expect("it is built in").object;
-        let holdout = Holdout::new(Arc::clone(object), None, Vec3::Y).expect("up is a unit vector");
+        let object = object("remote").expect("it is built in");
+        let holdout = Holdout::new(Arc::clone(&object.object), None, Vec3::Y).expect("up is a unit vector");
         let settings = SearchSettings {
-            seed: 3,
-            strategy: Strategy::Guided,
-            validity: Validity::Physical,
-            bend_ratios: BendRatioChoice::OneRandom,
-            friction: object.friction_under(Validity::Physical),
-            constraints: Constraints::default(),
-            choice,
-            atlas: None,
-            starts: SeedSource::Nothing,
-            recent: RecentGrips::default(),
-            known_tried: 0,
-            reproducible: false,
-            first_attempt: 0,
-            max_attempts: 10_000,
-            deadline: Some(Duration::from_micros(deadline)),
-            workers: 1,
-            record_step_times: false,
+            query: Query {
+                choice,
+                ..Query::default()
+            },
+            run: Run {
+                seed: 3,
+                max_attempts: 10_000,
+                deadline: Some(Duration::from_micros(deadline)),
+                ..Run::default()
+            },
+            ..SearchSettings::default()
+        };
+        let task = Task {
+            holdout: &holdout,
+            object: &object.prepared,
+            rig,
         };
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
@@ -165,7 +159,7 @@ mod tests {
         let clock = ReadingsClock::default();
         let patience = Duration::from_micros(patience);
         let stop = AtomicBool::new(false);
-        let outcome = search_in_slices(&pool, &holdout, rig, &settings, patience, &clock, &stop);
+        let outcome = search_in_slices(&pool, task, &settings, patience, &clock, &stop);
         (outcome, clock.0.into_inner())
     }
 

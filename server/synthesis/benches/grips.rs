@@ -9,16 +9,15 @@ use grasp_synthesis::{
     base::mechanisms::Mechanisms,
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::Recheck},
-    model::{
-        hand::{Handedness, rig::Rig},
-        object::GraspObject,
-        strategy::Validity,
-    },
+    model::{hand::Handedness, object::GraspObject, strategy::Validity},
     physical::{
         grip::Gripper,
         scene::{ObjectScene, Presented},
     },
-    propose::proposal::{Place, propose},
+    propose::{
+        prepared::{PreparedObject, PreparedRig},
+        proposal::{Place, propose},
+    },
 };
 
 /// Built-in objects: a light, thin one, and a box.
@@ -33,21 +32,21 @@ const GROWN: usize = 20;
 /// Proposals per batch.
 const PROPOSALS: u64 = 1000;
 
-fn rig() -> &'static Rig {
+fn rig() -> &'static PreparedRig {
     &hands::hand("adult", Handedness::Right)
         .expect("the hand is built in")
         .rig
 }
 
-fn object(name: &str) -> &'static GraspObject {
-    &objects::object(name).expect("the object is built in").object
+fn object(name: &str) -> &'static PreparedObject {
+    &objects::object(name).expect("the object is built in").prepared
 }
 
 fn scene(object: &GraspObject) -> ObjectScene<'_> {
     ObjectScene::new(object, object.friction_under(Validity::Physical))
 }
 
-fn grown(object: &GraspObject, entries: usize) -> Atlas {
+fn grown(object: &PreparedObject, entries: usize) -> Atlas {
     let mut growth = Growth::new(object, rig());
     let mut gripper = Gripper::default();
     while growth.len() < entries && !growth.is_complete() {
@@ -112,10 +111,10 @@ fn proposals(criterion: &mut Criterion) {
         let scene = scene(object(name));
         let place = Place {
             object: scene.object,
-            surface: &scene.object.surface_pairs,
+            surface: object(name).surface_pairs(),
             giver: None,
             rig: rig(),
-            repertoire: None,
+            placements: None,
             mechanisms: Mechanisms::ALL,
         };
         let proposals: Vec<_> = (0..PROPOSALS)

@@ -7,7 +7,7 @@
 //! frame b to frame a. Hand frames follow the thesis (4.4): +y along the fingers, +z out of the palm, pitch about x,
 //! yaw about z; [`model::hand::joints`] is the one place where they become `OpenXR` joint frames.
 //!
-//! The modules are layers. Each knows only those above it in this table; `tests/layers.rs` refuses any other import.
+//! The modules are layers. Each knows only those above it in this table; a test refuses any other import.
 //!
 //! | Layer | What it holds |
 //! |---|---|

@@ -20,14 +20,11 @@ use grasp_assets::primitives::held_primitives;
 use grasp_synthesis::{
     base::mechanisms::{Mechanism, Mechanisms},
     known::{atlas::Atlas, transferred_grips::TransferredGrips},
-    model::{
-        hand::{Handedness, rig::Rig},
-        holdout::Holdout,
-        score::Score,
-    },
-    search::{LookUp, find_grasp, find_known_grasp, settings::SearchSettings},
+    model::{hand::Handedness, holdout::Holdout, score::Score},
+    propose::prepared::PreparedRig,
+    search::{LookUp, find_grasp, find_known_grasp, scene::Task},
 };
-use grasp_tests::searches::MonotonicClock;
+use grasp_tests::searches::{MonotonicClock, prepared};
 use rand::{SeedableRng as _, seq::SliceRandom as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::ThreadPool;
@@ -35,7 +32,7 @@ use rayon::ThreadPool;
 use crate::{
     Row,
     asking::ANSWERED_WITHIN,
-    core::{Core, Known, LOOK_UP_TIME, WORKERS, settings, thread_time},
+    core::{Core, Knows, LOOK_UP_TIME, WORKERS, settings, thread_time},
     setting::{Setting, Thing, bar, built_in_holdouts, default_hand},
     table::{Line, Spread, Unit, time},
 };
@@ -120,12 +117,12 @@ impl Searched {
 struct Case {
     holdout: Holdout,
     atlas: Arc<Atlas>,
-    borrowed: Arc<Borrowed>,
+    borrowed: Arc<TransferredGrips>,
 }
 
 /// Searches as the server does: a look on the caller's thread, then a race that another thread waits for.
 struct Searcher {
-    rig: &'static Rig,
+    rig: &'static PreparedRig,
     coordinator: ThreadPool,
     workers: ThreadPool,
 }
@@ -146,18 +143,21 @@ impl Searcher {
     fn search(&self, case: &Case, knowledge: Knowledge, mechanisms: Mechanisms, seed: u64) -> Searched {
         let holdout = &case.holdout;
         let known = match knowledge {
-            Knowledge::Warm => Known::Atlas(&case.atlas),
-            Knowledge::Cold => Known::Boxes((!case.borrowed.is_empty()).then_some(&case.borrowed)),
+            Knowledge::Warm => Knows::Atlas(&case.atlas),
+            Knowledge::Cold => Knows::Boxes((!case.borrowed.is_empty()).then_some(&case.borrowed)),
         };
-        let mut settings = SearchSettings {
-            mechanisms,
-            ..settings(holdout, known, seed)
+        let mut settings = settings(known, mechanisms, seed);
+        let object = prepared(&holdout.object);
+        let task = Task {
+            holdout,
+            object: &object,
+            rig: self.rig,
         };
         let (start, look_up_start) = (Instant::now(), thread_time());
         let look = match knowledge {
             Knowledge::Warm => {
                 let clock = MonotonicClock::default();
-                find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME)
+                find_known_grasp(task, &settings, &clock, LOOK_UP_TIME)
             }
             Knowledge::Cold => LookUp::NotFound { tried: 0 },
         };
@@ -165,12 +165,12 @@ impl Searcher {
         let (outcome, race_time) = match look {
             LookUp::Found(outcome) => (*outcome, Duration::ZERO),
             LookUp::NotFound { tried } => {
-                settings.known_tried = tried;
-                settings.deadline = Some(ANSWERED_WITHIN.saturating_sub(look_up_time));
+                settings.known.tried = tried;
+                settings.run.deadline = Some(ANSWERED_WITHIN.saturating_sub(look_up_time));
                 self.coordinator.install(|| {
                     let clock = Effort::start(WORKERS);
                     let stop = AtomicBool::new(false);
-                    let outcome = find_grasp(&self.workers, holdout, self.rig, &settings, &clock, &stop);
+                    let outcome = find_grasp(&self.workers, task, &settings, &clock, &stop);
                     (outcome, clock.total())
                 })
             }
@@ -288,7 +288,7 @@ fn classes(setting: &Setting, things: &[Thing]) -> Vec<(Class, Vec<Case>)> {
     let known: Vec<_> = things
         .iter()
         .map(|thing| {
-            let atlas = core.atlas(thing.id(), &setting.atlases(), &thing.object);
+            let atlas = core.atlas(thing.id(), &Setting::atlases(), &thing.object);
             let atlas = atlas.expect("built-in objects come with an atlas");
             assert!(atlas.is_complete(), "the atlas of {} still grows", thing.id());
             (thing, atlas, Arc::new(TransferredGrips::of(&thing.object, held)))

@@ -2,28 +2,23 @@
 
 use std::{
     fs,
-    path::Path,
     sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
-use grasp_assets::atlases::atlas;
+use grasp_assets::{atlas_folder::AtlasFolder, atlases::shipped_atlas};
 use grasp_synthesis::{
     base::mechanisms::Mechanisms,
-    known::{
-        atlas::Atlas, codec::decode, recent_grips::RecentGrips, seed_source::SeedSource,
-        transferred_grips::TransferredGrips,
+    known::{atlas::Atlas, codec::decode, seed_source::SeedSource, transferred_grips::TransferredGrips},
+    model::{hand::Handedness, holdout::Holdout, object::GraspObject},
+    propose::prepared::{PreparedObject, PreparedRig},
+    search::{
+        LookUp, find_grasp, find_known_grasp,
+        scene::Task,
+        settings::{Known, Run, SearchSettings},
     },
-    model::{
-        constraints::Constraints,
-        hand::{Handedness, rig::Rig},
-        holdout::Holdout,
-        object::GraspObject,
-        strategy::{Choice, Strategy, Validity},
-    },
-    search::{LookUp, find_grasp, find_known_grasp, settings::SearchSettings},
 };
-use grasp_tests::searches::MonotonicClock;
+use grasp_tests::searches::{MonotonicClock, prepared};
 use rayon::ThreadPool;
 
 use crate::{asking::ANSWERED_WITHIN, setting::default_hand};
@@ -45,7 +40,7 @@ pub(crate) struct Taken {
 
 /// Searches of the core.
 pub(crate) struct Core {
-    rig: &'static Rig,
+    rig: &'static PreparedRig,
     pool: ThreadPool,
     mechanisms: Mechanisms,
 }
@@ -63,32 +58,29 @@ impl Core {
         }
     }
 
-    /// The atlas that a server used: the one that comes with it, or one that it left in a folder. None if there is none for
-    /// the object and the hand.
-    pub(crate) fn atlas(&self, id: &str, folder: &Path, object: &GraspObject) -> Option<Arc<Atlas>> {
+    /// The atlas that a server used: the one that it kept in a folder, or else the grips that ship with it. None if there is
+    /// none for the object and the hand.
+    pub(crate) fn atlas(&self, id: &str, folder: &AtlasFolder, object: &GraspObject) -> Option<Arc<Atlas>> {
         let decoded = |bytes: &[u8]| decode(bytes, object, self.rig).ok();
-        let built_in = atlas(id, self.rig).and_then(decoded);
-        let grown = built_in.or_else(|| {
-            let mut files = fs::read_dir(folder).ok()?;
-            files.find_map(|file| decoded(&fs::read(file.ok()?.path()).ok()?))
-        })?;
+        let kept = fs::read(folder.file(object, self.rig)).ok();
+        let kept = kept.and_then(|bytes| decoded(&bytes));
+        let grown = kept.or_else(|| shipped_atlas(id, self.rig).and_then(decoded))?;
         Some(grown.atlas)
     }
 
     /// The wall time of a search as the server runs it: a look on the calling thread, then a race of the workers.
     pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Taken {
-        let mut settings = SearchSettings {
-            mechanisms: self.mechanisms,
-            ..settings(holdout, Known::Atlas(atlas), seed)
-        };
+        let mut settings = settings(Knows::Atlas(atlas), self.mechanisms, seed);
+        let object = prepared(&holdout.object);
+        let task = self.task(holdout, &object);
         let clock = MonotonicClock::default();
         let start = Instant::now();
-        let outcome = match find_known_grasp(holdout, self.rig, &settings, &clock, LOOK_UP_TIME) {
+        let outcome = match find_known_grasp(task, &settings, &clock, LOOK_UP_TIME) {
             LookUp::Found(outcome) => *outcome,
             LookUp::NotFound { tried } => {
-                settings.known_tried = tried;
+                settings.known.tried = tried;
                 let stop = AtomicBool::new(false);
-                find_grasp(&self.pool, holdout, self.rig, &settings, &clock, &stop)
+                find_grasp(&self.pool, task, &settings, &clock, &stop)
             }
         };
         Taken {
@@ -97,16 +89,23 @@ impl Core {
         }
     }
 
+    fn task<'a>(&self, holdout: &'a Holdout, object: &'a PreparedObject) -> Task<'a> {
+        Task {
+            holdout,
+            object,
+            rig: self.rig,
+        }
+    }
+
     /// The processor time of a look through the whole atlas up to the first valid grip, on the calling thread: what else
     /// runs on the machine shows less than in wall time.
     pub(crate) fn look_up(&self, holdout: &Holdout, atlas: &Arc<Atlas>) -> Taken {
-        let settings = SearchSettings {
-            mechanisms: self.mechanisms,
-            ..settings(holdout, Known::Atlas(atlas), 0)
-        };
+        let settings = settings(Knows::Atlas(atlas), self.mechanisms, 0);
+        let object = prepared(&holdout.object);
+        let task = self.task(holdout, &object);
         let clock = MonotonicClock::default();
         let start = thread_time();
-        let outcome = find_known_grasp(holdout, self.rig, &settings, &clock, ANSWERED_WITHIN);
+        let outcome = find_known_grasp(task, &settings, &clock, ANSWERED_WITHIN);
         Taken {
             time: thread_time().saturating_sub(start),
             found: outcome.found().is_some(),
@@ -116,30 +115,31 @@ impl Core {
 
 /// What a server knows of how a hand holds an object.
 #[derive(Clone, Copy)]
-pub(crate) enum Known<'a> {
+pub(crate) enum Knows<'a> {
     /// A complete atlas.
     Atlas(&'a Arc<Atlas>),
     /// No atlas yet, but grips of boxes like the object, if any fit.
-    Boxes(Option<&'a Arc<Borrowed>>),
+    Boxes(Option<&'a Arc<TransferredGrips>>),
 }
 
 /// The settings that the server's defaults come to.
-pub(crate) fn settings(holdout: &Holdout, known: Known<'_>, seed: u64) -> SearchSettings {
-    let (atlas, starts) = match known {
-        Known::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
-        Known::Boxes(Some(borrowed)) => (None, SeedSource::Transferred(Arc::clone(borrowed))),
-        Known::Boxes(None) => (None, SeedSource::Nothing),
+pub(crate) fn settings(knows: Knows<'_>, mechanisms: Mechanisms, seed: u64) -> SearchSettings {
+    let (atlas, seeds) = match knows {
+        Knows::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
+        Knows::Boxes(Some(grips)) => (None, SeedSource::Transferred(Arc::clone(grips))),
+        Knows::Boxes(None) => (None, SeedSource::Nothing),
     };
     SearchSettings {
         known: Known {
             atlas,
-            seeds: starts,
+            seeds,
             ..Known::default()
         },
         run: Run {
             seed,
             deadline: Some(ANSWERED_WITHIN),
             workers: WORKERS,
+            mechanisms,
             ..Run::default()
         },
         ..SearchSettings::default()

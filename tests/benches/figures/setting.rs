@@ -9,6 +9,7 @@ use std::{
 };
 
 use grasp_assets::{
+    atlas_folder::AtlasFolder,
     holdouts::holdouts,
     objects::{BuiltInObject, Manifest, objects},
 };
@@ -120,9 +121,9 @@ impl Setting {
         &self.folder
     }
 
-    /// The folder that atlases are kept in.
-    pub(crate) fn atlases(&self) -> PathBuf {
-        self.folder.join("atlases")
+    /// The folder of atlases, shared with tests and experiments.
+    pub(crate) fn atlases() -> AtlasFolder {
+        AtlasFolder::in_target()
     }
 
     /// A folder of atlases that holds what [`Setting::atlases`] holds now, and nothing of an earlier run.
@@ -132,7 +133,7 @@ impl Setting {
             fs::remove_dir_all(&copy).expect("the copy is this bench's own");
         }
         fs::create_dir_all(&copy).expect("cargo's target folder can be written");
-        for file in fs::read_dir(self.atlases()).into_iter().flatten() {
+        for file in fs::read_dir(Self::atlases().path()).into_iter().flatten() {
             let file = file.expect("the folder can be read");
             fs::copy(file.path(), copy.join(file.file_name())).expect("an atlas can be copied");
         }
@@ -226,7 +227,7 @@ impl Setting {
     pub(crate) fn server_with_atlases(&self, things: &[&Thing]) -> TestServer {
         let server = self.server(|config| {
             config.builder_threads = thread::available_parallelism().map_or(1, usize::from);
-            config.atlas_directory = Some(self.atlases());
+            config.atlas_directory = Some(Self::atlases().path().to_owned());
         });
         self.calling.block_on(async {
             register(&server, things).await;

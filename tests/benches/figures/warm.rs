@@ -108,7 +108,7 @@ fn in_the_core(setting: &Setting, things: &[Thing]) -> Vec<Line> {
     let mut searches = Vec::new();
     let mut look_ups = Vec::new();
     for thing in things {
-        let Some(atlas) = core.atlas(thing.id(), &setting.atlases(), &thing.object) else {
+        let Some(atlas) = core.atlas(thing.id(), &Setting::atlases(), &thing.object) else {
             continue;
         };
         let of_thing = built_in.iter().filter(|(object, _)| *object == thing.id());

@@ -1,7 +1,7 @@
 //! The folder of a run, with everything made so far: an interrupted run resumes from it.
 //!
 //! `manifest.json` describes all records; `records.jsonl` has one record per line, each written at once. A truncated last
-//! line is dropped. `atlases/` has the atlases ([`crate::atlases`]).
+//! line is dropped.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -146,7 +146,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Opens a run's folder, or begins one. With `fresh`, existing records are discarded, but not atlases.
+    /// Opens a run's folder, or begins one. With `fresh`, existing records are discarded.
     ///
     /// # Errors
     /// The folder cannot be written, is in use, or belongs to another run.

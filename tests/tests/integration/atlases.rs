@@ -2,11 +2,16 @@
 
 use std::{fs, path::PathBuf};
 
-use grasp_assets::{atlases::atlas, hands::hand, objects::object};
+use grasp_assets::{
+    atlas_folder::{AtlasFolder, complete_atlas},
+    atlases::shipped_atlas,
+    hands::hand,
+    objects::object,
+};
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
-    known::codec::decode,
+    known::{codec::decode, key::file_name},
     model::hand::{Handedness, joints::HandJoints},
 };
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
@@ -23,6 +28,21 @@ async fn start(folder: &Folder) -> TestServer {
         config.atlas_directory = Some(folder.path().to_owned());
     })
     .await
+}
+
+/// A server whose atlas of a built-in object is complete for the default rig's right hand from its start, and its folder.
+pub(crate) async fn with_complete_atlas(object_name: &str) -> (TestServer, Folder) {
+    let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
+    let object = &object(object_name).expect("it is built in").object;
+    let complete = complete_atlas(object_name, rig);
+    let folder = Folder::empty(&format!("complete-{object_name}"));
+    let kept = AtlasFolder::in_target().file(object, rig);
+    fs::copy(kept, folder.path().join(file_name(object, rig))).expect("it was just read");
+    let server = start(&folder).await;
+    let entries = complete.entries().len() as u32;
+    let state = state(&server, &format!("objects/{object_name}"), entries).await;
+    assert_eq!(state.entries, entries);
+    (server, folder)
 }
 
 /// Waits until an object's atlas has `least` grips, and returns its state.
@@ -160,14 +180,65 @@ async fn a_recently_found_grip_answers_the_next_request() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn finger_subsets_are_searched_once_and_then_answered_as_recent() {
-    let folder = Folder::absent("sparing");
+async fn shipped_grips_answer_while_the_atlas_grows() {
+    let folder = Folder::absent("shipped");
     let server = start(&folder).await;
-    state(&server, "objects/scalpel", FIRST).await;
+    for (side, handedness) in [
+        (Handedness::Right, v1::Handedness::Right),
+        (Handedness::Left, v1::Handedness::Left),
+    ] {
+        let rig = &hand("adult", side).expect("it is built in").rig;
+        let remote = &object("remote").expect("it is built in").object;
+        let bytes = shipped_atlas("remote", rig).expect("it is shipped");
+        let shipped = decode(bytes, remote, rig).expect("it is current").atlas;
+        assert!(!shipped.is_complete());
+        let request = v1::FindGraspRequest {
+            object: "objects/remote".to_owned(),
+            budget: Some(seconds(10)),
+            receiving_hand: Some(v1::ReceivingHand {
+                rig: String::new(),
+                handedness: handedness.into(),
+            }),
+            ..Default::default()
+        };
+        let ask = async |request: v1::FindGraspRequest| {
+            let answer = server.grasps().await.find_grasp(request).await;
+            answer
+                .unwrap()
+                .into_inner()
+                .report
+                .expect("every answer has a report")
+        };
+        let report = bounded("the reading of the shipped grips", async {
+            loop {
+                let report = ask(request.clone()).await;
+                if report.source() == v1::GraspSource::Atlas {
+                    break report;
+                }
+            }
+        })
+        .await;
+        // Nothing that grows meanwhile is seen.
+        assert_eq!(report.atlas_entries as usize, shipped.entries().len());
+        assert_eq!(report.atlas_stamp, format!("{:016x}", shipped.stamp()));
+        // Reproducible answers wait for the complete atlas.
+        let report = ask(v1::FindGraspRequest {
+            reproducible: true,
+            ..request
+        })
+        .await;
+        assert_eq!((report.atlas_entries, report.atlas_stamp.as_str()), (0, ""));
+    }
+    let state = state(&server, "objects/remote", 1).await;
+    assert!(!state.complete);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn finger_subsets_are_searched_once_and_then_answered_as_recent() {
+    let (server, _folder) = with_complete_atlas("scalpel").await;
     let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
-    let scalpel = &object("scalpel").expect("it is built in").object;
-    let bytes = atlas("scalpel", rig).expect("it is shipped");
-    let atlas = decode(bytes, scalpel, rig).expect("it is today's").atlas;
+    let atlas = complete_atlas("scalpel", rig);
     let ask = async |request: &v1::FindGraspRequest| {
         let answer = server.grasps().await.find_grasp(request.clone()).await;
         let answer = answer.unwrap().into_inner();

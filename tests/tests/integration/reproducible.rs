@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-use grasp_assets::{atlases::atlas, hands::hand, objects::object, primitives::held_primitives};
+use grasp_assets::{atlas_folder::complete_atlas, hands::hand, objects::object, primitives::held_primitives};
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
-    known::{codec::decode, seed_source::SeedSource, transferred_grips::TransferredGrips},
+    known::{seed_source::SeedSource, transferred_grips::TransferredGrips},
     model::hand::{Handedness, joints::HandJoints},
 };
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout, searches::search_from};
 use prost::Message as _;
 
 use crate::{
-    atlases::state,
+    atlases::with_complete_atlas,
     fixtures::{floating_remote, held_remote, impossible, seconds},
 };
 
@@ -131,9 +131,7 @@ async fn the_reported_seed_and_attempt_replay_the_grasp() {
 /// The scissors with known grips as givers: some leave no known grip.
 fn givers_of_the_scissors() -> impl Iterator<Item = ClientHoldout> {
     let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
-    let scissors = &object("scissors").expect("they are built in").object;
-    let shipped = atlas("scissors", rig).expect("it is shipped");
-    let known = decode(shipped, scissors, rig).expect("it is today's").atlas;
+    let known = complete_atlas("scissors", rig);
     (0..known.entries().len())
         .step_by(3)
         .map(move |index| ClientHoldout {
@@ -194,8 +192,7 @@ async fn without_an_atlas_transferred_grips_seed_the_search() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
-    let server = TestServer::start_with(|config| config.builder_threads = 1).await;
-    state(&server, "objects/scissors", 1000).await;
+    let (server, _folder) = with_complete_atlas("scissors").await;
     let replay_of = |request: &v1::FindGraspRequest, report: &v1::SearchReport, atlas: v1::AtlasUse| {
         v1::FindGraspRequest {
             only_attempt: report.attempt,

@@ -1,6 +1,6 @@
 //! The figures of an adult right hand: bone lengths, widths, where the bones lie, what the joints can do.
 //!
-//! Sources are named beside the figures and in `assets/PROVENANCE.md`. Everything without a source is this project's
+//! Sources are named next to the figures and in `assets/PROVENANCE.md`. Everything without a source is this project's
 //! own choice, made so that the hand keeps the sourced overall measures (length, breadth, palm length, tip heights).
 
 /// Lengths of the metacarpals of index, middle, ring and little finger in millimetres (X-ray means of 66 adults,
@@ -51,15 +51,14 @@ pub(super) const ROLL_DEGREES: [f32; 4] = [2.0, 0.0, -2.0, -4.0];
 /// The thumb's base (the CMC joint) in millimetres in the wrist frame: palmar of the other carpal bones.
 pub(super) const THUMB_BASE_MM: [f32; 3] = [22.0, 21.0, 9.0];
 
-/// The direction of the thumb beside the flat hand in degrees: away from +y in the palm's plane, and out of it.
+/// The direction of the thumb next to the flat hand in degrees: away from +y in the palm's plane, and out of it.
 pub(super) const THUMB_RADIAL_DEGREES: f32 = 27.0;
 /// See [`THUMB_RADIAL_DEGREES`].
 pub(super) const THUMB_PALMAR_DEGREES: f32 = 5.0;
-/// The direction of the thumb's pad beside the flat hand in degrees: from the palm's normal toward the little
+/// The direction of the thumb's pad next to the flat hand in degrees: from the palm's normal toward the little
 /// finger's side. It contains the 17 degrees by which a thumb turns about its own length when it opposes the fingers
-/// (Cooney 1981), because the model has no roll. Of 60 to 115 degrees, those from 85 on let the thumb oppose index and
-/// middle finger across objects of 0.3 to 8 cm in the most poses; with smaller ones it flexes out of the palm instead
-/// of across it, with larger ones into the palm.
+/// (Cooney 1981), because the model has no roll. With smaller angles the thumb flexes out of the palm instead of across
+/// it, with larger ones into the palm.
 pub(super) const THUMB_PAD_DEGREES: f32 = 73.0 + 17.0;
 
 /// The length in millimetres from wrist to tip of the stretched middle finger in the rig `thesis` (thesis 4.3).

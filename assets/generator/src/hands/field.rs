@@ -168,7 +168,7 @@ impl HandField {
         p
     }
 
-    /// How far the surface is from an inner point in a direction, in metres.
+    /// Distance from an inner point to the surface in a direction, in metres.
     pub(super) fn distance_to_skin(&self, from: Vec3, direction: Vec3) -> f32 {
         let mut t = 0.0;
         for _ in 0..64 {

@@ -1,6 +1,6 @@
 //! How much each joint moves each vertex of the skin.
 //!
-//! A vertex belongs to one digit, so that no finger pulls at its neighbour; only the fold of a web hangs on both of
+//! A vertex belongs to one digit, so that no finger pulls at its neighbour; only the fold of a web follows both of
 //! its fingers. Toward the wrist the digits give way to the palm, whose weights are spread over wrist and metacarpals.
 
 use glam::Vec3;
@@ -59,7 +59,7 @@ fn before_web_end(bind: &HandJoints, digit: usize, p: Vec3) -> f32 {
     )
 }
 
-/// How far a point belongs to a digit and not to the palm: a blend across the digit's root. Skin far from the
+/// To what share a point belongs to a digit rather than to the palm: a blend across the digit's root. Skin far from the
 /// phalanges, as in the web of the thumb, stays with the palm.
 fn root_share(bind: &HandJoints, digit: usize, over: f32, scale: f32, p: Vec3) -> f32 {
     let close = smooth_step(14.0 * scale, 3.0 * scale, over);

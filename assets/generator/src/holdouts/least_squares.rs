@@ -1,11 +1,11 @@
 //! Levenberg–Marquardt for a few dozen bounded parameters (Nocedal and Wright, Numerical Optimization, 10.3), with
 //! forward differences: the same input gives the same bits.
 
-/// Step of the forward differences, in units of the parameters: small beside the 0.1 rad over which residuals bend,
-/// large beside the rounding of f32 geometry.
+/// Step of the forward differences, in units of the parameters: small compared with the 0.1 rad over which residuals
+/// bend, large compared with the rounding of f32 geometry.
 const DIFFERENCE: f64 = 1e-3;
 
-/// Iterations that change the cost by less than this share end the descent.
+/// The descent ends once an iteration lowers the cost by less than this share.
 const RELATIVE_PROGRESS: f64 = 1e-6;
 
 /// Where a descent ended.
@@ -17,7 +17,7 @@ pub(crate) struct Minimum {
     pub(crate) cost: f64,
 }
 
-/// Descends from `start` inside of `bounds` (one closed range a parameter) for at most `iterations` steps.
+/// Descends from `start` within `bounds` (one closed range per parameter) for at most `iterations` steps.
 /// `residuals` must always return the same number of values.
 pub(crate) fn minimise(
     start: &[f64],
@@ -72,7 +72,7 @@ fn half_square(values: &[f64]) -> f64 {
     0.5 * dot(values, values)
 }
 
-/// One column a parameter.
+/// One column per parameter.
 fn jacobian(
     parameters: &[f64],
     bounds: &[(f64, f64)],

@@ -1,4 +1,4 @@
-//! Pictures of the holdouts: whether a grasp looks like its type, only a look can tell.
+//! Pictures of the holdouts: whether a grasp looks like its type can only be judged by eye.
 
 use std::{fs, io, path::Path};
 
@@ -7,7 +7,7 @@ use grasp_assets::{hands::hand, holdouts::BuiltInHoldout, objects::object};
 use grasp_scene::{Camera, Finish, Part, RenderOptions, Scene, contact_sheet, linear_from_srgb, render};
 use grasp_synthesis::model::hand::joints::HandJoints;
 
-/// Where the camera is, seen from the holdout: the receiver's view, the giver's right and left, and from above.
+/// Direction from the holdout to the camera: the receiver's view, the giver's right and left, and above.
 const VIEWS: [(&str, Vec3); 4] = [
     ("from the receiver", Vec3::new(0.35, 0.35, 1.0)),
     ("from the giver's right", Vec3::new(-1.0, 0.25, 0.2)),
@@ -15,7 +15,7 @@ const VIEWS: [(&str, Vec3); 4] = [
     ("from above", Vec3::new(0.05, 1.0, -0.25)),
 ];
 
-/// Writes a sheet of views of each holdout.
+/// Writes a sheet of views for each holdout.
 ///
 /// # Errors
 /// A picture cannot be written.

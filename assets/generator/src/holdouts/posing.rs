@@ -1,5 +1,6 @@
-//! Poses a giver's hand after an author's intent: a rough orientation of the hand, a rough angle for every joint, and what should touch
-//! where. A descent refines all of it, keeps the hand out of the object and of itself, and stays in the rig's limits.
+//! Poses a giver's hand as its author describes it: a rough orientation of the hand, a rough angle for every joint, and
+//! what should touch where. A descent refines all of it, keeps the hand out of the object and of itself, and stays within
+//! the rig's limits.
 
 use glam::{Mat3, Quat, Vec2, Vec3};
 use grasp_assets::hands::Hand;
@@ -16,16 +17,16 @@ use serde::Deserialize;
 
 use super::{
     halton::halton,
+    hand_capsules::{Capsule, Palm, links, signed_distance},
     least_squares::minimise,
-    solids::{Capsule, Palm, links, signed_distance},
 };
 
-/// A hold as its author sees it, in the object's frame.
+/// A hold as its author describes it, in the object's frame.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Intent {
-    /// Where stretched fingers would about point.
+    /// About where stretched fingers would point.
     pub(crate) fingers: [f32; 3],
-    /// Where the palm about faces.
+    /// About where the palm faces.
     pub(crate) palm: [f32; 3],
     /// About how each digit is bent, thumb first.
     pub(crate) digits: [Bend; 5],
@@ -36,7 +37,7 @@ pub(crate) struct Intent {
     pub(crate) palm_touches: Vec<PalmTouch>,
 }
 
-/// Angles in degrees that a digit should be near to.
+/// Approximate angles of a digit, in degrees.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Bend {
@@ -99,7 +100,7 @@ pub(crate) struct Touch {
     pub(crate) side: Side,
     /// About where, in millimetres; the surface point nearest to it is meant.
     pub(crate) at_mm: [f32; 3],
-    /// How much the place matters beside the touch itself: 0 anywhere, 1 there and nowhere else.
+    /// How much the place matters compared with the touch itself: 0 anywhere, 1 only there.
     #[serde(default = "some_place")]
     pub(crate) place: f32,
 }
@@ -125,34 +126,34 @@ fn some_palm_place() -> f32 {
     0.1
 }
 
-/// How deep flesh may be pressed in without cost, in metres: skin gives about that much.
+/// How deep flesh may be pressed in without cost, in metres: about as much as skin gives.
 const SOFTNESS: f32 = 0.0005;
 
 /// How much two fingers may press into each other without cost, in metres: flesh between fingers gives more than pads.
 const SELF_SOFTNESS: f32 = 0.0015;
 
-/// Descents from slightly different starts; the best one counts.
+/// Descents from slightly different starting points; the best one counts.
 const STARTS: u32 = 10;
 
-/// Iterations of a descent: it mostly ends by itself after 20 to 60.
+/// Upper bound on the iterations of a descent; most converge after 20 to 60.
 const ITERATIONS: usize = 120;
 
-/// Metres that one unit of a position's parameter stands for, so that a unit moves fingertips about as far as a radian.
+/// Metres per unit of a position parameter: a unit then moves fingertips about as far as a radian does.
 const POSITION_SCALE: f32 = 0.1;
 
-/// Residuals are millimetres times these. A touch off its surface by 1 mm costs 1.
+/// Weights of the residuals, which are in millimetres. A touch 1 mm off its surface costs 1.
 const WEIGHT_TOUCH: f32 = 1.0;
-/// A skin that faces the surface at an angle, per sine.
+/// Skin that faces the surface at an angle, per unit of the sine.
 const WEIGHT_FACING: f32 = 3.0;
 /// Overlap with the object.
 const WEIGHT_PENETRATION: f32 = 2.0;
 /// Overlap of digits.
 const WEIGHT_SELF: f32 = 1.5;
-/// An angle off by a radian, times the digit's firmness.
+/// An angle's deviation in radians, times the digit's firmness.
 const WEIGHT_ANGLE: f32 = 2.5;
-/// The wrist off by a radian.
+/// The wrist's rotation off its guess, per radian.
 const WEIGHT_WRIST_TURN: f32 = 4.0;
-/// The wrist off by a metre.
+/// The wrist's shift off its guess, per metre.
 const WEIGHT_WRIST_SHIFT: f32 = 60.0;
 
 /// A touch on the mesh.
@@ -172,7 +173,7 @@ enum Part {
     Palm(Vec3),
 }
 
-/// What a descent works on.
+/// The problem that a descent solves.
 struct Problem<'a> {
     hand: &'a Hand,
     palm: &'a Palm,
@@ -185,7 +186,7 @@ struct Problem<'a> {
     allowed: Vec<f32>,
 }
 
-/// The hand in the object's frame that comes closest to `intent`, and what it cost.
+/// The hand in the object's frame that comes closest to `intent`, and its cost.
 pub(crate) fn pose_hand(hand: &Hand, object: &MeshBvh, intent: &Intent) -> (HandPose, f64) {
     let palm = Palm::of(hand);
     let problem = Problem::new(hand, &palm, object, intent);
@@ -229,7 +230,7 @@ impl<'a> Problem<'a> {
             contacts: links.chain(palms).collect(),
             allowed: Vec::new(),
         };
-        // Where the parts that should touch are nearest to their targets on the mean.
+        // The position in which the parts that should touch are nearest to their targets on average.
         let posed = problem.pose(&problem.start(0));
         let frames = hand_frames(&hand.rig, &posed);
         let share = 1.0 / problem.contacts.len().max(1) as f32;
@@ -373,7 +374,7 @@ impl<'a> Problem<'a> {
         }
         for &point in &self.palm.points {
             let point = pose.frame_from_wrist.transform_point(point);
-            // Outside and at most on the skin: only points inside the object count.
+            // Only points inside the object count.
             let depth = if self.object.contains(point) {
                 -signed_distance(self.object, point, 0.05)
             } else {

@@ -1,4 +1,4 @@
-//! Measures the holdouts and prints a table: what a look at the pictures cannot tell.
+//! Measures the holdouts and prints a table of what pictures do not show.
 
 use std::sync::atomic::AtomicBool;
 
@@ -7,33 +7,35 @@ use grasp_assets::{
     holdouts::BuiltInHoldout,
 };
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
-    known::{recent_grips::RecentGrips, seed_source::SeedSource},
     model::{
-        constraints::Constraints,
         hand::{Digit, HandPose, Handedness, Phalanx},
         holdout::Holdout,
-        strategy::{Choice, Strategy},
+        strategy::{Strategy, Validity},
     },
-    search::{find_grasp, settings::SearchSettings},
+    propose::prepared::PreparedObject,
+    search::{
+        find_grasp,
+        scene::Task,
+        settings::{Query, Run, SearchSettings},
+    },
 };
 
 use super::{
-    judge::{Figures, coverage, overlap, surface_points},
-    search::{FRICTION, NoClock},
-    solids::Palm,
+    attempt_search::{FRICTION, NoClock},
+    hand_capsules::Palm,
+    hold_figures::{Figures, coverage, overlap, surface_points},
 };
 
-/// Points of the surface at which coverage and overlap are taken.
+/// Surface points at which coverage and overlap are measured.
 const SURFACE_POINTS: u32 = 3000;
 
-/// A link touches if its skin is at most this far from the surface, in metres.
+/// Largest distance between a touching link's skin and the surface, in metres.
 const TOUCHES: f32 = 0.003;
 
-/// Valid grasps that the mean number of attempts is taken over.
+/// Valid grasps over which the number of attempts is averaged.
 const GRASPS: u64 = 10;
 
-/// Attempts after which a grasp is given up.
+/// Attempts after which the search for a grasp is abandoned.
 const MOST_ATTEMPTS: u64 = 3_000_000;
 
 /// Prints a line for each holdout.
@@ -45,7 +47,8 @@ pub(crate) fn report(holdouts: &[BuiltInHoldout]) {
     for holdout in holdouts {
         let giver = hand(&holdout.giver_rig, holdout.giver_handedness).expect("the rigs are built in");
         let held = holdout.to_holdout().expect("built-in holdouts can be made ready");
-        let attempts = attempts_per_grasp(&held).map_or("none".to_owned(), |mean| format!("{mean:.0}"));
+        let attempts = attempts_per_grasp(&held, holdout.prepared_object())
+            .map_or("none".to_owned(), |mean| format!("{mean:.0}"));
         println!("{} {attempts}", line(holdout, giver, &held));
     }
 }
@@ -95,8 +98,8 @@ fn touching(figures: &Figures) -> String {
     words.join(" ")
 }
 
-/// Mean attempts that a receiver's right hand needs with strategy F; none if no grasp was found.
-fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
+/// Mean number of attempts that a receiver's right hand needs with strategy F; none if no grasp was found.
+fn attempts_per_grasp(held: &Holdout, object: &PreparedObject) -> Option<f64> {
     let receiver = hand("thesis", Handedness::Right).expect("the rigs are built in");
     let pool = rayon::ThreadPoolBuilder::new()
         .build()
@@ -104,33 +107,28 @@ fn attempts_per_grasp(held: &Holdout) -> Option<f64> {
     let (mut attempts, mut grasps) = (0, 0_u32);
     for seed in 1..=GRASPS {
         let settings = SearchSettings {
-            seed,
-            strategy: Strategy::F,
-            validity: grasp_synthesis::model::strategy::Validity::Thesis,
-            bend_ratios: Strategy::F.default_bend_ratios(),
-            friction: FRICTION,
-            reproducible: true,
-            first_attempt: 0,
-            max_attempts: MOST_ATTEMPTS,
-            deadline: None,
-            workers: pool.current_num_threads(),
-            record_step_times: false,
-            mechanisms: Mechanisms::ALL,
-            constraints: Constraints::default(),
-            choice: Choice::FirstValid,
-            atlas: None,
-            starts: SeedSource::Nothing,
-            recent: RecentGrips::default(),
-            known_tried: 0,
+            query: Query {
+                strategy: Strategy::F,
+                validity: Validity::Thesis,
+                bend_ratios: Strategy::F.default_bend_ratios(),
+                friction: Some(FRICTION),
+                ..Query::default()
+            },
+            run: Run {
+                seed,
+                reproducible: true,
+                max_attempts: MOST_ATTEMPTS,
+                workers: pool.current_num_threads(),
+                ..Run::default()
+            },
+            ..SearchSettings::default()
         };
-        let outcome = find_grasp(
-            &pool,
-            held,
-            &receiver.rig,
-            &settings,
-            &NoClock,
-            &AtomicBool::new(false),
-        );
+        let task = Task {
+            holdout: held,
+            object,
+            rig: &receiver.rig,
+        };
+        let outcome = find_grasp(&pool, task, &settings, &NoClock, &AtomicBool::new(false));
         // Indices start at 0.
         attempts += outcome
             .report

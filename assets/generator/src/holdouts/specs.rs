@@ -1,13 +1,13 @@
-//! What the author of the holdouts wrote down: `holds.toml`, `genholds.toml`, and the record of the last search.
+//! The files behind the holdouts: `holds.toml`, `genholds.toml`, and the record of the last search.
 
 use std::{fs, io, path::PathBuf};
 
 use glam::Quat;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use super::{posing::Intent, wish::Wish};
+use super::{grasp_template::GraspTemplate, posing::Intent};
 
-/// Where the author's files are.
+/// The folder of the files.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/holdouts");
 
 /// A Hold: what it is, how it is turned, and the hand.
@@ -17,7 +17,7 @@ pub(crate) struct HoldSpec {
     pub(crate) name: String,
     /// The object's name.
     pub(crate) object: String,
-    /// The grasp type, as the thesis' caption has it.
+    /// The grasp type, as in the thesis' caption.
     pub(crate) grasp_type: String,
     /// The object's direction that points to the receiver.
     pub(crate) receiver: [f32; 3],
@@ -28,21 +28,20 @@ pub(crate) struct HoldSpec {
     pub(crate) intent: Intent,
 }
 
-/// A synthesized holdout: what the search looks for.
+/// A synthesized holdout that the search looks for.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Target {
     /// The holdout's name.
     pub(crate) name: String,
     /// The object's name.
     pub(crate) object: String,
-    /// The grasp type, as the thesis' caption has it.
+    /// The grasp type, as in the thesis' caption.
     pub(crate) grasp_type: String,
-    /// The object's direction that should point to the receiver; where the hand leaves the object free if there is
-    /// none.
+    /// The object's direction that should point to the receiver; by default, toward the part that the hand leaves free.
     pub(crate) offered: Option<[f32; 3]>,
     /// How it looks.
     #[serde(flatten)]
-    pub(crate) wish: Wish,
+    pub(crate) template: GraspTemplate,
 }
 
 #[derive(Deserialize)]
@@ -57,7 +56,7 @@ struct GenHolds {
     genhold: Vec<Target>,
 }
 
-/// A grasp of the synthesis that was chosen to be a holdout.
+/// A grasp of the synthesis that was chosen as a holdout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Selected {
@@ -67,7 +66,7 @@ pub(crate) struct Selected {
     pub(crate) seed: u64,
     /// The index of the attempt.
     pub(crate) attempt: u64,
-    /// How the object is turned in the world; gravity follows from it.
+    /// The object's orientation in the world, from which gravity follows.
     pub(crate) world_from_object: Quat,
 }
 
@@ -93,7 +92,7 @@ pub(crate) fn selection() -> Vec<Selected> {
     read::<Selection>("selection.toml").selected
 }
 
-/// Records what a search chose.
+/// Records the choices of a search.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -107,7 +106,7 @@ fn path(file: &str) -> PathBuf {
     PathBuf::from(FOLDER).join(file)
 }
 
-/// The files belong to the generator as its code does, so that a fault in them is one of the program.
+/// The files are part of the generator, so an error in them is a bug.
 fn read<T: DeserializeOwned>(file: &str) -> T {
     let path = path(file);
     let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

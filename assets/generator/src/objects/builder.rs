@@ -1,7 +1,7 @@
 //! Closed meshes from rings of vertices: lofted, split and capped.
 //!
 //! A ring runs counter-clockwise about the direction in which the surface is built. Strips between rings then face
-//! outward without further thought. Lengths are millimetres until [`MeshBuilder::finish`].
+//! outward by construction. Lengths are millimetres until [`MeshBuilder::finish`].
 
 use glam::{DVec2, DVec3, Vec3};
 use grasp_synthesis::geometry::mesh::TriangleMesh;

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 
 use super::builder::{MeshBuilder, Ring, Shape, on_rounded_rectangle, sin_cos_degrees};
 
-/// All but the buttons.
+/// Everything but the buttons.
 const BODY: &str = "body";
 
 /// Sides and tops of the buttons.
@@ -24,13 +24,13 @@ const CORNER_RADIUS: f64 = 13.0;
 const COLUMNS: [f64; 4] = [-18.6, -6.2, 6.2, 18.6];
 const CUTS: usize = 3;
 
-/// In how many parts the sides of the pad's row are cut: more, because its circle needs them.
+/// Parts into which the sides of the pad's row are cut: more than elsewhere, because its circle needs them.
 const PAD_CUTS: usize = 5;
 
-/// Cross-sections of the body from above to below: how far inside the outline, and z, in millimetres.
+/// Cross-sections of the body from top to bottom: how far inside the outline, and z, in millimetres.
 const BODY_RINGS: [[f64; 2]; 5] = [[2.2, -0.2], [0.7, -1.2], [0.0, -3.8], [1.8, -15.0], [6.0, -19.0]];
 
-/// What is in a row of the grid.
+/// The contents of a row of the grid.
 enum Row {
     /// A button or nothing for each column.
     Cells([Option<Button>; 3]),

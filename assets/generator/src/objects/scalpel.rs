@@ -1,7 +1,7 @@
 //! A scalpel: handle no. 3 (flat, waisted, with cross grooves where the fingers hold it) and blade no. 10 (straight
 //! back, curved belly), 15.6 cm long together.
 //!
-//! One loft along the long axis with 16 vertices a cross-section. The blade's edge looks toward +X.
+//! One loft along the long axis with 16 vertices per cross-section. The blade's edge looks toward +X.
 
 use glam::{DVec2, DVec3};
 
@@ -120,7 +120,7 @@ fn blade_group(k: usize) -> &'static str {
 /// A rounded rectangle, counter-clockwise about +y: from the side at +x over −z.
 fn handle_section(y: f64, half_size: DVec2, radius: f64) -> [DVec3; 16] {
     std::array::from_fn(|k| {
-        // Four vertices a corner, 30° apart on its arc.
+        // Four vertices per corner, 30° apart on its arc.
         let (sine, cosine) = sin_cos_degrees(90.0 * (k / 4) as f64 + 30.0 * (k % 4) as f64);
         let corner = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)][k / 4];
         let core = (half_size - DVec2::splat(radius)) * DVec2::from(corner);

@@ -1,4 +1,4 @@
-//! Shut surgical scissors of Mayo's kind, 16 cm long: two blades that cross at a screw, two shanks, two finger rings.
+//! Closed Mayo scissors (surgical), 16 cm long: two blades that cross at a screw, two shanks, two finger rings.
 //!
 //! One closed surface with two holes. Every cross-section has eight vertices; the surface forks once behind the screw
 //! and once at each finger ring, whose ends meet again at the fork.
@@ -10,7 +10,7 @@ use super::builder::{MeshBuilder, Ring, Shape, fork, sin_cos_degrees};
 /// The only group.
 const BODY: &str = "body";
 
-/// A cross-section of the two shut blades, in millimetres. The upper blade reaches from its back on the left to its
+/// A cross-section of the two closed blades, in millimetres. The upper blade reaches from its back on the left to its
 /// edge right of the middle, the lower one mirrored through the long axis.
 struct BladeSection {
     /// Along the long axis, from the screw.
@@ -51,7 +51,7 @@ const BLADES: [BladeSection; 4] = [
     },
 ];
 
-/// Tip of the shut blades from the screw, in millimetres.
+/// Tip of the closed blades from the screw, in millimetres.
 const TIP_Y: f64 = 65.0;
 
 /// Cross-sections of the flat box around the screw: y, half width and half thickness in millimetres.

@@ -105,13 +105,14 @@ impl Arguments {
     }
 }
 
-/// Waits until the server has loaded the built-in atlases: answers, and so the pictures of a seed, depend on them.
+/// Waits until the grips that ship with the server are read, a moment after its start: then the same seed always shows
+/// the same grasps.
 async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
     let start = Instant::now();
     loop {
         let objects = client.list_objects().await?;
-        let is_loaded = |object: &Object| object.atlas.as_ref().is_some_and(|atlas| atlas.complete);
-        if objects.iter().all(is_loaded) || start.elapsed() > ATLAS_LOAD_TIME {
+        let is_read = |object: &Object| object.atlas.as_ref().is_some_and(|atlas| atlas.entries > 0);
+        if objects.iter().all(is_read) || start.elapsed() > ATLAS_LOAD_TIME {
             return Ok(());
         }
         tokio::time::sleep(Duration::from_millis(10)).await;

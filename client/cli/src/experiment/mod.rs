@@ -12,6 +12,7 @@ use std::{
 };
 
 use clap::{Args, ValueEnum};
+use grasp_assets::atlas_folder::AtlasFolder;
 use grasp_experiment::{
     atlases::Atlases,
     folder::{Folder, Manifest},
@@ -30,9 +31,9 @@ const ABOUT: &str = r#"Reproduce the grasp sets of chapter 5 of the thesis, and 
 For each set and built-in holdout, this searches for valid grasps and records the first failed attempts, in this process
 and with the server's search library. The output folder keeps every grasp and attempt with its seed and index: an
 interrupted run resumes, and a run that asks for more adds only what is missing. Set ATLAS needs the complete atlases of
-the objects: any that are not built in are grown first, which takes minutes per object, and kept in the folder. The
-report has tables next to the thesis's figures, every plot as SVG and CSV, the claims of chapter 5 against this run, and
-a contact sheet of grasps ordered by comfort.
+the objects: those missing in --atlases grow first, some twenty seconds each. The report has tables next to the thesis's
+figures, every plot as SVG and CSV, the claims of chapter 5 against this run, and a contact sheet of grasps ordered by
+comfort.
 
 With --json: {"folder", "report", "ladder": [{column: value, …}], "claims": [{"source", "thesis", "run", "verdict",
 "why"}]}."#;
@@ -105,10 +106,13 @@ pub(crate) struct Arguments {
     /// The folder of the run.
     #[arg(long, value_name = "FOLDER", default_value = "target/experiment")]
     out: PathBuf,
+    /// The folder that complete atlases are kept in; all runs can share it.
+    #[arg(long, value_name = "FOLDER", default_value = "target/atlases")]
+    atlases: PathBuf,
     /// The folder of the report. Default: `report` in the folder of the run.
     #[arg(long, value_name = "FOLDER")]
     report: Option<PathBuf>,
-    /// Discard an earlier run in the folder, except for its atlases.
+    /// Discard an earlier run in the folder.
     #[arg(long)]
     fresh: bool,
 }
@@ -132,7 +136,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         let mut folder = Folder::open(&arguments.out, manifest, arguments.fresh)
             .map_err(|error| Failure::other("cannot use the folder of the run", error))?;
         let mut progress = RunProgress::default();
-        let atlases = Atlases::complete(&settings, &folder, grasp_assets::atlases::atlas, &stop, |now| {
+        let atlas_folder = AtlasFolder::new(arguments.atlases);
+        let atlases = Atlases::complete(&settings, &folder, &atlas_folder, &stop, |now| {
             progress.grow(&now);
         })
         .map_err(|error| Failure::other("cannot grow the atlases", error))?

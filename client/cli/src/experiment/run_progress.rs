@@ -30,7 +30,7 @@ impl RunProgress {
             self.atlas = Some((now.object, bar));
         }
         if let Some((_, bar)) = &self.atlas {
-            let why = now.refused.map_or_else(String::new, |why| {
+            let why = now.rejected.map_or_else(String::new, |why| {
                 format!("; the one in the folder is unusable: {why}")
             });
             bar.set_position(now.proposed);

@@ -77,6 +77,15 @@ pub fn encode(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
     bytes
 }
 
+/// The SHA-256 of everything that is kept of the grips, in their order: growth that differs in anything has another.
+pub fn fingerprint(grown: &Grown, object: &GraspObject, rig: &Rig) -> [u8; CHECKSUM_BYTES] {
+    let mut writer = Writer::default();
+    for (entry, shape) in grown.atlas.entries().iter().zip(&grown.shapes) {
+        write_entry(&mut writer, entry, shape, object, rig);
+    }
+    Sha256::digest(writer.into_bytes()).into()
+}
+
 /// What has grown for an object and a hand.
 ///
 /// # Errors

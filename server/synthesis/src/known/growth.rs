@@ -94,16 +94,23 @@ impl Grown {
         self.early_stamp
     }
 
-    /// The grips of its lists alone: of few, nearly every giver leaves some.
+    /// How many proposals were tried; 0 if these are the listed grips of another atlas.
+    pub fn proposed(&self) -> u64 {
+        self.proposed
+    }
+
+    /// The grips of its shortlists alone, as an incomplete atlas: nearly every giver leaves some of these few free. The
+    /// atlas itself cannot be grown from them: growth would start over at its first proposal.
     #[must_use]
     pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
         let places: Vec<usize> = self.atlas.listed().map(usize::from).collect();
         let entries = places.iter().map(|&place| self.atlas.entries()[place].clone());
         let grips = Grips::new(rig, entries.collect());
         Self {
-            atlas: Arc::new(Atlas::new(object, rig, grips, self.atlas.is_complete())),
+            atlas: Arc::new(Atlas::new(object, rig, grips, false)),
             shapes: places.iter().map(|&place| self.shapes[place]).collect(),
-            ..*self
+            proposed: 0,
+            early_stamp: self.early_stamp,
         }
     }
 

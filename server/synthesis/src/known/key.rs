@@ -1,5 +1,9 @@
 //! What an atlas was made of: another object, another hand or another algorithm makes other grips.
 
+mod algorithm;
+
+use std::fmt::Write as _;
+
 use sha2::{Digest as _, Sha256};
 
 use crate::{
@@ -15,20 +19,31 @@ use crate::{
     },
 };
 
-/// Counts the algorithms that made atlases. It is raised whenever the same object and hand get other grips, contacts or
-/// scores than before, so that atlases made earlier are not taken for today's.
-pub const ALGORITHM: u32 = 16;
+pub use crate::known::key::algorithm::ALGORITHM;
 
 /// Bytes of a key.
 pub const KEY_BYTES: usize = 32;
 
+/// Bytes of the key in a file name: 128 bits do not collide by chance.
+const FILE_NAME_BYTES: usize = 16;
+
 /// The SHA-256 of everything that the grips of an object and a hand depend on.
 pub fn key(object: &GraspObject, rig: &Rig) -> [u8; KEY_BYTES] {
     let mut hash = Hash(Sha256::new());
-    hash.count(ALGORITHM);
+    hash.0.update(ALGORITHM.to_le_bytes());
     hash.object(object);
     hash.rig(rig);
     hash.0.finalize().into()
+}
+
+/// The name of the file that keeps the atlas of an object and a hand: hexadecimal digits of the key and ".atlas".
+pub fn file_name(object: &GraspObject, rig: &Rig) -> String {
+    let mut name = String::with_capacity(2 * FILE_NAME_BYTES + 6);
+    for byte in &key(object, rig)[..FILE_NAME_BYTES] {
+        // Writing to a string cannot fail.
+        let _ = write!(name, "{byte:02x}");
+    }
+    name + ".atlas"
 }
 
 /// Hashes numbers, little-endian.

@@ -162,7 +162,7 @@ impl SeedSets {
             return Some(found);
         }
         let giver = demand.presented.giver.as_ref();
-        let grips = borrowed.perturbed(among, demand.rig, giver, demand.constraints, interrupted)?;
+        let grips = borrowed.for_giver(among, demand.rig, giver, demand.constraints, interrupted)?;
         let all = 0..grips.entries().len() as u16;
         let found = Seeds::of_with(demand.mechanisms, &grips, demand.rig, all, giver, interrupted)?;
         Some(seeds.get_or_init(|| (grips, found)))

@@ -40,8 +40,8 @@ pub(crate) fn spared_with(
         return None;
     }
     let kept = kept(entry, &solids, giver)?;
-    let inputs = TrackedSolids::of_rig(around.rig, entry.grip.pose.frame_from_wrist, &solids);
-    if is_met(giver, inputs.still()) {
+    let tracked = TrackedSolids::of_rig(around.rig, entry.grip.pose.frame_from_wrist, &solids);
+    if is_met(giver, tracked.still()) {
         return None;
     }
     let known = WholeGrip {

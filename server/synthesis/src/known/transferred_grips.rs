@@ -146,7 +146,7 @@ impl TransferredGrips {
 
     /// Those of the grips that are what is demanded and seem least in a giver's way, on the object; of those that are as little,
     /// the ones that fit best. `rig` is the hand that knows the boxes. None if interrupted.
-    pub fn perturbed(
+    pub fn for_giver(
         &self,
         among: Among,
         rig: &Rig,

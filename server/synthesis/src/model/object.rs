@@ -167,9 +167,9 @@ impl GraspObject {
 fn box_and_surface(mesh: TriangleMesh) -> (OrientedBox, MeshBvh) {
     let copy = mesh.clone();
     std::thread::scope(|scope| {
-        let perturbed = std::thread::Builder::new().spawn_scoped(scope, || OrientedBox::around(&copy));
+        let parallel = std::thread::Builder::new().spawn_scoped(scope, || OrientedBox::around(&copy));
         let surface = MeshBvh::build(mesh);
-        let bounding_box = perturbed.ok().and_then(|thread| thread.join().ok());
+        let bounding_box = parallel.ok().and_then(|thread| thread.join().ok());
         let bounding_box = bounding_box.unwrap_or_else(|| OrientedBox::around(&copy));
         (bounding_box, surface)
     })

@@ -61,7 +61,7 @@ pub(super) fn collect_contacts(
         }
     }
     let first_of_palm = contacts.len();
-    let inputs = TrackedPalm::of_rig(rig, pose.frame_from_wrist);
+    let tracked = TrackedPalm::of_rig(rig, pose.frame_from_wrist);
     // The ball of the thumb gives way with its metacarpal, and the web is a fold of skin: neither bears anything.
     for solid in &solids.palm {
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
@@ -72,8 +72,8 @@ pub(super) fn collect_contacts(
             let pressing = (solid.at(touch.along) - touch.point).normalize_or_zero();
             way_to_bone(solids, HandPart::Palm, touch.point).dot(pressing) >= OWN_COS
         };
-        let is_told = || inputs.distance_of_skin(touch.point) <= PALM_SLACK;
-        if contacts[first_of_palm..].iter().all(is_new) && is_own() && is_told() {
+        let is_tracked = || tracked.distance_of_skin(touch.point) <= PALM_SLACK;
+        if contacts[first_of_palm..].iter().all(is_new) && is_own() && is_tracked() {
             contacts.extend(contact(solids, &touch, HandPart::Palm));
         }
     }

@@ -125,7 +125,7 @@ impl ObjectFeatures {
         let across = (opposition.fingers - opposition.thumb).normalize_or_zero();
         let arm = weight - (opposition.fingers + opposition.thumb) * 0.5;
         let along = arm.dot(across);
-        let perturbed = (arm - across * along).length();
+        let sideways = (arm - across * along).length();
         // The network was taught on right hands.
         if rig.handedness == Handedness::Left {
             weight.x = -weight.x;
@@ -141,7 +141,7 @@ impl ObjectFeatures {
         let digits = shape.closing.iter().filter(|&&closes| closes).count();
         [
             opposition.width().max(LEAST_SIZE).ln(),
-            perturbed / self.characteristic_length,
+            sideways / self.characteristic_length,
             along.abs(),
             weight.x,
             weight.y,

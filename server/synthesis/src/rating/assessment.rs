@@ -67,8 +67,8 @@ impl Surroundings<'_> {
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        let inputs = TrackedSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
-        let giver_clearance = clear_of_giver(&inputs, presented.giver.as_ref());
+        let tracked = TrackedSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
+        let giver_clearance = clear_of_giver(&tracked, presented.giver.as_ref());
         let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         let mut grasp = grasp(
             grip,

@@ -269,7 +269,7 @@ mod tests {
             let own = dot(&cone.wrench(&push), &direction) - price * push.force.length();
             assert!(
                 (worth - own).abs() < 1e-12,
-                "case {case}: {worth} is inputs, {own} is had"
+                "case {case}: {worth} is given, {own} is found"
             );
             let rub = (push.force - cone.inward).length_squared() / cone.friction_squared;
             let used = rub + push.torsion.powi(2) / cone.torsion_squared;

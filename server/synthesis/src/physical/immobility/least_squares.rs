@@ -447,8 +447,11 @@ mod tests {
                 }
                 passive += 1;
             }
-            for (&ours, &inputs) in residual.iter().zip(solver.residual()) {
-                assert!((ours - inputs).abs() < 1e-9, "case {case}: {inputs}, not {ours}");
+            for (&ours, &reported) in residual.iter().zip(solver.residual()) {
+                assert!(
+                    (ours - reported).abs() < 1e-9,
+                    "case {case}: {reported}, not {ours}"
+                );
             }
             for column in &columns {
                 let gain = dot(column, &residual);

@@ -272,12 +272,12 @@ impl Skeleton {
 /// a hand's owner tells of its thickness may be more than what was fitted to another hand's skin.
 pub(super) fn palm_as_tracked(
     palm: &[TaperedCapsule; PALM_SOLIDS],
-    inputs: &TrackedPalm,
+    tracked: &TrackedPalm,
 ) -> [TaperedCapsule; PALM_SOLIDS] {
     let mut solids = *palm;
     for (solid, ends) in solids.iter_mut().zip(&PALM) {
-        let (start, start_radius) = as_tracked(ends[0].0, solid.start, solid.start_radius, inputs);
-        let (end, end_radius) = as_tracked(ends[1].0, solid.end, solid.end_radius, inputs);
+        let (start, start_radius) = as_tracked(ends[0].0, solid.start, solid.start_radius, tracked);
+        let (end, end_radius) = as_tracked(ends[1].0, solid.end, solid.end_radius, tracked);
         *solid = TaperedCapsule::new(start, end, start_radius, end_radius);
     }
     solids
@@ -285,10 +285,10 @@ pub(super) fn palm_as_tracked(
 
 /// The smallest ball around a fitted one that is as thick as the joints' radii say where it hangs.
 #[inline]
-fn as_tracked(anchor: Anchor, place: Vec3, radius: f32, inputs: &TrackedPalm) -> (Vec3, f32) {
+fn as_tracked(anchor: Anchor, place: Vec3, radius: f32, tracked: &TrackedPalm) -> (Vec3, f32) {
     let Between(a, b, share) = anchor else {
         return (place, radius);
     };
-    let (told_place, told_radius) = inputs.between(a, b, share);
-    TaperedCapsule::new(place, told_place, radius, told_radius).bounding_sphere()
+    let (tracked_place, tracked_radius) = tracked.between(a, b, share);
+    TaperedCapsule::new(place, tracked_place, radius, tracked_radius).bounding_sphere()
 }

@@ -28,7 +28,7 @@ pub struct TrackedSolids {
     pub palm: [TaperedCapsule; PALM_SOLIDS],
     /// What is told of the rest: across the knuckles, from the wrist to the metacarpals' bases and the thumb's, and the
     /// middle of the forearm.
-    pub inputs: [TaperedCapsule; TRACKED_SOLIDS],
+    pub tracked: [TaperedCapsule; TRACKED_SOLIDS],
 }
 
 impl TrackedSolids {
@@ -53,12 +53,12 @@ impl TrackedSolids {
     }
 
     fn new(hand: &HandSolids, palm: &TrackedPalm, forearm: TaperedCapsule) -> Self {
-        let mut inputs = [forearm; TRACKED_SOLIDS];
-        inputs[..AROUND_METACARPALS].copy_from_slice(&palm.around_metacarpals());
+        let mut tracked = [forearm; TRACKED_SOLIDS];
+        tracked[..AROUND_METACARPALS].copy_from_slice(&palm.around_metacarpals());
         Self {
             hand: *hand,
             palm: palm_as_tracked(&hand.palm, palm),
-            inputs,
+            tracked,
         }
     }
 
@@ -69,7 +69,7 @@ impl TrackedSolids {
             hand: self.hand.moved(way),
             ..*self
         };
-        for solid in moved.palm.iter_mut().chain(&mut moved.inputs) {
+        for solid in moved.palm.iter_mut().chain(&mut moved.tracked) {
             solid.start += way;
             solid.end += way;
         }
@@ -90,17 +90,17 @@ impl TrackedSolids {
             .chain(&self.palm)
             .chain(thenar)
             .chain(forearm)
-            .chain(&self.inputs)
+            .chain(&self.tracked)
     }
 
     /// Those of them that stay where the wrist is, whatever the digits do.
     pub fn still(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
-        self.palm.iter().chain(&self.hand.forearm).chain(&self.inputs)
+        self.palm.iter().chain(&self.hand.forearm).chain(&self.tracked)
     }
 
     /// All solids in the order of [`TrackedSolids::iter`], side by side.
     pub(crate) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
-        let mut all = [self.inputs[0]; Self::COUNT];
+        let mut all = [self.tracked[0]; Self::COUNT];
         for (place, solid) in all.iter_mut().zip(self.iter()) {
             *place = *solid;
         }

@@ -1,4 +1,4 @@
-//! The numbers that the network was taught: made by `grasp-assets-generator prospects`, not by hand.
+//! The numbers that the network was taught: made by `grasp-assets-generator success-prior`, not by hand.
 
 #![allow(clippy::unreadable_literal, clippy::excessive_precision)]
 

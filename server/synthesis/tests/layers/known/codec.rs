@@ -15,7 +15,7 @@ use sha2::{Digest as _, Sha256};
 use crate::fixtures::{
     atlases::{grown, growth},
     hands::{adult, right},
-    objects::{OBJECT_NAMES, object},
+    objects::{OBJECT_NAMES, object, prepared},
 };
 
 /// Length of the checksum at the end, in bytes.
@@ -69,7 +69,7 @@ fn an_interrupted_growth_resumes_to_the_same_atlas() {
     assert_ne!(before, &after[..before.len()]);
     assert!(half.atlas.entries().len() < whole.atlas.entries().len());
     assert_ne!(half.atlas.stamp(), whole.atlas.stamp());
-    assert!(grown(Growth::resume(object, rig, &half), 15) == whole);
+    assert!(grown(Growth::resume(prepared(object), rig, &half), 15) == whole);
 }
 
 #[test]
@@ -192,6 +192,12 @@ fn the_listed_part_of_an_atlas_is_an_atlas_of_its_shortlists() {
         .collect();
     assert!(!few.is_empty() && few.len() <= all.len());
     assert!(few.iter().eq(expected));
+    // They cannot pass for a complete atlas, nor for an interrupted growth.
+    assert!(!listed.atlas.is_complete());
+    assert_eq!(
+        (listed.proposed(), listed.early_stamp()),
+        (0, grown.early_stamp())
+    );
     // It round-trips like any other.
     let bytes = encode(&listed, object, rig);
     assert_eq!(decode_scissors(&bytes).expect("it is whole"), listed);

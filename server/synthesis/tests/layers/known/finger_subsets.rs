@@ -126,7 +126,7 @@ fn pose_of_digits(pose: &HandPose, digits: [bool; 5]) -> HandPose {
 }
 
 /// Every check of a grasp, independently of the search.
-fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &TrackedSolids) {
+pub(crate) fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &TrackedSolids) {
     let rig = right();
     let object = &holdout.object;
     let solids = HandSolids::of_pose(rig, &grasp.pose);

@@ -8,7 +8,7 @@ use grasp_synthesis::{
         atlas::Atlas,
         entry::Entry,
         seed_source::SeedSource,
-        seeds::{Start, Starts},
+        seeds::{Seed, Seeds},
     },
     model::holdout::Holdout,
     physical::{
@@ -52,7 +52,7 @@ fn farthest_clearance(entry: &Entry, giver: &TrackedSolids) -> f32 {
         .fold(f32::NEG_INFINITY, f32::max)
 }
 
-fn entries_of(seeds: &Starts) -> Vec<u16> {
+fn entries_of(seeds: &Seeds) -> Vec<u16> {
     seeds.all().iter().map(|seed| seed.entry).collect()
 }
 
@@ -65,7 +65,7 @@ fn seeds_are_the_grips_least_in_the_givers_way() {
         let presented = Presented::of(&holdout);
         let holding = known.holding_under(UP);
         let of = |order: &[u16]| {
-            Starts::of(
+            Seeds::of(
                 known.grips(),
                 rig,
                 order.iter().copied(),
@@ -80,13 +80,13 @@ fn seeds_are_the_grips_least_in_the_givers_way() {
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
         // Without a giver, as many of the best.
-        let nobody = Starts::of(known.grips(), rig, holding.iter().copied(), None, || false);
+        let nobody = Seeds::of(known.grips(), rig, holding.iter().copied(), None, || false);
         let best = entries_of(&nobody.expect("nobody interrupts"));
         assert!(best.len() >= 32 && holding.starts_with(&best));
         assert_eq!(seeds.all().len(), best.len());
         let distinct: HashSet<u16> = entries_of(&seeds).into_iter().collect();
         assert_eq!(distinct.len(), seeds.all().len());
-        for (&Start { entry, kept }, expected) in seeds.all().iter().zip(clearances) {
+        for (&Seed { entry, kept }, expected) in seeds.all().iter().zip(clearances) {
             let known = &known.entries()[usize::from(entry)];
             assert!(known.finger_subsets.contains(kept), "giver {grip}, {entry}");
             let found = clearance(known, kept, &giver);
@@ -95,7 +95,7 @@ fn seeds_are_the_grips_least_in_the_givers_way() {
                 "giver {grip}, {entry}: {found}, not {expected}"
             );
         }
-        let interrupted = Starts::of(
+        let interrupted = Seeds::of(
             known.grips(),
             rig,
             holding.iter().copied(),
@@ -125,7 +125,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
         let excluded = known.excluded_by(giver);
         let mut open = holding.clone().filter(|&entry| !excluded.contains(entry));
         let seeds = |of: &mut dyn Iterator<Item = u16>| {
-            Starts::of(known.grips(), rig, of, Some(giver), || false).expect("nobody interrupts")
+            Seeds::of(known.grips(), rig, of, Some(giver), || false).expect("nobody interrupts")
         };
         let (seeds, open_seeds) = (seeds(&mut holding.clone()), seeds(&mut open));
         let pairs = pairs_free_of(scissors, giver);

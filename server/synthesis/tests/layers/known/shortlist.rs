@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use grasp_assets::atlas_folder::complete_atlas;
 use grasp_synthesis::{
     known::{
         atlas::{Atlas, Listed},
@@ -38,7 +39,7 @@ const DIRECTION: usize = 20;
 fn the_shortlist_serves_more_givers_than_the_best_scored_grips() {
     let rig = right();
     for name in OBJECT_NAMES {
-        let atlas = shipped_atlas(name);
+        let atlas = complete_atlas(name, rig);
         let entries = atlas.entries();
         let up = direction(DIRECTION);
         let score = |&entry: &u16| entries[usize::from(entry)].scores[DIRECTION];

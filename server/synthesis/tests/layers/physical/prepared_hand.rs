@@ -24,7 +24,7 @@ fn tracked_hand(random: &mut Random, middle: Vec3) -> TrackedSolids {
     TrackedSolids {
         hand: hand(random, middle),
         palm: [(); PALM_SOLIDS].map(|()| solid(random, middle, 0.07, 0.019)),
-        told: [(); TRACKED_SOLIDS].map(|()| solid(random, middle, 0.07, 0.017)),
+        tracked: [(); TRACKED_SOLIDS].map(|()| solid(random, middle, 0.07, 0.017)),
     }
 }
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use glam::Vec3;
 use grasp_synthesis::{
     base::random::AttemptStream,
-    model::hand::{Digit, HandPose, Handedness, rig::Rig},
+    model::hand::{Digit, HandPose, Handedness},
     physical::solids::HandSolids,
     propose::{
         placement_cache::{PlacementCache, ROWS},
+        prepared::PreparedRig,
         proposal::{Candidate, propose},
     },
     search::physical_attempt::PhysicalAttempt,
@@ -16,7 +17,7 @@ use grasp_synthesis::{
 
 use crate::fixtures::{
     hands::{adult, right},
-    objects::{OBJECT_NAMES, object},
+    objects::{OBJECT_NAMES, object, prepared},
     proposals::{NO_GIVER, holds, place_with_cache, placement_cache, surroundings},
 };
 
@@ -24,7 +25,7 @@ use crate::fixtures::{
 const DEEPEST: f32 = 0.0075;
 
 /// A candidate's hand in the object's frame, with opposed pads.
-fn solids_of(rig: &Rig, candidate: &Candidate<'_>) -> HandSolids {
+fn solids_of(rig: &PreparedRig, candidate: &Candidate<'_>) -> HandSolids {
     let pose = HandPose {
         frame_from_wrist: candidate.object_from_wrist,
         digits: Digit::ALL.map(|digit| {
@@ -77,19 +78,18 @@ fn placements_are_drawn_once_per_object_and_hand() {
     let (right, left) = (right(), adult(Handedness::Left));
     let first = placement_cache(scissors, right);
     assert!(Arc::ptr_eq(&first, &placement_cache(scissors, right)));
-    // Also for copies of object and hand.
-    assert!(Arc::ptr_eq(
-        &first,
-        &placement_cache(&scissors.as_ref().clone(), &right.clone())
-    ));
-    assert_eq!(*first, PlacementCache::of(scissors, right));
+    // Also for copies of the hand.
+    assert!(Arc::ptr_eq(&first, &placement_cache(scissors, &right.clone())));
+    assert_eq!(*first, PlacementCache::of(prepared(scissors), right));
     assert_ne!(*first, *placement_cache(scissors, left));
 }
 
 #[test]
 fn evicts_the_first_of_too_many_hands() {
     let remote = object("remote");
-    let hands: Vec<Rig> = (0..5).map(|_| adult(Handedness::Left).mirrored()).collect();
+    let hands: Vec<PreparedRig> = (0..5)
+        .map(|_| PreparedRig::new(adult(Handedness::Left).mirrored()))
+        .collect();
     let first = placement_cache(remote, &hands[0]);
     for hand in &hands[1..4] {
         placement_cache(remote, hand);

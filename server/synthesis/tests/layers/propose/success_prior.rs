@@ -2,7 +2,6 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
     base::{pose::Pose, random::AttemptStream},
     geometry::mesh::TriangleMesh,
     model::{
@@ -40,7 +39,7 @@ fn hands_rated_better_hold_more_often() {
         let mut rated: Vec<(f32, bool)> = (0..6000)
             .filter_map(|index| {
                 let candidate = place(object, right()).pads_on_pair(&mut AttemptStream::new(41, index))?;
-                let features = bulk.told(right(), candidate.opposition, candidate.object_from_wrist, None);
+                let features = bulk.inputs(right(), candidate.opposition, candidate.object_from_wrist, None);
                 let holds = holds_freely(object, &candidate.proposal(), &mut attempt);
                 Some((TRAINED.log_odds(&features), holds))
             })
@@ -148,8 +147,8 @@ fn mirrored_hands_get_equal_features() {
             flip(place.position),
             Quat::from_xyzw(turn.x, -turn.y, -turn.z, turn.w),
         );
-        let features = bulk.told(right, opposition, place, Some(&giver));
-        let mirrored_features = mirrored_bulk.told(&left, &mirrored, mirrored_place, Some(&mirrored_giver));
+        let features = bulk.inputs(right, opposition, place, Some(&giver));
+        let mirrored_features = mirrored_bulk.inputs(&left, &mirrored, mirrored_place, Some(&mirrored_giver));
         for (i, (feature, mirrored)) in features.iter().zip(mirrored_features).enumerate() {
             // The box around a mirrored mesh is a mirrored box only up to rounding.
             assert!((feature - mirrored).abs() < 5e-3, "{i}: {feature} and {mirrored}");

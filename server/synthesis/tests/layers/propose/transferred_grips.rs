@@ -12,7 +12,7 @@ use grasp_synthesis::{
         grips::Grips,
         primitives::{HeldPrimitive, Primitive},
         seed_source::SeedSource,
-        transferred_grips::{Among, Borrowed},
+        transferred_grips::{Among, TransferredGrips},
     },
     model::{
         constraints::Constraints,
@@ -36,13 +36,13 @@ fn primitives_of_the_right_hand() -> &'static Arc<[HeldPrimitive]> {
 }
 
 /// What an object takes over from the primitives of the right hand.
-fn transferred_to(object: &GraspObject) -> Borrowed {
+fn transferred_to(object: &GraspObject) -> TransferredGrips {
     TransferredGrips::of(object, primitives_of_the_right_hand())
 }
 
 /// All transferred grips, without a giver.
-fn unconstrained(transferred: &Borrowed) -> Vec<Entry> {
-    let grips = transferred.beside(Among::All, right(), None, &Constraints::default(), &|| false);
+fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
+    let grips = transferred.for_giver(Among::All, right(), None, &Constraints::default(), &|| false);
     grips.expect("nobody interrupts").entries().to_vec()
 }
 
@@ -141,8 +141,8 @@ fn transferred_grips_touch_a_similar_box_in_any_pose() {
 }
 
 /// The transferred grips that pass the closure screen, without a giver.
-fn passing(transferred: &Borrowed) -> Vec<Entry> {
-    let grips = transferred.beside(Among::Passing, right(), None, &Constraints::default(), &|| false);
+fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
+    let grips = transferred.for_giver(Among::Passing, right(), None, &Constraints::default(), &|| false);
     grips.expect("nobody interrupts").entries().to_vec()
 }
 
@@ -210,7 +210,7 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
         ..Constraints::default()
     };
     let rest = transferred
-        .beside(Among::All, right(), None, &constraints, &|| false)
+        .for_giver(Among::All, right(), None, &constraints, &|| false)
         .expect("nobody interrupts");
     assert!(!rest.entries().is_empty());
     for entry in rest.entries() {
@@ -218,7 +218,7 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
     }
     assert!(
         transferred
-            .beside(Among::All, right(), None, &constraints, &|| true)
+            .for_giver(Among::All, right(), None, &constraints, &|| true)
             .is_none()
     );
 }
@@ -229,7 +229,7 @@ fn a_giver_gets_the_grips_least_in_its_way() {
         let transferred = transferred_to(&holdout.object);
         let giver = Presented::of(&holdout).giver.expect("there is one");
         let chosen_for = |giver| {
-            let grips = transferred.beside(Among::All, right(), giver, &Constraints::default(), &|| false);
+            let grips = transferred.for_giver(Among::All, right(), giver, &Constraints::default(), &|| false);
             grips.expect("nobody interrupts")
         };
         let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();

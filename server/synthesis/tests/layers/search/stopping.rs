@@ -14,6 +14,7 @@ use glam::Vec3;
 use grasp_synthesis::{
     base::clock::Clock,
     model::{hand::rig::Rig, holdout::Holdout, strategy::Strategy},
+    propose::prepared::PreparedRig,
     search::SearchEnd,
 };
 
@@ -270,10 +271,10 @@ fn a_deadline_leaves_a_reproducible_search_its_grasp_or_none() {
 #[test]
 fn a_hopeless_holdout_ends_at_the_deadline() {
     // A palm so far from the wrist that it is never near the object while the wrist is.
-    let hopeless = Rig {
+    let hopeless = PreparedRig::new(Rig {
         palm: Vec3::new(0.0, 0.0, 5.0),
-        ..simple_rig().clone()
-    };
+        ..Rig::clone(simple_rig())
+    });
     let holdout = held(bar());
     for workers in [1, 2] {
         let search = Search {

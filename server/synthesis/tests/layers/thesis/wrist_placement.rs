@@ -194,7 +194,7 @@ fn a_short_hand_stays_within_its_reach() {
     let short = Rig {
         reach: 0.07,
         palm: Vec3::new(0.0, 0.02, 0.005),
-        ..simple_rig().clone()
+        ..Rig::clone(simple_rig())
     };
     let holdout = floating(bar());
     let outside = |strategy, attempt| {

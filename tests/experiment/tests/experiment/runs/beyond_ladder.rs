@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    path::PathBuf,
     sync::{
         Arc, LazyLock,
         atomic::{AtomicBool, Ordering},
@@ -26,31 +27,26 @@ use grasp_synthesis::{
         growth::Growth,
         recheck::Recheck,
     },
-    model::{
-        hand::{Handedness, rig::Rig},
-        strategy::Validity,
-    },
+    model::{hand::Handedness, strategy::Validity},
     physical::{
         grip::Gripper,
         scene::{ObjectScene, Presented},
     },
+    propose::prepared::PreparedRig,
 };
 
-use crate::fixtures::small_runs::{Scratch, complete, index_of, maker, open, small};
+use crate::fixtures::small_runs::{Scratch, atlas_folder, complete, index_of, maker, open, small};
 
 /// Grips of the small atlas: enough that a giver leaves some.
 const GRIPS: usize = 100;
 
-/// The file of the scissors' atlas in a run's folder.
-const FILE: &str = "atlases/scissors-adult-right.atlas";
-
-fn adult() -> &'static Rig {
+fn adult() -> &'static PreparedRig {
     &hand("adult", Handedness::Right).expect("a built-in hand").rig
 }
 
 /// A small atlas of the scissors, marked as complete, and its bytes.
 static SMALL_ATLAS: LazyLock<(Arc<Atlas>, Vec<u8>)> = LazyLock::new(|| {
-    let object = &object("scissors").expect("a built-in object").object;
+    let object = &object("scissors").expect("a built-in object").prepared;
     let mut growth = Growth::new(object, adult());
     let mut gripper = Gripper::default();
     while growth.len() < GRIPS {
@@ -72,11 +68,17 @@ pub(crate) fn settings() -> Settings {
     }
 }
 
+/// The file of the scissors' atlas for a run.
+fn file(scratch: &Scratch) -> PathBuf {
+    let object = &object("scissors").expect("a built-in object").object;
+    atlas_folder(scratch.path()).file(object, adult())
+}
+
 /// A folder with the small atlas in it.
 pub(crate) fn with_atlas() -> Scratch {
     let scratch = Scratch::new();
-    fs::create_dir_all(scratch.path().join("atlases")).expect("a folder");
-    fs::write(scratch.path().join(FILE), &SMALL_ATLAS.1).expect("an atlas");
+    fs::create_dir_all(atlas_folder(scratch.path()).path()).expect("a folder");
+    fs::write(file(&scratch), &SMALL_ATLAS.1).expect("an atlas");
     scratch
 }
 
@@ -242,16 +244,10 @@ fn grow(scratch: &Scratch, until: u64) -> [AtlasProgress; 2] {
     let folder = open(scratch.path(), &settings);
     let stop = AtomicBool::new(false);
     let mut ends = None;
-    let atlases = Atlases::complete(
-        &settings,
-        &folder,
-        |_, _| None,
-        &stop,
-        |now| {
-            ends.get_or_insert([now; 2])[1] = now;
-            stop.store(now.entries >= until, Ordering::Relaxed);
-        },
-    );
+    let atlases = Atlases::complete(&settings, &folder, &atlas_folder(scratch.path()), &stop, |now| {
+        ends.get_or_insert([now; 2])[1] = now;
+        stop.store(now.entries >= until, Ordering::Relaxed);
+    });
     assert!(atlases.expect("a folder that can be written").is_none());
     ends.expect("the atlas has to grow")
 }
@@ -261,37 +257,37 @@ fn a_stopped_atlas_resumes() {
     let scratch = Scratch::new();
     let [first, last] = grow(&scratch, 5);
     assert_eq!(
-        (first.object, first.entries, first.refused),
+        (first.object, first.entries, first.rejected),
         ("scissors", 0, None)
     );
     let [again, _] = grow(&scratch, last.entries + 1);
-    assert_eq!((again.entries, again.refused), (last.entries, None));
+    assert_eq!((again.entries, again.rejected), (last.entries, None));
 }
 
 #[test]
 fn a_damaged_atlas_is_grown_again_with_the_reason() {
     let scratch = Scratch::new();
     grow(&scratch, 1);
-    let path = scratch.path().join(FILE);
+    let path = file(&scratch);
     let mut bytes = fs::read(&path).expect("an atlas");
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(&path, bytes).expect("an atlas");
     let [first, _] = grow(&scratch, 1);
-    assert_eq!((first.entries, first.refused), (0, Some(AtlasError::Damaged)));
+    assert_eq!((first.entries, first.rejected), (0, Some(AtlasError::Damaged)));
     let [next, _] = grow(&scratch, 1);
-    assert_eq!(next.refused, None);
+    assert_eq!(next.rejected, None);
 }
 
 #[test]
-fn a_shipped_atlas_is_not_grown() {
-    let scratch = Scratch::new();
+fn a_complete_atlas_in_the_folder_does_not_grow() {
+    let scratch = with_atlas();
     let settings = settings();
     let folder = open(scratch.path(), &settings);
-    let shipped = |name: &str, _: &Rig| (name == "scissors").then_some(SMALL_ATLAS.1.as_slice());
     let never = |now| panic!("it grows: {now:?}");
-    let atlases = Atlases::complete(&settings, &folder, shipped, &AtomicBool::new(true), never);
+    let atlas_folder = atlas_folder(scratch.path());
+    let atlases = Atlases::complete(&settings, &folder, &atlas_folder, &AtomicBool::new(true), never);
     let atlases = atlases.expect("a folder").expect("no atlas has to grow");
     assert!(Maker::new(&settings, atlases).is_ok());
-    assert!(!scratch.path().join(FILE).exists());
+    assert_eq!(fs::read(file(&scratch)).expect("an atlas"), SMALL_ATLAS.1);
 }

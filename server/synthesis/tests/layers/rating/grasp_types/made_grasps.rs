@@ -78,7 +78,7 @@ pub(crate) struct Held {
 /// A hand with angles in degrees (yaw and three pitches, thumb first) that holds a shape with the touching links, and
 /// another with its palm, if given.
 pub(crate) fn held(degrees: [[f32; 4]; 5], shape: Shape, touching: &[Touching], palm: Option<Shape>) -> Held {
-    let rig = right().clone();
+    let rig = Rig::clone(right());
     let pose = HandPose {
         frame_from_wrist: Pose::IDENTITY,
         digits: degrees.map(|[yaw, first, second, third]| DigitAngles {

@@ -7,7 +7,7 @@ use grasp_synthesis::{
     model::hand::{
         Handedness,
         joints::{JOINT_COUNT, index},
-        rig::{AngleRange, DigitLimits, DigitRig, Rig, RigGuide},
+        rig::{AngleRange, DigitLimits, DigitRig, Rig},
     },
 };
 
@@ -71,7 +71,7 @@ fn finger_orientation(finger: usize) -> Quat {
         * Quat::from_rotation_y(-anatomy::ROLL_DEGREES[finger].to_radians())
 }
 
-/// The orientation of the thumb beside the flat hand.
+/// The orientation of the thumb next to the flat hand.
 fn thumb_orientation() -> Quat {
     let (radial, palmar) = (
         anatomy::THUMB_RADIAL_DEGREES.to_radians(),
@@ -135,6 +135,5 @@ pub(super) fn right_rig(kind: RigKind) -> Rig {
         finger_metacarpals,
         palm_segments: [Segment::new(Vec3::ZERO, Vec3::ZERO); 10],
         joint_radii,
-        guide: RigGuide::default(),
     }
 }

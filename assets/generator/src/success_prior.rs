@@ -1,8 +1,8 @@
-//! Teaches the network by which GUIDED search prefers hands that are likely to hold.
+//! Trains the success prior: the network by which GUIDED search prefers hands that are likely to hold.
 
 mod examples;
-mod shapes;
-mod teacher;
+pub(crate) mod shapes;
+mod trainer;
 
 use std::fmt::Write as _;
 
@@ -17,13 +17,13 @@ use examples::Example;
 /// The file, below the assets' folder.
 const PATH: &str = "../server/synthesis/src/guided/prospects/taught.rs";
 
-/// Shapes that the network is taught on. More take longer, a fifth of a second each.
-const SHAPES: u64 = 480;
+/// Shapes in the training set. More take longer, a fifth of a second each.
+const TRAINING: u64 = 480;
 
-/// Further shapes that it is examined on.
-const EXAMINED: u64 = 48;
+/// Shapes in the validation set.
+const VALIDATION: u64 = 48;
 
-/// Share of an examined shape's hands, those rated best, whose holds are counted.
+/// Share of a validation shape's hands, those rated best, whose success rate is measured.
 const BEST_SHARE: f64 = 0.1;
 
 /// Numbers on a line.
@@ -36,9 +36,9 @@ pub(crate) fn generate() -> Vec<AssetFile> {
     rig.oppositions();
     let style = ProgressStyle::with_template("{msg:24} {bar:40} {pos}/{len}, {elapsed}")
         .expect("the template is right");
-    let bar = ProgressBar::new(SHAPES + EXAMINED).with_style(style);
+    let bar = ProgressBar::new(TRAINING + VALIDATION).with_style(style);
     bar.set_message("holding shapes");
-    let mut by_shape: Vec<Vec<Example>> = (0..SHAPES + EXAMINED)
+    let mut by_shape: Vec<Vec<Example>> = (0..TRAINING + VALIDATION)
         .into_par_iter()
         .map(|number| {
             let found = examples::of_shape(number, rig);
@@ -47,18 +47,18 @@ pub(crate) fn generate() -> Vec<AssetFile> {
         })
         .collect();
     bar.finish();
-    let examined = by_shape.split_off(SHAPES as usize);
-    let network = teacher::teach(&by_shape);
+    let validation = by_shape.split_off(TRAINING as usize);
+    let network = trainer::train(&by_shape);
     println!(
-        "of {} shapes that were not taught, the {:.0} % rated best hold {:.2} times as often as all",
-        examined.len(),
+        "of {} validation shapes, the {:.0} % of hands rated best hold {:.2} times as often as all",
+        validation.len(),
         100.0 * BEST_SHARE,
-        lift(&network, &examined)
+        lift(&network, &validation)
     );
     vec![(PATH.to_owned(), source(&network).into_bytes())]
 }
 
-/// How much more often the hands rated best hold than all do: the geometric mean over the shapes that can be held at all.
+/// How much more often the hands rated best hold than all hands do: the geometric mean over shapes that can be held.
 fn lift(network: &Network, by_shape: &[Vec<Example>]) -> f64 {
     let share = |examples: &[&Example]| {
         let held = examples.iter().filter(|example| example.holds).count();
@@ -69,13 +69,13 @@ fn lift(network: &Network, by_shape: &[Vec<Example>]) -> f64 {
         .filter_map(|examples| {
             let mut rated: Vec<(f32, &Example)> = examples
                 .iter()
-                .map(|example| (network.log_odds(&example.told), example))
+                .map(|example| (network.log_odds(&example.features), example))
                 .collect();
             rated.sort_by(|(a, _), (b, _)| b.total_cmp(a));
             let rated: Vec<&Example> = rated.into_iter().map(|(_, example)| example).collect();
             let best = &rated[..(rated.len() as f64 * BEST_SHARE) as usize];
             let all = share(&rated);
-            // One in a thousand more of both: shapes of which none is found count, too.
+            // A thousandth added to both keeps shapes in whose best share no hand holds.
             (all > 0.0).then(|| ((share(best) + 0.001) / (all + 0.001)).ln())
         })
         .collect();
@@ -85,7 +85,7 @@ fn lift(network: &Network, by_shape: &[Vec<Example>]) -> f64 {
 /// The network as Rust.
 fn source(network: &Network) -> String {
     let mut text = String::from(
-        "//! The numbers that the network was taught: made by `grasp-assets-generator prospects`, not by hand.\n\n\
+        "//! The numbers that the network was taught: made by `grasp-assets-generator success-prior`, not by hand.\n\n\
          #![allow(clippy::unreadable_literal, clippy::excessive_precision)]\n\n\
          use super::Network;\n\n\
          /// Taught on hands of the rig `adult` and shapes that were drawn at random.\n\

@@ -1,5 +1,5 @@
 //! Shapes like things that hands hold: boxes, rods and bottles, cups with and without a stem, and flattened eggs. Their
-//! sizes are drawn so that halves and doubles are as frequent.
+//! sizes are distributed evenly on a logarithmic scale.
 
 use std::f32::consts::TAU;
 
@@ -18,14 +18,14 @@ const MASSES: [f32; 2] = [0.03, 0.35];
 const CORNERS: usize = 20;
 const RINGS: usize = 12;
 
-/// Share of cups that have a foot and a stem.
+/// Share of cups with a foot and a stem.
 const STEMMED: f32 = 0.4;
 
 /// A ring of a round shape: its radius and its height in metres.
 type Ring = (f32, f32);
 
-/// A shape; every number has its own.
-pub(super) fn draw(number: u64) -> GraspObject {
+/// The shape of a number.
+pub(crate) fn draw(number: u64) -> GraspObject {
     let mut stream = AttemptStream::new(SEED, number);
     let mesh = match number % 4 {
         0 => cuboid(&mut stream),
@@ -87,7 +87,7 @@ fn rod(stream: &mut AttemptStream) -> TriangleMesh {
     round(&rings, 1.0)
 }
 
-/// A cup or glass that widens or narrows; some have a foot and a stem.
+/// A cup or glass that widens or narrows, some with a foot and a stem.
 fn cup(stream: &mut AttemptStream) -> TriangleMesh {
     let height = length(stream, 0.05, 0.15);
     let radius = length(stream, 0.02, 0.05);
@@ -120,7 +120,7 @@ fn cup(stream: &mut AttemptStream) -> TriangleMesh {
     round(&rings, 1.0)
 }
 
-/// A superellipsoid, flattened and pear-shaped more or less.
+/// A superellipsoid, more or less flattened and pear-shaped.
 fn egg(stream: &mut AttemptStream) -> TriangleMesh {
     let height = length(stream, 0.05, 0.22);
     let radius = length(stream, 0.01, 0.05);
@@ -139,12 +139,12 @@ fn egg(stream: &mut AttemptStream) -> TriangleMesh {
     round(&rings, flatness)
 }
 
-/// From one end to the other.
+/// Evenly spaced shares from 0 to 1.
 fn shares() -> impl Iterator<Item = f32> {
     (0..=RINGS).map(|ring| ring as f32 / RINGS as f32)
 }
 
-/// The body of revolution about z with these rings from bottom to top, its x made smaller, closed by discs.
+/// The body of revolution about z with these rings from bottom to top, squeezed along x and closed by discs.
 fn round(rings: &[Ring], flatness: f32) -> TriangleMesh {
     let mut positions: Vec<Vec3> = rings
         .iter()

@@ -1,4 +1,4 @@
-//! What a person would look at in a hold, as figures: what touches, how deep, how much the hand covers.
+//! Measures a hold as a person would look at it: what touches, how deep, how much the hand covers.
 
 use glam::Vec3;
 use grasp_assets::hands::Hand;
@@ -13,17 +13,17 @@ use grasp_synthesis::{
 
 use super::{
     halton::halton,
-    solids::{Capsule, Palm, links, signed_distance},
+    hand_capsules::{Capsule, Palm, links, signed_distance},
 };
 
-/// A hand that is farther out than this from a point of the surface does not cover it, in metres: about a finger and a
-/// half, so that what is left is room for a receiver's fingers.
+/// A hand farther than this from a point of the surface does not cover it, in metres: about one and a half fingers, which
+/// leaves room for a receiver's fingers.
 const COVER_REACH: f32 = 0.03;
 
 /// Links farther from the object than this count as this far, in metres.
 const CLEARANCE_REACH: f32 = 0.04;
 
-/// Length and radius of the forearm behind the wrist that has to be clear of the object, in metres.
+/// Length and radius of the forearm behind the wrist, which must be clear of the object, in metres.
 const FOREARM: (f32, f32) = (0.25, 0.03);
 
 /// A point of a surface with its outward normal.
@@ -50,7 +50,7 @@ pub(crate) fn surface_points(mesh: &TriangleMesh, count: u32) -> Vec<SurfacePoin
         .collect()
 }
 
-/// The surface points that the hand does not cover: nothing of it within 3 cm along the outward normal.
+/// The surface points that the hand does not cover: no part of it is within 3 cm along the outward normal.
 pub(crate) fn uncovered<'a>(points: &'a [SurfacePoint], hand: &MeshBvh) -> Vec<&'a SurfacePoint> {
     points
         .iter()
@@ -88,7 +88,7 @@ pub(crate) fn overlap(object: &MeshBvh, points: &[SurfacePoint], skin: &MeshBvh)
     (vertex, sample)
 }
 
-/// A link beside the object.
+/// A link relative to the object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LinkFigures {
     /// Distance between its skin and the object in metres, negative where they overlap.
@@ -132,16 +132,16 @@ impl LinkFigures {
     }
 }
 
-/// Figures of a hand on an object.
+/// Measures of a hand on an object.
 #[derive(Clone, Debug)]
 pub(crate) struct Figures {
-    /// Each link beside the object; thumb first.
+    /// Each link relative to the object; thumb first.
     pub(crate) links: [[LinkFigures; 3]; 5],
-    /// The same for the palm's skin.
+    /// Distance between the palm's skin and the object in metres, negative where they overlap.
     pub(crate) palm: f32,
     /// The deepest overlap of two digits, or of a digit and the palm's bones, in metres.
     pub(crate) self_overlap: f32,
-    /// How deep the object reaches into the forearm's place, in metres.
+    /// How deep the object reaches into the forearm, in metres.
     pub(crate) forearm_overlap: f32,
 }
 
@@ -170,7 +170,7 @@ impl Figures {
             for second in first + 1..5 {
                 for (i, a) in chains[first].iter().enumerate() {
                     for (j, b) in chains[second].iter().enumerate() {
-                        // The roots of neighbours share their flesh.
+                        // The roots of neighbouring digits share their flesh.
                         if i + j > 0 {
                             self_overlap = self_overlap.max(a.radius + b.radius - a.axis_distance(b));
                         }

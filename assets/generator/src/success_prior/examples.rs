@@ -1,5 +1,7 @@
 //! Hands that were closed on a shape, and whether they held.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use grasp_synthesis::{
     base::mechanisms::Mechanisms,
@@ -14,6 +16,7 @@ use grasp_synthesis::{
         solids::{PreparedHand, TrackedSolids},
     },
     propose::{
+        prepared::{PreparedObject, PreparedRig},
         proposal::Place,
         success_prior::{INPUTS, ObjectFeatures},
     },
@@ -23,16 +26,16 @@ use grasp_synthesis::{
 
 use super::shapes;
 
-/// Hands that are drawn for a shape; those that have no room are no examples.
+/// Hands drawn per shape; those without room give no example.
 const DRAWN: u64 = 6000;
 
-/// Hands of a shape that are closed at most.
-const CLOSED: usize = 1500;
+/// Largest number of examples per shape.
+const MOST_EXAMPLES: usize = 1500;
 
-/// Hands that are drawn for one gravity and giver.
+/// Hands drawn for the same gravity and giver.
 const ROUND: u64 = 64;
 
-/// Grips from which on some are taken for a giver's.
+/// Grips needed before some are used as givers.
 const ENOUGH_FOR_GIVERS: usize = 20;
 
 /// Seeds of the hands, and of gravity and givers: any will do.
@@ -41,21 +44,21 @@ const SEEDS: [u64; 2] = [0x4558_414d, 0x5052_4553];
 /// A hand that was closed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Example {
-    /// What the network is told of it.
-    pub(super) told: [f32; INPUTS],
+    /// The network's input.
+    pub(super) features: [f32; INPUTS],
     /// Did it hold?
     pub(super) holds: bool,
 }
 
-/// The hands of a shape, none preferred; every other round has a giver, whose hand is one that held before.
-pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
-    let object = shapes::draw(number);
+/// Examples of a shape, drawn without the prior; every other round has a giver, whose hand is a grip found before.
+pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
+    let object = PreparedObject::new(Arc::new(shapes::draw(number)));
     let scene = ObjectScene::new(&object, object.friction_under(Validity::Physical));
     let bulk = ObjectFeatures::of(&object);
     let constraints = Constraints::default();
     let mut attempt = PhysicalAttempt::default();
     let mut holding: Vec<HandPose> = Vec::new();
-    let mut examples = Vec::with_capacity(CLOSED);
+    let mut examples = Vec::with_capacity(MOST_EXAMPLES);
     let [hands, presenting] = SEEDS.map(|seed| seed.wrapping_add(number << 32));
     for round in 0..DRAWN / ROUND {
         let presented = present(
@@ -66,10 +69,10 @@ pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
         );
         let place = Place {
             object: &object,
-            surface: &object.surface_pairs,
+            surface: object.surface_pairs(),
             giver: presented.giver.as_ref(),
             rig,
-            repertoire: None,
+            placements: None,
             mechanisms: Mechanisms::ALL,
         };
         let around = Surroundings {
@@ -79,7 +82,7 @@ pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
             constraints: &constraints,
         };
         for index in round * ROUND..(round + 1) * ROUND {
-            if examples.len() >= CLOSED {
+            if examples.len() >= MOST_EXAMPLES {
                 return examples;
             }
             let Some(candidate) = place.pads_on_pair(&mut AttemptStream::new(hands, index)) else {
@@ -87,7 +90,7 @@ pub(super) fn of_shape(number: u64, rig: &Rig) -> Vec<Example> {
             };
             let held = attempt.hold(&around, &candidate.proposal(), &mut NoStopwatch, &|| false);
             examples.push(Example {
-                told: bulk.told(
+                features: bulk.inputs(
                     rig,
                     candidate.opposition,
                     candidate.object_from_wrist,

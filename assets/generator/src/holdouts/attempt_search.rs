@@ -1,5 +1,5 @@
-//! The long search: runs the synthesis on the free objects and picks, among all valid grasps, those that look most like
-//! the wished types. Its result is a list of seeds and attempts that the normal run replays.
+//! The long search: runs the synthesis on the free objects and picks the valid grasps that fit the templates best. Its
+//! result is a list of seeds and attempts, which a normal run replays.
 
 use std::{
     cmp::Ordering,
@@ -14,29 +14,30 @@ use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
     base::clock::Clock,
-    base::mechanisms::Mechanisms,
     geometry::mesh_bvh::MeshBvh,
-    known::{recent_grips::RecentGrips, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
-        constraints::Constraints,
         grasp::Grasp,
-        hand::rig::Rig,
         holdout::Holdout,
-        object::{GraspObject, THESIS_FRICTION},
-        strategy::{Choice, Strategy},
+        object::THESIS_FRICTION,
+        strategy::{Strategy, Validity},
     },
-    search::{find_grasp, settings::SearchSettings},
+    propose::prepared::{PreparedObject, PreparedRig},
+    search::{
+        find_grasp,
+        scene::Task,
+        settings::{Query, Run, SearchSettings},
+    },
 };
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
+    giver_orientation::giver_orientations,
+    grasp_template::{coverage_misfit, misfit},
     halton::halton,
-    judge::{Figures, SurfacePoint, coverage, overlap, posed_skin, surface_points, uncovered},
-    solids::Palm,
+    hand_capsules::Palm,
+    hold_figures::{Figures, SurfacePoint, coverage, overlap, posed_skin, surface_points, uncovered},
     specs::{Selected, Target},
-    stance::stances,
-    wish::{coverage_misfit, misfit},
 };
 
 /// The ladder's last step, as in the thesis' final algorithm.
@@ -48,19 +49,19 @@ pub(crate) const BEND_RATIOS: BendRatioChoice = BendRatioChoice::OneRandom;
 /// The friction of the thesis.
 pub(crate) const FRICTION: f32 = THESIS_FRICTION;
 
-/// Attempts that are run with one seed, and with one direction of gravity, before the next one is taken.
+/// Attempts per seed, all with the same direction of gravity.
 const ATTEMPTS_PER_SEED: u64 = 200_000;
 
-/// Candidates of each target that are looked at closely.
+/// Candidates per target that are examined closely.
 const SHORT_LIST: usize = 400;
 
-/// Stances of a candidate that are offered to the synthesis before the candidate is given up.
-const STANCES: usize = 60;
+/// Orientations per candidate that are tried before the candidate is dropped.
+const ORIENTATIONS: usize = 60;
 
-/// Points of the surface at which coverage and overlap are taken.
+/// Surface points at which coverage and overlap are measured.
 const SURFACE_POINTS: u32 = 1500;
 
-/// A candidate's penalty for awkwardness 1, in the millimetres of the misfit.
+/// Penalty for an awkwardness of 1, in the unit of the misfit (about millimetres).
 const AWKWARDNESS: f32 = 8.0;
 
 /// A clock for searches without a deadline.
@@ -73,9 +74,9 @@ impl Clock for NoClock {
 }
 
 /// A free object with a direction of gravity.
-fn free(object: &Arc<GraspObject>, up: Vec3) -> Holdout {
+fn free(object: &Arc<PreparedObject>, up: Vec3) -> Holdout {
     Holdout {
-        object: object.clone(),
+        object: object.object().clone(),
         presenting_hand: None,
         up,
     }
@@ -84,37 +85,33 @@ fn free(object: &Arc<GraspObject>, up: Vec3) -> Holdout {
 /// The first valid grasp among `attempts` attempts from `first` on, and its index.
 fn next_grasp(
     pool: &rayon::ThreadPool,
-    holdout: &Holdout,
-    rig: &Rig,
+    task: Task<'_>,
     seed: u64,
     first: u64,
     attempts: u64,
 ) -> Option<(u64, Grasp)> {
     let settings = SearchSettings {
-        seed,
-        strategy: STRATEGY,
-        validity: grasp_synthesis::model::strategy::Validity::Thesis,
-        bend_ratios: BEND_RATIOS,
-        friction: FRICTION,
-        reproducible: true,
-        first_attempt: first,
-        max_attempts: attempts,
-        deadline: None,
-        workers: 1,
-        record_step_times: false,
-        mechanisms: Mechanisms::ALL,
-        constraints: Constraints::default(),
-        choice: Choice::FirstValid,
-        atlas: None,
-        starts: SeedSource::Nothing,
-        recent: RecentGrips::default(),
-        known_tried: 0,
+        query: Query {
+            strategy: STRATEGY,
+            validity: Validity::Thesis,
+            bend_ratios: BEND_RATIOS,
+            friction: Some(FRICTION),
+            ..Query::default()
+        },
+        run: Run {
+            seed,
+            reproducible: true,
+            first_attempt: first,
+            max_attempts: attempts,
+            ..Run::default()
+        },
+        ..SearchSettings::default()
     };
-    let outcome = find_grasp(pool, holdout, rig, &settings, &NoClock, &AtomicBool::new(false));
+    let outcome = find_grasp(pool, task, &settings, &NoClock, &AtomicBool::new(false));
     outcome.report.attempt.zip(outcome.grasp)
 }
 
-/// A pool of one thread for searches that run side by side.
+/// A pool of one thread, for searches that run in parallel.
 pub(crate) fn single_thread() -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -125,13 +122,18 @@ pub(crate) fn single_thread() -> rayon::ThreadPool {
 /// Runs one attempt again.
 pub(crate) fn replay(
     pool: &rayon::ThreadPool,
-    object: &Arc<GraspObject>,
-    rig: &Rig,
+    object: &Arc<PreparedObject>,
+    rig: &PreparedRig,
     up: Vec3,
     seed: u64,
     attempt: u64,
 ) -> Option<Grasp> {
-    next_grasp(pool, &free(object, up), rig, seed, attempt, 1).map(|(_, grasp)| grasp)
+    let task = Task {
+        holdout: &free(object, up),
+        object,
+        rig,
+    };
+    next_grasp(pool, task, seed, attempt, 1).map(|(_, grasp)| grasp)
 }
 
 /// A valid grasp with its place in the search.
@@ -169,15 +171,15 @@ impl ShortList {
     }
 }
 
-/// What a search of one object needs.
-struct Bench<'a> {
+/// The inputs of a search for one object.
+struct ObjectSearch<'a> {
     hand: &'a Hand,
     palm: Palm,
-    object: &'a Arc<GraspObject>,
+    object: &'a Arc<PreparedObject>,
     points: Vec<SurfacePoint>,
 }
 
-/// Searches with `seeds` seeds an object and returns the best grasp of each target whose name contains `only`.
+/// Searches with `seeds` seeds per object and returns the best grasp of each target whose name contains `only`.
 pub(crate) fn search(hand: &Hand, targets: &[Target], seeds: u64, only: &str) -> Vec<Selected> {
     let mut selected = Vec::new();
     for built_in in grasp_assets::objects::objects() {
@@ -188,21 +190,21 @@ pub(crate) fn search(hand: &Hand, targets: &[Target], seeds: u64, only: &str) ->
         if targets.is_empty() {
             continue;
         }
-        let bench = Bench {
+        let search = ObjectSearch {
             hand,
             palm: Palm::of(hand),
-            object: &built_in.object,
+            object: &built_in.prepared,
             points: surface_points(built_in.object.surface.mesh(), SURFACE_POINTS),
         };
-        let lists = bench.short_lists(built_in.name, &targets, seeds);
+        let lists = search.short_lists(built_in.name, &targets, seeds);
         for (target, list) in targets.iter().zip(lists) {
-            selected.extend(bench.choose(target, &list));
+            selected.extend(search.choose(target, &list));
         }
     }
     selected
 }
 
-impl Bench<'_> {
+impl ObjectSearch<'_> {
     fn short_lists(&self, name: &str, targets: &[&Target], seeds: u64) -> Vec<ShortList> {
         let progress = ProgressBar::new(seeds).with_style(
             ProgressStyle::with_template("{prefix:10} {wide_bar} {pos}/{len} seeds {msg} {eta}")
@@ -229,7 +231,7 @@ impl Bench<'_> {
                             let mut lists = lists.lock().expect("no thread panicked");
                             for (target, list) in targets.iter().zip(lists.iter_mut()) {
                                 list.offer(Candidate {
-                                    misfit: misfit(&target.wish, &figures, pose),
+                                    misfit: misfit(&target.template, &figures, pose),
                                     ..candidate.clone()
                                 });
                             }
@@ -250,7 +252,12 @@ impl Bench<'_> {
         let mut first = 0;
         while first < ATTEMPTS_PER_SEED {
             let left = ATTEMPTS_PER_SEED - first;
-            let Some((attempt, grasp)) = next_grasp(pool, &holdout, &self.hand.rig, seed, first, left) else {
+            let task = Task {
+                holdout: &holdout,
+                object: self.object,
+                rig: &self.hand.rig,
+            };
+            let Some((attempt, grasp)) = next_grasp(pool, task, seed, first, left) else {
                 break;
             };
             first = attempt + 1;
@@ -263,7 +270,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The best of a short list once the object is turned so that a giver could hold it out.
+    /// The best candidate of a short list, with the object turned so that a giver could hold it out.
     fn choose(&self, target: &Target, list: &ShortList) -> Option<Selected> {
         let pool = single_thread();
         let mut best: Option<(f32, Selected, String)> = None;
@@ -282,16 +289,16 @@ impl Bench<'_> {
             let (vertex, sample) = overlap(&self.object.surface, &self.points, &skin);
             let sunk = 1e3 * vertex.max(sample);
             let shape =
-                candidate.misfit + coverage_misfit(&target.wish, covered) + 1.5 * (sunk - 2.0).max(0.0);
+                candidate.misfit + coverage_misfit(&target.template, covered) + 1.5 * (sunk - 2.0).max(0.0);
             let offered = target
                 .offered
                 .map_or_else(|| self.free_direction(&skin), Vec3::from);
-            for stance in stances(pose, offered).into_iter().take(STANCES) {
-                let score = shape + AWKWARDNESS * stance.awkwardness;
+            for orientation in giver_orientations(pose, offered).into_iter().take(ORIENTATIONS) {
+                let score = shape + AWKWARDNESS * orientation.awkwardness;
                 if best.as_ref().is_some_and(|(best, ..)| score >= *best) {
                     break;
                 }
-                let up = stance.world_from_object.conjugate() * Vec3::Y;
+                let up = orientation.world_from_object.conjugate() * Vec3::Y;
                 let again = replay(
                     &pool,
                     self.object,
@@ -305,11 +312,11 @@ impl Bench<'_> {
                         name: target.name.clone(),
                         seed: candidate.seed,
                         attempt: candidate.attempt,
-                        world_from_object: stance.world_from_object,
+                        world_from_object: orientation.world_from_object,
                     };
                     let story = format!(
                         "misfit {:.1}, covered {covered:.2}, sunk {sunk:.1} mm, awkwardness {:.2}",
-                        candidate.misfit, stance.awkwardness
+                        candidate.misfit, orientation.awkwardness
                     );
                     best = Some((score, selected, story));
                     break;
@@ -323,7 +330,7 @@ impl Bench<'_> {
         best.map(|(_, selected, _)| selected)
     }
 
-    /// From the middle of the object to the middle of what the hand leaves free.
+    /// The direction from the centre of the object to the centre of the surface that the hand leaves free.
     fn free_direction(&self, skin: &MeshBvh) -> Vec3 {
         let free = uncovered(&self.points, skin);
         let mean = |points: &mut dyn Iterator<Item = Vec3>| {

@@ -1,5 +1,5 @@
-//! The giver's hand as solids: a capsule a phalanx (Eq. 4.1 with round ends), a capsule a metacarpal, and points on the
-//! palm's skin. What the poses are made with and judged by.
+//! The giver's hand as solids: one capsule per phalanx (Eq. 4.1 with round ends) and metacarpal, and points on the palm's
+//! skin. Poses are made and measured with them.
 
 use glam::Vec3;
 use grasp_assets::hands::Hand;
@@ -13,10 +13,10 @@ use grasp_synthesis::{
     },
 };
 
-/// Samples along a capsule's axis at which its distance to the object is taken: every 5 mm on the longest phalanx.
+/// Samples along a capsule's axis at which its distance to the object is measured: every 5 mm on the longest phalanx.
 pub(crate) const AXIS_SAMPLES: usize = 7;
 
-/// Distance between the points kept of the palm's skin, in metres: half of the thinnest handle to be held.
+/// Distance between the points kept on the palm's skin, in metres: half the thinnest handle that is held.
 const PALM_SPACING: f32 = 0.004;
 
 /// Everything within `radius` metres of a segment.
@@ -36,7 +36,7 @@ impl Capsule {
         self.start.lerp(self.end, share)
     }
 
-    /// The points at which the distance to the object is taken.
+    /// The points at which the distance to the object is measured.
     pub(crate) fn axis_samples(&self) -> [Vec3; AXIS_SAMPLES] {
         std::array::from_fn(|i| self.at(i as f32 / (AXIS_SAMPLES - 1) as f32))
     }
@@ -77,10 +77,10 @@ impl Capsule {
     }
 }
 
-/// What of the hand does not depend on its joint angles, in the wrist frame.
+/// The parts of the hand that do not depend on joint angles, in the wrist frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Palm {
-    /// Points on its skin, with the thumb's part left out.
+    /// Points on its skin, except the thumb's.
     pub(crate) points: Vec<Vec3>,
     /// The metacarpals of the four fingers.
     pub(crate) metacarpals: [Capsule; 4],

@@ -1,0 +1,185 @@
+//! Complete atlases, grown on first use and kept in a folder.
+
+use std::{
+    collections::HashMap,
+    env,
+    ffi::OsString,
+    fs, io,
+    path::{Path, PathBuf},
+    sync::{Arc, LazyLock, Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+use grasp_synthesis::{
+    known::{
+        atlas::Atlas,
+        codec::{AtlasError, decode, encode},
+        growth::{Grown, Growth},
+        key::file_name,
+    },
+    model::{hand::rig::Rig, object::GraspObject},
+    physical::grip::Gripper,
+    propose::prepared::{PreparedObject, PreparedRig},
+};
+
+use crate::objects::object;
+
+/// How often a growing atlas is saved. Longer loses more when the process is killed; saving takes some 30 ms.
+const SAVE_INTERVAL: Duration = Duration::from_secs(10);
+
+/// The complete atlas of a built-in object, grown on first use and kept in `target/atlases`. Each is read once per process.
+///
+/// # Panics
+/// The object is not built in, or `target/atlases` cannot be read or written.
+pub fn complete_atlas(object_name: &str, rig: &PreparedRig) -> Arc<Atlas> {
+    /// Atlases by file; a slot stays locked while its atlas grows, so that parallel tests do not all grow it.
+    type Slots = HashMap<PathBuf, Arc<Mutex<Option<Arc<Atlas>>>>>;
+    static READ: LazyLock<Mutex<Slots>> = LazyLock::new(Mutex::default);
+
+    let object = &object(object_name).expect("the object is built in").prepared;
+    let folder = AtlasFolder::in_target();
+    let mut slots = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    let slot = Arc::clone(slots.entry(folder.file(object, rig)).or_default());
+    drop(slots);
+    let mut atlas = slot.lock().unwrap_or_else(PoisonError::into_inner);
+    let atlas = atlas.get_or_insert_with(|| match folder.complete(object, rig) {
+        Ok(atlas) => atlas,
+        Err(error) => panic!("no atlas of {object_name}: {error:?}"),
+    });
+    Arc::clone(atlas)
+}
+
+/// A folder of atlases, each named by the key of what it was grown from. A server accepts it as `atlas_directory`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AtlasFolder(PathBuf);
+
+/// How far an atlas has grown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GrowthProgress {
+    /// Grips found, in this run or before.
+    pub entries: u64,
+    /// Proposals tried for them.
+    pub proposed: u64,
+    /// Why the file in the folder is replaced rather than resumed.
+    pub rejected: Option<AtlasError>,
+}
+
+/// The folder cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot {action} {}", path.display())]
+pub struct AtlasFolderError {
+    /// "read", "create" or "write".
+    action: &'static str,
+    path: PathBuf,
+    source: io::Error,
+}
+
+impl AtlasFolder {
+    /// A folder, which is created when an atlas is first saved.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self(path.into())
+    }
+
+    /// `atlases` in Cargo's target folder, which all tests and benches of a checkout share.
+    pub fn in_target() -> Self {
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| OsString::from("target"));
+        Self(workspace.join(target).join("atlases"))
+    }
+
+    /// Where the folder is.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// The file of an object's and a hand's atlas.
+    pub fn file(&self, object: &GraspObject, rig: &Rig) -> PathBuf {
+        self.0.join(file_name(object, rig))
+    }
+
+    /// The complete atlas of an object and a hand. If the folder has none, it is grown first, which takes some twenty seconds.
+    ///
+    /// # Errors
+    /// The folder cannot be read or written.
+    pub fn complete(
+        &self,
+        object: &PreparedObject,
+        rig: &PreparedRig,
+    ) -> Result<Arc<Atlas>, AtlasFolderError> {
+        let atlas = self.grow_while(object, rig, |_| true)?;
+        Ok(atlas.expect("growth that is never stopped completes"))
+    }
+
+    /// The complete atlas of an object and a hand, grown for as long as `proceed` returns true. None if it returned false
+    /// first; what had grown by then is saved, and growth resumes from it.
+    ///
+    /// # Errors
+    /// The folder cannot be read or written.
+    pub fn grow_while(
+        &self,
+        object: &PreparedObject,
+        rig: &PreparedRig,
+        mut proceed: impl FnMut(GrowthProgress) -> bool,
+    ) -> Result<Option<Arc<Atlas>>, AtlasFolderError> {
+        let path = self.file(object, rig);
+        let (known, rejected) = match read(&path, object, rig)? {
+            Some(Ok(known)) if known.atlas.is_complete() => return Ok(Some(known.atlas)),
+            Some(Ok(known)) => (Some(known), None),
+            Some(Err(error)) => (None, Some(error)),
+            None => (None, None),
+        };
+        let mut growth = match &known {
+            Some(known) => Growth::resume(object, rig, known),
+            None => Growth::new(object, rig),
+        };
+        let mut gripper = Gripper::default();
+        let mut saved = Instant::now();
+        while !growth.is_complete() {
+            let progress = GrowthProgress {
+                entries: growth.len() as u64,
+                proposed: growth.proposed(),
+                rejected,
+            };
+            if !proceed(progress) {
+                write(&path, object, rig, &growth.grown())?;
+                return Ok(None);
+            }
+            growth.round(&mut gripper);
+            if saved.elapsed() >= SAVE_INTERVAL {
+                write(&path, object, rig, &growth.grown())?;
+                saved = Instant::now();
+            }
+        }
+        let grown = growth.grown();
+        write(&path, object, rig, &grown)?;
+        Ok(Some(grown.atlas))
+    }
+}
+
+/// What a file holds; none if there is no file.
+fn read(
+    path: &Path,
+    object: &GraspObject,
+    rig: &Rig,
+) -> Result<Option<Result<Grown, AtlasError>>, AtlasFolderError> {
+    match fs::read(path) {
+        Ok(bytes) => Ok(Some(decode(&bytes, object, rig))),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(failed_to("read", path)(error)),
+    }
+}
+
+/// Writes an atlas to a temporary file and renames it, so that no reader sees half of one.
+fn write(path: &Path, object: &GraspObject, rig: &Rig, grown: &Grown) -> Result<(), AtlasFolderError> {
+    let parent = path.parent().unwrap_or(Path::new(""));
+    fs::create_dir_all(parent).map_err(failed_to("create", parent))?;
+    let unfinished = path.with_extension(format!("{}-complete.part", std::process::id()));
+    fs::write(&unfinished, encode(grown, object, rig))
+        .and_then(|()| fs::rename(&unfinished, path))
+        .map_err(failed_to("write", path))
+}
+
+fn failed_to(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> AtlasFolderError {
+    let path = path.to_owned();
+    move |source| AtlasFolderError { action, path, source }
+}
