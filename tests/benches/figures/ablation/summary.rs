@@ -100,7 +100,7 @@ impl Results {
         knowledge: Knowledge,
         class: Class,
         variants: &[Option<Mechanism>],
-        searched: Vec<Vec<Searched>>,
+        searched: &[Vec<Searched>],
     ) -> Self {
         let (first, second) = (&searched[0], &searched[1]);
         let against = |number: usize, searched: &Vec<Searched>| match number {
@@ -110,7 +110,7 @@ impl Results {
         };
         let variants = variants
             .iter()
-            .zip(&searched)
+            .zip(searched)
             .enumerate()
             .map(|(number, (off, searched))| (*off, own(searched), against(number, searched)))
             .collect();
