@@ -1,7 +1,6 @@
 //! Grips that a giver excludes, against comparing hands one by one.
 
 use glam::{Quat, Vec3};
-use grasp_assets::atlas_folder::complete_atlas;
 use grasp_synthesis::{
     base::pose::Pose,
     geometry::mesh::TriangleMesh,
@@ -17,7 +16,7 @@ use grasp_synthesis::{
 };
 
 use crate::fixtures::{
-    atlases::{grown, growth},
+    atlases::{complete_atlas, grown, growth},
     hands::right,
     objects::object,
 };
@@ -102,7 +101,7 @@ fn atlas_memory_does_not_grow_with_the_objects_size() {
 fn a_shipped_atlas_excludes_only_meeting_grips_and_lists_the_best_first() {
     let rig = right();
     for name in ["remote", "scissors"] {
-        let atlas = complete_atlas(name, rig);
+        let atlas = complete_atlas(name);
         let entries = atlas.entries();
         let (mut meeting, mut excluded) = (0, 0);
         for giver in entries.iter().step_by(entries.len() / 8) {

@@ -19,7 +19,7 @@ use grasp_synthesis::{
 };
 
 use crate::fixtures::{
-    atlases::{scissors_atlas_of, scissors_held_by, shipped_atlas, sparse},
+    atlases::{complete_atlas, scissors_atlas_of, scissors_held_by, sparse},
     hands::right,
     holdouts::{UP, giver_solids},
     objects::object,
@@ -67,7 +67,7 @@ fn epsilon_of(contacts: &[Contact], kept: [bool; 5], scene: &ObjectScene<'_>) ->
 #[test]
 fn recorded_finger_subsets_are_those_with_closure() {
     let scene = object_scene(object("scissors"));
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let (mut closing, mut open) = (0, 0);
     for (place, entry) in known.entries().iter().enumerate().step_by(173) {
         let holding = entry.grip.bend_ratios.map(|ratio| ratio.is_some());
@@ -152,7 +152,7 @@ pub(crate) fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &TrackedS
 
 #[test]
 fn fingers_that_a_giver_blocks_are_lifted() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let (mut subsets, mut rejected, mut idle_only) = (0, 0, 0);
     for index in (0..known.entries().len()).step_by(109) {
         let entry = &known.entries()[index];
@@ -215,7 +215,7 @@ fn fingers_that_a_giver_blocks_are_lifted() {
 
 #[test]
 fn subsets_answer_where_no_whole_grip_is_left_and_are_reproducible() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let few = sparse(&known);
     let mut answered = 0;
     for giver in (0..known.entries().len()).step_by(4) {

@@ -1,14 +1,13 @@
 //! The palm's contacts against the surface it lies on.
 
 use glam::Vec3;
-use grasp_assets::atlas_folder::complete_atlas;
 use grasp_synthesis::{
     geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh},
     model::hand::HandPart,
 };
 
 use crate::fixtures::{
-    hands::right,
+    atlases::complete_atlas,
     objects::{OBJECT_NAMES, object},
 };
 
@@ -80,7 +79,7 @@ fn palm_contacts_have_normals_of_the_surface() {
         let triangles: Vec<Triangle> = (0..mesh.triangles().len())
             .map(|triangle| Triangle::of(mesh, triangle))
             .collect();
-        let atlas = complete_atlas(name, right());
+        let atlas = complete_atlas(name);
         let contacts = atlas.entries().iter().flat_map(|entry| &entry.contacts);
         for contact in contacts.filter(|contact| contact.part == HandPart::Palm) {
             let is_of_triangle = normals_near(&triangles, contact.position, NEAR)

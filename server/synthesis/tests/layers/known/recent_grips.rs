@@ -8,11 +8,11 @@ use grasp_synthesis::{
     search::{GraspSource, SearchOutcome},
 };
 
-use crate::fixtures::{atlases::shipped_atlas, hands::right, holdouts::held_by, searches::Search};
+use crate::fixtures::{atlases::complete_atlas, hands::right, holdouts::held_by, searches::Search};
 
 /// The remote, held out by the hand of a known grip.
 fn remote_held_out() -> Holdout {
-    held_by("remote", &shipped_atlas("remote").entries()[700].grip.pose)
+    held_by("remote", &complete_atlas("remote").entries()[700].grip.pose)
 }
 
 /// The grasp of a search without known grips.
@@ -38,7 +38,7 @@ fn of_recent(holdout: &Holdout, grasp: &Grasp, adapt: impl FnOnce(&mut Search<'_
 
 #[test]
 fn lists_newest_first_and_evicts_the_oldest() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let grips = known.entries();
     let mut recent = RecentGrips::default();
     assert!(recent.is_empty() && recent.without_oldest().is_empty());
@@ -74,7 +74,7 @@ fn a_recent_grip_is_found_again_with_the_same_forces_and_score() {
     }
     // Grips of the atlas come first.
     let with_atlas = of_recent(&holdout, &grasp, |search| {
-        search.atlas = Some(shipped_atlas("remote"));
+        search.atlas = Some(complete_atlas("remote"));
     });
     assert!(matches!(with_atlas.report.source, Some(GraspSource::Atlas(_))));
 }

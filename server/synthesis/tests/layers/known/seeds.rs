@@ -22,7 +22,7 @@ use grasp_synthesis::{
 };
 
 use crate::fixtures::{
-    atlases::{scissors_held_by, shipped_atlas, tight_givers},
+    atlases::{complete_atlas, scissors_held_by, tight_givers},
     hands::right,
     holdouts::{UP, giver_solids},
     proposals::{pairs_free_of, place_near_giver, surroundings},
@@ -58,7 +58,7 @@ fn entries_of(seeds: &Seeds) -> Vec<u16> {
 
 #[test]
 fn seeds_are_the_grips_least_in_the_givers_way() {
-    let (known, rig) = (shipped_atlas("scissors"), right());
+    let (known, rig) = (complete_atlas("scissors"), right());
     for grip in [0, 700, 1400] {
         let holdout = scissors_held_by(&known, grip);
         let giver = giver_solids(&holdout);
@@ -110,7 +110,7 @@ fn seeds_are_the_grips_least_in_the_givers_way() {
 #[test]
 fn perturbed_grips_hold_more_often_near_tight_givers() {
     const PROPOSALS: u64 = 150;
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let rig = right();
     let givers = tight_givers(&known, 30);
     assert!(givers.len() >= 3, "only {} givers are tight", givers.len());
@@ -179,7 +179,7 @@ fn search(
 
 #[test]
 fn attempts_seeded_by_known_grips_are_reproducible() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let grip = *tight_givers(&known, 30).first().expect("one giver is tight");
     let holdout = scissors_held_by(&known, grip);
     // Early attempts use other seeds than later ones.

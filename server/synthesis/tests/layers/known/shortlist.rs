@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use grasp_assets::atlas_folder::complete_atlas;
 use grasp_synthesis::{
     known::{
         atlas::{Atlas, Listed},
@@ -21,7 +20,7 @@ use grasp_synthesis::{
 };
 
 use crate::fixtures::{
-    atlases::{grown, growth, scissors_held_by, shipped_atlas},
+    atlases::{complete_atlas, grown, growth, scissors_held_by},
     hands::right,
     holdouts::{UP, floating},
     objects::{OBJECT_NAMES, object},
@@ -39,7 +38,7 @@ const DIRECTION: usize = 20;
 fn the_shortlist_serves_more_givers_than_the_best_scored_grips() {
     let rig = right();
     for name in OBJECT_NAMES {
-        let atlas = complete_atlas(name, rig);
+        let atlas = complete_atlas(name);
         let entries = atlas.entries();
         let up = direction(DIRECTION);
         let score = |&entry: &u16| entries[usize::from(entry)].scores[DIRECTION];
@@ -136,7 +135,7 @@ fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<[bool; 2]> {
 
 #[test]
 fn the_first_answer_is_the_first_holding_grip_of_the_shortlist() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let by_score = known.by_score(UP);
     let listed: Vec<u16> = known.shortlist(UP).iter().map(|listed| listed.entry).collect();
     let (mut on_list, mut beyond) = (0, 0);
@@ -175,7 +174,7 @@ fn the_first_answer_is_the_first_holding_grip_of_the_shortlist() {
 
 #[test]
 fn without_a_giver_grips_are_tried_by_score_and_the_best_counts_each_once() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let afloat = floating(Arc::clone(object("scissors")));
     let holds = which_hold(&afloat, &known);
     let first = known

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use grasp_synthesis::search::{GraspSource, LookUp};
 
 use crate::fixtures::{
-    atlases::{scissors_held_by, shipped_atlas, sparse},
+    atlases::{complete_atlas, scissors_held_by, sparse},
     clocks::FakeClock,
     hands::right,
     searches::{Search, pool},
@@ -18,7 +18,7 @@ fn look_up(search: &Search<'_>, within: Duration) -> LookUp {
 
 #[test]
 fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let pool = pool(1);
     let few = sparse(&known);
     let (mut cut, mut subset_grasp, mut nothing) = (0, 0, 0);
@@ -82,7 +82,7 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
 
 #[test]
 fn reproducible_look_ups_and_those_without_an_atlas_try_nothing() {
-    let known = shipped_atlas("scissors");
+    let known = complete_atlas("scissors");
     let holdout = scissors_held_by(&known, 0);
     let without = Search {
         reproducible: false,

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use grasp_assets::{atlas_folder::complete_atlas, primitives::held_primitives};
+use grasp_assets::primitives::held_primitives;
 use grasp_synthesis::{
     base::mechanisms::{Mechanism, Mechanisms},
     known::{atlas::Atlas, grips::Grips, seed_source::SeedSource, transferred_grips::TransferredGrips},
@@ -16,7 +16,10 @@ use grasp_synthesis::{
 };
 
 use crate::{
-    fixtures::{clocks::FakeClock, hands::right, holdouts::UP, objects::object, searches::Search},
+    fixtures::{
+        atlases::complete_atlas, clocks::FakeClock, hands::right, holdouts::UP, objects::object,
+        searches::Search,
+    },
     known::finger_subsets::assert_is_valid,
 };
 
@@ -47,7 +50,7 @@ fn remote() -> Arc<GraspObject> {
 /// The complete atlas of the built-in remote, and some of it.
 fn known() -> [Arc<Atlas>; 2] {
     let (rig, remote) = (right(), remote());
-    let known = complete_atlas("remote", rig);
+    let known = complete_atlas("remote");
     let few = known.entries().iter().step_by(90).cloned().collect();
     let few = Atlas::new(&remote, rig, Grips::new(rig, few), true);
     [known, Arc::new(few)]
