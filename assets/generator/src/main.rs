@@ -5,6 +5,7 @@ mod atlases;
 mod hands;
 mod holdouts;
 mod objects;
+mod screens;
 mod success_prior;
 
 use std::{
@@ -86,6 +87,9 @@ enum Section {
     /// The network by which GUIDED search prefers hands that are likely to hold, which is part of `grasp-synthesis`;
     /// takes minutes.
     SuccessPrior,
+    /// Derives the tables that decide in which order hands are screened against each other, and prints them; writes
+    /// nothing.
+    Screens,
     /// Objects, hands and holdouts; with --check, the algorithm, atlases and primitives too.
     All,
 }
@@ -108,6 +112,10 @@ impl Section {
             Self::Holdouts => holdouts::generate(),
             Self::Algorithm => algorithm::generate(),
             Self::SuccessPrior => success_prior::generate(),
+            Self::Screens => {
+                screens::print();
+                Vec::new()
+            }
             Self::All => [objects::generate(), hands::generate(), holdouts::generate()].concat(),
             Self::Atlases | Self::Primitives => Vec::new(),
         }
@@ -118,7 +126,7 @@ impl Section {
         match self {
             Self::Algorithm | Self::Atlases | Self::Primitives => true,
             Self::All => is_check,
-            Self::Objects | Self::Hands | Self::Holdouts | Self::SuccessPrior => false,
+            Self::Objects | Self::Hands | Self::Holdouts | Self::SuccessPrior | Self::Screens => false,
         }
     }
 }
