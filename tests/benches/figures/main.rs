@@ -2,8 +2,10 @@
 //! object was registered.
 //!
 //! `cargo bench -p grasp-tests --bench figures`, of which `-- --only warm` measures one row, `-- --test` only tries
-//! whether all runs, and `-- --json` writes for scripts. What takes long the first time is kept: atlases in
-//! `target/atlases`, givers in `target/figures`. Server and client share the process and two cores, as on a developer's machine; the load average is
+//! whether all runs, and `-- --json` writes for scripts. `-- --without NAME` switches mechanisms of the search off;
+//! `-- --only ablation` measures each one, and writes `tests/results/ablation`. What takes long the first time is kept:
+//! atlases in `target/atlases`, givers in `target/figures`. Server and client share the process and two cores, as on a
+//! developer's machine; the load average is
 //! told, for whatever else runs there shows in the outer quantiles. That a target is not met is told and is no failure.
 
 mod ablation;
