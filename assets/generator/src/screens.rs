@@ -7,9 +7,9 @@
 
 use std::fmt::Write as _;
 
-use grasp_assets::{atlases::atlas, hands::hand, objects::objects};
+use grasp_assets::{atlas_folder::complete_atlas, hands::hand, objects::objects};
 use grasp_synthesis::{
-    known::{atlas::Atlas, codec::decode},
+    known::atlas::Atlas,
     model::hand::{Handedness, joints::HandJoints, rig::Rig},
     physical::{
         grip::GIVER_CLEARANCE,
@@ -44,8 +44,7 @@ pub(crate) fn print() {
     let pairs: Vec<Pair> = objects()
         .iter()
         .flat_map(|object| {
-            let bytes = atlas(object.name, rig).expect("it comes with an atlas");
-            let known = decode(bytes, &object.object, rig).expect("it is today's").atlas;
+            let known = complete_atlas(object.name, rig);
             pairs(&known, rig)
         })
         .collect();
