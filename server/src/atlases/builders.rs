@@ -269,7 +269,7 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
     }
     let grown = Arc::new(growth.grown());
     if let Some(files) = &builders.files
-        && growth.len() > published
+        && (growth.len() > published || growth.is_complete())
     {
         files.write(object, hand, &grown);
     }
