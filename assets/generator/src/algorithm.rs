@@ -20,7 +20,7 @@ use sha2::{Digest as _, Sha256};
 use crate::{AssetFile, success_prior::shapes};
 
 /// The file, below the assets' folder.
-const PATH: &str = "../server/synthesis/src/atlas/key/algorithm.rs";
+const PATH: &str = "../server/synthesis/src/known/key/algorithm.rs";
 
 /// The box of the reference growth: 160 × 20 × 6 mm, as thin and long as the built-in objects.
 const BOX: Primitive = Primitive::ALL[2];
