@@ -53,7 +53,7 @@ pub struct Task<'a> {
 pub struct Scene<'a> {
     task: Task<'a>,
     /// Strategy, friction and what Algorithm 1 derives of them.
-    thesis: thesis::scene::Scene<'a>,
+    thesis: thesis::thesis_scene::ThesisScene<'a>,
     /// Under `PHYSICAL` validity.
     physical: Option<(ObjectScene<'a>, Presented)>,
     /// What the giver's hand leaves of the object's surface, once it was asked for.
@@ -85,7 +85,13 @@ impl<'a> Scene<'a> {
         let friction = query.friction_on(&holdout.object);
         Self {
             task,
-            thesis: thesis::scene::Scene::new(holdout, rig, query.strategy, query.bend_ratios, friction),
+            thesis: thesis::thesis_scene::ThesisScene::new(
+                holdout,
+                rig,
+                query.strategy,
+                query.bend_ratios,
+                friction,
+            ),
             free_surface: OnceLock::new(),
             placements: OnceLock::new(),
             constraints: query.constraints,
@@ -129,7 +135,7 @@ impl<'a> Scene<'a> {
     }
 
     /// What Algorithm 1 works with.
-    pub(super) fn thesis(&self) -> &thesis::scene::Scene<'a> {
+    pub(super) fn thesis(&self) -> &thesis::thesis_scene::ThesisScene<'a> {
         &self.thesis
     }
 
