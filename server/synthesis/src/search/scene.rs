@@ -26,10 +26,10 @@ use crate::{
     propose::{
         placement_cache::{PlacementCache, ROWS},
         prepared::{PreparedObject, PreparedRig},
-        proposal::{Place, propose, propose_evenly},
+        proposal::{ProposalContext, propose, propose_evenly},
         surface_pairs::SurfacePairs,
     },
-    rating::assessment::Surroundings,
+    rating::assessment::GraspContext,
     thesis,
 };
 
@@ -140,9 +140,9 @@ impl<'a> Scene<'a> {
     }
 
     /// Under `PHYSICAL` validity: what an attempt works with.
-    pub(super) fn surroundings(&self) -> Option<Surroundings<'_>> {
+    pub(super) fn surroundings(&self) -> Option<GraspContext<'_>> {
         let (object, presented) = self.physical.as_ref()?;
-        Some(Surroundings {
+        Some(GraspContext {
             object: *object,
             presented,
             rig: self.task.rig,
@@ -151,7 +151,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Where GUIDED search proposes the hand of an attempt.
-    pub(super) fn place(&self, attempt: u64) -> Place<'_> {
+    pub(super) fn place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
         let giver = presented.and_then(|presented| presented.giver.as_ref());
@@ -164,7 +164,7 @@ impl<'a> Scene<'a> {
             }
             _ => object.surface_pairs(),
         };
-        Place {
+        ProposalContext {
             object: object.object(),
             surface,
             giver,
@@ -175,14 +175,14 @@ impl<'a> Scene<'a> {
     }
 
     /// The same with the cached placements that the first attempts choose from.
-    fn cached_place(&self, attempt: u64) -> Place<'_> {
+    fn cached_place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let placements = || {
             self.placements
                 .get_or_init(|| object.placement_cache_with(self.mechanisms, rig))
         };
         let chooses = attempt < ROWS && self.mechanisms.has(Mechanism::PlacementCache);
-        Place {
+        ProposalContext {
             placements: chooses.then(|| &**placements()),
             ..self.place(attempt)
         }
