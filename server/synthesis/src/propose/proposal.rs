@@ -165,7 +165,7 @@ impl<'a> ProposalContext<'a> {
     }
 
     /// Draws a surface pair and an opposition of its width, and rotates the hand about the line through the pair until it
-    /// fits. Returns `None` if it does not within [`MAX_ROTATIONS`].
+    /// fits. Returns `None` if no rotation does.
     pub fn fitting_candidate(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
         let pair = self.free_pair(stream)?;
         let opposition = self.opposition_for(&pair, stream)?;

@@ -34,8 +34,8 @@ const COMFORT_SCALE: f32 = 0.04;
 /// "Postural hand synergies for tool use", 1998).
 const MAX_FLEXION_DIFFERENCE: f32 = 1.2;
 
-/// Weight in newtons for which a person adds another finger, from two digits for a pen to five for a bottle (after the
-/// masses by grasp type in Feix, Bullock and Dollar, "Analysis of human grasping behavior: object characteristics and
+/// Weight in newtons for which a person adds another finger, up to all five digits for a bottle (after the masses by
+/// grasp type in Feix, Bullock and Dollar, "Analysis of human grasping behavior: object characteristics and
 /// grasp type", 2014).
 const WEIGHT_PER_FINGER: f32 = 1.5;
 
