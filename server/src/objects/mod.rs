@@ -118,7 +118,7 @@ impl StoredObject {
                 .map_or(0, |surface| of_mesh(surface.mesh()))
             + self.object.surface.field_bytes()
             + self.object.surface_pairs().bytes()
-            + PlacementCaches::MOST_BYTES
+            + PlacementCaches::MAX_BYTES
             + self.transferred_grips.len() * TransferredGrips::MOST_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()
     }

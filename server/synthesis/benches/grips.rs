@@ -16,7 +16,7 @@ use grasp_synthesis::{
     },
     propose::{
         prepared::{PreparedObject, PreparedRig},
-        proposal::{Place, propose},
+        proposal::{ProposalContext, propose},
     },
 };
 
@@ -109,7 +109,7 @@ fn proposals(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(PROPOSALS));
     for name in OBJECTS {
         let scene = scene(object(name));
-        let place = Place {
+        let place = ProposalContext {
             object: scene.object,
             surface: object(name).surface_pairs(),
             giver: None,

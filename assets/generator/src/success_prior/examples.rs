@@ -17,10 +17,10 @@ use grasp_synthesis::{
     },
     propose::{
         prepared::{PreparedObject, PreparedRig},
-        proposal::Place,
+        proposal::ProposalContext,
         success_prior::{INPUTS, ObjectFeatures},
     },
-    rating::assessment::Surroundings,
+    rating::assessment::GraspContext,
     search::physical_attempt::PhysicalAttempt,
 };
 
@@ -67,7 +67,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             &mut AttemptStream::new(presenting, round),
             round % 2 == 1,
         );
-        let place = Place {
+        let place = ProposalContext {
             object: &object,
             surface: object.surface_pairs(),
             giver: presented.giver.as_ref(),
@@ -75,7 +75,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             placements: None,
             mechanisms: Mechanisms::ALL,
         };
-        let around = Surroundings {
+        let around = GraspContext {
             object: scene,
             presented: &presented,
             rig,
@@ -85,7 +85,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             if examples.len() >= MOST_EXAMPLES {
                 return examples;
             }
-            let Some(candidate) = place.pads_on_pair(&mut AttemptStream::new(hands, index)) else {
+            let Some(candidate) = place.fitting_candidate(&mut AttemptStream::new(hands, index)) else {
                 continue;
             };
             let held = attempt.hold(&around, &candidate.proposal(), &mut NoStopwatch, &|| false);

@@ -35,7 +35,7 @@ use crate::{
     },
     propose::{
         prepared::{PreparedObject, PreparedRig},
-        proposal::{Place, propose_evenly},
+        proposal::{ProposalContext, propose_evenly},
         surface_pairs::SurfacePairs,
     },
     rating::{scoring::grip_values, taxonomy::classify},
@@ -323,7 +323,7 @@ impl<'a> Growth<'a> {
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
         let is_beside = !self.is_empty() && stream.unit() < PERTURBED_SHARE;
-        let place = Place {
+        let place = ProposalContext {
             object: self.scene.object,
             surface: giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface),
             giver: giver.and_then(|giver| giver.presented.giver.as_ref()),

@@ -11,7 +11,7 @@ use crate::{
         scene::{ObjectScene, Presented},
         solids::TrackedSolids,
     },
-    rating::{assessment::grasp, scoring::score},
+    rating::{assessment::unscored_grasp, scoring::score},
 };
 
 /// An object that is held out, as known grips are asked to hold it.
@@ -74,7 +74,7 @@ impl<'a> Recheck<'a> {
         } else {
             entry.grip.epsilon
         };
-        let mut grasp = grasp(
+        let mut grasp = unscored_grasp(
             &entry.grip,
             &entry.contacts,
             entry.classification,

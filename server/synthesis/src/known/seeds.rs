@@ -21,7 +21,7 @@ use crate::{
         shape::{HandShape, Proposal},
         solids::{HandSolids, PreparedHand, Spheres, TaperedCapsule},
     },
-    propose::proposal::Place,
+    propose::proposal::ProposalContext,
 };
 
 /// Grips to start from. With fewer, fewer givers are answered at all; more are farther from keeping clear, and hold less
@@ -144,7 +144,7 @@ impl Seeds {
     pub fn propose(
         &self,
         entries: &[Entry],
-        place: &Place<'_>,
+        place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
         // The first of 32 comes six times as often as if all did alike. Of 44 holdouts that atlases of the built-in objects do
@@ -158,7 +158,7 @@ impl Seeds {
     pub fn propose_evenly(
         &self,
         entries: &[Entry],
-        place: &Place<'_>,
+        place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
         if self.0.is_empty() {
@@ -171,7 +171,7 @@ impl Seeds {
     fn perturbed(
         Seed { entry, kept }: Seed,
         entries: &[Entry],
-        place: &Place<'_>,
+        place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
         let entry = &entries[usize::from(entry)];

@@ -13,14 +13,14 @@ use crate::{
         grip::{GIVER_CLEARANCE, Gripper},
         solids::{HandSolids, PreparedHand, TaperedCapsule, TrackedSolids},
     },
-    rating::assessment::Surroundings,
+    rating::assessment::GraspContext,
 };
 
 /// The grasp that a known grip is without the fingers that the giver is in the way of, which rest elsewhere; none if it does
 /// not hold so, or if the giver is in the way of no finger.
 pub fn subset_grasp(
     entry: &Entry,
-    around: &Surroundings<'_>,
+    around: &GraspContext<'_>,
     giver: &PreparedHand,
     gripper: &mut Gripper,
 ) -> Option<Box<Grasp>> {
@@ -31,7 +31,7 @@ pub fn subset_grasp(
 pub(crate) fn spared_with(
     mechanisms: Mechanisms,
     entry: &Entry,
-    around: &Surroundings<'_>,
+    around: &GraspContext<'_>,
     giver: &PreparedHand,
     gripper: &mut Gripper,
 ) -> Option<Box<Grasp>> {
@@ -52,7 +52,7 @@ pub(crate) fn spared_with(
     let (grip, solids) = gripper
         .spare(&around.object, around.rig, &known, kept, giver)
         .ok()?;
-    around.hold_with(&grip, &solids, gripper, &mut NoStopwatch).ok()
+    around.assess(&grip, &solids, gripper, &mut NoStopwatch).ok()
 }
 
 /// True only if spheres inside show that the giver leaves too few digits of a grip to hold; not always then.

@@ -1,11 +1,10 @@
-//! `GUIDED` search: hands are placed where grips are, instead of anywhere.
+//! Proposals of `GUIDED` search: hands placed where grasps are likely, instead of anywhere near the object.
 //!
-//! A proposal starts from how hands hold: between thumb and finger pads, or in the palm. The hand's side
-//! ([`opposition`]) draws a shape and asks where its pads oppose each other and how far apart; the object's side
-//! ([`surface_pairs`]) knows where it is as thick as that; [`proposal`] puts the two together, and prefers what is likely to
-//! hold ([`success_prior`]). Where a hand has room at an object does not hang on who presents it: the first attempts choose from
-//! what was drawn once ([`placement_cache`]). What comes of a proposal is decided by the same checks as ever; a hand that nearly
-//! passes them is moved on a little, and a little again (`PhysicalAttempt::hold_or_refine`).
+//! Hands hold between thumb and finger pads, or in the palm. [`opposition`] samples hand shapes whose pads oppose each
+//! other at known widths; [`surface_pairs`] samples opposed points of the object with its thickness there; [`proposal`]
+//! matches the two and prefers hands that are likely to hold ([`success_prior`]). Whether a hand fits at the object does
+//! not depend on the giver, so the first attempts choose from placements sampled once ([`placement_cache`]). Proposals
+//! pass no check here; a hand that nearly passes them is perturbed a few times (`PhysicalAttempt::hold_or_refine`).
 
 pub mod opposition;
 pub mod placement_cache;

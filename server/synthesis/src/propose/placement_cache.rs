@@ -1,4 +1,4 @@
-//! Where a hand has room at an object, for every giver: drawn once, so that attempts need not.
+//! Placements at which a hand fits at an object, whoever presents it: sampled once per object and rig.
 
 use std::{
     fmt,
@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     prepared::{PreparedObject, PreparedRig},
-    proposal::{Candidate, Place},
+    proposal::{Candidate, ProposalContext},
     success_prior::ObjectFeatures,
     surface_pairs::SurfacePair,
 };
@@ -17,51 +17,48 @@ use crate::base::{
     random::AttemptStream,
 };
 
-/// Attempts of a search that choose from the repertoire, each from a row of its own. Most searches end within them; later
-/// ones draw anew, so that they are not bound to what is here.
+/// Number of leading attempts of a search that choose from the cache, each from its own row. Most searches end within them;
+/// later attempts sample freely, so that the cache does not limit what they can find.
 pub const ROWS: u64 = 32;
 
-/// Hands that are drawn for a row, …
-const DRAWN: usize = 512;
+/// Candidates sampled per row. More let a row be choosier, and take longer to build.
+const SAMPLED: usize = 512;
 
-/// … of which at most this many are kept, as far as they have room. With as many drawn, hands hold half as often again
-/// around a mug as those that are drawn anew, around a remote by three eighths; with half as many, a tenth less often and a
-/// sixth more. More kept leave more beside a giver, and take longer to choose from.
+/// Largest number of placements kept per row. More leave more that are clear of a giver, and take longer to choose from.
 const KEPT: usize = 24;
 
-/// How much what is likely to hold is preferred here, as a power of the likelihood. What is chosen from a row is preferred
-/// once more, beside the giver.
+/// Exponent of the success prior when filling a row. Choosing from a row applies the prior again, with the giver known.
 const PREFERENCE: f32 = 1.0;
 
-/// The seed of the draws: any will do, and every object has the same repertoire forever.
+/// Seed of the samples: arbitrary, but fixed so that an object always has the same placements.
 const SEED: u64 = 0x5245_5045;
 
-/// Hands of which an object keeps its repertoires at most: right and left ones of the rigs that are there.
-const MOST_HANDS: usize = 4;
+/// Largest number of caches per object: one each for the left and right hands of the built-in rigs.
+const MAX_RIGS: usize = 4;
 
-/// A hand that has room at the object.
+/// A hand that fits at the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Room {
-    /// The place of its opposition among the hand's.
+struct CachedPlacement {
+    /// The index of its opposition among the rig's.
     opposition: u16,
     pair: SurfacePair,
     object_from_wrist: Pose,
 }
 
-/// Where a hand has room at an object and is likely to hold it, whoever presents it.
+/// The placements at which a rig's hand fits at an object and is likely to hold it, whoever presents it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacementCache {
-    rows: Vec<Vec<Room>>,
+    rows: Vec<Vec<CachedPlacement>>,
 }
 
 impl PlacementCache {
-    /// Draws it: some five milliseconds.
+    /// Samples the placements: about five milliseconds.
     pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
-        Self::of_with(Mechanisms::ALL, object, rig)
+        Self::with_mechanisms(Mechanisms::ALL, object, rig)
     }
 
-    fn of_with(mechanisms: Mechanisms, object: &PreparedObject, rig: &PreparedRig) -> Self {
-        let place = Place {
+    fn with_mechanisms(mechanisms: Mechanisms, object: &PreparedObject, rig: &PreparedRig) -> Self {
+        let context = ProposalContext {
             object,
             surface: object.surface_pairs(),
             giver: None,
@@ -69,75 +66,75 @@ impl PlacementCache {
             placements: None,
             mechanisms,
         };
-        let bulk = ObjectFeatures::of(object);
+        let features = ObjectFeatures::of(object);
         let row = |row| {
             let mut stream = AttemptStream::new(SEED, row);
-            let drawn = place.drawn(DRAWN, &mut stream);
-            let likely = place.by_success_prior(&bulk, PREFERENCE, drawn, &mut stream);
-            let fitting = likely.iter().filter(|candidate| place.fits(candidate));
-            let rooms = fitting.take(KEPT).map(|candidate| Room {
-                opposition: candidate.opposition.place,
+            let sampled = context.sample_candidates(SAMPLED, &mut stream);
+            let ordered = context.order_by_success_prior(&features, PREFERENCE, sampled, &mut stream);
+            let fitting = ordered.iter().filter(|candidate| context.fits(candidate));
+            let kept = fitting.take(KEPT).map(|candidate| CachedPlacement {
+                opposition: candidate.opposition.index,
                 pair: candidate.pair,
                 object_from_wrist: candidate.object_from_wrist,
             });
-            rooms.collect()
+            kept.collect()
         };
         Self {
             rows: (0..ROWS).map(row).collect(),
         }
     }
 
-    /// What an attempt chooses from; nothing after [`ROWS`] of them. `rig` is the hand that it was drawn for.
+    /// The candidates for an attempt; none from attempt [`ROWS`] on. `rig` must be the one the cache was built for.
     pub fn row<'a>(&'a self, attempt: u64, rig: &'a PreparedRig) -> impl Iterator<Item = Candidate<'a>> {
         let row = usize::try_from(attempt).ok().and_then(|row| self.rows.get(row));
-        row.into_iter().flatten().map(|room| Candidate {
-            opposition: rig.oppositions().at(room.opposition),
-            pair: room.pair,
-            object_from_wrist: room.object_from_wrist,
+        row.into_iter().flatten().map(|placement| Candidate {
+            opposition: rig.oppositions().get(placement.opposition),
+            pair: placement.pair,
+            object_from_wrist: placement.object_from_wrist,
         })
     }
 }
 
-/// The repertoires of an object, each drawn when it is first asked for. Copies of an object share them.
+/// An object's placement caches, one per rig and set of mechanisms, each built on first use. Clones share them.
 #[derive(Clone, Default)]
-pub struct PlacementCaches(Arc<Mutex<Vec<Drawn>>>);
+pub struct PlacementCaches(Arc<Mutex<Vec<CacheSlot>>>);
 
-/// The mechanisms that cached placements depend on.
-const DRAWN_BY: [Mechanism; 2] = [Mechanism::SuccessPrior, Mechanism::RoomScreen];
+/// The mechanisms on which cached placements depend.
+const RELEVANT_MECHANISMS: [Mechanism; 2] = [Mechanism::SuccessPrior, Mechanism::RoomScreen];
 
-/// The placements of a hand, by some mechanisms.
-type Drawn = (PreparedRig, Mechanisms, Arc<OnceLock<Arc<PlacementCache>>>);
+/// A rig, the relevant mechanisms, and its cache once it is built.
+type CacheSlot = (PreparedRig, Mechanisms, Arc<OnceLock<Arc<PlacementCache>>>);
 
 impl PlacementCaches {
-    /// Bytes that they take at most.
-    pub const MOST_BYTES: usize = MOST_HANDS * ROWS as usize * KEPT * size_of::<Room>();
+    /// Upper bound on their size, in bytes.
+    pub const MAX_BYTES: usize = MAX_RIGS * ROWS as usize * KEPT * size_of::<CachedPlacement>();
 
-    /// That of a hand, drawn now if nobody asked for it yet; of more than [`MOST_HANDS`], the first is forgotten.
+    /// The cache of a rig, built on first use. Beyond [`MAX_RIGS`], the oldest is evicted.
     pub(super) fn of(
         &self,
         object: &PreparedObject,
         rig: &PreparedRig,
         mechanisms: Mechanisms,
     ) -> Arc<PlacementCache> {
-        let mechanisms = mechanisms.only_of(&DRAWN_BY);
-        let found = {
-            let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            let found = known
+        let mechanisms = mechanisms.only_of(&RELEVANT_MECHANISMS);
+        let slot = {
+            let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let found = slots
                 .iter()
-                .find(|(known_rig, by, _)| *by == mechanisms && known_rig.is_same(rig));
-            if let Some((_, _, found)) = found {
-                Arc::clone(found)
+                .find(|(slot_rig, by, _)| *by == mechanisms && slot_rig.ptr_eq(rig));
+            if let Some((_, _, slot)) = found {
+                Arc::clone(slot)
             } else {
-                if known.len() == MOST_HANDS {
-                    known.remove(0);
+                if slots.len() == MAX_RIGS {
+                    slots.remove(0);
                 }
-                let new = Arc::default();
-                known.push((rig.clone(), mechanisms, Arc::clone(&new)));
-                new
+                let slot = Arc::default();
+                slots.push((rig.clone(), mechanisms, Arc::clone(&slot)));
+                slot
             }
         };
-        // Not under the lock: searches with other hands go on meanwhile.
-        Arc::clone(found.get_or_init(|| Arc::new(PlacementCache::of_with(mechanisms, object, rig))))
+        // Built outside the lock, so that searches with other hands are not blocked.
+        Arc::clone(slot.get_or_init(|| Arc::new(PlacementCache::with_mechanisms(mechanisms, object, rig))))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Rigs and objects with what proposals derive from them once.
+//! Rigs and objects together with the data that proposals derive from them once.
 
 use std::{
     ops::Deref,
@@ -15,7 +15,7 @@ use crate::{
     model::{hand::rig::Rig, object::GraspObject},
 };
 
-/// A rig with how its digits can oppose each other, derived on first use. Copies share both.
+/// A rig and its oppositions, which are sampled on first use. Clones share both.
 #[derive(Clone, Debug)]
 pub struct PreparedRig(Arc<RigParts>);
 
@@ -26,7 +26,7 @@ struct RigParts {
 }
 
 impl PreparedRig {
-    /// A rig whose oppositions are derived when they are first used.
+    /// Wraps a rig; its oppositions are sampled on first use.
     pub fn new(rig: Rig) -> Self {
         Self(Arc::new(RigParts {
             rig,
@@ -34,18 +34,18 @@ impl PreparedRig {
         }))
     }
 
-    /// How thumb and fingers can oppose each other. The first call takes 0.1 to 0.2 s.
+    /// The rig's oppositions of thumb and fingers. The first call takes 0.1 to 0.2 s.
     pub fn oppositions(&self) -> &Oppositions {
         self.0.oppositions.get_or_init(|| Oppositions::of(&self.0.rig))
     }
 
-    /// True once the oppositions are derived: from then on they take no time.
+    /// True once the oppositions have been sampled, so that [`Self::oppositions`] returns at once.
     pub fn is_derived(&self) -> bool {
         self.0.oppositions.get().is_some()
     }
 
-    /// True if both are copies of one.
-    pub(super) fn is_same(&self, other: &Self) -> bool {
+    /// True if both are clones of the same prepared rig.
+    pub(super) fn ptr_eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 }
@@ -58,7 +58,7 @@ impl Deref for PreparedRig {
     }
 }
 
-/// An object with the points where hands may press, and the placements that have room, per hand.
+/// An object, the surface points where hands may press, and its placement caches.
 #[derive(Debug)]
 pub struct PreparedObject {
     object: Arc<GraspObject>,
@@ -67,7 +67,7 @@ pub struct PreparedObject {
 }
 
 impl PreparedObject {
-    /// Samples the object's surface for opposed points: some milliseconds.
+    /// Samples the object's surface for opposed points, which takes some milliseconds.
     pub fn new(object: Arc<GraspObject>) -> Self {
         let surface_pairs = SurfacePairs::of(&object.surface, |triangle| object.is_forbidden(triangle));
         Self {
@@ -82,18 +82,18 @@ impl PreparedObject {
         &self.object
     }
 
-    /// Where opposed digits and the palm may press.
+    /// The points where opposed digits or the palm may press.
     pub fn surface_pairs(&self) -> &SurfacePairs {
         &self.surface_pairs
     }
 
-    /// Where a hand has room at the object and is likely to hold it, whoever presents it. The first call for a hand takes
-    /// some five milliseconds.
+    /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five
+    /// milliseconds.
     pub fn placement_cache(&self, rig: &PreparedRig) -> Arc<PlacementCache> {
         self.placement_cache_with(Mechanisms::ALL, rig)
     }
 
-    /// The same by some of the mechanisms.
+    /// [`Self::placement_cache`] with only some mechanisms enabled.
     pub fn placement_cache_with(&self, mechanisms: Mechanisms, rig: &PreparedRig) -> Arc<PlacementCache> {
         self.placements.of(self, rig, mechanisms)
     }

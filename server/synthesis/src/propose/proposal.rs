@@ -1,4 +1,4 @@
-//! Proposals: a hand's shape and a wrist, drawn where grips are likely.
+//! Draws proposals: a hand shape and a wrist pose where a grasp is likely.
 
 use std::f32::consts::TAU;
 
@@ -22,87 +22,86 @@ use crate::{
     },
 };
 
-/// Share of proposals that lay the palm on the object instead of bringing pads to opposed points.
+/// Share of proposals that place the palm on the object instead of pads on opposed points.
 const PALM_SHARE: f32 = 0.15;
 
-/// Pads may be this much nearer to each other or farther apart than the object is thick, in metres: digits that
-/// close less or more still meet it near the same places.
-const THICKNESS_ROOM: [f32; 2] = [0.006, 0.012];
+/// How much closer together or farther apart than the object's thickness pads may be, in metres: closing digits still meet
+/// it near the same points.
+const THICKNESS_TOLERANCE: [f32; 2] = [0.006, 0.012];
 
-/// Largest tilt of a palm that is laid on the surface, as a tangent.
-const PALM_TILT: f32 = 0.35;
+/// Largest tilt of the palm from the surface's tangent plane, as a tangent per axis.
+const MAX_PALM_TILT: f32 = 0.35;
 
-/// Places that are drawn for a proposal until one has room, and …
-const MOST_PLACES: usize = 12;
+/// Largest number of locations (surface pairs or points) tried per proposal until the hand fits at one.
+const MAX_LOCATIONS: usize = 12;
 
-/// … turns of a hand at a place.
-const MOST_TURNS: usize = 10;
+/// Largest number of rotations of the hand tried at a location.
+const MAX_ROTATIONS: usize = 10;
 
-/// Places of which those come first where a hand is likely to hold. With half as many, grasps of ten objects took a tenth
-/// more of a processor's time in the mean; with twice as many, those of six of seven as well, of thin ones a quarter.
+/// Candidates sampled per proposal and ordered by the success prior. With half or twice as many, searches take longer.
 const COMPARED: usize = 64;
 
-/// How much what is likely to hold is preferred: the power of that likelihood by which it comes first. Higher ones find
-/// grasps sooner where the network is right, and more alike.
+/// Exponent of the success prior when ordering candidates. A larger one finds grasps sooner where the prior is right, but
+/// less varied ones.
 const PREFERENCE: f32 = 2.0;
 
-/// Share of proposals for which nothing is preferred: what the network is wrong about must be found, too.
+/// Share of proposals drawn without the success prior, so that grasps it misjudges are found too.
 const EVEN_SHARE: f32 = 0.2;
 
-/// Pairs and points that are drawn until one is off the giver's hand.
-const MOST_DRAWS: usize = 64;
+/// Largest number of pairs or points drawn until one is clear of the giver's hand.
+const MAX_DRAWS: usize = 64;
 
-/// How deep in the object digits may be where they are expected to end, in metres: they stop before. Where the object is
-/// thin, as thick as a finger ([`THIN`]), a digit is deep in it wherever it touches. Less refuses hands that would do.
-const PAD_DEPTHS: [f32; 2] = [0.0075, 0.005];
+/// How deep inner spheres of the digits may be in the object at the opposed pose, in metres, where it is thin (up to
+/// [`THIN`]) and thicker. Closing stops earlier, so smaller values reject hands that would fit.
+const MAX_DIGIT_DEPTHS: [f32; 2] = [0.0075, 0.005];
 
-/// The thickness below which an object is thin, in metres.
+/// Thickness in metres up to which an object is thin: that of a finger.
 const THIN: f32 = 0.015;
 
-/// Where on the palm it is laid on, from its middle, in metres: across, and along to the fingers.
-const PALM_SPOT: [[f32; 2]; 2] = [[-0.02, 0.02], [-0.02, 0.03]];
+/// Range of the contact point's offset from the palm's centre, in metres: across the palm, and along the fingers.
+const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.02, 0.02], [-0.02, 0.03]];
 
-/// How a palm that is laid on the surface starts above it, in metres.
-const PALM_START: f32 = 0.03;
+/// Height above the surface from which the palm approaches, in metres.
+const PALM_START_HEIGHT: f32 = 0.03;
 
-/// Where proposals are to fit in.
+/// The object, hands and settings for which proposals are drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Place<'a> {
-    /// What is to be held.
+pub struct ProposalContext<'a> {
+    /// The object to be held.
     pub object: &'a GraspObject,
-    /// Where it may be held: the object's, or what the giver's hand leaves of them.
+    /// Where it may be held: the object's pairs and points, or those that the giver's hand leaves free.
     pub surface: &'a SurfacePairs,
-    /// The giver's hand, if it is there already.
+    /// The giver's hand, if there is one.
     pub giver: Option<&'a PreparedHand>,
-    /// The hand that is to hold.
+    /// The receiving hand.
     pub rig: &'a PreparedRig,
-    /// Where it is known that the hand has room at the object, if that is to be gone by.
+    /// Cached placements to choose from, if they are to be used.
     pub placements: Option<&'a PlacementCache>,
-    /// The mechanisms by which hands are proposed.
+    /// The mechanisms that are enabled.
     pub mechanisms: Mechanisms,
 }
 
-/// A hand whose opposed pads are at opposed points of the surface.
+/// A hand placed with its opposed pads at opposed points of the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate<'a> {
-    /// How the pads oppose each other.
+    /// The hand's opposition.
     pub opposition: &'a Opposition,
-    /// The points.
+    /// The opposed points.
     pub pair: SurfacePair,
-    /// The wrist frame in the object's.
+    /// The wrist's pose in the object's frame, in metres.
     pub object_from_wrist: Pose,
 }
 
 impl<'a> Candidate<'a> {
-    /// The hand turned anyhow about the line between the points.
-    pub(super) fn drawn(opposition: &'a Opposition, pair: SurfacePair, stream: &mut AttemptStream) -> Self {
+    /// Places the hand on the pair, randomly rotated about the line through the points.
+    pub(super) fn draw(opposition: &'a Opposition, pair: SurfacePair, stream: &mut AttemptStream) -> Self {
         let across = opposition.fingers - opposition.thumb;
         let target = (pair.end - pair.start).normalize_or(Vec3::X);
         let arc = Quat::from_rotation_arc(across.normalize_or(Vec3::X), target);
         let turn = Quat::from_axis_angle(target, stream.between(0.0, TAU));
         let orientation = (turn * arc).normalize();
-        let middle = (pair.start + pair.end) * 0.5;
-        let position = middle - orientation * ((opposition.thumb + opposition.fingers) * 0.5);
+        let midpoint = (pair.start + pair.end) * 0.5;
+        let position = midpoint - orientation * ((opposition.thumb + opposition.fingers) * 0.5);
         Self {
             opposition,
             pair,
@@ -110,7 +109,7 @@ impl<'a> Candidate<'a> {
         }
     }
 
-    /// The hand to be closed.
+    /// The proposal to close this hand.
     pub fn proposal(&self) -> Proposal {
         Proposal {
             object_from_wrist: self.object_from_wrist,
@@ -120,37 +119,36 @@ impl<'a> Candidate<'a> {
     }
 }
 
-/// Draws a proposal, of which likely ones are preferred; none where there was no room for the hands that were drawn, or if
-/// interrupted.
+/// Draws a proposal, preferring hands that are likely to hold. Returns `None` if no sampled hand fits, or if interrupted.
 pub fn propose(
-    place: &Place<'_>,
+    context: &ProposalContext<'_>,
     stream: &mut AttemptStream,
     interrupted: &impl Fn() -> bool,
 ) -> Option<Proposal> {
     if stream.unit() < EVEN_SHARE {
-        propose_evenly(place, stream, interrupted)
-    } else if stream.unit() < place.palm_share() {
-        place.palm_on_surface(stream, interrupted)
+        propose_evenly(context, stream, interrupted)
+    } else if stream.unit() < context.palm_share() {
+        context.propose_palm(stream, interrupted)
     } else {
-        let known = place.likely_of_cache(stream);
-        known.or_else(|| place.likely_pads_on_pair(stream, interrupted))
+        let cached = context.propose_from_cache(stream);
+        cached.or_else(|| context.propose_likely_pads(stream, interrupted))
     }
 }
 
-/// Draws a proposal, none preferred: an atlas is to know of all.
+/// Draws a proposal without the success prior, as atlases need grips of every kind. Otherwise like [`propose`].
 pub fn propose_evenly(
-    place: &Place<'_>,
+    context: &ProposalContext<'_>,
     stream: &mut AttemptStream,
     interrupted: &impl Fn() -> bool,
 ) -> Option<Proposal> {
-    if stream.unit() < place.palm_share() {
-        return place.palm_on_surface(stream, interrupted);
+    if stream.unit() < context.palm_share() {
+        return context.propose_palm(stream, interrupted);
     }
-    place.any_pads_on_pair(stream, interrupted)
+    context.propose_pads(stream, interrupted)
 }
 
-impl<'a> Place<'a> {
-    /// How often the palm is laid on the object.
+impl<'a> ProposalContext<'a> {
+    /// Share of proposals that place the palm on the object.
     fn palm_share(&self) -> f32 {
         if self.mechanisms.has(Mechanism::PalmPlacement) {
             PALM_SHARE
@@ -159,87 +157,83 @@ impl<'a> Place<'a> {
         }
     }
 
-    /// The first of some places that has room.
-    fn any_pads_on_pair(
-        &self,
-        stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Proposal> {
-        (0..MOST_PLACES)
+    /// Places opposed pads at the first of some locations where the hand fits.
+    fn propose_pads(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
+        (0..MAX_LOCATIONS)
             .take_while(|_| !interrupted())
-            .find_map(|_| Some(self.pads_on_pair(stream)?.proposal()))
+            .find_map(|_| Some(self.fitting_candidate(stream)?.proposal()))
     }
 
-    /// Brings opposed pads to opposed points of the surface, and turns the hand about the line between them until palm,
-    /// forearm and digits have room.
-    pub fn pads_on_pair(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
+    /// Draws a surface pair and an opposition of its width, and rotates the hand about the line through the pair until it
+    /// fits. Returns `None` if no rotation does.
+    pub fn fitting_candidate(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
         let pair = self.free_pair(stream)?;
-        let opposition = self.opposing(&pair, stream)?;
-        (0..MOST_TURNS)
-            .map(|_| Candidate::drawn(opposition, pair, stream))
+        let opposition = self.opposition_for(&pair, stream)?;
+        (0..MAX_ROTATIONS)
+            .map(|_| Candidate::draw(opposition, pair, stream))
             .find(|candidate| self.fits(candidate))
     }
 
-    /// One of those that are known to have room at the object, where it has room beside the giver and is likely to hold.
-    fn likely_of_cache(&self, stream: &mut AttemptStream) -> Option<Proposal> {
+    /// Chooses a cached placement that is clear of the giver, preferring likely ones.
+    fn propose_from_cache(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let row = self.placements?.row(stream.attempt(), self.rig);
         let free = row.filter(|candidate| self.giver.is_none_or(|giver| candidate.pair.is_free_of(giver)));
-        let likely = self.by_success_prior(
+        let ordered = self.order_by_success_prior(
             &ObjectFeatures::of(self.object),
             PREFERENCE,
             free.collect(),
             stream,
         );
-        let clear = likely
+        let clear = ordered
             .iter()
             .find(|candidate| self.is_clear_of_giver(candidate))?;
         Some(clear.proposal())
     }
 
-    /// The same where hands are likely to hold, turned so that they are.
-    fn likely_pads_on_pair(
+    /// Like [`Self::propose_pads`], but tries locations and rotations in the order of the success prior.
+    fn propose_likely_pads(
         &self,
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
         if !self.mechanisms.has(Mechanism::SuccessPrior) {
-            return self.any_pads_on_pair(stream, interrupted);
+            return self.propose_pads(stream, interrupted);
         }
-        let bulk = ObjectFeatures::of(self.object);
-        let places = self.drawn(COMPARED, stream);
-        self.by_success_prior(&bulk, PREFERENCE, places, stream)
+        let features = ObjectFeatures::of(self.object);
+        let locations = self.sample_candidates(COMPARED, stream);
+        self.order_by_success_prior(&features, PREFERENCE, locations, stream)
             .iter()
-            .take(MOST_PLACES)
+            .take(MAX_LOCATIONS)
             .take_while(|_| !interrupted())
-            .find_map(|place| {
-                let turned = (0..MOST_TURNS).map(|_| Candidate::drawn(place.opposition, place.pair, stream));
-                let turned = self.by_success_prior(&bulk, PREFERENCE, turned.collect(), stream);
-                let fitting = turned.iter().find(|candidate| self.fits(candidate))?;
+            .find_map(|&Candidate { opposition, pair, .. }| {
+                let rotated = (0..MAX_ROTATIONS).map(|_| Candidate::draw(opposition, pair, stream));
+                let rotated = self.order_by_success_prior(&features, PREFERENCE, rotated.collect(), stream);
+                let fitting = rotated.iter().find(|candidate| self.fits(candidate))?;
                 Some(fitting.proposal())
             })
     }
 
-    /// As many hands at places off the giver's hand, or fewer where there are none.
-    pub(super) fn drawn(&self, count: usize, stream: &mut AttemptStream) -> Vec<Candidate<'a>> {
-        let mut drawn = Vec::with_capacity(count);
+    /// Samples up to `count` candidates whose pads are clear of the giver's hand, without testing whether they fit.
+    pub(super) fn sample_candidates(&self, count: usize, stream: &mut AttemptStream) -> Vec<Candidate<'a>> {
+        let mut candidates = Vec::with_capacity(count);
         for _ in 0..count {
             let Some(pair) = self.free_pair(stream) else { break };
-            if let Some(opposition) = self.opposing(&pair, stream) {
-                drawn.push(Candidate::drawn(opposition, pair, stream));
+            if let Some(opposition) = self.opposition_for(&pair, stream) {
+                candidates.push(Candidate::draw(opposition, pair, stream));
             }
         }
-        drawn
+        candidates
     }
 
-    /// In an order by chance, in which those come early that are likely to hold, by that power of the likelihood.
-    pub(super) fn by_success_prior(
+    /// Orders candidates at random, weighted by the success prior to the power of `preference`.
+    pub(super) fn order_by_success_prior(
         &self,
-        bulk: &ObjectFeatures,
+        features: &ObjectFeatures,
         preference: f32,
         candidates: Vec<Candidate<'a>>,
         stream: &mut AttemptStream,
     ) -> Vec<Candidate<'a>> {
-        let is_rated = self.mechanisms.has(Mechanism::SuccessPrior);
+        let uses_prior = self.mechanisms.has(Mechanism::SuccessPrior);
         let mut keyed: Vec<(f32, Candidate<'_>)> = candidates
             .into_iter()
             .map(|candidate| {
@@ -248,56 +242,56 @@ impl<'a> Place<'a> {
                     object_from_wrist,
                     ..
                 } = candidate;
-                let log_prospect = if is_rated {
-                    let inputs = bulk.inputs(self.rig, opposition, object_from_wrist, self.giver);
+                let log_probability = if uses_prior {
+                    let inputs = features.inputs(self.rig, opposition, object_from_wrist, self.giver);
                     -(-TRAINED.log_odds(&inputs)).exp().ln_1p()
                 } else {
                     0.0
                 };
-                // Gumbel's trick: by these keys, they are drawn without replacement by their weights.
-                let chance = -(-stream.unit().max(f32::MIN_POSITIVE).ln()).ln();
-                (preference * log_prospect + chance, candidate)
+                // Gumbel-max trick: sorting by these keys draws without replacement in proportion to the weights.
+                let gumbel = -(-stream.unit().max(f32::MIN_POSITIVE).ln()).ln();
+                (preference * log_probability + gumbel, candidate)
             })
             .collect();
         keyed.sort_by(|(a, _), (b, _)| b.total_cmp(a));
         keyed.into_iter().map(|(_, candidate)| candidate).collect()
     }
 
-    /// How a hand can oppose its pads at the pair's ends; none if it cannot.
-    fn opposing(&self, pair: &SurfacePair, stream: &mut AttemptStream) -> Option<&'a Opposition> {
-        let room = [
-            pair.thickness - THICKNESS_ROOM[0],
-            pair.thickness + THICKNESS_ROOM[1],
+    /// Draws an opposition about as wide as the pair is thick; `None` if the rig has none.
+    fn opposition_for(&self, pair: &SurfacePair, stream: &mut AttemptStream) -> Option<&'a Opposition> {
+        let widths = [
+            pair.thickness - THICKNESS_TOLERANCE[0],
+            pair.thickness + THICKNESS_TOLERANCE[1],
         ];
-        self.rig.oppositions().draw(room, stream)
+        self.rig.oppositions().draw(widths, stream)
     }
 
-    /// A pair off the giver's hand; none if none of [`MOST_DRAWS`] is.
+    /// A pair clear of the giver's hand; `None` if none of [`MAX_DRAWS`] is.
     fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
-        (0..MOST_DRAWS)
+        (0..MAX_DRAWS)
             .map_while(|_| self.surface.pair(stream))
             .find(|pair| self.giver.is_none_or(|giver| pair.is_free_of(giver)))
     }
 
-    /// A point off the giver's hand; none if none of [`MOST_DRAWS`] is.
+    /// A point clear of the giver's hand; `None` if none of [`MAX_DRAWS`] is.
     fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
-        (0..MOST_DRAWS)
+        (0..MAX_DRAWS)
             .map_while(|_| self.surface.point(stream))
             .find(|point| self.giver.is_none_or(|giver| point.is_free_of(giver)))
     }
 
-    /// True if palm, forearm and digits have room there.
+    /// True if palm, forearm and digits collide with neither object nor giver, as far as inner spheres show.
     pub(super) fn fits(&self, candidate: &Candidate<'_>) -> bool {
-        let pad_depth = PAD_DEPTHS[usize::from(candidate.pair.thickness > THIN)];
-        self.has_room(candidate.object_from_wrist)
-            && self.have_room(
+        let max_depth = MAX_DIGIT_DEPTHS[usize::from(candidate.pair.thickness > THIN)];
+        self.palm_fits(candidate.object_from_wrist)
+            && self.spheres_fit(
                 candidate.object_from_wrist,
                 &candidate.opposition.links,
-                pad_depth,
+                max_depth,
             )
     }
 
-    /// True if palm, forearm and digits are off the giver's hand there.
+    /// True if palm, forearm and digits are clear of the giver's hand, as far as inner spheres show.
     fn is_clear_of_giver(&self, candidate: &Candidate<'_>) -> bool {
         let spheres = [
             self.rig.oppositions().inner_spheres(),
@@ -306,21 +300,17 @@ impl<'a> Place<'a> {
         !self.mechanisms.has(Mechanism::RoomScreen)
             || spheres
                 .iter()
-                .all(|spheres| !self.meet_giver(candidate.object_from_wrist, spheres))
+                .all(|spheres| !self.spheres_meet_giver(candidate.object_from_wrist, spheres))
     }
 
-    /// Lays the palm on the surface where there is room.
-    fn palm_on_surface(
-        &self,
-        stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Proposal> {
-        (0..MOST_PLACES)
+    /// Places the palm on the surface at the first of some points where it fits.
+    fn propose_palm(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
+        (0..MAX_LOCATIONS)
             .take_while(|_| !interrupted())
             .find_map(|_| self.palm_on_point(stream))
     }
 
-    /// Holds the palm over a point of the surface, facing it, turned until the forearm has room.
+    /// Places the palm over a point of the surface, facing it, and rotates it until palm and forearm fit.
     fn palm_on_point(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let shape = HandShape {
             closing: [true; 5],
@@ -329,53 +319,54 @@ impl<'a> Place<'a> {
         let point = self.free_point(stream)?;
         let (a, b) = point.normal.any_orthonormal_pair();
         let tilted = point.normal
-            + a * stream.between(-PALM_TILT, PALM_TILT)
-            + b * stream.between(-PALM_TILT, PALM_TILT);
-        // The palm's +z goes into the surface.
+            + a * stream.between(-MAX_PALM_TILT, MAX_PALM_TILT)
+            + b * stream.between(-MAX_PALM_TILT, MAX_PALM_TILT);
+        // The palm's +z points into the surface.
         let z = -tilted.normalize_or(point.normal);
         let (a, b) = z.any_orthonormal_pair();
-        // Any part of the palm, not only its middle.
-        let across = stream.between(PALM_SPOT[0][0], PALM_SPOT[0][1]);
-        let along = stream.between(PALM_SPOT[1][0], PALM_SPOT[1][1]);
-        let spot = self.rig.palm + Vec3::new(across, along, 0.0);
-        (0..MOST_TURNS).find_map(|_| {
+        // Any part of the palm may touch, not only its centre.
+        let across = stream.between(PALM_OFFSETS[0][0], PALM_OFFSETS[0][1]);
+        let along = stream.between(PALM_OFFSETS[1][0], PALM_OFFSETS[1][1]);
+        let contact = self.rig.palm + Vec3::new(across, along, 0.0);
+        (0..MAX_ROTATIONS).find_map(|_| {
             let turn = stream.between(0.0, TAU);
             let y = a * turn.cos() + b * turn.sin();
             let orientation = Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z)).normalize();
-            let touching = Pose::new(point.position - orientation * spot, orientation);
-            self.has_room(touching).then_some(Proposal {
-                object_from_wrist: Pose::new(touching.position - z * PALM_START, orientation),
+            let touching = Pose::new(point.position - orientation * contact, orientation);
+            self.palm_fits(touching).then_some(Proposal {
+                object_from_wrist: Pose::new(touching.position - z * PALM_START_HEIGHT, orientation),
                 shape,
-                advance: 2.0 * PALM_START,
+                advance: 2.0 * PALM_START_HEIGHT,
             })
         })
     }
 
-    /// True if balls inside palm and forearm are off the object and the giver's hand: a hundred times sooner known than
-    /// the whole hand's clearance, which decides in the end.
-    fn has_room(&self, object_from_wrist: Pose) -> bool {
-        self.have_room(object_from_wrist, self.rig.oppositions().inner_spheres(), DEEPEST)
+    /// True if inner spheres of palm and forearm are clear of object and giver. This is a hundred times cheaper than the
+    /// whole hand's clearance, which is checked later.
+    fn palm_fits(&self, object_from_wrist: Pose) -> bool {
+        self.spheres_fit(object_from_wrist, self.rig.oppositions().inner_spheres(), DEEPEST)
     }
 
-    /// True if balls, in the wrist's frame, are off the giver's hand and at most `depth` metres in the object.
-    fn have_room(&self, object_from_wrist: Pose, spheres: &[Spheres], depth: f32) -> bool {
+    /// True if spheres, given in the wrist's frame, are clear of the giver's hand and at most `depth` metres deep in the
+    /// object.
+    fn spheres_fit(&self, object_from_wrist: Pose, spheres: &[Spheres], depth: f32) -> bool {
         if !self.mechanisms.has(Mechanism::RoomScreen) {
             return true;
         }
-        !self.meet_giver(object_from_wrist, spheres)
+        !self.spheres_meet_giver(object_from_wrist, spheres)
             && spheres.iter().all(|spheres| {
                 spheres
                     .transformed(object_from_wrist)
                     .iter()
-                    .all(|(middle, radius)| {
+                    .all(|(centre, radius)| {
                         let surface = &self.object.surface;
-                        radius <= depth || surface.closest_point_within(middle, radius - depth).is_none()
+                        radius <= depth || surface.closest_point_within(centre, radius - depth).is_none()
                     })
             })
     }
 
-    /// True if one of these balls, in the wrist's frame, certainly meets the giver's hand.
-    fn meet_giver(&self, object_from_wrist: Pose, spheres: &[Spheres]) -> bool {
+    /// True if one of the spheres, given in the wrist's frame, certainly meets the giver's hand.
+    fn spheres_meet_giver(&self, object_from_wrist: Pose, spheres: &[Spheres]) -> bool {
         self.giver.is_some_and(|giver| {
             spheres
                 .iter()

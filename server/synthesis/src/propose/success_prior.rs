@@ -1,10 +1,10 @@
-//! How likely a hand is to hold where it comes to be, as far as that shows before it is closed: a small network, taught on
-//! shapes that are drawn at random.
+//! The success prior: a small network that estimates, before a hand is closed, how likely it is to hold. It was trained on
+//! random shapes.
 //!
-//! What a hand meets when it is closed decides in the end, and takes a hundred times longer. The network knows of the
-//! object's box and weight only how they lie in the hand, of its surface how thick it is between the pads, and of the
-//! giver how near pads and palm are. That is enough to see that fingers hold a mug by its body or handle, and not by the
-//! rim that most pairs of points lie on. What it was taught (`taught.rs`) comes from the assets' generator.
+//! Closing the hand decides, but takes a hundred times longer. The network sees how the object's box and centre of mass lie
+//! in the hand, the object's thickness between the pads, the hand's shape, and how near the giver is to pads and palm.
+//! That suffices to prefer a mug's body or handle over its rim, on which most surface pairs lie. The assets' generator
+//! trains it and writes `weights.rs`.
 
 mod weights;
 
@@ -20,51 +20,53 @@ use crate::{
     physical::solids::PreparedHand,
 };
 
-/// Numbers that the network is told.
+/// Number of inputs of the network.
 pub const INPUTS: usize = 23;
 
-/// Units of the network's one hidden layer. Twice as many rate no better.
+/// Units of the hidden layer. Twice as many rank candidates no better.
 pub const UNITS: usize = 32;
 
-/// How far from what it was taught, in standard deviations, a number may be told: further out, nothing was learned.
-pub const FARTHEST: f32 = 3.0;
+/// Largest standardized input, in standard deviations from the training mean; beyond it, the network has learned nothing.
+pub const MAX_DEVIATION: f32 = 3.0;
 
-/// What is thinner or smaller than this is told as if it were this, in metres: logarithms have no zero.
-const LEAST_SIZE: f32 = 0.001;
+/// Lower bound on lengths before taking their logarithm, in metres.
+const MIN_SIZE: f32 = 0.001;
 
-/// Farther than this, in metres, a giver's hand is as if it were not there.
-const FAR: f32 = 0.1;
+/// Distance in metres from which a giver's hand counts as absent.
+const MAX_GIVER_DISTANCE: f32 = 0.1;
 
-/// The network that was taught.
-pub use crate::propose::success_prior::weights::TRAINED;
+/// The trained network.
+pub use weights::TRAINED;
 
-/// A network of one hidden layer of rectified units.
+/// A network with one hidden layer of rectified linear units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
-    /// What is told at the mean, …
+    /// Mean of each input in training.
     pub means: [f32; INPUTS],
-    /// … and how many standard deviations one more of it is.
+    /// Reciprocal of each input's standard deviation in training.
     pub scales: [f32; INPUTS],
-    /// From what is told to each unit.
+    /// Weight from each input to each hidden unit.
     pub weights: [[f32; UNITS]; INPUTS],
-    /// Of each unit.
+    /// Bias of each hidden unit.
     pub biases: [f32; UNITS],
-    /// From each unit to the answer.
+    /// Weight from each hidden unit to the output.
     pub outputs: [f32; UNITS],
-    /// Of the answer.
+    /// Bias of the output.
     pub output_bias: f32,
 }
 
 impl Network {
-    /// What the hidden layer is told: in standard deviations from the mean, at most [`FARTHEST`].
+    /// Standardizes the inputs: standard deviations from the mean, clamped to ±[`MAX_DEVIATION`].
     pub fn scaled(&self, inputs: &[f32; INPUTS]) -> [f32; INPUTS] {
-        std::array::from_fn(|i| ((inputs[i] - self.means[i]) * self.scales[i]).clamp(-FARTHEST, FARTHEST))
+        std::array::from_fn(|i| {
+            ((inputs[i] - self.means[i]) * self.scales[i]).clamp(-MAX_DEVIATION, MAX_DEVIATION)
+        })
     }
 
-    /// The hidden units, told what is scaled already.
+    /// Activations of the hidden units for standardized inputs.
     pub fn units(&self, scaled: &[f32; INPUTS]) -> [f32; UNITS] {
         let mut units = self.biases;
-        // Loops over indices, as zipped and mapped arrays stay calls.
+        // Indexed, because the compiler does not inline zipped and mapped arrays here.
         for (inputs, weights) in scaled.iter().zip(&self.weights) {
             for k in 0..UNITS {
                 units[k] += inputs * weights[k];
@@ -76,7 +78,7 @@ impl Network {
         units
     }
 
-    /// The log odds that the hand holds.
+    /// Log odds that the hand holds.
     pub fn log_odds(&self, inputs: &[f32; INPUTS]) -> f32 {
         let units = self.units(&self.scaled(inputs));
         let weighted = units.iter().zip(&self.outputs);
@@ -84,33 +86,33 @@ impl Network {
     }
 }
 
-/// What the network is told of an object.
+/// The features of an object from which the network's inputs are computed, in the object's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectFeatures {
     centre_of_mass: Vec3,
-    /// Unit vector along the longest edges of its box.
+    /// Unit vector along the longest edge of its box.
     long_axis: Vec3,
-    /// Logarithms of half its box's edges in metres, longest first.
-    sizes: [f32; 3],
+    /// Logarithms of its box's half extents in metres, longest first.
+    log_sizes: [f32; 3],
     /// Half the diagonal of its box, in metres.
     characteristic_length: f32,
 }
 
 impl ObjectFeatures {
-    /// Of an object, in its frame.
+    /// Computes the features of an object.
     pub fn of(object: &GraspObject) -> Self {
-        let around = &object.bounding_box;
-        let mut axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (around.half_extents.dot(axis), axis));
+        let bounds = &object.bounding_box;
+        let mut axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| (bounds.half_extents.dot(axis), axis));
         axes.sort_by(|(a, _), (b, _)| b.total_cmp(a));
         Self {
             centre_of_mass: object.centre_of_mass,
-            long_axis: around.object_from_box.transform_vector(axes[0].1),
-            sizes: axes.map(|(half, _)| half.max(LEAST_SIZE).ln()),
-            characteristic_length: around.half_extents.length().max(LEAST_SIZE),
+            long_axis: bounds.object_from_box.transform_vector(axes[0].1),
+            log_sizes: axes.map(|(half, _)| half.max(MIN_SIZE).ln()),
+            characteristic_length: bounds.half_extents.length().max(MIN_SIZE),
         }
     }
 
-    /// What the network is told of a hand whose pads, opposed so, come to be at `object_from_wrist`, beside a giver's.
+    /// The network's inputs for a hand with this opposition at `object_from_wrist`, near the giver's hand if there is one.
     pub fn inputs(
         &self,
         rig: &Rig,
@@ -119,39 +121,41 @@ impl ObjectFeatures {
         giver: Option<&PreparedHand>,
     ) -> [f32; INPUTS] {
         let wrist_from_object = object_from_wrist.inverse();
-        let mut weight = wrist_from_object.transform_point(self.centre_of_mass);
+        let mut centre_of_mass = wrist_from_object.transform_point(self.centre_of_mass);
         let long_axis = wrist_from_object.transform_vector(self.long_axis).abs();
-        // How far the weight is from the line through the pads, and from the middle between them along it.
+        // Distance of the centre of mass from the line through the pads, and along it from their midpoint.
         let across = (opposition.fingers - opposition.thumb).normalize_or_zero();
-        let arm = weight - (opposition.fingers + opposition.thumb) * 0.5;
+        let arm = centre_of_mass - (opposition.fingers + opposition.thumb) * 0.5;
         let along = arm.dot(across);
         let sideways = (arm - across * along).length();
-        // The network was taught on right hands.
+        // The network was trained on right hands.
         if rig.handedness == Handedness::Left {
-            weight.x = -weight.x;
+            centre_of_mass.x = -centre_of_mass.x;
         }
         let [from_thumb, from_fingers, from_palm] =
             [opposition.thumb, opposition.fingers, rig.palm].map(|point| {
                 let point = object_from_wrist.transform_point(point);
-                giver.map_or(FAR, |giver| {
-                    giver.point_distance_upper_bound(point).clamp(0.0, FAR)
+                giver.map_or(MAX_GIVER_DISTANCE, |giver| {
+                    giver
+                        .point_distance_upper_bound(point)
+                        .clamp(0.0, MAX_GIVER_DISTANCE)
                 })
             });
         let shape = &opposition.shape;
         let digits = shape.closing.iter().filter(|&&closes| closes).count();
         [
-            opposition.width().max(LEAST_SIZE).ln(),
+            opposition.width().max(MIN_SIZE).ln(),
             sideways / self.characteristic_length,
             along.abs(),
-            weight.x,
-            weight.y,
-            weight.z,
+            centre_of_mass.x,
+            centre_of_mass.y,
+            centre_of_mass.z,
             long_axis.x,
             long_axis.y,
             long_axis.z,
-            self.sizes[0],
-            self.sizes[1],
-            self.sizes[2],
+            self.log_sizes[0],
+            self.log_sizes[1],
+            self.log_sizes[2],
             digits as f32,
             f32::from(u8::from(shape.tucks)),
             shape.thumb_yaw,

@@ -1,4 +1,4 @@
-//! Where on an object opposed digits may press: points of the surface and what lies opposite of them.
+//! Where opposed digits or the palm may press: points sampled on the surface, and the points opposite them.
 
 use glam::Vec3;
 
@@ -8,81 +8,81 @@ use crate::{
     physical::solids::PreparedHand,
 };
 
-/// Points that are drawn on the surface. More cover small parts of large objects better and cost registration time, about
-/// a microsecond each.
+/// Points sampled on the surface. More cover small parts of large objects better, but each adds about a microsecond to the
+/// registration of an object.
 const SAMPLES: u64 = 2048;
 
-/// The seed of the points: any will do, and every object has the same points forever.
+/// Seed of the samples: arbitrary, but fixed so that an object always has the same points.
 const SEED: u64 = 0x5041_4952;
 
-/// How far a ray starts below the surface, in metres, so that it does not meet the triangle that it starts on.
+/// Depth below the surface at which a ray starts, in metres, so that it does not hit its own triangle.
 const START_DEPTH: f32 = 1e-5;
 
-/// The thickest that a hand gets round, in metres.
-const THICKEST: f32 = 0.15;
+/// Largest thickness that a hand can grasp, in metres.
+const MAX_THICKNESS: f32 = 0.15;
 
-/// Largest slant of the ray from the inward normal, as a tangent: about that of a friction cone.
-const SLANT: f32 = 0.4;
+/// Largest slant of the ray from the inward normal, as a tangent per axis: about that of a friction cone.
+const MAX_SLANT: f32 = 0.4;
 
-/// Least cosine between the ray and the normals at both ends: 45°. Less, and pads slip off.
-const LEAST_COS: f32 = 0.7;
+/// Minimum cosine between the ray and the normals at both ends: 45°. Pads would slip beyond it.
+const MIN_COS: f32 = 0.7;
 
-/// What a fingertip needs between a point that it presses and the giver's hand, in metres: half its thickness.
-const FINGER_ROOM: f32 = 0.006;
+/// Minimum distance in metres between a point pressed by a finger and the giver's hand: half a finger's thickness.
+const FINGER_CLEARANCE: f32 = 0.006;
 
-/// The same for the palm.
-const PALM_ROOM: f32 = 0.012;
+/// Minimum distance in metres between a point touched by the palm and the giver's hand.
+const PALM_CLEARANCE: f32 = 0.012;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// In metres.
+    /// Position in metres.
     pub position: Vec3,
     /// Outward unit normal.
     pub normal: Vec3,
 }
 
 impl SurfacePoint {
-    /// True if a palm has room there beside a giver's hand.
+    /// True unless the point is certainly too close to the giver's hand for a palm.
     pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
-        !giver.surely_nears(self.position, 0.0, PALM_ROOM)
+        !giver.surely_nears(self.position, 0.0, PALM_CLEARANCE)
     }
 }
 
-/// Two points of the surface that opposed digits may press together, straight through the object.
+/// Two points of the surface on opposite sides of the object, which opposed digits may press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePair {
-    /// The one end, in metres.
+    /// One end, in metres.
     pub start: Vec3,
-    /// The other end.
+    /// The other end, in metres.
     pub end: Vec3,
-    /// Distance between them.
+    /// Distance between the ends, in metres.
     pub thickness: f32,
 }
 
 impl SurfacePair {
-    /// True if fingers have room at both ends beside a giver's hand.
+    /// True unless an end is certainly too close to the giver's hand for a finger.
     pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
         [self.start, self.end]
             .iter()
-            .all(|&end| !giver.surely_nears(end, 0.0, FINGER_ROOM))
+            .all(|&end| !giver.surely_nears(end, 0.0, FINGER_CLEARANCE))
     }
 }
 
-/// What GUIDED search knows of an object's surface. In the object's frame.
+/// The sampled points and pairs of an object's surface, in the object's frame.
 #[derive(Clone, Debug, Default)]
 pub struct SurfacePairs {
     pairs: Vec<SurfacePair>,
-    /// Points that may be touched, uniform over the surface.
+    /// Points that may be touched, uniformly distributed over the surface.
     points: Vec<SurfacePoint>,
 }
 
 impl SurfacePairs {
-    /// Draws points on a surface; on triangles that `is_forbidden` says, none.
+    /// Samples a surface, without the triangles for which `is_forbidden` returns true.
     pub fn of(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Self {
         let mesh = surface.mesh();
         let mut sum = 0.0;
-        let heights: Vec<f64> = (0..mesh.triangles().len())
+        let cumulative_areas: Vec<f64> = (0..mesh.triangles().len())
             .map(|triangle| {
                 if !is_forbidden(triangle as u32) {
                     let [a, b, c] = mesh.corners(triangle).map(Vec3::as_dvec3);
@@ -91,17 +91,17 @@ impl SurfacePairs {
                 sum
             })
             .collect();
-        let mut found = Self::default();
+        let mut sampled = Self::default();
         if sum <= 0.0 {
-            return found;
+            return sampled;
         }
         for sample in 0..SAMPLES {
             let mut stream = AttemptStream::new(SEED, sample);
-            // Stratified: every sample has its own share of the area.
-            let height = (sample as f64 + f64::from(stream.unit())) / SAMPLES as f64 * sum;
-            let triangle = heights
-                .partition_point(|&end| end <= height)
-                .min(heights.len() - 1);
+            // Stratified: each sample has its own share of the area.
+            let area = (sample as f64 + f64::from(stream.unit())) / SAMPLES as f64 * sum;
+            let triangle = cumulative_areas
+                .partition_point(|&end| end <= area)
+                .min(cumulative_areas.len() - 1);
             let [a, b, c] = mesh.corners(triangle);
             let (mut u, mut v) = (stream.unit(), stream.unit());
             if u + v > 1.0 {
@@ -111,33 +111,33 @@ impl SurfacePairs {
                 position: a + (b - a) * u + (c - a) * v,
                 normal: mesh.normal(triangle),
             };
-            found.points.push(point);
-            let aside = point.normal.any_orthogonal_vector() * stream.between(-SLANT, SLANT)
-                + point.normal.cross(point.normal.any_orthogonal_vector()) * stream.between(-SLANT, SLANT);
-            let inward = (aside - point.normal).normalize_or(-point.normal);
+            sampled.points.push(point);
+            let slant = point.normal.any_orthogonal_vector() * stream.between(-MAX_SLANT, MAX_SLANT)
+                + point.normal.cross(point.normal.any_orthogonal_vector())
+                    * stream.between(-MAX_SLANT, MAX_SLANT);
+            let inward = (slant - point.normal).normalize_or(-point.normal);
             let start = point.position + inward * START_DEPTH;
-            let ray = Segment::new(start, start + inward * THICKEST);
+            let ray = Segment::new(start, start + inward * MAX_THICKNESS);
             let Some(exit) = surface.first_hit(ray) else {
                 continue;
             };
             let opposite = mesh.normal(exit.triangle as usize);
             if is_forbidden(exit.triangle)
-                || opposite.dot(inward) < LEAST_COS
-                || -point.normal.dot(inward) < LEAST_COS
+                || opposite.dot(inward) < MIN_COS
+                || -point.normal.dot(inward) < MIN_COS
             {
                 continue;
             }
-            found.pairs.push(SurfacePair {
+            sampled.pairs.push(SurfacePair {
                 start: point.position,
                 end: exit.position,
                 thickness: exit.distance + START_DEPTH,
             });
         }
-        found
+        sampled
     }
 
-    /// The pairs and points that a giver's hand leaves free: those that a finger, and a palm, has room at. Worth its time
-    /// where much is drawn from them.
+    /// The pairs and points that are not too close to the giver's hand. Filtering pays off only if many draws follow.
     #[must_use]
     pub fn free_of(&self, giver: &PreparedHand) -> Self {
         Self {
@@ -156,12 +156,12 @@ impl SurfacePairs {
         }
     }
 
-    /// Bytes that pairs and points take.
+    /// Size of pairs and points, in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.pairs.as_slice()) + size_of_val(self.points.as_slice())
     }
 
-    /// A pair, turned either way; none if the object has none.
+    /// Draws a pair in a random direction; `None` if there are none.
     pub fn pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
         if self.pairs.is_empty() {
             return None;
@@ -178,7 +178,7 @@ impl SurfacePairs {
         })
     }
 
-    /// A point of the surface; none if all of it is forbidden.
+    /// Draws a point; `None` if there are none.
     pub fn point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
         (!self.points.is_empty()).then(|| self.points[stream.below(self.points.len())])
     }

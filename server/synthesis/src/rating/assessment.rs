@@ -1,4 +1,4 @@
-//! The grasp that a valid grip is: forces, type, comfort and score for what is presented.
+//! Turns a valid grip into a rated grasp of a presented object: forces, type, comfort and score.
 
 use super::{
     comfort::{comfort, digit_totals},
@@ -25,25 +25,25 @@ use crate::{
     thesis::algorithm_1::HeldObject,
 };
 
-/// What an attempt works with.
+/// The object, presentation, hand and constraints that a grip is assessed against.
 #[derive(Clone, Copy, Debug)]
-pub struct Surroundings<'a> {
-    /// The object.
+pub struct GraspContext<'a> {
+    /// The object to be held.
     pub object: ObjectScene<'a>,
-    /// How it is held out.
+    /// How it is presented.
     pub presented: &'a Presented,
     /// The receiving hand.
     pub rig: &'a Rig,
-    /// What is demanded of the grasp, in the object's frame.
+    /// The constraints on the grasp, in the object's frame.
     pub constraints: &'a Constraints,
 }
 
-impl Surroundings<'_> {
-    /// The grasp that a grip is here which a gripper has just made.
+impl GraspContext<'_> {
+    /// Checks and rates the grip that `gripper` has just closed, whose hand is `solids`.
     ///
     /// # Errors
-    /// The first check that fails.
-    pub fn hold_with(
+    /// The first failed check.
+    pub fn assess(
         &self,
         grip: &Grip,
         solids: &HandSolids,
@@ -62,7 +62,7 @@ impl Surroundings<'_> {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
 
-        // Step 5, Immobility Validation, for what is held as it is held out.
+        // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
         let load = object.load(presented.up);
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
@@ -70,7 +70,7 @@ impl Surroundings<'_> {
         let tracked = TrackedSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
         let giver_clearance = clear_of_giver(&tracked, presented.giver.as_ref());
         let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
-        let mut grasp = grasp(
+        let mut grasp = unscored_grasp(
             grip,
             &gripper.contacts,
             classification,
@@ -79,7 +79,7 @@ impl Surroundings<'_> {
             presented,
             giver_clearance,
         );
-        let of_grip = grip_values(
+        let grip_values = grip_values(
             object,
             rig,
             &grip.pose,
@@ -88,8 +88,8 @@ impl Surroundings<'_> {
             grip.epsilon,
             solids,
         );
-        grasp.score = Some(score(of_grip, &grasp, object, rig, presented));
-        // Palm and digits may have moved the wrist since its place was admitted.
+        grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
+        // Closing may have moved the wrist since its placement was admitted.
         if !constraints.admits(&grasp) {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
@@ -97,8 +97,8 @@ impl Surroundings<'_> {
     }
 }
 
-/// The grasp that a grip is when it holds what is presented by the forces of `balance`, not rated yet.
-pub fn grasp(
+/// The grasp of a grip that holds the presented object with the forces of `balance`. Its score is left empty.
+pub fn unscored_grasp(
     grip: &Grip,
     contacts: &[Contact],
     classification: Classification,
@@ -107,7 +107,7 @@ pub fn grasp(
     presented: &Presented,
     giver_clearance: Option<f32>,
 ) -> Grasp {
-    let sum: glam::Vec3 = balance.forces.iter().sum();
+    let total_force: glam::Vec3 = balance.forces.iter().sum();
     let comfort = comfort(digit_totals(contacts, &balance.forces));
     Grasp {
         pose: grip.pose,
@@ -115,7 +115,7 @@ pub fn grasp(
         contacts: contacts.to_vec(),
         forces: balance.forces,
         torsions: balance.torsions,
-        wrench_angle: sum.angle_between(presented.up),
+        wrench_angle: total_force.angle_between(presented.up),
         comfort,
         margins: Some(PhysicalMargins {
             residual: balance.residual,
@@ -129,7 +129,7 @@ pub fn grasp(
     }
 }
 
-/// The grasp that a hand is which holds an object by the thesis' validity.
+/// The grasp of a hand that holds an object under `THESIS` validity: typed, but without margins or score.
 pub fn thesis_grasp(rig: &Rig, held: HeldObject) -> Grasp {
     Grasp {
         bend_ratios: held.bend_ratios,

@@ -1,14 +1,14 @@
-//! The evaluation measure "comfort" (thesis 4.6, Eq. 4.6).
+//! Comfort, the thesis' evaluation measure (4.6, Eq. 4.6).
 
 use glam::Vec3;
 
 use crate::model::{forces::COMFORTABLE_SHARES, grasp::Contact};
 
-/// E of Eq. 4.6: how far the digits' forces are from the comfortable distribution; 0 is the most comfortable.
+/// E of Eq. 4.6: squared distance of the digits' force shares from the comfortable ones; 0 is most comfortable.
 ///
-/// `digit_totals` are the force magnitudes of the digits, thumb first, in any unit; a digit without contact has 0.
-/// At least one of them touches. D' are the comfortable shares of the digits that touch, scaled to sum one. The thesis
-/// leaves the scale of the f open; as D' sums to one, so do they here, or E would say how heavy the object is.
+/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact, and at least one is
+/// positive. D' are the comfortable shares of the touching digits, normalized to sum 1. The thesis leaves the scale of f
+/// open; f is normalized likewise here, so that E does not depend on the object's weight.
 pub fn comfort(digit_totals: [f32; 5]) -> f32 {
     let total: f32 = digit_totals.iter().sum();
     debug_assert!(total > 0.0, "no digit applies a force: {digit_totals:?}");
@@ -19,7 +19,7 @@ pub fn comfort(digit_totals: [f32; 5]) -> f32 {
         .sum()
 }
 
-/// The force magnitudes of each digit, thumb first, summed over its contacts; `forces` has one entry a contact.
+/// Total force magnitude of each digit, thumb first; `forces` has one entry per contact.
 pub fn digit_totals(contacts: &[Contact], forces: &[Vec3]) -> [f32; 5] {
     let mut totals = [0.0; 5];
     for (contact, force) in contacts.iter().zip(forces) {

@@ -1,4 +1,4 @@
-//! How good a valid grasp is: its score, its type in the taxonomy, its comfort.
+//! Rates valid grasps: score, taxonomy type and comfort.
 
 pub mod assessment;
 pub mod comfort;

@@ -1,14 +1,14 @@
-//! The score: which of several valid grasps a person would rather see.
+//! The score: which of several valid grasps a viewer would prefer.
 //!
-//! Comfort E of the thesis (4.6) plus what makes a hand look human. Each term is a number from 0 to 1, 1 being best, and
-//! the score their weighted mean. The weights are the project's choice: they put what an onlooker notices first, fingers
-//! and the place of the hand, before what only forces tell.
+//! It combines comfort E of the thesis (4.6) with what makes a hand look human. Each term is in 0 to 1, 1 being best; the
+//! score is their weighted mean. The weights are this project's choice: what a viewer sees (fingers, placement of the
+//! hand) counts more than what only the forces show.
 
 use glam::Vec3;
 
 use super::{
     comfort::{comfort, digit_totals},
-    stiffness::give,
+    stiffness::compliance,
 };
 use crate::{
     model::{
@@ -26,60 +26,59 @@ use crate::{
     },
 };
 
-/// E at which comfort counts a third: of grasps valid by the thesis, half are below 0.04.
-const UNCOMFORTABLE: f32 = 0.04;
+/// E at which the comfort term falls to 1/e: the median of grasps under `THESIS` validity.
+const COMFORT_SCALE: f32 = 0.04;
 
-/// Difference of two neighbouring fingers' flexion in radians, all joints together, at which they look unrelated: about
-/// a third of a finger's range. Fingers move together (M. Santello, M. Flanders, J. Soechting, "Postural hand synergies
-/// for tool use", 1998: two components explain 80 % of hand postures).
-const UNRELATED_FLEXION: f32 = 1.2;
+/// Difference in total flexion of neighbouring fingers, in radians, at which shared flexion scores 0: a third of a finger's
+/// range. Fingers move together: two components explain 80 % of hand postures (Santello, Flanders and Soechting,
+/// "Postural hand synergies for tool use", 1998).
+const MAX_FLEXION_DIFFERENCE: f32 = 1.2;
 
-/// Newtons of weight that a person holds with each finger beside the thumb before taking one more: two fingers lift a
-/// pen, and five a bottle (after the masses by grasp type of Feix, Bullock and Dollar, "Analysis of human grasping
-/// behavior: object characteristics and grasp type", 2014).
+/// Weight in newtons for which a person adds another finger, up to all five digits for a bottle (after the masses by
+/// grasp type in Feix, Bullock and Dollar, "Analysis of human grasping behavior: object characteristics and
+/// grasp type", 2014).
 const WEIGHT_PER_FINGER: f32 = 1.5;
 
-/// Fingers that anything wants beside the thumb: between two digits, even what is light turns about the line from one to the
-/// other. With 1, half of the holds of a scalpel that a simulation lost were such pinches.
-const LEAST_FINGERS: f32 = 2.0;
+/// Fewest fingers, besides the thumb, for a full score: between two digits, even a light object turns about the line through
+/// them.
+const MIN_FINGERS: f32 = 2.0;
 
-/// Closure at which a hold looks safe, in multiples of what validity asks for.
+/// Closure that scores 1, as a multiple of the minimum for validity.
 const SAFE_CLOSURE: f32 = 6.0;
 
-/// Ways in metres that an object gives when it is pushed with its weight: where a hold looks steady, and where it looks
-/// loose. Between them, each time as far counts as much less.
-const STEADY: [f32; 2] = [1e-5, 1e-3];
+/// Displacements in metres under a push as large as the object's weight at which steadiness scores 1 and 0; logarithmic
+/// in between.
+const DISPLACEMENT_RANGE: [f32; 2] = [1e-5, 1e-3];
 
-/// Confidence of a classification from which a grasp is beyond doubt of its type, …
-const SURE_TYPE: f32 = 0.5;
+/// Confidence of a classification from which its type scores 1.
+const SURE_CONFIDENCE: f32 = 0.5;
 
-/// … and what it counts right below that: nobody can name it.
-const DOUBTFUL_TYPE: f32 = 0.6;
+/// Value just below [`SURE_CONFIDENCE`], where the type is ambiguous; it falls linearly to 0.
+const AMBIGUOUS_TYPE_VALUE: f32 = 0.6;
 
-/// The strongest contact's force, over what all digits together press with to hold the object firmly, at which a hold
-/// looks easy (the thumb bears half), and where it looks strained.
-const EASY: [f32; 2] = [0.6, 2.0];
+/// Force of the strongest contact, relative to the total force of a firm hold, at which ease scores 1 and 0; logarithmic in
+/// between. In an easy hold, the thumb bears half.
+const EFFORT_RANGE: [f32; 2] = [0.6, 2.0];
 
-/// Distance from the giver's hand in metres from which nobody worries: half a hand's breadth.
-const EASY_CLEARANCE: f32 = 0.04;
+/// Distance from the giver's hand that scores 1, in metres: half a hand's breadth.
+const AMPLE_GIVER_CLEARANCE: f32 = 0.04;
 
-/// Distance from forbidden surfaces in metres from which nobody worries: two fingers' thickness.
-const STERILE_CLEARANCE: f32 = 0.03;
+/// Distance from forbidden surfaces that scores 1, in metres: the thickness of two fingers.
+const AMPLE_STERILE_CLEARANCE: f32 = 0.03;
 
-/// Mean share of friction along the surface that pressing contacts use, in a hold that looks safe, and where it looks as if
-/// it slips. Of what is known of a grip, this tells best whether a simulation by others loses it to pushes: of two grips of
-/// which one is lost, it uses more in 69 of 100 cases (600 grips of the built-in objects).
-const RUBBING: [f32; 2] = [0.25, 0.7];
+/// Mean share of the available friction in use at pressing contacts for which the friction reserve scores 1 and 0. Of all
+/// terms, it best predicts which grips a third-party simulation loses when the object is pushed.
+const FRICTION_USE_RANGE: [f32; 2] = [0.25, 0.7];
 
-/// Share of the pressing from which a contact matters to the reserve.
-const MATTERING_SHARE: f32 = 0.05;
+/// Minimum share of the total normal force for a contact to count in the friction reserve.
+const MIN_NORMAL_SHARE: f32 = 0.05;
 
-/// The term of comfort E, its value from 0 to 1.
+/// Value of the comfort term, 0 to 1, for E of Eq. 4.6.
 pub fn comfort_value(comfort: f32) -> f32 {
-    (-comfort / UNCOMFORTABLE).exp()
+    (-comfort / COMFORT_SCALE).exp()
 }
 
-/// The values of the terms that follow from where a hand touches, without further ado; the others are 0.
+/// Values of the terms that depend only on posture and contacts; the others are 0.
 pub fn posture_values(
     object: &GraspObject,
     rig: &Rig,
@@ -95,7 +94,7 @@ pub fn posture_values(
     values
 }
 
-/// The values of the terms that depend on hand and object alone; the others are 0.
+/// Values of the terms that depend only on hand and object, not on how it is presented; the others are 0.
 pub fn grip_values(
     scene: &ObjectScene<'_>,
     rig: &Rig,
@@ -112,17 +111,17 @@ pub fn grip_values(
     values
 }
 
-/// 0 without a type.
+/// 0 without a type, rising with the confidence of one.
 fn natural_type(classification: Classification) -> f32 {
     classification
         .grasp_type
-        .map_or(0.0, |_| match classification.confidence / SURE_TYPE {
+        .map_or(0.0, |_| match classification.confidence / SURE_CONFIDENCE {
             sure if sure >= 1.0 => 1.0,
-            share => DOUBTFUL_TYPE * share,
+            share => AMBIGUOUS_TYPE_VALUE * share,
         })
 }
 
-/// The values of the terms that depend on the forces that balance gravity; the others are 0.
+/// Values of the terms that depend on the forces that balance gravity; the others are 0.
 pub fn force_values(scene: &ObjectScene<'_>, contacts: &[Contact], forces: &[Vec3]) -> Values {
     let mut values = [0.0; TERMS];
     values[Term::Comfort as usize] = comfort_value(comfort(digit_totals(contacts, forces)));
@@ -131,15 +130,16 @@ pub fn force_values(scene: &ObjectScene<'_>, contacts: &[Contact], forces: &[Vec
     values
 }
 
+/// 1 if no contact has to press hard, relative to a firm hold; 0 if one is strained.
 fn ease(scene: &ObjectScene<'_>, forces: &[Vec3]) -> f32 {
     let strongest = forces.iter().map(|force| force.length()).fold(0.0, f32::max);
-    let [easy, strained] = EASY;
+    let [easy, strained] = EFFORT_RANGE;
     let weight = f64::from(scene.object.mass * GRAVITY);
     let share = strongest / firm_force(weight, f64::from(scene.friction)) as f32;
     ((strained / share).ln() / (strained / easy).ln()).clamp(0.0, 1.0)
 }
 
-/// 1 where contacts press, 0 where they would slip with a little more.
+/// 1 if the contacts are far from slipping, 0 if they are about to.
 fn friction_reserve(friction: f32, contacts: &[Contact], forces: &[Vec3]) -> f32 {
     let pressing = || {
         contacts
@@ -147,17 +147,17 @@ fn friction_reserve(friction: f32, contacts: &[Contact], forces: &[Vec3]) -> f32
             .zip(forces)
             .map(|(contact, &force)| (-force.dot(contact.normal), force, contact.normal))
     };
-    let all: f32 = pressing().map(|(normal, ..)| normal).sum();
+    let total: f32 = pressing().map(|(normal, ..)| normal).sum();
     let (mut used, mut count) = (0.0, 0.0_f32);
-    for (normal, force, surface) in pressing().filter(|(normal, ..)| *normal > MATTERING_SHARE * all) {
+    for (normal, force, surface) in pressing().filter(|(normal, ..)| *normal > MIN_NORMAL_SHARE * total) {
         used += (force + surface * normal).length() / (friction * normal);
         count += 1.0;
     }
-    let [safe, slipping] = RUBBING;
+    let [safe, slipping] = FRICTION_USE_RANGE;
     ((slipping - used / count.max(1.0)) / (slipping - safe)).clamp(0.0, 1.0)
 }
 
-/// Adds what depends on how the object is held out to a grip's values.
+/// The score of a grasp: [`grip_values`] plus the terms that depend on how the object is presented.
 pub fn score(
     grip_values: Values,
     grasp: &Grasp,
@@ -166,17 +166,18 @@ pub fn score(
     presented: &Presented,
 ) -> Score {
     let mut values = grip_values;
-    let of_forces = force_values(scene, &grasp.contacts, &grasp.forces);
-    for (value, of_forces) in values.iter_mut().zip(of_forces) {
-        *value += of_forces;
+    let force_values = force_values(scene, &grasp.contacts, &grasp.forces);
+    for (value, force_value) in values.iter_mut().zip(force_values) {
+        *value += force_value;
     }
     let clearance = grasp.margins.and_then(|margins| margins.giver_clearance);
     values[Term::GiverClearance as usize] =
-        clearance.map_or(1.0, |distance| (distance / EASY_CLEARANCE).min(1.0));
+        clearance.map_or(1.0, |distance| (distance / AMPLE_GIVER_CLEARANCE).min(1.0));
     values[Term::AwayFromGiver as usize] = away_from_giver(scene.object, rig, &grasp.pose, presented);
     Score { values }
 }
 
+/// 1 if neighbouring fingers flex alike, 0 if some pair differs by [`MAX_FLEXION_DIFFERENCE`].
 fn shared_flexion(pose: &HandPose) -> f32 {
     let flexion = |digit: Digit| {
         let angles = pose.digits[digit.index()];
@@ -186,9 +187,10 @@ fn shared_flexion(pose: &HandPose) -> f32 {
         .windows(2)
         .map(|pair| (flexion(pair[0]) - flexion(pair[1])).abs())
         .fold(0.0, f32::max);
-    (1.0 - worst / UNRELATED_FLEXION).max(0.0)
+    (1.0 - worst / MAX_FLEXION_DIFFERENCE).max(0.0)
 }
 
+/// Share of the fingers that a person would use for this weight.
 fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
     let mut touching = [false; 5];
     let mut palm = false;
@@ -198,21 +200,21 @@ fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
             HandPart::Palm => palm = true,
         }
     }
-    // The palm carries as much as two fingers.
+    // The palm counts as two fingers.
     let fingers =
         touching[1..].iter().filter(|touches| **touches).count() as f32 + if palm { 2.0 } else { 0.0 };
     let wanted = 1.0 + object.mass * GRAVITY / WEIGHT_PER_FINGER;
-    (fingers / wanted.clamp(LEAST_FINGERS, 4.0)).min(1.0)
+    (fingers / wanted.clamp(MIN_FINGERS, 4.0)).min(1.0)
 }
 
-/// 1 for what hardly moves, 0 for what hangs loose.
+/// 1 if the object hardly moves under a push as large as its weight, 0 if it is loose.
 fn steadiness(object: &GraspObject, rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> f32 {
-    let way = object.mass * GRAVITY * give(rig, pose, contacts, object.centre_of_mass);
-    let [steady, loose] = STEADY;
-    ((loose / way).ln() / (loose / steady).ln()).clamp(0.0, 1.0)
+    let displacement = object.mass * GRAVITY * compliance(rig, pose, contacts, object.centre_of_mass);
+    let [steady, loose] = DISPLACEMENT_RANGE;
+    ((loose / displacement).ln() / (loose / steady).ln()).clamp(0.0, 1.0)
 }
 
-/// How far the phalanges' contacts lie toward their palmar sides, on average; a contact on the back counts as none.
+/// Mean over the phalanges' contacts of the cosine between push and palmar direction; contacts on the back count 0.
 fn pads(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> f32 {
     let frames = hand_frames(rig, pose);
     let mut sum = 0.0;
@@ -227,26 +229,27 @@ fn pads(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> f32 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
+/// 1 if the hand is well clear of forbidden surfaces, 0.2 if it is close; 1 for an object without any.
 fn sterile_distance(object: &GraspObject, solids: &HandSolids) -> f32 {
     if object.forbidden_count() == 0 {
         return 1.0;
     }
-    // By halves: nobody sees the difference of a few millimetres.
+    // Two thresholds suffice: a difference of a few millimetres is invisible.
     let is_near = |distance: f32| {
         solids
             .iter()
             .any(|part| object.is_forbidden_within(part, distance))
     };
-    if !is_near(STERILE_CLEARANCE) {
+    if !is_near(AMPLE_STERILE_CLEARANCE) {
         1.0
-    } else if !is_near(0.5 * STERILE_CLEARANCE) {
+    } else if !is_near(0.5 * AMPLE_STERILE_CLEARANCE) {
         0.6
     } else {
         0.2
     }
 }
 
-/// 1 if the palms lie on opposite sides of the centre of mass, seen from above, 0 if on the same side.
+/// 1 if the palms are on opposite sides of the centre of mass, seen from above; 0 if on the same side.
 fn away_from_giver(object: &GraspObject, rig: &Rig, pose: &HandPose, presented: &Presented) -> f32 {
     let Some(giver) = presented.giver_palm else {
         return 1.0;

@@ -1,9 +1,9 @@
-//! How far a held object gives way when it is pushed: digits as springs, to first order.
+//! Compliance of a held object: how far it moves when pushed, to first order, with the digits as springs.
 //!
-//! Forces that balance and close say that a grasp can hold; they do not say how far the digits yield until it does. Each
-//! joint of a digit is a spring here, flesh another, and the palm is rigid; the digits' joints are eliminated one digit at
-//! a time (Schur's complement), which leaves the object's own stiffness, a 6 × 6 matrix (M. Cutkosky and I. Kao,
-//! "Computing and controlling the compliance of a robotic hand", 1989).
+//! Balance and closure show that a grasp can hold, but not how far the digits yield until it does. Here each digit joint
+//! is a spring, the flesh at each contact another, and the palm is rigid. Eliminating the joints one digit at a time
+//! (Schur complement) leaves the object's 6 × 6 stiffness matrix (M. Cutkosky and I. Kao, "Computing and controlling the
+//! compliance of a robotic hand", 1989).
 
 use glam::{DVec3, Vec3};
 
@@ -15,26 +15,26 @@ use crate::{
     physical::contacts::TORSION_LEVER,
 };
 
-/// Stiffness of a digit at its tip in newtons a metre, all three joints giving way alike: index fingers that press have
-/// 200 to 800 (A. Hajian and R. Howe, "Identification of the mechanical impedance at the human finger tip", 1997). Twice
-/// as much halves all ways.
+/// Stiffness of a digit at its tip in newtons per metre, with equal compliance from its three joints. Pressing index
+/// fingers have 200 to 800 (A. Hajian and R. Howe, "Identification of the mechanical impedance at the human finger tip",
+/// 1997).
 const TIP_STIFFNESS: f64 = 500.0;
 
-/// Stiffness of flesh against a dent or a shear in newtons a metre: a third of a millimetre under 5 N. Less lets power
-/// grasps give way more; precision grasps hardly notice.
+/// Stiffness of flesh, normal and tangential, in newtons per metre: 5 N displace it by a third of a millimetre. A smaller
+/// one mainly makes power grasps more compliant.
 const FLESH_STIFFNESS: f64 = 15_000.0;
 
-/// Joints of a digit that bend.
+/// Pitch joints of a digit.
 const JOINTS: usize = 3;
 
-/// Rows: the object's shift, then its turn about the centre of mass.
+/// Rows: the object's translation, then its rotation about the centre of mass.
 type Matrix6 = [[f64; 6]; 6];
 
-/// The way in metres that a held object gives for each newton that pushes at its centre of mass `centre`, over all
-/// directions (Frobenius norm of the translational compliance): infinite if the contacts leave it a way for nothing.
+/// Compliance of a held object in metres per newton: the Frobenius norm of its translational compliance for pushes at
+/// `centre`, its centre of mass. Infinite if the contacts leave it free to move.
 ///
-/// Contacts are taken to stick; pose, contacts and centre are in one frame.
-pub fn give(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3) -> f32 {
+/// Contacts are assumed to stick. Pose, contacts and centre are in the same frame, in metres.
+pub fn compliance(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3) -> f32 {
     let mut stiffness = [[0.0; 6]; 6];
     for contact in contacts.iter().filter(|contact| contact.part == HandPart::Palm) {
         for (row, weight) in springs(contact, centre) {
@@ -47,8 +47,8 @@ pub fn give(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3) -> f
     translational_compliance(&stiffness).map_or(f32::INFINITY, |norm| norm as f32)
 }
 
-/// A contact's springs: how much each is stretched by each of the object's six motions, and its stiffness. Three
-/// directions, and the turn about the normal.
+/// A contact's four springs (three directions and the twist about its normal): the stretch per unit of each of the
+/// object's six motions, and the stiffness.
 fn springs(contact: &Contact, centre: Vec3) -> [([f64; 6], f64); 4] {
     let arm = (contact.position - centre).as_dvec3();
     let direction = |along: DVec3| {
@@ -69,7 +69,7 @@ fn springs(contact: &Contact, centre: Vec3) -> [([f64; 6], f64); 4] {
     ]
 }
 
-/// Adds what a digit resists, its own joints giving way.
+/// Adds the stiffness of a digit's contacts, reduced by the compliance of its joints.
 fn add_digit(
     stiffness: &mut Matrix6,
     rig: &Rig,
@@ -98,20 +98,20 @@ fn add_digit(
         touches = true;
         for (row, weight) in springs(contact, centre) {
             add_square(stiffness, &row, weight);
-            // What the joints that carry the contact do to the same spring, with the other sign.
+            // The joints that carry the contact stretch the same spring with the opposite sign.
             let along = DVec3::new(row[0], row[1], row[2]);
             let twist = if along == DVec3::ZERO {
                 contact.normal.as_dvec3()
             } else {
                 DVec3::ZERO
             };
-            let mut of_joints = [0.0; JOINTS];
+            let mut joint_stretch = [0.0; JOINTS];
             for joint in 0..=phalanx.index() {
                 let arm = (contact.position - frames.links[joint].position).as_dvec3();
-                of_joints[joint] = -(axes[joint].cross(arm).dot(along) + axes[joint].dot(twist));
+                joint_stretch[joint] = -(axes[joint].cross(arm).dot(along) + axes[joint].dot(twist));
             }
-            for (joint, &of_joint) in of_joints.iter().enumerate() {
-                for (other, &of_other) in of_joints.iter().enumerate() {
+            for (joint, &of_joint) in joint_stretch.iter().enumerate() {
+                for (other, &of_other) in joint_stretch.iter().enumerate() {
                     joints[joint][other] += weight * of_joint * of_other;
                 }
                 for (entry, &of_object) in mixed[joint].iter_mut().zip(&row) {
@@ -121,11 +121,11 @@ fn add_digit(
         }
     }
     if touches {
-        subtract_joints(stiffness, joints, mixed);
+        eliminate_joints(stiffness, joints, mixed);
     }
 }
 
-/// Adds a spring: its stretches' outer product.
+/// Adds a spring: the outer product of its stretches times its stiffness.
 fn add_square(stiffness: &mut Matrix6, stretch: &[f64; 6], weight: f64) {
     for (row, &a) in stiffness.iter_mut().zip(stretch) {
         for (entry, &b) in row.iter_mut().zip(stretch) {
@@ -134,13 +134,13 @@ fn add_square(stiffness: &mut Matrix6, stretch: &[f64; 6], weight: f64) {
     }
 }
 
-/// Schur's complement: the joints are where nothing pulls at them.
-fn subtract_joints(
+/// Schur complement: eliminates the joints, which settle where no net torque acts on them.
+fn eliminate_joints(
     stiffness: &mut Matrix6,
     mut joints: [[f64; JOINTS]; JOINTS],
     mut mixed: [[f64; 6]; JOINTS],
 ) {
-    // Gauss' elimination joint by joint; springs make every pivot positive.
+    // Gaussian elimination, joint by joint; the joints' springs keep every pivot positive.
     for joint in 0..JOINTS {
         let (pivot_joints, pivot_mixed) = (joints[joint], mixed[joint]);
         let pivot = pivot_joints[joint];
@@ -161,9 +161,9 @@ fn subtract_joints(
     }
 }
 
-/// The norm of the part of the inverse that turns pushes into shifts; none if the matrix is not positive definite.
+/// Norm of the block of the inverse that maps forces to translations; `None` if the matrix is not positive definite.
 fn translational_compliance(stiffness: &Matrix6) -> Option<f64> {
-    // The turns are eliminated first, which leaves a 3 × 3 matrix to invert.
+    // Eliminating the rotations first leaves a 3 × 3 matrix to invert.
     let mut left = *stiffness;
     let scale = left
         .iter()
@@ -172,7 +172,7 @@ fn translational_compliance(stiffness: &Matrix6) -> Option<f64> {
     for turn in (3..6).rev() {
         let of_pivot = left[turn];
         let pivot = of_pivot[turn];
-        // Turning for nothing is a matter of a newton metre's billionth.
+        // A pivot this small means that the object turns freely.
         if pivot.is_nan() || pivot <= 1e-12 * scale {
             return None;
         }

@@ -19,7 +19,7 @@ use crate::{
         grip::NoGrip,
         shape::{HandShape, Proposal},
     },
-    rating::assessment::{Surroundings, thesis_grasp},
+    rating::assessment::{GraspContext, thesis_grasp},
     thesis::{
         algorithm_1::{Failure, ThesisAttempt},
         finger_posing::PosedDigit,
@@ -200,7 +200,7 @@ impl Attempt {
     fn try_physically(
         &mut self,
         scene: &Scene<'_>,
-        around: &Surroundings<'_>,
+        around: &GraspContext<'_>,
         stream: &mut AttemptStream,
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
@@ -241,7 +241,7 @@ impl Attempt {
     fn try_seeds(
         &mut self,
         scene: &Scene<'_>,
-        around: &Surroundings<'_>,
+        around: &GraspContext<'_>,
         stream: &mut AttemptStream,
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,

@@ -7,7 +7,7 @@ use crate::{
         grip::{Gripper, NoGrip},
         shape::Proposal,
     },
-    rating::assessment::Surroundings,
+    rating::assessment::GraspContext,
 };
 
 /// How many hands are tried in vain beside one that nearly held. Of hands beside a near miss on scissors, one or two in a
@@ -31,7 +31,7 @@ impl PhysicalAttempt {
     /// signal.
     pub fn hold_or_refine(
         &mut self,
-        around: &Surroundings<'_>,
+        around: &GraspContext<'_>,
         proposal: &Proposal,
         stream: &mut AttemptStream,
         stopwatch: &mut impl Stopwatch,
@@ -72,12 +72,12 @@ impl PhysicalAttempt {
     /// The first check that fails, or the stop signal.
     pub fn hold(
         &mut self,
-        around: &Surroundings<'_>,
+        around: &GraspContext<'_>,
         proposal: &Proposal,
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
     ) -> Result<Box<Grasp>, NoGrip> {
-        let Surroundings {
+        let GraspContext {
             object,
             presented,
             rig,
@@ -86,6 +86,6 @@ impl PhysicalAttempt {
         let (grip, solids) =
             self.gripper
                 .grip(object, rig, proposal, Some(presented), stopwatch, interrupted)?;
-        around.hold_with(&grip, &solids, &mut self.gripper, stopwatch)
+        around.assess(&grip, &solids, &mut self.gripper, stopwatch)
     }
 }

@@ -26,10 +26,10 @@ use crate::{
     propose::{
         placement_cache::{PlacementCache, ROWS},
         prepared::{PreparedObject, PreparedRig},
-        proposal::{Place, propose, propose_evenly},
+        proposal::{ProposalContext, propose, propose_evenly},
         surface_pairs::SurfacePairs,
     },
-    rating::assessment::Surroundings,
+    rating::assessment::GraspContext,
     thesis,
 };
 
@@ -53,7 +53,7 @@ pub struct Task<'a> {
 pub struct Scene<'a> {
     task: Task<'a>,
     /// Strategy, friction and what Algorithm 1 derives of them.
-    thesis: thesis::scene::Scene<'a>,
+    thesis: thesis::thesis_scene::ThesisScene<'a>,
     /// Under `PHYSICAL` validity.
     physical: Option<(ObjectScene<'a>, Presented)>,
     /// What the giver's hand leaves of the object's surface, once it was asked for.
@@ -85,7 +85,13 @@ impl<'a> Scene<'a> {
         let friction = query.friction_on(&holdout.object);
         Self {
             task,
-            thesis: thesis::scene::Scene::new(holdout, rig, query.strategy, query.bend_ratios, friction),
+            thesis: thesis::thesis_scene::ThesisScene::new(
+                holdout,
+                rig,
+                query.strategy,
+                query.bend_ratios,
+                friction,
+            ),
             free_surface: OnceLock::new(),
             placements: OnceLock::new(),
             constraints: query.constraints,
@@ -129,14 +135,14 @@ impl<'a> Scene<'a> {
     }
 
     /// What Algorithm 1 works with.
-    pub(super) fn thesis(&self) -> &thesis::scene::Scene<'a> {
+    pub(super) fn thesis(&self) -> &thesis::thesis_scene::ThesisScene<'a> {
         &self.thesis
     }
 
     /// Under `PHYSICAL` validity: what an attempt works with.
-    pub(super) fn surroundings(&self) -> Option<Surroundings<'_>> {
+    pub(super) fn surroundings(&self) -> Option<GraspContext<'_>> {
         let (object, presented) = self.physical.as_ref()?;
-        Some(Surroundings {
+        Some(GraspContext {
             object: *object,
             presented,
             rig: self.task.rig,
@@ -145,7 +151,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Where GUIDED search proposes the hand of an attempt.
-    pub(super) fn place(&self, attempt: u64) -> Place<'_> {
+    pub(super) fn place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
         let giver = presented.and_then(|presented| presented.giver.as_ref());
@@ -158,7 +164,7 @@ impl<'a> Scene<'a> {
             }
             _ => object.surface_pairs(),
         };
-        Place {
+        ProposalContext {
             object: object.object(),
             surface,
             giver,
@@ -169,14 +175,14 @@ impl<'a> Scene<'a> {
     }
 
     /// The same with the cached placements that the first attempts choose from.
-    fn cached_place(&self, attempt: u64) -> Place<'_> {
+    fn cached_place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let placements = || {
             self.placements
                 .get_or_init(|| object.placement_cache_with(self.mechanisms, rig))
         };
         let chooses = attempt < ROWS && self.mechanisms.has(Mechanism::PlacementCache);
-        Place {
+        ProposalContext {
             placements: chooses.then(|| &**placements()),
             ..self.place(attempt)
         }

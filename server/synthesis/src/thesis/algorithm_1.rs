@@ -1,6 +1,6 @@
 //! Algorithm 1 (`TRYSYNTHESIZEGRASP`): one attempt at a grasp.
 //!
-//! The thesis prints "or `ISIMMOBILIZINGGRASP`" in line 6; a grasp is invalid if it does NOT immobilize.
+//! Erratum: line 6 of the thesis prints "or `ISIMMOBILIZINGGRASP`", but a grasp is invalid if it does NOT immobilize.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use super::{
     contact_validation::{collect_contacts, touches_forbidden_surface},
     finger_posing::{PosedDigit, find_touching_finger_pose, missing_contacts},
     immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers},
-    scene::Scene,
+    thesis_scene::ThesisScene,
     wrist_placement::WristFrame,
 };
 use crate::{
@@ -27,21 +27,21 @@ use crate::{
 /// A hand that passed every check of Algorithm 1, in the object's frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldObject {
-    /// The hand.
+    /// Wrist and joint angles.
     pub pose: HandPose,
-    /// The bend ratio that each digit was closed with, thumb first; none where the digit found no contact.
+    /// The bend ratio each digit closed with, thumb first; `None` for a digit without contact.
     pub bend_ratios: [Option<f32>; 5],
-    /// Where it touches, thumb first.
+    /// Contacts, thumb first.
     pub contacts: Vec<Contact>,
-    /// The force on the object at each contact, in newtons.
+    /// Force on the object at each contact, in newtons.
     pub forces: Vec<Vec3>,
-    /// The force magnitudes of each digit in newtons, thumb first.
+    /// Total force magnitude of each digit in newtons, thumb first.
     pub digit_totals: [f32; 5],
     /// The angle of Eq. 4.5, in radians.
     pub wrench_angle: f32,
 }
 
-/// Why an attempt gave no grasp.
+/// Why an attempt found no grasp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Failure {
     /// A check failed.
@@ -51,7 +51,7 @@ pub enum Failure {
         /// For `NotImmobilizing`: the smallest angle of Eq. 4.5, in radians.
         wrench_angle: Option<f32>,
     },
-    /// The stop signal came before the attempt was over.
+    /// The search was stopped during the attempt.
     Interrupted,
 }
 
@@ -64,31 +64,31 @@ impl From<Rejection> for Failure {
     }
 }
 
-/// The state of an attempt. Reuse it: the next attempt keeps its buffers.
+/// The working state of an attempt. Reuse it to reuse its buffers.
 #[derive(Clone, Debug, Default)]
 pub struct ThesisAttempt {
     digits: [PosedDigit; 5],
-    /// How many of `digits` this attempt posed.
+    /// Number of leading `digits` that this attempt posed.
     posed: usize,
     contacts: Vec<Contact>,
     immobility: ImmobilityBuffers,
 }
 
 impl ThesisAttempt {
-    /// The digits that the attempt posed, thumb first: all five, or none, or the thumb alone where the search stops
-    /// without it.
+    /// The digits that the attempt posed, thumb first: all five, none, or only the thumb if it missed and the strategy
+    /// then stops posing.
     pub fn posed_digits(&self) -> &[PosedDigit] {
         &self.digits[..self.posed]
     }
 
-    /// `TRYSYNTHESIZEGRASP`. `place_wrist` is step 1: [`Scene::placer`], or another source of wrist frames. `interrupted`
-    /// is called after at most some 50 µs of work.
+    /// `TRYSYNTHESIZEGRASP`. `place_wrist` performs step 1 through [`ThesisScene::placer`] or another source of wrist
+    /// frames. `interrupted` is polled about every 50 µs.
     ///
     /// # Errors
-    /// The first check that fails, or the stop signal.
+    /// The first failed check, or the interruption.
     pub fn try_synthesize_grasp(
         &mut self,
-        scene: &Scene<'_>,
+        scene: &ThesisScene<'_>,
         place_wrist: impl FnOnce(&mut AttemptStream) -> Result<WristFrame, Failure>,
         stream: &mut AttemptStream,
         stopwatch: &mut impl Stopwatch,
@@ -96,12 +96,12 @@ impl ThesisAttempt {
     ) -> Result<HeldObject, Failure> {
         self.posed = 0;
 
-        // Step 1, Wrist Placement.
+        // Step 1: Wrist Placement.
         let wrist = place_wrist(stream);
         stopwatch.lap(Step::WristPlacement);
         let wrist = wrist?;
 
-        // Step 2, Finger Posing.
+        // Step 2: Finger Posing.
         let posed = self.pose_digits(scene, &wrist, stream, interrupted);
         stopwatch.lap(Step::FingerPosing);
         posed?;
@@ -109,14 +109,14 @@ impl ThesisAttempt {
             return Err(rejection.into());
         }
 
-        // Step 3, Collision Validation.
+        // Step 3: Collision Validation.
         let collision = collision(scene.holdout, scene.rig, &wrist, &self.digits);
         stopwatch.lap(Step::CollisionValidation);
         if let Some(rejection) = collision {
             return Err(rejection.into());
         }
 
-        // Step 4, Contact Validation.
+        // Step 4: Contact Validation.
         let object = &scene.holdout.object;
         collect_contacts(object, &self.digits, &mut self.contacts);
         let unwanted = touches_forbidden_surface(object, &self.contacts);
@@ -125,7 +125,7 @@ impl ThesisAttempt {
             return Err(Rejection::UnwantedContact.into());
         }
 
-        // Step 5, Immobility Validation.
+        // Step 5: Immobility Validation.
         let choice = if scene.strategy.takes_first_force_distribution() {
             DistributionChoice::FirstSufficient
         } else {
@@ -145,11 +145,11 @@ impl ThesisAttempt {
         }
     }
 
-    /// `CALCULATEHOLDPOSEANDCONTACTS`: poses the digits in turn, from strategy D on only while the thumb touches
-    /// (Algorithm 12).
+    /// `CALCULATEHOLDPOSEANDCONTACTS`: poses the digits in turn, thumb first. From strategy D on, the fingers are posed
+    /// only if the thumb touches (Algorithm 12).
     fn pose_digits(
         &mut self,
-        scene: &Scene<'_>,
+        scene: &ThesisScene<'_>,
         wrist: &WristFrame,
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
@@ -176,7 +176,7 @@ impl ThesisAttempt {
         Ok(())
     }
 
-    /// What an attempt that passed all checks found.
+    /// Collects the result once all checks have passed.
     fn held_object(&self, wrist: &WristFrame, wrench_angle: f32) -> HeldObject {
         HeldObject {
             pose: HandPose {

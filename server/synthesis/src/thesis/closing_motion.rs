@@ -1,13 +1,12 @@
 //! The closing motion of a digit, tabulated (thesis 4.4).
 //!
-//! Once its yaw is fixed, a digit moves in a plane: all three pitches turn about the same axis. What closing needs of
-//! forward kinematics is therefore two-dimensional and the same in every attempt, so it is computed once a search:
-//! the touch segments of the outer links for every step of the bend angle, in the plane of the first link ([`Curl`]),
-//! and the turn of the first link itself ([`BaseStep`]). The slow forward kinematics of [`crate::model::hand::kinematics`]
-//! are the oracle of these tables.
+//! With its yaw fixed, a digit moves in a plane, because its three pitch axes are parallel. The forward kinematics of
+//! closing are therefore two-dimensional and the same in every attempt, so they are tabulated once per search:
+//! [`BaseStep`] holds the rotation of the first link, [`Curl`] the touch segments of the outer links in the plane of the
+//! first. Tests compare the tables with the full forward kinematics of [`crate::model::hand::kinematics`].
 //!
-//! The bend angle counts from the lower end of the base pitch's range: `θ1 = θ1.min + angle`,
-//! `θ2 = θ2.min + ratio · angle` (the thumb's starts at -45°), `θ3 = 2/3 θ2`, each kept inside its limits.
+//! The bend angle starts at the lower limit of the base pitch: `θ1 = θ1.min + angle`,
+//! `θ2 = θ2.min + ratio · angle` (the thumb's θ2 starts at -45°), `θ3 = 2/3 θ2`, each clamped to its limits.
 
 use glam::{Vec2, Vec3};
 
@@ -20,33 +19,33 @@ use crate::model::{
     },
 };
 
-/// `angleStep` of Algorithm 4 in degrees (thesis 4.4). A larger step closes faster and sinks deeper into the object.
+/// `angleStep` of Algorithm 4 in degrees (thesis 4.4). A larger step closes faster but penetrates the object deeper.
 pub const ANGLE_STEP_DEGREES: f32 = 5.0;
 
-/// The touch segments lie this share of a link's diameter W from the bone: on the skin. The thesis prints the whole
-/// width, which floats half a finger's width off the skin of its Eq. 4.1.
+/// Distance of a touch segment from the bone, as a share of the link's diameter W: 0.5 is on the skin. The thesis prints
+/// the full width, which is W/2 off the skin of its Eq. 4.1.
 pub const TOUCH_OFFSET_SHARE: f32 = 0.5;
 
-/// Room in metres by which something must be out of reach before it is culled: far more than rounding.
+/// Margin in metres by which something must be out of reach to be culled: well above rounding error.
 pub const REACH_SLACK: f32 = 1e-5;
 
 /// A line segment in a digit's plane: x along the first link, y out of its pad, in metres from the base joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneSegment {
-    /// A: at the joint.
+    /// A, at the joint.
     pub start: Vec2,
-    /// B: at the far end.
+    /// B, at the far end.
     pub end: Vec2,
 }
 
 impl PlaneSegment {
-    /// The largest distance of its points from the base joint.
+    /// Largest distance of its points from the base joint, in metres.
     fn radius(&self) -> f32 {
         self.start.length().max(self.end.length())
     }
 }
 
-/// A step of the base joint.
+/// One step of the base joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseStep {
     /// θ1 in radians.
@@ -57,7 +56,7 @@ pub struct BaseStep {
     pub cos: f32,
 }
 
-/// A step of the second and third joint, seen from the first link.
+/// One step of the second and third joints, in the frame of the first link. Lengths and positions are in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Curl {
     /// θ2 in radians.
@@ -68,48 +67,48 @@ pub struct Curl {
     pub second_touch: PlaneSegment,
     /// Touch segment of the third link.
     pub third_touch: PlaneSegment,
-    /// How far the second touch segment reaches from the base joint, in metres.
+    /// Reach of the second touch segment from the base joint.
     pub second_radius: f32,
-    /// How far the third touch segment reaches from the base joint, in metres.
+    /// Reach of the third touch segment from the base joint.
     pub third_radius: f32,
-    /// Where the third joint is.
+    /// Position of the third joint.
     pub third_joint: Vec2,
-    /// Where the tip is.
+    /// Position of the tip.
     pub tip: Vec2,
 }
 
-/// The closing of one digit.
+/// The tabulated closing motion of one digit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DigitMotion {
     /// The base joint in the wrist frame, in metres.
     pub base: Vec3,
-    /// Axes of the stretched digit's base frame in the wrist frame: x, the pitch axis, …
+    /// x axis of the extended digit's base frame, in the wrist frame: the pitch axis.
     pub axis_x: Vec3,
-    /// … y, along the link, …
+    /// y axis of that frame: along the link.
     pub axis_y: Vec3,
-    /// … and z, out of the pad, about which the digit yaws.
+    /// z axis of that frame: out of the pad, the yaw axis.
     pub axis_z: Vec3,
     /// Range of ψ1.
     pub base_yaw: AngleRange,
-    /// Sense of a positive yaw about +z.
+    /// Sign of a positive yaw about +z.
     pub yaw_sign: f32,
     /// Length of the first link in metres.
     pub first_length: f32,
     /// Touch segment of the first link.
     pub first_touch: PlaneSegment,
-    /// How far the first touch segment reaches from the base joint, in metres.
+    /// Reach of the first touch segment from the base joint, in metres.
     pub first_radius: f32,
-    /// How far any touch segment reaches from the base joint, in metres.
+    /// Largest reach of any touch segment from the base joint, in metres.
     pub reach: f32,
-    /// The steps of the base joint, from the lower end of its range to the last one below its upper end.
+    /// The steps of the base joint, from its lower limit to the last step below its upper limit.
     pub base_steps: Vec<BaseStep>,
-    /// For every bend ratio, the steps of the outer joints: at least as many as the base joint has, and as many as
-    /// the second joint needs to arrive at its limit. The last is at the limit.
+    /// The steps of the outer joints for each bend ratio: at least as many as `base_steps`, and enough for the second
+    /// joint to reach its limit, where the last one is.
     pub curls: [Vec<Curl>; 3],
 }
 
 impl DigitMotion {
-    /// Tabulates a digit's closing.
+    /// Tabulates a digit's closing motion.
     pub fn new(digit: &DigitRig) -> Self {
         let step = ANGLE_STEP_DEGREES.to_radians();
         let limits = &digit.limits;
@@ -156,12 +155,12 @@ impl DigitMotion {
         }
     }
 
-    /// `FingerOpenedPose`: the sampled yaw with every pitch at the lower end of its range.
+    /// `FingerOpenedPose`: the sampled yaw in radians, with every pitch at its lower limit.
     pub fn opened(&self, base_yaw: f32) -> DigitAngles {
         self.angles(base_yaw, 0, 0, 0)
     }
 
-    /// The joint angles at a step of the base joint and one of the outer joints for a bend ratio.
+    /// The joint angles for a yaw in radians, a base step, a bend ratio (its index) and a step of the outer joints.
     pub fn angles(&self, base_yaw: f32, base_step: usize, ratio: usize, curl: usize) -> DigitAngles {
         let curl = &self.curls[ratio][curl];
         DigitAngles {
@@ -204,7 +203,7 @@ pub fn hand_motion(rig: &Rig) -> [DigitMotion; 5] {
     std::array::from_fn(|digit| DigitMotion::new(&rig.digits[digit]))
 }
 
-/// True if one of the allowed ratios is drawn, instead of all being tried in turn (Algorithm 13, line 5).
+/// True if one allowed ratio is drawn at random instead of trying all in turn (Algorithm 13, line 5).
 pub fn draws_one_ratio(choice: BendRatioChoice) -> bool {
     matches!(
         choice,
@@ -212,15 +211,15 @@ pub fn draws_one_ratio(choice: BendRatioChoice) -> bool {
     )
 }
 
-/// How many steps from the lower end of a range stay below its upper end; at least 1.
+/// Number of steps from the lower end of a range that stay below its upper end, and at least 1.
 fn count_steps(range: AngleRange, step: f32) -> usize {
-    // A thousandth of a step less, so that a range of whole steps has as many steps as it should in spite of rounding.
+    // Subtracting a thousandth of a step keeps rounding from adding one to a range of whole steps.
     let steps = ((range.max - range.min) / step - 1e-3).ceil();
     (steps.max(1.0)) as usize
 }
 
-/// The touch segment of a link that starts at `joint` and runs `along` (a unit vector): from A = (0, 0, W/2) to
-/// B = (0, L, W/2) in the link's frame.
+/// The touch segment of a link from `joint` in the unit direction `along`: from A = (0, 0, W/2) to B = (0, L, W/2) in the
+/// link's frame.
 fn touch_segment(joint: Vec2, along: Vec2, length: f32, diameter: f32) -> PlaneSegment {
     let start = joint + along.perp() * (TOUCH_OFFSET_SHARE * diameter);
     PlaneSegment {

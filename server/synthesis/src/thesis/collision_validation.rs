@@ -1,8 +1,8 @@
 //! Step 3, Collision Validation: Algorithm 6 (`COLLIDESWITHMESH`) for the object and for the presenting hand.
 //!
-//! The 25 collision segments are the rig's ten through the palm and the fifteen bones of the digits. A segment
-//! collides if it crosses the mesh or lies inside it. Palm and fingers are told apart, as Table 5.2 does; the palm
-//! comes first.
+//! The 25 collision segments are the rig's ten palm segments and the fifteen bones of the digits. A segment collides if
+//! it crosses the mesh or lies inside it. As in Table 5.2, palm and finger collisions are separate rejections; the palm is
+//! tested first.
 
 use glam::Vec3;
 
@@ -13,7 +13,10 @@ use crate::{
     model::{hand::rig::Rig, holdout::Holdout},
 };
 
-/// How the posed hand collides with the object or with the presenting hand, if it does.
+/// Tests the posed hand against the object and the presenting hand.
+///
+/// # Panics
+/// If the presenting hand has no surface; `THESIS` validity requires one.
 pub fn collision(
     holdout: &Holdout,
     rig: &Rig,
@@ -23,7 +26,7 @@ pub fn collision(
     let object = &holdout.object.surface;
     let giver = holdout.presenting_hand.as_ref().map(|hand| {
         let surface = hand.surface.as_ref();
-        surface.expect("under THESIS validity the giver's hand has a skin")
+        surface.expect("THESIS validity needs a mesh of the giver's hand")
     });
     let palm = rig.palm_segments.map(|segment| {
         Segment::new(
@@ -43,13 +46,13 @@ pub fn collision(
     (fingers_collide(object) || giver.is_some_and(fingers_collide)).then_some(Rejection::FingerCollision)
 }
 
-/// True if a segment crosses the mesh or lies inside it. One that does not cross is inside if its start is.
+/// True if a segment crosses the mesh or lies inside it. A segment that does not cross is inside if its start is.
 fn palm_collides_with_mesh(segments: &[Segment], mesh: &MeshBvh) -> bool {
     segments.iter().any(|&segment| mesh.is_crossed_by(segment))
         || segments.iter().any(|segment| mesh.contains(segment.start))
 }
 
-/// The same for the bones of a digit. They form one chain: if none of them crosses, all are inside if one end is.
+/// The same for the bones of a digit. They form a chain: if none crosses the mesh, all are inside if its base is.
 fn digit_collides_with_mesh(joints: &[Vec3; 4], mesh: &MeshBvh) -> bool {
     joints
         .windows(2)

@@ -7,7 +7,7 @@ use crate::model::{
     object::GraspObject,
 };
 
-/// Puts the contacts of the posed digits into `contacts`, thumb first and from the palm outward.
+/// Replaces `contacts` with those of the posed digits, thumb first, from the proximal to the distal phalanx.
 pub fn collect_contacts(object: &GraspObject, digits: &[PosedDigit; 5], contacts: &mut Vec<Contact>) {
     contacts.clear();
     for (digit, posed) in Digit::ALL.into_iter().zip(digits) {
@@ -22,7 +22,7 @@ pub fn collect_contacts(object: &GraspObject, digits: &[PosedDigit; 5], contacts
     }
 }
 
-/// True if a contact lies on a forbidden surface of the object.
+/// `COLLIDESWITHFORBIDDENSURFACE`: true if a contact lies on a forbidden triangle of the object.
 pub fn touches_forbidden_surface(object: &GraspObject, contacts: &[Contact]) -> bool {
     contacts
         .iter()

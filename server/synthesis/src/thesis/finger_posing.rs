@@ -1,14 +1,14 @@
-//! Step 2, Finger Posing: Algorithm 3 (`CALCULATEHOLDPOSEANDCONTACTS`) with Algorithm 4 (`FINDTOUCHINGFINGERPOSE`),
-//! from strategy D on Algorithm 12, from strategy E on Algorithm 13, and Algorithm 5 (`GRASPINGCONTACTSEXIST`).
+//! Step 2, Finger Posing: Algorithms 3 (`CALCULATEHOLDPOSEANDCONTACTS`), 4 (`FINDTOUCHINGFINGERPOSE`) and 5
+//! (`GRASPINGCONTACTSEXIST`), with Algorithm 12 from strategy D on and Algorithm 13 from strategy E on.
 //!
 //! A digit closes from its opened pose in steps of 5° until a touch segment crosses the object:
-//! - If the second or the third link touches, the pose is taken, with one contact for every link that touches: the
-//!   crossing nearest to the link's joint.
-//! - If only the first link touches, the base joint stays there and the other two go on at the same pace (prose of
-//!   4.4; Algorithm 4 as printed would stop). That ends when one of the outer links touches, or with the second joint
-//!   at its limit; the first link's contact is kept in both cases.
-//! - If nothing touches until the base joint reaches the end of its range, the next bend ratio is tried; after the
-//!   last one the digit has no contact and stays opened.
+//! - If the second or third link touches, the digit stops. Each touching link has one contact: the crossing nearest to
+//!   the link's joint.
+//! - If only the first link touches, the base joint stops and the other two continue at the same pace (prose of 4.4;
+//!   Algorithm 4 as printed would stop) until an outer link touches or the second joint reaches its limit. The first
+//!   link's contact is kept in either case.
+//! - If nothing touches before the base joint reaches its limit, the next bend ratio is tried. After the last one, the
+//!   digit has no contact and stays opened.
 
 use glam::{Vec2, Vec3};
 
@@ -27,16 +27,16 @@ use crate::{
     },
 };
 
-/// A digit after it was closed.
+/// A digit after closing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PosedDigit {
-    /// Its joint angles; the opened pose if it has no contact.
+    /// Joint angles; the opened pose if it has no contact.
     pub angles: DigitAngles,
-    /// The bend ratio with which it touches.
+    /// The bend ratio it closed with; `None` without contact.
     pub bend_ratio: Option<f32>,
-    /// Where its links touch, from the palm outward.
+    /// Contact of each link, from proximal to distal.
     pub hits: [Option<SegmentHit>; 3],
-    /// The ends of its links in the object's frame: base, second and third joint, tip.
+    /// Ends of its links in the object's frame, in metres: base, second and third joint, tip.
     pub joints: [Vec3; 4],
 }
 
@@ -47,19 +47,19 @@ impl PosedDigit {
     }
 }
 
-/// A digit's plane in the object's frame, its yaw applied: where the closing happens.
+/// The plane in which a digit closes once its yaw is set, in the object's frame.
 #[derive(Clone, Copy, Debug)]
 struct DigitPlane {
     base: Vec3,
-    /// Along the first link at θ1 = 0.
+    /// Direction of the first link at θ1 = 0.
     along: Vec3,
-    /// Out of its pad at θ1 = 0.
+    /// Direction out of its pad at θ1 = 0.
     palmar: Vec3,
     /// The pitch axis: normal to the plane.
     normal: Vec3,
 }
 
-/// The first link's axes after a turn of the base joint.
+/// The first link's axes at a pitch of the base joint.
 #[derive(Clone, Copy, Debug)]
 struct LinkAxes {
     base: Vec3,
@@ -79,7 +79,7 @@ impl DigitPlane {
     }
 
     #[inline]
-    fn turned(&self, sin: f32, cos: f32) -> LinkAxes {
+    fn pitched(&self, sin: f32, cos: f32) -> LinkAxes {
         LinkAxes {
             base: self.base,
             along: self.along * cos + self.palmar * sin,
@@ -100,7 +100,7 @@ impl LinkAxes {
     }
 }
 
-/// `FINDTOUCHINGFINGERPOSE` for one digit: draws a yaw, then tries the bend ratios that `choice` allows.
+/// `FINDTOUCHINGFINGERPOSE` for one digit: draws a yaw, then closes with the bend ratios that `choice` allows.
 pub fn find_touching_finger_pose(
     object: &GraspObject,
     wrist: &WristFrame,
@@ -120,8 +120,8 @@ pub fn find_touching_finger_pose(
     close_digit(object, wrist, motion, base_yaw, ratios)
 }
 
-/// The rest of `FINDTOUCHINGFINGERPOSE`, with nothing left to chance: closes a digit at a yaw in radians with bend ratios
-/// tried in turn, given as indices into [`BEND_RATIOS`].
+/// The deterministic part of `FINDTOUCHINGFINGERPOSE`: closes a digit at a yaw in radians, trying the bend ratios in turn.
+/// `ratios` are indices into [`BEND_RATIOS`].
 pub fn close_digit(
     object: &GraspObject,
     wrist: &WristFrame,
@@ -156,18 +156,18 @@ pub fn close_digit(
     }
 }
 
-/// The distance of the base joint from the object in metres, or none if no touch segment can reach the object in any
-/// step of closing: the thesis stops "posing a finger early when its base joint is further away from the object than
-/// its finger length" (5.2). Exact, since the touch segments' own reach is asked for, and not the bones'.
+/// Distance from the base joint to the object in metres, or `None` if no touch segment reaches the object at any step: the
+/// thesis stops "posing a finger early when its base joint is further away from the object than its finger length"
+/// (5.2). Uses the reach of the touch segments rather than the bones, so it never skips a digit that would touch.
 fn distance_in_reach(object: &GraspObject, motion: &DigitMotion, plane: &DigitPlane) -> Option<f32> {
-    let snug = &object.bounding_box;
-    // The digit stays in its plane: an object whose box is all on one side of it cannot be touched.
-    let axes = snug.object_from_box.orientation;
-    let half = snug.half_extents;
+    let bounds = &object.bounding_box;
+    // The digit stays in its plane, so it cannot touch an object whose box lies entirely on one side of it.
+    let axes = bounds.object_from_box.orientation;
+    let half = bounds.half_extents;
     let spread = (axes * Vec3::X).dot(plane.normal).abs() * half.x
         + (axes * Vec3::Y).dot(plane.normal).abs() * half.y
         + (axes * Vec3::Z).dot(plane.normal).abs() * half.z;
-    if (snug.object_from_box.position - plane.base)
+    if (bounds.object_from_box.position - plane.base)
         .dot(plane.normal)
         .abs()
         > spread + REACH_SLACK
@@ -180,10 +180,10 @@ fn distance_in_reach(object: &GraspObject, motion: &DigitMotion, plane: &DigitPl
         .map(|closest| closest.distance)
 }
 
-/// The ends of a digit's links in the object's frame.
+/// Ends of a digit's links in the object's frame.
 fn joints(motion: &DigitMotion, plane: &DigitPlane, base_step: usize, curl: &Curl) -> [Vec3; 4] {
     let step = motion.base_steps[base_step];
-    let axes = plane.turned(step.sin, step.cos);
+    let axes = plane.pitched(step.sin, step.cos);
     [
         plane.base,
         axes.point(Vec2::new(motion.first_length, 0.0)),
@@ -192,31 +192,31 @@ fn joints(motion: &DigitMotion, plane: &DigitPlane, base_step: usize, curl: &Cur
     ]
 }
 
-/// The closing of one digit in its plane.
+/// One digit closing in its plane.
 struct Closing<'a> {
     object: &'a GraspObject,
     motion: &'a DigitMotion,
     plane: &'a DigitPlane,
-    /// From the base joint to the object, in metres.
+    /// Distance from the base joint to the object, in metres.
     distance: f32,
 }
 
 impl Closing<'_> {
-    /// Closes with one bend ratio. The steps of base and outer joints at which the digit ends, and where it touches.
+    /// Closes with one bend ratio. Returns the final steps of the base joint and the outer joints, and the contacts.
     fn close(&self, curls: &[Curl]) -> Option<(usize, usize, [Option<SegmentHit>; 3])> {
         for (step, (base, curl)) in self.motion.base_steps.iter().zip(curls).enumerate() {
-            let axes = self.plane.turned(base.sin, base.cos);
+            let axes = self.plane.pitched(base.sin, base.cos);
             let first = self.hit(&axes, &self.motion.first_touch, self.motion.first_radius);
             let [second, third] = self.outer_hits(&axes, curl);
             if second.is_some() || third.is_some() {
                 return Some((step, step, [first, second, third]));
             }
             if first.is_some() {
-                // The base joint stays, the others go on.
+                // The base joint stops, the outer joints continue.
                 let mut last = step;
                 for (index, curl) in curls.iter().enumerate().skip(step + 1) {
                     if curl.second_pitch == curls[last].second_pitch {
-                        // At the limit, where only the base joint would still have moved.
+                        // The second joint is at its limit; the remaining steps would move only the base joint.
                         break;
                     }
                     last = index;
@@ -231,7 +231,7 @@ impl Closing<'_> {
         None
     }
 
-    /// The contacts of the second and the third link.
+    /// Contacts of the second and third links.
     #[inline]
     fn outer_hits(&self, axes: &LinkAxes, curl: &Curl) -> [Option<SegmentHit>; 2] {
         [
@@ -240,10 +240,10 @@ impl Closing<'_> {
         ]
     }
 
-    /// The contact of one link whose touch segment reaches `radius` metres from the base joint.
+    /// Contact of one link, whose touch segment reaches `radius` metres from the base joint.
     #[inline]
     fn hit(&self, axes: &LinkAxes, touch: &PlaneSegment, radius: f32) -> Option<SegmentHit> {
-        // Everything nearer to the base joint than the object's closest point is free.
+        // The object has no point nearer to the base joint than `distance`.
         if radius + REACH_SLACK < self.distance {
             return None;
         }
@@ -251,8 +251,8 @@ impl Closing<'_> {
     }
 }
 
-/// `GRASPINGCONTACTSEXIST` as the kind of failure: a grasp needs a contact on the thumb and one on a finger. `posed`
-/// are the digits that were posed, thumb first; from strategy D on posing stops after a thumb without contact.
+/// `GRASPINGCONTACTSEXIST`, negated: a grasp needs a contact on the thumb and one on a finger; returns which is missing.
+/// `posed` are the posed digits, thumb first. From strategy D on, that is only the thumb if it misses.
 pub fn missing_contacts(strategy: Strategy, posed: &[PosedDigit]) -> Option<Rejection> {
     let (thumb, fingers) = posed.split_first()?;
     let finger_touches = fingers.iter().any(PosedDigit::touches);

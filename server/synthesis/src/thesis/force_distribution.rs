@@ -1,4 +1,4 @@
-//! Distributions of force over contacts: Algorithm 10 (`FORCEDISTRIBUTIONSOVERCONTACTS`).
+//! Force distributions over contacts: Algorithm 10 (`FORCEDISTRIBUTIONSOVERCONTACTS`).
 
 use super::wrenches::Wrench;
 use crate::{
@@ -6,20 +6,20 @@ use crate::{
     model::{forces::COMFORTABLE_SHARES, grasp::Contact, hand::Digit},
 };
 
-/// The noise on a share: a factor drawn uniformly from here (Algorithm 10 says "random noise"). Wider noise reaches more
-/// distributions and lets fewer of a hundred come near the comfortable one.
+/// Range of the uniform factor on each share (Algorithm 10 says only "random noise"). A wider range covers more
+/// distributions, but fewer tries land near the comfortable one.
 pub const SHARE_NOISE: [f32; 2] = [0.5, 1.5];
 
-/// Force magnitudes for the four unit wrenches of every contact.
+/// Force magnitudes for the four unit wrenches of each contact.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForceDistribution {
-    /// λ: for every contact, one factor for each of its four unit wrenches, not negative.
+    /// λ: for each contact, a non-negative factor per unit wrench.
     pub magnitudes: Vec<[f32; 4]>,
 }
 
 impl ForceDistribution {
-    /// `FORCEDISTRIBUTIONSOVERCONTACTS`, into this buffer: the comfortable shares with noise, split evenly over the
-    /// contacts of a digit and at random over the four wrenches of a contact.
+    /// `FORCEDISTRIBUTIONSOVERCONTACTS`, into this buffer: the comfortable shares with noise, split evenly among a digit's
+    /// contacts and at random among a contact's four wrenches.
     pub fn sample(&mut self, contacts: &[Contact], contact_counts: [u32; 5], stream: &mut AttemptStream) {
         let noisy = COMFORTABLE_SHARES.map(|share| share * stream.between(SHARE_NOISE[0], SHARE_NOISE[1]));
         self.magnitudes.clear();
@@ -31,7 +31,7 @@ impl ForceDistribution {
         }));
     }
 
-    /// The wrench that the contacts apply together.
+    /// Sum of the contact wrenches.
     pub fn summed_wrench(&self, unit_wrenches: &[[Wrench; 4]]) -> Wrench {
         let mut sum = Wrench::default();
         for (magnitudes, wrenches) in self.magnitudes.iter().zip(unit_wrenches) {
@@ -42,7 +42,7 @@ impl ForceDistribution {
         sum
     }
 
-    /// The force magnitudes of each digit, summed over its contacts.
+    /// Total force magnitude of each digit, thumb first.
     pub fn digit_totals(&self, contacts: &[Contact]) -> [f32; 5] {
         let mut totals = [0.0; 5];
         for (contact, magnitudes) in contacts.iter().zip(&self.magnitudes) {
@@ -54,7 +54,7 @@ impl ForceDistribution {
     }
 }
 
-/// How many contacts each digit has, thumb first.
+/// Number of contacts of each digit, thumb first.
 pub fn contact_counts(contacts: &[Contact]) -> [u32; 5] {
     Digit::ALL.map(|digit| {
         let of_digit = contacts

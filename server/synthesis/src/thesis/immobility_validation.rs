@@ -1,7 +1,7 @@
-//! Step 5, Immobility Validation: Algorithm 9 (`ISIMMOBILIZINGGRASP`), for strategy F Algorithm 14.
+//! Step 5, Immobility Validation: Algorithm 9 (`ISIMMOBILIZINGGRASP`); for strategy F, Algorithm 14.
 //!
-//! Valid as printed: the friction cone has the half-angle cos⁻¹ μ, and the angle of Eq. 4.5 is taken between vectors of
-//! six numbers, newtons beside newton metres, so that torque hardly counts.
+//! Follows the thesis as printed: the friction cone has the half-angle cos⁻¹ μ, and the angle of Eq. 4.5 is between
+//! six-vectors that mix newtons and newton metres, so torque hardly counts.
 
 use std::f32::consts::PI;
 
@@ -13,58 +13,57 @@ use super::{
 };
 use crate::{base::random::AttemptStream, model::grasp::Contact};
 
-/// α of Eq. 4.5: the summed contact wrench must oppose gravity with less than this angle (4.5). A larger one accepts
-/// grasps that hold the object less well.
+/// α of Eq. 4.5 in degrees (4.5): largest angle between the summed contact wrench and the one that cancels gravity. A
+/// larger one accepts grasps that hold the object less well.
 pub const ACCEPTED_WRENCH_ANGLE_DEGREES: f32 = 5.0;
 
-/// How many force distributions are tried (Algorithms 9 and 14).
+/// Number of force distributions tried (Algorithms 9 and 14).
 pub const DISTRIBUTION_TRIES: usize = 100;
 
-/// Distributions between two looks at the stop signal. One takes a few dozen nanoseconds a contact.
-const TRIES_PER_LOOK: usize = 25;
+/// Distributions tried between two checks of the stop signal; each takes a few dozen nanoseconds per contact.
+const TRIES_PER_STOP_CHECK: usize = 25;
 
-/// What Immobility Validation asks of the object.
+/// The properties of the object that Immobility Validation uses.
 #[derive(Clone, Copy, Debug)]
 pub struct Load {
-    /// The wrench of gravity on the object.
+    /// Wrench of gravity about the centre of mass.
     pub gravity: Wrench,
-    /// In metres, in the object's frame.
+    /// Centre of mass in the object's frame, in metres.
     pub centre_of_mass: Vec3,
     /// Coefficient of static friction.
     pub friction: f32,
 }
 
-/// Which distribution is taken.
+/// Which force distribution is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DistributionChoice {
     /// The one that opposes gravity best (Algorithm 9).
     Best,
-    /// The first that suffices (Algorithm 14).
+    /// The first that is good enough (Algorithm 14).
     FirstSufficient,
 }
 
-/// Buffers that are kept from one attempt to the next, and the distribution that was taken.
+/// Buffers reused across attempts, and the chosen distribution.
 #[derive(Clone, Debug, Default)]
 pub struct ImmobilityBuffers {
     unit_wrenches: Vec<[Wrench; 4]>,
     sampled: ForceDistribution,
-    taken: ForceDistribution,
+    chosen: ForceDistribution,
 }
 
-/// How Immobility Validation ended.
+/// Outcome of Immobility Validation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Immobility {
-    /// A distribution opposes gravity with this angle in radians.
+    /// A distribution holds the object; its angle of Eq. 4.5 in radians.
     Immobilizing(f32),
-    /// None does; the best has this angle in radians.
+    /// No distribution does; the smallest angle in radians.
     NotImmobilizing(f32),
-    /// The stop signal came first.
+    /// The search was stopped first.
     Interrupted,
 }
 
 impl ImmobilityBuffers {
-    /// `ISIMMOBILIZINGGRASP`. The distribution that was taken is kept for [`Self::forces`] and
-    /// [`Self::digit_totals`].
+    /// `ISIMMOBILIZINGGRASP`. Keeps the chosen distribution for [`Self::forces`] and [`Self::digit_totals`].
     pub fn validate(
         &mut self,
         contacts: &[Contact],
@@ -85,21 +84,21 @@ impl ImmobilityBuffers {
         let accepted_cos = ACCEPTED_WRENCH_ANGLE_DEGREES.to_radians().cos();
         let mut best_cos = f32::NEG_INFINITY;
         for index in 0..DISTRIBUTION_TRIES {
-            if index % TRIES_PER_LOOK == 0 && interrupted() {
+            if index % TRIES_PER_STOP_CHECK == 0 && interrupted() {
                 return Immobility::Interrupted;
             }
             self.sampled.sample(contacts, counts, stream);
             let cos = self.sampled.summed_wrench(&self.unit_wrenches).cos_angle(needed);
             if cos > best_cos {
                 best_cos = cos;
-                std::mem::swap(&mut self.sampled, &mut self.taken);
+                std::mem::swap(&mut self.sampled, &mut self.chosen);
                 if choice == DistributionChoice::FirstSufficient && cos > accepted_cos {
                     break;
                 }
             }
         }
         self.scale_to_gravity(needed);
-        // The arc cosine is not exact for small angles, but it falls strictly with the cosine that decides.
+        // acos is inexact for small angles; the decision below uses the cosine.
         let angle = best_cos.clamp(-1.0, 1.0).acos().clamp(0.0, PI);
         if best_cos > accepted_cos {
             Immobility::Immobilizing(angle)
@@ -108,20 +107,20 @@ impl ImmobilityBuffers {
         }
     }
 
-    /// `ScaleToGravitySize`: the summed wrench of the taken distribution becomes as large as that of gravity.
+    /// `ScaleToGravitySize`: scales the chosen distribution until its summed wrench has the magnitude of gravity's.
     fn scale_to_gravity(&mut self, needed: Wrench) {
-        let summed = self.taken.summed_wrench(&self.unit_wrenches).magnitude();
+        let summed = self.chosen.summed_wrench(&self.unit_wrenches).magnitude();
         if summed > 0.0 {
             let factor = needed.magnitude() / summed;
-            for magnitude in self.taken.magnitudes.iter_mut().flatten() {
+            for magnitude in self.chosen.magnitudes.iter_mut().flatten() {
                 *magnitude *= factor;
             }
         }
     }
 
-    /// The force that the taken distribution applies at each contact, in newtons.
+    /// Force of the chosen distribution at each contact, in newtons.
     pub fn forces(&self) -> Vec<Vec3> {
-        self.taken
+        self.chosen
             .magnitudes
             .iter()
             .zip(&self.unit_wrenches)
@@ -135,9 +134,9 @@ impl ImmobilityBuffers {
             .collect()
     }
 
-    /// The force magnitudes of each digit in the taken distribution, thumb first, in newtons: summed over its contacts
-    /// and their four wrenches.
+    /// Total force magnitude of each digit in the chosen distribution, thumb first, in newtons: the sum over its contacts
+    /// and their four unit wrenches.
     pub fn digit_totals(&self, contacts: &[Contact]) -> [f32; 5] {
-        self.taken.digit_totals(contacts)
+        self.chosen.digit_totals(contacts)
     }
 }

@@ -1,6 +1,6 @@
-//! Grasp synthesis: Algorithm 1 (`TRYSYNTHESIZEGRASP`) and its five steps.
+//! Algorithm 1 of the thesis (`TRYSYNTHESIZEGRASP`) and its five steps, under strategies A to F.
 //!
-//! | Algorithm of the thesis | here |
+//! | Algorithm of the thesis | Module |
 //! |---|---|
 //! | 1 `TRYSYNTHESIZEGRASP` | [`algorithm_1`] |
 //! | 2 `PLACEWRISTFRAME`, 11 modified | [`wrist_placement`], measures in [`placement_measures`] |
@@ -13,8 +13,8 @@
 //! | 9 `ISIMMOBILIZINGGRASP`, 14 modified | [`immobility_validation`] |
 //! | 10 `FORCEDISTRIBUTIONSOVERCONTACTS` | [`force_distribution`] |
 //!
-//! Invariants: nothing here allocates on the way to a rejection; nothing reads a clock except through a
-//! [`crate::base::stopwatch::Stopwatch`]; an attempt's outcome depends on the scene, the seed and the attempt's index alone.
+//! Invariants: a rejected attempt allocates nothing; the clock is read only through a
+//! [`crate::base::stopwatch::Stopwatch`]; an attempt's outcome depends only on the scene, the seed and the attempt index.
 
 pub mod algorithm_1;
 pub mod closing_motion;
@@ -24,6 +24,6 @@ pub mod finger_posing;
 pub mod force_distribution;
 pub mod immobility_validation;
 pub mod placement_measures;
-pub mod scene;
+pub mod thesis_scene;
 pub mod wrenches;
 pub mod wrist_placement;

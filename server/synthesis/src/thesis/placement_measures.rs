@@ -1,7 +1,7 @@
 //! The six measures of a wrist placement and their allowed ranges (thesis 5.3, Table 5.3).
 //!
-//! This is the plain form: every measure as a number. The search asks only whether all of them are in range, and does
-//! so in a cheaper order ([`super::wrist_placement`]).
+//! This is the reference form, which computes every measure. The search needs only to know whether all are in range, and
+//! tests that in a cheaper order ([`super::wrist_placement`]).
 
 use glam::Vec3;
 
@@ -10,7 +10,7 @@ use crate::{
     model::{hand::rig::Rig, holdout::Holdout, strategy::Strategy},
 };
 
-/// The allowed values of a measure, ends included.
+/// The allowed range of a measure, ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeasureRange {
     /// Smallest allowed value, in metres or degrees.
@@ -30,47 +30,47 @@ impl MeasureRange {
     }
 }
 
-/// Metres from the wrist O to the object (Table 5.3). A wider range loses fewer placements to pruning, and posing
+/// Distance in metres from the wrist O to the object (Table 5.3). A wider range prunes fewer placements, and finger posing
 /// fails on more of them.
 pub const WRIST_DISTANCE: MeasureRange = MeasureRange::new(0.0075, 0.12);
 
-/// Metres from the palm H to the object (Table 5.3; the text of 5.3 gives two other ranges).
+/// Distance in metres from the palm H to the object (Table 5.3; the text of 5.3 gives two other ranges).
 pub const PALM_DISTANCE: MeasureRange = MeasureRange::new(0.0, 0.08);
 
-/// Degrees between the wrist's upward vector +y and H' - O (Table 5.3).
+/// Angle in degrees between the wrist's upward vector +y and H' - O (Table 5.3).
 pub const UPWARD_WRIST_ANGLE_DEGREES: MeasureRange = MeasureRange::new(0.0, 55.0);
 
-/// Degrees between the wrist's forward vector +z and H' - O (Table 5.3).
+/// Angle in degrees between the wrist's forward vector +z and H' - O (Table 5.3).
 pub const FORWARD_WRIST_ANGLE_DEGREES: MeasureRange = MeasureRange::new(35.0, 95.0);
 
-/// Degrees of the upward and the forward wrist angle together (Table 5.3). As +y and +z are perpendicular, the lower
-/// end always holds; only rounding could break it, so nothing tests it.
+/// Sum of the upward and forward wrist angles in degrees (Table 5.3). The lower end is not tested: it always holds, since
+/// +y and +z are perpendicular.
 pub const WRIST_ANGLE_SUM_DEGREES: MeasureRange = MeasureRange::new(90.0, 115.0);
 
-/// Degrees between the directions from the centre of mass to the two palms, seen on the ground plane (5.3).
+/// Angle in degrees between the directions from the centre of mass to the two palms, on the ground plane (5.3).
 pub const PALM_COM_PALM_ANGLE_DEGREES: MeasureRange = MeasureRange::new(90.0, 180.0);
 
-/// What the measures of one wrist placement are.
+/// The measures of one wrist placement.
 ///
-/// O is the wrist, H the middle of the palm's skin, O' and H' the points of the object closest to them.
+/// O is the wrist, H the centre of the palm's skin; O' and H' are the closest points of the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacementMeasures {
     /// |O' - O| in metres.
     pub wrist_distance: f32,
     /// |H' - H| in metres.
     pub palm_distance: f32,
-    /// Angle between the wrist's +y and H' - O, in degrees from 0 to 180.
+    /// Angle between the wrist's +y and H' - O, 0 to 180 degrees.
     pub upward_angle_degrees: f32,
-    /// Angle between the wrist's +z and H' - O, in degrees from 0 to 180.
+    /// Angle between the wrist's +z and H' - O, 0 to 180 degrees.
     pub forward_angle_degrees: f32,
-    /// The palm-CoM-palm angle in degrees from 0 to 180. None if there is no presenting hand, or if a palm lies
-    /// straight above or below the centre of mass: then there is no direction on the ground plane, and the two hands
-    /// are not on the same side of the object, so the placement counts as in range.
+    /// The palm-CoM-palm angle, 0 to 180 degrees. `None`, which counts as in range, without a presenting hand or if a
+    /// palm is straight above or below the centre of mass: it then has no direction on the ground plane, and the hands
+    /// are not on the same side of the object.
     pub palm_com_palm_angle_degrees: Option<f32>,
 }
 
 impl PlacementMeasures {
-    /// Measures a placement of the wrist in the object's frame.
+    /// Measures a wrist pose in the object's frame.
     pub fn of(holdout: &Holdout, rig: &Rig, object_from_wrist: Pose) -> Self {
         let surface = &holdout.object.surface;
         let wrist = object_from_wrist.position;
@@ -96,12 +96,12 @@ impl PlacementMeasures {
         }
     }
 
-    /// The sum of the upward and the forward wrist angle, in degrees.
+    /// Sum of the upward and forward wrist angles, in degrees.
     pub fn angle_sum_degrees(&self) -> f32 {
         self.upward_angle_degrees + self.forward_angle_degrees
     }
 
-    /// True if the strategy keeps the placement.
+    /// True if the strategy accepts the placement.
     pub fn are_in_range(&self, strategy: Strategy) -> bool {
         let by_object = !strategy.prunes_by_object()
             || WRIST_DISTANCE.contains(self.wrist_distance)
@@ -117,8 +117,8 @@ impl PlacementMeasures {
     }
 }
 
-/// The angle in radians between the projections, onto the ground plane, of the directions from the centre of mass to
-/// the two palms. The thesis calls that plane "XY"; it is the one perpendicular to gravity.
+/// The palm-CoM-palm angle in radians: between the directions from the centre of mass to the two palms, projected onto the
+/// ground plane. The thesis calls that plane "XY"; here it is perpendicular to gravity.
 fn palm_com_palm_angle(holdout: &Holdout, receiving_palm: Vec3) -> Option<f32> {
     let on_ground = |point: Vec3| {
         let arm = point - holdout.object.centre_of_mass;
@@ -129,7 +129,7 @@ fn palm_com_palm_angle(holdout: &Holdout, receiving_palm: Vec3) -> Option<f32> {
     (giver != Vec3::ZERO && receiver != Vec3::ZERO).then(|| angle_between(giver, receiver))
 }
 
-/// The angle between two vectors in radians; exact near 0 and π, where the arc cosine is not.
+/// The angle between two vectors in radians; accurate near 0 and π, where acos is not.
 fn angle_between(a: Vec3, b: Vec3) -> f32 {
     a.cross(b).length().atan2(a.dot(b))
 }

@@ -1,4 +1,4 @@
-//! Wrenches (thesis 2.6) and the four of a contact: Algorithm 8 (`FOURUNITWRENCHESFROMCONTACT`).
+//! Wrenches (thesis 2.6) and the four unit wrenches of a contact: Algorithm 8 (`FOURUNITWRENCHESFROMCONTACT`).
 
 use std::ops::{Add, AddAssign, Mul};
 
@@ -6,22 +6,21 @@ use glam::Vec3;
 
 use crate::model::{forces::GRAVITY, grasp::Contact};
 
-/// γ of Algorithm 8 in metres: how far the friction cone's tip is moved back along the normal. The thesis says "a
-/// small value". A larger one widens the contact area that the four forces stand for and moves their common point off
-/// the surface.
+/// γ of Algorithm 8 in metres ("a small value"): offset of the friction cone's apex from the surface along the normal. A
+/// larger one widens the contact area that the four forces represent.
 pub const CONE_OFFSET: f32 = 0.003;
 
 /// A force and its torque about the centre of mass: W = (F, p × F).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
-    /// In newtons.
+    /// Force in newtons.
     pub force: Vec3,
-    /// In newton metres.
+    /// Torque in newton metres.
     pub torque: Vec3,
 }
 
 impl Wrench {
-    /// The wrench of a force that acts at `anchor`, measured from the centre of mass in metres.
+    /// Wrench of a force acting at `anchor`, in metres relative to the centre of mass.
     pub fn of_force(force: Vec3, anchor: Vec3) -> Self {
         Self {
             force,
@@ -29,7 +28,7 @@ impl Wrench {
         }
     }
 
-    /// The wrench of gravity on a mass in kilograms. It acts at the centre of mass, so that it has no torque.
+    /// Wrench of gravity on a mass in kilograms. It acts at the centre of mass and has no torque.
     pub fn of_gravity(mass: f32, up: Vec3) -> Self {
         Self {
             force: up * (-GRAVITY * mass),
@@ -37,17 +36,17 @@ impl Wrench {
         }
     }
 
-    /// Product of the two as vectors of six numbers: newtons and newton metres side by side, as Eq. 4.5 has it.
+    /// Dot product as six-vectors, mixing newtons and newton metres as Eq. 4.5 does.
     pub fn dot(self, other: Self) -> f32 {
         self.force.dot(other.force) + self.torque.dot(other.torque)
     }
 
-    /// Length as a vector of six numbers.
+    /// Length as a six-vector.
     pub fn magnitude(self) -> f32 {
         self.dot(self).sqrt()
     }
 
-    /// Cosine of the angle to another wrench; -1, the worst, if one of them vanishes.
+    /// Cosine of the angle to another wrench; -1 (the worst) if either is zero.
     pub fn cos_angle(self, other: Self) -> f32 {
         let product = self.magnitude() * other.magnitude();
         if product > 0.0 {
@@ -86,17 +85,17 @@ impl Mul<f32> for Wrench {
     }
 }
 
-/// Cosine of the friction cone's half-angle as printed: the half-angle is cos⁻¹ μ (2.6, 4.5), 70° for μ = 0.34, where
-/// physics has tan⁻¹ μ. From μ = 1 on the printed cone has closed to its axis.
+/// Cosine of the friction cone's half-angle as the thesis prints it: cos⁻¹ μ (2.6, 4.5), 70° for μ = 0.34. Physically it
+/// is tan⁻¹ μ. For μ ≥ 1 the printed cone degenerates to its axis.
 pub fn printed_cone_cos(friction: f32) -> f32 {
     friction.clamp(0.0, 1.0)
 }
 
-/// `FOURUNITWRENCHESFROMCONTACT`: unit forces along four lines on the boundary of the friction cone, with their torques
-/// about the centre of mass.
+/// `FOURUNITWRENCHESFROMCONTACT`: unit forces along four edges of the friction cone, with their torques about the centre
+/// of mass.
 ///
-/// The hand pushes, so the cone opens into the object; its tip is γ outside the surface, and each force acts where its
-/// line, of length γ from the tip, ends. `cone_cos` is the cosine of the cone's half-angle.
+/// The hand pushes, so the cone opens into the object. Its apex is γ outside the surface, and each force acts γ from the
+/// apex along its edge. `cone_cos` is the cosine of the cone's half-angle.
 pub fn four_unit_wrenches(contact: &Contact, centre_of_mass: Vec3, cone_cos: f32) -> [Wrench; 4] {
     let inward = -contact.normal;
     let (right, forward) = inward.any_orthonormal_pair();

@@ -1,11 +1,11 @@
 //! Step 1, Wrist Placement: Algorithm 2 (`PLACEWRISTFRAME`) and, from strategy B on, Algorithm 11
 //! (`MODIFIEDPLACEWRISTFRAME`).
 //!
-//! A position is drawn uniformly from C - B and a rotation uniformly from all rotations; B is the object's box and C
-//! holds everything within the hand's reach of B. From strategy B on, placements are drawn until one has all its
-//! measures in range ([`super::placement_measures`]).
+//! Positions are uniform in C - B and rotations uniform among all rotations, where B is the object's bounding box and C
+//! is everything within the hand's reach of B. From strategy B on, placements are drawn until all measures of one are
+//! in range ([`super::placement_measures`]).
 //!
-//! Algorithm 11 as printed rejects positions outside the box; what 4.3 describes is the opposite, and that is done.
+//! Erratum: Algorithm 11 as printed rejects positions outside the box; this follows 4.3, which describes the opposite.
 
 use glam::{Mat3, Quat, Vec3};
 
@@ -18,27 +18,25 @@ use crate::{
     model::{hand::rig::Rig, holdout::Holdout, object::GraspObject, strategy::Strategy},
 };
 
-/// Room, in metres, by which a bound must be broken before it prunes a placement in place of the measure that it
-/// bounds: far more than rounding and far less than matters. Without it the cheap order of checks could reject what
-/// the plain order keeps.
+/// Margin in metres by which a bound must be violated to prune a placement without computing the measure: well above
+/// rounding error, so that no placement is pruned that the exact measures accept.
 const BOUND_SLACK: f32 = 1e-5;
 
-/// Draws of a position between two looks at the stop signal, while no placement is accepted. A draw takes a few
-/// nanoseconds and every tenth or so leads to measures, of about 100 ns on a mesh of a few thousand triangles: some
-/// microseconds between looks. More make stopping slower, fewer searching.
-const DRAWS_PER_LOOK: u32 = 256;
+/// Positions drawn between two checks of the stop signal, which are some microseconds apart. More make stopping slower,
+/// fewer make searching slower.
+const DRAWS_PER_STOP_CHECK: u32 = 256;
 
-/// A placed wrist: F0 in the object's frame, as a pose and as a matrix.
+/// A placed wrist: the frame F0 in the object's frame, as a pose and a matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WristFrame {
-    /// The pose.
+    /// The pose of the wrist, in metres.
     pub object_from_wrist: Pose,
-    /// The rotation of the pose; its columns are the wrist's axes.
+    /// Its rotation; the columns are the wrist's axes.
     pub rotation: Mat3,
 }
 
 impl WristFrame {
-    /// The frame at a pose.
+    /// The wrist frame at a pose.
     pub fn new(object_from_wrist: Pose) -> Self {
         Self {
             object_from_wrist,
@@ -46,7 +44,7 @@ impl WristFrame {
         }
     }
 
-    /// A point of the wrist frame in the object's frame.
+    /// Transforms a point from the wrist's frame to the object's.
     #[inline]
     pub fn transform_point(&self, point: Vec3) -> Vec3 {
         self.rotation * point + self.object_from_wrist.position
@@ -61,19 +59,19 @@ pub struct WristPlacer<'a> {
     palm: Vec3,
     reach: f32,
     squared_reach: f32,
-    /// Square of the distance from B up to which a position is worth a rotation.
-    squared_near: f32,
+    /// Squared distance from B beyond which a position is pruned before drawing a rotation.
+    squared_max_distance: f32,
     object_from_box: Pose,
     half_extents: Vec3,
     /// The centre of mass in the frame of B.
     centre_of_mass: Vec3,
-    /// From the centre of mass to the giver's palm, seen on the ground plane, in the frame of B; none if the angle
-    /// between the palms is not looked at.
+    /// From the centre of mass to the giver's palm, projected onto the ground plane, in the frame of B; `None` if the
+    /// palm-CoM-palm angle is not tested.
     toward_giver: Option<Vec3>,
     cosines: AngleCosines,
 }
 
-/// The cosines of the ends of Table 5.3's angle ranges.
+/// Cosines of the limits of Table 5.3's angle ranges.
 #[derive(Clone, Copy, Debug)]
 struct AngleCosines {
     upward_max: f32,
@@ -82,16 +80,16 @@ struct AngleCosines {
     sum_max: f32,
 }
 
-/// A placement before its position is known in the object's frame: everything in the frame of B.
+/// A drawn position in the frame of B.
 #[derive(Clone, Copy, Debug)]
 struct Draft {
     position: Vec3,
-    /// Distance from the box; never 0, as positions inside are not drawn.
+    /// Distance from the box in metres; positive, as positions inside it are rejected.
     box_distance: f32,
 }
 
 impl<'a> WristPlacer<'a> {
-    /// Prepares the drawing of placements for a strategy.
+    /// Prepares placements at a holdout under a strategy.
     pub fn new(holdout: &'a Holdout, rig: &Rig, strategy: Strategy) -> Self {
         let object = &*holdout.object;
         let box_from_object = object.bounding_box.object_from_box.inverse();
@@ -104,7 +102,7 @@ impl<'a> WristPlacer<'a> {
                 box_from_object.transform_vector(arm - holdout.up * arm.dot(holdout.up))
             });
         let cos = |degrees: f32| degrees.to_radians().cos();
-        let near = if strategy.prunes_by_object() {
+        let max_distance = if strategy.prunes_by_object() {
             rig.reach.min(WRIST_DISTANCE.max + BOUND_SLACK)
         } else {
             rig.reach
@@ -115,7 +113,7 @@ impl<'a> WristPlacer<'a> {
             palm: rig.palm,
             reach: rig.reach,
             squared_reach: rig.reach * rig.reach,
-            squared_near: near * near,
+            squared_max_distance: max_distance * max_distance,
             object_from_box: object.bounding_box.object_from_box,
             half_extents: object.bounding_box.half_extents,
             centre_of_mass: box_from_object.transform_point(object.centre_of_mass),
@@ -129,49 +127,49 @@ impl<'a> WristPlacer<'a> {
         }
     }
 
-    /// `PLACEWRISTFRAME` with the strategy's pruning. None if `interrupted` says so before a placement is accepted;
-    /// `pruned` counts the pruned placements in either case.
+    /// `PLACEWRISTFRAME` with the strategy's pruning. Returns `None` if interrupted before a placement is accepted. Adds
+    /// the number of pruned placements to `pruned` in either case.
     pub fn place(
         &self,
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
         pruned: &mut u64,
     ) -> Option<WristFrame> {
-        let mut refused = 0;
+        let mut newly_pruned = 0;
         loop {
-            for _ in 0..DRAWS_PER_LOOK {
-                // Uniform in the box around C. A position outside C - B is drawn again. One in there but too far from
-                // the box is too far from the object, and pruned before it is given a rotation. As these two are most
-                // of what happens here and come in random order, they share one branch.
+            for _ in 0..DRAWS_PER_STOP_CHECK {
+                // Uniform in the box around C. Positions outside C - B are redrawn; positions in it but too far from the
+                // box are pruned before a rotation is drawn. These two cases dominate and come in random order, so
+                // they share one branch.
                 let position = stream.in_cube() * (self.half_extents + self.reach);
                 let outside = (position.abs() - self.half_extents).max(Vec3::ZERO);
                 let squared = outside.length_squared();
-                if squared <= self.squared_near && squared > 0.0 {
+                if squared <= self.squared_max_distance && squared > 0.0 {
                     let draft = Draft {
                         position,
                         box_distance: squared.sqrt(),
                     };
                     if let Some(wrist) = self.accept(&draft, stream.rotation()) {
-                        *pruned += refused;
+                        *pruned += newly_pruned;
                         return Some(wrist);
                     }
                 }
-                refused += u64::from(squared > 0.0) & u64::from(squared <= self.squared_reach);
+                newly_pruned += u64::from(squared > 0.0) & u64::from(squared <= self.squared_reach);
             }
             if interrupted() {
-                *pruned += refused;
+                *pruned += newly_pruned;
                 return None;
             }
         }
     }
 
-    /// The placement in the object's frame, if its measures are in range. The order is by cost: what the box alone can
-    /// tell comes before the search for closest points. `box_from_wrist` is the rotation.
+    /// The placement in the object's frame, if its measures are in range. Tests run in order of cost: bounds from the box
+    /// come before closest-point queries.
     fn accept(&self, draft: &Draft, box_from_wrist: Quat) -> Option<WristFrame> {
         let axes = Mat3::from_quat(box_from_wrist);
         let palm = draft.position + axes * self.palm;
         if self.is_on_givers_side(palm)
-            || self.strategy.prunes_by_object() && self.is_hopeless(draft, &axes, palm)
+            || self.strategy.prunes_by_object() && self.is_ruled_out_by_box(draft, &axes, palm)
         {
             return None;
         }
@@ -183,24 +181,24 @@ impl<'a> WristPlacer<'a> {
             .then_some(wrist)
     }
 
-    /// True if the palm-CoM-palm angle is below 90°: the projections of the two arms onto the ground plane then have a
-    /// positive product, and it is enough to project one of them. An arm that vanishes gives 0, which is in range.
+    /// True if the palm-CoM-palm angle is below 90°: the ground-plane projections of the two arms then have a positive
+    /// dot product, for which projecting one of them suffices. A zero arm gives 0, which is in range.
     fn is_on_givers_side(&self, palm: Vec3) -> bool {
         self.toward_giver
             .is_some_and(|toward_giver| (palm - self.centre_of_mass).dot(toward_giver) > 0.0)
     }
 
-    /// True if the box alone shows that a measure is out of range, since H' is a point of the box. All in the frame of B.
-    fn is_hopeless(&self, draft: &Draft, axes: &Mat3, palm: Vec3) -> bool {
+    /// True if the box alone proves a measure out of range, given that H' lies in the box. All in the frame of B.
+    fn is_ruled_out_by_box(&self, draft: &Draft, axes: &Mat3, palm: Vec3) -> bool {
         let outside = (palm.abs() - self.half_extents).max(Vec3::ZERO);
         let max_palm_distance = PALM_DISTANCE.max + BOUND_SLACK;
         if outside.length_squared() > max_palm_distance * max_palm_distance {
             return true;
         }
-        // The largest and the smallest that axis · (H' - O) can be.
+        // Largest and smallest possible axis · (H' - O).
         let highest = |axis: Vec3| axis.abs().dot(self.half_extents) - axis.dot(draft.position);
         let lowest = |axis: Vec3| -axis.abs().dot(self.half_extents) - axis.dot(draft.position);
-        // |H' - O| is at least the distance from O to the box, and at most this:
+        // |H' - O| is at least the distance from O to the box, and at most this.
         let farthest = self.palm.length() + max_palm_distance;
         highest(axes.y_axis) < self.cosines.upward_max * draft.box_distance - BOUND_SLACK
             || highest(axes.z_axis) < self.cosines.forward_max * farthest - BOUND_SLACK
@@ -217,15 +215,15 @@ impl<'a> WristPlacer<'a> {
         };
         let to_object = closest.position - position;
         let distance = to_object.length();
-        if !self.cosines.hold(
+        if !self.cosines.admit(
             wrist.rotation.y_axis.dot(to_object),
             wrist.rotation.z_axis.dot(to_object),
             distance,
         ) {
             return false;
         }
-        // The wrist is at most as far from the object as H' is, and at least as far as from the box: mostly that
-        // settles its distance.
+        // The wrist's distance from the object lies between its distances from the box and from H', which usually
+        // decides.
         (distance <= WRIST_DISTANCE.max
             || surface
                 .closest_point_within(position, WRIST_DISTANCE.max)
@@ -238,16 +236,16 @@ impl<'a> WristPlacer<'a> {
 }
 
 impl AngleCosines {
-    /// True if the two wrist angles and their sum are in range for a vector H' - O with these components along the
-    /// wrist's +y and +z, and this length.
-    fn hold(&self, upward: f32, forward: f32, length: f32) -> bool {
+    /// True if the two wrist angles and their sum are in range, given the components of H' - O along the wrist's +y and +z
+    /// and its length.
+    fn admit(&self, upward: f32, forward: f32, length: f32) -> bool {
         if upward < self.upward_max * length
             || forward < self.forward_max * length
             || forward > self.forward_min * length
         {
             return false;
         }
-        // cos(u + f) falls with the sum, which is at most 55° + 95° here.
+        // cos(u + f) decreases with the sum, which is at most 55° + 95° here.
         let squared = length * length;
         let sines = ((squared - upward * upward).max(0.0) * (squared - forward * forward).max(0.0)).sqrt();
         upward * forward - sines >= self.sum_max * squared

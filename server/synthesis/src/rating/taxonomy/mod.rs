@@ -1,8 +1,8 @@
-//! Which type of the GRASP taxonomy a grasp is (thesis 2.4). The thesis looks at its grasps and calls those unnatural that
-//! are none (5.2, 6.1); this does the same with numbers, for every grasp.
+//! Classifies grasps by the GRASP taxonomy (thesis 2.4). The thesis judges by eye and calls grasps of no type unnatural
+//! (5.2, 6.1); this computes the type of every grasp.
 //!
-//! - [`GraspType`]: the types, and the cells that they share.
-//! - [`classify`]: a posed hand with its contacts to a type. `features` takes the measures, `scores` weighs them.
+//! - [`GraspType`]: the types and the cells they belong to.
+//! - [`classify`]: from a posed hand and its contacts to a type. `features` measures, `scores` rates each type.
 
 mod features;
 mod membership;
@@ -14,12 +14,12 @@ use crate::model::{
     hand::{HandPose, rig::Rig},
 };
 
-/// Of the second-best score, the share that is taken from the best one: two types that fit equally well halve the
-/// confidence. A higher one asks for a clearer lead.
+/// Share of the second-best score subtracted from the best to give the confidence, which a tie therefore halves. A larger
+/// one requires a clearer lead.
 const DOUBT: f32 = 0.5;
 
-/// The type of a grasp from the receiving hand and its contacts, both in the same frame (any), in metres. The same for
-/// left and right hands and for hands of any size.
+/// Classifies a grasp from the receiving hand and its contacts, both in the same (arbitrary) frame, in metres. Independent
+/// of handedness and hand size.
 pub fn classify(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> Classification {
     let scores = scores::scores(&features::Features::of(rig, pose, contacts));
     let (mut best, mut second, mut best_type) = (0.0, 0.0, None);

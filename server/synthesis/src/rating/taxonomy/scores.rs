@@ -1,8 +1,8 @@
-//! How well a grasp fits each type: the fit to the type's cell (what opposes what, with which fingers, where the thumb is)
-//! times the fit to the type within it (size, shape, how the digits are bent). All of them from 0 to 1.
+//! How well a grasp fits each type: the fit to the type's cell (opposition, fingers, thumb position) times the fit to the
+//! type within the cell (size, shape, flexion). All fits are from 0 to 1.
 //!
-//! The paper defines the types by pictures and by the cells' words; the thesis classifies by eye. What tells the types of
-//! a cell apart here, and from where on, is this project's reading of those pictures.
+//! The taxonomy's paper defines types by pictures and cells by words; the thesis classifies by eye. The criteria and
+//! thresholds within a cell are this project's reading of those pictures.
 
 use super::{
     features::{Features, Finger, bent, opposed, straight},
@@ -10,44 +10,44 @@ use super::{
 };
 use crate::model::grasp_type::{Cell, GraspClass, GraspType, Opposition, ThumbPosition, VirtualFinger};
 
-/// Heights of the thumb's tip over the palm's plane, in hand lengths, between which the thumb goes from lying beside the
-/// palm to standing opposite to it: 2 and 5 cm on an adult's hand. Higher ones take more thumbs for adducted.
+/// Height of the thumb's tip above the palm's plane, in hand lengths, over which the thumb goes from adducted to abducted:
+/// 2 to 5 cm on an adult's hand. Larger values classify more thumbs as adducted.
 const THUMB_HEIGHT: [f32; 2] = [0.12, 0.26];
 
-/// Thicknesses in hand lengths between which small becomes medium: 20 and 32 mm for an adult's hand.
+/// Thickness in hand lengths over which small becomes medium: 20 to 32 mm on an adult's hand.
 const SMALL_TO_MEDIUM: [f32; 2] = [0.105, 0.17];
 
-/// Between which medium becomes large: 53 and 72 mm for an adult's hand.
+/// Thickness in hand lengths over which medium becomes large: 53 to 72 mm on an adult's hand.
 const MEDIUM_TO_LARGE: [f32; 2] = [0.28, 0.38];
 
-/// Convergence of the outer fingers' pushes between which a prism becomes something round. On a ball, three fingertips are
-/// about a radius apart, which gives 1.
+/// Convergence of the outer fingers' pushes over which a prism becomes round. On a sphere, three fingertips are about a
+/// radius apart, which gives 1.
 const ROUND: [f32; 2] = [0.25, 0.7];
 
-/// Pull of the digits toward the palm between which a disk becomes a ball: fingers reach past the widest part of a ball.
-const BALL: [f32; 2] = [0.05, 0.3];
+/// Pull of the digits toward the palm over which a disk becomes a sphere: fingers reach past the widest part of a sphere.
+const SPHERE: [f32; 2] = [0.05, 0.3];
 
-/// Means of the two outer joints' bend together, in degrees, between which stretched fingers become curled ones.
+/// Mean flexion of the two outer joints together, in degrees, over which extended fingers become curled.
 const CURLED: [f32; 2] = [40.0, 80.0];
 
-/// The same between which fingers begin to go around something: they need not bend much around something large.
+/// Mean flexion, in degrees, over which fingers begin to wrap around something; a large object needs little.
 const AROUND: [f32; 2] = [15.0, 45.0];
 
-/// Means of what the fingers hold with more than their last links between which precision becomes power.
+/// Mean of [`Finger::inner`] over which precision becomes power.
 const POWER: [f32; 2] = [0.3, 0.7];
 
-/// How much less surely a side holds if a pad of the same finger touches too.
-const PAD_BESIDE_SIDE: f32 = 0.8;
+/// Discount on side opposition if a pad of the same finger touches too.
+const PAD_DISCOUNT: f32 = 0.8;
 
-/// How much less surely thumb and pads hold if the palm bears the object.
-const PALM_BESIDE_PAD: f32 = 0.85;
+/// Discount on pad and middle-finger side opposition if the palm supports the object.
+const PALM_DISCOUNT: f32 = 0.85;
 
-/// The scores of all types, in the order of their numbers.
+/// The score of each type, in the order of [`GraspType::ALL`].
 pub(super) fn scores(features: &Features) -> [f32; 33] {
     let view = View::new(features);
     GraspType::ALL.map(|grasp_type| {
         let cell = view.cell(grasp_type.cell());
-        // Most types fall with their cell.
+        // Most types are ruled out by their cell.
         if cell == 0.0 {
             0.0
         } else {
@@ -56,22 +56,22 @@ pub(super) fn scores(features: &Features) -> [f32; 33] {
     })
 }
 
-/// The features as the cells and types ask for them.
+/// The degrees of membership that cells and types combine, 0 to 1.
 struct View<'a> {
     features: &'a Features,
-    /// Fingers against the palm.
+    /// Finger pads against the palm.
     palm: f32,
-    /// Pads against the thumb's, away from the palm.
+    /// Finger pads against the thumb, away from the palm.
     pad: f32,
-    /// The thumb against the index finger's side.
+    /// Thumb against the index finger's side.
     side_of_index: f32,
-    /// The thumb against the middle finger's side, with the index finger's pad on the object.
+    /// Thumb against the middle finger's side, with the index finger's pad on the object.
     side_of_middle: f32,
-    /// Index against middle finger.
+    /// Index finger against middle finger.
     between_fingers: f32,
-    /// The thumb stands opposite.
+    /// The thumb is abducted.
     abducted: f32,
-    /// More than the last links of the fingers touch.
+    /// The fingers hold with more than their last links.
     inner: f32,
     round: f32,
     curled: f32,
@@ -93,7 +93,7 @@ impl<'a> View<'a> {
         };
         let against_side = |finger: &Finger| {
             if thumb.touches {
-                finger.thumbward * (1.0 - PAD_BESIDE_SIDE * finger.pad) * opposed(thumb.press, finger.press)
+                finger.radial * (1.0 - PAD_DISCOUNT * finger.pad) * opposed(thumb.press, finger.press)
             } else {
                 0.0
             }
@@ -103,12 +103,10 @@ impl<'a> View<'a> {
             palm: features.palm_support * features.mean(|finger| finger.pad),
             pad: thumb_against_pads
                 * features.mean(|finger| finger.pad)
-                * (1.0 - PALM_BESIDE_PAD * features.palm_support),
+                * (1.0 - PALM_DISCOUNT * features.palm_support),
             side_of_index: against_side(index),
-            side_of_middle: against_side(middle)
-                * index.pad
-                * (1.0 - PALM_BESIDE_PAD * features.palm_support),
-            between_fingers: index.littleward.min(middle.thumbward) * opposed(index.press, middle.press),
+            side_of_middle: against_side(middle) * index.pad * (1.0 - PALM_DISCOUNT * features.palm_support),
+            between_fingers: index.ulnar.min(middle.radial) * opposed(index.press, middle.press),
             abducted: rising(thumb.height, THUMB_HEIGHT),
             inner: features.mean(|finger| finger.inner),
             round: rising(features.convergence, ROUND),
@@ -118,7 +116,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// How well a cell fits.
+    /// Fit of a cell.
     fn cell(&self, cell: Cell) -> f32 {
         let thumb = match cell.thumb {
             ThumbPosition::Abducted => self.abducted,
@@ -127,12 +125,12 @@ impl<'a> View<'a> {
         let fingers = virtual_finger(self.features.touching, cell);
         let no_thumb = !self.features.thumb.touches;
         match (cell.class, cell.opposition, cell.virtual_finger) {
-            // A thumb that touches nothing opposes nothing.
+            // A thumb without contact opposes nothing.
             (_, Opposition::Palm, _) if no_thumb && cell.thumb == ThumbPosition::Abducted => 0.0,
             (_, Opposition::Palm, _) if no_thumb => fingers,
             (_, Opposition::Palm, _) => self.palm * thumb * fingers,
-            // Where pads oppose the thumb, it is opposite to them by that alone; of Parallel Extension, adducted in the
-            // table, the type itself asks that it lies along the fingers.
+            // A thumb that opposes pads needs no test of its position. Parallel Extension, adducted in the table, itself
+            // requires the thumb along the fingers.
             (GraspClass::Power, Opposition::Pad, _) => self.pad * rising(self.inner, POWER) * fingers,
             (_, Opposition::Pad, _) => self.pad * falling(self.inner, POWER) * fingers,
             (_, Opposition::Side, VirtualFinger::Two) if cell.thumb == ThumbPosition::Abducted => {
@@ -143,8 +141,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// How well a type fits among those of its cell.
-    #[expect(clippy::match_same_arms, reason = "types stand by their cells")]
+    /// Fit of a type within its cell.
+    #[expect(clippy::match_same_arms, reason = "the arms are grouped by cell")]
     fn within_cell(&self, grasp_type: GraspType) -> f32 {
         let Features {
             thumb,
@@ -157,15 +155,15 @@ impl<'a> View<'a> {
         let prismatic = 1.0 - self.round;
         let straight_fingers = 1.0 - self.curled;
         let around = prismatic * bent(self.features.mean(|finger| finger.curl), AROUND);
-        let ball = rising(pull, BALL);
+        let sphere = rising(pull, SPHERE);
         let parallel = straight_fingers * rising(self.along_fingers(), [0.6, 0.85]);
         let supported = self.supported();
         match grasp_type {
             GraspType::LargeDiameter => around * self.large,
             GraspType::SmallDiameter => around * self.small,
             GraspType::MediumWrap => around * (1.0 - self.small) * (1.0 - self.large),
-            GraspType::PowerDisk => self.round * (1.0 - ball),
-            GraspType::PowerSphere => self.round * ball,
+            GraspType::PowerDisk => self.round * (1.0 - sphere),
+            GraspType::PowerSphere => self.round * sphere,
 
             GraspType::AdductedThumb if thumb.touches => {
                 self.wrapped()
@@ -185,11 +183,11 @@ impl<'a> View<'a> {
                 self.curled * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
             }
 
-            // An index finger that lies on nothing points past the object.
+            // An index finger without contact points past the object.
             GraspType::IndexFingerExtension if !index.touches => 0.0,
             GraspType::IndexFingerExtension => {
                 let others = fingers[1..].iter().map(|finger| finger.curl).sum::<f32>() / 3.0;
-                self.index_stretched() * bent(others, CURLED)
+                self.index_extended() * bent(others, CURLED)
             }
 
             GraspType::Ring => bent(index.knuckle + index.curl, [60.0, 100.0]),
@@ -204,43 +202,43 @@ impl<'a> View<'a> {
             GraspType::Prismatic2Finger | GraspType::Prismatic3Finger => prismatic,
             GraspType::Tripod | GraspType::Quadpod => self.round,
             GraspType::Prismatic4Finger => prismatic * (1.0 - parallel),
-            GraspType::PrecisionDisk => self.round * (1.0 - ball),
-            GraspType::PrecisionSphere => self.round * ball,
+            GraspType::PrecisionDisk => self.round * (1.0 - sphere),
+            GraspType::PrecisionSphere => self.round * sphere,
             GraspType::ParallelExtension => prismatic * parallel,
 
             GraspType::Lateral => (1.0 - supported) * if palm_touches { 0.0 } else { 1.0 },
             GraspType::Stick => supported * if palm_touches { 0.0 } else { 1.0 },
             GraspType::Ventral => f32::from(u8::from(palm_touches)),
-            // A thumb that touches too does not belong to the grip between the fingers.
+            // A touching thumb is no part of a grip between two fingers.
             GraspType::AdductionGrip if thumb.touches => 0.4,
             GraspType::AdductionGrip => 1.0,
             GraspType::LateralTripod | GraspType::WritingTripod | GraspType::TripodVariation => 1.0,
         }
     }
 
-    /// How surely the index finger is stretched.
-    fn index_stretched(&self) -> f32 {
+    /// Degree to which the index finger is extended.
+    fn index_extended(&self) -> f32 {
         let index = self.features.fingers[0];
         straight(index.knuckle + index.curl, [30.0, 70.0])
     }
 
-    /// How surely all fingers are curled, the index finger too.
+    /// Degree to which all fingers are curled, including the index finger.
     fn wrapped(&self) -> f32 {
-        self.curled * (1.0 - self.index_stretched())
+        self.curled * (1.0 - self.index_extended())
     }
 
-    /// How surely thumb and index finger touch with their tips.
+    /// Degree to which thumb and index finger touch with their tips.
     fn tips(&self) -> f32 {
         self.features.thumb.tip.max(0.3) * self.features.fingers[0].tip
     }
 
-    /// How surely pads of the fingers beside the index finger steady the object.
+    /// Degree to which a pad of another finger than the index supports the object.
     fn supported(&self) -> f32 {
         let others = &self.features.fingers[1..];
         others.iter().map(|finger| finger.pad).fold(0.0, f32::max)
     }
 
-    /// Cosine of the angle between the thumb's last link and where stretched fingers point.
+    /// Cosine of the angle between the thumb's last link and the direction of extended fingers.
     fn along_fingers(&self) -> f32 {
         let mut knuckles = 0.0;
         for finger in self.features.touching_fingers() {
@@ -252,15 +250,15 @@ impl<'a> View<'a> {
     }
 }
 
-/// How well the fingers that touch are those of a cell. Against the palm, an outermost finger more or less matters little.
-/// Against the thumb, neighbours that are moved on by one finger do: a pinch with the middle finger is one still, with the
-/// ring finger it has no name. A skipped finger between two that touch matters more.
+/// How well the touching fingers match those of a cell. Against the palm, one outer finger more or less matters little.
+/// Against the thumb, a set shifted by one finger still fits in part: a pinch with the middle finger is one, with the ring
+/// finger it is not. A gap between touching fingers matters more.
 #[expect(
     clippy::match_same_arms,
-    reason = "the palm's fingers stand apart from the thumb's"
+    reason = "palm and thumb oppositions are grouped separately"
 )]
 fn virtual_finger(touching: u8, cell: Cell) -> f32 {
-    // From the lowest bit: index, middle, ring, little finger; written from the little one to the index finger.
+    // Lowest bit first: index, middle, ring, little finger, so literals read from little to index finger.
     match (cell.opposition, cell.virtual_finger, touching) {
         (_, VirtualFinger::TwoToFive, 0b1111)
         | (Opposition::Palm, VirtualFinger::ThreeToFive, 0b1110 | 0b1111)

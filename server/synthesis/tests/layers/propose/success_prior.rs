@@ -14,8 +14,8 @@ use grasp_synthesis::{
     },
     propose::{
         opposition::{Opposition, Oppositions},
-        proposal::{Candidate, Place, propose, propose_evenly},
-        success_prior::{FARTHEST, INPUTS, ObjectFeatures, TRAINED, UNITS},
+        proposal::{Candidate, ProposalContext, propose, propose_evenly},
+        success_prior::{INPUTS, MAX_DEVIATION, ObjectFeatures, TRAINED, UNITS},
     },
     search::physical_attempt::PhysicalAttempt,
 };
@@ -38,7 +38,8 @@ fn hands_rated_better_hold_more_often() {
         let mut attempt = PhysicalAttempt::default();
         let mut rated: Vec<(f32, bool)> = (0..6000)
             .filter_map(|index| {
-                let candidate = place(object, right()).pads_on_pair(&mut AttemptStream::new(41, index))?;
+                let candidate =
+                    place(object, right()).fitting_candidate(&mut AttemptStream::new(41, index))?;
                 let features = bulk.inputs(right(), candidate.opposition, candidate.object_from_wrist, None);
                 let holds = holds_freely(object, &candidate.proposal(), &mut attempt);
                 Some((TRAINED.log_odds(&features), holds))
@@ -60,7 +61,7 @@ fn hands_rated_better_hold_more_often() {
 #[test]
 fn preferred_hands_hold_more_often_than_evenly_drawn_ones() {
     let remote = object("remote");
-    let count = |draw: &dyn Fn(&Place<'_>, &mut AttemptStream) -> Option<Proposal>| {
+    let count = |draw: &dyn Fn(&ProposalContext<'_>, &mut AttemptStream) -> Option<Proposal>| {
         let mut attempt = PhysicalAttempt::default();
         (0..1500)
             .filter(|&index| {
@@ -89,7 +90,7 @@ fn the_network_matches_its_formula_in_double_precision() {
             for (i, feature) in features.iter().enumerate() {
                 let scaled =
                     (f64::from(*feature) - f64::from(TRAINED.means[i])) * f64::from(TRAINED.scales[i]);
-                let scaled = scaled.clamp(-f64::from(FARTHEST), f64::from(FARTHEST));
+                let scaled = scaled.clamp(-f64::from(MAX_DEVIATION), f64::from(MAX_DEVIATION));
                 sum += scaled * f64::from(TRAINED.weights[i][unit]);
             }
             answer += sum.max(0.0) * f64::from(TRAINED.outputs[unit]);
@@ -165,7 +166,7 @@ fn pads_of_candidates_lie_on_the_line_through_their_points() {
             opposition,
             pair,
             object_from_wrist,
-        }) = place(remote, right()).pads_on_pair(&mut AttemptStream::new(59, index))
+        }) = place(remote, right()).fitting_candidate(&mut AttemptStream::new(59, index))
         else {
             continue;
         };

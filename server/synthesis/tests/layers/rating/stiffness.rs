@@ -7,7 +7,7 @@ use grasp_synthesis::{
         grasp::Contact,
         hand::{Digit, HandPart, HandPose, Phalanx, kinematics::hand_frames, rig::Rig},
     },
-    rating::stiffness::give,
+    rating::stiffness::compliance,
 };
 
 use crate::fixtures::{
@@ -108,7 +108,7 @@ fn solve(mut rows: Vec<[f64; UNKNOWNS + 1]>) -> [f64; UNKNOWNS] {
 }
 
 /// Norm of the shifts by unit pushes along the axes, from the whole system.
-fn give_of_system(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3) -> f64 {
+fn compliance_of_system(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3) -> f64 {
     let mut stiffness = vec![[0.0; UNKNOWNS + 1]; UNKNOWNS];
     for digit in Digit::ALL {
         for joint in 0..3 {
@@ -135,14 +135,14 @@ fn give_of_system(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3
 }
 
 #[test]
-fn give_matches_the_system_of_all_springs() {
+fn compliance_matches_the_system_of_all_springs() {
     let rig = right();
     for name in ["remote", "scissors"] {
         let object = object(name);
         for entry in grown_to(object, rig, 40).atlas().entries() {
             let pose = &entry.grip.pose;
-            let found = f64::from(give(rig, pose, &entry.contacts, object.centre_of_mass));
-            let expected = give_of_system(rig, pose, &entry.contacts, object.centre_of_mass);
+            let found = f64::from(compliance(rig, pose, &entry.contacts, object.centre_of_mass));
+            let expected = compliance_of_system(rig, pose, &entry.contacts, object.centre_of_mass);
             assert!(
                 (found / expected - 1.0).abs() < 0.01,
                 "{name}: {found}, not {expected}"
@@ -170,7 +170,7 @@ fn a_palm_gives_way_only_by_its_flesh() {
     let around = [0.0_f32, 2.1, 4.2].map(|angle| 0.02 * Vec3::new(angle.cos(), angle.sin(), 0.0));
     let middle = around.iter().sum::<Vec3>() / 3.0;
     let contacts = around.map(|place| at(place, HandPart::Palm));
-    let found = give(rig, &pose, &contacts, middle);
+    let found = compliance(rig, &pose, &contacts, middle);
     let expected = 3.0_f64.sqrt() / (3.0 * FLESH);
     assert!(
         (f64::from(found) / expected - 1.0).abs() < 1e-3,
@@ -178,7 +178,7 @@ fn a_palm_gives_way_only_by_its_flesh() {
     );
 
     // Without contacts nothing holds, and a digit gives way more than the palm.
-    assert_eq!(give(rig, &pose, &[], middle), f32::INFINITY);
+    assert_eq!(compliance(rig, &pose, &[], middle), f32::INFINITY);
     let tips = around.map(|place| at(place, HandPart::Phalanx(Digit::Index, Phalanx::Third)));
-    assert!(give(rig, &pose, &tips, middle) > 2.0 * found);
+    assert!(compliance(rig, &pose, &tips, middle) > 2.0 * found);
 }

@@ -1,4 +1,4 @@
-//! What all attempts of Algorithm 1 at a holdout share.
+//! The data shared by all attempts of Algorithm 1 at a holdout.
 
 use std::sync::OnceLock;
 
@@ -10,27 +10,27 @@ use super::{
 };
 use crate::model::{bend_ratios::BendRatioChoice, hand::rig::Rig, holdout::Holdout, strategy::Strategy};
 
-/// A holdout, the receiving hand, and how Algorithm 1 tries to take it.
+/// A holdout, the receiving hand, and the settings of Algorithm 1.
 #[derive(Clone, Debug)]
-pub struct Scene<'a> {
-    /// What is held out.
+pub struct ThesisScene<'a> {
+    /// The object and how it is presented.
     pub holdout: &'a Holdout,
     /// The receiving hand.
     pub rig: &'a Rig,
-    /// The step of the ladder.
+    /// Which of the modifications of chapter 5 apply.
     pub strategy: Strategy,
-    /// Which bend ratios a digit tries.
+    /// The bend ratios a digit may close with.
     pub bend_ratios: BendRatioChoice,
-    /// Step 1.
+    /// Draws wrist frames: step 1.
     pub placer: WristPlacer<'a>,
-    /// What a grasp has to hold.
+    /// The weight and friction of the object.
     pub load: Load,
-    /// Tabulated on first use: it takes longer than a look-up of known grips, which never needs it.
+    /// Tabulated on first use, since it takes longer than a look-up of known grips, which does not need it.
     motion: OnceLock<[DigitMotion; 5]>,
 }
 
-impl<'a> Scene<'a> {
-    /// Prepares attempts at a holdout. `friction` is the coefficient of static friction, more than 0.
+impl<'a> ThesisScene<'a> {
+    /// Prepares attempts at a holdout. `friction` is the coefficient of static friction; it must be positive.
     pub fn new(
         holdout: &'a Holdout,
         rig: &'a Rig,
@@ -62,7 +62,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// How the digits close, step by step.
+    /// The closing motion of each digit, thumb first.
     pub fn motion(&self) -> &[DigitMotion; 5] {
         self.motion.get_or_init(|| hand_motion(self.rig))
     }
