@@ -16,7 +16,7 @@ use crate::{
     base::{pose::Pose, random::AttemptStream},
     model::object::GraspObject,
     physical::{
-        grip::DEEPEST,
+        grip::MAX_PENETRATION,
         shape::{HandShape, Proposal},
         solids::{PreparedHand, Spheres},
     },
@@ -354,7 +354,11 @@ impl<'a> Place<'a> {
     /// True if balls inside palm and forearm are off the object and the giver's hand: a hundred times sooner known than
     /// the whole hand's clearance, which decides in the end.
     fn has_room(&self, object_from_wrist: Pose) -> bool {
-        self.have_room(object_from_wrist, self.rig.oppositions().inner_spheres(), DEEPEST)
+        self.have_room(
+            object_from_wrist,
+            self.rig.oppositions().inner_spheres(),
+            MAX_PENETRATION,
+        )
     }
 
     /// True if balls, in the wrist's frame, are off the giver's hand and at most `depth` metres in the object.
@@ -379,7 +383,7 @@ impl<'a> Place<'a> {
         self.giver.is_some_and(|giver| {
             spheres
                 .iter()
-                .any(|spheres| giver.surely_nears_any(&spheres.transformed(object_from_wrist), 0.0))
+                .any(|spheres| giver.any_certainly_within(&spheres.transformed(object_from_wrist), 0.0))
         })
     }
 }
