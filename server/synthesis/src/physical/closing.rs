@@ -38,7 +38,7 @@ const CERTAINLY_INSIDE: f32 = -INSIDE_DEPTH - TOUCH_TOLERANCE;
 /// Clearance between a relaxed digit and the object, in metres: just enough to be visible.
 const RELAXED_CLEARANCE: f32 = 0.001;
 
-/// Degrees of closure, from 0 to 1, tried as starts for relaxing a digit that cannot be opened.
+/// Fractions of full closure tried as starts for relaxing a digit that cannot be opened.
 const CURLED: [f32; 3] = [0.35, 0.7, 1.0];
 
 /// Above this gap, in metres, a lower bound replaces the exact gap. Smaller values take more steps of a few
@@ -86,7 +86,7 @@ pub struct Closing<'a> {
     pub radii: [f32; 4],
     /// The plane it bends in, in the object's frame.
     pub plane: DigitPlane,
-    /// Degree of closure, from 0 to 1, that closing starts from. If the digit would start inside something, half of
+    /// Fraction of full closure, from 0 to 1, that closing starts from. If the digit would start inside something, half of
     /// it is tried, then the opened digit.
     pub preshape: f32,
     /// Other parts of the hand that stop the digit.

@@ -38,7 +38,7 @@ impl Flexing<'_> {
         }
     }
 
-    /// The pose at a degree of closure: 0 is opened, 1 is closed to the joint limits.
+    /// The pose at a fraction of full closure: 0 is opened, 1 is closed to the joint limits.
     pub fn closed_by(&self, closure: f32) -> DigitAngles {
         let sweep = self.sweep();
         self.angles_at(&sweep, closure * self.full_sweep(&sweep))

@@ -38,7 +38,7 @@ pub struct HandShape {
     pub bend_ratios: [f32; 2],
     /// Which digits close, thumb first; the others rest.
     pub closing: [bool; 5],
-    /// Degree of closure, from 0 to 1, that thumb and fingers start from. A preshaped hand avoids obstacles that only
+    /// Fraction of full closure, from 0 to 1, that thumb and fingers start from. A preshaped hand avoids obstacles that only
     /// an opened one would meet.
     pub preshape: [f32; 2],
     /// Whether fingers that do not close are tucked into the palm instead of resting next to those that do.

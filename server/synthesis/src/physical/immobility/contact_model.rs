@@ -83,9 +83,9 @@ impl ContactCone {
     /// The push whose wrench reaches farthest along `direction`, and its reach, when `share` of friction and torsion
     /// may be used.
     ///
-    /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is (n +
-    /// t)·a + s b with a = u + v × arm and b = v·n. Over the ellipsoid, that is largest at t = μ² aₜ / q and s = σ² b
-    /// / q with q² = μ² |aₜ|² + σ² b², where it is a·n + q. A share scales t, s and q.
+    /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is
+    /// (n + t)·a + s b with a = u + v × arm and b = v·n. Over the ellipsoid, that is largest at t = μ² aₜ / q and
+    /// s = σ² b / q with q² = μ² |aₜ|² + σ² b², where it is a·n + q. A share scales t, s and q.
     pub(super) fn farthest_push(&self, direction: &ScaledWrench, share: f64) -> (f64, UnitPush) {
         let ContactDirection {
             normal,

@@ -166,8 +166,8 @@ impl Polytope {
         true
     }
 
-    /// Creates the facet at the ridge of the removed facet `removing`, opposite its vertex `ridge`, whose other side is
-    /// the remaining facet `remaining`.
+    /// Creates the facet at the ridge of facet `removing`, opposite its vertex `ridge`, that borders on
+    /// facet `remaining`.
     fn create(&mut self, removing: u32, ridge: usize, remaining: u32, name: u32) {
         let (from, to) = (&self.facets[removing as usize], &self.facets[remaining as usize]);
         let (a, b) = ((-to.height).max(0.0), from.height);
