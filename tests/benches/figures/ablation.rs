@@ -260,7 +260,7 @@ pub(crate) fn measure(
     }
     let all: Vec<Results> = parts
         .into_iter()
-        .map(|part| Results::of(part.knowledge, part.class, &part.variants, part.searched))
+        .map(|part| Results::of(part.knowledge, part.class, &part.variants, &part.searched))
         .collect();
     let folder = results_folder(setting);
     fs::create_dir_all(&folder).expect("the results folder can be created");

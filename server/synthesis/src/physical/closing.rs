@@ -149,7 +149,7 @@ impl Closing<'_> {
     }
 
     /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in total, or less if something
-    /// stops it. If the opened digit is inside the object, it bends from the first free pose of [`CURLED`].
+    /// stops it. If the opened digit is inside the object, it bends from the first partly closed pose that is free.
     pub fn relax(&self, flexion: f32) -> ClosedDigit {
         let opened = self.flexing.opened();
         let start = std::iter::once(0.0)

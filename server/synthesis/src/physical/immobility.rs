@@ -6,7 +6,7 @@
 //! only for the wrench that reaches farthest in a direction; whatever they build lies inside the true limits, so
 //! every answer is conservative.
 //!
-//! - [`balance`]: forces that hold the object against gravity, as comfortably as possible (non-negative least squares
+//! - [`balance()`]: forces that hold the object against gravity, as comfortably as possible (non-negative least squares
 //!   after Lawson and Hanson, over cones instead of a matrix);
 //! - [`epsilon`]: the largest disturbance that the contacts resist in every direction (Ferrari and Canny), by an
 //!   expanding polytope in six dimensions.
@@ -74,7 +74,7 @@ pub struct Balance {
     pub friction_use: FrictionUse,
 }
 
-/// How much of friction and torsion the forces may use. [`balance`] tries these in order until the digits press
+/// How much of friction and torsion the forces may use. [`balance()`] tries these in order until the digits press
 /// firmly. More steps would find safer forces, but cost time whenever the first fail.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FrictionUse {
@@ -92,7 +92,7 @@ impl FrictionUse {
     pub const ALL: [Self; 3] = [Self::Low, Self::Moderate, Self::Full];
 }
 
-/// Buffers that [`balance`] and [`epsilon`] reuse between calls.
+/// Buffers that [`balance()`] and [`epsilon`] reuse between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Buffers {
     cones: Vec<contact_model::ContactCone>,

@@ -100,7 +100,7 @@ impl Results {
         knowledge: Knowledge,
         class: Class,
         variants: &[Option<Mechanism>],
-        searched: Vec<Vec<SearchSample>>,
+        searched: &[Vec<SearchSample>],
     ) -> Self {
         let (first, second) = (&searched[0], &searched[1]);
         let comparison = |number: usize, searched: &Vec<SearchSample>| match number {
@@ -110,7 +110,7 @@ impl Results {
         };
         let variants = variants
             .iter()
-            .zip(&searched)
+            .zip(searched)
             .enumerate()
             .map(|(number, (off, searched))| (*off, stats(searched), comparison(number, searched)))
             .collect();
