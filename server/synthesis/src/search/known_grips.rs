@@ -85,7 +85,7 @@ enum Open<'a> {
         solids: Solids<'a>,
     },
     /// It may hold without the fingers that the giver is in the way of: this grip of the atlas.
-    Low(u16),
+    Sparing(u16),
 }
 
 /// What was taken of the known grips.
@@ -243,7 +243,7 @@ impl<'a> KnownGrips<'a> {
             let grips = self.atlas?.grips();
             let is_open = !self.mechanisms.has(Mechanism::InnerSpheres)
                 || grips.may_hold_with_subset(usize::from(index), self.giver?);
-            return is_open.then_some(Open::Low(index));
+            return is_open.then_some(Open::Sparing(index));
         };
         Some(Open::Whole {
             source: GraspSource::Recent,
@@ -271,7 +271,7 @@ impl<'a> KnownGrips<'a> {
                 entry,
                 solids,
             }) => (source, self.hold(entry, &solids, gripper)),
-            Taken::Open(Open::Low(index)) => {
+            Taken::Open(Open::Sparing(index)) => {
                 (GraspSource::Spared(index), self.hold_with_subset(index, gripper))
             }
         };
