@@ -1,4 +1,4 @@
-//! How long an attempt takes with each strategy, and how long finding a grasp takes at each holdout.
+//! Time per attempt with each strategy, and time to a grasp at each holdout.
 //!
 //! `cargo bench -p grasp-tests --bench attempt`
 
@@ -20,7 +20,7 @@ use grasp_tests::searches::{Bench, prepared};
 /// Seed of every search here.
 const SEED: u64 = 20_180_612;
 
-/// One attempt, prunes included, in turn over all holdouts.
+/// One attempt, early rejections included, cycling over all holdouts.
 fn attempt(criterion: &mut Criterion) {
     let bench = Bench::new(1);
     let mut group = criterion.benchmark_group("attempt");
@@ -64,7 +64,7 @@ fn attempt(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A valid grasp with strategy F on one and on two threads; every iteration searches on from where the last one ended.
+/// Time to a valid grasp with strategy F on one and two threads. Each iteration continues where the last one ended.
 fn find(criterion: &mut Criterion) {
     for threads in [1, 2] {
         let bench = Bench::new(threads);
@@ -84,7 +84,7 @@ fn find(criterion: &mut Criterion) {
     }
 }
 
-/// The grasp type of a grasp on each holdout in turn.
+/// Time to classify a grasp, cycling over one grasp per holdout.
 fn classification(criterion: &mut Criterion) {
     let bench = Bench::new(1);
     let grasps: Vec<_> = (0..bench.holdouts.len())

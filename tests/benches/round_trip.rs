@@ -1,4 +1,4 @@
-//! What gRPC adds: a replayed attempt asked over loopback, against the same replay by a plain call, and a listing.
+//! The overhead of gRPC: a replayed attempt over loopback against the same replay as a plain call, and a listing.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use grasp_client::{FindRequest, Outcome, Validity, built_in::request_for};
@@ -6,18 +6,18 @@ use grasp_synthesis::model::strategy::Strategy;
 use grasp_tests::{TestServer, searches::Bench};
 
 fn round_trip(criterion: &mut Criterion) {
-    let runtime = tokio::runtime::Runtime::new().expect("a runtime can be had");
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime can be started");
     let server = runtime.block_on(TestServer::start());
     let client = runtime.block_on(server.client());
 
-    // An attempt that is known to be valid: the search is a few microseconds, the rest is the way there and back.
+    // A known valid attempt: the search takes a few microseconds, the rest is the round trip.
     let bench = Bench::new(1);
     let holdout = bench.holdouts.len() - 1;
     let attempt = bench
         .search(holdout, Strategy::F, 1, 0, u64::MAX)
         .report
         .attempt
-        .expect("it is receivable");
+        .expect("the holdout has a valid grasp");
     let request = FindRequest {
         seed: Some(1),
         validity: Some(Validity::Thesis),
@@ -28,8 +28,11 @@ fn round_trip(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("round trip");
     group.bench_function("replay, plain call", |bencher| {
         bencher.iter(|| {
-            // The server poses the giver's hand for every request: so must the plain call.
-            let holdout = bench.holdouts[holdout].0.to_holdout().expect("it is sound");
+            // The server poses the giver's hand per request, so the plain call must too.
+            let holdout = bench.holdouts[holdout]
+                .0
+                .to_holdout()
+                .expect("the holdout is sound");
             let outcome = bench.search_on(&holdout, Strategy::F, 1, attempt, 1);
             assert!(outcome.grasp.is_some());
         });
@@ -43,7 +46,7 @@ fn round_trip(criterion: &mut Criterion) {
     group.bench_function("list objects", |bencher| {
         bencher
             .to_async(&runtime)
-            .iter(|| async { client.list_objects().await.expect("it is served") });
+            .iter(|| async { client.list_objects().await.expect("the server lists its objects") });
     });
     group.finish();
     runtime.block_on(server.stop());

@@ -308,7 +308,7 @@ mod tests {
         assert_eq!(changed(|entry| entry.scores[3] ^= 1), Some(7));
         let use_more = |entry: &mut Entry| {
             let more = match entry.friction_uses.get(3) {
-                FrictionUse::Full => FrictionUse::Sparing,
+                FrictionUse::Full => FrictionUse::Low,
                 _ => FrictionUse::Full,
             };
             entry.friction_uses.set(3, more);

@@ -1,4 +1,4 @@
-//! Time per query, in batches of fixed random queries: divide by the batch, or read the throughput.
+//! Time per query, in batches of fixed random queries: divide by the batch size, or read the throughput.
 //!
 //! "Mixed" segments lie anywhere in a box 5 cm larger than the object, like those of a hand being placed; "near" ones
 //! start within 15 mm of the surface, like those of a closing finger. Both are as long as a phalanx.
@@ -11,7 +11,7 @@ use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Queries per batch: more than branch predictors can memorise.
+/// Queries per batch: more than a branch predictor can memorise.
 const BATCH: usize = 8192;
 
 /// A closed grid of rows × columns quads, wrapped like a torus.

@@ -1,13 +1,12 @@
-//! Time per grip: to check one of an atlas against a giver, to find the first that holds, to close a proposed hand, and
-//! to find an entry of an atlas. In batches of fixed queries: divide by the batch, or read the throughput.
+//! Time per grip: to check an atlas entry against a giver, to find the first entry that holds, to close a proposed
+//! hand, and to grow an atlas entry. In batches of fixed queries: divide by the batch size, or read the throughput.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{mechanisms::Mechanisms, random::AttemptStream, stopwatch::NoStopwatch},
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::Recheck},
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     physical::{
@@ -20,13 +19,13 @@ use grasp_synthesis::{
     },
 };
 
-/// Built-in objects: a light, thin one, and a box.
+/// Built-in objects: a light, thin one and a box.
 const OBJECTS: [&str; 2] = ["scissors", "remote"];
 
 /// Entries of the searched atlases.
 const ENTRIES: usize = 400;
 
-/// Entries of the atlas grown in each iteration.
+/// Entries grown per iteration.
 const GROWN: usize = 20;
 
 /// Proposals per batch.
@@ -75,16 +74,17 @@ fn holds(criterion: &mut Criterion) {
         };
         let pairs = presented
             .iter()
-            .flat_map(|way| atlas.entries().iter().map(move |entry| (entry, way)));
-        let (accepted, rejected): (Vec<_>, Vec<_>) = pairs.partition(|(entry, way)| holds(entry, way));
+            .flat_map(|presented_case| atlas.entries().iter().map(move |entry| (entry, presented_case)));
+        let (accepted, rejected): (Vec<_>, Vec<_>) =
+            pairs.partition(|(entry, presented_case)| holds(entry, presented_case));
 
         let mut group = criterion.benchmark_group(format!("hold/{name}"));
         for (verdict, pairs) in [("accepted", accepted), ("rejected", rejected)] {
             group.throughput(Throughput::Elements(pairs.len() as u64));
             group.bench_function(verdict, |bencher| {
                 bencher.iter(|| {
-                    for (entry, way) in &pairs {
-                        black_box(holds(black_box(entry), way));
+                    for (entry, presented_case) in &pairs {
+                        black_box(holds(black_box(entry), presented_case));
                     }
                 });
             });
@@ -92,10 +92,15 @@ fn holds(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(presented.len() as u64));
         group.bench_function("first valid", |bencher| {
             bencher.iter(|| {
-                for way in &presented {
-                    let listed = atlas.shortlist(way.up).iter().map(|listed| listed.entry);
-                    let mut order = listed.chain(atlas.by_score(way.up).iter().copied());
-                    black_box(order.find(|&index| holds(&atlas.entries()[usize::from(index)], way)));
+                for presented_case in &presented {
+                    let listed = atlas
+                        .shortlist(presented_case.up)
+                        .iter()
+                        .map(|listed| listed.entry);
+                    let mut order = listed.chain(atlas.by_score(presented_case.up).iter().copied());
+                    black_box(
+                        order.find(|&index| holds(&atlas.entries()[usize::from(index)], presented_case)),
+                    );
                 }
             });
         });

@@ -11,7 +11,7 @@ use grasp_synthesis::{
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Grasps per batch: more than branch predictors can memorise.
+/// Grasps per batch: more than a branch predictor can memorise.
 const BATCH: usize = 512;
 
 /// Required epsilon.
@@ -65,7 +65,7 @@ fn bench_immobility(criterion: &mut Criterion) {
         };
         let firm: Vec<_> = held.iter().filter(closed).cloned().collect();
         println!(
-            "{count} contacts: {} of {BATCH} balance, {} close",
+            "{count} contacts: {} of {BATCH} balance gravity, {} have closure",
             held.len(),
             firm.len()
         );

@@ -1,7 +1,7 @@
-//! Time per query of hands as solids, in batches of fixed random queries: divide by the batch, or read the throughput.
+//! Time per clearance query, in batches of fixed random queries: divide by the batch size, or read the throughput.
 //!
-//! "Touching" capsules are as close to the surface as those of a closed finger, "near" ones are within 3 cm, and "deep"
-//! ones start inside the volume.
+//! "Touching" capsules are as close to the surface as those of a closed finger, "near" ones are within 3 cm, and
+//! "deep" ones start inside the volume.
 
 use std::hint::black_box;
 
@@ -14,7 +14,7 @@ use grasp_synthesis::{
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Queries per batch: more than branch predictors can memorise.
+/// Queries per batch: more than a branch predictor can memorise.
 const BATCH: usize = 4096;
 
 /// A bar of 5 × 18 × 2.4 cm, like a remote control, with 2,400 triangles.

@@ -1,12 +1,13 @@
-//! What each mechanism of a default search is worth: all of them against each one switched off, in one process.
+//! What each mechanism of a default search contributes: all mechanisms on against each one switched off, in one
+//! process.
 //!
-//! Every variant searches the same holdout with the same seed before the next holdout comes, in an order that is shuffled
-//! for each, so that whatever else runs on the machine slows all of them alike. All mechanisms run twice: what the two
-//! differ by is noise. Budgets and times are in processor time, as an idle machine would take it (see [`effort`]); wall
-//! times are kept too, since they show what waking threads costs.
+//! Every variant searches the same holdout with the same seed before the next holdout, in an order shuffled per
+//! holdout, so that other load on the machine slows all variants alike. The variant with all mechanisms runs twice;
+//! the difference between the two is noise. Budgets and times are in processor time, the time on an idle machine (see
+//! [`processor_clock`]); wall times are kept too, because they show the cost of waking threads.
 
-mod effort;
 mod page;
+mod processor_clock;
 mod summary;
 
 use std::{
@@ -31,21 +32,21 @@ use rayon::ThreadPool;
 
 use crate::{
     Row,
-    asking::ANSWERED_WITHIN,
-    core::{Core, Knows, LOOK_UP_TIME, WORKERS, settings, thread_time},
-    setting::{Setting, Thing, bar, built_in_holdouts, default_hand},
+    core::{CoreSearcher, KnownGrips, LOOK_UP_TIME, WORKERS, settings, thread_time},
+    requests::ANSWERED_WITHIN,
+    setting::{Setting, TestObject, bar, built_in_holdouts, default_hand},
     table::{Line, Spread, Unit, time},
 };
-use effort::Effort;
+use processor_clock::ProcessorClock;
 use summary::{Class, Results};
 
-/// Seed of the variants' order.
+/// Seed of the order of variants.
 const SEED: u64 = 20_180_613;
 
-/// Holdouts of each class that are searched before those that are measured, to fill caches.
-const UNMEASURED: usize = 3;
+/// Holdouts per class searched before measuring, to fill caches.
+const WARM_UP: usize = 3;
 
-/// What searches know of the object.
+/// What searches know about the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Knowledge {
     /// A complete atlas.
@@ -64,7 +65,7 @@ impl Knowledge {
         }
     }
 
-    /// The mechanisms that such searches run. Grips that recent searches found are left out: nobody asks twice here.
+    /// The mechanisms that run in such searches, except recent grips: no request repeats here.
     fn mechanisms(self) -> impl Iterator<Item = Mechanism> {
         let runs = move |mechanism: &Mechanism| match mechanism {
             Mechanism::RecentGrips => false,
@@ -96,31 +97,31 @@ impl Knowledge {
     }
 }
 
-/// One search.
+/// The result of one search.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Searched {
-    /// Processor time, as the time that the search takes on an idle machine.
+pub(crate) struct SearchSample {
+    /// Processor time: the duration on an idle machine.
     time: Duration,
-    /// Wall time on this machine, with what else it does.
+    /// Wall time on this machine, including other load.
     wall_time: Duration,
-    /// The grasp's score, if there is a grasp.
+    /// Score of the grasp, if one was found.
     score: Option<f32>,
 }
 
-impl Searched {
+impl SearchSample {
     fn is_in_time(&self) -> bool {
         self.score.is_some() && self.time <= ANSWERED_WITHIN
     }
 }
 
-/// A holdout and what is known of its object.
+/// A holdout and what is known about its object.
 struct Case {
     holdout: Holdout,
     atlas: Arc<Atlas>,
-    borrowed: Arc<TransferredGrips>,
+    transferred: Arc<TransferredGrips>,
 }
 
-/// Searches as the server does: a look on the caller's thread, then a race that another thread waits for.
+/// Searches as the server does: a look-up on the calling thread, then a race that another thread waits for.
 struct Searcher {
     rig: &'static PreparedRig,
     coordinator: ThreadPool,
@@ -131,7 +132,7 @@ impl Searcher {
     fn new() -> Self {
         let pool = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("threads can be had")
+            pool.expect("threads can be started")
         };
         Self {
             rig: &default_hand(Handedness::Right).rig,
@@ -140,11 +141,11 @@ impl Searcher {
         }
     }
 
-    fn search(&self, case: &Case, knowledge: Knowledge, mechanisms: Mechanisms, seed: u64) -> Searched {
+    fn search(&self, case: &Case, knowledge: Knowledge, mechanisms: Mechanisms, seed: u64) -> SearchSample {
         let holdout = &case.holdout;
         let known = match knowledge {
-            Knowledge::Warm => Knows::Atlas(&case.atlas),
-            Knowledge::Cold => Knows::Boxes((!case.borrowed.is_empty()).then_some(&case.borrowed)),
+            Knowledge::Warm => KnownGrips::Atlas(&case.atlas),
+            Knowledge::Cold => KnownGrips::Boxes((!case.transferred.is_empty()).then_some(&case.transferred)),
         };
         let mut settings = settings(known, mechanisms, seed);
         let object = prepared(&holdout.object);
@@ -168,14 +169,14 @@ impl Searcher {
                 settings.known.tried = tried;
                 settings.run.deadline = Some(ANSWERED_WITHIN.saturating_sub(look_up_time));
                 self.coordinator.install(|| {
-                    let clock = Effort::start(WORKERS);
+                    let clock = ProcessorClock::start(WORKERS);
                     let stop = AtomicBool::new(false);
                     let outcome = find_grasp(&self.workers, task, &settings, &clock, &stop);
                     (outcome, clock.total())
                 })
             }
         };
-        Searched {
+        SearchSample {
             time: look_up_time + race_time,
             wall_time: start.elapsed(),
             score: outcome
@@ -185,7 +186,7 @@ impl Searcher {
     }
 }
 
-/// All mechanisms twice, then each one off that such searches run.
+/// All mechanisms twice, then each mechanism of such searches switched off.
 fn variants(knowledge: Knowledge) -> Vec<Option<Mechanism>> {
     [None, None]
         .into_iter()
@@ -193,27 +194,31 @@ fn variants(knowledge: Knowledge) -> Vec<Option<Mechanism>> {
         .collect()
 }
 
-/// What is measured of one class with the same knowledge.
+/// The measurements of one class with one kind of knowledge.
 struct Part<'a> {
     knowledge: Knowledge,
     variants: Vec<Option<Mechanism>>,
     class: Class,
     cases: &'a [Case],
-    /// For each variant.
-    searched: Vec<Vec<Searched>>,
+    /// Samples per variant.
+    searched: Vec<Vec<SearchSample>>,
 }
 
 impl Part<'_> {
-    fn search(&self, searcher: &Searcher, case: usize, variant: usize, seed: u64) -> Searched {
+    fn search(&self, searcher: &Searcher, case: usize, variant: usize, seed: u64) -> SearchSample {
         let mechanisms = self.variants[variant].map_or(Mechanisms::ALL, |off| Mechanisms::ALL.without(off));
         searcher.search(&self.cases[case], self.knowledge, mechanisms, seed)
     }
 }
 
-/// Measures, and writes the table and the page.
-pub(crate) fn measure(setting: &Setting, things: &[Thing], longest: Option<Duration>) -> Vec<Line> {
+/// Runs the ablation and writes table and page.
+pub(crate) fn measure(
+    setting: &Setting,
+    test_objects: &[TestObject],
+    longest: Option<Duration>,
+) -> Vec<Line> {
     let load_before = crate::load_average();
-    let classes = classes(setting, things);
+    let classes = classes(setting, test_objects);
     let searcher = Searcher::new();
     let mut parts: Vec<Part<'_>> = Vec::new();
     for knowledge in Knowledge::ALL {
@@ -229,7 +234,7 @@ pub(crate) fn measure(setting: &Setting, things: &[Thing], longest: Option<Durat
         }
     }
     for part in &parts {
-        for case in 0..UNMEASURED.min(part.cases.len()) {
+        for case in 0..WARM_UP.min(part.cases.len()) {
             for variant in 0..part.variants.len() {
                 part.search(&searcher, case, variant, u64::MAX);
             }
@@ -238,7 +243,7 @@ pub(crate) fn measure(setting: &Setting, things: &[Thing], longest: Option<Durat
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let start = Instant::now();
     let bar = bar(setting.holdouts, "ablation, holdouts of each class".to_owned());
-    // All parts take turns: what the machine is busy with passes, and a run that is cut short has some of each.
+    // The parts take turns: bursts of load spread over all of them, and a run cut short has samples of each.
     for number in 0..setting.holdouts {
         if number > 0 && longest.is_some_and(|longest| start.elapsed() >= longest) {
             break;
@@ -258,7 +263,7 @@ pub(crate) fn measure(setting: &Setting, things: &[Thing], longest: Option<Durat
         .map(|part| Results::of(part.knowledge, part.class, &part.variants, &part.searched))
         .collect();
     let folder = results_folder(setting);
-    fs::create_dir_all(&folder).expect("the folder can be made");
+    fs::create_dir_all(&folder).expect("the results folder can be created");
     let write = |name: &str, text: String| {
         fs::write(folder.join(name), text).expect("the results can be written");
     };
@@ -268,7 +273,7 @@ pub(crate) fn measure(setting: &Setting, things: &[Thing], longest: Option<Durat
     all.iter().map(line).collect()
 }
 
-/// Where the results are kept; those of a quick run say nothing.
+/// The folder of the results. Those of a quick run are meaningless and go elsewhere.
 fn results_folder(setting: &Setting) -> PathBuf {
     if setting.quick {
         setting.folder().join("ablation")
@@ -277,39 +282,50 @@ fn results_folder(setting: &Setting) -> PathBuf {
     }
 }
 
-/// The built-in holdouts, again and again, and random ones of each object.
-fn classes(setting: &Setting, things: &[Thing]) -> Vec<(Class, Vec<Case>)> {
-    let core = Core::new(Mechanisms::ALL);
+/// The built-in holdouts, repeated, and random ones of each object.
+fn classes(setting: &Setting, test_objects: &[TestObject]) -> Vec<(Class, Vec<Case>)> {
+    let core = CoreSearcher::new(Mechanisms::ALL);
     let rig = &default_hand(Handedness::Right).rig;
     let (_, held) = held_primitives()
         .iter()
         .find(|(hand, _)| std::ptr::eq(&raw const hand.rig, rig))
-        .expect("the default hand knows boxes");
-    let known: Vec<_> = things
+        .expect("the default hand has grips on primitives");
+    let known: Vec<_> = test_objects
         .iter()
-        .map(|thing| {
-            let atlas = core.atlas(thing.id(), &Setting::atlases(), &thing.object);
+        .map(|test_object| {
+            let atlas = core.atlas(test_object.id(), &Setting::atlases(), &test_object.object);
             let atlas = atlas.expect("built-in objects come with an atlas");
-            assert!(atlas.is_complete(), "the atlas of {} still grows", thing.id());
-            (thing, atlas, Arc::new(TransferredGrips::of(&thing.object, held)))
+            assert!(
+                atlas.is_complete(),
+                "the atlas of {} is still growing",
+                test_object.id()
+            );
+            (
+                test_object,
+                atlas,
+                Arc::new(TransferredGrips::of(&test_object.object, held)),
+            )
         })
         .collect();
     let case = |id: &str, holdout: &grasp_tests::random_holdouts::ClientHoldout| {
-        let of_object = known.iter().find(|(thing, ..)| thing.id() == id);
-        let (thing, atlas, borrowed) = of_object.expect("its object is built in");
+        let of_object = known.iter().find(|(test_object, ..)| test_object.id() == id);
+        let (test_object, atlas, transferred) = of_object.expect("its object is built in");
         Case {
-            holdout: holdout.holdout(Arc::clone(&thing.object)),
+            holdout: holdout.holdout(Arc::clone(&test_object.object)),
             atlas: Arc::clone(atlas),
-            borrowed: Arc::clone(borrowed),
+            transferred: Arc::clone(transferred),
         }
     };
     let built_in = built_in_holdouts();
     let repeated = built_in.iter().cycle().take(setting.holdouts);
     let fifteen = repeated.map(|(object, holdout)| case(object, holdout));
     let mut classes = vec![(Class::Fifteen, fifteen.collect())];
-    for thing in things {
-        let class = Class::random(thing.id());
-        let cases = thing.holdouts.iter().map(|holdout| case(thing.id(), holdout));
+    for test_object in test_objects {
+        let class = Class::random(test_object.id());
+        let cases = test_object
+            .holdouts
+            .iter()
+            .map(|holdout| case(test_object.id(), holdout));
         classes.push((class, cases.collect()));
     }
     classes
@@ -321,12 +337,12 @@ fn line(results: &Results) -> Line {
     let spread = Spread::of_times(results.all_on().map(|searched| searched.time));
     let noise = results.noise();
     Line::new(Row::Ablation, what, Unit::Seconds, spread).remark(format!(
-        "all on; the same again: median {:.3} ×, p99 {:.3} ×, answered {:+.2} points",
+        "all on; repeated: median {:.3} ×, p99 {:.3} ×, answered {:+.2} points",
         noise.median.value, noise.p99.value, noise.answered.value
     ))
 }
 
-/// A time for people.
+/// A duration for readers.
 fn shown(seconds: f64) -> String {
     time(seconds)
 }

@@ -1,4 +1,4 @@
-//! The best grasp within a budget of 5 ms, and what a request gets that names none.
+//! The best grasp within a budget of 5 ms, and requests for the best that name no budget.
 
 use std::time::Duration;
 
@@ -7,25 +7,25 @@ use grasp_tests::TestServer;
 
 use crate::{
     Row,
-    asking::{Answer, assert_some_found, search_times, share, wire_duration},
-    setting::{Setting, Thing},
+    requests::{Answer, assert_some_found, search_times, share, wire_duration},
+    setting::{Setting, TestObject},
     table::{Line, Spread, Target, Unit, time},
 };
 
-/// The budget: what a search for the best has for choosing where the request names none. Then it looks on for the first grasp
-/// if there is none by then; where it is named, that is its end.
+/// The budget, equal to what a search for the best spends on comparing where the request names none. Without a named
+/// budget, a search without a grasp by then goes on to the first; with one, it ends.
 const BUDGET: Duration = Duration::from_millis(5);
 
-/// How many candidates are ranked at least, at the median.
+/// Target: grasps compared, at the median.
 const CANDIDATES: f64 = 500.0;
 
-/// How many seconds beyond the budget the search may take at p99.
+/// Target: p99 of the time a search takes beyond its budget, in seconds.
 const OVERSHOOT: f64 = 0.5e-3;
 
-/// Requests an object at most: each takes the whole budget.
-const MOST_REQUESTS: usize = 400;
+/// Limit on requests per object, because each takes the whole budget.
+const MAX_REQUESTS: usize = 400;
 
-pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Line> {
+pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[TestObject]) -> Vec<Line> {
     let best = |request| v1::FindGraspRequest {
         choice: v1::Choice::BestWithinBudget.into(),
         ..request
@@ -35,20 +35,20 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
         ..best(request)
     };
     let mut without = Vec::new();
-    let mut ask = |what: &str, mut requests: Vec<v1::FindGraspRequest>| {
-        requests.truncate(MOST_REQUESTS);
+    let mut send = |what: &str, mut requests: Vec<v1::FindGraspRequest>| {
+        requests.truncate(MAX_REQUESTS);
         let asked = requests.iter().cloned().map(within_budget);
-        let answers = setting.ask_all(server, &format!("best, {what}"), asked);
+        let answers = setting.send_all(server, &format!("best, {what}"), asked);
         let answered = requests.into_iter().zip(&answers);
         without.extend(answered.filter_map(|(request, answer)| (!answer.found).then_some(request)));
         answers
     };
-    let mut all = ask("the 15 holdouts", setting.built_in_requests());
+    let mut all = send("the 15 holdouts", setting.built_in_requests());
     assert_some_found(&all);
     let mut lines = vec![candidates("the 15 holdouts", &all)];
-    for thing in things {
-        let answers = ask(thing.id(), thing.requests());
-        lines.push(candidates(&format!("random {}", thing.id()), &answers));
+    for test_object in test_objects {
+        let answers = send(test_object.id(), test_object.requests());
+        lines.push(candidates(&format!("random {}", test_object.id()), &answers));
         all.extend(answers);
     }
     let spread = candidates_of(&all);
@@ -60,7 +60,7 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
     )));
     lines.extend(overshoot(&all));
     if !without.is_empty() {
-        let again = setting.ask_all(server, "best, without a budget", without.into_iter().map(best));
+        let again = setting.send_all(server, "best, without a budget", without.into_iter().map(best));
         let in_time = share(&again, Answer::is_in_time);
         let found = share(&again, |answer| answer.found);
         lines.push(
@@ -99,7 +99,7 @@ fn candidates(what: &str, answers: &[Answer]) -> Line {
     ))
 }
 
-/// Beyond the budget, as the server's report says and as the client sees it.
+/// Time beyond the budget, as the server reports it and as the client sees it.
 fn overshoot(answers: &[Answer]) -> [Line; 2] {
     let beyond = |taken: fn(&Answer) -> f64| {
         let beyond: Vec<f64> = answers
@@ -118,10 +118,10 @@ fn overshoot(answers: &[Answer]) -> [Line; 2] {
             None => line,
         }
         .remark(format!(
-            "the budget is {}, and counts from the call's arrival",
+            "budget {}, counted from the call's arrival",
             time(budget)
         )),
         Line::new(Row::Best, "overshoot, round trip", Unit::Seconds, in_client)
-            .remark("the wire and the wording of the answer included"),
+            .remark("includes the wire and writing the answer"),
     ]
 }

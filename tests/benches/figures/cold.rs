@@ -6,47 +6,47 @@ use grasp_tests::TestServer;
 
 use crate::{
     Row,
-    asking::{Answer, ask, assert_some_found, search_times, share},
-    setting::{Setting, Thing, bar, copy_of},
+    requests::{Answer, assert_some_found, search_times, send, share},
+    setting::{Setting, TestObject, bar, copy_of},
     table::{Line, Unit},
 };
 
-/// Limits of median and p99 in seconds.
+/// Targets for median and p99, in seconds.
 const MEDIAN: f64 = 2e-3;
 const P99: f64 = 33e-3;
 
-/// Requests of a kind at most: one that nothing answers takes a second.
-const MOST_REQUESTS: usize = 400;
+/// Limit on requests per kind: one without an answer takes a second.
+const MAX_REQUESTS: usize = 400;
 
-/// Objects that are registered to be asked for once: enough for a p99 of all three, and few enough for the server's
-/// cache.
+/// Copies registered per object, each asked for once: enough for a p99 over all three, and few enough for the
+/// server's cache.
 const REGISTERED: usize = 40;
 
-/// Asks without atlases, which the server does not build either.
-pub(crate) fn measure(setting: &Setting, things: &[Thing]) -> Vec<Line> {
+/// Measures a server that neither has nor builds atlases.
+pub(crate) fn measure(setting: &Setting, test_objects: &[TestObject]) -> Vec<Line> {
     let server = setting.server(|_| {});
-    let ask_all = |what: &str, requests: Vec<v1::FindGraspRequest>| {
-        let requests = requests.into_iter().take(MOST_REQUESTS).map(without_atlas);
-        setting.ask_all(&server, &format!("cold, {what}"), requests)
+    let send_all = |what: &str, requests: Vec<v1::FindGraspRequest>| {
+        let requests = requests.into_iter().take(MAX_REQUESTS).map(without_atlas);
+        setting.send_all(&server, &format!("cold, {what}"), requests)
     };
-    let mut all = ask_all("the 15 holdouts", setting.built_in_requests());
+    let mut all = send_all("the 15 holdouts", setting.built_in_requests());
     assert_some_found(&all);
     let mut lines = vec![line("the 15 holdouts", &all)];
-    for thing in things {
-        let answers = ask_all(thing.id(), thing.requests());
-        lines.push(line(&format!("random {}", thing.id()), &answers));
+    for test_object in test_objects {
+        let answers = send_all(test_object.id(), test_object.requests());
+        lines.push(line(&format!("random {}", test_object.id()), &answers));
         all.extend(answers);
     }
     lines.push(line("all", &all));
     lines.push(line(
         "very first calls of new objects",
-        &first_calls(setting, &server, things),
+        &first_calls(setting, &server, test_objects),
     ));
     setting.serving.block_on(server.stop());
     lines
 }
 
-/// The same request, answered without an atlas.
+/// The same request, to be answered without an atlas.
 pub(crate) fn without_atlas(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
     v1::FindGraspRequest {
         atlas: v1::AtlasUse::None.into(),
@@ -65,20 +65,23 @@ fn line(what: &str, answers: &[Answer]) -> Line {
 }
 
 /// Copies of the built-in objects, each registered and asked for once.
-fn first_calls(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Answer> {
+fn first_calls(setting: &Setting, server: &TestServer, test_objects: &[TestObject]) -> Vec<Answer> {
     let copies = if setting.quick { 1 } else { REGISTERED };
-    let bar = bar(copies * things.len(), "first calls of new objects".to_owned());
+    let bar = bar(
+        copies * test_objects.len(),
+        "first calls of new objects".to_owned(),
+    );
     setting.calling.block_on(async {
         let mut registry = server.objects().await;
         let mut client = server.grasps().await;
         let mut answers = Vec::new();
-        for (thing, built_in) in things.iter().zip(objects()) {
-            for (number, holdout) in thing.holdouts.iter().take(copies).enumerate() {
-                let id = format!("{}-{number}", thing.id());
+        for (test_object, built_in) in test_objects.iter().zip(objects()) {
+            for (number, holdout) in test_object.holdouts.iter().take(copies).enumerate() {
+                let id = format!("{}-{number}", test_object.id());
                 let created = registry.create_object(copy_of(built_in, &id)).await;
                 created.expect("a built-in object can be registered again");
                 let request = without_atlas(holdout.request(&format!("objects/{id}")));
-                answers.push(ask(&mut client, request).await);
+                answers.push(send(&mut client, request).await);
                 bar.inc(1);
             }
         }

@@ -1,4 +1,4 @@
-//! The core alone, on the same holdouts and atlases as the server: what its own share of the time is.
+//! The core alone, on the same holdouts and atlases as the server: its share of the time.
 
 use std::{
     fs,
@@ -21,45 +21,45 @@ use grasp_synthesis::{
 use grasp_tests::searches::{MonotonicClock, prepared};
 use rayon::ThreadPool;
 
-use crate::{asking::ANSWERED_WITHIN, setting::default_hand};
+use crate::{requests::ANSWERED_WITHIN, setting::default_hand};
 
-/// Workers of a search, as of a test's server.
+/// Workers per search, as on the test server.
 pub(crate) const WORKERS: usize = 2;
 
-/// How long the server looks for a known grip before it wakes its workers.
+/// Duration of the server's look-up before it wakes its workers.
 pub(crate) const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
-/// What one search took.
+/// The timing of one search.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Taken {
-    /// Was a grasp found?
+pub(crate) struct Timing {
+    /// Whether a grasp was found.
     pub(crate) found: bool,
-    /// From the clock on the wall, or of one thread alone.
+    /// Wall time, or processor time of one thread.
     pub(crate) time: Duration,
 }
 
-/// Searches of the core.
-pub(crate) struct Core {
+/// Runs searches of the core.
+pub(crate) struct CoreSearcher {
     rig: &'static PreparedRig,
     pool: ThreadPool,
     mechanisms: Mechanisms,
 }
 
-impl Core {
-    /// Searches with the default right hand by some mechanisms.
+impl CoreSearcher {
+    /// Searches with the default right hand and these mechanisms.
     pub(crate) fn new(mechanisms: Mechanisms) -> Self {
         Self {
             rig: &default_hand(Handedness::Right).rig,
             pool: rayon::ThreadPoolBuilder::new()
                 .num_threads(WORKERS)
                 .build()
-                .expect("threads can be had"),
+                .expect("threads can be started"),
             mechanisms,
         }
     }
 
-    /// The atlas that a server used: the one that it kept in a folder, or else the grips that ship with it. None if there is
-    /// none for the object and the hand.
+    /// The atlas a server used: the one saved in a folder, else the shipped grips. `None` if there is none for this
+    /// object and hand.
     pub(crate) fn atlas(&self, id: &str, folder: &AtlasFolder, object: &GraspObject) -> Option<Arc<Atlas>> {
         let decoded = |bytes: &[u8]| decode(bytes, object, self.rig).ok();
         let kept = fs::read(folder.file(object, self.rig)).ok();
@@ -68,9 +68,9 @@ impl Core {
         Some(grown.atlas)
     }
 
-    /// The wall time of a search as the server runs it: a look on the calling thread, then a race of the workers.
-    pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Taken {
-        let mut settings = settings(Knows::Atlas(atlas), self.mechanisms, seed);
+    /// Wall time of a search as the server runs it: a look-up on the calling thread, then a race of the workers.
+    pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Timing {
+        let mut settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, seed);
         let object = prepared(&holdout.object);
         let task = self.task(holdout, &object);
         let clock = MonotonicClock::default();
@@ -83,7 +83,7 @@ impl Core {
                 find_grasp(&self.pool, task, &settings, &clock, &stop)
             }
         };
-        Taken {
+        Timing {
             time: start.elapsed(),
             found: outcome.grasp.is_some(),
         }
@@ -97,37 +97,37 @@ impl Core {
         }
     }
 
-    /// The processor time of a look through the whole atlas up to the first valid grip, on the calling thread: what else
-    /// runs on the machine shows less than in wall time.
-    pub(crate) fn look_up(&self, holdout: &Holdout, atlas: &Arc<Atlas>) -> Taken {
-        let settings = settings(Knows::Atlas(atlas), self.mechanisms, 0);
+    /// Processor time of a look-up through the whole atlas up to the first valid grip, on the calling thread: less
+    /// sensitive to other load than wall time.
+    pub(crate) fn look_up(&self, holdout: &Holdout, atlas: &Arc<Atlas>) -> Timing {
+        let settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, 0);
         let object = prepared(&holdout.object);
         let task = self.task(holdout, &object);
         let clock = MonotonicClock::default();
         let start = thread_time();
         let outcome = find_known_grasp(task, &settings, &clock, ANSWERED_WITHIN);
-        Taken {
+        Timing {
             time: thread_time().saturating_sub(start),
             found: outcome.found().is_some(),
         }
     }
 }
 
-/// What a server knows of how a hand holds an object.
+/// What a server knows about holding an object.
 #[derive(Clone, Copy)]
-pub(crate) enum Knows<'a> {
+pub(crate) enum KnownGrips<'a> {
     /// A complete atlas.
     Atlas(&'a Arc<Atlas>),
-    /// No atlas yet, but grips of boxes like the object, if any fit.
+    /// No atlas yet, but grips on similar boxes, if any fit.
     Boxes(Option<&'a Arc<TransferredGrips>>),
 }
 
-/// The settings that the server's defaults come to.
-pub(crate) fn settings(knows: Knows<'_>, mechanisms: Mechanisms, seed: u64) -> SearchSettings {
-    let (atlas, seeds) = match knows {
-        Knows::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
-        Knows::Boxes(Some(grips)) => (None, SeedSource::Transferred(Arc::clone(grips))),
-        Knows::Boxes(None) => (None, SeedSource::Nothing),
+/// The settings that the server's defaults amount to.
+pub(crate) fn settings(known: KnownGrips<'_>, mechanisms: Mechanisms, seed: u64) -> SearchSettings {
+    let (atlas, seeds) = match known {
+        KnownGrips::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
+        KnownGrips::Boxes(Some(grips)) => (None, SeedSource::Transferred(Arc::clone(grips))),
+        KnownGrips::Boxes(None) => (None, SeedSource::Nothing),
     };
     SearchSettings {
         known: Known {
@@ -153,7 +153,7 @@ pub(crate) fn thread_time() -> Duration {
     Duration::try_from(time).expect("a thread's time is positive")
 }
 
-/// Where the system tells no thread's time, wall time must do.
+/// Wall time, on systems without a clock per thread.
 #[cfg(not(target_os = "linux"))]
 pub(crate) fn thread_time() -> Duration {
     static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);

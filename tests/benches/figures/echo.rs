@@ -1,4 +1,4 @@
-//! A service that sends bytes back: what gRPC itself costs for messages of some sizes.
+//! A service that sends bytes back: the cost of gRPC itself for messages of given sizes.
 
 use std::{
     convert::Infallible,
@@ -21,10 +21,10 @@ use tonic_prost::ProstCodec;
 /// Its only method.
 const METHOD: &str = "/grasp.bench.Echo/Echo";
 
-/// Bytes of a request that say how long the answer is to be, little-endian.
+/// Leading bytes of a request that hold the length of the answer, little-endian.
 const LENGTH_BYTES: usize = size_of::<u32>();
 
-/// Answers every request with as many zeros as its first bytes say.
+/// Answers every request with as many zeros as its leading bytes say.
 #[derive(Clone, Copy, Debug)]
 struct Echo;
 
@@ -43,7 +43,9 @@ impl UnaryService<Vec<u8>> for Echo {
             .map(|bytes| u32::from_le_bytes(*bytes));
         std::future::ready(match length {
             Some(length) => Ok(Response::new(vec![0; length as usize])),
-            None => Err(Status::invalid_argument("the request does not say a length")),
+            None => Err(Status::invalid_argument(
+                "the request does not start with a length",
+            )),
         })
     }
 }
@@ -66,18 +68,18 @@ impl Service<http::Request<Body>> for Echo {
     }
 }
 
-/// A running echo server; it ends when it is dropped.
+/// A running echo server; stops when dropped.
 pub(crate) struct EchoServer {
     endpoint: String,
     _stop: DropGuard,
 }
 
 impl EchoServer {
-    /// Starts one on a free port, on the runtime that it is called on.
+    /// Starts a server on a free port, on the calling runtime.
     pub(crate) async fn start() -> Self {
         let listener = TcpListener::bind((std::net::Ipv6Addr::LOCALHOST, 0))
             .await
-            .expect("a free port of the loopback interface");
+            .expect("the loopback interface has a free port");
         let address = listener.local_addr().expect("a bound socket has an address");
         let stop = CancellationToken::new();
         let serving = Server::builder().add_service(Echo).serve_with_incoming_shutdown(
@@ -91,7 +93,7 @@ impl EchoServer {
         }
     }
 
-    /// A client on a connection of its own.
+    /// A client with its own connection.
     pub(crate) async fn client(&self) -> EchoClient {
         let endpoint = Endpoint::from_shared(self.endpoint.clone()).expect("an address makes an endpoint");
         let channel = endpoint
@@ -106,7 +108,8 @@ impl EchoServer {
 pub(crate) struct EchoClient(client::Grpc<Channel>);
 
 impl EchoClient {
-    /// How long a request of `request` bytes takes whose answer has `answer` bytes; the wire adds three to each.
+    /// Duration of a call whose request has `request` bytes and whose answer has `answer` bytes; the wire format adds
+    /// three to each.
     pub(crate) async fn time(&mut self, request: usize, answer: usize) -> Duration {
         let length = u32::try_from(answer).expect("an answer is no longer than 4 GB");
         let mut bytes = vec![0; request.max(LENGTH_BYTES)];
@@ -114,7 +117,7 @@ impl EchoClient {
         let start = Instant::now();
         let echoed = self.call(bytes).await.expect("the echo server answers");
         let time = start.elapsed();
-        assert_eq!(echoed.len(), answer, "the echo has the length that was asked for");
+        assert_eq!(echoed.len(), answer, "the echo has the requested length");
         time
     }
 

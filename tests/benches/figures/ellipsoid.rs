@@ -1,4 +1,4 @@
-//! Meshes that nobody has seen before.
+//! New meshes that no server has seen before.
 
 use std::{
     f32::consts::{PI, TAU},
@@ -7,17 +7,17 @@ use std::{
 
 use glam::Vec3;
 
-/// Half axes in metres: lies in a hand like a computer mouse, and a giver leaves half of it.
+/// Half axes in metres: the size of a computer mouse, half of which a giver leaves free.
 const HALF_AXES: Vec3 = Vec3::new(0.026, 0.018, 0.06);
 
-/// Rings of vertices between the poles, and vertices of a ring: 1,984 triangles.
+/// Rings of vertices between the poles, and vertices per ring: 1,984 triangles.
 const RINGS: usize = 31;
 const RING: usize = 32;
 
-/// How high the bumps are, as a share of the radius.
+/// Height of the bumps, as a share of the radius.
 const BUMPS: f32 = 0.04;
 
-/// A closed bumpy ellipsoid of some 2,000 triangles as OBJ text in metres; another one for every number.
+/// A closed bumpy ellipsoid of some 2,000 triangles as OBJ text in metres. There are four shapes, by `number` modulo 4.
 pub(crate) fn ellipsoid(number: u8) -> String {
     let waves = f32::from(number % 4) + 3.0;
     let point = |polar: f32, around: f32| {
@@ -48,9 +48,9 @@ pub(crate) fn ellipsoid(number: u8) -> String {
         let (here, next) = (at(0, place), at(0, place + 1));
         let _ = writeln!(obj, "f {first} {here} {next}");
         for ring in 1..RINGS {
-            let (above, beside_above) = (at(ring - 1, place), at(ring - 1, place + 1));
+            let (above, above_next) = (at(ring - 1, place), at(ring - 1, place + 1));
             let (here, next) = (at(ring, place), at(ring, place + 1));
-            let _ = writeln!(obj, "f {above} {here} {next}\nf {above} {next} {beside_above}");
+            let _ = writeln!(obj, "f {above} {here} {next}\nf {above} {next} {above_next}");
         }
         let (here, next) = (at(RINGS - 1, place), at(RINGS - 1, place + 1));
         let _ = writeln!(obj, "f {here} {last} {next}");

@@ -1,15 +1,13 @@
-//! The table of the figures that are to be reached: how soon a grasp is there, warm, cold, over the wire, and after an
-//! object was registered.
+//! Figures: the time to a grasp warm, cold, over the wire and after an object is registered, against targets.
 //!
-//! `cargo bench -p grasp-tests --bench figures`, of which `-- --only warm` measures one row, `-- --test` only tries
-//! whether all runs, and `-- --json` writes for scripts. `-- --without NAME` switches mechanisms of the search off;
-//! `-- --only ablation` measures each one, and writes `tests/results/ablation`. What takes long the first time is kept:
-//! atlases in `target/atlases`, givers in `target/figures`. Server and client share the process and two cores, as on a
-//! developer's machine; the load average is
-//! told, for whatever else runs there shows in the outer quantiles. That a target is not met is told and is no failure.
+//! `cargo bench -p grasp-tests --bench figures`; `-- --only warm` measures one row, `-- --test` only checks that
+//! everything runs, and `-- --json` writes JSON for scripts. `-- --without NAME` switches mechanisms of the search off;
+//! `-- --only ablation` measures each one, and writes `tests/results/ablation`. Slow preparations are kept: atlases in
+//! `target/atlases`, givers in `target/figures`. Server and client share the process and two cores, as on a
+//! developer's machine. The load average is printed, because other load shows in the outer quantiles. A missed target
+//! is reported, but is not a failure.
 
 mod ablation;
-mod asking;
 mod best;
 mod cold;
 mod core;
@@ -17,6 +15,7 @@ mod echo;
 mod ellipsoid;
 mod graspit;
 mod registration;
+mod requests;
 mod setting;
 mod table;
 mod warm;
@@ -32,19 +31,19 @@ use serde::Serialize;
 use setting::Setting;
 use table::Line;
 
-/// Holdouts an object in a quick run.
+/// Holdouts per object in a quick run.
 const QUICK_HOLDOUTS: usize = 4;
 
-/// Givers that are placed on an object in a quick run.
+/// Givers per object in a quick run.
 const QUICK_GIVERS: usize = 2;
 
-/// What is measured together.
+/// Figures that are measured together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Row {
     /// With complete atlases: the first valid grasp, in the server and in the core.
     Warm,
-    /// The same over gRPC, beside an echo.
+    /// Whole calls over gRPC, next to an echo of the same size.
     Wire,
     /// The best grasp within the default budget.
     Best,
@@ -52,9 +51,9 @@ enum Row {
     Cold,
     /// From a mesh to a complete atlas.
     Registration,
-    /// Beside `GraspIt!`.
+    /// Comparison with `GraspIt!`.
     Graspit,
-    /// All mechanisms against each one switched off; only where it is named.
+    /// All mechanisms against each one switched off; only if named in `--only`.
     Ablation,
 }
 
@@ -72,37 +71,37 @@ impl Row {
     }
 }
 
-/// Measures the figures that are to be reached.
+/// Measures figures against their targets.
 #[derive(Debug, Parser)]
 struct Arguments {
     /// Measure only these rows.
     #[arg(long, value_enum, value_delimiter = ',', num_args = 1..)]
     only: Vec<Row>,
-    /// Random holdouts of each object; from a thousand on, p99.9 is told.
+    /// Random holdouts per object; p99.9 needs at least a thousand.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     holdouts: u32,
-    /// Recorded givers that hold each object out. More vary the holdouts more and take half a second each, the first time;
-    /// one giver of 48 who leaves no room is 2 % of the holdouts.
+    /// Recorded givers per object. More vary the holdouts more and take half a second each, the first time; one giver
+    /// of 48 who leaves no room is 2 % of the holdouts.
     #[arg(long, default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..))]
     givers: u32,
     /// Switch these mechanisms off in every row but the ablation, which switches off each in turn.
     #[arg(long, value_name = "NAME", value_delimiter = ',', num_args = 1..)]
     without: Vec<Mechanism>,
-    /// End the ablation after this many minutes, with what was measured by then.
+    /// End the ablation after this many minutes, with the samples taken by then.
     #[arg(long)]
     minutes: Option<u32>,
-    /// Write JSON.
+    /// Print JSON.
     #[arg(long)]
     json: bool,
-    /// Only try whether everything runs and answers come: a few requests each, atlases as far as they are.
+    /// Only check that everything runs and is answered: a few requests each, with whatever atlases exist.
     #[arg(long)]
     test: bool,
-    /// Given by cargo.
+    /// Passed by cargo.
     #[arg(long, hide = true)]
     bench: bool,
 }
 
-/// Everything that was measured.
+/// All measurements.
 #[derive(Serialize)]
 struct Report {
     machine: Machine,
@@ -156,47 +155,47 @@ fn main() {
         println!("without {}", report.without.join(", "));
     }
     println!(
-        "{}; load average {} before and {} after; {holdouts} random holdouts an object, of {givers} givers\n\n{}",
+        "{}; load average {} before and {} after; {holdouts} random holdouts per object, from {givers} givers\n\n{}",
         report.machine,
         load(&report.load_before),
         load(&report.load_after),
-        table::told(&report.lines)
+        table::render(&report.lines)
     );
 }
 
-fn measure(setting: &Setting, minutes: Option<u32>, is_wanted: impl Fn(Row) -> bool) -> Vec<Line> {
-    let things = setting.built_in_things();
+fn measure(setting: &Setting, minutes: Option<u32>, is_selected: impl Fn(Row) -> bool) -> Vec<Line> {
+    let test_objects = setting.built_in_test_objects();
     let mut lines = Vec::new();
-    if [Row::Warm, Row::Wire, Row::Best].into_iter().any(&is_wanted) {
-        let server = setting.server_with_atlases(&things.iter().collect::<Vec<_>>());
-        if is_wanted(Row::Warm) {
-            lines.extend(warm::measure(setting, &server, &things));
+    if [Row::Warm, Row::Wire, Row::Best].into_iter().any(&is_selected) {
+        let server = setting.server_with_atlases(&test_objects.iter().collect::<Vec<_>>());
+        if is_selected(Row::Warm) {
+            lines.extend(warm::measure(setting, &server, &test_objects));
         }
-        if is_wanted(Row::Wire) {
-            lines.extend(wire::measure(setting, &server, &things));
+        if is_selected(Row::Wire) {
+            lines.extend(wire::measure(setting, &server, &test_objects));
         }
-        if is_wanted(Row::Best) {
-            lines.extend(best::measure(setting, &server, &things));
+        if is_selected(Row::Best) {
+            lines.extend(best::measure(setting, &server, &test_objects));
         }
         setting.serving.block_on(server.stop());
     }
-    if is_wanted(Row::Cold) {
-        lines.extend(cold::measure(setting, &things));
+    if is_selected(Row::Cold) {
+        lines.extend(cold::measure(setting, &test_objects));
     }
-    if is_wanted(Row::Registration) {
-        lines.extend(registration::measure(setting, &things));
+    if is_selected(Row::Registration) {
+        lines.extend(registration::measure(setting, &test_objects));
     }
-    if is_wanted(Row::Graspit) {
+    if is_selected(Row::Graspit) {
         lines.extend(graspit::measure(setting));
     }
-    if is_wanted(Row::Ablation) {
+    if is_selected(Row::Ablation) {
         let longest = minutes.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));
-        lines.extend(ablation::measure(setting, &things, longest));
+        lines.extend(ablation::measure(setting, &test_objects, longest));
     }
     lines
 }
 
-/// The machine's load average over the last minute, where the system tells.
+/// The machine's load average over the last minute, where the system provides it.
 pub(crate) fn load_average() -> Option<String> {
     let text = std::fs::read_to_string("/proc/loadavg").ok()?;
     text.split_whitespace().next().map(str::to_owned)

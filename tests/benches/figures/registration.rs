@@ -1,4 +1,4 @@
-//! From a mesh to an object that is called, an atlas that is of use, and a complete one; and what others notice of it.
+//! From a mesh to a callable object, a useful atlas and a complete one; and the effect on other calls meanwhile.
 
 use std::{
     sync::Arc,
@@ -11,49 +11,49 @@ use tonic::transport::Channel;
 
 use crate::{
     Row,
-    asking::{Answer, ask, round_trips, search_times, share, within_50_ms},
     ellipsoid::ellipsoid,
-    setting::{Setting, Thing, atlas_state, bar},
+    requests::{Answer, round_trips, search_times, send, share, within_50_ms},
+    setting::{Setting, TestObject, atlas_state, bar},
     table::{Line, Spread, Target, Unit, time},
 };
 
-/// Limits in seconds.
+/// Targets in seconds.
 const CALLABLE: f64 = 0.05;
 const USEFUL: f64 = 5.0;
 const COMPLETE: f64 = 120.0;
 
-/// The share of random holdouts that a useful atlas answers.
+/// Share of random holdouts that a useful atlas answers.
 const USEFUL_SHARE: f64 = 0.9;
 
-/// How many times the idle p99 the p99 may be while an atlas grows.
-const MOST_TIMES: f64 = 2.0;
+/// Target: p99 while an atlas grows over the idle p99.
+const MAX_RATIO: f64 = 2.0;
 
-/// The objects' mass in kilograms.
+/// Mass of the objects in kilograms.
 const MASS: f32 = 0.1;
 
-/// Random holdouts by which an atlas is judged each time that it has grown: enough to tell nine of ten from eight.
-/// Builders wait while searches run, so more make it look slower.
-const JUDGED_BY: usize = 60;
+/// Random holdouts that probe an atlas each time it has grown: enough to tell nine in ten from eight. Builders wait
+/// while searches run, so more make growth look slower.
+const PROBES: usize = 60;
 
-/// How often it is looked whether an atlas has grown: the error of the times to a useful and a complete one.
-const LOOKS_EVERY: Duration = Duration::from_millis(20);
+/// Interval between checks for growth: the error of the times to a useful and a complete atlas.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// How long a complete atlas is waited for.
-const PATIENCE: Duration = Duration::from_mins(10);
+/// Longest wait for a complete atlas.
+const ATLAS_TIMEOUT: Duration = Duration::from_mins(10);
 
-/// Registrations that are timed until they are answered.
+/// Timed registrations.
 const REGISTRATIONS: usize = 20;
 
-/// Time between two requests of a client while others are served: those of some players together. Without a pause
-/// builders would always wait.
+/// Time between two requests of a client while others are served: the rate of a few players together. Without a
+/// pause, builders would always wait.
 const PACE: Duration = Duration::from_millis(5);
 
-/// Requests before those that are measured.
-const UNMEASURED: usize = 30;
+/// Requests sent before measuring.
+const WARM_UP: usize = 30;
 
-pub(crate) fn measure(setting: &Setting, others: &[Thing]) -> Vec<Line> {
-    // The atlases of the others, which must not grow meanwhile, and none of these meshes.
-    let others: Vec<&Thing> = others.iter().collect();
+pub(crate) fn measure(setting: &Setting, others: &[TestObject]) -> Vec<Line> {
+    // Complete atlases of the other objects, which must not grow meanwhile, and none of the new meshes.
+    let others: Vec<&TestObject> = others.iter().collect();
     let complete = setting.server_with_atlases(&others);
     setting.serving.block_on(complete.stop());
     let folder = setting.copied_atlases();
@@ -65,10 +65,10 @@ pub(crate) fn measure(setting: &Setting, others: &[Thing]) -> Vec<Line> {
     };
     let server = start();
     let mut lines = growth(setting, &server);
-    // What it builds next must not be noticed by the others.
+    // Measure the effect on other calls from a fresh start.
     setting.serving.block_on(server.stop());
     let server = start();
-    lines.extend(meanwhile(setting, &server, others[0]));
+    lines.extend(while_growing(setting, &server, others[0]));
     setting.serving.block_on(server.stop());
     lines.push(callable(setting));
     lines
@@ -83,7 +83,7 @@ fn create(number: u8) -> v1::CreateObjectRequest {
     }
 }
 
-/// How long `CreateObject` takes, where nothing else goes on.
+/// Duration of `CreateObject` on an idle server.
 fn callable(setting: &Setting) -> Line {
     let server = setting.server(|_| {});
     let registrations = if setting.quick { 1 } else { REGISTRATIONS };
@@ -99,10 +99,10 @@ fn callable(setting: &Setting) -> Line {
             let start = Instant::now();
             let answer = client.create_object(request).await.expect("the mesh is sound");
             times.push(start.elapsed());
-            let object = answer.into_inner().object.expect("an answer has the object");
+            let object = answer.into_inner().object.expect("the answer has the object");
             assert!(
                 object.warnings.is_empty(),
-                "the mesh is odd: {:?}",
+                "the mesh has warnings: {:?}",
                 object.warnings
             );
             triangles = object.triangle_count;
@@ -120,8 +120,8 @@ fn callable(setting: &Setting) -> Line {
 fn growth(setting: &Setting, server: &TestServer) -> Vec<Line> {
     let request = create(1);
     let object = Arc::new(object_of(&request.obj, MASS));
-    let thing = setting.thing(&request.object_id.clone(), object, Some(request.clone()));
-    let judges: Vec<_> = thing.requests().into_iter().take(JUDGED_BY).collect();
+    let test_object = setting.test_object(&request.object_id.clone(), object, Some(request.clone()));
+    let probes: Vec<_> = test_object.requests().into_iter().take(PROBES).collect();
     let bar = bar(0, "an atlas grows".to_owned());
     setting.calling.block_on(async {
         let mut client = server.grasps().await;
@@ -131,11 +131,11 @@ fn growth(setting: &Setting, server: &TestServer) -> Vec<Line> {
         let mut useful = None;
         let mut stamp = String::new();
         loop {
-            let state = atlas_state(server, &thing.name).await;
+            let state = atlas_state(server, &test_object.name).await;
             let grown = start.elapsed();
             if state.stamp != stamp && useful.is_none() {
                 stamp.clone_from(&state.stamp);
-                let answers = judge(&mut client, &judges).await;
+                let answers = probe(&mut client, &probes).await;
                 let by_atlas = share(&answers, |answer| answer.from_atlas);
                 if by_atlas >= USEFUL_SHARE {
                     useful = Some((
@@ -144,25 +144,25 @@ fn growth(setting: &Setting, server: &TestServer) -> Vec<Line> {
                             "{} grips answer {:.0} % of {}",
                             state.entries,
                             100.0 * by_atlas,
-                            judges.len()
+                            probes.len()
                         ),
                     ));
                 }
             }
             bar.set_message(format!("an atlas grows: {} grips", state.entries));
-            let is_over = state.complete || grown > PATIENCE || (setting.quick && !stamp.is_empty());
+            let is_over = state.complete || grown > ATLAS_TIMEOUT || (setting.quick && !stamp.is_empty());
             if is_over {
                 return growth_lines(useful, &state, grown);
             }
-            tokio::time::sleep(LOOKS_EVERY).await;
+            tokio::time::sleep(POLL_INTERVAL).await;
         }
     })
 }
 
-async fn judge(client: &mut GraspServiceClient<Channel>, judges: &[v1::FindGraspRequest]) -> Vec<Answer> {
-    let mut answers = Vec::with_capacity(judges.len());
-    for request in judges {
-        answers.push(ask(client, within_50_ms(request.clone())).await);
+async fn probe(client: &mut GraspServiceClient<Channel>, probes: &[v1::FindGraspRequest]) -> Vec<Answer> {
+    let mut answers = Vec::with_capacity(probes.len());
+    for request in probes {
+        answers.push(send(client, within_50_ms(request.clone())).await);
     }
     answers
 }
@@ -170,31 +170,28 @@ async fn judge(client: &mut GraspServiceClient<Channel>, judges: &[v1::FindGrasp
 fn growth_lines(useful: Option<(Duration, String)>, last: &v1::AtlasState, grown: Duration) -> Vec<Line> {
     let once = |what: &str, time: Duration, limit: f64, came: bool| {
         let seconds = time.as_secs_f64();
-        let target = Target::at_most("time", Unit::Seconds, seconds, limit).unless_given_up(!came);
+        let target = Target::at_most("time", Unit::Seconds, seconds, limit).failed_if(!came);
         line(what, Spread::of(&[seconds])).target(target)
     };
     let is_useful = useful.is_some();
-    let (time_to_use, use_told) = useful.unwrap_or_else(|| {
-        let told = format!("not by then: {} grips answer too few", last.entries);
-        (grown, told)
+    let (time_to_use, use_remark) = useful.unwrap_or_else(|| {
+        let remark = format!("not yet: {} grips answer too few", last.entries);
+        (grown, remark)
     });
-    let end = if last.complete {
-        ""
-    } else {
-        "not complete by then: "
-    };
+    let end = if last.complete { "" } else { "not complete yet: " };
     vec![
-        once("atlas useful", time_to_use, USEFUL, is_useful).remark(use_told),
+        once("atlas useful", time_to_use, USEFUL, is_useful).remark(use_remark),
         once("atlas complete", grown, COMPLETE, last.complete).remark(format!("{end}{} grips", last.entries)),
     ]
 }
 
-/// Asks for another object at a steady pace, first in peace, then while an object is registered and its atlas grows.
-fn meanwhile(setting: &Setting, server: &TestServer, other: &Thing) -> Vec<Line> {
+/// Calls for another object at a steady pace, first on an idle server, then while an object is registered and its
+/// atlas grows.
+fn while_growing(setting: &Setting, server: &TestServer, other: &TestObject) -> Vec<Line> {
     let requests = other.requests();
     let (idle, busy, state) = setting.calling.block_on(async {
         let mut client = server.grasps().await;
-        paced(&mut client, &requests[..requests.len().min(UNMEASURED)]).await;
+        paced(&mut client, &requests[..requests.len().min(WARM_UP)]).await;
         let idle = paced(&mut client, &requests).await;
         let request = create(2);
         let name = format!("objects/{}", request.object_id);
@@ -208,33 +205,33 @@ fn meanwhile(setting: &Setting, server: &TestServer, other: &Thing) -> Vec<Line>
         (idle, busy, atlas_state(server, &name).await)
     });
     let (idle_trips, busy_trips) = (round_trips(&idle), round_trips(&busy));
-    let told = |answers: &[Answer]| format!("search: {}", outer(search_times(answers)));
-    let busy_line = line("serving meanwhile, round trip", busy_trips).remark(format!(
+    let remark = |answers: &[Answer]| format!("search: {}", median_and_p99(search_times(answers)));
+    let busy_line = line("serving while an atlas grows, round trip", busy_trips).remark(format!(
         "{}; the atlas had {} grips at the end{}",
-        told(&busy),
+        remark(&busy),
         state.entries,
         if state.complete {
-            ", and had not grown all the time"
+            " and was complete before the end"
         } else {
             ""
         }
     ));
     vec![
-        line("serving in peace, round trip", idle_trips).remark(told(&idle)),
+        line("serving while idle, round trip", idle_trips).remark(remark(&idle)),
         match (idle_trips.p99, busy_trips.p99) {
             (Some(idle), Some(busy)) => busy_line.target(Target::at_most(
-                "p99, in those of peace",
+                "p99 over idle p99",
                 Unit::Times,
                 busy / idle,
-                MOST_TIMES,
+                MAX_RATIO,
             )),
             _ => busy_line,
         },
     ]
 }
 
-/// Median and p99 in words.
-fn outer(spread: Spread) -> String {
+/// Median and p99 as text.
+fn median_and_p99(spread: Spread) -> String {
     let p99 = spread.p99.map_or_else(|| "–".to_owned(), time);
     format!("median {}, p99 {p99}", time(spread.median))
 }
@@ -245,7 +242,7 @@ async fn paced(client: &mut GraspServiceClient<Channel>, requests: &[v1::FindGra
     let mut answers = Vec::with_capacity(requests.len());
     for request in requests {
         ticks.tick().await;
-        answers.push(ask(client, request.clone()).await);
+        answers.push(send(client, request.clone()).await);
     }
     answers
 }

@@ -1,4 +1,4 @@
-//! What the rows share: runtimes, folders, the objects with their holdouts, and servers that know them.
+//! Shared by all rows: runtimes, folders, test objects with their holdouts, and servers that know them.
 
 use std::{
     fs,
@@ -30,58 +30,58 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use tokio::runtime::{Builder, Runtime};
 
-use crate::asking::{Answer, ask, wire_duration};
+use crate::requests::{Answer, send, wire_duration};
 
-/// The seed of givers and holdouts: another one, and they are all others.
+/// Seed of givers and holdouts.
 const SEED: u64 = 20_180_612;
 
-/// Threads that serve: as many as the server's binary takes here.
+/// Threads of the server, as many as its binary starts here.
 const SERVING_THREADS: usize = 2;
 
-/// How often it is looked whether atlases have grown. Looking more often costs the builders time.
-const LOOKS_EVERY: Duration = Duration::from_millis(100);
+/// Interval between checks for atlas growth. Shorter ones cost the builders time.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// How long atlases may take: each at most two minutes, if the targets are met.
-const PATIENCE: Duration = Duration::from_hours(1);
+/// Longest wait for all atlases. The target is two minutes for each.
+const ATLAS_TIMEOUT: Duration = Duration::from_hours(1);
 
-/// Everything that the rows have in common.
+/// What all rows share.
 pub(crate) struct Setting {
-    /// Only try whether all runs?
+    /// Whether to only check that everything runs.
     pub(crate) quick: bool,
-    /// Random holdouts an object.
+    /// Random holdouts per object.
     pub(crate) holdouts: usize,
-    /// Givers that are placed on an object.
+    /// Givers placed per object.
     pub(crate) givers: usize,
-    /// The mechanisms that searches run.
+    /// Mechanisms that searches run.
     pub(crate) mechanisms: Mechanisms,
-    /// Where servers run.
+    /// Runtime of the servers.
     pub(crate) serving: Runtime,
-    /// Where clients run: one thread, as in a game.
+    /// Runtime of the clients: one thread, as in a game.
     pub(crate) calling: Runtime,
-    /// Keeps what takes long to make.
+    /// Folder for slow preparations.
     folder: PathBuf,
     hands: Vec<GivingHand>,
 }
 
 /// An object with random holdouts.
-pub(crate) struct Thing {
+pub(crate) struct TestObject {
     /// "objects/{object}".
     pub(crate) name: String,
-    /// As the server knows it too.
+    /// The same object as the server's.
     pub(crate) object: Arc<GraspObject>,
-    /// How it is registered; none for those that are built in.
+    /// The request that registers it; `None` for built-in objects.
     pub(crate) create: Option<v1::CreateObjectRequest>,
-    /// Random holdouts of it.
+    /// Its random holdouts.
     pub(crate) holdouts: Vec<ClientHoldout>,
 }
 
-impl Thing {
-    /// Its name without the collection's.
+impl TestObject {
+    /// Its name without the collection.
     pub(crate) fn id(&self) -> &str {
         self.name.trim_start_matches("objects/")
     }
 
-    /// Requests for all its holdouts.
+    /// A request for each of its holdouts.
     pub(crate) fn requests(&self) -> Vec<v1::FindGraspRequest> {
         self.holdouts
             .iter()
@@ -94,7 +94,9 @@ impl Setting {
     /// Starts the runtimes and finds the folder.
     pub(crate) fn new(quick: bool, holdouts: usize, givers: usize, mechanisms: Mechanisms) -> Self {
         let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
-        let folder = target.expect("cargo's folder lies in another").join("figures");
+        let folder = target
+            .expect("cargo's temporary folder has a parent")
+            .join("figures");
         fs::create_dir_all(&folder).expect("cargo's target folder can be written");
         Self {
             quick,
@@ -106,17 +108,17 @@ impl Setting {
                 .thread_name("serving")
                 .enable_all()
                 .build()
-                .expect("threads can be had"),
+                .expect("threads can be started"),
             calling: Builder::new_current_thread()
                 .enable_all()
                 .build()
-                .expect("a runtime can be had"),
+                .expect("a runtime can be started"),
             folder,
             hands: giving_hands(),
         }
     }
 
-    /// The folder that keeps what takes long to make.
+    /// The folder for slow preparations.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
@@ -126,11 +128,11 @@ impl Setting {
         AtlasFolder::in_target()
     }
 
-    /// A folder of atlases that holds what [`Setting::atlases`] holds now, and nothing of an earlier run.
+    /// A fresh folder with a copy of the atlases in [`Setting::atlases`].
     pub(crate) fn copied_atlases(&self) -> PathBuf {
         let copy = self.folder.join("copied-atlases");
         if copy.exists() {
-            fs::remove_dir_all(&copy).expect("the copy is this bench's own");
+            fs::remove_dir_all(&copy).expect("the old copy can be removed");
         }
         fs::create_dir_all(&copy).expect("cargo's target folder can be written");
         for file in fs::read_dir(Self::atlases().path()).into_iter().flatten() {
@@ -140,7 +142,7 @@ impl Setting {
         copy
     }
 
-    /// Requests for the built-in holdouts, again and again until there are as many as random ones of an object.
+    /// Requests for the built-in holdouts, repeated until there are as many as random ones per object.
     pub(crate) fn built_in_requests(&self) -> Vec<v1::FindGraspRequest> {
         let once: Vec<_> = built_in_holdouts()
             .iter()
@@ -151,23 +153,23 @@ impl Setting {
     }
 
     /// The built-in objects with random holdouts.
-    pub(crate) fn built_in_things(&self) -> Vec<Thing> {
+    pub(crate) fn built_in_test_objects(&self) -> Vec<TestObject> {
         objects()
             .iter()
-            .map(|built_in| self.thing(built_in.name, Arc::clone(&built_in.object), None))
+            .map(|built_in| self.test_object(built_in.name, Arc::clone(&built_in.object), None))
             .collect()
     }
 
     /// An object with random holdouts.
-    pub(crate) fn thing(
+    pub(crate) fn test_object(
         &self,
         id: &str,
         object: Arc<GraspObject>,
         create: Option<v1::CreateObjectRequest>,
-    ) -> Thing {
+    ) -> TestObject {
         let givers = self.givers(id, &object);
         let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        Thing {
+        TestObject {
             name: format!("objects/{id}"),
             holdouts: (0..self.holdouts).map(|_| givers.draw(&mut random)).collect(),
             object,
@@ -175,19 +177,19 @@ impl Setting {
         }
     }
 
-    /// The givers of an object, from a file where they were placed before.
+    /// The givers of an object, loaded from a file if they were placed before.
     fn givers(&self, id: &str, object: &GraspObject) -> Givers {
         let rig = &default_hand(Handedness::Right).rig;
-        let made_of = key(object, rig);
-        let (made_of, _) = made_of.split_first_chunk().expect("a key has as many bytes");
-        let made_of = u128::from_be_bytes(*made_of);
+        let digest = key(object, rig);
+        let (digest, _) = digest.split_first_chunk().expect("a key has at least 16 bytes");
+        let digest = u128::from_be_bytes(*digest);
         let hands = if data_folder().is_some() {
             "recorded"
         } else {
             "built-in"
         };
-        // Named after how they are placed too: others are there from before.
-        let file = format!("givers-by-skin-{hands}-{made_of:032x}-{SEED}.json");
+        // The name includes the placement method, to ignore files of older ones.
+        let file = format!("givers-by-skin-{hands}-{digest:032x}-{SEED}.json");
         let file = self.folder.join(file);
         let kept = fs::read(&file)
             .ok()
@@ -211,10 +213,10 @@ impl Setting {
             fs::write(&file, text).expect("cargo's target folder can be written");
         }
         placed.truncate(self.givers);
-        Givers::new(&self.hands, &placed).expect("the hands are those that were placed")
+        Givers::new(&self.hands, &placed).expect("the placements match the hands")
     }
 
-    /// A server as the binary's defaults make it, but for what `adapt` changes.
+    /// A server with the binary's defaults, except for what `adapt` changes.
     pub(crate) fn server(&self, adapt: impl FnOnce(&mut grasp_server::Config)) -> TestServer {
         self.serving.block_on(TestServer::start_with(|config| {
             config.mechanisms = self.mechanisms;
@@ -222,52 +224,55 @@ impl Setting {
         }))
     }
 
-    /// A server that knows `things` and has complete atlases of them for both hands, so that nothing grows any more; in a
-    /// quick run, atlases that are of some use.
-    pub(crate) fn server_with_atlases(&self, things: &[&Thing]) -> TestServer {
+    /// A server that knows the test objects and has complete atlases of them for both hands, so that nothing grows
+    /// any more. In a quick run, some entries suffice.
+    pub(crate) fn server_with_atlases(&self, test_objects: &[&TestObject]) -> TestServer {
         let server = self.server(|config| {
             config.builder_threads = thread::available_parallelism().map_or(1, usize::from);
             config.atlas_directory = Some(Self::atlases().path().to_owned());
         });
         self.calling.block_on(async {
-            register(&server, things).await;
-            self.wait_for_atlases(&server, things).await;
+            register(&server, test_objects).await;
+            self.wait_for_atlases(&server, test_objects).await;
         });
         server
     }
 
-    async fn wait_for_atlases(&self, server: &TestServer, things: &[&Thing]) {
+    async fn wait_for_atlases(&self, server: &TestServer, test_objects: &[&TestObject]) {
         let start = Instant::now();
-        let bar = bar(things.len(), "building atlases, once".to_owned());
-        let mut waiting: Vec<&Thing> = things.to_vec();
+        let bar = bar(test_objects.len(), "building atlases, once".to_owned());
+        let mut waiting: Vec<&TestObject> = test_objects.to_vec();
         while !waiting.is_empty() {
             let mut left = Vec::new();
-            for thing in waiting {
+            for test_object in waiting {
                 let ready = if self.quick {
-                    atlas_state(server, &thing.name).await.entries > 0
+                    atlas_state(server, &test_object.name).await.entries > 0
                 } else {
-                    is_complete(server, &thing.name, v1::Handedness::Right).await
-                        && is_complete(server, &thing.name, v1::Handedness::Left).await
+                    is_complete(server, &test_object.name, v1::Handedness::Right).await
+                        && is_complete(server, &test_object.name, v1::Handedness::Left).await
                 };
                 if ready {
                     bar.inc(1);
                 } else {
-                    left.push(thing);
+                    left.push(test_object);
                 }
             }
             waiting = left;
-            assert!(start.elapsed() < PATIENCE, "atlases do not become complete");
+            assert!(
+                start.elapsed() < ATLAS_TIMEOUT,
+                "atlases were not complete in time"
+            );
             if !waiting.is_empty() {
-                tokio::time::sleep(LOOKS_EVERY).await;
+                tokio::time::sleep(POLL_INTERVAL).await;
             }
         }
     }
 
-    /// Asks one request after the other.
+    /// Sends requests one after the other.
     ///
     /// # Panics
-    /// One is not answered; that there is no grasp is an answer.
-    pub(crate) fn ask_all(
+    /// A request fails. An answer without a grasp is not a failure.
+    pub(crate) fn send_all(
         &self,
         server: &TestServer,
         message: &str,
@@ -279,7 +284,7 @@ impl Setting {
             let mut client = server.grasps().await;
             let mut answers = Vec::with_capacity(requests.len());
             for request in requests {
-                answers.push(ask(&mut client, request).await);
+                answers.push(send(&mut client, request).await);
                 bar.inc(1);
             }
             answers
@@ -287,7 +292,7 @@ impl Setting {
     }
 }
 
-/// The built-in holdouts, each with its object.
+/// The built-in holdouts, each with the name of its object.
 pub(crate) fn built_in_holdouts() -> Vec<(&'static str, ClientHoldout)> {
     holdouts()
         .iter()
@@ -295,12 +300,12 @@ pub(crate) fn built_in_holdouts() -> Vec<(&'static str, ClientHoldout)> {
         .collect()
 }
 
-/// The hand that requests get that name none.
+/// The hand of requests that name none.
 pub(crate) fn default_hand(handedness: Handedness) -> &'static grasp_assets::hands::Hand {
     grasp_assets::hands::hand("adult", handedness).expect("the adult rig is built in")
 }
 
-/// How a built-in object is registered under another name.
+/// The request that registers a built-in object under another name.
 pub(crate) fn copy_of(built_in: &BuiltInObject, id: &str) -> v1::CreateObjectRequest {
     let about = Manifest::parse(built_in.manifest).expect("the built-in manifests are sound");
     let [x, y, z] = about.centre_of_mass_m.to_array();
@@ -317,15 +322,18 @@ pub(crate) fn copy_of(built_in: &BuiltInObject, id: &str) -> v1::CreateObjectReq
     }
 }
 
-/// Registers those that are not built in.
-pub(crate) async fn register(server: &TestServer, things: &[&Thing]) {
+/// Registers the test objects that are not built in.
+pub(crate) async fn register(server: &TestServer, test_objects: &[&TestObject]) {
     let mut client = server.objects().await;
-    for create in things.iter().filter_map(|thing| thing.create.clone()) {
+    for create in test_objects
+        .iter()
+        .filter_map(|test_object| test_object.create.clone())
+    {
         client.create_object(create).await.expect("the mesh is sound");
     }
 }
 
-/// What a server tells of an object's atlas.
+/// The state of an object's atlas.
 pub(crate) async fn atlas_state(server: &TestServer, name: &str) -> v1::AtlasState {
     let request = v1::GetObjectRequest {
         name: name.to_owned(),
@@ -337,7 +345,7 @@ pub(crate) async fn atlas_state(server: &TestServer, name: &str) -> v1::AtlasSta
         .expect("the server keeps atlases")
 }
 
-/// Is a hand's atlas complete, and not empty? Only complete ones answer reproducible requests.
+/// Whether a hand's atlas is complete and not empty: only complete ones answer reproducible requests.
 async fn is_complete(server: &TestServer, name: &str, handedness: v1::Handedness) -> bool {
     let request = v1::FindGraspRequest {
         object: name.to_owned(),
@@ -355,7 +363,7 @@ async fn is_complete(server: &TestServer, name: &str, handedness: v1::Handedness
     report.is_some_and(|report| report.atlas_entries > 0)
 }
 
-/// A progress bar; hidden where standard error is no terminal, gone when it is dropped.
+/// A progress bar; hidden unless standard error is a terminal, cleared when dropped.
 pub(crate) fn bar(steps: usize, message: String) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:32} {pos:>5}/{len} {elapsed:>4} {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());

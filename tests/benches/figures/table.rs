@@ -1,4 +1,4 @@
-//! What was measured, as a table for people and as JSON for scripts.
+//! The measurements as a table for readers and as JSON for scripts.
 
 use std::time::Duration;
 
@@ -8,28 +8,28 @@ use serde::Serialize;
 
 use crate::Row;
 
-/// Samples from which on a quantile says something: one of them lies beyond it.
-const SAMPLES_OF_P99: usize = 100;
-/// The same for the last thousandth.
-const SAMPLES_OF_P999: usize = 1000;
+/// Samples needed for a p99: at least one lies beyond it.
+const MIN_SAMPLES_P99: usize = 100;
+/// Samples needed for a p99.9.
+const MIN_SAMPLES_P999: usize = 1000;
 
-/// What a number counts.
+/// The unit of a value.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Unit {
     /// A time in seconds.
     Seconds,
-    /// How many.
+    /// A count.
     Count,
-    /// How many times another figure.
+    /// A ratio.
     Times,
     /// A share from 0 to 1.
     Share,
 }
 
 impl Unit {
-    /// For people.
-    fn told(self, value: f64) -> String {
+    /// The value with its unit, for readers.
+    fn format(self, value: f64) -> String {
         match self {
             Self::Seconds => time(value),
             Self::Count => format!("{value:.0}"),
@@ -40,7 +40,7 @@ impl Unit {
     }
 }
 
-/// A time with a unit that fits and three digits or so; may be negative.
+/// A time in a fitting unit with about three digits; may be negative.
 pub(crate) fn time(seconds: f64) -> String {
     let (value, unit) = match seconds.abs() {
         ..1e-3 => (seconds * 1e6, "µs"),
@@ -55,7 +55,7 @@ pub(crate) fn time(seconds: f64) -> String {
     format!("{value:.decimals$} {unit}")
 }
 
-/// How values are spread; of too few, the outer quantiles are not told.
+/// The spread of values. Outer quantiles are omitted if there are too few.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct Spread {
     pub(crate) count: usize,
@@ -66,26 +66,26 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// Of values, at least one.
+    /// The spread of at least one value.
     pub(crate) fn of(values: &[f64]) -> Self {
-        let at = |share| quantile(values, share).expect("something was measured");
+        let at = |share| quantile(values, share).expect("there is at least one value");
         Self {
             count: values.len(),
             median: at(0.5),
-            p99: (values.len() >= SAMPLES_OF_P99).then(|| at(0.99)),
-            p999: (values.len() >= SAMPLES_OF_P999).then(|| at(0.999)),
+            p99: (values.len() >= MIN_SAMPLES_P99).then(|| at(0.99)),
+            p999: (values.len() >= MIN_SAMPLES_P999).then(|| at(0.999)),
             max: at(1.0),
         }
     }
 
-    /// Of times.
+    /// The spread of at least one time, in seconds.
     pub(crate) fn of_times(times: impl IntoIterator<Item = Duration>) -> Self {
         let seconds: Vec<f64> = times.into_iter().map(|time| time.as_secs_f64()).collect();
         Self::of(&seconds)
     }
 }
 
-/// On which side of its limit a figure should be.
+/// The side of its limit on which a figure should be.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Side {
@@ -95,7 +95,7 @@ pub(crate) enum Side {
     AtLeast,
 }
 
-/// A figure that is to be reached.
+/// A figure with its limit.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Target {
     figure: String,
@@ -107,7 +107,7 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// `value` of `figure` must not be above `limit`.
+    /// `value` of `figure` should not exceed `limit`.
     pub(crate) fn at_most(figure: &str, unit: Unit, value: f64, limit: f64) -> Self {
         Self {
             figure: figure.to_owned(),
@@ -119,7 +119,7 @@ impl Target {
         }
     }
 
-    /// `value` of `figure` must not be below `limit`.
+    /// `value` of `figure` should reach `limit`.
     pub(crate) fn at_least(figure: &str, unit: Unit, value: f64, limit: f64) -> Self {
         Self {
             side: Side::AtLeast,
@@ -128,25 +128,25 @@ impl Target {
         }
     }
 
-    /// Not met if what was waited for did not come: `value` is then how long it was waited for.
-    pub(crate) fn unless_given_up(self, given_up: bool) -> Self {
+    /// Not met if the wait timed out; `value` is then the duration of the wait.
+    pub(crate) fn failed_if(self, timed_out: bool) -> Self {
         Self {
-            met: self.met && !given_up,
+            met: self.met && !timed_out,
             ..self
         }
     }
 
-    fn told(&self) -> String {
+    fn describe(&self) -> String {
         let side = match self.side {
             Side::AtMost => "≤",
             Side::AtLeast => "≥",
         };
-        format!("{} {side} {}", self.figure, self.unit.told(self.limit))
+        format!("{} {side} {}", self.figure, self.unit.format(self.limit))
     }
 
     fn verdict(&self) -> String {
         let met = if self.met { "met" } else { "NOT MET" };
-        format!("{met}: {}", self.unit.told(self.value))
+        format!("{met}: {}", self.unit.format(self.value))
     }
 }
 
@@ -157,13 +157,13 @@ pub(crate) struct Line {
     what: String,
     unit: Unit,
     spread: Spread,
-    /// What else there is to say.
+    /// A remark.
     remark: String,
     targets: Vec<Target>,
 }
 
 impl Line {
-    /// Values of `unit`.
+    /// A line without remark and targets.
     pub(crate) fn new(row: Row, what: impl Into<String>, unit: Unit, spread: Spread) -> Self {
         Self {
             row,
@@ -175,7 +175,7 @@ impl Line {
         }
     }
 
-    /// With something else to say.
+    /// The line with a remark.
     pub(crate) fn remark(self, remark: impl Into<String>) -> Self {
         Self {
             remark: remark.into(),
@@ -183,13 +183,13 @@ impl Line {
         }
     }
 
-    /// With a figure that is to be reached.
+    /// The line with one more target.
     pub(crate) fn target(mut self, target: Target) -> Self {
         self.targets.push(target);
         self
     }
 
-    /// With limits of median, p99 and p99.9, as far as there are enough samples to tell.
+    /// The line with limits for median, p99 and p99.9, as far as there are enough samples.
     pub(crate) fn limits(mut self, median: f64, p99: f64, p999: Option<f64>) -> Self {
         let spread = self.spread;
         let figures = [
@@ -207,12 +207,12 @@ impl Line {
     }
 }
 
-/// A line below the header and none elsewhere, as the command line draws its tables.
+/// A line below the header only, like the tables of the command line.
 const LINE_BELOW_HEADER: TableStyle =
     TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
-/// All lines for people.
-pub(crate) fn told(lines: &[Line]) -> String {
+/// The table of all lines.
+pub(crate) fn render(lines: &[Line]) -> String {
     let header = [
         "row", "of", "n", "median", "p99", "p99.9", "max", "target", "", "remark",
     ];
@@ -228,17 +228,17 @@ pub(crate) fn told(lines: &[Line]) -> String {
     }
     for line in lines {
         let spread = line.spread;
-        let told = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| line.unit.told(value));
-        let targets: Vec<_> = line.targets.iter().map(Target::told).collect();
+        let cell = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| line.unit.format(value));
+        let targets: Vec<_> = line.targets.iter().map(Target::describe).collect();
         let verdicts: Vec<_> = line.targets.iter().map(Target::verdict).collect();
         table.add_row([
             line.row.name().to_owned(),
             line.what.clone(),
             spread.count.to_string(),
-            told(Some(spread.median)),
-            told(spread.p99),
-            told(spread.p999),
-            told(Some(spread.max)),
+            cell(Some(spread.median)),
+            cell(spread.p99),
+            cell(spread.p999),
+            cell(Some(spread.max)),
             targets.join("\n"),
             verdicts.join("\n"),
             line.remark.clone(),

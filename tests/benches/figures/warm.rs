@@ -1,4 +1,4 @@
-//! Warm: requests that an atlas may answer, first valid, in the server.
+//! Warm: requests that an atlas can answer, first valid grasp, in the server and in the core.
 
 use std::time::Duration;
 
@@ -7,53 +7,53 @@ use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 
 use crate::{
     Row,
-    asking::{Answer, assert_some_found, search_times, share, wire_duration, within_50_ms},
-    core::{Core, Taken},
-    setting::{Setting, Thing, built_in_holdouts},
+    core::{CoreSearcher, Timing},
+    requests::{Answer, assert_some_found, search_times, share, wire_duration, within_50_ms},
+    setting::{Setting, TestObject, built_in_holdouts},
     table::{Line, Spread, Target, Unit, time},
 };
 
-/// Limits of median, p99 and p99.9 in seconds.
+/// Targets for median, p99 and p99.9, in seconds.
 const MEDIAN: f64 = 20e-6;
 const P99: f64 = 0.5e-3;
 const P999: f64 = 2e-3;
 
-/// Unanswered requests of an object that are asked again, and with which budget: the server's default would not tell a
-/// hard one from an impossible one.
-const ASKED_AGAIN: usize = 20;
-const PATIENCE: Duration = Duration::from_secs(3);
+/// Unanswered requests per object that are retried, and their budget: with the server's default, hard and impossible
+/// ones would look alike.
+const MAX_RETRIES: usize = 20;
+const RETRY_BUDGET: Duration = Duration::from_secs(3);
 
-/// Requests before those that are measured, to fill caches: of random holdouts others than those, as what their searches
-/// find is known from then on. Of few requests, half.
-const UNMEASURED: usize = 30;
+/// Requests sent before measuring, to fill caches; half of them if there are few. Random ones use other holdouts than
+/// the measured ones, because the server remembers the grips found.
+const WARM_UP: usize = 30;
 
-pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Line> {
-    let mut lines = in_the_server(setting, server, things);
-    lines.extend(in_the_core(setting, things));
+pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[TestObject]) -> Vec<Line> {
+    let mut lines = in_the_server(setting, server, test_objects);
+    lines.extend(in_the_core(setting, test_objects));
     lines
 }
 
-/// What the server's own reports say.
-fn in_the_server(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Line> {
-    let ask = |message: &str, requests: &[v1::FindGraspRequest]| {
+/// From the server's own reports.
+fn in_the_server(setting: &Setting, server: &TestServer, test_objects: &[TestObject]) -> Vec<Line> {
+    let send = |message: &str, requests: &[v1::FindGraspRequest]| {
         let requests = requests.iter().cloned();
-        let unmeasured = UNMEASURED.min(requests.len() / 2);
+        let warm_up = WARM_UP.min(requests.len() / 2);
         setting
-            .ask_all(server, message, requests.map(within_50_ms))
-            .split_off(unmeasured)
+            .send_all(server, message, requests.map(within_50_ms))
+            .split_off(warm_up)
     };
-    let built_in = ask("warm, the 15 holdouts", &setting.built_in_requests());
+    let built_in = send("warm, the 15 holdouts", &setting.built_in_requests());
     assert_some_found(&built_in);
     let mut lines = vec![line("server, the 15 holdouts", &built_in, "").limits(MEDIAN, P99, Some(P999))];
     let mut all = Vec::new();
-    for thing in things {
-        let requests = thing.requests();
-        let answers = ask(&format!("warm, {}", thing.id()), &requests);
-        let unmeasured = requests.len() - answers.len();
-        let late = requests.into_iter().skip(unmeasured).zip(&answers);
+    for test_object in test_objects {
+        let requests = test_object.requests();
+        let answers = send(&format!("warm, {}", test_object.id()), &requests);
+        let warm_up = requests.len() - answers.len();
+        let late = requests.into_iter().skip(warm_up).zip(&answers);
         let late = late.filter(|(_, answer)| !answer.is_in_time());
-        let again = ask_again(setting, server, late.map(|(request, _)| request).collect());
-        let line = line(&format!("server, random {}", thing.id()), &answers, &again);
+        let again = retry_late(setting, server, late.map(|(request, _)| request).collect());
+        let line = line(&format!("server, random {}", test_object.id()), &answers, &again);
         lines.push(line.target(answered(&answers)));
         all.extend(answers);
     }
@@ -62,21 +62,22 @@ fn in_the_server(setting: &Setting, server: &TestServer, things: &[Thing]) -> Ve
     lines
 }
 
-/// Asks once more, with patience, for some that were not answered: a giver may leave nothing to be grasped. In words.
-fn ask_again(setting: &Setting, server: &TestServer, late: Vec<v1::FindGraspRequest>) -> String {
-    let some = late.len().min(ASKED_AGAIN);
+/// Retries some unanswered requests with a longer budget, because a giver may leave nothing to grasp. Returns the
+/// result as text.
+fn retry_late(setting: &Setting, server: &TestServer, late: Vec<v1::FindGraspRequest>) -> String {
+    let some = late.len().min(MAX_RETRIES);
     if some == 0 || setting.quick {
         return String::new();
     }
     let patient = late.into_iter().take(some).map(|request| v1::FindGraspRequest {
-        budget: wire_duration(PATIENCE),
+        budget: wire_duration(RETRY_BUDGET),
         ..request
     });
-    let answers = setting.ask_all(server, "asking again", patient);
+    let answers = setting.send_all(server, "retrying late ones", patient);
     let found = answers.iter().filter(|answer| answer.found).count();
     format!(
         "; {found} of {some} late ones answered in {}",
-        time(PATIENCE.as_secs_f64())
+        time(RETRY_BUDGET.as_secs_f64())
     )
 }
 
@@ -92,9 +93,9 @@ fn line(what: &str, answers: &[Answer], about_late: &str) -> Line {
     let p99 = (!in_time.is_empty())
         .then(|| search_times(&in_time).p99)
         .flatten();
-    let p99 = p99.map_or_else(String::new, |p99| format!(", the others' p99 is {}", time(p99)));
+    let p99 = p99.map_or_else(String::new, |p99| format!(", p99 of the others {}", time(p99)));
     Line::new(Row::Warm, what, Unit::Seconds, search_times(answers)).remark(format!(
-        "{:.1} % answered by the atlas, {:.1} % by what was found for others, {late} of {} unanswered in 50 ms{p99}{about_late}",
+        "{:.1} % answered by the atlas, {:.1} % by recent grips, {late} of {} unanswered in 50 ms{p99}{about_late}",
         100.0 * of_atlas,
         100.0 * of_recent,
         answers.len()
@@ -102,22 +103,22 @@ fn line(what: &str, answers: &[Answer], about_late: &str) -> Line {
 }
 
 /// The same holdouts without a server.
-fn in_the_core(setting: &Setting, things: &[Thing]) -> Vec<Line> {
-    let core = Core::new(setting.mechanisms);
+fn in_the_core(setting: &Setting, test_objects: &[TestObject]) -> Vec<Line> {
+    let core = CoreSearcher::new(setting.mechanisms);
     let built_in = built_in_holdouts();
     let mut searches = Vec::new();
     let mut look_ups = Vec::new();
-    for thing in things {
-        let Some(atlas) = core.atlas(thing.id(), &Setting::atlases(), &thing.object) else {
+    for test_object in test_objects {
+        let Some(atlas) = core.atlas(test_object.id(), &Setting::atlases(), &test_object.object) else {
             continue;
         };
-        let of_thing = built_in.iter().filter(|(object, _)| *object == thing.id());
-        let fixed = of_thing.map(|(_, holdout)| holdout);
+        let of_object = built_in.iter().filter(|(object, _)| *object == test_object.id());
+        let fixed = of_object.map(|(_, holdout)| holdout);
         let repeated: Vec<_> = fixed.cycle().take(setting.holdouts.div_ceil(3)).collect();
-        let random: Vec<_> = thing.holdouts.iter().collect();
+        let random: Vec<_> = test_object.holdouts.iter().collect();
         for (is_random, holdouts) in [(false, repeated), (true, random)] {
             for (seed, holdout) in holdouts.into_iter().enumerate() {
-                let holdout = ClientHoldout::holdout(holdout, thing.object.clone());
+                let holdout = ClientHoldout::holdout(holdout, test_object.object.clone());
                 searches.push((is_random, core.search(&holdout, &atlas, seed as u64)));
                 look_ups.push((is_random, core.look_up(&holdout, &atlas)));
             }
@@ -130,7 +131,7 @@ fn in_the_core(setting: &Setting, things: &[Thing]) -> Vec<Line> {
     ] {
         for (of, is_random) in [("the 15 holdouts", false), ("random, all", true)] {
             let of_kind = taken.iter().filter(|(random, _)| *random == is_random);
-            let taken: Vec<Taken> = of_kind.map(|(_, taken)| *taken).collect();
+            let taken: Vec<Timing> = of_kind.map(|(_, taken)| *taken).collect();
             if taken.is_empty() {
                 continue;
             }

@@ -1,26 +1,26 @@
-//! The same over gRPC on loopback, beside an echo of the same sizes.
+//! Whole calls over gRPC on loopback, alternating with an echo of the same sizes.
 
 use grasp_tests::TestServer;
 
 use crate::{
     Row,
-    asking::{Answer, ask, round_trips, search_times, within_50_ms},
     echo::EchoServer,
-    setting::{Setting, Thing, bar},
+    requests::{Answer, round_trips, search_times, send, within_50_ms},
+    setting::{Setting, TestObject, bar},
     table::{Line, Spread, Target, Unit, time},
 };
 
-/// How many times the echo's median a round trip's may be.
-const MOST_TIMES: f64 = 1.5;
+/// Target: median round trip over the echo's median.
+const MAX_RATIO: f64 = 1.5;
 
-/// Pairs of calls before those that are measured: connections and caches warm up.
-const UNMEASURED: usize = 30;
+/// Pairs of calls before measuring, to warm up connections and caches.
+const WARM_UP: usize = 30;
 
-pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) -> Vec<Line> {
+pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[TestObject]) -> Vec<Line> {
     let mut requests = setting.built_in_requests();
-    requests.extend(things.iter().flat_map(Thing::requests));
-    let unmeasured = requests.len().min(UNMEASURED);
-    let requests: Vec<_> = requests[..unmeasured]
+    requests.extend(test_objects.iter().flat_map(TestObject::requests));
+    let warm_up = requests.len().min(WARM_UP);
+    let requests: Vec<_> = requests[..warm_up]
         .iter()
         .chain(&requests)
         .cloned()
@@ -35,13 +35,13 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
         let mut client = server.grasps().await;
         let mut echo = echo_server.client().await;
         for request in requests {
-            let answer = ask(&mut client, request).await;
+            let answer = send(&mut client, request).await;
             echoes.push(echo.time(answer.sent_bytes, answer.received_bytes).await);
             answers.push(answer);
             bar.inc(1);
         }
     });
-    let (answers, echoes) = (answers.split_off(unmeasured), echoes.split_off(unmeasured));
+    let (answers, echoes) = (answers.split_off(warm_up), echoes.split_off(warm_up));
 
     let (round_trip, echo) = (round_trips(&answers), Spread::of_times(echoes));
     let median_of = |bytes: fn(&Answer) -> usize| {
@@ -52,7 +52,7 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
     let in_search = search_times(&answers).median;
     vec![
         Line::new(Row::Wire, "echo", Unit::Seconds, echo).remark(format!(
-            "{} bytes there and {} back, at the median",
+            "{} bytes sent and {} received, at the median",
             median_of(|answer| answer.sent_bytes),
             median_of(|answer| answer.received_bytes)
         )),
@@ -61,10 +61,10 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, things: &[Thing]) 
                 "median, in echoes",
                 Unit::Times,
                 times,
-                MOST_TIMES,
+                MAX_RATIO,
             ))
             .remark(format!(
-                "of the median, {} are the search's, {} the echo's, {} all else",
+                "of the median, {} are the search, {} the echo, {} the rest",
                 time(in_search),
                 time(echo.median),
                 time(round_trip.median - echo.median - in_search)

@@ -73,6 +73,6 @@ impl<'a> ClosureScreen<'a> {
         soften(&self.on_surface, self.scene.friction, &mut self.soft_contacts);
         // Closure is the same wherever gravity pulls.
         let load = self.scene.load(Vec3::Y);
-        epsilon_upper_bound(&self.soft_contacts, &load, &mut self.buffers) >= self.scene.least_epsilon
+        epsilon_upper_bound(&self.soft_contacts, &load, &mut self.buffers) >= self.scene.required_epsilon
     }
 }

@@ -30,7 +30,7 @@ impl FrictionUses {
     /// That of a direction.
     pub fn get(self, direction: usize) -> FrictionUse {
         match (self.more >> direction & 1, self.all >> direction & 1) {
-            (0, _) => FrictionUse::Sparing,
+            (0, _) => FrictionUse::Low,
             (_, 0) => FrictionUse::Moderate,
             _ => FrictionUse::Full,
         }
@@ -40,7 +40,7 @@ impl FrictionUses {
     pub fn set(&mut self, direction: usize, friction_use: FrictionUse) {
         let bit = 1_u64 << direction;
         let put = |bits: u64, is_set: bool| if is_set { bits | bit } else { bits & !bit };
-        self.more = put(self.more, friction_use != FrictionUse::Sparing);
+        self.more = put(self.more, friction_use != FrictionUse::Low);
         self.all = put(self.all, friction_use == FrictionUse::Full);
     }
 }

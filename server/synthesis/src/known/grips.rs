@@ -58,7 +58,7 @@ impl Grips {
     /// always then. Sooner told than exactly: mostly by some 20 ns of work.
     #[inline]
     pub fn unless_met(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<TrackedSolids>> {
-        if giver.surely_nears_any(&self.inner_spheres[entry], GIVER_CLEARANCE) {
+        if giver.any_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE) {
             return None;
         }
         self.unless_met_by_second(entry, rig, giver)
@@ -73,7 +73,7 @@ impl Grips {
         giver: &PreparedHand,
     ) -> Option<Box<TrackedSolids>> {
         let solids = self.entries[entry].tracked_solids(rig);
-        let is_met = giver.surely_nears_any(&second_spheres(&solids.hand), GIVER_CLEARANCE);
+        let is_met = giver.any_certainly_within(&second_spheres(&solids.hand), GIVER_CLEARANCE);
         (!is_met).then(|| Box::new(solids))
     }
 
@@ -83,7 +83,7 @@ impl Grips {
     pub fn may_hold_with_subset(&self, entry: usize, giver: &PreparedHand) -> bool {
         let sets = self.finger_subsets[entry];
         let is_too_much = |near| !sets.hold_without(in_way_by_first(near));
-        let near = giver.surely_near(&self.inner_spheres[entry], GIVER_CLEARANCE, is_too_much);
+        let near = giver.which_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE, is_too_much);
         !is_too_much(near)
     }
 

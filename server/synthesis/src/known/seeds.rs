@@ -201,8 +201,9 @@ impl Seeds {
             let perturbed = known.perturbed_about(pivot, [SHIFT, TURN], stream);
             let way = perturbed.object_from_wrist * known.object_from_wrist.inverse();
             let is_met = |giver: &PreparedHand| {
-                let nears =
-                    |spheres: &Spheres| giver.surely_nears_any(&spheres.transformed(way), GIVER_CLEARANCE);
+                let nears = |spheres: &Spheres| {
+                    giver.any_certainly_within(&spheres.transformed(way), GIVER_CLEARANCE)
+                };
                 inside.iter().any(nears)
             };
             if screens && place.giver.is_some_and(is_met) {
@@ -211,7 +212,7 @@ impl Seeds {
             let moved = solids.transformed(way);
             let keeps_clear = place
                 .giver
-                .is_none_or(|giver| !giver.is_neared_by(solids_of(kept, &moved), GIVER_CLEARANCE));
+                .is_none_or(|giver| !giver.comes_within(solids_of(kept, &moved), GIVER_CLEARANCE));
             let is_likely = keeps_clear
                 && still_touch(&contacts, place.object, way)
                 && keeps_off(kept, place.object, &moved);

@@ -110,7 +110,7 @@ impl<'a> Shortlist<'a> {
     #[inline]
     pub fn unless_met(&self, place: usize, giver: &PreparedHand) -> Option<(u16, &'a TrackedSolids)> {
         let place = usize::from(self.places[place]);
-        let meets = |spheres: &Spheres| giver.surely_nears_any(spheres, GIVER_CLEARANCE);
+        let meets = |spheres: &Spheres| giver.any_certainly_within(spheres, GIVER_CLEARANCE);
         if meets(&self.inner_spheres[place]) {
             return None;
         }

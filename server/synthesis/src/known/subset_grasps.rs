@@ -9,7 +9,7 @@ use crate::{
     base::stopwatch::NoStopwatch,
     model::grasp::Grasp,
     physical::{
-        finger_subset::WholeGrip,
+        finger_subset::KnownGrip,
         grip::{GIVER_CLEARANCE, Gripper},
         solids::{HandSolids, PreparedHand, TaperedCapsule, TrackedSolids},
     },
@@ -44,13 +44,13 @@ pub(crate) fn spared_with(
     if is_met(giver, tracked.still()) {
         return None;
     }
-    let known = WholeGrip {
+    let known = KnownGrip {
         grip: &entry.grip,
         contacts: &entry.contacts,
         solids: &solids,
     };
     let (grip, solids) = gripper
-        .spare(&around.object, around.rig, &known, kept, giver)
+        .keep_fingers(&around.object, around.rig, &known, kept, giver)
         .ok()?;
     around.assess(&grip, &solids, gripper, &mut NoStopwatch).ok()
 }
@@ -58,7 +58,7 @@ pub(crate) fn spared_with(
 /// True only if spheres inside show that the giver leaves too few digits of a grip to hold; not always then.
 fn is_too_near(entry: &Entry, solids: &HandSolids, giver: &PreparedHand) -> bool {
     let is_too_much = |near| !entry.finger_subsets.hold_without(in_way_by_second(near));
-    is_too_much(giver.surely_near(&second_spheres(solids), GIVER_CLEARANCE, is_too_much))
+    is_too_much(giver.which_certainly_within(&second_spheres(solids), GIVER_CLEARANCE, is_too_much))
 }
 
 /// Which digits hold that the giver is not in the way of, thumb first; none if they do not without the others or leave out
@@ -82,5 +82,5 @@ fn are_neighbours(digits: [bool; 5]) -> bool {
 }
 
 fn is_met<'a>(giver: &PreparedHand, solids: impl Iterator<Item = &'a TaperedCapsule> + Clone) -> bool {
-    giver.is_neared_by(solids, GIVER_CLEARANCE)
+    giver.comes_within(solids, GIVER_CLEARANCE)
 }

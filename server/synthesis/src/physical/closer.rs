@@ -1,11 +1,12 @@
-//! Step 2 under `PHYSICAL` validity for the digits of one hand: thumb, fingers, and what rests.
+//! Step 2 under `PHYSICAL` validity for all digits of one hand: thumb first, then fingers, then idle fingers come to
+//! rest.
 
 use super::{
     closing::{ClosedDigit, Closing},
     grip::{GIVER_CLEARANCE, NoGrip, nears_forbidden_surface},
     obstacle::Obstacle,
     scene::ObjectScene,
-    shape::{HandShape, LEAST_RESTING_FLEXION, TUCKED_FLEXION},
+    shape::{HandShape, MIN_RESTING_FLEXION, TUCKED_FLEXION},
     solids::{PreparedHand, link_radii},
 };
 use crate::{
@@ -13,26 +14,27 @@ use crate::{
     model::hand::{Digit, HandPose, kinematics::DigitPlane, rig::Rig},
 };
 
-/// Flexions in radians with which a finger that holds nothing gets out of the giver's way: tucked away, and bent a little.
+/// Flexions in radians, in order of preference, that take an idle finger clear of the giver: tucked into the palm, or
+/// nearly straight.
 const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
 
-/// Closes the digits of a hand whose wrist stays.
+/// Closes the digits of a hand whose wrist is fixed.
 #[derive(Debug)]
 pub(super) struct Closer<'a> {
-    /// The object.
+    /// The object being grasped.
     pub scene: &'a ObjectScene<'a>,
     /// The giver's hand.
     pub giver: Option<&'a PreparedHand>,
-    /// The hand that closes.
+    /// The rig of the closing hand.
     pub rig: &'a Rig,
-    /// How it is held.
+    /// The shape the hand closes from.
     pub shape: &'a HandShape,
-    /// Where its wrist is.
+    /// Its wrist pose, in the object's frame.
     pub object_from_wrist: Pose,
 }
 
 impl Closer<'_> {
-    /// The hand with its digits posed.
+    /// The hand pose with these digits.
     pub(super) fn pose(&self, digits: &[ClosedDigit; 5]) -> HandPose {
         HandPose {
             frame_from_wrist: self.object_from_wrist,
@@ -52,7 +54,7 @@ impl Closer<'_> {
         }
     }
 
-    /// A digit closed as far as it goes, if nothing is in its way before.
+    /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to the giver.
     fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
         let closed = self.closing(digit, obstacles).close()?;
         self.is_clear_of_giver(&closed).then_some(closed)
@@ -62,13 +64,16 @@ impl Closer<'_> {
         nears_forbidden_surface(self.scene, digit.links.iter())
     }
 
-    /// True if a digit keeps off the giver's hand.
+    /// True if a digit keeps [`GIVER_CLEARANCE`] from the giver's hand.
     pub(super) fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
         self.giver
-            .is_none_or(|giver| !giver.is_neared_by(digit.links.iter(), GIVER_CLEARANCE))
+            .is_none_or(|giver| !giver.comes_within(digit.links.iter(), GIVER_CLEARANCE))
     }
 
-    /// Closes the thumb, which must touch.
+    /// Closes the thumb.
+    ///
+    /// # Errors
+    /// The thumb is blocked, does not touch the object, or comes too close to a forbidden surface.
     pub(super) fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, NoGrip> {
         let thumb = self.close(Digit::Thumb, obstacles);
         let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
@@ -81,8 +86,11 @@ impl Closer<'_> {
         }
     }
 
-    /// Closes the fingers; those that have something in their way, come near to what is not to be touched or are not to
-    /// close hold nothing.
+    /// Closes the fingers that the shape closes. A finger that is blocked or comes too close to a forbidden surface
+    /// holds nothing.
+    ///
+    /// # Errors
+    /// No finger touches the object, or the stop signal came.
     pub(super) fn close_fingers(
         &self,
         thumb: ClosedDigit,
@@ -106,7 +114,7 @@ impl Closer<'_> {
         Ok(closed)
     }
 
-    /// The digits with those at rest that hold nothing.
+    /// The digits, with fingers that hold nothing moved to rest.
     pub(super) fn rest_idle(&self, closed: &[ClosedDigit; 5], obstacles: &[Obstacle]) -> [ClosedDigit; 5] {
         let mut rested = *closed;
         for &finger in &Digit::ALL[1..] {
@@ -119,7 +127,8 @@ impl Closer<'_> {
         rested
     }
 
-    /// A finger that holds nothing, relaxed; tucked away or nearly stretched where it would meet the giver's hand.
+    /// A relaxed pose for a finger that holds nothing; where that is too close to the giver, tucked away or nearly
+    /// straight.
     fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
         let closing = self.closing(finger, obstacles);
         let relaxed = closing.relax(flexion);
@@ -131,9 +140,9 @@ impl Closer<'_> {
         free.unwrap_or(relaxed)
     }
 
-    /// A finger that is taken off the object, clear of the giver's hand: relaxed or tucked away. None where that has no room,
-    /// as one that stands out among fingers that hold looks like a gesture, nor where it would meet the giver if nothing
-    /// else stopped it, as finding out takes most of the time.
+    /// A resting pose, clear of the giver, for a finger taken off the object: relaxed, else tucked away. `None` if
+    /// there is no room to bend it, because one straight finger among holding ones reads as a gesture. Poses whose
+    /// unobstructed form already meets the giver are skipped, since relaxing a finger takes most of the time.
     pub(super) fn rest_clear(
         &self,
         finger: Digit,
@@ -145,6 +154,6 @@ impl Closer<'_> {
             .into_iter()
             .filter(|&flexion| self.is_clear_of_giver(&closing.bent(flexion)))
             .map(|flexion| closing.relax(flexion))
-            .find(|rested| rested.flexion() >= LEAST_RESTING_FLEXION && self.is_clear_of_giver(rested))
+            .find(|rested| rested.flexion() >= MIN_RESTING_FLEXION && self.is_clear_of_giver(rested))
     }
 }

@@ -1,10 +1,10 @@
-//! Step 2 under `PHYSICAL` validity: digits close until their flesh touches, at angles that are solved for.
+//! Step 2 under `PHYSICAL` validity: one digit closes until its flesh touches, at joint angles that are solved for.
 //!
-//! The thesis closes in steps of 5° and tests a line on the front of each link (Algorithm 4). Here a digit's links are
-//! tapered capsules. They close as far as they certainly can, by conservative advancement: a clearance divided by the
-//! fastest that any point of the links can move is an angle through which nothing is reached (after B. Mirtich,
-//! "Timewarp Rigid Body Simulation", 2000, for rotations). A link that touches stays, and so do the joints that carry
-//! it; the joints beyond go on, as a finger's deep flexor bends the last joint when the others are held.
+//! The thesis closes in steps of 5° and tests a line on the front of each link (Algorithm 4). Here a digit's links
+//! are tapered capsules that close by conservative advancement (after B. Mirtich, "Timewarp Rigid Body Simulation",
+//! 2000, for rotations): a clearance divided by the highest speed of any point on the links is an angle that is
+//! certainly free. A link that touches stops, and with it the joints that carry it; the outer joints continue, as the
+//! deep flexor bends the last joint of a finger whose other joints are held.
 
 use std::f32::consts::PI;
 
@@ -18,49 +18,48 @@ use crate::{
     model::hand::{DigitAngles, kinematics::DigitPlane},
 };
 
-/// How deep a link's capsule is in the surface when it is said to touch, in metres: soft pads give way that much under a
-/// light touch. More looks sunken, less looks hovering.
+/// How deep a touching link's capsule lies in the surface, in metres: soft pads yield that much under a light touch.
+/// Larger values look sunken, smaller ones look like hovering.
 pub const TOUCH_DEPTH: f32 = 0.0005;
 
-/// How near to that depth is near enough, in metres: nobody sees a tenth of a millimetre. Less takes more steps.
+/// Tolerance of [`TOUCH_DEPTH`], in metres: a tenth of a millimetre is invisible. Smaller values take more steps.
 pub(super) const TOUCH_TOLERANCE: f32 = 0.0001;
 
-/// The clearance below which a part of the hand touches, in metres.
+/// A part of the hand touches below this clearance, in metres.
 pub(super) const TOUCHING: f32 = -TOUCH_DEPTH + 2.0 * TOUCH_TOLERANCE;
 
-/// A link that starts deeper than this in a surface is inside from the start, in metres.
+/// A link deeper than this in a surface, in metres, counts as starting inside it.
 const INSIDE_DEPTH: f32 = TOUCH_DEPTH + 0.0005;
 
-/// The clearance below which a link is surely that deep, in metres, however it is rounded. Most of those that are inside are
-/// known by it, without a look at how deep they are: that saves a fifth of the time of an attempt on a mug, a tenth on a
-/// wineglass and nothing on scissors. A lower one leaves more to be looked at.
-const SURELY_INSIDE: f32 = -INSIDE_DEPTH - TOUCH_TOLERANCE;
+/// A link below this clearance, in metres, is deeper than [`INSIDE_DEPTH`] whatever the rounding. A cheap early exit:
+/// it saves a fifth of an attempt's time on a mug.
+const CERTAINLY_INSIDE: f32 = -INSIDE_DEPTH - TOUCH_TOLERANCE;
 
-/// Room that a relaxed digit leaves between itself and the object, in metres: enough to be seen.
+/// Clearance between a relaxed digit and the object, in metres: just enough to be visible.
 const RELAXED_CLEARANCE: f32 = 0.001;
 
-/// Shares of its way to closed from which a digit that cannot be opened is relaxed.
+/// Fractions of full closure tried as starts for relaxing a digit that cannot be opened.
 const CURLED: [f32; 3] = [0.35, 0.7, 1.0];
 
-/// From a gap of this many metres on, one that is sure is as good as the true one. A smaller one takes more steps of a
-/// few nanoseconds each, a larger one more looks at the mesh.
-pub(super) const SURE_GAP: f32 = 0.004;
+/// Above this gap, in metres, a lower bound replaces the exact gap. Smaller values take more steps of a few
+/// nanoseconds each, larger ones more mesh queries.
+pub(super) const COARSE_GAP: f32 = 0.004;
 
-/// The farthest that the mesh is looked at, in metres: what is nearer is found sooner.
-pub(super) const NEAR: f32 = 0.015;
+/// Largest distance of a closest-point query on the mesh, in metres. Shorter queries are faster.
+pub(super) const SEARCH_DISTANCE: f32 = 0.015;
 
-/// Steps of advancement at most. Each covers what is certainly free, so that surfaces that a link glides along need
-/// many; where it still has not arrived, it stops where it is, which is free.
-pub(super) const MOST_STEPS: usize = 120;
+/// Limit on the steps of one advancement. Links gliding along a surface need many; a link that has not arrived by
+/// then stops where it is, which is free.
+pub(super) const MAX_STEPS: usize = 120;
 
-/// A digit after it was closed.
+/// A digit after closing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClosedDigit {
     /// Its joint angles.
     pub angles: DigitAngles,
     /// Its links as solids, in the object's frame.
     pub links: [TaperedCapsule; 3],
-    /// Which links touch.
+    /// Which of the links touch the object.
     pub touches: [bool; 3],
 }
 
@@ -70,39 +69,39 @@ impl ClosedDigit {
         self.touches.contains(&true)
     }
 
-    /// Sum of the three joints' flexion in radians.
+    /// Sum of the three joints' flexion, in radians.
     pub fn flexion(&self) -> f32 {
         self.angles.base_pitch + self.angles.second_pitch + self.angles.third_pitch
     }
 }
 
-/// What closes: one digit at a wrist, toward an object.
+/// One digit about to close on an object, with its wrist fixed.
 #[derive(Clone, Copy, Debug)]
 pub struct Closing<'a> {
     /// The object's surface.
     pub surface: &'a MeshBvh,
     /// The digit and how it bends.
     pub flexing: Flexing<'a>,
-    /// Radii of the digit's joints and tip, in metres.
+    /// Radii at the digit's joints and tip, in metres.
     pub radii: [f32; 4],
-    /// Where it bends, in the object's frame.
+    /// The plane it bends in, in the object's frame.
     pub plane: DigitPlane,
-    /// The share of its way from opened to closed that the digit is shaped by before it closes, from 0 to 1; where it
-    /// would start inside of something then, by half of it or opened.
+    /// Fraction of full closure, from 0 to 1, that closing starts from. If the digit would start inside something, half of
+    /// it is tried, then the opened digit.
     pub preshape: f32,
-    /// What else of the hand is in the digit's way.
+    /// Other parts of the hand that stop the digit.
     pub obstacles: &'a [Obstacle],
 }
 
 impl Closing<'_> {
-    /// Closes until every joint is held or at its limit. None if a link is inside a surface from the start.
+    /// Closes until every joint is stopped or at its limit. `None` if a link starts inside a surface.
     pub fn close(&self) -> Option<ClosedDigit> {
         let mut angles = [self.preshape, 0.5 * self.preshape, 0.0]
             .map(|share| self.flexing.closed_by(share))
             .into_iter()
             .find(|angles| self.is_free(angles))?;
         let mut touches = [false; 3];
-        // The first joint that is not held.
+        // The first joint that still moves.
         let mut free = 0;
         while free < 3 {
             let sweep = Sweep {
@@ -117,7 +116,7 @@ impl Closing<'_> {
             };
             angles = self.advance(&sweep, -TOUCH_DEPTH, f32::INFINITY);
             let links = self.links(&angles);
-            // Of the links that touch now, the outermost holds all joints below it.
+            // The outermost link that touches now stops all joints below it.
             let held = (free..3).rev().find_map(|link| {
                 let touches = self.link_touches(&links[link]);
                 (touches || self.is_obstructed(link, &links[link])).then_some((link, touches))
@@ -127,7 +126,7 @@ impl Closing<'_> {
             free = link + 1;
         }
         let links = self.links(&angles);
-        // What came to lie against the surface while other links were closing touches too.
+        // Links that met the surface while others were closing touch too.
         for (touches, link) in touches.iter_mut().zip(&links) {
             *touches = *touches || self.link_touches(link);
         }
@@ -138,10 +137,10 @@ impl Closing<'_> {
         })
     }
 
-    /// The digit bent by `flexion` radians in all, whatever is in the way.
+    /// The digit bent by `flexion` radians in total, ignoring obstacles.
     pub fn bent(&self, flexion: f32) -> ClosedDigit {
         let sweep = self.flexing.sweep();
-        let angles = self.flexing.angles_at(&sweep, way_to(flexion, &sweep));
+        let angles = self.flexing.angles_at(&sweep, sweep_to(flexion, &sweep));
         ClosedDigit {
             angles,
             links: self.links(&angles),
@@ -149,8 +148,8 @@ impl Closing<'_> {
         }
     }
 
-    /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in all, or less if something is in
-    /// the way. Where the opened digit is inside the object, it is bent from the first of the curled poses that is not.
+    /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in total, or less if something
+    /// stops it. If the opened digit is inside the object, it bends from the first partly closed pose that is free.
     pub fn relax(&self, flexion: f32) -> ClosedDigit {
         let opened = self.flexing.opened();
         let start = std::iter::once(0.0)
@@ -160,7 +159,7 @@ impl Closing<'_> {
             .unwrap_or(opened);
         let rates = std::array::from_fn(|joint| self.flexing.rate(joint));
         let sweep = Sweep { start, rates };
-        let angles = self.advance(&sweep, RELAXED_CLEARANCE, way_to(flexion, &sweep));
+        let angles = self.advance(&sweep, RELAXED_CLEARANCE, sweep_to(flexion, &sweep));
         ClosedDigit {
             angles,
             links: self.links(&angles),
@@ -168,56 +167,56 @@ impl Closing<'_> {
         }
     }
 
-    /// Sweeps until a moving link's clearance is down to `target`, or `most` radians. Only for links that are outside of
-    /// the object's volume: of others it asks how far the surface is.
-    fn advance(&self, sweep: &Sweep, target: f32, most: f32) -> DigitAngles {
-        let most = most.min(self.flexing.whole_way(sweep));
-        let mut way = 0.0;
-        // Up to where each link is free; it is not looked at again before.
-        let mut free_until = [0.0; 3];
-        for _ in 0..MOST_STEPS {
-            if way >= most {
+    /// Sweeps until the clearance of a moving link drops to `target` metres, or for `max_sweep` radians. Links must
+    /// start outside the object's volume, since only the distance to the surface is measured.
+    fn advance(&self, sweep: &Sweep, target: f32, max_sweep: f32) -> DigitAngles {
+        let max_sweep = max_sweep.min(self.flexing.full_sweep(sweep));
+        let mut swept = 0.0;
+        // Each link is free up to this angle and is not checked again before it.
+        let mut clear_until = [0.0; 3];
+        for _ in 0..MAX_STEPS {
+            if swept >= max_sweep {
                 break;
             }
-            let angles = self.flexing.angles_at(sweep, way);
+            let angles = self.flexing.angles_at(sweep, swept);
             let links = self.links(&angles);
             let speeds = self.speeds(sweep, &angles, &links);
-            // The outermost links move fastest and stop most sweeps.
+            // The outermost links move fastest and end max_sweep sweeps.
             for link in (0..3).rev() {
                 let speed = speeds[link];
                 if speed <= 0.0 {
-                    free_until[link] = f32::INFINITY;
+                    clear_until[link] = f32::INFINITY;
                 }
-                if free_until[link] > way {
+                if clear_until[link] > swept {
                     continue;
                 }
-                // Beyond what the rest of the way can reach, nothing needs to be known.
-                let reachable = target + 2.0 * TOUCH_TOLERANCE + speed * (most - way);
+                // Gaps beyond what the rest of the sweep can close do not matter.
+                let reachable = target + 2.0 * TOUCH_TOLERANCE + speed * (max_sweep - swept);
                 let free = self.gap(link, &links[link], reachable) - target;
                 if free <= TOUCH_TOLERANCE {
                     return angles;
                 }
-                free_until[link] = way + free / speed;
+                clear_until[link] = swept + free / speed;
             }
-            way = free_until.into_iter().fold(most, f32::min);
+            swept = clear_until.into_iter().fold(max_sweep, f32::min);
         }
-        self.flexing.angles_at(sweep, way)
+        self.flexing.angles_at(sweep, swept)
     }
 
-    /// A gap that the surface and the obstacles keep from a link, in metres: the smallest if that is small and less than
-    /// `reachable`.
+    /// A lower bound, in metres, on the gap between a link and the surface or obstacles; exact if it is below
+    /// [`COARSE_GAP`] and `reachable`.
     fn gap(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
         let obstructed = self.gap_to_obstacles(index, link, reachable);
-        let sure = self.surface.least_gap(link);
-        if sure > SURE_GAP {
-            return sure.min(obstructed);
+        let lower_bound = self.surface.least_gap(link);
+        if lower_bound > COARSE_GAP {
+            return lower_bound.min(obstructed);
         }
-        let within = obstructed.min(NEAR);
+        let within = obstructed.min(SEARCH_DISTANCE);
         let gap = self.surface.closest_to_capsule(link, within);
         gap.map_or(within, |gap| gap.gap)
     }
 
-    /// The same for the obstacles alone: `reachable` if none is nearer.
+    /// The gap to the obstacles alone, or `reachable` if none is closer.
     fn gap_to_obstacles(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
         let link = Bounded::new(*link);
         let ahead = self.obstacles.iter().filter(|obstacle| obstacle.stops(index));
@@ -231,7 +230,7 @@ impl Closing<'_> {
         links.iter().enumerate().all(is_free)
             && !links
                 .iter()
-                .any(|link| comes_within(link, self.surface, SURELY_INSIDE))
+                .any(|link| comes_within(link, self.surface, CERTAINLY_INSIDE))
             && self.smallest_clearance(&links, INSIDE_DEPTH) >= -INSIDE_DEPTH
     }
 
@@ -239,10 +238,11 @@ impl Closing<'_> {
         self.gap_to_obstacles(index, link, TOUCHING) < TOUCHING
     }
 
-    /// Metres by which the gap of each link can shrink for a radian of the rest of a sweep.
+    /// Upper bounds on how fast each link's gap can shrink, in metres per radian of the rest of a sweep.
     ///
-    /// A link is made of balls, which turn within themselves, so that their middles' speeds count; the fastest is at an
-    /// end. A joint at its limit turns no more. As the digit bends, everything comes nearer to the joints that carry it.
+    /// A link is a union of spheres, which rotate in place, so only the speeds of their centres count; the fastest is
+    /// at an end of the link. A joint at its limit no longer turns. As the digit bends, its parts come closer to the
+    /// joints that carry them.
     fn speeds(&self, sweep: &Sweep, angles: &DigitAngles, links: &[TaperedCapsule; 3]) -> [f32; 3] {
         let limits = &self.flexing.digit.limits;
         let rate = |joint: usize, angle: f32, max: f32| if angle < max { sweep.rates[joint] } else { 0.0 };
@@ -251,13 +251,13 @@ impl Closing<'_> {
             rate(1, angles.second_pitch, limits.second_pitch.max),
             rate(2, angles.third_pitch, limits.third_pitch.max),
         ];
-        // Bent backward, or by more than half a turn, a digit may yet stretch.
-        let comes_nearer = angles.second_pitch.min(angles.third_pitch) >= 0.0
+        // A digit bent backward, or by more than half a turn, may still straighten.
+        let bends_inward = angles.second_pitch.min(angles.third_pitch) >= 0.0
             && limits.second_pitch.max + limits.third_pitch.max <= PI;
         std::array::from_fn(|link| {
             (0..=link)
                 .map(|joint| {
-                    let reach = if comes_nearer {
+                    let reach = if bends_inward {
                         let joint = links[joint].start;
                         let TaperedCapsule { start, end, .. } = links[link];
                         joint
@@ -277,7 +277,7 @@ impl Closing<'_> {
         link_solids(self.plane.joints(angles), self.radii)
     }
 
-    /// The smallest clearance of some links, up to `enough`.
+    /// The smallest clearance of some links in metres, or `enough` if all are larger.
     fn smallest_clearance(&self, links: &[TaperedCapsule], enough: f32) -> f32 {
         let smallest = |least: f32, link| clearance(link, self.surface, least).min(least);
         links.iter().fold(enough, smallest)
@@ -288,8 +288,8 @@ impl Closing<'_> {
     }
 }
 
-/// The way of a sweep to a flexion in radians, if no joint comes to its limit before.
-fn way_to(flexion: f32, sweep: &Sweep) -> f32 {
+/// The sweep parameter at which the total flexion reaches `flexion` radians, ignoring joint limits.
+fn sweep_to(flexion: f32, sweep: &Sweep) -> f32 {
     let start = &sweep.start;
     let bent = start.base_pitch + start.second_pitch + start.third_pitch;
     (flexion - bent).max(0.0) / sweep.rates.iter().sum::<f32>()

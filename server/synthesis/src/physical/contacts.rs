@@ -1,4 +1,4 @@
-//! Where a closed hand meets the object: digits from all sides, and the palm.
+//! Contacts between a closed hand and the object: all sides of the digits, and the palm.
 
 use glam::Vec3;
 
@@ -13,34 +13,33 @@ use crate::model::{
     object::GraspObject,
 };
 
-/// Metres by which friction is multiplied to give the torsion that a fingertip bears per newton of normal force: two
-/// thirds of the radius of a disk that is pressed evenly, of 5 mm here. A larger one lets two fingers hold what would
-/// twist out of them.
+/// Torsion that a contact bears per newton of normal force, divided by friction, in metres: two thirds of the radius
+/// of an evenly pressed disk, here of 5 mm. Larger values let two fingers hold what would twist out of them.
 pub(crate) const TORSION_LEVER: f32 = 0.0033;
 
-/// Cosine of the angle up to which a contact's normal may differ from the direction to the bone: a touch, not a scrape.
+/// Cosine of the largest angle between a contact's normal and the direction to the bone: a touch, not a scrape.
 const FACING_COS: f32 = 0.5;
 
-/// Cosine of the angle up to which the way to the bone counts as the triangle's normal: places of touches are exact to some
-/// hundredths of a millimetre, beside flesh that is 6 mm thick and more. A larger angle flattens edges that are blunt.
-const INSIDE_COS: f32 = 0.9962;
+/// Cosine of the angle within which the direction to the bone counts as the triangle's normal. Contact points are
+/// exact to some hundredths of a millimetre under flesh at least 6 mm thick. Larger angles flatten blunt edges.
+const FACE_NORMAL_COS: f32 = 0.9962;
 
-/// Contacts of the palm are at least this far apart in metres: the solids that it is made of overlap, and several of them
-/// touch with the same piece of skin. Fewer make the palm pivot, more cost time in the immobility checks.
+/// Smallest distance between contacts of the palm, in metres: its solids overlap, and several touch with the same
+/// patch of skin. Fewer contacts let the palm pivot, more cost time in the immobility checks.
 const PALM_SPACING: f32 = 0.015;
 
-/// How far from the palm that the joints' radii tell a contact of it may be, in metres. Flesh that stands farther off, as
-/// the ball of the little finger does, gives way before it bears; and whoever draws the hand by its radii sees a contact in
-/// the air there.
+/// Largest distance of a palm contact from the palm described by the joints' radii, in metres. Flesh farther out,
+/// such as the ball of the little finger, yields before it bears, and a client that draws the hand from its radii
+/// would see that contact in the air.
 const PALM_SLACK: f32 = 0.0015;
 
-/// Cosine of the angle up to which the palm's bone may lie off the way that a solid of it presses. The solids overlap: skin
-/// that lies deeper in another one belongs to that one, which touches in a place of its own. A larger angle lets normals
-/// leave those of the surface, a smaller one drops contacts where solids blend.
-const OWN_COS: f32 = 0.985;
+/// Cosine of the largest angle between the direction to the palm's bone and the direction in which one of its solids
+/// presses. Skin that lies deeper in an overlapping solid belongs to that one. Larger angles tilt contact normals,
+/// smaller ones drop contacts where solids blend.
+const PALM_PRESS_COS: f32 = 0.985;
 
-/// Puts the contacts of the digits that touch and of the palm into `contacts`, thumb first and the palm last. The pose is
-/// that of the digits.
+/// Replaces `contacts` by those of the touching digits and of the palm, thumb first and palm last. `pose` must be the
+/// pose of `digits`.
 pub(super) fn collect_contacts(
     object: &GraspObject,
     rig: &Rig,
@@ -60,9 +59,9 @@ pub(super) fn collect_contacts(
                 .extend(touch.and_then(|touch| contact(solids, &touch, HandPart::Phalanx(digit, phalanx))));
         }
     }
-    let first_of_palm = contacts.len();
+    let first_palm_contact = contacts.len();
     let tracked = TrackedPalm::of_rig(rig, pose.frame_from_wrist);
-    // The ball of the thumb gives way with its metacarpal, and the web is a fold of skin: neither bears anything.
+    // The ball of the thumb yields with its metacarpal, and the web is a fold of skin: neither bears load.
     for solid in &solids.palm {
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
             continue;
@@ -70,16 +69,16 @@ pub(super) fn collect_contacts(
         let is_new = |other: &Contact| other.position.distance(touch.point) >= PALM_SPACING;
         let is_own = || {
             let pressing = (solid.at(touch.along) - touch.point).normalize_or_zero();
-            way_to_bone(solids, HandPart::Palm, touch.point).dot(pressing) >= OWN_COS
+            direction_to_bone(solids, HandPart::Palm, touch.point).dot(pressing) >= PALM_PRESS_COS
         };
-        let is_tracked = || tracked.distance_of_skin(touch.point) <= PALM_SLACK;
-        if contacts[first_of_palm..].iter().all(is_new) && is_own() && is_tracked() {
+        let is_tracked = || tracked.distance_to_skin(touch.point) <= PALM_SLACK;
+        if contacts[first_palm_contact..].iter().all(is_new) && is_own() && is_tracked() {
             contacts.extend(contact(solids, &touch, HandPart::Palm));
         }
     }
 }
 
-/// The contacts as soft fingers, for objects with a friction coefficient of `friction`.
+/// Replaces `soft_contacts` by the contacts as soft fingers with friction coefficient `friction`.
 pub(crate) fn soften<'a>(
     contacts: impl IntoIterator<Item = &'a Contact>,
     friction: f32,
@@ -95,8 +94,8 @@ pub(crate) fn soften<'a>(
     }));
 }
 
-/// True if something of the hand presses against the thumb: contacts whose normals differ by less than a right angle
-/// never hold anything. It settles most hopeless grips before any force is solved for.
+/// True if two contact normals differ by more than a right angle; nothing can be held otherwise. Rejects most
+/// hopeless grips before any force is solved for.
 pub(super) fn are_opposed(contacts: &[Contact]) -> bool {
     contacts
         .iter()
@@ -104,9 +103,9 @@ pub(super) fn are_opposed(contacts: &[Contact]) -> bool {
         .any(|(i, a)| contacts[..i].iter().any(|b| a.normal.dot(b.normal) < 0.0))
 }
 
-/// The contact of a touch, if the surface faces the bone there.
+/// The contact at a touch, if the surface faces the bone there.
 fn contact(solids: &HandSolids, touch: &Touch, part: HandPart) -> Option<Contact> {
-    let outward = way_to_bone(solids, part, touch.point);
+    let outward = direction_to_bone(solids, part, touch.point);
     (outward.dot(touch.normal) >= FACING_COS).then(|| Contact {
         position: touch.point,
         normal: pressed_normal(outward, touch.normal),
@@ -115,23 +114,23 @@ fn contact(solids: &HandSolids, touch: &Touch, part: HandPart) -> Option<Contact
     })
 }
 
-/// The normal at a contact, of which place, part and triangle are known.
+/// The normal at a contact whose part, position and triangle normal are known.
 pub(crate) fn contact_normal(solids: &HandSolids, part: HandPart, point: Vec3, of_triangle: Vec3) -> Vec3 {
-    pressed_normal(way_to_bone(solids, part, point), of_triangle)
+    pressed_normal(direction_to_bone(solids, part, point), of_triangle)
 }
 
-/// Inside of a triangle, round flesh presses along its normal. At an edge or a corner it does so along one of the
-/// directions between the normals that meet there: the way to the bone.
-fn pressed_normal(way_to_bone: Vec3, of_triangle: Vec3) -> Vec3 {
-    if way_to_bone.dot(of_triangle) > INSIDE_COS {
+/// Inside a triangle, round flesh presses along the triangle's normal; at an edge or corner, along the direction to
+/// the bone, which lies between the normals that meet there.
+fn pressed_normal(direction_to_bone: Vec3, of_triangle: Vec3) -> Vec3 {
+    if direction_to_bone.dot(of_triangle) > FACE_NORMAL_COS {
         of_triangle
     } else {
-        way_to_bone
+        direction_to_bone
     }
 }
 
-/// The direction from a point of the surface to the bone of the part that touches there.
-fn way_to_bone(solids: &HandSolids, part: HandPart, point: Vec3) -> Vec3 {
+/// Unit vector from a point of the surface to the bone of the part that touches there.
+fn direction_to_bone(solids: &HandSolids, part: HandPart, point: Vec3) -> Vec3 {
     let parts = match part {
         HandPart::Palm => solids.palm.as_slice(),
         HandPart::Phalanx(digit, phalanx) => {

@@ -1,7 +1,7 @@
-//! A known grip without the fingers that a giver is in the way of.
+//! A known grip without the fingers that collide with the giver.
 //!
-//! Mostly not the whole hand is in a giver's way, but a finger or two; and often the others hold without them. Then those
-//! fingers rest where there is room, and nothing else of the hand moves.
+//! Usually only a finger or two collide, and the others often hold without them. The colliding fingers come to rest
+//! where there is room; the rest of the hand stays as it is.
 
 use super::{
     closer::Closer,
@@ -21,39 +21,39 @@ use crate::{
     },
 };
 
-/// A grip that is known.
+/// A grip that is already known.
 #[derive(Clone, Copy, Debug)]
-pub struct WholeGrip<'a> {
+pub struct KnownGrip<'a> {
     /// The grip.
     pub grip: &'a Grip,
-    /// Where it touches.
+    /// Its contacts.
     pub contacts: &'a [Contact],
-    /// Its hand.
+    /// The solids of its hand.
     pub solids: &'a HandSolids,
 }
 
 impl Gripper {
-    /// The grip with only some of the digits that hold, `kept`, thumb first; the others that hold, and those that the giver is
-    /// in the way of, rest anew. What it touches is in `contacts` afterwards.
+    /// The grip with only the holding digits in `kept`, thumb first. The other holding digits, and idle ones that
+    /// collide with the giver, move to rest. The grip's contacts are in `contacts` afterwards.
     ///
     /// # Errors
     /// The first check that fails.
-    pub fn spare(
+    pub fn keep_fingers(
         &mut self,
         scene: &ObjectScene<'_>,
         rig: &Rig,
-        known: &WholeGrip<'_>,
+        known: &KnownGrip<'_>,
         kept: [bool; 5],
         giver: &PreparedHand,
     ) -> Result<(Grip, HandSolids), NoGrip> {
-        let WholeGrip {
+        let KnownGrip {
             grip,
             contacts,
             solids,
         } = known;
-        let of_kept = contacts.iter().filter(|contact| contact.part.is_among(kept));
+        let kept_contacts = contacts.iter().filter(|contact| contact.part.is_among(kept));
         self.contacts.clear();
-        self.contacts.extend(of_kept.copied());
+        self.contacts.extend(kept_contacts.copied());
 
         // Step 2, Finger Posing, for the fingers that hold nothing.
         self.obstacles.clear();
@@ -66,7 +66,7 @@ impl Gripper {
             shape: &HandShape::of_grip(rig, grip),
             object_from_wrist: grip.pose.frame_from_wrist,
         };
-        let as_known = Digit::ALL.map(|digit| ClosedDigit {
+        let current = Digit::ALL.map(|digit| ClosedDigit {
             angles: grip.pose.digits[digit.index()],
             links: solids.phalanges[digit.index()],
             touches: Phalanx::ALL.map(|phalanx| {
@@ -75,20 +75,21 @@ impl Gripper {
             }),
         });
         let holding = grip.holding_digits();
-        let mut digits = as_known;
+        let mut digits = current;
         for finger in Digit::ALL.into_iter().skip(1) {
             let place = finger.index();
-            let stays = kept[place] || !holding[place] && closer.is_clear_of_giver(&as_known[place]);
+            let stays = kept[place] || !holding[place] && closer.is_clear_of_giver(&current[place]);
             if !stays {
-                let flexion = closer.shape.resting_flexion(&as_known, place);
+                let flexion = closer.shape.resting_flexion(&current, place);
                 let rested = closer.rest_clear(finger, &self.obstacles, flexion);
                 digits[place] = rested.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
             }
         }
         let posed = self.validate(&closer, &digits, &mut NoStopwatch)?;
 
-        // Step 5, Immobility Validation: last, since sets of fingers are known to hold before they are asked to.
+        // Step 5, Immobility Validation. Last, because callers only pass subsets that are known to hold.
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+        // Step 5, Immobility Validation. Last, because callers only pass subsets that are known to hold.
         let epsilon = self.closure(scene);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         Ok(posed.with_closure(epsilon))

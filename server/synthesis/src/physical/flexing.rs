@@ -1,31 +1,32 @@
-//! How a digit's three joints bend together, object or not.
+//! How a digit's three joints bend together.
 
 use crate::model::hand::{
     DigitAngles,
     rig::{AngleRange, DigitRig},
 };
 
-/// A digit that bends: its second joint so many degrees for a degree of the first, its third two thirds of that.
+/// A bending digit: its second joint turns `bend_ratio` times as far as the first, its third two thirds as far as the
+/// second.
 #[derive(Clone, Copy, Debug)]
 pub struct Flexing<'a> {
     /// The digit.
     pub digit: &'a DigitRig,
-    /// ψ1 in radians.
+    /// ψ1, in radians.
     pub base_yaw: f32,
-    /// Degrees of the second joint for a degree of the first.
+    /// Degrees of the second joint per degree of the first.
     pub bend_ratio: f32,
 }
 
-/// Which of the three joints bend, and where they start.
+/// A sweep of the three joints: start angles and rates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sweep {
     pub(super) start: DigitAngles,
-    /// Radians of each joint for a radian of the sweep.
+    /// Radians of each joint per radian of the sweep.
     pub(super) rates: [f32; 3],
 }
 
 impl Flexing<'_> {
-    /// The opened pose: every joint at the lower end of its range, but not bent backward.
+    /// The opened pose: every joint at the lower end of its range, the outer two not bent backward.
     pub fn opened(&self) -> DigitAngles {
         let limits = &self.digit.limits;
         let straight = |range: AngleRange| range.min.max(0.0_f32.min(range.max));
@@ -37,13 +38,13 @@ impl Flexing<'_> {
         }
     }
 
-    /// The pose after a share of the way from opened to closed as far as the joints go.
-    pub fn closed_by(&self, share: f32) -> DigitAngles {
+    /// The pose at a fraction of full closure: 0 is opened, 1 is closed to the joint limits.
+    pub fn closed_by(&self, closure: f32) -> DigitAngles {
         let sweep = self.sweep();
-        self.angles_at(&sweep, share * self.whole_way(&sweep))
+        self.angles_at(&sweep, closure * self.full_sweep(&sweep))
     }
 
-    /// All joints from the opened pose.
+    /// A sweep of all joints from the opened pose.
     pub(super) fn sweep(&self) -> Sweep {
         Sweep {
             start: self.opened(),
@@ -51,7 +52,7 @@ impl Flexing<'_> {
         }
     }
 
-    /// Radians of a joint for a radian of a sweep.
+    /// Radians of a joint per radian of a sweep.
     pub(super) fn rate(&self, joint: usize) -> f32 {
         match joint {
             0 => 1.0,
@@ -60,34 +61,34 @@ impl Flexing<'_> {
         }
     }
 
-    /// The angles after a sweep, none beyond its limit.
-    pub(super) fn angles_at(&self, sweep: &Sweep, way: f32) -> DigitAngles {
+    /// The joint angles after `swept` radians of a sweep, clamped to the limits.
+    pub(super) fn angles_at(&self, sweep: &Sweep, swept: f32) -> DigitAngles {
         let limits = &self.digit.limits;
         DigitAngles {
             base_yaw: self.base_yaw,
-            base_pitch: (sweep.start.base_pitch + sweep.rates[0] * way).min(limits.base_pitch.max),
-            second_pitch: (sweep.start.second_pitch + sweep.rates[1] * way).min(limits.second_pitch.max),
-            third_pitch: (sweep.start.third_pitch + sweep.rates[2] * way).min(limits.third_pitch.max),
+            base_pitch: (sweep.start.base_pitch + sweep.rates[0] * swept).min(limits.base_pitch.max),
+            second_pitch: (sweep.start.second_pitch + sweep.rates[1] * swept).min(limits.second_pitch.max),
+            third_pitch: (sweep.start.third_pitch + sweep.rates[2] * swept).min(limits.third_pitch.max),
         }
     }
 
-    /// The way after which all joints that move are at their limits.
-    pub(super) fn whole_way(&self, sweep: &Sweep) -> f32 {
+    /// Radians of a sweep until every moving joint is at its limit.
+    pub(super) fn full_sweep(&self, sweep: &Sweep) -> f32 {
         let limits = &self.digit.limits;
-        let way = |rate: f32, start: f32, max: f32| {
+        let length = |rate: f32, start: f32, max: f32| {
             if rate > 0.0 {
                 ((max - start) / rate).max(0.0)
             } else {
                 0.0
             }
         };
-        way(sweep.rates[0], sweep.start.base_pitch, limits.base_pitch.max)
-            .max(way(
+        length(sweep.rates[0], sweep.start.base_pitch, limits.base_pitch.max)
+            .max(length(
                 sweep.rates[1],
                 sweep.start.second_pitch,
                 limits.second_pitch.max,
             ))
-            .max(way(
+            .max(length(
                 sweep.rates[2],
                 sweep.start.third_pitch,
                 limits.third_pitch.max,

@@ -1,15 +1,15 @@
-//! A grip: a hand closed on an object, whoever holds it out and wherever gravity pulls. Steps 2 to 4 of Algorithm 1 with
-//! the hand as solids, and closure.
+//! A grip: a hand closed on an object, independent of the giver's pose and of gravity. Steps 2 to 4 of Algorithm 1
+//! with the hand as solids, and closure.
 //!
-//! The checks come by cost: palm and forearm before any digit closes, what settles most hands before what settles few.
-//! Half of the hands that close on something touch it where they cannot hold it; fingers that hold nothing are rested
-//! after that is known.
+//! Checks run in order of cost: palm and forearm before any digit closes, and those that reject most hands first.
+//! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
+//! known.
 
 use glam::Vec3;
 
 use super::{
     closer::Closer,
-    closing::{ClosedDigit, MOST_STEPS, NEAR, SURE_GAP, TOUCH_DEPTH, TOUCH_TOLERANCE},
+    closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     immobility::{Buffers, SoftContact, epsilon},
     obstacle::Obstacle,
@@ -31,38 +31,39 @@ use crate::{
     },
 };
 
-/// How deep any part of the hand may sink into the rigid object, in metres: soft flesh gives way by about as much under
-/// a firm grip. More lets hands look sunken.
-pub const DEEPEST: f32 = 0.002;
+/// Deepest penetration of any part of the hand into the rigid object, in metres: soft flesh yields by about as much
+/// under a firm grip. Larger values let hands look sunken.
+pub const MAX_PENETRATION: f32 = 0.002;
 
-/// How far the receiving hand and forearm stay from the giver's, in metres. More is safer and finds fewer grasps.
+/// Clearance between the receiving hand and forearm and the giver's, in metres. Larger values are safer and find
+/// fewer grasps.
 pub const GIVER_CLEARANCE: f32 = 0.001;
 
-/// How far the hand stays from forbidden surfaces, in metres: none of them is touched if flesh gives way by two, and skin is
-/// one thicker than the solids.
+/// Clearance between the hand and forbidden surfaces, in metres: flesh may yield by two millimetres, and skin is one
+/// thicker than the solids.
 pub const FORBIDDEN_CLEARANCE: f32 = 0.003;
 
-/// The share of enough closure, by a bound from above, from which a hand is a near miss. Less closure says little of what
-/// there is beside it.
-const NEARLY: f32 = 0.3;
+/// Share of the required closure, by an upper bound, from which a rejected hand is a near miss. Hands with less say
+/// little about their neighbourhood.
+const NEAR_MISS_SHARE: f32 = 0.3;
 
-/// Why a hand was not closed to a grip.
+/// Why a hand did not become a grip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoGrip {
     /// A check failed.
     Rejected(Rejection),
-    /// The stop signal came before it was over.
+    /// The stop signal came first.
     Interrupted,
 }
 
 /// A hand closed on an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grip {
-    /// The hand in the object's frame.
+    /// The hand's pose in the object's frame.
     pub pose: HandPose,
-    /// The bend ratio that each digit was closed with, thumb first; none where the digit does not touch.
+    /// The bend ratio each digit closed with, thumb first; `None` for a digit that does not touch.
     pub bend_ratios: [Option<f32>; 5],
-    /// How deep it sinks into the object at its deepest, in metres; 0 if it does nowhere.
+    /// Deepest penetration into the object in metres, 0 if there is none.
     pub penetration: f32,
     /// Ferrari-Canny epsilon of its contacts.
     pub epsilon: f32,
@@ -75,7 +76,7 @@ impl Grip {
     }
 }
 
-/// A hand of which all is in order but that its closure is not known.
+/// A hand that passed every check but closure.
 #[derive(Clone, Debug)]
 pub(super) struct Posed {
     pose: HandPose,
@@ -85,7 +86,7 @@ pub(super) struct Posed {
 }
 
 impl Posed {
-    /// The grip that it is with an epsilon, and its solids.
+    /// The grip with its closure, and the solids of its hand.
     pub(super) fn with_closure(self, epsilon: f32) -> (Grip, HandSolids) {
         let Self {
             pose,
@@ -103,24 +104,24 @@ impl Posed {
     }
 }
 
-/// Closes hands, and keeps its buffers from one to the next.
+/// Closes hands. Keeps its buffers from one call to the next.
 #[derive(Clone, Debug, Default)]
 pub struct Gripper {
-    /// Joint angles of the digits that were posed, thumb first.
+    /// Joint angles of the digits posed so far, thumb first.
     pub posed: Vec<DigitAngles>,
-    /// Where the hand touches.
+    /// Contacts of the hand.
     pub contacts: Vec<Contact>,
     pub(super) obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
-    /// The closure that was found last, as a share of what is enough; a bound from above where it is not. 0 before a hand
-    /// has come that far.
+    /// Closure of the last hand as a share of the required one: an upper bound if below 1, 0 if no hand came that
+    /// far.
     closure_share: f32,
 }
 
 impl Gripper {
-    /// Closes a proposed hand. What it touches is in `contacts` afterwards. With `presented`, a hand that
-    /// comes too near to the giver's is refused on the way.
+    /// Closes a proposed hand; its contacts are in `contacts` afterwards. With `presented`, hands that come too close
+    /// to the giver are rejected on the way.
     ///
     /// # Errors
     /// The first check that fails, or the stop signal.
@@ -137,7 +138,8 @@ impl Gripper {
         self.closure_share = 0.0;
         let giver = presented.and_then(|presented| presented.giver.as_ref());
 
-        // Steps 3 and 4 for palm and forearm, which do not move, and for the ball of the thumb where it starts.
+        // Steps 3 and 4 for palm and forearm, which do not move with the digits, and for the ball of the thumb in its
+        // start pose.
         let Proposal { shape, advance, .. } = proposal;
         let opened = HandPose {
             frame_from_wrist: proposal.object_from_wrist,
@@ -146,7 +148,7 @@ impl Gripper {
         let mut still = HandSolids::of_pose(rig, &opened);
         let mut object_from_wrist = proposal.object_from_wrist;
         if *advance > 0.0 {
-            let Some(way) = free_way(
+            let Some(offset) = palm_advance(
                 scene,
                 &still,
                 object_from_wrist.transform_vector(Vec3::Z),
@@ -155,8 +157,8 @@ impl Gripper {
                 stopwatch.lap(Step::CollisionValidation);
                 return Err(NoGrip::Rejected(Rejection::PalmCollision));
             };
-            object_from_wrist.position += way;
-            still = still.moved(way);
+            object_from_wrist.position += offset;
+            still = still.moved(offset);
         }
         let collides = collides_without_digits(
             scene,
@@ -199,7 +201,7 @@ impl Gripper {
             return Err(NoGrip::Interrupted);
         }
 
-        // Step 4, Contact Validation, for the digits that hold.
+        // Step 4, Contact Validation, for the digits that touch.
         collect_contacts(
             scene.object,
             rig,
@@ -210,7 +212,7 @@ impl Gripper {
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
         stopwatch.lap(Step::ContactValidation);
 
-        // Step 5, Immobility Validation: whether they can hold anything.
+        // Step 5, Immobility Validation: whether the contacts can hold anything.
         let epsilon = are_opposed(&self.contacts).then(|| self.closure(scene)).flatten();
         stopwatch.lap(Step::ImmobilityValidation);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
@@ -225,7 +227,7 @@ impl Gripper {
         Ok(posed.with_closure(epsilon))
     }
 
-    /// The checks of a hand whose digits are all posed, but for closure.
+    /// Every check but closure, for a hand whose digits are all posed.
     pub(super) fn validate(
         &mut self,
         closer: &Closer<'_>,
@@ -250,9 +252,9 @@ impl Gripper {
         let penetration = penetration.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
 
         // Step 4 for the whole hand.
-        let is_unwanted = nears_forbidden_surface(scene, solids.iter());
+        let touches_forbidden = nears_forbidden_surface(scene, solids.iter());
         stopwatch.lap(Step::ContactValidation);
-        if is_unwanted {
+        if touches_forbidden {
             return Err(NoGrip::Rejected(Rejection::UnwantedContact));
         }
         let bend_ratios = std::array::from_fn(|digit| {
@@ -268,24 +270,31 @@ impl Gripper {
         })
     }
 
-    /// The closure of the contacts, if it is enough.
+    /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.
     pub fn closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
-        // Closure is the same wherever gravity pulls.
+        // Closure does not depend on the direction of gravity.
         let load = scene.load(Vec3::Y);
-        let epsilon = epsilon(&self.soft_contacts, &load, scene.least_epsilon, &mut self.buffers);
-        self.closure_share = epsilon / scene.least_epsilon;
-        (epsilon >= scene.least_epsilon).then_some(epsilon)
+        let epsilon = epsilon(
+            &self.soft_contacts,
+            &load,
+            scene.required_epsilon,
+            &mut self.buffers,
+        );
+        self.closure_share = epsilon / scene.required_epsilon;
+        (epsilon >= scene.required_epsilon).then_some(epsilon)
     }
 
-    /// After a hand that was refused: at most how much of enough closure it has, if that is near.
+    /// After a rejected hand: an upper bound of its closure as a share of the required one, if that makes it a near
+    /// miss.
     pub fn near_miss(&self) -> Option<f32> {
-        (NEARLY..1.0)
+        (NEAR_MISS_SHARE..1.0)
             .contains(&self.closure_share)
             .then_some(self.closure_share)
     }
 }
 
-/// The distance of a hand from the giver's, if it is enough: `Some(None)` without a giver.
+/// A hand's distance from the giver's in metres: `None` if it is below [`GIVER_CLEARANCE`], `Some(None)` without a
+/// giver.
 pub fn clear_of_giver(hand: &TrackedSolids, giver: Option<&PreparedHand>) -> Option<Option<f32>> {
     match giver {
         None => Some(None),
@@ -293,9 +302,8 @@ pub fn clear_of_giver(hand: &TrackedSolids, giver: Option<&PreparedHand>) -> Opt
     }
 }
 
-/// Where the wrist of a proposed hand is when its palm is laid on, if that is how it is to be; none if the palm does not
-/// touch anything on its way.
-pub fn settled_wrist(scene: &ObjectScene<'_>, rig: &Rig, proposal: &Proposal) -> Option<Pose> {
+/// The wrist pose of a proposal after its advance; `None` if the palm touches nothing within it.
+pub fn wrist_after_advance(scene: &ObjectScene<'_>, rig: &Rig, proposal: &Proposal) -> Option<Pose> {
     let wrist = proposal.object_from_wrist;
     if proposal.advance <= 0.0 {
         return Some(wrist);
@@ -305,43 +313,49 @@ pub fn settled_wrist(scene: &ObjectScene<'_>, rig: &Rig, proposal: &Proposal) ->
         digits: Digit::ALL.map(|digit| proposal.shape.flexing(rig, digit).opened()),
     };
     let still = HandSolids::of_pose(rig, &opened);
-    let way = free_way(scene, &still, wrist.transform_vector(Vec3::Z), proposal.advance)?;
-    Some(Pose::new(wrist.position + way, wrist.orientation))
+    let offset = palm_advance(scene, &still, wrist.transform_vector(Vec3::Z), proposal.advance)?;
+    Some(Pose::new(wrist.position + offset, wrist.orientation))
 }
 
-/// The way along `direction` after which palm or thenar touch, if they are free at first and touch within `most` metres.
-fn free_way(scene: &ObjectScene<'_>, still: &HandSolids, direction: Vec3, most: f32) -> Option<Vec3> {
+/// The offset along `direction` at which palm or thenar touch. `None` if they start inside the object or touch
+/// nothing within `max_advance` metres.
+fn palm_advance(
+    scene: &ObjectScene<'_>,
+    still: &HandSolids,
+    direction: Vec3,
+    max_advance: f32,
+) -> Option<Vec3> {
     let surface = &scene.object.surface;
-    let mut way = 0.0;
-    for _ in 0..MOST_STEPS {
-        let moved = still.moved(direction * way);
+    let mut advanced = 0.0;
+    for _ in 0..MAX_STEPS {
+        let moved = still.moved(direction * advanced);
         let parts = moved.palm.iter().chain(&moved.thenar);
-        let reachable = most - way + TOUCH_DEPTH;
-        let sure = parts
+        let reachable = max_advance - advanced + TOUCH_DEPTH;
+        let lower_bound = parts
             .clone()
             .fold(reachable, |least, part| least.min(surface.least_gap(part)));
-        let gap = if sure > SURE_GAP {
-            sure
+        let gap = if lower_bound > COARSE_GAP {
+            lower_bound
         } else {
-            parts.fold(reachable.min(NEAR), |least, part| {
+            parts.fold(reachable.min(SEARCH_DISTANCE), |least, part| {
                 surface
                     .closest_to_capsule(part, least)
                     .map_or(least, |gap| gap.gap)
             })
         };
-        if way + gap >= most {
+        if advanced + gap >= max_advance {
             return None;
         }
         let free = gap + TOUCH_DEPTH;
         if free < TOUCH_TOLERANCE {
-            return (free > -TOUCH_TOLERANCE).then_some(direction * way);
+            return (free > -TOUCH_TOLERANCE).then_some(direction * advanced);
         }
-        way += free;
+        advanced += free;
     }
-    Some(direction * way)
+    Some(direction * advanced)
 }
 
-/// True if palm or forearm sink into the object or come too near to the giver.
+/// True if palm or forearm penetrate the object or come too close to the giver.
 fn collides_without_digits(
     scene: &ObjectScene<'_>,
     giver: Option<&PreparedHand>,
@@ -351,30 +365,30 @@ fn collides_without_digits(
     let surface = &scene.object.surface;
     palm.iter()
         .chain(forearm)
-        .any(|part| comes_within(part, surface, -DEEPEST))
-        || giver.is_some_and(|giver| giver.is_neared_by(still.still(), GIVER_CLEARANCE))
+        .any(|part| comes_within(part, surface, -MAX_PENETRATION))
+        || giver.is_some_and(|giver| giver.comes_within(still.still(), GIVER_CLEARANCE))
 }
 
-/// How deep the hand is in the object, if that, its distance from the giver's, and its parts' distances from each other
-/// are in order.
+/// The deepest penetration into the object in metres. `None` if it is too deep, the hand is too close to the giver,
+/// or parts of the hand go through each other.
 fn penetration(scene: &ObjectScene<'_>, giver: Option<&PreparedHand>, solids: &HandSolids) -> Option<f32> {
     if self_clearance(solids) < 0.0 {
         return None;
     }
-    // Palm and forearm were compared before the digits closed.
+    // Palm and forearm were checked before the digits closed.
     let moving = solids.phalanges.as_flattened().iter().chain(&solids.thenar);
-    if giver.is_some_and(|giver| giver.is_neared_by(moving, GIVER_CLEARANCE)) {
+    if giver.is_some_and(|giver| giver.comes_within(moving, GIVER_CLEARANCE)) {
         return None;
     }
     let surface = &scene.object.surface;
     let deepest = solids.iter().try_fold(0.0, |least: f32, part| {
         let least = clearance(part, surface, least).min(least);
-        (least >= -DEEPEST).then_some(least)
+        (least >= -MAX_PENETRATION).then_some(least)
     });
     deepest.map(|least| -least)
 }
 
-/// True if a part comes too near to a forbidden surface.
+/// True if a part comes within [`FORBIDDEN_CLEARANCE`] of a forbidden surface.
 pub(super) fn nears_forbidden_surface<'a>(
     scene: &ObjectScene<'_>,
     mut parts: impl Iterator<Item = &'a TaperedCapsule>,

@@ -1,8 +1,8 @@
 //! `PHYSICAL` validity: grasps that a person would believe.
 //!
-//! Where the thesis tests a few segments, the hand is solid here ([`solids`]), and digits close until their flesh touches
-//! ([`closing`]); where it draws force distributions until one is lucky, forces are solved for ([`immobility`]). A hand closed on an
-//! object is a [`grip`].
+//! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
+//! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
+//! ([`immobility`]). A [`grip`] is a hand closed on an object.
 
 mod closer;
 pub mod closing;

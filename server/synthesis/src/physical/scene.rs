@@ -1,4 +1,4 @@
-//! What grips and holds are judged by: the object under a friction, and what a holdout adds to it.
+//! The scene of a grip: the object under some friction, and what a holdout adds to it.
 
 use glam::Vec3;
 
@@ -11,45 +11,45 @@ use crate::{
     model::{holdout::Holdout, object::GraspObject},
 };
 
-/// Smallest Ferrari-Canny epsilon of a grasp on an object that fingers get round. In a simulation, grasps above 0.02 did
-/// not fall under gravity and half of them held against pulls in all directions. A higher one gives firmer grasps and
-/// finds fewer.
-const LEAST_EPSILON: f32 = 0.02;
+/// Smallest Ferrari-Canny epsilon of a valid grasp, without unit, for objects that fingers reach around. In
+/// simulation, grasps above 0.02 did not fall, and half of them resisted pulls in all directions. Higher values give
+/// firmer but fewer grasps.
+const MIN_EPSILON: f32 = 0.02;
 
-/// Of the epsilon that a thin object allows at best, the share that a grasp must have: a rod can only be kept from rolling
-/// by friction at its radius, however it is held.
-const LEAST_SHARE_OF_BEST: f32 = 0.25;
+/// Required share of the best epsilon that a thin object allows: only friction at its radius keeps a rod from
+/// rolling, however it is held.
+const MIN_SHARE_OF_BEST: f32 = 0.25;
 
-/// An object as something to hold: everything that does not depend on how it is held out.
+/// An object to be grasped, with everything that does not depend on how it is held out.
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectScene<'a> {
     /// The object.
     pub object: &'a GraspObject,
     /// Coefficient of static friction between skin and object.
     pub friction: f32,
-    /// Half the diagonal of its box, in metres: how far from the middle a force can act.
+    /// Half the diagonal of its oriented box, in metres: the largest lever of a force about the middle.
     pub characteristic_length: f32,
-    /// The closure that a grip must have.
-    pub least_epsilon: f32,
+    /// Smallest Ferrari-Canny epsilon of a valid grip.
+    pub required_epsilon: f32,
 }
 
 impl<'a> ObjectScene<'a> {
-    /// The object under a friction.
+    /// The object with a friction coefficient between skin and surface.
     pub fn new(object: &'a GraspObject, friction: f32) -> Self {
         let half_extents = object.bounding_box.half_extents;
         let characteristic_length = half_extents.length();
-        // The mean of the two smaller ones: how far from its long axis the surface is.
+        // Mean of the two smaller half extents: the distance of the surface from the long axis.
         let thickness = 0.5 * (half_extents.element_sum() - half_extents.max_element());
         let best = friction * thickness / characteristic_length;
         Self {
             object,
             friction,
             characteristic_length,
-            least_epsilon: LEAST_EPSILON.min(LEAST_SHARE_OF_BEST * best),
+            required_epsilon: MIN_EPSILON.min(MIN_SHARE_OF_BEST * best),
         }
     }
 
-    /// What the contacts have to hold when `up` is against gravity.
+    /// The load on the contacts when `up`, a unit vector in the object's frame, points against gravity.
     pub fn load(&self, up: Vec3) -> Load {
         Load {
             mass: self.object.mass,
@@ -60,25 +60,25 @@ impl<'a> ObjectScene<'a> {
     }
 }
 
-/// What a holdout adds to its object.
+/// What a holdout adds to its object: the giver and the direction of gravity.
 #[derive(Clone, Debug)]
 pub struct Presented {
     /// The giver's hand, in the object's frame.
     pub giver: Option<PreparedHand>,
-    /// The middle of the giver's palm, in metres.
+    /// Centre of the giver's palm, in metres, in the object's frame.
     pub giver_palm: Option<Vec3>,
     /// Unit vector against gravity, in the object's frame.
     pub up: Vec3,
 }
 
 impl Presented {
-    /// How the object of a holdout is presented.
+    /// The giver and gravity of a holdout.
     pub fn of(holdout: &Holdout) -> Self {
-        Self::of_with(Mechanisms::ALL, holdout)
+        Self::with_mechanisms(Mechanisms::ALL, holdout)
     }
 
-    /// [`Presented::of`] by some of the mechanisms.
-    pub(crate) fn of_with(mechanisms: Mechanisms, holdout: &Holdout) -> Self {
+    /// [`Presented::of`] with some of the mechanisms.
+    pub(crate) fn with_mechanisms(mechanisms: Mechanisms, holdout: &Holdout) -> Self {
         let prepared = |solids: &TrackedSolids| {
             if mechanisms.has(Mechanism::GiverOrder) {
                 PreparedHand::new(solids)

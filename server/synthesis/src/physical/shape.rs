@@ -1,4 +1,4 @@
-//! How a hand is held while it closes, and how idle fingers rest.
+//! The shape a hand closes from, how idle fingers rest, and proposals of where to close.
 
 use glam::{Quat, Vec3};
 
@@ -14,39 +14,39 @@ use crate::{
     },
 };
 
-/// Flexion in radians, of all three joints together, with which a hand at rest holds its fingers: about 25° for the
-/// first two and two thirds of it for the last.
+/// Total flexion of a relaxed finger in radians: about 25° in each of the first two joints and two thirds of that in
+/// the last.
 const RESTING_FLEXION: f32 = 1.15;
 
-/// The least and the most of it beside digits that are less or more bent.
-pub(super) const LEAST_RESTING_FLEXION: f32 = 0.5 * RESTING_FLEXION;
-const MOST_RESTING_FLEXION: f32 = 1.5 * RESTING_FLEXION;
+/// Bounds of the total flexion of an idle finger next to straighter or more bent ones, in radians.
+pub(super) const MIN_RESTING_FLEXION: f32 = 0.5 * RESTING_FLEXION;
+const MAX_RESTING_FLEXION: f32 = 1.5 * RESTING_FLEXION;
 
-/// The same of fingers that are tucked away: about nine tenths of their way into the palm, which stops them before.
+/// Total flexion aimed at by tucked fingers, in radians: about nine tenths of full closure. The palm stops them
+/// earlier.
 pub(super) const TUCKED_FLEXION: f32 = 3.8;
 
-/// What an attempt draws of the hand: how the thumb stands, how far the fingers are spread, how the digits bend, and
-/// which of them close on the object. The fingers share a spread and a bend ratio, as those of a person do; drawn one by
-/// one, half of the hands have fingers that cross.
+/// The shape an attempt draws: thumb yaw, finger spread, bend ratios, and which digits close. Fingers share one
+/// spread and one bend ratio, as a person's do; drawn one by one, half of the hands have crossing fingers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandShape {
-    /// Where in its range the thumb's yaw is, from 0 to 1.
+    /// The thumb's yaw as a share of its range, from 0 to 1.
     pub thumb_yaw: f32,
-    /// 0: fingers beside each other or as close as they go, 1: as far apart as they go.
+    /// Spread of the fingers, from 0 (side by side) to 1 (as far apart as they go).
     pub spread: f32,
-    /// Degrees of the second joint for a degree of the first, of the thumb and of the fingers.
+    /// Degrees of the second joint per degree of the first: for the thumb, and for the fingers.
     pub bend_ratios: [f32; 2],
     /// Which digits close, thumb first; the others rest.
     pub closing: [bool; 5],
-    /// How far thumb and fingers are shaped to the object before they close on it: the share of their way from opened to
-    /// closed, from 0 to 1. A hand that is shaped already does not meet with what only an opened one would.
+    /// Fraction of full closure, from 0 to 1, that thumb and fingers start from. A preshaped hand avoids obstacles that only
+    /// an opened one would meet.
     pub preshape: [f32; 2],
-    /// Are fingers that do not close tucked into the palm, instead of resting beside those that do?
+    /// Whether fingers that do not close are tucked into the palm instead of resting next to those that do.
     pub tucks: bool,
 }
 
 impl HandShape {
-    /// A shape as the strategies of chapter 5 draw it: every digit closes.
+    /// A shape drawn as the strategies of chapter 5 do: every digit closes.
     pub fn draw(choice: BendRatioChoice, stream: &mut AttemptStream) -> Self {
         let mut draw_ratio = |digit: Digit| {
             let allowed = allowed_ratios(choice, digit.index());
@@ -63,8 +63,7 @@ impl HandShape {
         }
     }
 
-    /// The shape that a known grip was closed from, as far as its hand shows that: not how it was shaped to the object
-    /// before.
+    /// The shape a known grip was closed from, as far as its pose shows; the preshape is lost.
     pub fn of_grip(rig: &Rig, grip: &Grip) -> Self {
         let yaw_share = |digit: Digit| {
             let AngleRange { min, max } = rig.digit(digit).limits.base_yaw;
@@ -82,7 +81,7 @@ impl HandShape {
         }
     }
 
-    /// Where in its range a digit's yaw is: spread fingers fan out from between middle and ring finger.
+    /// A digit's yaw as a share of its range. Spread fingers fan out about the gap between middle and ring finger.
     fn yaw_share(&self, digit: Digit) -> f32 {
         let fan = match digit {
             Digit::Thumb => return self.thumb_yaw,
@@ -94,8 +93,8 @@ impl HandShape {
         0.5 + fan * self.spread
     }
 
-    /// The flexion of a digit that touches nothing: that of the digits beside it that touch, at most a relaxed hand's and a
-    /// half more; that of a relaxed hand if none does. A digit that is tucked away bends as far as it can.
+    /// Total flexion in radians of a digit that touches nothing: the mean of its touching neighbours, within bounds,
+    /// or that of a relaxed finger if none touches. A tucked digit bends as far as it can.
     pub(super) fn resting_flexion(&self, closed: &[ClosedDigit; 5], digit: usize) -> f32 {
         if self.tucks && !self.closing[digit] {
             return TUCKED_FLEXION;
@@ -116,11 +115,11 @@ impl HandShape {
         if count == 0.0 {
             RESTING_FLEXION
         } else {
-            (sum / count).clamp(LEAST_RESTING_FLEXION, MOST_RESTING_FLEXION)
+            (sum / count).clamp(MIN_RESTING_FLEXION, MAX_RESTING_FLEXION)
         }
     }
 
-    /// How a digit of a hand of this shape bends.
+    /// How a digit of this shape bends.
     pub fn flexing<'a>(&self, rig: &'a Rig, digit: Digit) -> Flexing<'a> {
         let digit_rig = rig.digit(digit);
         let AngleRange { min, max } = digit_rig.limits.base_yaw;
@@ -132,32 +131,33 @@ impl HandShape {
     }
 }
 
-/// How far beside a proposal another one's wrist lies at most, in metres and radians, …
+/// Largest shift (metres, per axis) and turn (radians) of a perturbed wrist, …
 const PERTURBATION: [f32; 2] = [0.006, 0.12];
 
-/// … and how much the thumb's yaw and the fingers' spread differ, as shares of their ranges.
+/// … and largest change of the thumb's yaw and the fingers' spread, as shares of their ranges.
 const SHAPE_PERTURBATION: f32 = 0.1;
 
-/// A hand to be closed.
+/// A hand pose to close from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proposal {
-    /// The wrist frame in the object's.
+    /// Wrist pose in the object's frame.
     pub object_from_wrist: Pose,
-    /// How the hand is held.
+    /// The shape the hand closes from.
     pub shape: HandShape,
-    /// How far the hand goes along its +z, in metres, until the palm touches; 0 if it stays where it is. A palm that does
-    /// not touch by then is no grip.
+    /// Largest distance, in metres, that the hand advances along its +z until the palm touches; 0 if it stays put. A
+    /// palm that does not touch within it is rejected.
     pub advance: f32,
 }
 
 impl Proposal {
-    /// One a little beside, of a hand that is a little different.
+    /// A proposal nearby, with a slightly different shape.
     #[must_use]
     pub fn perturbed(&self, stream: &mut AttemptStream) -> Self {
         self.perturbed_about(self.object_from_wrist.position, PERTURBATION, stream)
     }
 
-    /// The same, turned about a pivot in the object's frame, and shifted, by other limits than those: metres, radians.
+    /// [`Proposal::perturbed`], turned about `pivot` (object frame) and shifted, with given limits in metres and
+    /// radians.
     #[must_use]
     pub fn perturbed_about(&self, pivot: Vec3, [shift, turn]: [f32; 2], stream: &mut AttemptStream) -> Self {
         let Pose {

@@ -1,9 +1,8 @@
-//! Hands as solids: what they leave free of objects and of each other.
+//! Hands as solids, and their clearances from objects and from each other.
 //!
-//! A hand is a union of tapered capsules ([`HandSolids`]; where it is beside another person's, [`TrackedSolids`]). How far
-//! it is from an object's surface, and how deep in it, is asked capsule by capsule ([`clearance()`], [`closest()`],
-//! [`comes_within()`]); how far from other parts of itself by [`self_clearance`], and how far from a giver's hand, of that
-//! hand when it is a [`PreparedHand`].
+//! A hand is a union of tapered capsules: [`HandSolids`], or [`TrackedSolids`] where it meets another person's hand.
+//! [`clearance()`], [`closest()`] and [`comes_within()`] measure a capsule against an object's surface,
+//! [`self_clearance`] a hand against itself, and [`PreparedHand`] a giver's hand against others.
 
 mod flesh;
 mod hand_clearance;

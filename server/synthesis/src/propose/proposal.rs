@@ -16,7 +16,7 @@ use crate::{
     base::{pose::Pose, random::AttemptStream},
     model::object::GraspObject,
     physical::{
-        grip::DEEPEST,
+        grip::MAX_PENETRATION,
         shape::{HandShape, Proposal},
         solids::{PreparedHand, Spheres},
     },
@@ -344,7 +344,8 @@ impl<'a> ProposalContext<'a> {
     /// True if inner spheres of palm and forearm are clear of object and giver. This is a hundred times cheaper than the
     /// whole hand's clearance, which is checked later.
     fn palm_fits(&self, object_from_wrist: Pose) -> bool {
-        self.spheres_fit(object_from_wrist, self.rig.oppositions().inner_spheres(), DEEPEST)
+        let spheres = self.rig.oppositions().inner_spheres();
+        self.spheres_fit(object_from_wrist, spheres, MAX_PENETRATION)
     }
 
     /// True if spheres, given in the wrist's frame, are clear of the giver's hand and at most `depth` metres deep in the
@@ -370,7 +371,7 @@ impl<'a> ProposalContext<'a> {
         self.giver.is_some_and(|giver| {
             spheres
                 .iter()
-                .any(|spheres| giver.surely_nears_any(&spheres.transformed(object_from_wrist), 0.0))
+                .any(|spheres| giver.any_certainly_within(&spheres.transformed(object_from_wrist), 0.0))
         })
     }
 }

@@ -45,7 +45,7 @@ pub struct SurfacePoint {
 impl SurfacePoint {
     /// True unless the point is certainly too close to the giver's hand for a palm.
     pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
-        !giver.surely_nears(self.position, 0.0, PALM_CLEARANCE)
+        !giver.certainly_within(self.position, 0.0, PALM_CLEARANCE)
     }
 }
 
@@ -65,7 +65,7 @@ impl SurfacePair {
     pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
         [self.start, self.end]
             .iter()
-            .all(|&end| !giver.surely_nears(end, 0.0, FINGER_CLEARANCE))
+            .all(|&end| !giver.certainly_within(end, 0.0, FINGER_CLEARANCE))
     }
 }
 

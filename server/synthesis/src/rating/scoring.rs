@@ -105,7 +105,7 @@ pub fn grip_values(
     solids: &HandSolids,
 ) -> Values {
     let mut values = posture_values(scene.object, rig, pose, contacts, classification);
-    values[Term::Closure as usize] = (epsilon / (SAFE_CLOSURE * scene.least_epsilon)).min(1.0);
+    values[Term::Closure as usize] = (epsilon / (SAFE_CLOSURE * scene.required_epsilon)).min(1.0);
     values[Term::Steadiness as usize] = steadiness(scene.object, rig, pose, contacts);
     values[Term::SterileDistance as usize] = sterile_distance(scene.object, solids);
     values

@@ -22,7 +22,7 @@ use crate::{
     },
     physical::{
         flexing::Flexing,
-        grip::{DEEPEST, GIVER_CLEARANCE},
+        grip::{GIVER_CLEARANCE, MAX_PENETRATION},
         scene::{ObjectScene, Presented},
         solids::{HandSolids, TRACKED_SOLIDS, TrackedSolids, comes_within, self_clearance},
     },
@@ -65,7 +65,7 @@ const COMING: Keep = Keep {
 
 /// What the hand keeps to while it closes: it may be as deep as in a grasp.
 const CLOSING: Keep = Keep {
-    object: -DEEPEST,
+    object: -MAX_PENETRATION,
     giver: 0.5 * GIVER_CLEARANCE,
 };
 
@@ -88,7 +88,7 @@ pub fn plan_way(
 ///
 /// `PRE_GRASP` is [`OPEN_CLEARANCE`] and more off the object and [`GIVER_CLEARANCE`] and more off the giver's hand, and
 /// not through itself. On the way there the hand touches neither; closing, it sinks no deeper into the object than
-/// [`DEEPEST`], to a tenth of a millimetre, and touches no forbidden surface. The hand moves in a direction of the cone
+/// [`MAX_PENETRATION`], to a tenth of a millimetre, and touches no forbidden surface. The hand moves in a direction of the cone
 /// `approach`, which is in the object's frame as the rest is; none: in any.
 ///
 /// None if no straight way in was found. The grasp is as valid as others then, but the hand would have to wind its way in.
@@ -278,7 +278,7 @@ impl Planner<'_> {
             .hand
             .iter()
             .any(|solid| comes_within(solid, surface, OPEN_CLEARANCE))
-            && giver.is_none_or(|giver| !giver.is_neared_by(solids.iter(), GIVER_CLEARANCE))
+            && giver.is_none_or(|giver| !giver.comes_within(solids.iter(), GIVER_CLEARANCE))
             && self_clearance(&solids.hand) >= 0.0
     }
 

@@ -19,7 +19,7 @@ use crate::{
         strategy::{Strategy, Validity},
     },
     physical::{
-        grip::settled_wrist,
+        grip::wrist_after_advance,
         scene::{ObjectScene, Presented},
         shape::Proposal,
     },
@@ -101,7 +101,7 @@ impl<'a> Scene<'a> {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
                     ObjectScene::new(&holdout.object, friction),
-                    Presented::of_with(mechanisms, holdout),
+                    Presented::with_mechanisms(mechanisms, holdout),
                 )),
             },
         }
@@ -204,7 +204,7 @@ impl<'a> Scene<'a> {
         let proposal = propose_evenly(&self.place(stream.attempt()), stream, interrupted)?;
         let scene = ObjectScene::new(&self.task.holdout.object, self.thesis.load.friction);
         Some(Proposal {
-            object_from_wrist: settled_wrist(&scene, self.task.rig, &proposal)?,
+            object_from_wrist: wrist_after_advance(&scene, self.task.rig, &proposal)?,
             advance: 0.0,
             ..proposal
         })

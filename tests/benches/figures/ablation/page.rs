@@ -1,4 +1,4 @@
-//! The results as CSV for scripts and as a page for people.
+//! The results as CSV for scripts and as a page for readers.
 
 use std::fmt::Write as _;
 
@@ -7,11 +7,11 @@ use grasp_synthesis::base::mechanisms::Mechanism;
 
 use super::{
     Knowledge, shown,
-    summary::{ANSWERED_COST, Against, Figure, MEDIAN_COST, Own, P99_COST, Results},
+    summary::{ANSWERED_COST, Comparison, Figure, MEDIAN_COST, P99_COST, Results, VariantStats},
 };
 use crate::setting::Setting;
 
-/// A line for each class and variant.
+/// One line per class and variant.
 pub(super) fn csv(all: &[Results]) -> String {
     let mut text = String::from(
         "row,class,without,searches,median_us,p90_us,p99_us,mean_us,wall_median_us,answered_percent,mean_score,\
@@ -28,7 +28,7 @@ pub(super) fn csv(all: &[Results]) -> String {
                 (None, 0) => "nothing (A)",
                 (None, _) => "nothing (B)",
             };
-            let Own {
+            let VariantStats {
                 median,
                 p90,
                 p99,
@@ -58,23 +58,23 @@ pub(super) fn csv(all: &[Results]) -> String {
     text
 }
 
-/// The rule, what all mechanisms reach, the noise, a table per row, and the verdicts.
+/// The rule, the results with all mechanisms on, the noise, one table per kind of knowledge, and the verdicts.
 pub(super) fn page(all: &[Results], setting: &Setting, loads: &[Option<String>; 2]) -> String {
     let load = |load: &Option<String>| load.clone().unwrap_or_else(|| "unknown".to_owned());
     let searches = all.first().map_or(0, |results| results.all_on().count() / 2);
     let mut text = format!(
-        "# What each mechanism of a default search is worth\n\n\
+        "# What each mechanism of a default search contributes\n\n\
          Made by `cargo bench -p grasp-tests --bench figures -- --only ablation --holdouts {searches} --givers {}`; \
          every figure is in `ablation.csv`.\n\n\
          {}; load average {} before and {} after. {searches} searches per class and variant, {} givers per object, \
          50 ms per search, two workers. Each holdout is searched by every variant in turn, in shuffled order and with \
-         the same seed. Times and the 50 ms are processor time, as an idle machine would take it: that of a thread that \
-         works alone, and half of what two workers take together; *wall* is the median on the clock, with what else the \
-         machine did. *warm*: with complete atlases; *cold*: without an atlas. Recent grips are not measured: nobody \
-         asks twice here.\n\n\
+         the same seed. Times and the 50 ms are processor time, the duration on an idle machine: all of a thread that works \
+         alone, and half of what two workers take together; *wall* is the median wall time, including other load on the \
+         machine. *warm*: with complete atlases; *cold*: without an atlas. Recent grips are not measured: no request \
+         repeats here.\n\n\
          **Rule.** A mechanism is removed if its absence costs less than {:.0} % at the median (on either clock), less than {:.0} % at p99 \
          and less than {ANSWERED_COST} percentage points of answers in 50 ms with every class of holdouts. A verdict is \
-         *sure* if the 95 % intervals (bootstrap over holdouts) leave it no choice.\n\n",
+         *sure* if the whole 95 % intervals (bootstrap over holdouts) agree with it.\n\n",
         setting.givers,
         Machine::this(),
         load(&loads[0]),
@@ -84,7 +84,7 @@ pub(super) fn page(all: &[Results], setting: &Setting, loads: &[Option<String>; 
         100.0 * P99_COST,
     );
     text += "## All mechanisms on, and noise\n\n\
-             The last five columns compare a second run of the same with the first.\n\n\
+             The last five columns compare two identical runs.\n\n\
              | row | class | median | p90 | p99 | mean | answered in 50 ms | score | median | wall | p99 | answered | mean |\n\
              |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     for results in all {
@@ -121,14 +121,14 @@ fn points(figure: Figure) -> String {
     format!("{:+.2} ({:+.2} to {:+.2})", figure.value, figure.low, figure.high)
 }
 
-/// Each mechanism off against all on: a line each, columns for each class.
+/// Each mechanism off against all on: one line per mechanism, columns per class.
 fn table(all: &[Results], knowledge: Knowledge) -> String {
     let classes: Vec<&Results> = all
         .iter()
         .filter(|results| results.knowledge == knowledge)
         .collect();
     let mut text = format!(
-        "\n## {}\n\nRatios to all on, with 95 % intervals; answers in 50 ms in percentage points. Bold: beyond the rule's \
+        "\n## {}\n\nRatios to all on, with 95 % intervals; answers within 50 ms in percentage points. Bold: beyond the rule's \
          limit.\n\n| without |",
         knowledge.name()
     );
@@ -166,20 +166,20 @@ fn table(all: &[Results], knowledge: Knowledge) -> String {
     text
 }
 
-fn of(results: &Results, mechanism: Mechanism) -> Option<Against> {
+fn of(results: &Results, mechanism: Mechanism) -> Option<Comparison> {
     let mut variants = results.variants.iter();
     let found = variants.find(|(off, ..)| *off == Some(mechanism));
     found.map(|(_, _, against)| *against)
 }
 
-/// What the rule says of each mechanism that was measured.
+/// The rule's verdict on each measured mechanism.
 fn verdicts(all: &[Results]) -> String {
     let mut text = String::from(
-        "\n## Verdicts\n\nThe most that the absence of a mechanism costs with any class.\n\n\
+        "\n## Verdicts\n\nThe highest cost of a mechanism's absence over all classes.\n\n\
          | mechanism | median | wall | p99 | answered in 50 ms | least score | verdict |\n|---|---:|---:|---:|---:|---:|---|\n",
     );
     for mechanism in Mechanism::ALL {
-        let measured: Vec<(String, Against)> = all
+        let measured: Vec<(String, Comparison)> = all
             .iter()
             .filter_map(|results| {
                 let class = format!("{}, {}", results.knowledge.name(), results.class.name());
@@ -190,18 +190,18 @@ fn verdicts(all: &[Results]) -> String {
             let _ = writeln!(text, "| {mechanism} | | | | | | not measured |");
             continue;
         }
-        let worst = |value: fn(&Against) -> f64| {
+        let worst = |value: fn(&Comparison) -> f64| {
             let worst = measured
                 .iter()
                 .max_by(|(_, a), (_, b)| value(a).total_cmp(&value(b)));
-            worst.expect("some were measured")
+            worst.expect("at least one class was measured")
         };
         let (median_class, median) = worst(|against| against.median.value);
         let (wall_class, wall) = worst(|against| against.wall_median.value);
         let (p99_class, p99) = worst(|against| against.p99.value);
         let (answered_class, answered) = worst(|against| -against.answered.value);
         let (_, score) = worst(|against| -against.score);
-        let costs = |against: &Against, of: fn(&Figure) -> f64, of_answered: fn(&Figure) -> f64| {
+        let costs = |against: &Comparison, of: fn(&Figure) -> f64, of_answered: fn(&Figure) -> f64| {
             of(&against.median).max(of(&against.wall_median)) >= 1.0 + MEDIAN_COST
                 || of(&against.p99) >= 1.0 + P99_COST
                 || of_answered(&against.answered) <= -ANSWERED_COST

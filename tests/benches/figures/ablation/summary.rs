@@ -1,11 +1,11 @@
-//! Quantiles, ratios and how sure they are.
+//! Quantiles and ratios, with confidence intervals.
 
 use grasp_experiment::stats::mean;
 use grasp_synthesis::base::mechanisms::Mechanism;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{Knowledge, Searched};
+use super::{Knowledge, SearchSample};
 
 /// A mechanism is kept if its absence costs this share at the median, …
 pub(super) const MEDIAN_COST: f64 = 0.10;
@@ -16,13 +16,13 @@ pub(super) const P99_COST: f64 = 0.25;
 /// … or this many percentage points of answers in 50 ms, with any class of holdouts.
 pub(super) const ANSWERED_COST: f64 = 0.5;
 
-/// Resamples of a bootstrap interval. More make its ends steadier, in proportion to their root.
+/// Resamples per bootstrap interval. The ends of intervals become steadier with its square root.
 const RESAMPLES: usize = 400;
 
 /// Seed of the resamples.
 const SEED: u64 = 20_180_614;
 
-/// Holdouts that are judged together.
+/// Holdouts that are summarised together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Class {
     /// The fifteen built-in ones.
@@ -47,7 +47,7 @@ impl Class {
     }
 }
 
-/// A figure with the ends of its 95 % interval.
+/// A value with its 95 % interval.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Figure {
     pub(crate) value: f64,
@@ -55,64 +55,64 @@ pub(crate) struct Figure {
     pub(crate) high: f64,
 }
 
-/// One variant against all mechanisms on.
+/// One variant compared with all mechanisms on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Against {
+pub(crate) struct Comparison {
     /// Ratio of the medians.
     pub(crate) median: Figure,
-    /// The same of wall times.
+    /// Ratio of the median wall times.
     pub(crate) wall_median: Figure,
     /// Ratio of the p99.
     pub(crate) p99: Figure,
-    /// Percentage points more or fewer answered in 50 ms.
+    /// Difference of the share answered within 50 ms, in percentage points.
     pub(crate) answered: Figure,
     /// Ratio of the means.
     pub(crate) mean: Figure,
-    /// Ratio of mean scores, of holdouts that both answer.
+    /// Ratio of mean scores over holdouts that both answer.
     pub(crate) score: f64,
 }
 
-/// A variant's own figures; times in seconds.
+/// Statistics of one variant; times in seconds.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Own {
+pub(crate) struct VariantStats {
     pub(crate) median: f64,
     pub(crate) p90: f64,
     pub(crate) p99: f64,
     pub(crate) mean: f64,
     pub(crate) wall_median: f64,
-    /// Share answered in 50 ms.
+    /// Share answered within 50 ms.
     pub(crate) answered: f64,
     pub(crate) score: f64,
 }
 
-/// What one class came to.
+/// The results of one class.
 pub(crate) struct Results {
     pub(crate) knowledge: Knowledge,
     pub(crate) class: Class,
-    /// For each variant: what is off, its figures, and its figures against all on.
-    pub(crate) variants: Vec<(Option<Mechanism>, Own, Against)>,
-    baseline: Vec<Searched>,
+    /// Per variant: the mechanism switched off, its statistics, and the comparison with all on.
+    pub(crate) variants: Vec<(Option<Mechanism>, VariantStats, Comparison)>,
+    baseline: Vec<SearchSample>,
 }
 
 impl Results {
-    /// The first two variants have all mechanisms on.
+    /// Summarises samples per variant; the first two variants have all mechanisms on.
     pub(super) fn of(
         knowledge: Knowledge,
         class: Class,
         variants: &[Option<Mechanism>],
-        searched: &[Vec<Searched>],
+        searched: &[Vec<SearchSample>],
     ) -> Self {
         let (first, second) = (&searched[0], &searched[1]);
-        let against = |number: usize, searched: &Vec<Searched>| match number {
-            0 => against(&[first], first),
-            1 => against(&[first], second),
-            _ => against(&[first, second], searched),
+        let comparison = |number: usize, searched: &Vec<SearchSample>| match number {
+            0 => compare(&[first], first),
+            1 => compare(&[first], second),
+            _ => compare(&[first, second], searched),
         };
         let variants = variants
             .iter()
             .zip(searched)
             .enumerate()
-            .map(|(number, (off, searched))| (*off, own(searched), against(number, searched)))
+            .map(|(number, (off, searched))| (*off, stats(searched), comparison(number, searched)))
             .collect();
         let baseline = searched[..2].concat();
         Self {
@@ -124,29 +124,29 @@ impl Results {
     }
 
     /// Every search with all mechanisms on.
-    pub(super) fn all_on(&self) -> impl Iterator<Item = Searched> {
+    pub(super) fn all_on(&self) -> impl Iterator<Item = SearchSample> {
         self.baseline.iter().copied()
     }
 
-    /// What two runs of the same differ by.
-    pub(super) fn noise(&self) -> Against {
+    /// Comparison of the two identical runs.
+    pub(super) fn noise(&self) -> Comparison {
         self.variants[1].2
     }
 
-    /// All on, both runs together.
-    pub(super) fn baseline(&self) -> Own {
-        own(&self.baseline)
+    /// Statistics with all mechanisms on, over both runs.
+    pub(super) fn baseline(&self) -> VariantStats {
+        stats(&self.baseline)
     }
 }
 
-/// A quantile of numbers that are sorted.
+/// A quantile of sorted numbers.
 fn sorted_quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * (sorted.len() - 1) as f64;
     let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
     below + (above - below) * place.fract()
 }
 
-fn own(searched: &[Searched]) -> Own {
+fn stats(searched: &[SearchSample]) -> VariantStats {
     let mut times: Vec<f64> = searched.iter().map(|one| one.time.as_secs_f64()).collect();
     times.sort_by(f64::total_cmp);
     let wall_times = searched.iter().map(|one| one.wall_time.as_secs_f64());
@@ -157,7 +157,7 @@ fn own(searched: &[Searched]) -> Own {
         .filter_map(|one| one.score)
         .map(f64::from)
         .collect();
-    Own {
+    VariantStats {
         median: sorted_quantile(&times, 0.5),
         p90: sorted_quantile(&times, 0.9),
         p99: sorted_quantile(&times, 0.99),
@@ -168,16 +168,16 @@ fn own(searched: &[Searched]) -> Own {
     }
 }
 
-/// Ratios and differences of a variant to runs with all on; intervals by a bootstrap over the holdouts, which both share.
-fn against(all_on: &[&Vec<Searched>], searched: &[Searched]) -> Against {
+/// Compares a variant with runs with all mechanisms on. Intervals are bootstrapped over the holdouts that both share.
+fn compare(all_on: &[&Vec<SearchSample>], searched: &[SearchSample]) -> Comparison {
     let count = searched.len();
     let of = |holdouts: &[usize]| {
-        let all: Vec<Searched> = all_on
+        let all: Vec<SearchSample> = all_on
             .iter()
             .flat_map(|run| holdouts.iter().map(|&holdout| run[holdout]))
             .collect();
-        let without: Vec<Searched> = holdouts.iter().map(|&holdout| searched[holdout]).collect();
-        let (all, without) = (own(&all), own(&without));
+        let without: Vec<SearchSample> = holdouts.iter().map(|&holdout| searched[holdout]).collect();
+        let (all, without) = (stats(&all), stats(&without));
         [
             without.median / all.median,
             without.p99 / all.p99,
@@ -209,7 +209,7 @@ fn against(all_on: &[&Vec<Searched>], searched: &[Searched]) -> Against {
         .filter_map(|(all, without)| Some((f64::from(all.score?), f64::from(without.score?))))
         .collect();
     let sum = |of: fn(&(f64, f64)) -> f64| scores.iter().map(of).sum::<f64>();
-    Against {
+    Comparison {
         median: figure(0),
         p99: figure(1),
         answered: figure(2),

@@ -22,7 +22,7 @@ use crate::{
         score::Term,
     },
     physical::{
-        contacts::contact_normal, grip::Grip, immobility::MOST_CONTACTS, shape::HandShape, solids::HandSolids,
+        contacts::contact_normal, grip::Grip, immobility::MAX_CONTACTS, shape::HandShape, solids::HandSolids,
     },
     rating::{scoring::posture_values, taxonomy::classify},
 };
@@ -107,7 +107,7 @@ pub(super) fn read_entry(
     let friction_uses = read_friction_uses(reader)?;
     let sets = reader.u16()?;
     let count = usize::from(reader.u8()?);
-    if count > MOST_CONTACTS {
+    if count > MAX_CONTACTS {
         return Err(AtlasError::Malformed("a grip has too many contacts"));
     }
     let mesh = object.surface.mesh();

@@ -1,85 +1,82 @@
-//! Force balance: which contact forces hold the object against gravity.
+//! Force balance: contact forces that hold the object against gravity.
 
 use glam::{DVec3, Vec3};
 
 use super::{
-    Balance, Buffers, FrictionUse, Load, MOST_CONTACTS, SoftContact,
+    Balance, Buffers, FrictionUse, Load, MAX_CONTACTS, SoftContact,
     contact_model::{ContactCone, ScaledWrench, UnitPush, dot},
     least_squares::{Column, ConicLeastSquares},
 };
 use crate::model::forces::{COMFORTABLE_SHARES, GRAVITY};
 
-/// The most force at a contact in newtons: peak force of a finger (thesis 2.5, after Didomenico and Nussbaum). A smaller
-/// one refuses heavy objects.
+/// Largest force at a contact, in newtons: peak force of a finger (thesis 2.5, after Didomenico and Nussbaum).
+/// Smaller values reject heavy objects.
 pub const MAX_CONTACT_FORCE: f32 = 27.0;
 
-/// How long the unbalanced wrench may be, as a share of the weight. The thesis' 5 degrees are 9 %, and objects held like
-/// that fall in a simulation; a smaller share refuses more grasps.
+/// Largest unbalanced wrench, as a share of the weight. The thesis' 5 degrees are 9 %, and objects held like that
+/// fall in simulation. Smaller values reject more grasps.
 pub const BALANCE_TOLERANCE: f32 = 0.02;
 
-/// How firmly the digits press where balance leaves it open: the sum of their normal forces times friction, over the
-/// weight. 1 is the least with which two opposed digits hold anything; people keep a margin above that (Westling and
-/// Johansson 1984), and what a giver lets go of may be pushed. In a simulation by others, of 150 grips 38 % bore pushes of
-/// their object's weight from all sides with 3, 67 % where 16 N were the least, and 67 % with 5 and [`SURE_GRIP`] (all
-/// three before [`FrictionUse`]).
+/// Firm sum of the digits' normal forces times friction, over the weight. Two opposed digits need at least 1; people
+/// keep a margin (Westling and Johansson 1984), and a released object may be pushed.
 const FIRMNESS: f64 = 5.0;
 
-/// Newtons that the digits press with together beside that: nobody takes even a scalpel of 20 grams more gingerly than a
-/// pen. Twice as much makes what is thin turn out of the hand.
-const SURE_GRIP: f64 = 8.0;
+/// Part of the firm force that does not depend on the weight, in newtons: even a 20 g scalpel is held as firmly as a
+/// pen. Twice as much makes thin objects turn out of the hand.
+const BASE_GRIP_FORCE: f64 = 8.0;
 
-/// The firmness aimed at puts no digit beyond this share of [`MAX_CONTACT_FORCE`]; nobody lifts with all their strength
-/// more firmly than necessary.
+/// The firm sum puts no digit beyond this share of [`MAX_CONTACT_FORCE`]: people do not grip at full strength.
 const FIRM_SHARE_OF_MAX: f64 = 0.5;
 
-/// Share of friction and torsion of [`FrictionUse::Sparing`]: with it, twice the load does not slip either.
-const FINGER_SUBSET_SHARE: f64 = 0.45;
+/// Share of friction and torsion of [`FrictionUse::Low`]: twice the load does not slip either.
+const LOW_SHARE: f64 = 0.45;
 
-/// Of [`FrictionUse::Moderate`]: half as much again as the load holds.
+/// Share of [`FrictionUse::Moderate`]: one and a half times the load holds.
 const MODERATE_SHARE: f64 = 0.7;
 
-/// Of [`FrictionUse::Full`]: all of it, but for what rounding to single precision may add.
+/// Share of [`FrictionUse::Full`]: all, less what rounding to single precision may add.
 const FULL_SHARE: f64 = 1.0 - 2e-6;
 
-/// Digits that press with this share of the sum aimed at press firmly. A larger one uses up friction for the last newtons,
-/// a smaller one lets what is thin be held by a few tenths of a newton, out of which it creeps.
+/// Digits press firmly from this share of the firm sum. Larger values spend friction on the last newtons; smaller
+/// ones hold thin objects by a few tenths of a newton, from which they creep.
 const FIRM_ENOUGH: f64 = 0.5;
 
-/// Weight of uncomfortable shares, as shares of the firm sum, against unbalanced wrench.
+/// Weight of deviations from the comfortable shares (of the firm sum) against unbalanced wrench.
 const SHARE_WEIGHT: f64 = 0.04;
 
-/// Weight of firmness, as a share of the firm sum, against unbalanced wrench: of contacts that cannot press firmly without
-/// upsetting the balance, firmness takes at most half of this, which is the whole [`BALANCE_TOLERANCE`]. More would
-/// refuse their forces, far less would drown in rounding.
+/// Weight of missing firmness (as a share of the firm sum) against unbalanced wrench. Contacts that cannot press
+/// firmly in balance then lose at most half of this, the whole [`BALANCE_TOLERANCE`]. More would reject their forces,
+/// far less would drown in rounding.
 const FIRMNESS_WEIGHT: f64 = 0.04;
 
-/// Weight of a contact's limit against unbalanced wrench: what is over the limit costs a thousand times as much.
+/// Weight of a contact's force limit against unbalanced wrench: force beyond the limit costs about a thousand times
+/// as much.
 const LIMIT_WEIGHT: f64 = 30.0;
 
-/// The search for any balance ends at this share of [`BALANCE_TOLERANCE`]: it has been found.
+/// The search for any balance ends once the residual is below this share of [`BALANCE_TOLERANCE`].
 const FOUND: f64 = 0.5;
 
-/// A push that goes less than this with the residual does not help to balance any more.
+/// A push that gains less than this along the residual no longer helps to balance.
 const NEGLIGIBLE_GAIN: f64 = 1e-6;
 
-/// A push that gains less than this share of what the first newton gains for firmness makes the forces no more
-/// comfortable: sums and shares that differ by some percent are equally so. A smaller one takes longer.
+/// A push that gains less than this share of what the first newton gains for firmness does not improve comfort: sums
+/// and shares that differ by some percent are equally comfortable. Smaller values take longer.
 const NEGLIGIBLE_COMFORT: f64 = 0.01;
 
-/// Columns tried for each of the two questions. Most grasps need a dozen.
+/// Limit on the columns added per solve. Most grasps need a dozen.
 const MAX_COLUMNS: usize = 60;
 
-/// Rows in front of all: the wrench.
+/// Leading rows: the wrench.
 const WRENCH_ROWS: usize = 6;
 
-/// Rows behind all: the digits' shares and their sum.
+/// Trailing rows: the digits' shares and their sum.
 const COMFORT_ROWS: usize = 6;
 
-/// Fours of rows where forces are not limited, and where those of up to [`MOST_CONTACTS`] are.
+/// Groups of four rows: without force limits, and with those of up to [`MAX_CONTACTS`].
 const UNLIMITED_FOURS: usize = (WRENCH_ROWS + COMFORT_ROWS).div_ceil(4);
-const LIMITED_FOURS: usize = (WRENCH_ROWS + MOST_CONTACTS + COMFORT_ROWS).div_ceil(4);
+const LIMITED_FOURS: usize = (WRENCH_ROWS + MAX_CONTACTS + COMFORT_ROWS).div_ceil(4);
 
-/// What finds forces, kept for its memory.
+/// The least-squares solvers, kept for their memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Solvers {
     unlimited: ConicLeastSquares<UNLIMITED_FOURS>,
@@ -88,20 +85,20 @@ pub(super) struct Solvers {
 }
 
 /// Forces inside the friction limits, each at most [`MAX_CONTACT_FORCE`], that balance gravity within
-/// [`BALANCE_TOLERANCE`]. Of those, ones that are firm and keep off the friction limits if there are any; their digits'
-/// shares as near to the comfortable ones (Eq. 4.6) as balance allows, and their sum near to a firm grip. The palm may
-/// press as it likes. `None` if there are none.
+/// [`BALANCE_TOLERANCE`]; `None` if there are none. Forces that are firm and keep off the friction limits are
+/// preferred. The digits' shares are as close to the comfortable ones (Eq. 4.6) as balance allows, and their sum to
+/// the firm force; the palm is free.
 ///
-/// Limits are kept exactly; where balance is at the very edge of its tolerance, forces may be missed.
+/// Limits hold exactly. At the very edge of the balance tolerance, forces may be missed.
 ///
 /// # Panics
-/// There are more than [`MOST_CONTACTS`].
+/// There are more than [`MAX_CONTACTS`].
 pub fn balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Option<Balance> {
-    balance_with(contacts, load, FrictionUse::Sparing, buffers)
+    balance_with(contacts, load, FrictionUse::Low, buffers)
 }
 
-/// [`balance`] with forces that use at least as much friction as is said: for contacts of which it is known that they
-/// press firmly with no less under a load like this one. It takes half as long as to find that out.
+/// [`balance`] starting from `least_use`, for contacts known not to press firmly with less friction under a similar
+/// load. It takes half the time of finding that out.
 ///
 /// # Panics
 /// As [`balance`].
@@ -115,8 +112,8 @@ pub fn balance_with(
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
-    // Contacts that have closure hold nearly everything.
-    if let Some(found) = problem.safest_balance(least_use, solvers) {
+    // Contacts with closure hold nearly any load.
+    if let Some(found) = problem.lowest_friction_balance(least_use, solvers) {
         return Some(found);
     }
     let mut found = problem.best(solvers);
@@ -128,15 +125,15 @@ pub fn balance_with(
     (found.residual <= BALANCE_TOLERANCE).then_some(found)
 }
 
-/// Newtons that the digits press with together, normal to the surface, to hold a weight in newtons firmly.
+/// Sum of the digits' normal forces, in newtons, that holds a weight in newtons firmly.
 pub(crate) fn firm_force(weight: f64, friction: f64) -> f64 {
-    SURE_GRIP + FIRMNESS / friction * weight
+    BASE_GRIP_FORCE + FIRMNESS / friction * weight
 }
 
-/// Non-negative least squares for one grasp. Forces are in units of the weight.
+/// The least-squares problem of one grasp. Forces are in units of the weight.
 ///
-/// Rows: the wrench; then, if limited, one a contact that sets its force and a slack equal to the limit; then, if
-/// comfortable, one a digit for its share and one for the sum of all.
+/// Rows: the wrench; if limited, one per contact that equates its force and a slack with the limit; if comfortable,
+/// one per digit for its share and one for the sum of all.
 struct Problem<'a> {
     contacts: &'a [SoftContact],
     cones: &'a [ContactCone],
@@ -144,11 +141,11 @@ struct Problem<'a> {
     weight: f64,
     length: f64,
     up: DVec3,
-    /// Comfortable shares of the digits that touch, scaled to sum one.
+    /// Comfortable shares of the touching digits, scaled to sum to one.
     shares: [f64; 5],
-    /// Sum of the digits' normal forces to aim at.
+    /// Target sum of the digits' normal forces.
     firm_sum: f64,
-    /// Weights of a weight's force in the rows of shares and of firmness.
+    /// Weights of one weight's force in the rows of shares and of firmness.
     share_weight: f64,
     firmness_weight: f64,
     friction_use: FrictionUse,
@@ -169,9 +166,9 @@ impl<'a> Problem<'a> {
         }
         let sum: f64 = shares.iter().sum();
         let largest = shares.iter().fold(0.0, |a: f64, &b| a.max(b));
-        let strongest = FIRM_SHARE_OF_MAX * f64::from(MAX_CONTACT_FORCE) / weight;
+        let max_firm_force = FIRM_SHARE_OF_MAX * f64::from(MAX_CONTACT_FORCE) / weight;
         let firm_sum = if sum > 0.0 {
-            (firm_force(weight, friction) / weight).min(strongest * sum / largest)
+            (firm_force(weight, friction) / weight).min(max_firm_force * sum / largest)
         } else {
             0.0
         };
@@ -191,9 +188,9 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The comfortable balance that is firm with the least friction from `least_use` on, or else the firmest, if there is
-    /// one.
-    fn safest_balance(&mut self, least_use: FrictionUse, solvers: &mut Solvers) -> Option<Balance> {
+    /// The comfortable balance that is firm with the least friction use, starting at `least_use`; otherwise the
+    /// firmest one found.
+    fn lowest_friction_balance(&mut self, least_use: FrictionUse, solvers: &mut Solvers) -> Option<Balance> {
         let mut firmest: Option<(f64, Balance)> = None;
         for friction_use in FrictionUse::ALL {
             if friction_use < least_use {
@@ -223,7 +220,7 @@ impl<'a> Problem<'a> {
         f64::from(sum) / self.weight
     }
 
-    /// The comfortable balance with so much friction, if there is one.
+    /// The comfortable balance within this friction use, if there is one.
     fn comfortable_balance(&mut self, friction_use: FrictionUse, solvers: &mut Solvers) -> Option<Balance> {
         let was_limited = self.limited;
         self.comfortable = true;
@@ -240,7 +237,7 @@ impl<'a> Problem<'a> {
         (found.residual <= BALANCE_TOLERANCE).then_some(found)
     }
 
-    /// The largest force at a contact over the weight.
+    /// Largest force at a contact, over the weight.
     fn limit(&self) -> f64 {
         f64::from(MAX_CONTACT_FORCE) / self.weight
     }
@@ -249,7 +246,7 @@ impl<'a> Problem<'a> {
         if self.limited { self.contacts.len() } else { 0 }
     }
 
-    /// The best forces, by what is asked for.
+    /// The best forces for the current rows.
     fn best(&self, solvers: &mut Solvers) -> Balance {
         let Solvers {
             unlimited,
@@ -265,7 +262,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Adds pushes until none helps. `entries` is a buffer.
+    /// Adds pushes until none improves the solution. `entries` is a buffer.
     fn solve<const FOURS: usize>(&self, solver: &mut ConicLeastSquares<FOURS>, entries: &mut Vec<f64>) {
         let rows = WRENCH_ROWS + self.limit_rows() + if self.comfortable { COMFORT_ROWS } else { 0 };
         entries.clear();
@@ -290,39 +287,40 @@ impl<'a> Problem<'a> {
             if !self.comfortable && length < FOUND * f64::from(BALANCE_TOLERANCE) {
                 return;
             }
-            let mut most = if self.comfortable {
+            let mut best_gain = if self.comfortable {
                 NEGLIGIBLE_COMFORT * self.firmness_weight.powi(2) * self.firm_sum.max(1.0)
             } else {
                 NEGLIGIBLE_GAIN
             };
             let mut best = None;
-            let of_comfort = self.comfort_gains(solver.residual());
+            let comfort_gains = self.comfort_gains(solver.residual());
             for (contact, cone) in self.cones.iter().enumerate() {
-                // The residual times the push's column, without writing that; without limits, without the push either.
+                // The residual times the push's column, without writing that column; without limits, without
+                // computing the push either.
                 let (mut gain, push) = if self.limited {
-                    let (gain, push) = self.worthiest_push(contact, solver.residual());
+                    let (gain, push) = self.best_push(contact, solver.residual());
                     (gain, Some(push))
                 } else {
                     (cone.reach(&unbalanced, share), None)
                 };
                 if let Some(digit) = self.contacts[contact].digit {
-                    gain += of_comfort[digit.index()];
+                    gain += comfort_gains[digit.index()];
                 }
-                if gain > most {
-                    most = gain;
+                if gain > best_gain {
+                    best_gain = gain;
                     best = Some((contact, push));
                 }
             }
             let slack = (0..self.limit_rows())
                 .map(|row| (LIMIT_WEIGHT * solver.residual()[WRENCH_ROWS + row], row))
                 .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
-            // What is left is perpendicular to what is balanced, so that pushes and slacks, together at most `strength`,
-            // can shorten it by no more than they gain along it.
-            let gained = strength * most.max(slack.0);
+            // The residual is perpendicular to the solution, so pushes and slacks, together at most `strength`, can
+            // shorten it by no more than they gain along it.
+            let gained = strength * best_gain.max(slack.0);
             if !self.comfortable && length - gained / length > f64::from(BALANCE_TOLERANCE) {
                 return;
             }
-            if slack.0 > most {
+            if slack.0 > best_gain {
                 entries.fill(0.0);
                 entries[WRENCH_ROWS + slack.1] = LIMIT_WEIGHT;
                 if solver.add(entries, Column::Slack) {
@@ -340,21 +338,21 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The push of a contact that helps most where forces are limited, and how much it helps beside comfort.
-    fn worthiest_push(&self, contact: usize, residual: &[f64]) -> (f64, UnitPush) {
+    /// The most useful push of a contact where forces are limited, and its gain apart from comfort.
+    fn best_push(&self, contact: usize, residual: &[f64]) -> (f64, UnitPush) {
         let unbalanced: ScaledWrench = std::array::from_fn(|k| residual[k]);
-        // Once a contact's forces are over its limit, each newton more is to be paid for.
+        // Once a contact's forces exceed its limit, each further newton has a price.
         let price = (-residual[WRENCH_ROWS + contact] * LIMIT_WEIGHT / self.limit()).max(0.0);
-        self.cones[contact].worthiest_push(&unbalanced, share(self.friction_use), price)
+        self.cones[contact].best_push_at_price(&unbalanced, share(self.friction_use), price)
     }
 
-    /// What a push takes of its contact's limit.
+    /// How much of its contact's limit a push uses.
     fn limit_entry(&self, push: &UnitPush) -> f64 {
-        // Forces at a contact add up to at most the sum of their lengths.
+        // The length of a sum of forces is at most the sum of their lengths.
         LIMIT_WEIGHT * push.force.length() / self.limit()
     }
 
-    /// What a push of each digit gains in the rows of comfort.
+    /// Gain of a push of each digit in the comfort rows.
     fn comfort_gains(&self, residual: &[f64]) -> [f64; 5] {
         if !self.comfortable {
             return [0.0; 5];
@@ -374,7 +372,7 @@ impl<'a> Problem<'a> {
         }
         comfort.fill(0.0);
         if let (true, Some(digit)) = (self.comfortable, self.contacts[contact].digit) {
-            // Of digit d: its normal force less its share of the sum of all digits.
+            // Row of digit d: its normal force minus its share of the sum of all digits.
             for (row, share) in comfort.iter_mut().zip(self.shares) {
                 *row = -self.share_weight * share;
             }
@@ -405,7 +403,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// What the pushes leave unbalanced, over the weight.
+    /// Length of the wrench that the pushes leave unbalanced, over the weight.
     fn residual(&self, pushes: &[UnitPush]) -> f32 {
         let [x, y, z] = self.up.to_array();
         let mut left = [x, y, z, 0.0, 0.0, 0.0];
@@ -417,7 +415,7 @@ impl<'a> Problem<'a> {
         dot(&left, &left).sqrt() as f32
     }
 
-    /// Shortens what is over the limit, as equations with weights leave a little.
+    /// Shortens forces beyond the limit, because weighted equations leave a small excess.
     fn keep_limits(&self, balance: &mut Balance) {
         if !exceeds_limit(balance) {
             return;
@@ -442,10 +440,10 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Of friction and torsion, how much may be used.
+/// Usable share of friction and torsion.
 fn share(friction_use: FrictionUse) -> f64 {
     match friction_use {
-        FrictionUse::Sparing => FINGER_SUBSET_SHARE,
+        FrictionUse::Low => LOW_SHARE,
         FrictionUse::Moderate => MODERATE_SHARE,
         FrictionUse::Full => FULL_SHARE,
     }
@@ -458,7 +456,7 @@ fn exceeds_limit(balance: &Balance) -> bool {
         .any(|force| force.length() > MAX_CONTACT_FORCE)
 }
 
-/// Rounded down, so that the limit holds in single precision too.
+/// Rounds down, so that the limit holds in single precision too.
 fn shortened(force: Vec3, factor: f32) -> Vec3 {
     force * (factor * (1.0 - f32::EPSILON * 2.0))
 }

@@ -1,4 +1,4 @@
-//! Closure: how large a disturbance the contacts can resist.
+//! Closure: the largest disturbance that the contacts resist in every direction.
 
 use super::{
     Buffers, Load, SoftContact,
@@ -6,29 +6,29 @@ use super::{
     polytope::Polytope,
 };
 
-/// How much of the true epsilon [`epsilon`] may leave out, as a share of it. A smaller one costs time: the polytope grows
-/// until it is that near.
+/// Relative error of [`epsilon`], which is a lower bound. Smaller values take longer: the polytope grows until it is
+/// that close.
 pub const EPSILON_TOLERANCE: f32 = 0.05;
 
-/// Steps of Gilbert's algorithm that look for a disturbance nobody resists before a polytope is built. More find more
-/// of those, but cost every grasp that has closure.
+/// Steps of Gilbert's algorithm that look for an unresisted disturbance before a polytope is built. More steps reject
+/// more grasps early but slow down every grasp with closure.
 const GILBERT_STEPS: usize = 12;
 
-/// When so many facets have been made, some 1 ms of work, the bound is taken as it is. Grasps need about 1,000; more
-/// would only bring epsilon nearer for those that hold equally badly in very many directions.
+/// Limit on the facets built, some 1 ms of work; the bound reached by then is returned. Grasps need about 1,000; only
+/// grasps equally weak in very many directions need more.
 const MAX_FACETS_MADE: usize = 10_000;
 
-/// Contacts that resist less than this in some direction have no closure: below, single precision decides.
+/// Contacts that resist less than this in some direction have no closure: below it, single precision decides.
 const NO_CLOSURE: f64 = 1e-6;
 
-/// Ferrari and Canny's epsilon (1992) of soft-finger contacts: the radius of the largest ball about the origin inside the
-/// convex hull of the unit wrenches of all contacts. That is the L1 convention: the normal forces sum to one newton. The
-/// number is the longest disturbance, as a share of the summed normal forces, that the contacts resist from wherever it
-/// comes; torque is over the characteristic length, and the number without unit. 0 if there is no closure.
+/// Ferrari and Canny's epsilon (1992) of soft-finger contacts: the radius of the largest ball about the origin inside
+/// the convex hull of the unit wrenches of all contacts. This is the L1 convention, in which the normal forces sum to
+/// one newton: epsilon is the largest disturbance, as a share of the summed normal forces, that the contacts resist
+/// in every direction. Torque is divided by the characteristic length, so epsilon has no unit. 0 means no closure.
 ///
-/// The value is a lower bound, at most [`EPSILON_TOLERANCE`] below the true one unless that took more than about 1 ms. If it cannot reach `required`, the search
-/// ends as soon as that is certain, and the value is only some number below `required`; with `required` 0, it is always
-/// followed to its end.
+/// The value is a lower bound, within [`EPSILON_TOLERANCE`] of the true one unless that takes more than about 1 ms.
+/// With `required` above 0, the search ends as soon as epsilon cannot reach it, and the value is merely some number
+/// below `required`.
 pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &mut Buffers) -> f32 {
     let resisted = least_resisted(model(contacts, load, &mut buffers.cones));
     let required = f64::from(required);
@@ -41,7 +41,7 @@ pub fn epsilon(contacts: &[SoftContact], load: &Load, required: f32, buffers: &m
     inscribed_sphere(&buffers.cones, resisted, required, &mut buffers.polytope) as f32
 }
 
-/// At most how much [`epsilon`] is, found in a tenth of the time; 0 if there surely is no closure.
+/// An upper bound of [`epsilon`], in a tenth of the time; 0 if there is certainly no closure.
 pub fn epsilon_upper_bound(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> f32 {
     least_resisted(model(contacts, load, &mut buffers.cones)) as f32
 }
@@ -53,9 +53,9 @@ fn model<'a>(contacts: &[SoftContact], load: &Load, cones: &'a mut Vec<ContactCo
     cones
 }
 
-/// An upper bound of epsilon, 0 if there surely is no closure: Gilbert's algorithm (1966) walks to the point of the
-/// hull that is nearest to the origin. While the origin is outside or near the surface, the directions on its way are
-/// those that the contacts resist least.
+/// An upper bound of epsilon, 0 if there is certainly no closure. Gilbert's algorithm (1966) walks to the point of
+/// the hull nearest to the origin; while the origin is outside or near the surface, its directions are those that the
+/// contacts resist least.
 fn least_resisted(cones: &[ContactCone]) -> f64 {
     let mut point: ScaledWrench = [0.0; 6];
     for cone in cones {
@@ -75,7 +75,7 @@ fn least_resisted(cones: &[ContactCone]) -> f64 {
         if upper <= NO_CLOSURE {
             return 0.0;
         }
-        // The nearest point to the origin on the segment to the new wrench.
+        // The point nearest to the origin on the segment to the new wrench.
         let step: ScaledWrench = std::array::from_fn(|k| wrench[k] - point[k]);
         let share = (-dot(&point, &step) / dot(&step, &step)).clamp(0.0, 1.0);
         for (x, s) in point.iter_mut().zip(step) {
@@ -85,8 +85,8 @@ fn least_resisted(cones: &[ContactCone]) -> f64 {
     upper
 }
 
-/// Epsilon from below. The polytope's facet nearest to the origin bounds it from below, what the contacts resist along
-/// that facet's normal from above; the wrench that does so becomes a new vertex, until the bounds meet.
+/// Epsilon from below. The polytope's facet nearest to the origin gives a lower bound, the reach of the contacts
+/// along its normal an upper one; the wrench with that reach becomes a new vertex, until the bounds meet.
 fn inscribed_sphere(cones: &[ContactCone], upper: f64, required: f64, polytope: &mut Polytope) -> f64 {
     if !polytope.start(|direction| farthest_wrench(cones, direction)) {
         return 0.0;
@@ -105,7 +105,7 @@ fn inscribed_sphere(cones: &[ContactCone], upper: f64, required: f64, polytope: 
         }
         let near = lower >= (1.0 - f64::from(EPSILON_TOLERANCE)) * upper;
         if near || polytope.facets_made() > MAX_FACETS_MADE || !polytope.expand(facet, wrench) {
-            // Rounding must not lift the bound above what is certain.
+            // Rounding must not lift the result above the upper bound.
             return lower.clamp(0.0, upper);
         }
     }

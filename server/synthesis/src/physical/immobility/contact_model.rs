@@ -4,17 +4,17 @@ use glam::DVec3;
 
 use super::{Load, SoftContact};
 
-/// A force and its torque about the centre of mass over the characteristic length.
+/// A force, and its torque about the centre of mass over the characteristic length.
 pub(super) type ScaledWrench = [f64; 6];
 
-/// Product of two vectors of equally many numbers.
+/// Dot product of two slices of equal length.
 #[inline]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four sums side by side: one has to wait for each addition before it can start the next.
+    // Four independent sums: a single one would wait for each addition before starting the next.
     let (a_fours, a_rest) = a.as_chunks::<4>();
     let (b_fours, b_rest) = b.as_chunks::<4>();
     let mut sums = [0.0; 4];
-    // Indices, as zipped iterators stay calls where this is called from.
+    // Indexed, because zipped iterators are not inlined at the call sites.
     for four in 0..a_fours.len() {
         for k in 0..4 {
             sums[k] += a_fours[four][k] * b_fours[four][k];
@@ -27,11 +27,11 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + rest
 }
 
-/// Halvings of the share of friction in the search for [`ContactCone::worthiest_push`]: down to a ten-millionth, and what is
-/// gained changes by less than that. Fewer stop the search for forces early.
+/// Bisection steps in [`ContactCone::best_push_at_price`], down to a ten-millionth of the friction; the gain changes
+/// by less. Fewer steps end the search for forces early.
 const HALVINGS: usize = 24;
 
-/// A contact's friction limits, prepared for questions. Everything is per newton of normal force.
+/// A contact's friction limits, prepared for queries. Everything is per newton of normal force.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactCone {
     inward: DVec3,
@@ -39,11 +39,11 @@ pub(super) struct ContactCone {
     arm: DVec3,
     /// μ².
     friction_squared: f64,
-    /// σ²: of the torsion radius over the characteristic length.
+    /// σ²: square of the torsion radius over the characteristic length.
     torsion_squared: f64,
 }
 
-/// What a contact applies with a normal force of one newton.
+/// Force and torsion of a contact at a normal force of one newton.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct UnitPush {
     pub(super) force: DVec3,
@@ -51,8 +51,8 @@ pub(super) struct UnitPush {
     pub(super) torsion: f64,
 }
 
-/// A direction as a contact meets it, in the words of [`ContactCone::farthest_push`].
-struct Along {
+/// A direction resolved at a contact, in the notation of [`ContactCone::farthest_push`].
+struct ContactDirection {
     /// a·n.
     normal: f64,
     /// aₜ.
@@ -74,26 +74,25 @@ impl ContactCone {
         }
     }
 
-    /// How far the push reaches whose wrench reaches farthest along `direction` with a share of friction and torsion:
-    /// [`ContactCone::farthest_push`] without the push, in half the time.
+    /// The reach of [`ContactCone::farthest_push`] without the push, in half the time.
     pub(super) fn reach(&self, direction: &ScaledWrench, share: f64) -> f64 {
-        let Along { normal, gain, .. } = self.along(direction);
+        let ContactDirection { normal, gain, .. } = self.resolve(direction);
         normal + share * gain
     }
 
-    /// The push whose wrench reaches farthest along `direction`, and how far, when `share` of friction and torsion may be
-    /// used.
+    /// The push whose wrench reaches farthest along `direction`, and its reach, when `share` of friction and torsion
+    /// may be used.
     ///
     /// A push has force n + t and torsion s with |t|²/μ² + s²/σ² ≤ 1. Its wrench times the direction (u, v) is
-    /// (n + t)·a + s b with a = u + v × arm and b = v·n; over an ellipsoid that is largest at t = μ² aₜ / q, s = σ² b / q
-    /// with q² = μ² |aₜ|² + σ² b², where it is a·n + q. With a share of both, t, s and q are that share of these.
+    /// (n + t)·a + s b with a = u + v × arm and b = v·n. Over the ellipsoid, that is largest at t = μ² aₜ / q and
+    /// s = σ² b / q with q² = μ² |aₜ|² + σ² b², where it is a·n + q. A share scales t, s and q.
     pub(super) fn farthest_push(&self, direction: &ScaledWrench, share: f64) -> (f64, UnitPush) {
-        let Along {
+        let ContactDirection {
             normal,
             across,
             about_normal,
             gain,
-        } = self.along(direction);
+        } = self.resolve(direction);
         let push = if gain > 0.0 {
             UnitPush {
                 force: self.inward + across * (share * self.friction_squared / gain),
@@ -108,43 +107,48 @@ impl ContactCone {
         (normal + share * gain, push)
     }
 
-    /// The push whose reach along `direction`, less `price` for each newton of its force, is most, and how much that is, when
-    /// `share` of friction and torsion may be used. `price` is not negative.
+    /// The push that maximises its reach along `direction` minus `price` per newton of its force, and that maximum,
+    /// when `share` of friction and torsion may be used. `price` must not be negative.
     ///
-    /// In the words of [`ContactCone::farthest_push`], with r = |aₜ|: all of the torsion that friction leaves is free of charge,
-    /// so that t = μ u along aₜ and s = σ √(1 − u²). What they gain, r μ u + |b| σ √(1 − u²) − price √(1 + μ² u²), is concave in
-    /// u, so that its slope changes its sign once between 0 and 1.
-    pub(super) fn worthiest_push(&self, direction: &ScaledWrench, share: f64, price: f64) -> (f64, UnitPush) {
+    /// In the notation of [`ContactCone::farthest_push`], with r = |aₜ|: torsion is free, so all of it that friction
+    /// leaves is used, and t = μ u along aₜ, s = σ √(1 − u²). The gain r μ u + |b| σ √(1 − u²) − price √(1 + μ² u²)
+    /// is concave in u, so its slope changes sign once between 0 and 1.
+    pub(super) fn best_push_at_price(
+        &self,
+        direction: &ScaledWrench,
+        share: f64,
+        price: f64,
+    ) -> (f64, UnitPush) {
         if price <= 0.0 {
             return self.farthest_push(direction, share);
         }
-        let Along {
+        let ContactDirection {
             normal,
             across,
             about_normal,
             ..
-        } = self.along(direction);
+        } = self.resolve(direction);
         let rub = across.length();
-        let most_rub = share * self.friction_squared.sqrt();
-        let most_twist = share * self.torsion_squared.sqrt();
+        let max_tangential = share * self.friction_squared.sqrt();
+        let max_torsion = share * self.torsion_squared.sqrt();
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..HALVINGS {
             let used = 0.5 * (low + high);
-            let tangential = most_rub * used;
-            let gained = most_rub * (rub - price * tangential / (1.0 + tangential * tangential).sqrt());
-            // The slope times √(1 − u²), which is finite where all of the friction is used.
-            if gained * (1.0 - used * used).sqrt() > about_normal.abs() * most_twist * used {
+            let tangential = max_tangential * used;
+            let gained = max_tangential * (rub - price * tangential / (1.0 + tangential * tangential).sqrt());
+            // The slope times √(1 − u²), which stays finite where all of the friction is used.
+            if gained * (1.0 - used * used).sqrt() > about_normal.abs() * max_torsion * used {
                 low = used;
             } else {
                 high = used;
             }
         }
-        let tangential = most_rub * high;
-        // Where there is nothing to gain by it, no torsion.
+        let tangential = max_tangential * high;
+        // No torsion where it gains nothing.
         let torsion = if about_normal == 0.0 {
             0.0
         } else {
-            most_twist * (1.0 - high * high).sqrt() * about_normal.signum()
+            max_torsion * (1.0 - high * high).sqrt() * about_normal.signum()
         };
         let push = UnitPush {
             force: self.inward + across.normalize_or_zero() * tangential,
@@ -155,7 +159,7 @@ impl ContactCone {
     }
 
     #[inline]
-    fn along(&self, direction: &ScaledWrench) -> Along {
+    fn resolve(&self, direction: &ScaledWrench) -> ContactDirection {
         let [ux, uy, uz, vx, vy, vz] = *direction;
         let twist = DVec3::new(vx, vy, vz);
         let along = DVec3::new(ux, uy, uz) + twist.cross(self.arm);
@@ -165,7 +169,7 @@ impl ContactCone {
         let gain = (self.friction_squared * across.length_squared()
             + self.torsion_squared * about_normal * about_normal)
             .sqrt();
-        Along {
+        ContactDirection {
             normal,
             across,
             about_normal,
@@ -189,8 +193,8 @@ impl ContactCone {
     }
 }
 
-/// The wrench that reaches farthest along `direction` over all contacts, each with one newton of normal force, and how
-/// far: the support function of the hull of unit wrenches.
+/// The support function of the hull of unit wrenches: the wrench, over all contacts with one newton of normal force
+/// each, that reaches farthest along `direction`, and its reach.
 pub(super) fn farthest_wrench(cones: &[ContactCone], direction: &ScaledWrench) -> (f64, ScaledWrench) {
     let mut best = (f64::NEG_INFINITY, [0.0; 6]);
     let mut chosen = None;
@@ -218,11 +222,11 @@ mod tests {
     use super::*;
     use crate::model::hand::Digit;
 
-    /// Steps of each angle that pushes are tried at.
+    /// Steps of each angle in the exhaustive search.
     const STEPS: usize = 160;
 
-    /// Of pushes at the limits of friction, in steps over all of them: the most that one is worth.
-    fn most_worth(cone: &ContactCone, direction: &ScaledWrench, share: f64, price: f64) -> f64 {
+    /// The largest gain over a grid of pushes at the friction limits.
+    fn largest_gain(cone: &ContactCone, direction: &ScaledWrench, share: f64, price: f64) -> f64 {
         let (side, other) = cone.inward.any_orthonormal_pair();
         let at = |turn: usize, tilt: usize| {
             let (turn, tilt) = (
@@ -237,12 +241,12 @@ mod tests {
             dot(&cone.wrench(&push), direction) - price * push.force.length()
         };
         let pushes = (0..STEPS).flat_map(|turn| (0..=STEPS).map(move |tilt| (turn, tilt)));
-        let most = pushes.map(|(turn, tilt)| at(turn, tilt));
-        most.fold(f64::NEG_INFINITY, f64::max)
+        let gains = pushes.map(|(turn, tilt)| at(turn, tilt));
+        gains.fold(f64::NEG_INFINITY, f64::max)
     }
 
     #[test]
-    fn no_push_is_worth_more() {
+    fn best_push_at_price_is_optimal() {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
         let load = Load {
             mass: 0.2,
@@ -265,29 +269,29 @@ mod tests {
             let direction: ScaledWrench = std::array::from_fn(|_| random.random_range(-1.0..1.0));
             let share = [0.45, 1.0][case % 2];
             let price = [0.0, 0.3, 2.0][case % 3];
-            let (worth, push) = cone.worthiest_push(&direction, share, price);
+            let (gain, push) = cone.best_push_at_price(&direction, share, price);
             let own = dot(&cone.wrench(&push), &direction) - price * push.force.length();
             assert!(
-                (worth - own).abs() < 1e-12,
-                "case {case}: {worth} is given, {own} is found"
+                (gain - own).abs() < 1e-12,
+                "case {case}: reported gain {gain}, recomputed {own}"
             );
             let rub = (push.force - cone.inward).length_squared() / cone.friction_squared;
             let used = rub + push.torsion.powi(2) / cone.torsion_squared;
             assert!(
                 used < share * share + 1e-9,
-                "case {case}: {used} of friction is used"
+                "case {case}: uses {used} of the squared friction limit"
             );
-            let most = most_worth(&cone, &direction, share, price);
+            let most = largest_gain(&cone, &direction, share, price);
             assert!(
-                worth > most - 1e-12,
-                "case {case}: {worth}, and {most} is to be had"
+                gain > most - 1e-12,
+                "case {case}: gain {gain}, but {most} is possible"
             );
-            assert!(worth < most + 1e-3, "case {case}: {worth} is more than {most}");
+            assert!(gain < most + 1e-3, "case {case}: gain {gain} exceeds {most}");
             if price == 0.0 {
                 let (reach, _) = cone.farthest_push(&direction, share);
                 assert!(
-                    (worth - reach).abs() < 1e-9,
-                    "case {case}: free of charge, {reach}"
+                    (gain - reach).abs() < 1e-9,
+                    "case {case}: gain {gain} at no price, reach {reach}"
                 );
             }
         }

@@ -1,21 +1,21 @@
 //! Non-negative least squares after Lawson and Hanson (1974, chapter 23), one column at a time.
 //!
-//! The columns are not a matrix that is there from the start: whoever asks looks at the residual, finds the column of a
-//! cone that goes with it best, and adds it. What is kept is the passive set, the columns with a positive weight; the
-//! weights always solve the least-squares problem over it.
+//! The matrix is not known in advance: the caller looks at the residual, finds the column of a cone that best matches
+//! it, and adds it. The solver keeps the passive set, the columns with positive weights, and the weights that solve
+//! the least-squares problem over it.
 //!
-//! For the columns A of the passive set, a T is kept with which A T has columns of length one that are perpendicular to
-//! each other, the directions. A column more is split, by Gram and Schmidt, into what the directions say already and one of
-//! its own; for one that leaves, a reflection turns all directions but one away from it, and that one leaves with it. Each
-//! moves the solution along one direction alone, and hardly a number waits for another one to be found.
+//! For the matrix A of passive columns it keeps a matrix T for which A T has orthonormal columns, the directions.
+//! Gram-Schmidt orthogonalisation splits a new column into a part along the directions and a new direction. When a
+//! column leaves, a Householder reflection concentrates it in one direction, which leaves with it. Either way the
+//! solution moves along a single direction, and hardly any number depends on another being computed first.
 
 use super::contact_model::UnitPush;
 
-/// A column whose own part has less than this share of its squared length depends on the others.
+/// A column depends on the others if its orthogonal part has less than this share of its squared length.
 const DEPENDENT_SHARE: f64 = 1e-11;
 
-/// Below this share, rounding leaves so much of the others in a column's own part that what is left of them is taken off
-/// once more ("twice is enough": Parlett 1980, section 6-9, after Kahan). A larger one repeats in vain.
+/// Below this share, rounding leaves too much of the other directions in the orthogonal part, so the projection is
+/// repeated once ("twice is enough": Parlett 1980, section 6-9, after Kahan). Larger values repeat in vain.
 const REPEATED_SHARE: f64 = 1e-4;
 
 /// What a column stands for.
@@ -28,37 +28,37 @@ pub(super) enum Column {
         /// Force and torsion per unit of weight.
         push: UnitPush,
     },
-    /// What is left below an upper limit.
+    /// The unused part of an upper limit.
     Slack,
 }
 
-/// Numbers that are worked on side by side; what there are fewer of is filled up with zeros.
+/// Four numbers processed together; short vectors are padded with zeros.
 type Four = [f64; 4];
 
-/// A number a row, or a column: there are never more columns than rows, as they are independent.
+/// One number per row, or per column: the columns are independent, so there are never more of them than rows.
 type Fours<const FOURS: usize> = [Four; FOURS];
 
-/// The smallest |A x − b| over x ≥ 0, for the columns added so far, which have at most four times `FOURS` rows.
+/// Minimises |A x − b| over x ≥ 0 for the columns added so far, of at most four times `FOURS` rows.
 #[derive(Clone, Debug)]
 pub(super) struct ConicLeastSquares<const FOURS: usize> {
     rows: usize,
     /// The passive set.
     columns: Vec<Column>,
-    /// As many as there are columns, in an order of their own.
+    /// As many as there are columns, in no related order.
     directions: Vec<Direction<FOURS>>,
     solution: Solution<FOURS>,
 }
 
-/// A combination of the columns that has length one and is perpendicular to the others.
+/// A combination of the columns with unit length, orthogonal to the other directions.
 #[derive(Clone, Copy, Debug)]
 struct Direction<const FOURS: usize> {
-    /// A number a row: a column of A T.
+    /// One number per row: a column of A T.
     unit: Fours<FOURS>,
-    /// How much of each column there is in it: a column of T.
+    /// The share of each column in it: a column of T.
     weights: Fours<FOURS>,
 }
 
-/// What weights leave of the target.
+/// Weights, and the residual they leave of the target.
 #[derive(Clone, Copy, Debug)]
 struct Solution<const FOURS: usize> {
     /// x.
@@ -74,18 +74,18 @@ impl<const FOURS: usize> Default for ConicLeastSquares<FOURS> {
             columns: Vec::new(),
             directions: Vec::new(),
             solution: Solution {
-                weights: none(),
-                residual: none(),
+                weights: zeros(),
+                residual: zeros(),
             },
         }
     }
 }
 
 impl<const FOURS: usize> ConicLeastSquares<FOURS> {
-    /// Starts anew, without columns.
+    /// Starts over with a new target and no columns.
     ///
     /// # Panics
-    /// There are more rows than there is room for.
+    /// `target` has more rows than fit.
     pub(super) fn reset(&mut self, target: &[f64]) {
         self.rows = target.len();
         self.columns.clear();
@@ -93,8 +93,8 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         self.directions.clear();
         self.directions.reserve(self.rows);
         self.solution = Solution {
-            weights: none(),
-            residual: filled_up(target),
+            weights: zeros(),
+            residual: padded(target),
         };
     }
 
@@ -109,18 +109,18 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         weights.iter().copied().zip(&self.columns)
     }
 
-    /// Adds a column and solves again. False, and nothing is changed, if it depends on those that are there or would
+    /// Adds a column and solves again. Returns false and changes nothing if the column depends on the others or would
     /// get no positive weight.
     pub(super) fn add(&mut self, entries: &[f64], column: Column) -> bool {
-        debug_assert_eq!(entries.len(), self.rows, "a column has other rows");
+        debug_assert_eq!(entries.len(), self.rows, "a column needs one entry per row");
         let newest = self.columns.len();
         if newest == self.rows {
             return false;
         }
-        let Some(direction) = own_direction(&self.directions, filled_up(entries)) else {
+        let Some(direction) = orthogonal_direction(&self.directions, padded(entries)) else {
             return false;
         };
-        // The solution without regard to signs. What was left is perpendicular to all directions but the new one.
+        // The solution without sign constraints. The residual is orthogonal to all directions but the new one.
         let mut free = self.solution;
         free.step(dot(&direction.unit, &free.residual), &direction);
         if free.weights.as_flattened()[newest] <= 0.0 {
@@ -128,8 +128,8 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         }
         self.columns.push(column);
         self.directions.push(direction);
-        // Lawson and Hanson's inner loop: as far toward the free solution as no weight becomes negative; a column whose
-        // weight vanishes leaves the passive set.
+        // Lawson and Hanson's inner loop: move toward the free solution until a weight would become negative; a
+        // column whose weight vanishes leaves the passive set.
         while let Some((vanishing, share)) = self.first_to_vanish(&free) {
             let weights = self.solution.weights.as_flattened_mut().iter_mut();
             for (weight, free) in weights.zip(free.weights.as_flattened()) {
@@ -141,8 +141,8 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         true
     }
 
-    /// The column whose weight vanishes first on the way to another solution, and after which share of it; none if all stay
-    /// positive.
+    /// The column whose weight vanishes first on the way to another solution, and at which share of that way; `None`
+    /// if all weights stay positive.
     fn first_to_vanish(&self, free: &Solution<FOURS>) -> Option<(usize, f64)> {
         let weights = self.solution.weights.as_flattened().iter();
         let pairs = weights.zip(free.weights.as_flattened());
@@ -162,12 +162,12 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         first
     }
 
-    /// Removes a column. `free` is the solution without regard to signs before, and after.
+    /// Removes a column. `free` is the solution without sign constraints, and is updated.
     fn remove(&mut self, column: usize, free: &mut Solution<FOURS>) {
-        let Some((share, leaving)) = self.part_direction(column) else {
+        let Some((share, leaving)) = self.isolate_direction(column) else {
             return;
         };
-        // As far along it as takes the column's weight away.
+        // As far along it as brings the column's weight to zero.
         free.step(-free.weights.as_flattened()[column] / share, &leaving);
 
         self.columns.swap_remove(column);
@@ -180,12 +180,12 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         }
     }
 
-    /// Turns the directions so that only one has anything of a column, and takes that one out: how much it has, and the
-    /// direction; none if there are none.
-    fn part_direction(&mut self, column: usize) -> Option<(f64, Direction<FOURS>)> {
-        // Householder's reflection after which the column's row of T has everything in its last place. Of the two that do,
-        // the one with which nothing cancels out.
-        let mut normal = none::<FOURS>();
+    /// Reflects the directions so that only one contains a column, and removes that one. Returns the column's share
+    /// in it and the direction; `None` if there are no directions.
+    fn isolate_direction(&mut self, column: usize) -> Option<(f64, Direction<FOURS>)> {
+        // The Householder reflection that moves the column's whole row of T into its last entry. Of the two that do,
+        // the one without cancellation.
+        let mut normal = zeros::<FOURS>();
         for (place, direction) in normal.as_flattened_mut().iter_mut().zip(&self.directions) {
             *place = direction.weights.as_flattened()[column];
         }
@@ -195,8 +195,8 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
         let share = -length.copysign(*last);
         *last -= share;
         let mut sum = Direction {
-            unit: none(),
-            weights: none(),
+            unit: zeros(),
+            weights: zeros(),
         };
         for (part, direction) in normal.as_flattened().iter().zip(&self.directions) {
             add_multiple(&mut sum.unit, part * scale, &direction.unit);
@@ -212,7 +212,7 @@ impl<const FOURS: usize> ConicLeastSquares<FOURS> {
 }
 
 impl<const FOURS: usize> Solution<FOURS> {
-    /// Takes so much of a direction from the residual into the weights.
+    /// Moves `length` along a direction, from the residual into the weights.
     #[inline]
     fn step(&mut self, length: f64, direction: &Direction<FOURS>) {
         add_multiple(&mut self.weights, length, &direction.weights);
@@ -220,21 +220,21 @@ impl<const FOURS: usize> Solution<FOURS> {
     }
 }
 
-/// The direction that a column adds to others, in which all of them have their weights. None if it depends on them.
+/// The direction that a column adds to the others; `None` if it depends on them.
 #[inline]
-fn own_direction<const FOURS: usize>(
+fn orthogonal_direction<const FOURS: usize>(
     directions: &[Direction<FOURS>],
     entries: Fours<FOURS>,
 ) -> Option<Direction<FOURS>> {
     let square = dot(&entries, &entries);
     let mut own = Direction {
         unit: entries,
-        weights: none(),
+        weights: zeros(),
     };
     own.weights.as_flattened_mut()[directions.len()] = 1.0;
     let mut own_square = square;
     for _ in 0..2 {
-        let mut reaches = none::<FOURS>();
+        let mut reaches = zeros::<FOURS>();
         for (reach, direction) in reaches.as_flattened_mut().iter_mut().zip(directions) {
             *reach = dot(&direction.unit, &own.unit);
         }
@@ -260,18 +260,18 @@ fn own_direction<const FOURS: usize>(
 }
 
 #[inline]
-fn none<const FOURS: usize>() -> Fours<FOURS> {
+fn zeros<const FOURS: usize>() -> Fours<FOURS> {
     [[0.0; 4]; FOURS]
 }
 
-/// Numbers with zeros behind them.
-fn filled_up<const FOURS: usize>(numbers: &[f64]) -> Fours<FOURS> {
-    let mut filled = none();
+/// A slice padded with zeros.
+fn padded<const FOURS: usize>(numbers: &[f64]) -> Fours<FOURS> {
+    let mut filled = zeros();
     filled.as_flattened_mut()[..numbers.len()].copy_from_slice(numbers);
     filled
 }
 
-/// Adds a multiple of some numbers to others.
+/// Adds `factor` times `numbers` to `to`.
 #[inline]
 fn add_multiple<const FOURS: usize>(to: &mut Fours<FOURS>, factor: f64, numbers: &Fours<FOURS>) {
     for i in 0..FOURS {
@@ -281,7 +281,7 @@ fn add_multiple<const FOURS: usize>(to: &mut Fours<FOURS>, factor: f64, numbers:
     }
 }
 
-/// Product of two columns.
+/// Dot product of two padded vectors.
 #[inline]
 fn dot<const FOURS: usize>(a: &Fours<FOURS>, b: &Fours<FOURS>) -> f64 {
     let mut sums = [0.0; 4];
@@ -302,7 +302,7 @@ mod tests {
 
     const ROWS: usize = 6;
 
-    /// The residual's length when the best of some columns is added again and again.
+    /// Length of the residual after repeatedly adding the best of some columns.
     fn solved(columns: &[[f64; ROWS]], target: &[f64; ROWS], solver: &mut ConicLeastSquares<2>) -> f64 {
         solver.reset(target);
         loop {
@@ -320,7 +320,7 @@ mod tests {
         dot(solver.residual(), solver.residual()).sqrt()
     }
 
-    /// The least residual over all sets of columns whose own solution has no negative weight.
+    /// The least residual over all subsets of columns whose own solution has no negative weight.
     fn least_residual(columns: &[[f64; ROWS]], target: &[f64; ROWS]) -> f64 {
         let mut least = dot(target, target).sqrt();
         for set in 1_u32..1 << columns.len() {
@@ -344,7 +344,7 @@ mod tests {
         least
     }
 
-    /// Least squares by Gauss and Jordan on the normal equations with pivots; `None` for dependent columns.
+    /// Least squares by Gauss-Jordan elimination on the normal equations with pivoting; `None` for dependent columns.
     fn unconstrained(columns: &[&[f64; ROWS]], target: &[f64; ROWS]) -> Option<Vec<f64>> {
         let count = columns.len();
         let mut rows: Vec<Vec<f64>> = columns
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_all_sets_of_columns() {
+    fn matches_exhaustive_search() {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut solver = ConicLeastSquares::<2>::default();
         let (mut exact, mut inexact) = (0, 0);
@@ -385,7 +385,7 @@ mod tests {
             let mut columns: Vec<_> = (0..=case % 9).map(|_| vector()).collect();
             let target = vector();
             if case % 4 == 0 {
-                // Columns that depend on others.
+                // Dependent columns.
                 columns.push(columns[0].map(|x| 2.0 * x));
                 columns.push(std::array::from_fn(|k| {
                     columns[0][k] + columns[columns.len() / 2][k]
@@ -396,17 +396,20 @@ mod tests {
             assert!((found - least).abs() < 1e-7, "case {case}: {found}, not {least}");
             if least < 1e-7 { exact += 1 } else { inexact += 1 }
         }
-        assert!(exact > 50 && inexact > 50, "{exact} exact, {inexact} not");
+        assert!(
+            exact > 50 && inexact > 50,
+            "{exact} exact and {inexact} inexact cases"
+        );
     }
 
     #[test]
-    fn hundreds_of_columns_may_come_and_go() {
+    fn stays_accurate_when_columns_leave() {
         const MANY: usize = 37;
         let mut random = Xoshiro256PlusPlus::seed_from_u64(12);
         let mut solver = ConicLeastSquares::<10>::default();
         let mut left = 0;
         for case in 0..40 {
-            // Columns about one direction, as pushes of a contact are, so that most depend on each other nearly.
+            // Columns around one direction, like the pushes of a contact, so that most are nearly dependent.
             let mut vector = |around: f64| -> [f64; MANY] {
                 std::array::from_fn(|k| {
                     around * (k as f64).cos() + 10_f64.powi(-(case % 4)) * random.random_range(-1.0..1.0)
@@ -416,7 +419,7 @@ mod tests {
             solver.reset(&target);
             let mut added = 0;
             for _ in 0..2_000 {
-                // Any that helps, not the best: so more of them leave.
+                // Any column that helps, not the best one, so that more of them leave.
                 let first = random.random_range(0..columns.len());
                 let helps = |k: &usize| dot(&columns[*k], solver.residual()) > 1e-9;
                 let Some(next) = (first..columns.len()).chain(0..first).find(helps) else {
@@ -431,8 +434,8 @@ mod tests {
                 }
                 added += 1;
             }
-            // Karush, Kuhn and Tucker: the residual is the target's, no column goes with it, and those with weight are
-            // perpendicular to it.
+            // Karush-Kuhn-Tucker conditions: the reported residual is right, no column has a gain along it, and passive columns
+            // are orthogonal to it.
             let mut residual = target;
             let mut passive = 0;
             for (weight, column) in solver.weighted_columns() {
@@ -455,10 +458,10 @@ mod tests {
             }
             for column in &columns {
                 let gain = dot(column, &residual);
-                assert!(gain < 2e-9, "case {case}: {gain} is left to gain");
+                assert!(gain < 2e-9, "case {case}: a column still gains {gain}");
             }
             left += added - passive;
         }
-        assert!(left > 300, "{left} columns left the passive set");
+        assert!(left > 300, "only {left} columns left the passive set");
     }
 }

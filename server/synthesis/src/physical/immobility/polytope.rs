@@ -1,23 +1,23 @@
 //! A convex polytope in six dimensions that grows by one vertex at a time.
 //!
-//! All facets are simplices of six vertices. A new vertex sees some facets from outside; they go, and each ridge between
-//! a facet that goes and one that stays gets a new facet with the vertex (beneath and beyond). The plane of such a facet
-//! is the combination of the two planes at the ridge that meets the vertex; both factors are positive, so that nothing
-//! cancels and rounding does not grow.
+//! All facets are simplices of six vertices. Facets that a new vertex sees from outside are removed, and each ridge
+//! between a removed and a remaining facet gets a new facet with the vertex (beneath and beyond). The plane of a new
+//! facet is the combination of the two planes at its ridge that contains the vertex; both factors are positive, so
+//! nothing cancels and rounding errors do not grow.
 
 use super::contact_model::{ScaledWrench, dot};
 
 /// Numbers in a wrench.
 const DIMENSIONS: usize = 6;
 
-/// A vertex sees a facet if it is farther than this outside. Wrenches are of the order of one; rounding is far below, and
-/// a facet that was spared wrongly is off by no more than this.
+/// A vertex sees a facet if it is farther than this outside. Wrenches are of order one and rounding is far below; a
+/// facet kept by mistake is off by no more than this.
 const OUTSIDE: f64 = 1e-10;
 
-/// A hull that is thinner than this in some direction has no volume.
+/// A hull thinner than this in some direction has no volume.
 const FLAT: f64 = 1e-7;
 
-/// Set in a dying facet's neighbour to say that it is the new facet at that ridge.
+/// Flag in a removed facet's neighbour index: the new facet at that ridge.
 const NEW: u32 = 1 << 31;
 
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ struct Facet {
     vertices: [u16; DIMENSIONS],
     /// Neighbour k shares all vertices but the k-th.
     neighbours: [u32; DIMENSIONS],
-    /// Signed distance of the newest vertex, if `seen_by` names it.
+    /// Signed distance of the newest vertex, valid if `seen_by` names it.
     height: f64,
     seen_by: u32,
 }
@@ -36,21 +36,21 @@ struct Facet {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Polytope {
     vertices: u32,
-    /// How many facets were made, those that are gone again included.
+    /// Facets built so far, including removed ones.
     made: usize,
     facets: Vec<Facet>,
-    /// Signed distance of each facet's plane from the origin, negative if the origin is outside; infinite for facets
-    /// that are gone.
+    /// Signed distance of each facet's plane from the origin: negative if the origin is outside, infinite for removed
+    /// facets.
     offsets: Vec<f64>,
-    gone: Vec<u32>,
-    going: Vec<u32>,
-    /// New facets, each with the one it replaces at its ridge.
+    removed: Vec<u32>,
+    removing: Vec<u32>,
+    /// New facets, each with the facet it replaces at its ridge.
     created: Vec<(u32, u32)>,
 }
 
 impl Polytope {
-    /// Starts with a simplex of seven points that `farthest` gives for as many directions. False if all points lie in a
-    /// plane.
+    /// Starts with a simplex of seven points, support points that `farthest` returns for seven directions. Returns
+    /// false if all points lie in a hyperplane.
     pub(super) fn start(&mut self, farthest: impl Fn(&ScaledWrench) -> (f64, ScaledWrench)) -> bool {
         let mut corners = [[0.0; DIMENSIONS]; DIMENSIONS + 1];
         corners[0] = farthest(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).1;
@@ -81,9 +81,9 @@ impl Polytope {
         self.made = DIMENSIONS + 1;
         self.facets.clear();
         self.offsets.clear();
-        self.gone.clear();
+        self.removed.clear();
         for (k, &(gradient, constant)) in coordinates.iter().enumerate() {
-            // 0 on the facet opposite to corner k, 1 in that corner.
+            // 0 on the facet opposite corner k, 1 at that corner.
             let length = dot(&gradient, &gradient).sqrt();
             let others = std::array::from_fn(|i| if i < k { i } else { i + 1 });
             self.facets.push(Facet {
@@ -114,13 +114,13 @@ impl Polytope {
         (self.facets[facet as usize].normal, self.offsets[facet as usize])
     }
 
-    /// How many facets were made since the start: what the polytope has cost.
+    /// Facets built since the start: a measure of cost.
     pub(super) fn facets_made(&self) -> usize {
         self.made
     }
 
-    /// Grows by a vertex that is outside `facet`. False if it is not, or if rounding has broken the surface; the polytope
-    /// is not to be used any more then.
+    /// Adds a vertex outside `facet`. Returns false if it is not outside, or if rounding has broken the surface,
+    /// after which the polytope must not be used.
     pub(super) fn expand(&mut self, facet: u32, vertex: ScaledWrench) -> bool {
         let height = dot(&self.facets[facet as usize].normal, &vertex) - self.offsets[facet as usize];
         if height <= OUTSIDE {
@@ -129,13 +129,13 @@ impl Polytope {
         let name = self.vertices;
         self.vertices += 1;
         self.created.clear();
-        self.going.clear();
-        self.going.push(facet);
+        self.removing.clear();
+        self.removing.push(facet);
         self.facets[facet as usize].height = height;
         self.facets[facet as usize].seen_by = name;
         let mut visited = 0;
-        while visited < self.going.len() {
-            let from = self.going[visited];
+        while visited < self.removing.len() {
+            let from = self.removing[visited];
             visited += 1;
             for ridge in 0..DIMENSIONS {
                 let to = self.facets[from as usize].neighbours[ridge];
@@ -144,7 +144,7 @@ impl Polytope {
                     neighbour.seen_by = name;
                     neighbour.height = dot(&neighbour.normal, &vertex) - self.offsets[to as usize];
                     if neighbour.height > OUTSIDE {
-                        self.going.push(to);
+                        self.removing.push(to);
                     }
                 }
                 if self.facets[to as usize].height <= OUTSIDE {
@@ -159,31 +159,32 @@ impl Polytope {
                 return false;
             }
         }
-        for &index in &self.going {
+        for &index in &self.removing {
             self.offsets[index as usize] = f64::INFINITY;
         }
-        self.gone.append(&mut self.going);
+        self.removed.append(&mut self.removing);
         true
     }
 
-    /// The new facet at the ridge of `going`, opposite to its vertex `ridge`, beyond which `staying` stays.
-    fn create(&mut self, going: u32, ridge: usize, staying: u32, name: u32) {
-        let (from, to) = (&self.facets[going as usize], &self.facets[staying as usize]);
+    /// Creates the facet at the ridge of facet `removing`, opposite its vertex `ridge`, that borders on
+    /// facet `remaining`.
+    fn create(&mut self, removing: u32, ridge: usize, remaining: u32, name: u32) {
+        let (from, to) = (&self.facets[removing as usize], &self.facets[remaining as usize]);
         let (a, b) = ((-to.height).max(0.0), from.height);
         let sum: ScaledWrench = std::array::from_fn(|k| a * from.normal[k] + b * to.normal[k]);
         let scale = dot(&sum, &sum).sqrt().recip();
-        let offset = (a * self.offsets[going as usize] + b * self.offsets[staying as usize]) * scale;
+        let offset = (a * self.offsets[removing as usize] + b * self.offsets[remaining as usize]) * scale;
         let mut facet = Facet {
             normal: sum.map(|x| x * scale),
             vertices: from.vertices,
-            // The others are found when all new facets are there.
-            neighbours: [going; DIMENSIONS],
+            // The others are linked once all new facets exist.
+            neighbours: [removing; DIMENSIONS],
             height: 0.0,
             seen_by: name,
         };
         facet.vertices[ridge] = name as u16;
-        facet.neighbours[ridge] = staying;
-        let index = if let Some(index) = self.gone.pop() {
+        facet.neighbours[ridge] = remaining;
+        let index = if let Some(index) = self.removed.pop() {
             self.facets[index as usize] = facet;
             self.offsets[index as usize] = offset;
             index
@@ -192,24 +193,24 @@ impl Polytope {
             self.offsets.push(offset);
             self.facets.len() as u32 - 1
         };
-        self.created.push((index, going));
-        self.facets[going as usize].neighbours[ridge] = NEW | index;
-        for neighbour in &mut self.facets[staying as usize].neighbours {
-            if *neighbour == going {
+        self.created.push((index, removing));
+        self.facets[removing as usize].neighbours[ridge] = NEW | index;
+        for neighbour in &mut self.facets[remaining as usize].neighbours {
+            if *neighbour == removing {
                 *neighbour = index;
             }
         }
     }
 
-    /// Finds a new facet's neighbours among the new ones: around the four vertices that they share with the newest one,
-    /// through facets that go, to where that fan ends. `None` if it does not end, which takes rounding to break the
-    /// surface.
+    /// Links a new facet to its neighbours among the new ones. For each shared ridge, walks around its four vertices
+    /// other than the newest, through removed facets, to the end of that fan. `None` if the fan does not end, which
+    /// means that rounding has broken the surface.
     fn link(&mut self, index: u32, replaced: u32) -> Option<()> {
         let newest = (self.vertices - 1) as u16;
         let at_newest = position(&self.facets[index as usize].vertices, newest)?;
         for other in (0..DIMENSIONS).filter(|&k| k != at_newest) {
             if self.facets[index as usize].neighbours[other] != replaced {
-                // Found from the other end.
+                // Already linked from the other side.
                 continue;
             }
             let mut from = replaced;
@@ -219,21 +220,21 @@ impl Polytope {
             loop {
                 let to = self.facets[from as usize].neighbours[across];
                 if to & NEW != 0 {
-                    // The vertices of that new facet are in the places that they have in the one it replaces.
+                    // The new facet's vertices keep the positions they have in the facet it replaces.
                     let found = to & !NEW;
                     let back = position(&self.facets[from as usize].vertices, pivot)?;
                     self.facets[index as usize].neighbours[other] = found;
                     self.facets[found as usize].neighbours[back] = index;
                     break;
                 }
-                // Enter `to`, where the vertex not shared becomes the one to keep, and leave it opposite to the pivot.
+                // Enter `to`, whose unshared vertex becomes the one to keep, and leave it opposite the pivot.
                 let entered = &self.facets[to as usize];
                 let back = position(&entered.neighbours, from)?;
                 across = position(&entered.vertices, pivot)?;
                 pivot = entered.vertices[back];
                 from = to;
                 steps += 1;
-                if steps > self.going.len() {
+                if steps > self.removing.len() {
                     return None;
                 }
             }
@@ -246,10 +247,10 @@ fn position<T: Copy + PartialEq>(values: &[T; DIMENSIONS], value: T) -> Option<u
     values.iter().position(|&v| v == value)
 }
 
-/// What is left of a vector without its parts along an orthonormal basis, at length one.
+/// The normalised part of a vector that is orthogonal to an orthonormal basis.
 fn orthonormalised(vector: ScaledWrench, basis: &[ScaledWrench]) -> ScaledWrench {
     let mut rest = vector;
-    // Twice, because once loses digits when little is left.
+    // Twice, because a single pass loses digits when little is left.
     for _ in 0..2 {
         for axis in basis {
             let along = dot(&rest, axis);
@@ -262,7 +263,8 @@ fn orthonormalised(vector: ScaledWrench, basis: &[ScaledWrench]) -> ScaledWrench
     rest.map(|x| x / length)
 }
 
-/// A direction perpendicular to an orthonormal basis that does not span everything: from the axis that it covers least.
+/// A unit vector orthogonal to an orthonormal basis that does not span everything, from the axis that the basis
+/// covers least.
 fn perpendicular(basis: &[ScaledWrench]) -> ScaledWrench {
     let covered = |k: usize| basis.iter().map(|axis| axis[k] * axis[k]).sum::<f64>();
     let mut least = 0;
@@ -277,7 +279,7 @@ fn perpendicular(basis: &[ScaledWrench]) -> ScaledWrench {
 }
 
 /// Gradient and constant of each barycentric coordinate: the columns of the inverse of the matrix whose rows are the
-/// corners with a 1 behind them, by Gauss and Jordan with row pivots. `None` if it is singular.
+/// corners followed by a 1, by Gauss-Jordan elimination with row pivoting. `None` if it is singular.
 fn barycentric_coordinates(
     corners: &[ScaledWrench; DIMENSIONS + 1],
 ) -> Option<[(ScaledWrench, f64); DIMENSIONS + 1]> {

@@ -1,9 +1,8 @@
-//! The flesh of the palm as solids, where it lies on the bones.
+//! Flesh of the palm as solids attached to the bones.
 //!
-//! The figures are a least-squares fit of the solids' union to the skin of the built-in rig `adult`, in three poses: its
-//! stretched hand, a relaxed one and one whose thumb opposes the fingers. Of the back, 95 % lies within 1.3 mm of the
-//! fitted solids, of the palmar side within 1.8 mm, and 2.2 mm when thumb and fingers bend. For other hands they grow
-//! with the hand.
+//! The values are a least-squares fit of the solids' union to the skin of the built-in rig `adult` in three poses:
+//! stretched, relaxed, and thumb opposing the fingers. 95 % of the back lies within 1.3 mm of the fitted solids, of
+//! the palmar side within 1.8 mm (2.2 mm when thumb and fingers bend). For other hands they scale with the hand.
 
 use glam::{Mat3, Vec3};
 
@@ -24,17 +23,17 @@ use crate::{
 /// finger, and the two sides of the carpus.
 pub const PALM_SOLIDS: usize = 10;
 
-/// Solids that move with the thumb's metacarpal: the ball of the thumb, its root in the palm, and the web to the index
-/// finger.
+/// Solids that move with the thumb's metacarpal: the ball of the thumb, its root in the palm, and the web to the
+/// index finger.
 pub const THENAR_SOLIDS: usize = 4;
 
-/// From the wrist to the middle finger's knuckle of the hand that the figures are fitted to, in metres.
+/// Distance from wrist to middle knuckle of the fitted hand, in metres.
 const FITTED_SIZE: f32 = 0.097_674;
 
-/// Metres in a millimetre.
+/// Metres per millimetre.
 const MILLIMETRE: f32 = 1e-3;
 
-/// The ends of the fingers' metacarpals by their numbers, in the order of [`joint_of_end`].
+/// Indices of the ends of the fingers' metacarpals, in the order of [`joint_of_end`].
 const INDEX_BASE: usize = 0;
 const INDEX_KNUCKLE: usize = 1;
 const MIDDLE_BASE: usize = 2;
@@ -46,24 +45,25 @@ const LITTLE_KNUCKLE: usize = 7;
 
 use Anchor::{Between, Thumb, Wrist};
 
-/// Where an end of a solid hangs on the skeleton.
+/// The point of the skeleton that an end of a solid is attached to.
 #[derive(Clone, Copy, Debug)]
 enum Anchor {
-    /// On the wrist, in the frame of the palm.
+    /// The wrist, in the frame of the palm.
     Wrist,
-    /// At a share of the way between two ends of metacarpals, in the frame of the palm.
+    /// A point between two ends of metacarpals, at a share of their distance, in the frame of the palm.
     Between(usize, usize, f32),
-    /// On the thumb's base, in the frame of its metacarpal.
+    /// The thumb's base, in the frame of its metacarpal.
     Thumb,
 }
 
-/// An end of a solid: where it hangs, how far from there in millimetres, and its radius in millimetres.
+/// An end of a solid: its anchor, its offset from there in millimetres, and its radius in millimetres.
 ///
-/// In the palm's frame, x goes to the thumb's side, y to the knuckles and z out of the palm; in the thumb's, y goes along
-/// the metacarpal, z to the pad, and x completes a right-handed frame on the right hand, a left-handed one on the left.
+/// In the palm's frame, x points to the thumb's side, y to the knuckles and z out of the palm. In the thumb's, y
+/// points along the metacarpal and z to the pad; x completes a right-handed frame on the right hand, a left-handed
+/// one on the left.
 type End = (Anchor, [f32; 3], f32);
 
-/// The palm: see [`PALM_SOLIDS`].
+/// The palm, see [`PALM_SOLIDS`].
 const PALM: [[End; 2]; PALM_SOLIDS] = [
     [
         (Between(INDEX_BASE, INDEX_BASE, 0.5), [0.0, 0.0, 1.9], 11.9),
@@ -119,7 +119,7 @@ const PALM: [[End; 2]; PALM_SOLIDS] = [
     ],
 ];
 
-/// What moves with the thumb: see [`THENAR_SOLIDS`].
+/// The ball of the thumb and the web, see [`THENAR_SOLIDS`].
 const THENAR: [[End; 2]; THENAR_SOLIDS] = [
     [
         (Wrist, [13.9, 38.3, 14.3], 17.0),
@@ -136,7 +136,7 @@ const THENAR: [[End; 2]; THENAR_SOLIDS] = [
     ],
 ];
 
-/// The bones that flesh hangs on, in the frame of the hand's pose.
+/// The bones that carry the flesh, in the frame of the hand's pose.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bones {
     handedness: Handedness,
@@ -144,12 +144,12 @@ pub(super) struct Bones {
     metacarpal_ends: [Vec3; METACARPAL_ENDS],
     /// The thumb's base and second joint.
     thumb: [Vec3; 2],
-    /// The direction that the pad of the thumb's metacarpal faces.
+    /// The direction that the palmar side of the thumb's metacarpal faces.
     thumb_pad: Vec3,
 }
 
 impl Bones {
-    /// Those of tracked joints.
+    /// The bones of tracked joints.
     pub(super) fn of_joints(joints: &HandJoints) -> Self {
         let at = |joint: usize| joints.joints[joint].pose.position;
         let thumb = index::FIRST_OF_DIGIT[0];
@@ -163,7 +163,7 @@ impl Bones {
         }
     }
 
-    /// Those of a rig whose wrist and joints of the digits are there.
+    /// The bones of a rig with a given wrist pose and given joints of the digits.
     pub(super) fn of_rig(
         rig: &Rig,
         frame_from_wrist: Pose,
@@ -187,17 +187,18 @@ impl Bones {
     }
 }
 
-/// A skeleton to hang flesh on.
+/// The frames and scale that place solids on the bones.
 pub(super) struct Skeleton {
     bones: Bones,
     frame_from_palm: Mat3,
     frame_from_thumb: Mat3,
-    /// Metres in a millimetre of the fitted hand.
+    /// Metres per millimetre of the fitted hand.
     millimetre: f32,
 }
 
 impl Skeleton {
-    /// The skeleton of a hand. Its frames follow the joints' positions, which trackers know better than orientations.
+    /// The skeleton of a hand. Its frames follow joint positions, because trackers measure positions better than
+    /// orientations.
     pub(super) fn new(bones: Bones) -> Self {
         let [index_knuckle, middle_knuckle, little_knuckle] =
             [INDEX_KNUCKLE, MIDDLE_KNUCKLE, LITTLE_KNUCKLE].map(|end| bones.metacarpal_ends[end]);
@@ -268,24 +269,24 @@ impl Skeleton {
     }
 }
 
-/// The palm's fitted solids, those along the metacarpals and between them at least as thick as the joints' radii say: what
-/// a hand's owner tells of its thickness may be more than what was fitted to another hand's skin.
+/// The palm's fitted solids, those along and between the metacarpals at least as thick as the joints' radii: an
+/// owner's tracked hand may be thicker than one fitted to another hand's skin.
 pub(super) fn palm_as_tracked(
     palm: &[TaperedCapsule; PALM_SOLIDS],
     tracked: &TrackedPalm,
 ) -> [TaperedCapsule; PALM_SOLIDS] {
     let mut solids = *palm;
     for (solid, ends) in solids.iter_mut().zip(&PALM) {
-        let (start, start_radius) = as_tracked(ends[0].0, solid.start, solid.start_radius, tracked);
-        let (end, end_radius) = as_tracked(ends[1].0, solid.end, solid.end_radius, tracked);
+        let (start, start_radius) = widened(ends[0].0, solid.start, solid.start_radius, tracked);
+        let (end, end_radius) = widened(ends[1].0, solid.end, solid.end_radius, tracked);
         *solid = TaperedCapsule::new(start, end, start_radius, end_radius);
     }
     solids
 }
 
-/// The smallest ball around a fitted one that is as thick as the joints' radii say where it hangs.
+/// The smallest sphere around a fitted one and the tracked one at its anchor.
 #[inline]
-fn as_tracked(anchor: Anchor, place: Vec3, radius: f32, tracked: &TrackedPalm) -> (Vec3, f32) {
+fn widened(anchor: Anchor, place: Vec3, radius: f32, tracked: &TrackedPalm) -> (Vec3, f32) {
     let Between(a, b, share) = anchor else {
         return (place, radius);
     };

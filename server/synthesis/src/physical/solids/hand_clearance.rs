@@ -1,23 +1,23 @@
-//! How far a hand is from itself, and when two solids are certainly far apart.
+//! Clearance of a hand from itself, and lower bounds on the distance of two solids.
 
 use glam::Vec3;
 
 use super::{HandSolids, TaperedCapsule};
 
-/// How far the skins of two parts of a hand may press into each other before one counts as going through the other, in
-/// metres: neighbouring fingers touch in life, and the flesh of both gives way by a millimetre under little force. More
-/// lets fingers visibly share room, less refuses hands that are closed like every other.
+/// How far two parts of a hand may press into each other before one counts as going through the other, in metres:
+/// neighbouring fingers touch in life, and both yield by a millimetre under little force. Larger values let fingers
+/// visibly overlap, smaller ones reject ordinary closed hands.
 pub const SOFT_CONTACT: f32 = 0.002;
 
-/// How much thicker the first phalanx of a finger is at the knuckle than at its far joint where neighbours are compared.
-/// The radius of a knuckle includes the palm's flesh, which the neighbours share.
+/// Upper bound on the radius of a finger's first phalanx at the knuckle over that at its far joint, where neighbours
+/// are compared: a knuckle's radius includes flesh of the palm that neighbours share.
 const KNUCKLE_TAPER: f32 = 1.03;
 
-/// The smallest distance between parts of a hand that can meet in metres, with what soft flesh allows
-/// ([`SOFT_CONTACT`]) added: negative if one goes through the other, [`SOFT_CONTACT`] if none touches another.
+/// The smallest distance in metres between parts of a hand that can meet, plus what soft flesh allows
+/// ([`SOFT_CONTACT`]): negative if one goes through another, [`SOFT_CONTACT`] if none touch.
 ///
-/// Those are the links of different digits, and the two outer links of a digit with the palm, for fingers also with the
-/// ball of the thumb. The inner links and the thumb's ball overlap the palm in every pose.
+/// The parts that can meet are the links of different digits, the two outer links of a digit and the palm, and, for
+/// fingers, the ball of the thumb. Inner links and the thumb's ball overlap the palm in every pose.
 pub fn self_clearance(hand: &HandSolids) -> f32 {
     let mut least = 0.0;
     let mut phalanges = hand.phalanges;
@@ -41,7 +41,7 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
     least + SOFT_CONTACT
 }
 
-/// A solid with the ball around it.
+/// A solid with its bounding sphere.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::physical) struct Bounded {
     pub(in crate::physical) solid: TaperedCapsule,
@@ -59,16 +59,16 @@ impl Bounded {
         }
     }
 
-    /// A distance that the other certainly keeps, in metres, by the same means as [`Bounded::is_beyond`].
-    pub(in crate::physical) fn sure_distance(&self, other: &Self) -> f32 {
-        let by_balls = self.centre.distance(other.centre) - self.radius - other.radius;
+    /// A lower bound on the distance in metres, by the same tests as [`Bounded::is_beyond`].
+    pub(in crate::physical) fn distance_lower_bound(&self, other: &Self) -> f32 {
+        let by_spheres = self.centre.distance(other.centre) - self.radius - other.radius;
         let (long, round) = self.longer_first(other);
         let by_axis = long.distance_squared_from_axis(round.centre).sqrt() - long.thickest() - round.radius;
-        by_balls.max(by_axis)
+        by_spheres.max(by_axis)
     }
 
-    /// True if the other is certainly farther away than `distance`: by the balls around both, then by one ball and the
-    /// longer solid's axis, as the ball around a forearm is wide.
+    /// True if the other is certainly farther away than `distance`: by the bounding spheres, then by one sphere and
+    /// the longer solid's axis, because the sphere around a forearm is wide.
     pub(super) fn is_beyond(&self, other: &Self, distance: f32) -> bool {
         let reach = distance + self.radius + other.radius;
         if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {
@@ -99,7 +99,7 @@ impl Bounded {
     }
 }
 
-/// The smallest distance between two groups of solids, or `least` if it is more than that.
+/// The smallest distance between two groups of solids, or `least` if it is larger.
 fn between(ours: &[Bounded], theirs: &[Bounded], least: f32) -> f32 {
     let mut least = least;
     for our in ours {

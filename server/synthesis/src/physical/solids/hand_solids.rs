@@ -1,4 +1,4 @@
-//! The solids of a hand.
+//! The solids of a hand and its forearm.
 
 use glam::Vec3;
 
@@ -16,39 +16,39 @@ use crate::{
     },
 };
 
-/// Solids that the forearm is made of: side by side, since it is twice as wide as thick at the wrist.
+/// Solids of the forearm: two in parallel, because it is twice as wide as thick at the wrist.
 pub const FOREARM_SOLIDS: usize = 2;
 
-/// How much of the forearm counts, in metres behind the wrist: to the elbow's end of an adult's forearm.
+/// Modelled length of the forearm behind the wrist, in metres: up to the elbow of an adult.
 const FOREARM_LENGTH: f32 = 0.25;
 
-/// Half the thickness of the forearm at wrist and far end, as a multiple of the wrist's tracked radius, which is half its
-/// thickness at the crease. The far one makes a circumference of 0.30 m beside one of 0.17 m at an adult's wrist, as the
-/// means of ANSUR II for forearm and wrist are.
+/// Half the thickness of the forearm at wrist and far end, as multiples of the wrist's tracked radius (half its
+/// thickness at the crease). The far end has a circumference of 0.30 m for 0.17 m at the wrist, the means of ANSUR
+/// II.
 const FOREARM_RADII: [f32; 2] = [0.95, 2.3];
 
-/// How far its two solids lie from its middle at wrist and far end, in the same unit: a wrist is 1.65 times as broad as
-/// thick, a forearm 1.4 times.
+/// Distance of the two solids from the forearm's axis at wrist and far end, in the same unit: a wrist is 1.65 times
+/// as broad as thick, a forearm 1.4 times.
 const FOREARM_SIDES: [f32; 2] = [0.65, 0.85];
 
-/// A posed hand and its forearm as solids, in the frame of the pose.
+/// The solids of a posed hand and its forearm, in the frame of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandSolids {
-    /// The three links of each digit, thumb first. The thumb's first one is its metacarpal.
+    /// The three links of each digit, thumb first. The thumb's first link is its metacarpal.
     pub phalanges: [[TaperedCapsule; 3]; 5],
-    /// The palm, as far as it moves with the wrist.
+    /// The part of the palm that moves with the wrist.
     pub palm: [TaperedCapsule; PALM_SOLIDS],
-    /// The ball of the thumb and the web to the index finger: they move with the thumb's metacarpal.
+    /// The ball of the thumb and the web to the index finger, which move with the thumb's metacarpal.
     pub thenar: [TaperedCapsule; THENAR_SOLIDS],
-    /// The forearm, from the wrist backward.
+    /// The forearm, behind the wrist.
     pub forearm: [TaperedCapsule; FOREARM_SOLIDS],
 }
 
 impl HandSolids {
-    /// How many solids there are.
+    /// Number of solids.
     pub(crate) const COUNT: usize = 15 + PALM_SOLIDS + THENAR_SOLIDS + FOREARM_SOLIDS;
 
-    /// The solids of a posed rig: some 600 ns.
+    /// The solids of a posed rig, in some 600 ns.
     pub fn of_pose(rig: &Rig, pose: &HandPose) -> Self {
         let wrist = pose.frame_from_wrist;
         let plane = |digit: usize| DigitPlane::new(&rig.digits[digit], wrist, pose.digits[digit].base_yaw);
@@ -92,13 +92,13 @@ impl HandSolids {
         }
     }
 
-    /// The same hand elsewhere.
+    /// The same hand, translated.
     #[must_use]
-    pub fn moved(&self, way: Vec3) -> Self {
-        self.map(|point| point + way)
+    pub fn moved(&self, offset: Vec3) -> Self {
+        self.map(|point| point + offset)
     }
 
-    /// The same hand in another frame, or elsewhere and turned.
+    /// The same hand in another frame, or under a rigid motion.
     #[must_use]
     pub fn transformed(&self, a_from_b: Pose) -> Self {
         self.map(|point| a_from_b.transform_point(point))
@@ -113,7 +113,7 @@ impl HandSolids {
             forearm,
         } = &mut placed;
         let others = palm.iter_mut().chain(thenar).chain(forearm);
-        // Mapped arrays stay calls, which take longer than what they do.
+        // A loop, because mapped arrays are not inlined and the call costs more than its work.
         for solid in phalanges.as_flattened_mut().iter_mut().chain(others) {
             solid.start = place(solid.start);
             solid.end = place(solid.end);
@@ -121,7 +121,7 @@ impl HandSolids {
         placed
     }
 
-    /// The solid that [`HandSolids::iter`] gives at an index, at once.
+    /// The solid at an index of [`HandSolids::iter`], without iterating.
     pub(crate) fn solid(&self, index: usize) -> &TaperedCapsule {
         let Self {
             phalanges,
@@ -162,8 +162,8 @@ pub fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
     joints_of_digit(digit.index()).map(|joint| rig.joint_radii[joint])
 }
 
-/// The links of a digit, whose joints and tip are at `points`, with distances from there to the skin. The tip lies on
-/// the skin, so the last ball ends there.
+/// The links of a digit with joints and tip at `points` and distances `radii` from there to the skin. The tip lies on
+/// the skin, so the last link's sphere ends there.
 pub fn link_solids(points: [Vec3; 4], radii: [f32; 4]) -> [TaperedCapsule; 3] {
     let link = |i: usize| TaperedCapsule::new(points[i], points[i + 1], radii[i], radii[i + 1]);
     let last = link(2);
@@ -187,8 +187,8 @@ fn forearm(frame_from_wrist: Pose, radius: f32) -> [TaperedCapsule; FOREARM_SOLI
     })
 }
 
-/// The forearm's middle behind a wrist of `radius` metres, from the ball of the wrist: as thick as told there, where the two
-/// solids side by side leave a dip.
+/// The middle of the forearm behind a wrist of `radius` metres, starting at the wrist's tracked sphere: it fills the
+/// dip between the two parallel solids.
 pub(super) fn middle_of_forearm(frame_from_wrist: Pose, radius: f32) -> TaperedCapsule {
     let end = frame_from_wrist.transform_point(Vec3::new(0.0, -FOREARM_LENGTH, 0.0));
     TaperedCapsule::new(frame_from_wrist.position, end, radius, FOREARM_RADII[1] * radius)

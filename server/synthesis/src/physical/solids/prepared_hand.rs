@@ -1,5 +1,5 @@
-//! A giver's hand prepared for being compared with many others, coordinate by coordinate: one ball is compared with all of
-//! its solids at once.
+//! A giver's hand prepared for comparison with many others. Its solids are stored by coordinate, so that one sphere
+//! is compared with all of them at once.
 
 use glam::Vec3;
 
@@ -9,72 +9,71 @@ use super::{
     spheres::{SPHERES, Spheres},
 };
 
-/// Solids that are compared at once: those of a giver, filled up to whole registers.
+/// Number of the giver's solids, padded to whole registers.
 const LANES: usize = TrackedSolids::COUNT.next_multiple_of(8);
 
-/// The solids of a giver, indices of [`TrackedSolids::iter`], in the order in which they settle most: each is the one that
-/// met most of the receiving hands that those before it did not, of 933,479 known grips of the built-in objects that meet
-/// a recorded giver and are not [excluded](crate::known::atlas::Atlas::excluded_by) before. The first four meet 79 % of them,
-/// eight 95 %.
-const MET_FIRST: [usize; TrackedSolids::COUNT] = [
+/// The giver's solids, as indices of [`TrackedSolids::iter`], ordered greedily: each collides with most of the hands
+/// that those before it miss. Sample: all atlas grips of the built-in objects, against recorded givers, that the atlas
+/// does not exclude before. The first four solids find 79 % of the collisions, eight 95 %.
+const COLLISION_ORDER: [usize; TrackedSolids::COUNT] = [
     8, 2, 18, 5, 15, 11, 29, 6, 13, 25, 17, 30, 3, 14, 12, 1, 16, 22, 7, 26, 4, 9, 39, 21, 20, 10, 24, 19,
     23, 37, 34, 31, 38, 36, 33, 32, 27, 0, 28, 35,
 ];
 
-/// Solids of a hand that one solid is compared with at once: a register's worth of single precision.
+/// Solids of the giver compared with one solid at once: one register of single precision.
 const GROUP: usize = 8;
 
-/// Solids that some balls are compared with before it is asked whether that settled it. Fewer ask more often, more
-/// compare in vain: a look-up takes a tenth longer with four, and a fifth to a half with twenty.
+/// Solids compared with a group of spheres between checks for a decision. Fewer check more often, more compare in
+/// vain: a look-up takes a tenth longer with four, a fifth to a half longer with twenty.
 const SOLIDS_AT_ONCE: usize = 8;
 
-/// Solids that tell how far a hand is at most. With eight, more hands have to be compared exactly, and finding those that are
-/// least in a giver's way takes a quarter longer; with 24, it takes as long.
-const SETTLING: usize = 16;
+/// Solids behind the upper bounds on distance. With eight, looser bounds cause more exact comparisons and the search
+/// for the clearest hands takes a quarter longer; 24 gain nothing.
+const BOUNDING_SOLIDS: usize = 16;
 
-/// More than what single precision makes of distances within reach of an arm, in metres: what is decided at once is right
-/// by that much, and the rest is left to exact distances.
+/// Upper bound on the rounding error of distances within arm's reach, in metres. Decisions beyond it are certain; the
+/// others are left to exact distances.
 const ROUNDING: f32 = 2e-6;
 
-/// One number of each solid.
+/// One value per solid.
 type Lanes = [f32; LANES];
 
-/// The solids of a giver's hand, which stays where it is while others are compared with it.
+/// The solids of a giver's hand, fixed while others are compared with it.
 #[derive(Clone, Debug)]
 pub struct PreparedHand {
     solids: [Bounded; TrackedSolids::COUNT],
     /// Starts of the axes, in metres.
-    seeds: [Lanes; 3],
-    /// From there to their ends.
+    starts: [Lanes; 3],
+    /// Vectors from there to their ends, in metres.
     axes: [Lanes; 3],
-    /// One over the axes' squared lengths.
+    /// Reciprocals of the axes' squared lengths.
     inverse_squares: Lanes,
     start_radii: Lanes,
     /// End radius less start radius.
     rises: Lanes,
 }
 
-/// What a point is from the axes of a hand's solids, the foot of its perpendicular cut off at the ends.
-struct ToAxes {
+/// Squared distances of a point from the axes of the solids, with the feet of its perpendiculars clamped to the ends.
+struct AxisDistances {
     squares: Lanes,
     /// The feet, from 0 at the start to 1 at the end.
     along: Lanes,
 }
 
-/// What some balls' middles are from the axis of one solid, as [`ToAxes`].
-struct ToAxis {
+/// Squared distances of a group of spheres' centres from the axis of one solid, as in [`AxisDistances`].
+struct SphereAxisDistances {
     squares: [f32; SPHERES],
     /// The solid's radii at the feet.
     radii: [f32; SPHERES],
 }
 
 impl PreparedHand {
-    /// Prepares a hand: below a microsecond.
+    /// Prepares a hand, in less than a microsecond.
     pub fn new(giver: &TrackedSolids) -> Self {
-        Self::in_order(giver, &MET_FIRST)
+        Self::in_order(giver, &COLLISION_ORDER)
     }
 
-    /// The same with its solids compared in the order of [`TrackedSolids::iter`].
+    /// The same with the solids compared in the order of [`TrackedSolids::iter`].
     pub(crate) fn in_anatomical_order(giver: &TrackedSolids) -> Self {
         Self::in_order(giver, &std::array::from_fn(|solid| solid))
     }
@@ -87,19 +86,19 @@ impl PreparedHand {
         }
         let mut prepared = Self {
             solids,
-            seeds: [[0.0; LANES]; 3],
+            starts: [[0.0; LANES]; 3],
             axes: [[0.0; LANES]; 3],
             inverse_squares: [0.0; LANES],
             start_radii: [0.0; LANES],
             rises: [0.0; LANES],
         };
         for i in 0..LANES {
-            // The rest repeats the last solid, which changes nothing.
+            // The padding repeats the last solid, which changes nothing.
             let solid = &solids[i.min(TrackedSolids::COUNT - 1)].solid;
-            let way = solid.end - solid.start;
+            let axis_vector = solid.end - solid.start;
             for axis in 0..3 {
-                prepared.seeds[axis][i] = solid.start[axis];
-                prepared.axes[axis][i] = way[axis];
+                prepared.starts[axis][i] = solid.start[axis];
+                prepared.axes[axis][i] = axis_vector[axis];
             }
             let square = solid.start.distance_squared(solid.end);
             prepared.inverse_squares[i] = square.max(f32::MIN_POSITIVE).recip();
@@ -109,30 +108,31 @@ impl PreparedHand {
         prepared
     }
 
-    /// Its solids, those first that most other hands meet.
+    /// Its solids, in the order of comparison.
     pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> {
         self.solids.iter().map(|bounded| &bounded.solid)
     }
 
-    /// True only if a ball comes nearer to the hand than `distance` metres; not always then.
+    /// True only if a sphere comes closer to the hand than `distance` metres; near that distance it may be false
+    /// regardless.
     #[inline]
-    pub fn surely_nears(&self, middle: Vec3, radius: f32, distance: f32) -> bool {
-        let ToAxes { squares, along } = self.to_axes(middle);
+    pub fn certainly_within(&self, centre: Vec3, radius: f32, distance: f32) -> bool {
+        let AxisDistances { squares, along } = self.axis_distances(centre);
         let reach = radius + distance - ROUNDING;
         let mut nears = 0_u32;
         for i in 0..LANES {
-            // The ball around the foot is one of those that the solid is made of.
+            // The sphere around the foot is part of the solid.
             let reach = (reach + self.start_radii[i] + self.rises[i] * along[i]).max(0.0);
             nears |= u32::from(squares[i] < reach * reach);
         }
         nears != 0
     }
 
-    /// Metres that a point is at most from the hand's skin, and hardly less where solids taper as a hand's do; below 0
-    /// inside.
+    /// An upper bound on the distance of a point from the hand's skin in metres, negative inside; tight for solids
+    /// that taper like a hand's.
     #[inline]
     pub fn point_distance_upper_bound(&self, point: Vec3) -> f32 {
-        let ToAxes { squares, along } = self.to_axes(point);
+        let AxisDistances { squares, along } = self.axis_distances(point);
         let mut distances = [0.0; LANES];
         for i in 0..LANES {
             distances[i] = squares[i].sqrt() - (self.start_radii[i] + self.rises[i] * along[i]);
@@ -140,35 +140,40 @@ impl PreparedHand {
         least_of(&distances)
     }
 
-    /// True only if one of some balls comes nearer to the hand than `distance` metres; not always then. Some 20 ns where
-    /// the first solids settle it.
+    /// True only if one of the spheres comes closer to the hand than `distance` metres; near that distance it may be
+    /// false regardless. Takes some 20 ns if the first solids decide.
     #[inline]
-    pub fn surely_nears_any(&self, spheres: &Spheres, distance: f32) -> bool {
+    pub fn any_certainly_within(&self, spheres: &Spheres, distance: f32) -> bool {
         let mut reaches = spheres.radii;
         for reach in &mut reaches {
             *reach += distance - ROUNDING;
         }
         (0..LANES).step_by(SOLIDS_AT_ONCE).any(|first| {
-            let nears = self.near_some(first, spheres, &reaches);
+            let nears = self.near_group(first, spheres, &reaches);
             nears.iter().fold(0, |any, near| any | near) != 0
         })
     }
 
-    /// Which of some balls surely come nearer to the hand than `distance` metres, a bit each; only some of them if those
-    /// settle it.
+    /// The spheres that certainly come closer to the hand than `distance` metres, one bit each. Stops early, with
+    /// only some of them, once `is_settled` accepts the bits found.
     #[inline]
-    pub fn surely_near(&self, spheres: &Spheres, distance: f32, is_settled: impl Fn(u8) -> bool) -> u8 {
+    pub fn which_certainly_within(
+        &self,
+        spheres: &Spheres,
+        distance: f32,
+        is_settled: impl Fn(u8) -> bool,
+    ) -> u8 {
         let mut reaches = spheres.radii;
         for reach in &mut reaches {
             *reach += distance - ROUNDING;
         }
         let mut near = 0_u8;
         for first in (0..LANES).step_by(SOLIDS_AT_ONCE) {
-            let nears = self.near_some(first, spheres, &reaches);
+            let nears = self.near_group(first, spheres, &reaches);
             let bits = nears
                 .iter()
                 .enumerate()
-                .map(|(ball, &nears)| (nears as u8) << ball);
+                .map(|(sphere, &nears)| (nears as u8) << sphere);
             near |= bits.fold(0, |bits, bit| bits | bit);
             if is_settled(near) {
                 break;
@@ -177,12 +182,12 @@ impl PreparedHand {
         near
     }
 
-    /// Metres that each of some balls is at most from the hand.
+    /// Upper bounds on the distance of each sphere from the hand, in metres.
     #[inline]
     pub fn distance_upper_bounds(&self, spheres: &Spheres) -> [f32; SPHERES] {
         let mut least = [f32::INFINITY; SPHERES];
-        for k in 0..SETTLING {
-            let ToAxis { squares, radii } = self.to_axis(k, spheres);
+        for k in 0..BOUNDING_SOLIDS {
+            let SphereAxisDistances { squares, radii } = self.sphere_axis_distances(k, spheres);
             for i in 0..SPHERES {
                 let distance = squares[i].sqrt() - (spheres.radii[i] + radii[i]);
                 least[i] = if distance < least[i] { distance } else { least[i] };
@@ -194,47 +199,51 @@ impl PreparedHand {
         least
     }
 
-    /// True if any of some solids comes nearer to the hand than `distance` metres.
-    pub fn is_neared_by<'a>(
+    /// True if any of the solids comes closer to the hand than `distance` metres.
+    pub fn comes_within<'a>(
         &self,
         solids: impl Iterator<Item = &'a TaperedCapsule> + Clone,
         distance: f32,
     ) -> bool {
         let middle_nears =
-            |solid: &TaperedCapsule| self.surely_nears(solid.at(0.5), solid.radius_at(0.5), distance);
+            |solid: &TaperedCapsule| self.certainly_within(solid.at(0.5), solid.radius_at(0.5), distance);
         solids.clone().any(middle_nears) || self.least_distance(solids, distance, distance).is_none()
     }
 
-    /// The smallest distance of another hand in metres, if it is at least `required`.
+    /// The distance of another hand in metres, if it is at least `required`.
     pub fn clearance(&self, other: &TrackedSolids, required: f32) -> Option<f32> {
-        // Middle by middle, a distance that the smallest does not exceed, and for each pair one that it surely keeps.
+        // From the middle of each solid: an upper bound on the smallest distance, and a lower bound for each pair.
         let mut bounds = [f32::INFINITY; LANES];
-        let mut sure = [[0.0; LANES]; TrackedSolids::COUNT];
-        for (our, sure) in other.iter().zip(&mut sure) {
-            let ToAxes { squares, along } = self.to_axes(our.at(0.5));
+        let mut lower_bounds = [[0.0; LANES]; TrackedSolids::COUNT];
+        for (our, lower_bounds) in other.iter().zip(&mut lower_bounds) {
+            let AxisDistances { squares, along } = self.axis_distances(our.at(0.5));
             let radius = our.radius_at(0.5);
             let around = 0.5 * our.length() + our.start_radius.max(our.end_radius) + ROUNDING;
             for i in 0..LANES {
                 let to_axis = squares[i].sqrt();
                 let distance = to_axis - (radius + self.start_radii[i] + self.rises[i] * along[i]);
                 bounds[i] = if distance < bounds[i] { distance } else { bounds[i] };
-                sure[i] = to_axis - (around + self.start_radii[i] + self.rises[i].max(0.0));
+                lower_bounds[i] = to_axis - (around + self.start_radii[i] + self.rises[i].max(0.0));
             }
         }
         let mut least = least_of(&bounds) + ROUNDING;
         if least < required {
             return None;
         }
-        // Of the pairs that this leaves, one or two are left by what a better direction shows.
-        for (our, sure) in other.iter().zip(&sure) {
-            for (group, sure) in sure.as_chunks::<GROUP>().0.iter().enumerate() {
-                if sure.iter().fold(0, |any, sure| any | u32::from(*sure <= least)) == 0 {
+        // Of the remaining pairs, a better direction leaves one or two.
+        for (our, lower_bounds) in other.iter().zip(&lower_bounds) {
+            for (group, group_bounds) in lower_bounds.as_chunks::<GROUP>().0.iter().enumerate() {
+                if group_bounds
+                    .iter()
+                    .fold(0, |any, bound| any | u32::from(*bound <= least))
+                    == 0
+                {
                     continue;
                 }
-                let kept = self.kept_distances(our, group);
+                let pair_bounds = self.distance_lower_bounds(our, group);
                 let theirs = self.solids.iter().skip(group * GROUP);
-                for (their, kept) in theirs.zip(kept) {
-                    if kept <= least {
+                for (their, bound) in theirs.zip(pair_bounds) {
+                    if bound <= least {
                         least = least.min(our.distance(&their.solid));
                     }
                     if least < required {
@@ -246,14 +255,14 @@ impl PreparedHand {
         Some(least)
     }
 
-    /// Distances in metres that a group of the solids surely keep from another one.
+    /// Lower bounds, in metres, on the distance of a group of the solids from another one.
     ///
-    /// Whatever the direction, two convex solids are at least as far apart as what they take up along it. The way between
-    /// about the nearest points of their axes is a direction that shows nearly the whole distance.
+    /// Along any direction, the gap between the projections of two convex solids is such a bound. The direction
+    /// between nearly nearest points of their axes makes it nearly tight.
     #[inline]
-    fn kept_distances(&self, our: &TaperedCapsule, group: usize) -> [f32; GROUP] {
+    fn distance_lower_bounds(&self, our: &TaperedCapsule, group: usize) -> [f32; GROUP] {
         let of = |lanes: &Lanes| lanes.as_chunks::<GROUP>().0[group];
-        let [sx, sy, sz] = self.seeds.each_ref().map(of);
+        let [sx, sy, sz] = self.starts.each_ref().map(of);
         let [ax, ay, az] = self.axes.each_ref().map(of);
         let (inverse_squares, start_radii, rises) =
             (of(&self.inverse_squares), of(&self.start_radii), of(&self.rises));
@@ -262,7 +271,7 @@ impl PreparedHand {
         let rise = our.end_radius - our.start_radius;
         let mut kept = [0.0; GROUP];
         for i in 0..GROUP {
-            // The foot of our middle on their axis, its foot on ours, and that one's on theirs again.
+            // The foot of our middle on their axis, its foot on ours, and the foot of that on theirs again.
             let (x, y, z) = (middle.x - sx[i], middle.y - sy[i], middle.z - sz[i]);
             let t = ((x * ax[i] + y * ay[i] + z * az[i]) * inverse_squares[i]).clamp(0.0, 1.0);
             let (x, y, z) = (our.start.x - sx[i], our.start.y - sy[i], our.start.z - sz[i]);
@@ -276,7 +285,8 @@ impl PreparedHand {
             let square = nx * nx + ny * ny + nz * nz;
             let inverse = square.max(f32::MIN_POSITIVE).sqrt().recip();
             let (nx, ny, nz) = (nx * inverse, ny * inverse, nz * inverse);
-            // Both are the hulls of their balls at the ends; from their start, along the direction.
+            // Each solid is the hull of the spheres at its ends; coordinates along the direction, relative to their
+            // start.
             let our_start = x * nx + y * ny + z * nz - our.start_radius;
             let our_end = our_start + axis.x * nx + axis.y * ny + axis.z * nz - rise;
             let their_end = ax[i] * nx + ay[i] * ny + az[i] * nz + rises[i];
@@ -285,8 +295,8 @@ impl PreparedHand {
         kept
     }
 
-    /// The smallest distance of some solids in metres, or `enough` if it is more than that; none if it is below
-    /// `required`.
+    /// The smallest distance of some solids from the hand in metres, or `enough` if it is larger; `None` if it is
+    /// below `required`.
     pub fn least_distance<'a>(
         &self,
         solids: impl Iterator<Item = &'a TaperedCapsule>,
@@ -296,7 +306,7 @@ impl PreparedHand {
         let mut least = enough;
         for solid in solids {
             let our = Bounded::new(*solid);
-            let ToAxes { squares, .. } = self.to_axes(our.centre);
+            let AxisDistances { squares, .. } = self.axis_distances(our.centre);
             let mut is_near = [false; LANES];
             for i in 0..LANES {
                 let thickest = self.start_radii[i] + self.rises[i].max(0.0);
@@ -315,15 +325,15 @@ impl PreparedHand {
         Some(least)
     }
 
-    /// For each of some balls, 1 if it surely comes nearer to one of the solids from `first` on, [`SOLIDS_AT_ONCE`], than how
-    /// far it reaches.
+    /// For each sphere, 1 if its centre is certainly within its reach of one of the [`SOLIDS_AT_ONCE`] solids from
+    /// `first`.
     #[inline]
-    fn near_some(&self, first: usize, spheres: &Spheres, reaches: &[f32; SPHERES]) -> [u32; SPHERES] {
+    fn near_group(&self, first: usize, spheres: &Spheres, reaches: &[f32; SPHERES]) -> [u32; SPHERES] {
         let mut nears = [0; SPHERES];
         for k in first..first + SOLIDS_AT_ONCE {
-            let ToAxis { squares, radii } = self.to_axis(k, spheres);
+            let SphereAxisDistances { squares, radii } = self.sphere_axis_distances(k, spheres);
             for i in 0..SPHERES {
-                // As in `surely_nears`.
+                // As in `certainly_within`.
                 let reach = (reaches[i] + radii[i]).max(0.0);
                 nears[i] |= u32::from(squares[i] < reach * reach);
             }
@@ -332,9 +342,9 @@ impl PreparedHand {
     }
 
     #[inline]
-    fn to_axes(&self, point: Vec3) -> ToAxes {
+    fn axis_distances(&self, point: Vec3) -> AxisDistances {
         let (mut squares, mut along) = ([0.0; LANES], [0.0; LANES]);
-        let ([sx, sy, sz], [ax, ay, az]) = (&self.seeds, &self.axes);
+        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
         for i in 0..LANES {
             let (x, y, z) = (point.x - sx[i], point.y - sy[i], point.z - sz[i]);
             let t = (x * ax[i] + y * ay[i] + z * az[i]) * self.inverse_squares[i];
@@ -343,13 +353,13 @@ impl PreparedHand {
             squares[i] = x * x + y * y + z * z;
             along[i] = t;
         }
-        ToAxes { squares, along }
+        AxisDistances { squares, along }
     }
 
     #[inline]
-    fn to_axis(&self, k: usize, spheres: &Spheres) -> ToAxis {
-        let [xs, ys, zs] = &spheres.middles;
-        let ([sx, sy, sz], [ax, ay, az]) = (&self.seeds, &self.axes);
+    fn sphere_axis_distances(&self, k: usize, spheres: &Spheres) -> SphereAxisDistances {
+        let [xs, ys, zs] = &spheres.centres;
+        let ([sx, sy, sz], [ax, ay, az]) = (&self.starts, &self.axes);
         let (mut squares, mut radii) = ([0.0; SPHERES], [0.0; SPHERES]);
         for i in 0..SPHERES {
             let (x, y, z) = (xs[i] - sx[k], ys[i] - sy[k], zs[i] - sz[k]);
@@ -359,11 +369,11 @@ impl PreparedHand {
             squares[i] = x * x + y * y + z * z;
             radii[i] = self.start_radii[k] + self.rises[k] * t;
         }
-        ToAxis { squares, radii }
+        SphereAxisDistances { squares, radii }
     }
 }
 
-/// The least of some numbers: group by group, as one after the other takes as long as finding them.
+/// The smallest of some values, by groups: a sequential minimum would take as long as computing them.
 #[inline]
 fn least_of(numbers: &Lanes) -> f32 {
     let mut least = [f32::INFINITY; GROUP];

@@ -1,5 +1,4 @@
-//! The flesh of the palm as a hand's own joints tell it: tapered capsules from joint to joint, as wide as the joints'
-//! radii say.
+//! The palm as described by a hand's own joints: tapered capsules from joint to joint, with the joints' radii.
 
 use std::array::from_fn;
 
@@ -14,31 +13,31 @@ use crate::{
     },
 };
 
-/// Two joints, indices of [`TrackedPalm::joints`].
+/// Two joints, as indices into [`TrackedPalm::joints`].
 type Bone = [usize; 2];
 
-/// The ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
+/// Ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
 pub(super) const METACARPAL_ENDS: usize = 8;
 
-/// The wrist, and …
+/// Index of the wrist, …
 const WRIST: usize = METACARPAL_ENDS;
 
-/// … the base of the thumb.
+/// … and of the thumb's base.
 const THUMB: usize = WRIST + 1;
 
-/// The bases of the metacarpals, from index to little finger, and …
+/// Indices of the metacarpals' bases, from index to little finger, …
 const BASES: [usize; 4] = [0, 2, 4, 6];
 
-/// … the knuckles.
+/// … and of the knuckles.
 const KNUCKLES: [usize; 4] = [1, 3, 5, 7];
 
-/// Along the metacarpals.
+/// The metacarpals.
 const METACARPALS: [Bone; 4] = [[0, 1], [2, 3], [4, 5], [6, 7]];
 
-/// From one base to the next.
+/// Between neighbouring bases.
 const ACROSS_BASES: [Bone; 3] = neighbours(BASES);
 
-/// From one knuckle to the next.
+/// Between neighbouring knuckles.
 const ACROSS_KNUCKLES: [Bone; 3] = neighbours(KNUCKLES);
 
 /// From the wrist to the bases of the metacarpals, the thumb's last.
@@ -50,7 +49,7 @@ const FROM_WRIST: [Bone; 5] = [
     [WRIST, THUMB],
 ];
 
-/// How many capsules [`TrackedPalm::around_metacarpals`] gives.
+/// Number of capsules from [`TrackedPalm::around_metacarpals`].
 pub(super) const AROUND_METACARPALS: usize = ACROSS_KNUCKLES.len() + FROM_WRIST.len();
 
 const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
@@ -58,16 +57,16 @@ const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
     [[a, b], [b, c], [c, d]]
 }
 
-/// The joints that stay where they are in the palm, each with how far it is from there to the skin.
+/// The joints that are fixed in the palm, each with its distance to the skin.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackedPalm {
-    /// Base and knuckle of each metacarpal from index to little finger, the wrist, and the base of the thumb: places and
-    /// radii in metres.
+    /// Base and knuckle of each metacarpal from index to little finger, the wrist, and the base of the thumb:
+    /// positions and radii in metres.
     joints: [(Vec3, f32); THUMB + 1],
 }
 
 impl TrackedPalm {
-    /// That of tracked joints, in their frame.
+    /// The palm of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
         Self {
             joints: from_fn(|place| {
@@ -77,7 +76,7 @@ impl TrackedPalm {
         }
     }
 
-    /// That of a rig's hand, whatever its digits do.
+    /// The palm of a rig's hand, which does not depend on its digits.
     pub fn of_rig(rig: &Rig, frame_from_wrist: Pose) -> Self {
         let in_wrist = |place: usize| match place {
             WRIST => Vec3::ZERO,
@@ -95,14 +94,14 @@ impl TrackedPalm {
         }
     }
 
-    /// Place and radius at a share of the way between two ends of metacarpals.
+    /// Position and radius at a share of the distance between two ends of metacarpals.
     pub(super) fn between(&self, a: usize, b: usize, share: f32) -> (Vec3, f32) {
         let [(a, a_radius), (b, b_radius)] = [self.joints[a], self.joints[b]];
         (a.lerp(b, share), a_radius + (b_radius - a_radius) * share)
     }
 
-    /// What is told of the palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist
-    /// to the bases.
+    /// The palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist to the
+    /// bases.
     pub(super) fn around_metacarpals(&self) -> [TaperedCapsule; AROUND_METACARPALS] {
         let mut solids = [TaperedCapsule::default(); AROUND_METACARPALS];
         let bones = ACROSS_KNUCKLES.into_iter().chain(FROM_WRIST);
@@ -112,9 +111,9 @@ impl TrackedPalm {
         solids
     }
 
-    /// How far a point is from the skin that is told, in metres, from outside or inside: around the four metacarpals, from
-    /// one to the next across knuckles and bases, and from the wrist to the bases and the thumb's.
-    pub fn distance_of_skin(&self, point: Vec3) -> f32 {
+    /// Unsigned distance of a point from the tracked skin in metres: around the metacarpals, between neighbours
+    /// across knuckles and bases, and from the wrist to all bases, the thumb's included.
+    pub fn distance_to_skin(&self, point: Vec3) -> f32 {
         METACARPALS
             .into_iter()
             .chain(ACROSS_BASES)

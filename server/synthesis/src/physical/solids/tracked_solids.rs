@@ -1,4 +1,4 @@
-//! The solids of a hand that is compared with another person's.
+//! Tracked hand solids: a hand as it is compared with another person's.
 
 use glam::Vec3;
 
@@ -14,28 +14,28 @@ use crate::{
     },
 };
 
-/// Solids that such a hand has beside those of every hand.
+/// Solids of such a hand in addition to [`HandSolids`].
 pub const TRACKED_SOLIDS: usize = AROUND_METACARPALS + 1;
 
-/// A hand and forearm as solids for where two hands meet: nowhere thinner than skin that was fitted to a hand of its size,
-/// and nowhere more than a millimetre thinner than its joints' radii say, by which others draw it.
+/// A hand and forearm as solids for where two hands meet: nowhere thinner than skin fitted to a hand of its size, and
+/// at most a millimetre thinner than its joints' radii, from which clients draw it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedSolids {
-    /// The hand as it is beside an object.
+    /// The hand as it is compared with an object.
     pub hand: HandSolids,
-    /// Its palm, along the metacarpals at least as thick as told: four solids more instead would no longer fit into as many
-    /// registers.
+    /// Its palm, along the metacarpals at least as thick as tracked. Four separate solids instead would no longer fit
+    /// into the same number of registers.
     pub palm: [TaperedCapsule; PALM_SOLIDS],
-    /// What is told of the rest: across the knuckles, from the wrist to the metacarpals' bases and the thumb's, and the
-    /// middle of the forearm.
+    /// The other tracked parts: across the knuckles, from the wrist to all metacarpal bases, and the middle of the
+    /// forearm.
     pub tracked: [TaperedCapsule; TRACKED_SOLIDS],
 }
 
 impl TrackedSolids {
-    /// How many solids there are.
+    /// Number of solids.
     pub(crate) const COUNT: usize = HandSolids::COUNT + TRACKED_SOLIDS;
 
-    /// The solids of a hand's tracked joints, in their frame.
+    /// The solids of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
         let wrist = joints.joints[index::WRIST];
         let forearm = middle_of_forearm(thesis_from_openxr_frame(wrist.pose), wrist.radius);
@@ -46,7 +46,7 @@ impl TrackedSolids {
         )
     }
 
-    /// The solids of a rig's hand of which those beside an object are known, with its wrist there.
+    /// The solids of a rig's hand with a given wrist pose, whose [`HandSolids`] are known.
     pub fn of_rig(rig: &Rig, frame_from_wrist: Pose, hand: &HandSolids) -> Self {
         let forearm = middle_of_forearm(frame_from_wrist, rig.joint_radii[index::WRIST]);
         Self::new(hand, &TrackedPalm::of_rig(rig, frame_from_wrist), forearm)
@@ -62,21 +62,21 @@ impl TrackedSolids {
         }
     }
 
-    /// The same hand elsewhere.
+    /// The same hand, translated.
     #[must_use]
-    pub fn moved(&self, way: Vec3) -> Self {
+    pub fn moved(&self, offset: Vec3) -> Self {
         let mut moved = Self {
-            hand: self.hand.moved(way),
+            hand: self.hand.moved(offset),
             ..*self
         };
         for solid in moved.palm.iter_mut().chain(&mut moved.tracked) {
-            solid.start += way;
-            solid.end += way;
+            solid.start += offset;
+            solid.end += offset;
         }
         moved
     }
 
-    /// All solids for where hands meet: those of every hand in the order of [`HandSolids::iter`], then those that are told.
+    /// All solids for comparing hands: those of [`HandSolids::iter`] in the same order, then the additional ones.
     pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
         let HandSolids {
             phalanges,
@@ -93,12 +93,12 @@ impl TrackedSolids {
             .chain(&self.tracked)
     }
 
-    /// Those of them that stay where the wrist is, whatever the digits do.
+    /// The solids that move with the wrist only.
     pub fn still(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
         self.palm.iter().chain(&self.hand.forearm).chain(&self.tracked)
     }
 
-    /// All solids in the order of [`TrackedSolids::iter`], side by side.
+    /// All solids in the order of [`TrackedSolids::iter`].
     pub(crate) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
         let mut all = [self.tracked[0]; Self::COUNT];
         for (place, solid) in all.iter_mut().zip(self.iter()) {

@@ -55,7 +55,7 @@ fn excluded_grips_meet_the_giver() {
             let exclusion = atlas.excluded_by(&hand);
             for (index, entry) in atlas.entries().iter().enumerate() {
                 let solids = HandSolids::of_pose(rig, &entry.grip.pose);
-                let meets = hand.is_neared_by(solids.iter(), GIVER_CLEARANCE);
+                let meets = hand.comes_within(solids.iter(), GIVER_CLEARANCE);
                 let is_excluded = exclusion.contains(index as u16);
                 assert!(
                     meets || !is_excluded,
@@ -110,7 +110,7 @@ fn a_shipped_atlas_excludes_only_meeting_grips_and_lists_the_best_first() {
             // Some of every block that is compared together.
             for index in (0..entries.len()).step_by(61) {
                 let solids = HandSolids::of_pose(rig, &entries[index].grip.pose);
-                let meets = hand.is_neared_by(solids.iter(), GIVER_CLEARANCE);
+                let meets = hand.comes_within(solids.iter(), GIVER_CLEARANCE);
                 let is_excluded = exclusion.contains(index as u16);
                 assert!(meets || !is_excluded, "{name}: {index} keeps clear");
                 meeting += usize::from(meets);

@@ -10,7 +10,7 @@ use grasp_synthesis::{
         holdout::Holdout,
     },
     physical::{
-        grip::{DEEPEST, GIVER_CLEARANCE},
+        grip::{GIVER_CLEARANCE, MAX_PENETRATION},
         immobility::{BALANCE_TOLERANCE, Buffers, EPSILON_TOLERANCE, SoftContact, epsilon},
         scene::ObjectScene,
         solids::{HandSolids, TaperedCapsule, TrackedSolids, clearance, self_clearance},
@@ -81,10 +81,10 @@ fn recorded_finger_subsets_are_those_with_closure() {
             }
             // Epsilon is exact to its tolerance; within that, either answer is right.
             let bound = epsilon_of(&entry.contacts, kept, &scene);
-            if bound >= scene.least_epsilon {
+            if bound >= scene.required_epsilon {
                 closing += 1;
                 assert!(is_set, "grip {place}, {kept:?}: {bound}");
-            } else if bound < (1.0 - EPSILON_TOLERANCE) * scene.least_epsilon {
+            } else if bound < (1.0 - EPSILON_TOLERANCE) * scene.required_epsilon {
                 open += 1;
                 assert!(!is_set, "grip {place}, {kept:?}: {bound}");
             }
@@ -140,14 +140,14 @@ pub(crate) fn assert_is_valid(grasp: &Grasp, holdout: &Holdout, giver: &TrackedS
         .iter()
         .map(|solid| clearance(solid, &object.surface, 0.0))
         .fold(0.0, f32::min);
-    assert!((deepest + margins.penetration).abs() < 1e-6 && -deepest <= DEEPEST);
+    assert!((deepest + margins.penetration).abs() < 1e-6 && -deepest <= MAX_PENETRATION);
 
     let weight = object.mass * GRAVITY;
     let force: glam::Vec3 = grasp.forces.iter().sum();
     assert!((force - UP * weight).length() <= BALANCE_TOLERANCE * weight * 1.01);
     let scene = object_scene(object);
     let closure = epsilon_of(&grasp.contacts, [true; 5], &scene);
-    assert!(closure >= (1.0 - EPSILON_TOLERANCE) * scene.least_epsilon);
+    assert!(closure >= (1.0 - EPSILON_TOLERANCE) * scene.required_epsilon);
 }
 
 #[test]

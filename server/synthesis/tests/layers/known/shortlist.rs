@@ -56,7 +56,7 @@ fn the_shortlist_serves_more_givers_than_the_best_scored_grips() {
             let hand = PreparedHand::new(&TrackedSolids::of_joints(&joints));
             let keeps_clear = |entry: &&u16| {
                 let solids = entries[usize::from(**entry)].solids(rig);
-                !hand.is_neared_by(solids.iter(), GIVER_CLEARANCE)
+                !hand.comes_within(solids.iter(), GIVER_CLEARANCE)
             };
             let listed = list.iter().find(keeps_clear);
             let best = holding.iter().find(keeps_clear);

@@ -246,7 +246,7 @@ fn distances_to_a_tracked_palm_match_its_swept_balls() {
             .iter()
             .map(|(ball, radius)| ball.distance(point) - radius)
             .fold(f32::INFINITY, f32::min);
-        let found = TrackedPalm::of_joints(&joints).distance_of_skin(point);
+        let found = TrackedPalm::of_joints(&joints).distance_to_skin(point);
         assert!(
             (found - expected.abs()).abs() < 3e-4,
             "{point}: {found}, not {expected}"

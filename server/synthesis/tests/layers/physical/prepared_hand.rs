@@ -75,7 +75,7 @@ fn distances_and_verdicts_match_all_pairs() {
         let least = least_of_all_pairs(palm(), &giver);
         if (least - required).abs() >= 1e-5 {
             assert_eq!(
-                prepared.is_neared_by(palm(), required),
+                prepared.comes_within(palm(), required),
                 least < required,
                 "case {case}"
             );
@@ -83,7 +83,7 @@ fn distances_and_verdicts_match_all_pairs() {
         }
 
         let (middle, radius) = (receiver.palm[0].start, receiver.palm[0].start_radius);
-        if prepared.surely_nears(middle, radius, required) {
+        if prepared.certainly_within(middle, radius, required) {
             let distances = giver.iter().map(|solid| solid.signed_distance(middle) - radius);
             let least = distances.fold(f32::INFINITY, f32::min);
             assert!(least < required, "case {case}: the ball is {least} m off");
@@ -112,11 +112,13 @@ fn moved_balls_are_near_where_any_one_of_them_is() {
         let balls = Spheres::new(|i| (middles[i], radii[i])).transformed(way);
         let nears = |distance: f32| {
             let mut each = middles.iter().zip(radii);
-            each.any(|(middle, radius)| giver.surely_nears(way.transform_point(*middle), radius, distance))
+            each.any(|(middle, radius)| {
+                giver.certainly_within(way.transform_point(*middle), radius, distance)
+            })
         };
         // Where rounding decides, either answer is right.
         let (surely, perhaps) = (nears(0.001 - 1e-6), nears(0.001 + 1e-6));
-        let found = giver.surely_nears_any(&balls, 0.001);
+        let found = giver.any_certainly_within(&balls, 0.001);
         assert!(found || !surely, "case {case}: one of them is near");
         assert!(!found || perhaps, "case {case}: none of them is near");
         if found {
@@ -127,7 +129,7 @@ fn moved_balls_are_near_where_any_one_of_them_is() {
 
         // Each ball's upper bound holds, and it is near exactly where it is alone.
         let bounds = giver.distance_upper_bounds(&balls);
-        let near_ones = giver.surely_near(&balls, 0.001, |_| false);
+        let near_ones = giver.which_certainly_within(&balls, 0.001, |_| false);
         for (ball, (middle, radius)) in middles.into_iter().zip(radii).enumerate() {
             let middle = way.transform_point(middle);
             let distances = solids.iter().map(|solid| solid.signed_distance(middle) - radius);
@@ -139,12 +141,12 @@ fn moved_balls_are_near_where_any_one_of_them_is() {
             );
             close += usize::from(bound < least + 1e-3);
             let is_near = near_ones >> ball & 1 == 1;
-            let nears = |distance: f32| giver.surely_nears(middle, radius, distance);
+            let nears = |distance: f32| giver.certainly_within(middle, radius, distance);
             assert!(is_near || !nears(0.001 - 1e-6), "case {case}: {ball} is near");
             assert!(!is_near || nears(0.001 + 1e-6), "case {case}: {ball} is not near");
         }
         // Once one ball decides, the others may be skipped.
-        let settled = giver.surely_near(&balls, 0.001, |near| near != 0);
+        let settled = giver.which_certainly_within(&balls, 0.001, |near| near != 0);
         assert!(
             settled & !near_ones == 0 && (settled != 0) == (near_ones != 0),
             "case {case}"

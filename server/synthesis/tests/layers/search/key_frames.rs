@@ -15,7 +15,7 @@ use grasp_synthesis::{
         object::GraspObject,
     },
     physical::{
-        grip::{DEEPEST, GIVER_CLEARANCE, Gripper},
+        grip::{GIVER_CLEARANCE, Gripper, MAX_PENETRATION},
         scene::Presented,
         solids::{HandSolids, TrackedSolids, clearance, self_clearance},
     },
@@ -263,7 +263,7 @@ fn closing_stays_within_the_grasps_depth_and_off_forbidden_surfaces() {
         for (moment, pose) in moments(pre_grasp, close).enumerate() {
             let (depth, giver) = gaps(planned, &pose);
             assert!(
-                depth >= -DEEPEST - TOLERANCE && giver > 0.0,
+                depth >= -MAX_PENETRATION - TOLERANCE && giver > 0.0,
                 "{} at {moment}: {depth} m, {giver} m",
                 planned.name
             );

@@ -34,7 +34,7 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
                 refined += 1;
                 let margins = grasp.margins.expect("it is physical");
                 assert!(
-                    margins.epsilon >= around.object.least_epsilon,
+                    margins.epsilon >= around.object.required_epsilon,
                     "{index}: {margins:?}"
                 );
                 assert!(margins.residual <= 0.02, "{index}: {margins:?}");

@@ -1,7 +1,7 @@
-//! Processor time of a search, as the time that it takes on an idle machine.
+//! Processor time of a search as its duration on an idle machine.
 //!
-//! The coordinating thread works alone before workers are woken, so that its time counts whole; of the workers, who share
-//! the rest, each has done an even part of it.
+//! The coordinating thread works alone before it wakes the workers, so its time counts in full; the rest is divided
+//! evenly among the workers.
 
 use std::{cell::Cell, time::Duration};
 
@@ -10,19 +10,19 @@ use grasp_synthesis::base::clock::Clock;
 use crate::core::thread_time;
 
 thread_local! {
-    /// Does this thread wait for workers?
+    /// Whether this thread waits for workers.
     static COORDINATES: Cell<bool> = const { Cell::new(false) };
 }
 
 /// A clock that starts with a search.
-pub(super) struct Effort {
+pub(super) struct ProcessorClock {
     workers: u32,
     coordinator_start: Duration,
     process_start: Duration,
 }
 
-impl Effort {
-    /// Starts on the thread that waits for `workers` others.
+impl ProcessorClock {
+    /// Starts on the thread that waits for `workers` other threads.
     pub(super) fn start(workers: usize) -> Self {
         COORDINATES.set(true);
         Self {
@@ -32,7 +32,7 @@ impl Effort {
         }
     }
 
-    /// The time so far, asked for on the thread that waits.
+    /// The time so far. Must be called on the waiting thread.
     pub(super) fn total(&self) -> Duration {
         let of_coordinator = self.of_coordinator();
         let of_workers = self.of_process().saturating_sub(of_coordinator);
@@ -48,7 +48,7 @@ impl Effort {
     }
 }
 
-impl Clock for Effort {
+impl Clock for ProcessorClock {
     fn now(&self) -> Duration {
         if COORDINATES.get() {
             self.of_coordinator()
@@ -58,14 +58,14 @@ impl Clock for Effort {
     }
 }
 
-/// Processor time of all threads.
+/// Processor time of all threads of this process.
 #[cfg(target_os = "linux")]
 fn process_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Duration::try_from(time).expect("a process' time is positive")
 }
 
-/// Where the system has no such clock, all threads count as busy.
+/// Without such a clock, all threads count as busy.
 #[cfg(not(target_os = "linux"))]
 fn process_time() -> Duration {
     thread_time() * crate::core::WORKERS as u32

@@ -1,4 +1,4 @@
-//! Requests over real gRPC, one at a time, and what became of them.
+//! Requests over real gRPC, one at a time, and their answers.
 
 use std::time::{Duration, Instant};
 
@@ -8,42 +8,42 @@ use tonic::transport::Channel;
 
 use crate::table::Spread;
 
-/// How soon an answer must be there to count as answered: two or three frames, which the start of a handover hides.
+/// Time within which a request counts as answered: two or three frames, hidden by the start of a handover.
 pub(crate) const ANSWERED_WITHIN: Duration = Duration::from_millis(50);
 
-/// An answer, in figures.
+/// The measurements of one answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Answer {
-    /// Was a grasp found?
+    /// Whether a grasp was found.
     pub(crate) found: bool,
-    /// Was it one of the atlas?
+    /// Whether it came from the atlas.
     pub(crate) from_atlas: bool,
-    /// Was it what an earlier request's search had found?
+    /// Whether it came from the grips of earlier requests.
     pub(crate) from_recent: bool,
-    /// Valid grasps that were ranked.
+    /// Valid grasps that were compared.
     pub(crate) candidates: u64,
-    /// What the server says that the search took; reading the request, planning key frames and wording the answer come
-    /// on top.
+    /// Duration of the search as the server reports it: without reading the request, planning key frames and writing
+    /// the answer.
     pub(crate) search_time: Duration,
-    /// The budget that was in force.
+    /// The budget in force.
     pub(crate) budget: Duration,
-    /// From before the call to its answer in the client, encoding and decoding included.
+    /// Duration of the call in the client, encoding and decoding included.
     pub(crate) round_trip: Duration,
-    /// Bytes of the request's message.
+    /// Size of the request message in bytes.
     pub(crate) sent_bytes: usize,
-    /// Bytes of the answer's message.
+    /// Size of the answer message in bytes.
     pub(crate) received_bytes: usize,
 }
 
 impl Answer {
-    /// Was a grasp found in 50 ms?
+    /// Whether a grasp was found within 50 ms.
     pub(crate) fn is_in_time(&self) -> bool {
         self.found && self.search_time <= ANSWERED_WITHIN
     }
 }
 
-/// Asks once.
-pub(crate) async fn ask(client: &mut GraspServiceClient<Channel>, request: v1::FindGraspRequest) -> Answer {
+/// Sends one request.
+pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::FindGraspRequest) -> Answer {
     let sent_bytes = request.encoded_len();
     let start = Instant::now();
     let answer = client.find_grasp(request).await.expect("the request is valid");
@@ -75,30 +75,30 @@ pub(crate) fn within_50_ms(request: v1::FindGraspRequest) -> v1::FindGraspReques
     }
 }
 
-/// A duration as a message.
+/// A duration as a protobuf message.
 pub(crate) fn wire_duration(duration: Duration) -> Option<prost_types::Duration> {
     prost_types::Duration::try_from(duration).ok()
 }
 
-/// The spread of the search times.
+/// Spread of the search times.
 pub(crate) fn search_times(answers: &[Answer]) -> Spread {
     Spread::of_times(answers.iter().map(|answer| answer.search_time))
 }
 
-/// The spread of the round trips.
+/// Spread of the round trips.
 pub(crate) fn round_trips(answers: &[Answer]) -> Spread {
     Spread::of_times(answers.iter().map(|answer| answer.round_trip))
 }
 
-/// The share of answers of which something is true.
+/// Share of the answers for which a predicate holds.
 pub(crate) fn share(answers: &[Answer], is: impl Fn(&Answer) -> bool) -> f64 {
     answers.iter().filter(|answer| is(answer)).count() as f64 / answers.len() as f64
 }
 
-/// Makes sure that what was measured are grasps.
+/// Asserts that grasps were measured.
 ///
 /// # Panics
-/// None of the answers has one.
+/// No answer has a grasp.
 pub(crate) fn assert_some_found(answers: &[Answer]) {
     assert!(
         answers.iter().any(|answer| answer.found),
