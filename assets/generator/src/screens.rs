@@ -115,7 +115,7 @@ fn print_spheres(pairs: &[Pair]) {
                 let solid: Option<&TaperedCapsule> = pair.grip.hand.iter().nth(solid);
                 solid.is_some_and(|solid| {
                     let (middle, radius) = (solid.at(along), solid.radius_at(along));
-                    pair.giver.surely_nears(middle, radius, GIVER_CLEARANCE)
+                    pair.giver.certainly_within(middle, radius, GIVER_CLEARANCE)
                 })
             };
             pairs.iter().map(settles).collect()
