@@ -124,7 +124,7 @@ impl GraspObject {
             friction,
             forbidden_surface: surface
                 .mesh()
-                .part(|triangle| forbidden[triangle])
+                .submesh(|triangle| forbidden[triangle])
                 .map(MeshBvh::build_quick),
             surface,
             forbidden,

@@ -208,7 +208,7 @@ impl Closing<'_> {
     /// `reachable`.
     fn gap(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
         let obstructed = self.gap_to_obstacles(index, link, reachable);
-        let sure = self.surface.least_gap(link);
+        let sure = self.surface.gap_lower_bound(link);
         if sure > SURE_GAP {
             return sure.min(obstructed);
         }

@@ -319,7 +319,7 @@ fn free_way(scene: &ObjectScene<'_>, still: &HandSolids, direction: Vec3, most: 
         let reachable = most - way + TOUCH_DEPTH;
         let sure = parts
             .clone()
-            .fold(reachable, |least, part| least.min(surface.least_gap(part)));
+            .fold(reachable, |least, part| least.min(surface.gap_lower_bound(part)));
         let gap = if sure > SURE_GAP {
             sure
         } else {

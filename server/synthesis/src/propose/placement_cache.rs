@@ -119,7 +119,7 @@ impl PlacementCaches {
         rig: &PreparedRig,
         mechanisms: Mechanisms,
     ) -> Arc<PlacementCache> {
-        let mechanisms = mechanisms.only_of(&DRAWN_BY);
+        let mechanisms = mechanisms.restricted_to(&DRAWN_BY);
         let found = {
             let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let found = known

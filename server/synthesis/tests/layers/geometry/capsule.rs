@@ -119,7 +119,7 @@ fn distances_match_closed_forms() {
 /// Compares the gap to a mesh's surface with the balls' gaps.
 fn compare(name: &str, surface: &MeshBvh, count: usize) {
     let mut random = Random::new(13);
-    let part = |odd: usize| surface.mesh().part(|triangle| triangle % 2 == odd);
+    let part = |odd: usize| surface.mesh().submesh(|triangle| triangle % 2 == odd);
     let parts: Vec<MeshBvh> = [part(0), part(1)]
         .into_iter()
         .flatten()
@@ -333,7 +333,7 @@ fn lower_bounds_of_gaps_never_exceed_the_gaps() {
         for i in 0..400 {
             let near = random.near(&mesh, 0.1);
             let capsule = capsule(&mut random, near);
-            let bound = prepared.least_gap(&capsule);
+            let bound = prepared.gap_lower_bound(&capsule);
             let gap = exact.closest_to_capsule(&capsule, 1.0).map_or(1.0, |gap| gap.gap);
             assert!(
                 bound <= gap + ACCURACY,
