@@ -193,15 +193,15 @@ pub(super) fn closest(
 /// Lower bounds of the gaps to the boxes of a node's children; NaN, which is below no limit, for unused children.
 #[inline]
 fn box_gaps(node: &Node, query: &Query) -> Vec4 {
-    let [least, most] = &node.bounds;
+    let [min, max] = &node.bounds;
     // D(t) - r(t) and its slope.
     let tangent = |t: Vec4| {
         let mut squared = Vec4::ZERO;
         let mut falling = Vec4::ZERO;
         for axis in 0..3 {
             let point = query.start[axis] + query.axis[axis] * t;
-            let below = (least[axis] - point).max(Vec4::ZERO);
-            let above = (point - most[axis]).max(Vec4::ZERO);
+            let below = (min[axis] - point).max(Vec4::ZERO);
+            let above = (point - max[axis]).max(Vec4::ZERO);
             // At most one of the two is positive, except for unused children.
             let outside = above.max(below);
             squared += outside * outside;
@@ -235,7 +235,7 @@ fn box_gaps(node: &Node, query: &Query) -> Vec4 {
         value0,
         Vec4::select(slope1.cmple(Vec4::ZERO), value1, lowest),
     );
-    let used = least[0].cmplt(most[0]) | least[0].cmpeq(most[0]);
+    let used = min[0].cmplt(max[0]) | min[0].cmpeq(max[0]);
     Vec4::select(used, bound - SLACK, Vec4::NAN)
 }
 
@@ -252,15 +252,15 @@ fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
     let third = minus(&first, &pack.edge2);
     let edge3 = minus(&pack.edge2, &pack.edge1);
 
-    let starts = pack_distances(pack, &query.start).sqrt() - query.start_radius;
-    let ends = pack_distances(pack, &query.end).sqrt() - query.end_radius;
+    let at_start = pack_distances(pack, &query.start).sqrt() - query.start_radius;
+    let at_end = pack_distances(pack, &query.end).sqrt() - query.end_radius;
     let corners = corner_gap(query, &first)
         .min(corner_gap(query, &second))
         .min(corner_gap(query, &third));
     let edges = edge_gap(query, &first, &pack.edge1)
         .min(edge_gap(query, &first, &pack.edge2))
         .min(edge_gap(query, &second, &edge3));
-    let around = starts.min(ends).min(corners).min(edges);
+    let around = at_start.min(at_end).min(corners).min(edges);
 
     let height = dot(&pack.normal, &first);
     let climb = dot(&pack.normal, &query.axis);
@@ -268,10 +268,10 @@ fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
     let crossing = point_along(&first, &query.axis, t);
     let around_first = cross(&crossing, &pack.normal);
     let around_second = cross(&minus(&crossing, &pack.edge1), &pack.normal);
-    let least_side = dot(&pack.edge1, &around_first)
+    let smallest_side = dot(&pack.edge1, &around_first)
         .min(-dot(&pack.edge2, &around_first))
         .min(dot(&edge3, &around_second));
-    let crosses = least_side.cmpge(Vec4::ZERO)
+    let crosses = smallest_side.cmpge(Vec4::ZERO)
         & (height * (height + climb)).cmple(Vec4::ZERO)
         & climb.cmpne(Vec4::ZERO);
     Vec4::select(crosses, around.min(-query.radius_at(t)), around)

@@ -88,8 +88,8 @@ pub(super) fn closest(
 /// Squared distances to the boxes of a node's children, reduced by [`BOX_SLACK`]; 0 inside, ∞ for unused children.
 #[inline]
 fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
-    let [least, most] = &node.bounds;
-    let (below, above) = (minus(least, point), minus(point, most));
+    let [min, max] = &node.bounds;
+    let (below, above) = (minus(min, point), minus(point, max));
     let outside = [
         below[0].max(above[0]).max(Vec4::ZERO),
         below[1].max(above[1]).max(Vec4::ZERO),

@@ -145,12 +145,12 @@ impl ExactQuery {
         const NOISE: f64 = 4e-15;
         let [a, b, c] = corners.map(|corner| corner.as_dvec3() - self.start);
         let volumes = [b.cross(c), c.cross(a), a.cross(b)].map(|product| self.direction.dot(product));
-        let least = volumes[0].min(volumes[1]).min(volumes[2]);
-        let most = volumes[0].max(volumes[1]).max(volumes[2]);
+        let smallest = volumes[0].min(volumes[1]).min(volumes[2]);
+        let largest = volumes[0].max(volumes[1]).max(volumes[2]);
         let reach = a.length_squared().max(b.length_squared()).max(c.length_squared());
         let noise = NOISE * self.direction.length() * reach;
         let slack = GRAZE * (volumes[0].abs() + volumes[1].abs() + volumes[2].abs()) + noise;
-        if least < -slack && most > slack {
+        if smallest < -slack && largest > slack {
             return ExactCrossing::Miss;
         }
         let normal = (b - a).cross(c - a);
@@ -159,12 +159,12 @@ impl ExactQuery {
             return ExactCrossing::Graze(None);
         }
         let t = a.dot(normal) / facing;
-        let passes_inside = least >= 0.0 || most <= 0.0;
+        let passes_inside = smallest >= 0.0 || largest <= 0.0;
         let crossing = (passes_inside && (0.0..=1.0).contains(&t)).then_some(Crossing {
             t,
             leaves: facing > 0.0,
         });
-        let clear = least > slack || most < -slack;
+        let clear = smallest > slack || largest < -slack;
         match crossing {
             Some(crossing) if clear => ExactCrossing::Hit(crossing),
             None if clear => ExactCrossing::Miss,

@@ -76,12 +76,12 @@ impl DistanceField {
         // Each sphere bounds the part of the capsule nearest to its centre on the axis.
         let half_part = 0.5 / SPHERES as f32;
         let overhang = half_part * (capsule.length() + (capsule.end_radius - capsule.start_radius).abs());
-        let mut least = f32::INFINITY;
+        let mut bound = f32::INFINITY;
         for sphere in 0..SPHERES {
             let along = (2 * sphere + 1) as f32 * half_part;
-            least = least.min(self.distance_lower_bound(capsule.at(along)) - capsule.radius_at(along));
+            bound = bound.min(self.distance_lower_bound(capsule.at(along)) - capsule.radius_at(along));
         }
-        least - overhang
+        bound - overhang
     }
 
     /// Memory of the samples, in bytes.

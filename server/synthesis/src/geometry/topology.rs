@@ -139,15 +139,15 @@ fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) 
             .flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]])
             .filter(|[from, to]| from != to)
     };
-    let mut starts = vec![0_u32; vertices + 1];
+    let mut offsets = vec![0_u32; vertices + 1];
     for [from, to] in directed() {
-        starts[from.min(to) as usize + 1] += 1;
+        offsets[from.min(to) as usize + 1] += 1;
     }
     for vertex in 0..vertices {
-        starts[vertex + 1] += starts[vertex];
+        offsets[vertex + 1] += offsets[vertex];
     }
-    let mut cursor = starts.clone();
-    let mut uses = vec![(0_u32, 0_i32); starts[vertices] as usize];
+    let mut cursor = offsets.clone();
+    let mut uses = vec![(0_u32, 0_i32); offsets[vertices] as usize];
     for [from, to] in directed() {
         let slot = &mut cursor[from.min(to) as usize];
         uses[*slot as usize] = (from.max(to), if from < to { 1 } else { -1 });
@@ -155,7 +155,7 @@ fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) 
     }
     let mut chain = Vec::new();
     for vertex in 0..vertices {
-        let row = &mut uses[starts[vertex] as usize..starts[vertex + 1] as usize];
+        let row = &mut uses[offsets[vertex] as usize..offsets[vertex + 1] as usize];
         row.sort_unstable();
         for same in row.chunk_by(|a, b| a.0 == b.0) {
             let count: i32 = same.iter().map(|&(_, direction)| direction).sum();

@@ -159,11 +159,7 @@ impl TypeSet {
 
 impl FromIterator<GraspType> for TypeSet {
     fn from_iter<I: IntoIterator<Item = GraspType>>(types: I) -> Self {
-        Self(
-            types
-                .into_iter()
-                .fold(0, |bits, grasp_type| bits | Self::bit(grasp_type)),
-        )
+        Self(types.into_iter().fold(0, |bits, kind| bits | Self::bit(kind)))
     }
 }
 
