@@ -118,9 +118,9 @@ fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Vi
         }
     }
     // Clients count the triangles of their file, some of which may have been dropped.
-    let triangles = obj.places_in_file;
+    let triangles = obj.triangles_in_file;
     for (place, &triangle) in fields.forbidden_triangles.iter().enumerate() {
-        if let Ok(index) = obj.places.binary_search(&triangle) {
+        if let Ok(index) = obj.indices_in_file.binary_search(&triangle) {
             forbidden.push(index as u32);
         } else if triangle as usize >= triangles {
             violations.add(

@@ -116,7 +116,7 @@ impl StoredObject {
                 .object
                 .forbidden_surface()
                 .map_or(0, |surface| of_mesh(surface.mesh()))
-            + self.object.surface.field_bytes()
+            + self.object.surface.distance_field_bytes()
             + self.object.surface_pairs().bytes()
             + PlacementCaches::MAX_BYTES
             + self.transferred_grips.len() * TransferredGrips::MOST_BYTES

@@ -162,7 +162,9 @@ fn grasp_type(field: Field<'_>, value: i32, violations: &mut Violations) -> Opti
     }
     let wire: v1::GraspType = known(field, value, violations);
     // The contract uses the taxonomy's numbers.
-    u32::try_from(i32::from(wire)).ok().and_then(GraspType::of_number)
+    u32::try_from(i32::from(wire))
+        .ok()
+        .and_then(GraspType::from_number)
 }
 
 fn digit(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Digit> {

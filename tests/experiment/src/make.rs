@@ -167,7 +167,7 @@ impl Maker {
             search: Some(SearchFigures {
                 attempts: report.attempts,
                 pruned_placements: report.pruned_placements,
-                rejections: Rejection::OF_THESIS.map(|kind| report.rejections[kind.index()]),
+                rejections: Rejection::THESIS.map(|kind| report.rejections[kind.index()]),
                 nanoseconds: nanoseconds(took),
                 atlas: cell.set.atlas.then_some(AtlasFigures {
                     entries: report.known_grips as u64,

@@ -82,7 +82,7 @@ pub struct SearchFigures {
     pub attempts: u64,
     /// Placements pruned by the measures.
     pub pruned_placements: u64,
-    /// Failed attempts by kind, in the order of [`Rejection::OF_THESIS`]: the experiments set no constraints.
+    /// Failed attempts by kind, in the order of [`Rejection::THESIS`]: the experiments set no constraints.
     pub rejections: [u64; 8],
     /// Wall-clock time in nanoseconds.
     pub nanoseconds: u64,

@@ -21,7 +21,7 @@ pub(super) struct Cleaned {
     /// For each triangle, the index of its face.
     pub(super) faces: Vec<usize>,
     /// For each triangle, its index before any were dropped.
-    pub(super) places: Vec<u32>,
+    pub(super) indices_in_file: Vec<u32>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -31,9 +31,9 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
         triangulate: true,
         ..tobj::LoadOptions::default()
     };
-    // The scan drops references to material libraries; if one got through, it would be refused, not opened.
-    let refuse = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut scan.plain.as_bytes(), &options, refuse)
+    // The scan drops references to material libraries; if one got through, it would be rejected, not opened.
+    let reject = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
+    let (models, _) = tobj::load_obj_buf(&mut scan.plain.as_bytes(), &options, reject)
         .map_err(|error| vec![ObjError::Unreadable(error)])?;
     // Without groups in its input, tobj returns one model.
     let Some(parsed) = models.into_iter().next().map(|model| model.mesh) else {
@@ -60,10 +60,10 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
     let mut seen = HashSet::new();
     let mut triangles = Vec::new();
     let mut faces = Vec::new();
-    let mut places = Vec::new();
+    let mut indices_in_file = Vec::new();
     // Slivers with three distinct vertices have no area but still close the gap between their neighbours.
     let mut joined = Vec::new();
-    for (place, (triangle, face)) in corners.into_iter().zip(origins).enumerate() {
+    for (index, (triangle, face)) in corners.into_iter().zip(origins).enumerate() {
         let line = scan.faces[face].line;
         if has_repeated_corner(triangle) {
             dropped.without_area.note(line);
@@ -74,7 +74,7 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
             if has_area(&positions, triangle) {
                 triangles.push(triangle);
                 faces.push(face);
-                places.push(place as u32);
+                indices_in_file.push(index as u32);
             } else {
                 dropped.without_area.note(line);
             }
@@ -107,7 +107,7 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
     Ok(Cleaned {
         mesh,
         faces,
-        places,
+        indices_in_file,
         warnings,
     })
 }

@@ -26,11 +26,11 @@ pub struct ObjMesh {
     /// Vertices (welded, in order of first use) and triangles (in the file's order, polygons as fans from their first
     /// corner), scaled to metres.
     pub mesh: TriangleMesh,
-    /// For each triangle, its index in the file: counted from 0 after polygons are split and before triangles are
-    /// dropped; ascending. Maps indices that refer to the file to indices of `mesh`.
-    pub places: Vec<u32>,
+    /// For each triangle, its index in the file, counted from 0 after polygons are split and before triangles are
+    /// dropped; ascending.
+    pub indices_in_file: Vec<u32>,
     /// Number of triangles in the file, dropped ones included.
-    pub places_in_file: usize,
+    pub triangles_in_file: usize,
     /// The triangles of each group (`g`), object (`o`) and material (`usemtl`), ascending; sorted by name.
     pub groups: Vec<(String, Vec<u32>)>,
     /// Defects that do not prevent use: dropped triangles, unused vertices, open edges and the like.
@@ -58,13 +58,13 @@ pub fn read_obj(text: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<Obj
     let Cleaned {
         mesh,
         faces,
-        places,
+        indices_in_file,
         warnings,
     } = clean::clean(&scan, unit_metres)?;
     Ok(ObjMesh {
         mesh,
-        places,
-        places_in_file: scan.triangles,
+        indices_in_file,
+        triangles_in_file: scan.triangles,
         groups: scan.groups(&faces),
         warnings,
     })

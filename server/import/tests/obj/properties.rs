@@ -33,10 +33,10 @@ fn assert_sound(read: &ObjMesh, limits: MeshLimits) {
     let triangles = read.mesh.triangles().len();
     assert!((1..=limits.triangles).contains(&triangles));
     assert!(read.mesh.positions().len() <= limits.vertices);
-    assert_eq!(read.places.len(), triangles);
-    assert!(read.places.is_sorted_by(|a, b| a < b));
-    assert!((read.places[triangles - 1] as usize) < read.places_in_file);
-    assert!(read.places_in_file <= limits.triangles);
+    assert_eq!(read.indices_in_file.len(), triangles);
+    assert!(read.indices_in_file.is_sorted_by(|a, b| a < b));
+    assert!((read.indices_in_file[triangles - 1] as usize) < read.triangles_in_file);
+    assert!(read.triangles_in_file <= limits.triangles);
     let mut bits: Vec<_> = read
         .mesh
         .positions()

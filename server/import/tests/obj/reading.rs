@@ -120,8 +120,8 @@ fn groups_objects_and_materials_apply_until_replaced() {
         read.groups,
         expected.map(|(name, triangles)| (name.to_owned(), triangles))
     );
-    assert_eq!(read.places, [0, 1, 2, 3, 5]);
-    assert_eq!(read.places_in_file, 6);
+    assert_eq!(read.indices_in_file, [0, 1, 2, 3, 5]);
+    assert_eq!(read.triangles_in_file, 6);
 }
 
 #[test]

@@ -1,9 +1,9 @@
-//! The clock that is handed in.
+//! The clock that the caller supplies.
 
 use std::time::Duration;
 
-/// A monotonic clock. The crate reads no other.
+/// A monotonic clock. The crate never reads the system's time itself.
 pub trait Clock: Sync {
-    /// Time since an origin that does not change while the clock lives.
+    /// Time since a fixed origin, chosen by the clock; never decreases.
     fn now(&self) -> Duration;
 }

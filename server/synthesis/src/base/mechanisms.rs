@@ -1,67 +1,68 @@
-//! The mechanisms of a default search (`GUIDED`, `PHYSICAL`), each of which can be switched off to measure its worth.
+//! The mechanisms of a default search (`GUIDED`, `PHYSICAL`). Each can be switched off to measure what it
+//! contributes.
 //!
-//! Mechanisms propose, order and screen; the checks that decide whether a grasp is valid are not among them. A search with
-//! some switched off is slower or finds less, but never answers with an invalid grasp.
+//! Mechanisms propose, order and screen candidates; they never decide whether a grasp is valid. Without some of them,
+//! a search is slower or finds fewer grasps, but never returns an invalid one.
 
 use std::{fmt, str::FromStr};
 
-/// A mechanism that makes a default search faster, finds more, or finds better grasps.
+/// A mechanism that makes a default search faster, or lets it find more or better grasps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mechanism {
-    /// Grips of the atlas are tried before any fresh attempt.
+    /// Tries the atlas's grips before any new attempt.
     AtlasLookUp,
-    /// Complementary grips of the atlas come first where there is a giver.
+    /// With a giver present, tries a shortlist of complementary atlas grips first.
     Shortlists,
-    /// The atlas' grips are tried by falling score under the request's gravity, instead of in the order in which it keeps them.
+    /// Tries atlas grips by descending score under the request's gravity instead of in stored order.
     GravityOrder,
-    /// Grips that share a cell with the giver's hand are skipped, all at once.
+    /// Skips, in one step, all grips that share a grid cell with the giver's hand.
     CellOccupancy,
-    /// Spheres inside a known hand show that it meets the giver, before hands are compared exactly.
+    /// Rejects a known hand whose inner spheres hit the giver before the exact collision test.
     InnerSpheres,
-    /// The giver's solids are compared in the order in which they settle most, instead of in anatomical order.
+    /// Tests the giver's most decisive solids first instead of following anatomical order.
     GiverOrder,
-    /// Balancing a known grip starts from the friction that it is known to use.
+    /// Starts balancing a known grip's forces from the friction it is known to use.
     FrictionUses,
-    /// Known grips are also tried without the fingers that the giver is in the way of.
+    /// Also tries known grips without the fingers that the giver obstructs.
     FingerSubsets,
-    /// Grips that recent searches found are tried after those of the atlas.
+    /// After the atlas, tries grips that recent searches found.
     RecentGrips,
-    /// The first 300 µs of a search go to known grips alone, before workers are woken.
+    /// Spends the first 300 µs of a search on known grips alone, before waking workers.
     HeadStart,
-    /// Known grips are looked up on the caller's own thread before the search is handed to others.
+    /// Looks up known grips on the caller's own thread before handing the search to workers.
     CallerLookUp,
-    /// Failed attempts go on with hands perturbed about known grips of the atlas.
+    /// After failed attempts, tries hands perturbed about grips of the atlas.
     Seeds,
-    /// Seeds are first taken from grips that are not certainly in the giver's way.
+    /// Takes seeds first from grips that do not certainly collide with the giver.
     OpenSeeds,
-    /// Seeds are also taken from all grips, by their clearance from the giver.
+    /// Also takes seeds from all grips, ordered by clearance from the giver.
     NearestSeeds,
-    /// Without an atlas, failed attempts go on with hands perturbed about grips of boxes like the object.
+    /// Without an atlas, perturbs hands about grips transferred from boxes that resemble the object.
     TransferredGrips,
-    /// Every other attempt takes only transferred grips whose contacts may have closure on the object.
+    /// In every other attempt, uses only transferred grips whose contacts may have force closure on the object.
     ClosureScreen,
-    /// A hand that nearly has closure is perturbed a few times.
+    /// Perturbs a hand that nearly has force closure a few times.
     NearMisses,
-    /// Hands are placed where opposed pads fit opposed points of the surface, instead of anywhere near the object.
+    /// Places hands where opposed pads fit opposed surface points instead of anywhere near the object.
     Oppositions,
-    /// A network orders placements by how likely the hand is to hold there.
+    /// Orders placements by a network's estimate of how likely the hand is to hold there.
     SuccessPrior,
-    /// The first attempts choose from placements that were drawn once per object and rig.
+    /// Draws the first attempts from placements sampled once per object and rig.
     PlacementCache,
-    /// From the fifth attempt, placements are drawn only from what the giver leaves free of the surface.
+    /// From the fifth attempt, samples placements only on surface that the giver leaves free.
     FreeSurface,
-    /// Placements whose palm, forearm or links clearly collide are skipped before the hand is closed.
+    /// Skips placements whose palm, forearm or links clearly collide before closing the hand.
     RoomScreen,
-    /// Some hands are laid on the surface with their palm.
+    /// Places some hands with the palm on the surface.
     PalmPlacement,
-    /// Hands are partly closed to the object's width before they close on it.
+    /// Preshapes the hand to the object's width before closing it.
     Preshape,
-    /// Some hands tuck fingers that do not close into the palm.
+    /// Tucks fingers that do not take part into the palm, for some hands.
     TuckedFingers,
 }
 
 impl Mechanism {
-    /// All of them, in the order of a search.
+    /// All mechanisms, in the order in which a search uses them.
     pub const ALL: [Self; 25] = [
         Self::AtlasLookUp,
         Self::Shortlists,
@@ -90,7 +91,7 @@ impl Mechanism {
         Self::TuckedFingers,
     ];
 
-    /// Its name in kebab case.
+    /// The kebab-case name that [`FromStr`] accepts.
     pub const fn name(self) -> &'static str {
         match self {
             Self::AtlasLookUp => "atlas-look-up",
@@ -132,7 +133,7 @@ impl fmt::Display for Mechanism {
     }
 }
 
-/// A name that no mechanism has.
+/// A name that belongs to no mechanism.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownMechanism(String);
 
@@ -149,12 +150,12 @@ impl FromStr for Mechanism {
     type Err = UnknownMechanism;
 
     fn from_str(name: &str) -> Result<Self, UnknownMechanism> {
-        let named = Self::ALL.into_iter().find(|mechanism| mechanism.name() == name);
-        named.ok_or_else(|| UnknownMechanism(name.to_owned()))
+        let found = Self::ALL.into_iter().find(|mechanism| mechanism.name() == name);
+        found.ok_or_else(|| UnknownMechanism(name.to_owned()))
     }
 }
 
-/// The mechanisms that a search runs; by default, all.
+/// The set of mechanisms that a search uses; all by default.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Mechanisms(u32);
 
@@ -162,21 +163,22 @@ impl Mechanisms {
     /// Every mechanism.
     pub const ALL: Self = Self((1 << Mechanism::ALL.len()) - 1);
 
-    /// These without one.
+    /// The set without one mechanism.
     #[must_use]
     pub const fn without(self, mechanism: Mechanism) -> Self {
         Self(self.0 & !mechanism.bit())
     }
 
-    /// True if a mechanism is switched on.
+    /// True if the mechanism is switched on.
     #[inline]
     pub const fn has(self, mechanism: Mechanism) -> bool {
         self.0 & mechanism.bit() != 0
     }
 
-    /// All but those of some that are off here: two searches that differ in others alone share what depends on `some`.
-    pub(crate) fn only_of(self, some: &[Mechanism]) -> Self {
-        let off = some.iter().filter(|&&mechanism| !self.has(mechanism));
+    /// Keeps the switches of `relevant` and turns all others on, for use as a cache key: searches that differ only in
+    /// irrelevant mechanisms then share an entry.
+    pub(crate) fn restricted_to(self, relevant: &[Mechanism]) -> Self {
+        let off = relevant.iter().filter(|&&mechanism| !self.has(mechanism));
         off.fold(Self::ALL, |all, &mechanism| all.without(mechanism))
     }
 }
@@ -203,8 +205,8 @@ mod tests {
 
     #[test]
     fn all_lists_every_mechanism_once() {
-        for (place, mechanism) in Mechanism::ALL.into_iter().enumerate() {
-            assert_eq!(mechanism as usize, place);
+        for (index, mechanism) in Mechanism::ALL.into_iter().enumerate() {
+            assert_eq!(mechanism as usize, index);
             assert!(Mechanisms::default().has(mechanism));
         }
     }
@@ -217,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_name_is_refused_with_the_known_ones() {
+    fn rejects_unknown_name_and_lists_known_names() {
         let error = "luck".parse::<Mechanism>().unwrap_err().to_string();
         assert!(error.contains("\"luck\""), "{error}");
         for mechanism in Mechanism::ALL {
@@ -226,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn without_switches_off_that_mechanism_alone() {
+    fn without_switches_off_only_that_mechanism() {
         for off in Mechanism::ALL {
             let rest = Mechanisms::ALL.without(off);
             for mechanism in Mechanism::ALL {

@@ -1,4 +1,5 @@
-//! What every layer uses and what knows of none: poses, the clock, random streams, the stopwatch, rejections.
+//! Shared by every layer and dependent on none: poses, the clock, random streams, the stopwatch, rejections, and the
+//! switches of the default search's mechanisms.
 
 pub mod clock;
 pub mod mechanisms;

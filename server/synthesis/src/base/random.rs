@@ -1,20 +1,20 @@
-//! The random stream of an attempt.
+//! The random stream of one attempt.
 
 use glam::{Quat, Vec3};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// 2^-24: the spacing of numbers made from 24 random bits, which is all that an `f32` below 1 can hold.
+/// 2^-24: spacing of uniform numbers made from 24 random bits, the precision of an `f32` below 1.
 const UNIT_24: f32 = 1.0 / (1 << 24) as f32;
 
-/// 2^-20: the spacing of numbers in [-1, 1) made from 21 random bits, so that three fit into one draw. A wrist position
-/// is thereby placed on a grid finer than a micrometre.
+/// 2^-20: spacing of numbers in [-1, 1) made from 21 random bits; three of them fit into one draw. Wrist positions
+/// thus fall on a grid finer than a micrometre.
 const SIGNED_21: f32 = 1.0 / (1 << 20) as f32;
 
-/// All randomness of one attempt.
+/// The source of all randomness in one attempt.
 ///
-/// Each attempt has its own stream from the search's seed and its own index. Whatever else runs, and on however many
-/// workers, attempt i of a seed draws the same numbers.
+/// The stream depends on the search's seed and the attempt's index alone: attempt i of a seed draws the same numbers
+/// on any number of workers.
 #[derive(Clone, Debug)]
 pub struct AttemptStream {
     attempt: u64,
@@ -22,10 +22,10 @@ pub struct AttemptStream {
 }
 
 impl AttemptStream {
-    /// The stream of an attempt.
+    /// The stream of attempt number `attempt`.
     pub fn new(seed: u64, attempt: u64) -> Self {
-        // For one seed this maps indices to states one to one: no two attempts of a search share a stream. The seed is
-        // mixed first, so that seed 1 is not seed 0 shifted by an index.
+        // For a given seed, indices map to states one to one: no two attempts of a search share a stream. Mixing the
+        // seed first keeps seed 1 from being seed 0 shifted by one index.
         let state = mix(mix(seed).wrapping_add(attempt));
         Self {
             attempt,
@@ -38,20 +38,20 @@ impl AttemptStream {
         self.attempt
     }
 
-    /// A number in [0, 1).
+    /// A uniform number in [0, 1).
     #[inline]
     pub fn unit(&mut self) -> f32 {
         (self.generator.next_u64() >> 40) as f32 * UNIT_24
     }
 
-    /// A number between `min` and `max`.
+    /// A uniform number from `min` to `max`, both included.
     #[inline]
     pub fn between(&mut self, min: f32, max: f32) -> f32 {
-        // Rounding can lift the sum to just above the upper end.
+        // Rounding can push the sum just above `max`.
         (min + (max - min) * self.unit()).min(max)
     }
 
-    /// A whole number in 0 .. `count`.
+    /// A uniform integer in `0..count`; `count` is from 1 to 2^24.
     #[inline]
     pub fn below(&mut self, count: usize) -> usize {
         debug_assert!(
@@ -61,7 +61,7 @@ impl AttemptStream {
         ((self.unit() * count as f32) as usize).min(count - 1)
     }
 
-    /// A point of the cube from -1 to 1.
+    /// A uniform point of the cube [-1, 1)³.
     #[inline]
     pub fn in_cube(&mut self) -> Vec3 {
         let bits = self.generator.next_u64();
@@ -69,7 +69,7 @@ impl AttemptStream {
         Vec3::new(coordinate(43), coordinate(22), coordinate(1))
     }
 
-    /// A point of the unit disk other than its centre, and its squared distance from there.
+    /// A uniform point (x, y) of the open unit disk, never the centre, and its squared distance from the centre.
     #[inline]
     fn in_disk(&mut self) -> (f32, f32, f32) {
         loop {
@@ -83,8 +83,8 @@ impl AttemptStream {
         }
     }
 
-    /// A rotation, uniform over all rotations: Marsaglia, "Choosing a point from the surface of a sphere", Annals of
-    /// Mathematical Statistics 43 (1972), for the sphere of unit quaternions. It needs no trigonometry.
+    /// A uniform random rotation by Marsaglia's method for the unit quaternions ("Choosing a point from the surface
+    /// of a sphere", Annals of Mathematical Statistics 43, 1972), without trigonometry.
     #[inline]
     pub fn rotation(&mut self) -> Quat {
         let (x, y, first) = self.in_disk();
@@ -93,8 +93,8 @@ impl AttemptStream {
         Quat::from_xyzw(x, y, z * scale, w * scale)
     }
 
-    /// Four numbers in [0, 1] that sum to one, uniform over all such numbers (a flat Dirichlet distribution): the
-    /// spacings of three sorted uniform numbers.
+    /// Four non-negative shares that sum to one, from the flat Dirichlet distribution: the spacings of three sorted
+    /// uniform numbers.
     #[inline]
     pub fn four_shares(&mut self) -> [f32; 4] {
         let (a, b, c) = (self.unit(), self.unit(), self.unit());
@@ -105,7 +105,8 @@ impl AttemptStream {
     }
 }
 
-/// The finaliser of `SplitMix64` (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014): a
+/// The finaliser of `SplitMix64` (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014):
+/// a
 /// bijection in which every input bit moves about half of the output bits.
 fn mix(value: u64) -> u64 {
     let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);

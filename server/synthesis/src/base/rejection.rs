@@ -1,8 +1,8 @@
-//! Why attempts fail (thesis Table 5.2, and a request's own constraints).
+//! Why attempts fail: the kinds of thesis Table 5.2, and a request's own constraints.
 
 use serde::{Deserialize, Serialize};
 
-/// An attempt's failure. A rejection is data, never an error.
+/// Why an attempt failed. A rejection is data, never an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rejection {
@@ -10,7 +10,7 @@ pub enum Rejection {
     NoContacts,
     /// The thumb has no contact.
     NoThumb,
-    /// The thumb has no contact, and the fingers were not tried.
+    /// The thumb has no contact, so the fingers were not tried.
     NoThumbEarlyStop,
     /// No finger has a contact.
     NoFingers,
@@ -22,13 +22,13 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
-    /// The wrist, the contacts, the type or the comfort is not what the request's constraints ask for.
+    /// The wrist, the contacts, the grasp type or the comfort violates a constraint of the request.
     UnmetConstraint,
 }
 
 impl Rejection {
-    /// All kinds: those of Table 5.2 in its order, which is also the order in which an attempt meets them, then the one
-    /// that the thesis does not have.
+    /// All kinds: those of Table 5.2 in its order, which is also the order of an attempt's checks, then the one that
+    /// the thesis lacks.
     pub const ALL: [Self; 9] = [
         Self::NoContacts,
         Self::NoThumb,
@@ -41,13 +41,14 @@ impl Rejection {
         Self::UnmetConstraint,
     ];
 
-    /// The kinds of Table 5.2, all that a search without constraints can meet: the first of [`Rejection::ALL`].
-    pub const OF_THESIS: [Self; 8] = {
-        let [of_thesis @ .., _] = Self::ALL;
-        of_thesis
+    /// The kinds of Table 5.2, the only ones that a search without constraints reports: the first of
+    /// [`Rejection::ALL`].
+    pub const THESIS: [Self; 8] = {
+        let [thesis @ .., _] = Self::ALL;
+        thesis
     };
 
-    /// Its place in [`Rejection::ALL`].
+    /// The index in [`Rejection::ALL`].
     pub const fn index(self) -> usize {
         self as usize
     }
@@ -58,10 +59,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_has_its_own_place_those_of_the_thesis_first() {
-        for (place, kind) in Rejection::ALL.into_iter().enumerate() {
-            assert_eq!(kind.index(), place);
+    fn indices_follow_all_with_thesis_kinds_first() {
+        for (index, kind) in Rejection::ALL.into_iter().enumerate() {
+            assert_eq!(kind.index(), index);
         }
-        assert!(!Rejection::OF_THESIS.contains(&Rejection::UnmetConstraint));
+        assert!(!Rejection::THESIS.contains(&Rejection::UnmetConstraint));
     }
 }

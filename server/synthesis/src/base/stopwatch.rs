@@ -1,4 +1,4 @@
-//! Times of the steps of Algorithm 1, at no cost when nobody asks for them.
+//! Times the steps of Algorithm 1, at no cost when timing is off.
 
 use std::time::Duration;
 
@@ -35,7 +35,7 @@ pub struct StepTimes {
 }
 
 impl StepTimes {
-    fn of_step(&mut self, step: Step) -> &mut Duration {
+    fn step_mut(&mut self, step: Step) -> &mut Duration {
         match step {
             Step::WristPlacement => &mut self.wrist_placement,
             Step::FingerPosing => &mut self.finger_posing,
@@ -55,19 +55,19 @@ impl StepTimes {
     }
 }
 
-/// Is told when an attempt starts and when each of its steps ends.
+/// Receives a call when an attempt starts and when each of its steps ends.
 pub trait Stopwatch {
-    /// An attempt starts.
+    /// Marks the start of an attempt.
     fn start(&mut self);
 
-    /// The step that ran since the last call has ended.
+    /// Marks the end of the step that has run since the last call.
     fn lap(&mut self, step: Step);
 
-    /// What was recorded, if anything is.
+    /// The recorded times; none if this stopwatch does not record.
     fn times(&self) -> Option<StepTimes>;
 }
 
-/// Records nothing; the compiler removes every trace of it.
+/// Records nothing; its calls compile to nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct NoStopwatch;
 
@@ -83,7 +83,7 @@ impl Stopwatch for NoStopwatch {
     }
 }
 
-/// Records by a clock.
+/// Records times by a clock.
 #[derive(Clone, Copy)]
 pub struct StepStopwatch<'a> {
     clock: &'a dyn Clock,
@@ -92,7 +92,7 @@ pub struct StepStopwatch<'a> {
 }
 
 impl<'a> StepStopwatch<'a> {
-    /// A stopwatch that has recorded nothing yet.
+    /// A stopwatch with all times at zero.
     pub fn new(clock: &'a dyn Clock) -> Self {
         Self {
             clock,
@@ -109,7 +109,7 @@ impl Stopwatch for StepStopwatch<'_> {
 
     fn lap(&mut self, step: Step) {
         let now = self.clock.now();
-        *self.times.of_step(step) += now.saturating_sub(self.last);
+        *self.times.step_mut(step) += now.saturating_sub(self.last);
         self.last = now;
     }
 

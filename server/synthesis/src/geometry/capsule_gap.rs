@@ -1,49 +1,51 @@
-//! The gap between a tapered capsule and a surface: branch and bound, four boxes and four triangles at a time.
+//! The gap between a tapered capsule and a surface, by branch and bound over four boxes or four triangles at a time.
 //!
-//! With D(t) the distance from the point a(t) of the capsule's axis to a convex set, the gap to the set is the least of
-//! D(t) - r(t) for t from 0 to 1, and D is convex. For boxes, tangents of it give a lower bound; for triangles, the
-//! least is one of a few values that have closed forms.
+//! Let D(t) be the distance from the point a(t) of the capsule's axis to a convex set. D is convex, and the gap to
+//! the
+//! set is the minimum of D(t) - r(t) for t from 0 to 1. For boxes, tangents of D - r give a lower bound; for
+//! triangles,
+//! the minimum is one of a few values in closed form.
 
 use glam::{Vec3, Vec4};
 
 use super::{
     closest::{closest_on_triangle, pack_distances},
-    crossing::{cross, dot, lanes, minus, on_way},
+    crossing::{cross, dot, lanes, minus, point_along},
     mesh::TriangleMesh,
+    stack_entry::{StackEntry, sorted_farthest_first},
     tapered_capsule::TaperedCapsule,
-    waiting::{Waiting, sorted_falling},
     wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
 };
 
-/// Slack of the bounds in metres: more than all roundings for coordinates of a metre, and a hundredth of what matters
-/// to a hand.
+/// Slack of the lower bounds, in metres: exceeds all rounding for coordinates up to a metre, and is a hundredth of
+/// what matters to a hand.
 const SLACK: f32 = 1e-6;
 
-/// How much closer a triangle must be to be preferred to one that was found, in metres. Along flat faces, many triangles
-/// are equally close, and with 0 all of them would be visited. Nothing that is done with hands needs more.
+/// How much closer a triangle must be to replace the one found so far, in metres: the accuracy of the result. With 0,
+/// every triangle of a flat face that is equally close would be visited.
 const ACCURACY: f32 = 1e-5;
 
-/// The least determinant of two directions that is divided by, in m⁴: less than what a micrometre makes with another,
-/// and more than 0. What comes out for such pairs is clamped and measured, never trusted.
-const LEAST_DETERMINANT: f32 = 1e-30;
+/// Floor of determinants of two directions before division, in m⁴: positive, and below that of two perpendicular
+/// micrometres. Parameters from such pairs are clamped and only yield distances that occur.
+const MIN_DETERMINANT: f32 = 1e-30;
 
-/// Where the surface of a mesh is closest to a capsule's skin or deepest below it.
+/// Where a mesh's surface comes closest to a capsule's skin or penetrates it deepest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CapsuleGap {
-    /// The point of the mesh.
+    /// The point of the mesh, in metres.
     pub position: Vec3,
     /// The triangle it lies on.
     pub triangle: u32,
-    /// Where on the capsule's axis the ball is that comes closest: 0 is the start, 1 the end.
+    /// Axis parameter of the capsule's closest sphere, from 0 (start) to 1 (end).
     pub along: f32,
-    /// From the capsule's skin to the point in metres, negative below the skin.
+    /// Distance from the capsule's skin to the point, in metres; negative below the skin.
     pub gap: f32,
 }
 
 /// Three coordinates of four points.
 type Four = [Vec4; 3];
 
-/// A capsule as the four-lane formulas need it.
+/// A capsule prepared for the four-lane formulas.
 struct Query {
     start: Four,
     end: Four,
@@ -55,13 +57,13 @@ struct Query {
     end_radius: Vec4,
     /// From the start's radius to the end's.
     rise: Vec4,
-    /// A point that lies `x` along the axis' direction and `y` across it is closest to the ball at
+    /// A point at `x` along the axis and `y` perpendicular to it is closest to the sphere at
     /// t = `foot` + (x + y `lean`) / length.
     foot: Vec4,
     direction: Four,
     lean: Vec4,
     inverse_length: Vec4,
-    /// What makes every gap a number that is not negative.
+    /// In metres; added to a gap, it makes it non-negative, as stack entries require.
     largest_radius: f32,
 }
 
@@ -72,9 +74,9 @@ impl Query {
         let length = axis.length();
         let rise = capsule.end_radius - capsule.start_radius;
         let slope = rise / length;
-        // Where one ball contains the other, it is the only one that counts.
-        let is_one_ball = slope.is_nan() || slope.abs() >= 1.0;
-        let (foot, direction, lean, inverse_length) = if is_one_ball {
+        // If one sphere contains the other, it is the whole solid.
+        let is_one_sphere = slope.is_nan() || slope.abs() >= 1.0;
+        let (foot, direction, lean, inverse_length) = if is_one_sphere {
             (if rise > 0.0 { 1.0 } else { 0.0 }, Vec3::ZERO, 0.0, 0.0)
         } else {
             (
@@ -105,7 +107,7 @@ impl Query {
     }
 }
 
-/// True if any of the triangles is less than `distance` metres off the capsule's skin.
+/// True if any triangle is closer than `distance` metres to the capsule's skin.
 pub(super) fn is_within(bvh: &WideBvh, capsule: &TaperedCapsule, distance: f32) -> bool {
     let mut is_within = false;
     descend(bvh, &Query::new(capsule), distance, |_, _| {
@@ -115,33 +117,33 @@ pub(super) fn is_within(bvh: &WideBvh, capsule: &TaperedCapsule, distance: f32) 
     is_within
 }
 
-/// Visits triangles with gaps below a limit, the likely closest first. `found` takes a gap and its triangle and returns
-/// the limit from then on.
+/// Visits triangles with gaps below a limit, roughly closest first. `found` receives each gap and its triangle and
+/// returns the new limit.
 #[inline]
 fn descend(bvh: &WideBvh, query: &Query, limit: f32, mut found: impl FnMut(f32, u32) -> f32) {
     let mut limit = limit;
-    bvh.with_stack(|stack: &mut [Waiting]| {
+    bvh.with_stack(|stack: &mut [StackEntry]| {
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let waiting = stack[height];
-            if waiting.bound() - query.largest_radius > limit {
+            let entry = stack[height];
+            if entry.bound() - query.largest_radius > limit {
                 continue;
             }
-            match waiting.child() {
+            match entry.child() {
                 Child::Node(index) => {
                     let node = &bvh.nodes[index];
                     let bounds = box_gaps(node, query);
                     let near = bounds.cmple(Vec4::splat(limit)).bitmask();
                     let keys = (bounds + query.largest_radius).max(Vec4::ZERO).to_array();
-                    let mut children = [Waiting::default(); WIDTH];
+                    let mut children = [StackEntry::default(); WIDTH];
                     for lane in 0..WIDTH {
                         if near >> lane & 1 == 1 {
-                            children[lane] = Waiting::new(keys[lane], node.children[lane]);
+                            children[lane] = StackEntry::new(keys[lane], node.children[lane]);
                         }
                     }
-                    let children = sorted_falling(children);
-                    // The closest child is taken up next; what is no child is overwritten.
+                    let children = sorted_farthest_first(children);
+                    // The closest child comes off the stack next; empty slots are overwritten.
                     *stack[height..]
                         .first_chunk_mut()
                         .expect("the stack is large enough for any tree") = children;
@@ -162,7 +164,7 @@ fn descend(bvh: &WideBvh, query: &Query, limit: f32, mut found: impl FnMut(f32, 
     });
 }
 
-/// Where the surface is closest to the capsule's skin within [`ACCURACY`], if that is at most `within` metres off it.
+/// Where the surface is closest to the capsule's skin, within [`ACCURACY`]; none if the gap exceeds `within` metres.
 pub(super) fn closest(
     bvh: &WideBvh,
     mesh: &TriangleMesh,
@@ -188,20 +190,19 @@ pub(super) fn closest(
     })
 }
 
-/// Lower bounds of the gaps to the boxes of a node's children; NaN, which is below no limit, for unused
-/// children.
+/// Lower bounds of the gaps to the boxes of a node's children; NaN, which is below no limit, for unused children.
 #[inline]
 fn box_gaps(node: &Node, query: &Query) -> Vec4 {
-    let [least, most] = &node.bounds;
+    let [min, max] = &node.bounds;
     // D(t) - r(t) and its slope.
     let tangent = |t: Vec4| {
         let mut squared = Vec4::ZERO;
         let mut falling = Vec4::ZERO;
         for axis in 0..3 {
             let point = query.start[axis] + query.axis[axis] * t;
-            let below = (least[axis] - point).max(Vec4::ZERO);
-            let above = (point - most[axis]).max(Vec4::ZERO);
-            // One of the two is 0, but for unused children.
+            let below = (min[axis] - point).max(Vec4::ZERO);
+            let above = (point - max[axis]).max(Vec4::ZERO);
+            // At most one of the two is positive, except for unused children.
             let outside = above.max(below);
             squared += outside * outside;
             falling += (above - below) * query.axis[axis];
@@ -211,7 +212,7 @@ fn box_gaps(node: &Node, query: &Query) -> Vec4 {
     };
     let (value0, slope0) = tangent(Vec4::ZERO);
     let (value1, slope1) = tangent(Vec4::ONE);
-    // Two tangents meet where the least may be; a third there lifts the bound to where it meets one of them.
+    // The end tangents meet near the minimum; a third tangent there raises the bound to where it meets one of them.
     let between = Vec4::select(
         slope0.cmplt(Vec4::ZERO) & slope1.cmpgt(Vec4::ZERO),
         ((value1 - slope1 - value0) / (slope0 - slope1))
@@ -234,15 +235,16 @@ fn box_gaps(node: &Node, query: &Query) -> Vec4 {
         value0,
         Vec4::select(slope1.cmple(Vec4::ZERO), value1, lowest),
     );
-    let used = least[0].cmplt(most[0]) | least[0].cmpeq(most[0]);
+    let used = min[0].cmplt(max[0]) | min[0].cmpeq(max[0]);
     Vec4::select(used, bound - SLACK, Vec4::NAN)
 }
 
 /// Gaps to the triangles of a pack; NaN for unused lanes.
 ///
-/// The least is at an end of the axis, at a corner, where the way from axis to edge is square to the edge and leaves the
-/// axis at the cone's angle, or where the axis crosses the triangle. Above the face's inside, the distance is linear.
-/// Every value that is taken into account is one that occurs, so that the least of them is right.
+/// The minimum lies at an end of the axis, at a corner, at an edge's stationary point (where the line from axis to
+/// edge is perpendicular to the edge and meets the axis at the cone's angle), or where the axis crosses the triangle;
+/// over the interior of the face, the distance is linear. Every candidate is a distance that occurs, so their minimum
+/// is correct.
 #[inline]
 fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
     let first = minus(&query.start, &pack.corner);
@@ -250,51 +252,51 @@ fn pack_gaps(pack: &TrianglePack, query: &Query) -> Vec4 {
     let third = minus(&first, &pack.edge2);
     let edge3 = minus(&pack.edge2, &pack.edge1);
 
-    let starts = pack_distances(pack, &query.start).sqrt() - query.start_radius;
-    let ends = pack_distances(pack, &query.end).sqrt() - query.end_radius;
+    let at_start = pack_distances(pack, &query.start).sqrt() - query.start_radius;
+    let at_end = pack_distances(pack, &query.end).sqrt() - query.end_radius;
     let corners = corner_gap(query, &first)
         .min(corner_gap(query, &second))
         .min(corner_gap(query, &third));
     let edges = edge_gap(query, &first, &pack.edge1)
         .min(edge_gap(query, &first, &pack.edge2))
         .min(edge_gap(query, &second, &edge3));
-    let around = starts.min(ends).min(corners).min(edges);
+    let around = at_start.min(at_end).min(corners).min(edges);
 
     let height = dot(&pack.normal, &first);
     let climb = dot(&pack.normal, &query.axis);
     let t = -height / climb;
-    let crossing = on_way(&first, &query.axis, t);
+    let crossing = point_along(&first, &query.axis, t);
     let around_first = cross(&crossing, &pack.normal);
     let around_second = cross(&minus(&crossing, &pack.edge1), &pack.normal);
-    let least_side = dot(&pack.edge1, &around_first)
+    let smallest_side = dot(&pack.edge1, &around_first)
         .min(-dot(&pack.edge2, &around_first))
         .min(dot(&edge3, &around_second));
-    let crosses = least_side.cmpge(Vec4::ZERO)
+    let crosses = smallest_side.cmpge(Vec4::ZERO)
         & (height * (height + climb)).cmple(Vec4::ZERO)
         & climb.cmpne(Vec4::ZERO);
     Vec4::select(crosses, around.min(-query.radius_at(t)), around)
 }
 
-/// Gap to a corner, from which the capsule's start is seen at `start`.
+/// Gap to a corner; `start` is the capsule's start relative to the corner.
 #[inline]
 fn corner_gap(query: &Query, start: &Four) -> Vec4 {
     let along = -dot(start, &query.direction);
-    let across = on_way(start, &query.direction, along);
+    let across = point_along(start, &query.direction, along);
     let across = dot(&across, &across).sqrt();
     let t = query.foot + (along + across * query.lean) * query.inverse_length;
     let t = t.max(Vec4::ZERO).min(Vec4::ONE);
-    let way = on_way(start, &query.axis, t);
-    dot(&way, &way).sqrt() - query.radius_at(t)
+    let offset = point_along(start, &query.axis, t);
+    dot(&offset, &offset).sqrt() - query.radius_at(t)
 }
 
-/// Gap to an edge at its stationary point, from whose first corner the capsule's start is seen at `start`.
+/// Gap to an edge at its stationary point; `start` is the capsule's start relative to the edge's first corner.
 #[inline]
 fn edge_gap(query: &Query, start: &Four, edge: &Four) -> Vec4 {
     let (aa, ab, bb) = (query.squared_length, dot(&query.axis, edge), dot(edge, edge));
     let normal = cross(&query.axis, edge);
-    let determinant = dot(&normal, &normal).max(Vec4::splat(LEAST_DETERMINANT));
-    // See TaperedCapsule::distance; the edge is a capsule without radius.
-    let rest = (determinant - query.rise * query.rise * bb).max(Vec4::splat(LEAST_DETERMINANT));
+    let determinant = dot(&normal, &normal).max(Vec4::splat(MIN_DETERMINANT));
+    // As in `TaperedCapsule::distance`, with the edge as a capsule of radius 0.
+    let rest = (determinant - query.rise * query.rise * bb).max(Vec4::splat(MIN_DETERMINANT));
     let height = dot(start, &normal);
     let distance = (height * height / rest).sqrt();
     let along_axis = query.rise * distance - dot(start, &query.axis);
@@ -305,14 +307,14 @@ fn edge_gap(query: &Query, start: &Four, edge: &Four) -> Vec4 {
     let u = ((along_axis * ab - along_edge * aa) / determinant)
         .max(Vec4::ZERO)
         .min(Vec4::ONE);
-    let way = minus(
-        &on_way(start, &query.axis, t),
+    let offset = minus(
+        &point_along(start, &query.axis, t),
         &[edge[0] * u, edge[1] * u, edge[2] * u],
     );
-    dot(&way, &way).sqrt() - query.radius_at(t)
+    dot(&offset, &offset).sqrt() - query.radius_at(t)
 }
 
-/// Where on the axis the gap to a triangle is the least, in double precision.
+/// Axis parameter at which the gap to a triangle is smallest, in double precision.
 fn nearest_on_axis(capsule: &TaperedCapsule, triangle: [Vec3; 3]) -> f64 {
     let corners = triangle.map(Vec3::as_dvec3);
     let start = capsule.start.as_dvec3();

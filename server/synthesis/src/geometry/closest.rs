@@ -1,4 +1,4 @@
-//! The closest point of a surface: branch and bound, four boxes and four triangles at a time.
+//! The closest point of a surface, by branch and bound over four boxes or four triangles at a time.
 
 use glam::{DVec3, Vec3, Vec4};
 
@@ -6,25 +6,24 @@ use super::{
     aabb::Aabb,
     crossing::{cross, dot, lanes, minus},
     mesh::TriangleMesh,
-    waiting::{Waiting, sorted_falling},
+    stack_entry::{StackEntry, sorted_farthest_first},
     wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
 };
 
-/// Relative slack of a squared distance to a box: a few roundings, so that a box is never left out by one.
+/// Factor on squared distances to boxes: covers a few roundings, so that rounding never excludes a box.
 const BOX_SLACK: f32 = 1.0 - 8.0 * f32::EPSILON;
 
-/// Relative slack of a distance to the mesh's box, for the same reason.
+/// Factor on the distance limit for the mesh's box, for the same reason.
 const AABB_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// True if no point of a mesh in this box can be within `max_distance` of the point.
+/// True if nothing inside the box can be within `max_distance` metres of the point.
 #[inline]
 pub(super) fn is_beyond(aabb: &Aabb, point: Vec3, max_distance: f32) -> bool {
     aabb.distance(point) > max_distance * AABB_SLACK
 }
 
-/// The triangle that is closest to a point, the closest point on it and its distance, if that is at most
-/// `max_distance` metres.
-// Not inlined, so that the stack is not prepared for points far away.
+/// The triangle closest to a point, the closest point on it and its distance; none beyond `max_distance` metres.
+// Not inlined: far points return early and must not pay for the stack.
 #[inline(never)]
 pub(super) fn closest(
     bvh: &WideBvh,
@@ -36,31 +35,31 @@ pub(super) fn closest(
         return None;
     }
     let splat = [Vec4::splat(point.x), Vec4::splat(point.y), Vec4::splat(point.z)];
-    // Slightly more than asked for; the last step compares exactly.
+    // Slightly above the limit; the last step compares exactly.
     let mut best = (max_distance * max_distance).max(f32::MIN_POSITIVE) / (BOX_SLACK * BOX_SLACK);
     let mut winner = None;
-    bvh.with_stack(|stack: &mut [Waiting]| {
+    bvh.with_stack(|stack: &mut [StackEntry]| {
         let mut height = 1;
         while height > 0 {
             height -= 1;
-            let waiting = stack[height];
-            if waiting.bound() > best {
+            let entry = stack[height];
+            if entry.bound() > best {
                 continue;
             }
-            match waiting.child() {
+            match entry.child() {
                 Child::Node(index) => {
                     let node = &bvh.nodes[index];
                     let distances = box_distances(node, &splat);
                     let near = distances.cmple(Vec4::splat(best)).bitmask();
                     let distances = distances.to_array();
-                    let mut children = [Waiting::default(); WIDTH];
+                    let mut children = [StackEntry::default(); WIDTH];
                     for lane in 0..WIDTH {
                         if near >> lane & 1 == 1 {
-                            children[lane] = Waiting::new(distances[lane], node.children[lane]);
+                            children[lane] = StackEntry::new(distances[lane], node.children[lane]);
                         }
                     }
-                    let children = sorted_falling(children);
-                    // The closest child is taken up next; what is no child is overwritten.
+                    let children = sorted_farthest_first(children);
+                    // The closest child comes off the stack next; empty slots are overwritten.
                     *stack[height..]
                         .first_chunk_mut()
                         .expect("the stack is large enough for any tree") = children;
@@ -86,11 +85,11 @@ pub(super) fn closest(
     (distance <= f64::from(max_distance)).then_some((triangle, exact.as_vec3(), distance as f32))
 }
 
-/// Squared distances to the boxes of a node's children; 0 inside, ∞ for unused children.
+/// Squared distances to the boxes of a node's children, reduced by [`BOX_SLACK`]; 0 inside, ∞ for unused children.
 #[inline]
 fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
-    let [least, most] = &node.bounds;
-    let (below, above) = (minus(least, point), minus(point, most));
+    let [min, max] = &node.bounds;
+    let (below, above) = (minus(min, point), minus(point, max));
     let outside = [
         below[0].max(above[0]).max(Vec4::ZERO),
         below[1].max(above[1]).max(Vec4::ZERO),
@@ -101,8 +100,8 @@ fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {
 
 /// Squared distances to the triangles of a pack; NaN for unused lanes.
 ///
-/// Without branches: the distance to the plane where the point's projection falls inside, else the least of the
-/// distances to the three edges.
+/// Without branches: the distance to the plane if the point projects into the triangle, else the smallest distance to
+/// its three edges.
 #[inline]
 pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
     let c = minus(point, &pack.corner);
@@ -114,8 +113,8 @@ pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
     let length1 = dot(&pack.edge1, &pack.edge1);
     let length2 = dot(&pack.edge2, &pack.edge2);
 
-    // Which side of each edge the projection is on. Not by the usual products of dot products, which are off by the
-    // square of a sliver's slenderness.
+    // On which side of each edge the projection lies. The usual products of dot products would lose precision with
+    // the square of a sliver's aspect ratio.
     let around_first = cross(&c, &pack.normal);
     let around_second = cross(&from_second, &pack.normal);
     let inside = dot(&pack.edge1, &around_first)
@@ -135,8 +134,8 @@ pub(super) fn pack_distances(pack: &TrianglePack, point: &[Vec4; 3]) -> Vec4 {
     Vec4::select(inside, height * height, edges)
 }
 
-/// Squared distances from points to edges: `from_start` is the point seen from the edge's start, `along` its product
-/// with the edge.
+/// Squared distances from points to edges. `from_start` is the point relative to the edge's start, `along` its dot
+/// product with the edge.
 #[inline]
 fn edge_distance(from_start: &[Vec4; 3], edge: &[Vec4; 3], along: Vec4, squared_length: Vec4) -> Vec4 {
     let t = (along / squared_length).max(Vec4::ZERO).min(Vec4::ONE);
@@ -144,8 +143,8 @@ fn edge_distance(from_start: &[Vec4; 3], edge: &[Vec4; 3], along: Vec4, squared_
     dot(&offset, &offset)
 }
 
-/// The point of a triangle that is closest to `point`, in double precision (C. Ericson: Real-Time Collision
-/// Detection, 2005, 5.1.5: the Voronoi regions of the corners, the edges and the face in turn).
+/// The point of a triangle closest to `point`, in double precision, by testing the Voronoi regions of corners, edges
+/// and face in turn (C. Ericson: Real-Time Collision Detection, 2005, 5.1.5).
 pub(super) fn closest_on_triangle(corners: [Vec3; 3], point: DVec3) -> DVec3 {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let (ab, ac) = (b - a, c - a);

@@ -1,11 +1,14 @@
-//! Whether a mesh's volume contains a point: the generalised winding number, at the price of a ray.
+//! Tests whether a mesh's volume contains a point, by the generalised winding number at the cost of one ray.
 //!
 //! The winding number of a point (A. Jacobson, L. Kavan, O. Sorkine-Hornung: Robust Inside-Outside Segmentation using
-//! Generalized Winding Numbers, 2013) is the number of times the surface encloses it, a fraction where the surface has
-//! holes. Where it is closed, a ray that leaves the surface as often as it enters plus w times has winding number w;
-//! overlapping closed parts add up and cavities cancel. Where it has holes, cones from one apex over their rims close
-//! it: the ray then counts mesh and cones, and the solid angles of the cones are subtracted (the closing of
-//! section 4.1 there). Only the rims cost extra, and the result is that of the sum over all triangles.
+//! Generalized Winding Numbers, 2013) is the number of times the surface encloses it, a fraction where the surface
+//! has
+//! holes. For a closed surface it is the number of times that a ray from the point leaves the surface minus the
+//! number
+//! of times that it enters: overlapping parts add up and cavities cancel. Holes are closed by cones from one apex
+//! over
+//! their rims: the ray counts mesh and cones, and the solid angles of the cones are subtracted (section 4.1 there).
+//! Only the rims cost extra, and the result equals the sum of solid angles over all triangles.
 
 use glam::{DVec3, Vec3};
 
@@ -18,12 +21,12 @@ use super::{
     wide_bvh::WideBvh,
 };
 
-/// Winding numbers of a larger magnitude are inside: halfway between enclosed once and not at all. A mesh that is
-/// inside out as a whole still encloses its volume.
+/// Points whose winding number exceeds this in magnitude are inside: halfway between not enclosed and enclosed once.
+/// The magnitude makes a mesh that is inside out as a whole enclose its volume too.
 const INSIDE: f64 = 0.5;
 
-/// Fixed directions of the rays, by falling preference: unit vectors, none along or near an axis, a diagonal or each
-/// other, since modelled surfaces like those. A ray that grazes an edge is void and the next is tried.
+/// Directions of the rays, in order of preference: unit vectors away from axes, diagonals and each other, along which
+/// modelled surfaces tend to run. If a ray grazes an edge, the next direction is tried.
 const DIRECTIONS: [Vec3; 4] = [
     Vec3::new(0.858_314_5, 0.393_482_4, 0.329_470_7),
     Vec3::new(-0.314_159_3, 0.876_129_6, -0.365_632_5),
@@ -31,43 +34,43 @@ const DIRECTIONS: [Vec3; 4] = [
     Vec3::new(-0.607_143_9, -0.231_764_5, -0.760_050_3),
 ];
 
-/// A triangle of a cone over the rim of a hole.
+/// A triangle of the cone that closes a hole.
 #[derive(Clone, Copy, Debug)]
 struct Cap {
     corners: [Vec3; 3],
-    /// How often it counts.
+    /// Its multiplicity, signed.
     count: f64,
 }
 
-/// What containment needs beside the hierarchy.
+/// What the containment test needs in addition to the hierarchy.
 #[derive(Clone, Debug)]
 pub(super) struct Containment {
     caps: Vec<Cap>,
-    /// Longer than any way out of the box of mesh and cones, in metres.
-    reach: f32,
+    /// Length of the rays, in metres: enough to leave the box of mesh and cones from any point in it.
+    ray_length: f32,
 }
 
 impl Containment {
-    /// Finds the rims of a mesh; O(n).
+    /// Finds the rims of a mesh's holes and closes them; O(n).
     pub(super) fn of(mesh: &TriangleMesh, aabb: &Aabb) -> Self {
         let boundary = topology::boundary_chain(mesh);
-        // Inside the box, so that the cones are too.
+        // An apex inside the box keeps the cones inside.
         let apex = aabb.centre();
         let caps = boundary
             .into_iter()
             .map(|([from, to], count)| Cap {
-                // Against the direction of the rim, as a neighbouring triangle would.
+                // Traverses the rim backward, as a neighbouring triangle would.
                 corners: [to, from, apex],
                 count: f64::from(count),
             })
             .collect();
         Self {
             caps,
-            reach: 2.0 * aabb.diagonal(),
+            ray_length: 2.0 * aabb.diagonal(),
         }
     }
 
-    /// True if the volume contains the point, which must lie in the mesh's box.
+    /// True if the volume contains the point, which must lie inside the mesh's box.
     pub(super) fn contains(&self, bvh: &WideBvh, mesh: &TriangleMesh, point: Vec3) -> bool {
         let winding = DIRECTIONS
             .iter()
@@ -76,9 +79,9 @@ impl Containment {
         winding.abs() > INSIDE
     }
 
-    /// The winding number, counted along a ray; nothing if the ray grazes an edge.
+    /// The winding number, counted along a ray; none if the ray grazes an edge.
     fn winding_along(&self, bvh: &WideBvh, mesh: &TriangleMesh, point: Vec3, direction: Vec3) -> Option<f64> {
-        let ray = Segment::new(point, point + direction * self.reach);
+        let ray = Segment::new(point, point + direction * self.ray_length);
         let mut crossings = Some(0.0);
         crossing::visit_all(bvh, mesh, ray, |outcome| {
             crossings = crossings.zip(signed(outcome)).map(|(sum, sign)| sum + sign);
@@ -88,15 +91,15 @@ impl Containment {
         if !self.caps.is_empty() {
             let exact = ExactQuery::new(ray);
             for cap in &self.caps {
-                let through = signed(exact.test(cap.corners))?;
-                winding += cap.count * (through - solid_angle_share(cap.corners, point));
+                let crossed = signed(exact.test(cap.corners))?;
+                winding += cap.count * (crossed - solid_angle_share(cap.corners, point));
             }
         }
         Some(winding)
     }
 }
 
-/// +1 for leaving, -1 for entering, nothing for a graze.
+/// +1 for leaving the volume, -1 for entering, 0 for a miss, none for a graze.
 fn signed(outcome: ExactCrossing) -> Option<f64> {
     match outcome {
         ExactCrossing::Miss => Some(0.0),
@@ -105,15 +108,15 @@ fn signed(outcome: ExactCrossing) -> Option<f64> {
     }
 }
 
-/// The generalised winding number by its definition: the solid angles of all triangles; O(n).
+/// The generalised winding number by its definition, from the solid angles of all triangles; O(n).
 fn winding_number(mesh: &TriangleMesh, point: Vec3) -> f64 {
     (0..mesh.triangles().len())
         .map(|triangle| solid_angle_share(mesh.corners(triangle), point))
         .sum()
 }
 
-/// The signed solid angle of a triangle seen from a point as a share of the full sphere (A. van Oosterom, J. Strackee:
-/// The Solid Angle of a Plane Triangle, 1983); positive if the point sees its back.
+/// The signed solid angle of a triangle seen from a point, as a share of the full sphere; positive if the point sees
+/// the back of the triangle (A. van Oosterom, J. Strackee: The Solid Angle of a Plane Triangle, 1983).
 fn solid_angle_share(corners: [Vec3; 3], point: Vec3) -> f64 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - point.as_dvec3());
     let (la, lb, lc) = (DVec3::length(a), DVec3::length(b), DVec3::length(c));

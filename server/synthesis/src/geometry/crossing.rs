@@ -1,10 +1,10 @@
-//! Where segments cross triangles.
+//! Crossings of segments with triangles.
 //!
 //! Every query runs in two stages. The first tests four triangles at once in `f32` (T. Möller, B. Trumbore: Fast,
-//! Minimum Storage Ray-Triangle Intersection, 1997) and knows how far its rounding can be off. What is certain is
-//! taken; what is not, because the segment passes within rounding of an edge or an endpoint lies within rounding of
-//! the surface, is decided by the second stage in `f64`. So no crossing is lost near the ends of a segment, and none
-//! between two triangles that share an edge.
+//! Minimum Storage Ray-Triangle Intersection, 1997) with a bound on its rounding error. Cases within that bound (the
+//! segment passes close to an edge, or an endpoint lies close to the surface) go to the second stage in `f64`. Thus
+//! no
+//! crossing is lost near the ends of a segment or between two triangles that share an edge.
 
 use glam::{BVec4A, DVec3, Vec3, Vec4};
 
@@ -14,20 +14,19 @@ use super::{
     wide_bvh::{Child, ChildRef, Node, TrianglePack, WideBvh},
 };
 
-/// Bound of the relative rounding error of the `f32` stage, in units of the product of the lengths involved: about 20
-/// operations of half an epsilon each. Larger is safe and sends more triangles to the `f64` stage; smaller may lose
-/// crossings.
+/// Bound of the `f32` stage's rounding error, relative to the product of the lengths involved: about 20 operations of
+/// half an epsilon each. Larger is safe and sends more triangles to the `f64` stage; smaller may lose crossings.
 const ROUNDING: f32 = 16.0 * f32::EPSILON;
 
-/// Relative slack of the interval in which a segment passes a box: three roundings each of two plane distances.
+/// Relative slack of the interval in which a segment is inside a box: three roundings each of two plane distances.
 /// Larger is safe and visits more nodes.
 const SLAB_SLACK: f32 = 1.0 + 8.0 * f32::EPSILON;
 
-/// Stands for a component of the direction that is zero, in metres, so that its inverse is finite: far below the
-/// spacing of coordinates, and its inverse times any coordinate does not overflow.
+/// Replaces zero components of the direction, in metres, to keep their inverse finite: far below the spacing of
+/// coordinates, and its inverse times any coordinate does not overflow.
 const TINY_COMPONENT: f32 = 1e-18;
 
-/// A segment as the inner loops want it: start + t·direction for t from 0 to 1.
+/// A segment prepared for the inner loops: start + t·direction for t from 0 to 1.
 pub(super) struct Query {
     start: [Vec4; 3],
     direction: [Vec4; 3],
@@ -63,7 +62,7 @@ impl Query {
         }
     }
 
-    /// Which children's boxes the segment enters before `t_max`.
+    /// Bit mask of the children whose boxes the segment enters before `t_max`.
     #[inline]
     fn entered(&self, node: &Node, t_max: Vec4) -> u32 {
         let plane = |side: usize, axis: usize| {
@@ -74,14 +73,14 @@ impl Query {
         enter.cmple(leave * SLAB_SLACK).bitmask()
     }
 
-    /// Which triangles of a pack the segment crosses for certain, and which possibly.
+    /// Masks of the triangles of a pack that the segment certainly crosses, and of those that it possibly crosses.
     #[inline]
     fn filter(&self, pack: &TrianglePack) -> (BVec4A, BVec4A) {
         let d = &self.direction;
         let c: [Vec4; 3] = minus(&pack.corner, &self.start);
         let r = cross(&c, d);
         let facing = dot(&pack.normal, d);
-        // Everything is mirrored so that the segment runs along the normal.
+        // Flip signs so that the segment runs along the normal.
         let sign = Vec4::ONE.copysign(facing);
         let determinant = pack.doubled_area * (facing * sign);
         let u = dot(&pack.edge2, &r) * sign;
@@ -106,23 +105,23 @@ pub(super) struct ExactQuery {
     direction: DVec3,
 }
 
-/// How a segment meets the plane of a triangle, in double precision.
+/// Where a segment crosses a triangle, in double precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Crossing {
-    /// The share of the segment before the crossing.
+    /// Parameter of the crossing along the segment, 0 to 1.
     pub(super) t: f64,
-    /// True if the segment runs along the normal: out of the volume.
+    /// True if the segment leaves the volume: if it runs along the normal.
     pub(super) leaves: bool,
 }
 
 /// The outcome of a test in double precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ExactCrossing {
-    /// The segment's line passes the triangle.
+    /// It misses the triangle.
     Miss,
-    /// It meets the triangle within rounding of an edge.
+    /// It passes within rounding of an edge, or lies within rounding of the triangle's plane.
     Graze(Option<Crossing>),
-    /// It meets the triangle's inside.
+    /// It crosses the triangle's interior.
     Hit(Crossing),
 }
 
@@ -135,22 +134,23 @@ impl ExactQuery {
         }
     }
 
-    /// Tests a triangle by the signed volumes of the segment's line with its three edges. Two triangles that share an
-    /// edge compute the same volume but for its sign, so that nothing slips through between them (S. Woop, C. Benthin,
-    /// I. Wald: Watertight Ray/Triangle Intersection, 2013). A segment in the plane of a triangle does not cross it.
+    /// Tests a triangle by the signed volumes that the segment's line spans with its three edges. Two triangles that
+    /// share an edge compute the same volume with opposite sign, so that nothing slips between them (S. Woop, C.
+    /// Benthin, I. Wald: Watertight Ray/Triangle Intersection, 2013). A segment in the triangle's plane does not
+    /// cross it.
     pub(super) fn test(&self, corners: [Vec3; 3]) -> ExactCrossing {
-        /// Share of the triangle's area below which a part of it counts as none: thousands of roundings.
+        /// Share of the summed volumes below which one counts as zero: thousands of roundings.
         const GRAZE: f64 = 1e-12;
-        /// Error of a volume in shares of the product of the lengths in it: some ten roundings.
+        /// Rounding error of a volume, relative to the product of its lengths: some ten roundings.
         const NOISE: f64 = 4e-15;
         let [a, b, c] = corners.map(|corner| corner.as_dvec3() - self.start);
         let volumes = [b.cross(c), c.cross(a), a.cross(b)].map(|product| self.direction.dot(product));
-        let least = volumes[0].min(volumes[1]).min(volumes[2]);
-        let most = volumes[0].max(volumes[1]).max(volumes[2]);
+        let smallest = volumes[0].min(volumes[1]).min(volumes[2]);
+        let largest = volumes[0].max(volumes[1]).max(volumes[2]);
         let reach = a.length_squared().max(b.length_squared()).max(c.length_squared());
         let noise = NOISE * self.direction.length() * reach;
         let slack = GRAZE * (volumes[0].abs() + volumes[1].abs() + volumes[2].abs()) + noise;
-        if least < -slack && most > slack {
+        if smallest < -slack && largest > slack {
             return ExactCrossing::Miss;
         }
         let normal = (b - a).cross(c - a);
@@ -159,12 +159,12 @@ impl ExactQuery {
             return ExactCrossing::Graze(None);
         }
         let t = a.dot(normal) / facing;
-        let passes_inside = least >= 0.0 || most <= 0.0;
+        let passes_inside = smallest >= 0.0 || largest <= 0.0;
         let crossing = (passes_inside && (0.0..=1.0).contains(&t)).then_some(Crossing {
             t,
             leaves: facing > 0.0,
         });
-        let clear = least > slack || most < -slack;
+        let clear = smallest > slack || largest < -slack;
         match crossing {
             Some(crossing) if clear => ExactCrossing::Hit(crossing),
             None if clear => ExactCrossing::Miss,
@@ -172,7 +172,7 @@ impl ExactQuery {
         }
     }
 
-    /// The crossing, on an edge or inside.
+    /// The crossing, in the interior or on an edge.
     fn crossing(&self, corners: [Vec3; 3]) -> Option<Crossing> {
         match self.test(corners) {
             ExactCrossing::Miss => None,
@@ -182,8 +182,8 @@ impl ExactQuery {
     }
 }
 
-/// True if the segment crosses any triangle; endpoints count. Not inlined, so that the stack is not prepared for the
-/// many segments that pass the mesh's box.
+/// True if the segment crosses any triangle, endpoints included. Not inlined: the many segments that miss the mesh's
+/// box must not pay for the stack.
 #[inline(never)]
 pub(super) fn crosses_any(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> bool {
     let query = Query::new(segment);
@@ -214,7 +214,7 @@ pub(super) fn crosses_any(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) 
     })
 }
 
-/// True if the segment crosses one of the possible triangles of a pack.
+/// True if the segment crosses one of the possible triangles of a pack, in double precision.
 #[cold]
 fn any_crossing(query: &Query, pack: &TrianglePack, possible: BVec4A, mesh: &TriangleMesh) -> bool {
     let exact = ExactQuery::new(query.segment);
@@ -224,8 +224,8 @@ fn any_crossing(query: &Query, pack: &TrianglePack, possible: BVec4A, mesh: &Tri
     })
 }
 
-/// The first crossing: the triangle and the share of the segment before it. Of several at the same place the triangle
-/// with the lowest index.
+/// The triangle that the segment crosses first, and the crossing. Of several at the same point, the lowest index
+/// wins.
 pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Option<(u32, Crossing)> {
     let query = Query::new(segment);
     let exact = ExactQuery::new(segment);
@@ -265,7 +265,7 @@ pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Opt
     best
 }
 
-/// Every crossing of a segment, in no particular order, until `visit` returns false.
+/// Passes the exact outcome for every candidate triangle to `visit`, in no particular order, until it returns false.
 pub(super) fn visit_all(
     bvh: &WideBvh,
     mesh: &TriangleMesh,
@@ -316,19 +316,19 @@ pub(super) fn dot(a: &[Vec4; 3], b: &[Vec4; 3]) -> Vec4 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Four differences. Axis by axis, as an array that is made by a closure is made by calls.
+/// Four differences. Written out by axis because `array::from_fn` with a closure would not be inlined.
 #[inline]
 pub(super) fn minus(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// Four points on the way from others.
+/// Four points `from` + `direction` · t.
 #[inline]
-pub(super) fn on_way(from: &[Vec4; 3], way: &[Vec4; 3], share: Vec4) -> [Vec4; 3] {
+pub(super) fn point_along(from: &[Vec4; 3], direction: &[Vec4; 3], t: Vec4) -> [Vec4; 3] {
     [
-        from[0] + way[0] * share,
-        from[1] + way[1] * share,
-        from[2] + way[2] * share,
+        from[0] + direction[0] * t,
+        from[1] + direction[1] * t,
+        from[2] + direction[2] * t,
     ]
 }
 

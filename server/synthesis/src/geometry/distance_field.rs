@@ -1,19 +1,19 @@
-//! A coarse grid of distances to a mesh: what is certainly free is known without a look at the mesh.
+//! A coarse grid of distances to a mesh, which proves that a capsule is clear without visiting triangles.
 
 use glam::{UVec3, Vec3};
 
 use super::{aabb::Aabb, tapered_capsule::TaperedCapsule};
 
-/// Nodes of the grid at most. More bound distances more tightly (half the spacing takes eight times as many), and cost
-/// time when the mesh is prepared, about 0.2 µs each, and 4 bytes each.
-const MOST_NODES: f32 = 32_768.0;
+/// Target number of grid nodes. More tighten the bounds (half the spacing takes eight times as many) at about 0.2 µs
+/// of preparation and 4 bytes per node.
+const TARGET_NODES: f32 = 32_768.0;
 
-/// How far the grid goes beyond the mesh, in metres: about the length of a finger's link. Farther out, the mesh's box is
-/// as good.
+/// How far the grid extends beyond the mesh's box, in metres: about the length of a phalanx. Farther out, the box
+/// itself gives as good a bound.
 const MARGIN: f32 = 0.04;
 
-/// Balls that a capsule is covered by.
-const BALLS: usize = 3;
+/// Number of spheres along the axis that cover a capsule. More tighten the bound and take longer.
+const SPHERES: usize = 3;
 
 /// Distances from the nodes of a grid to a surface.
 #[derive(Clone, Debug)]
@@ -22,24 +22,24 @@ pub(super) struct DistanceField {
     spacing: f32,
     inverse_spacing: f32,
     counts: UVec3,
-    /// The box around the surface: beyond the grid, it bounds better than the grid's edge.
+    /// The box around the surface, which gives the better bound beyond the grid.
     aabb: Aabb,
     distances: Vec<f32>,
 }
 
 impl DistanceField {
-    /// The field around what lies in `aabb`. `distance` gives a point's distance from the surface, or `within` if it is
-    /// farther than that.
+    /// Samples the field of a surface inside `aabb`. `distance(point, within)` returns the point's distance from the
+    /// surface, or `within` if it is larger.
     pub(super) fn new(aabb: &Aabb, distance: impl Fn(Vec3, f32) -> f32) -> Self {
         let size = aabb.max - aabb.min + 2.0 * MARGIN;
-        let spacing = (size.element_product() / MOST_NODES).cbrt();
+        let spacing = (size.element_product() / TARGET_NODES).cbrt();
         let counts = (size / spacing).ceil().as_uvec3() + 1;
         let origin = aabb.min - MARGIN;
         let diagonal = size.length();
         let mut distances = Vec::with_capacity((counts.x * counts.y * counts.z) as usize);
         for z in 0..counts.z {
             for y in 0..counts.y {
-                // Neighbouring nodes' distances differ by no more than the spacing, which bounds the search.
+                // Distances of neighbouring nodes differ by at most the spacing, which bounds the next search.
                 let mut within = diagonal;
                 for x in 0..counts.x {
                     let node = origin + UVec3::new(x, y, z).as_vec3() * spacing;
@@ -59,32 +59,32 @@ impl DistanceField {
         }
     }
 
-    /// A distance that the surface surely keeps from a point, in metres.
+    /// A lower bound of the distance from a point to the surface, in metres.
     #[inline]
-    fn least_distance(&self, point: Vec3) -> f32 {
+    fn distance_lower_bound(&self, point: Vec3) -> f32 {
         let last = (self.counts - 1).as_vec3();
-        let place = ((point - self.origin) * self.inverse_spacing).clamp(Vec3::ZERO, last);
-        let node = (place + 0.5).as_uvec3().min(self.counts - 1);
+        let grid_position = ((point - self.origin) * self.inverse_spacing).clamp(Vec3::ZERO, last);
+        let node = (grid_position + 0.5).as_uvec3().min(self.counts - 1);
         let index = (node.z * self.counts.y + node.y) * self.counts.x + node.x;
-        let apart = point.distance(self.origin + node.as_vec3() * self.spacing);
-        (self.distances[index as usize] - apart).max(self.aabb.distance(point))
+        let from_node = point.distance(self.origin + node.as_vec3() * self.spacing);
+        (self.distances[index as usize] - from_node).max(self.aabb.distance(point))
     }
 
-    /// A gap that the surface surely keeps from a capsule's skin, in metres; below 0, none is sure.
+    /// A lower bound of the gap between the surface and a capsule's skin, in metres. A negative bound says nothing.
     #[inline]
-    pub(super) fn least_gap(&self, capsule: &TaperedCapsule) -> f32 {
-        // Each ball around a point of the axis bounds the part that is nearest to it.
-        let half_part = 0.5 / BALLS as f32;
+    pub(super) fn gap_lower_bound(&self, capsule: &TaperedCapsule) -> f32 {
+        // Each sphere bounds the part of the capsule nearest to its centre on the axis.
+        let half_part = 0.5 / SPHERES as f32;
         let overhang = half_part * (capsule.length() + (capsule.end_radius - capsule.start_radius).abs());
-        let mut least = f32::INFINITY;
-        for ball in 0..BALLS {
-            let along = (2 * ball + 1) as f32 * half_part;
-            least = least.min(self.least_distance(capsule.at(along)) - capsule.radius_at(along));
+        let mut bound = f32::INFINITY;
+        for sphere in 0..SPHERES {
+            let along = (2 * sphere + 1) as f32 * half_part;
+            bound = bound.min(self.distance_lower_bound(capsule.at(along)) - capsule.radius_at(along));
         }
-        least - overhang
+        bound - overhang
     }
 
-    /// Bytes that the field takes.
+    /// Memory of the samples, in bytes.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(self.distances.as_slice())
     }

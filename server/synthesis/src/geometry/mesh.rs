@@ -4,27 +4,27 @@ use glam::{DVec3, Vec3};
 
 use super::aabb::Aabb;
 
-/// A triangle mesh: every index is in range, every coordinate finite, no triangle without area.
+/// A triangle mesh. Every index is in range, every coordinate finite, and every triangle has an area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-/// Why a mesh was refused.
+/// Why a mesh was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// There is nothing to touch.
+    /// There are no triangles.
     #[error("the mesh has no triangles")]
     Empty,
-    /// A triangle names a vertex that does not exist.
-    #[error("triangle {triangle} names vertex {vertex}, but there are {vertices} vertices")]
+    /// A triangle refers to a vertex that does not exist.
+    #[error("triangle {triangle} refers to vertex {vertex}, but there are {vertices} vertices")]
     IndexOutOfRange {
         /// Index of the triangle.
         triangle: usize,
-        /// The vertex it names.
+        /// The vertex it refers to.
         vertex: u32,
-        /// How many there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// A coordinate is NaN or infinite.
@@ -42,10 +42,10 @@ pub enum MeshError {
 }
 
 impl TriangleMesh {
-    /// A mesh from positions in metres and triangles, counter-clockwise seen from outside.
+    /// A mesh from positions, in metres, and triangles that are counter-clockwise seen from outside.
     ///
     /// # Errors
-    /// The first thing that is wrong; see [`MeshError`].
+    /// The first violation found; see [`MeshError`].
     pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         if triangles.is_empty() {
             return Err(MeshError::Empty);
@@ -60,11 +60,11 @@ impl TriangleMesh {
         Ok(Self { positions, triangles })
     }
 
-    /// The same, but triangles without area are left out: for meshes that are deformed. Indices of triangles then mean
-    /// those that remain.
+    /// As [`TriangleMesh::new`], but drops triangles without area, which deformation may produce. Triangle indices
+    /// then count the remaining ones.
     ///
     /// # Errors
-    /// The first thing that is wrong; [`MeshError::Empty`] if no triangle remains.
+    /// The first violation found; [`MeshError::Empty`] if no triangle remains.
     pub fn without_degenerates(positions: Vec<Vec3>, triangles: &[[u32; 3]]) -> Result<Self, MeshError> {
         check_finite(&positions)?;
         let mut kept = Vec::with_capacity(triangles.len());
@@ -83,42 +83,42 @@ impl TriangleMesh {
         })
     }
 
-    /// The triangles that `is_chosen` says by their indices, with the vertices that they have; none if it says none.
-    pub fn part(&self, is_chosen: impl Fn(usize) -> bool) -> Option<Self> {
-        let mut part = Self {
+    /// The triangles whose index `is_chosen` accepts, with the vertices they use; none if it accepts none.
+    pub fn submesh(&self, is_chosen: impl Fn(usize) -> bool) -> Option<Self> {
+        let mut submesh = Self {
             positions: Vec::new(),
             triangles: Vec::new(),
         };
-        let mut moved_to = vec![None; self.positions.len()];
+        let mut new_index = vec![None; self.positions.len()];
         for (_, corners) in self.triangles.iter().enumerate().filter(|&(i, _)| is_chosen(i)) {
-            part.triangles.push(corners.map(|vertex| {
-                *moved_to[vertex as usize].get_or_insert_with(|| {
-                    part.positions.push(self.positions[vertex as usize]);
-                    (part.positions.len() - 1) as u32
+            submesh.triangles.push(corners.map(|vertex| {
+                *new_index[vertex as usize].get_or_insert_with(|| {
+                    submesh.positions.push(self.positions[vertex as usize]);
+                    (submesh.positions.len() - 1) as u32
                 })
             }));
         }
-        (!part.triangles.is_empty()).then_some(part)
+        (!submesh.triangles.is_empty()).then_some(submesh)
     }
 
-    /// The vertices in metres.
+    /// The vertex positions, in metres.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }
 
-    /// The triangles as vertex indices.
+    /// The triangles, as vertex indices.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// The corners of a triangle.
+    /// The corners of a triangle, in metres.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|v| self.positions[v as usize])
     }
 
     /// The outward unit normal of a triangle.
     pub fn normal(&self, triangle: usize) -> Vec3 {
-        // In f64, so that slivers and tiny triangles get a sound normal: products of f32 differences are exact there.
+        // f64 holds products of f32 differences exactly, so that slivers and tiny triangles get a sound normal.
         let [a, b, c] = self.corners(triangle).map(Vec3::as_dvec3);
         (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3()
     }
@@ -133,7 +133,7 @@ impl TriangleMesh {
         )
     }
 
-    /// Area of the surface in m².
+    /// Surface area, in m².
     pub fn area(&self) -> f64 {
         (0..self.triangles.len())
             .map(|triangle| {
@@ -143,26 +143,25 @@ impl TriangleMesh {
             .sum()
     }
 
-    /// The volume in m³ by the divergence theorem: negative if the mesh is inside out. Overlapping parts count twice;
-    /// it means nothing for a mesh that is not closed.
+    /// The volume by the divergence theorem, in m³; negative if the mesh is inside out. Overlapping parts count
+    /// twice, and the value is meaningless unless the mesh is closed.
     pub fn signed_volume(&self) -> f64 {
         self.volume_moments().0
     }
 
-    /// The centroid of the volume in metres: the centre of mass of a homogeneous body. None if the mesh encloses no
-    /// volume: if it is below a billionth of that of its box, or the centroid falls outside that box, as for a mesh
-    /// that is far from closed.
+    /// The centroid of the volume, in metres: the centre of mass of a homogeneous body. None if the mesh encloses no
+    /// volume (less than a billionth of its box's) or is so far from closed that the centroid falls outside its box.
     pub fn volume_centroid(&self) -> Option<Vec3> {
-        /// Share of the box's volume that is taken for the sum of rounding errors.
+        /// Share of the box's volume below which a volume counts as rounding error.
         const NO_VOLUME: f64 = 1e-9;
         let aabb = self.aabb();
         let (volume, centroid) = self.volume_moments();
-        let of_box = aabb.extents().as_dvec3().element_product();
+        let box_volume = aabb.extents().as_dvec3().element_product();
         let centroid = centroid.as_vec3();
-        (volume.abs() > NO_VOLUME * of_box && aabb.contains(centroid)).then_some(centroid)
+        (volume.abs() > NO_VOLUME * box_volume && aabb.contains(centroid)).then_some(centroid)
     }
 
-    /// Volume and centroid: the sums over the tetrahedra between the triangles and a point in the middle of the mesh.
+    /// Signed volume and centroid, summed over the tetrahedra between each triangle and the centre of the mesh's box.
     fn volume_moments(&self) -> (f64, DVec3) {
         let origin = self.aabb().centre().as_dvec3();
         let mut volume = 0.0;
@@ -195,9 +194,9 @@ fn check_indices(triangle: usize, corners: [u32; 3], vertices: usize) -> Result<
     }
 }
 
-/// True if the corners span an area that is a normal `f32`; indices must be in range.
+/// True if the corners span an area that is a normal `f32` number. Indices must be in range.
 fn has_area(positions: &[Vec3], corners: [u32; 3]) -> bool {
     let [a, b, c] = corners.map(|v| positions[v as usize]);
-    // In f32, like the search structures: what underflows or overflows there must not count as an area.
+    // In f32 like the search structures, so that an area that underflows or overflows there is rejected here.
     (b - a).cross(c - a).length().is_normal()
 }

@@ -1,4 +1,4 @@
-//! Segments, meshes, bounding boxes and the queries that the synthesis needs.
+//! Segments, meshes, bounding volumes, capsules, and the spatial queries on them.
 
 pub mod aabb;
 pub mod capsule_gap;
@@ -9,9 +9,9 @@ mod distance_field;
 pub mod mesh;
 pub mod mesh_bvh;
 pub mod oriented_box;
+mod stack_entry;
 pub mod tapered_capsule;
 pub mod topology;
-mod waiting;
 mod wide_bvh;
 
 use glam::Vec3;
@@ -20,9 +20,9 @@ use serde::{Deserialize, Serialize};
 /// A line segment, in metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
-    /// A.
+    /// Start point A.
     pub start: Vec3,
-    /// B.
+    /// End point B.
     pub end: Vec3,
 }
 

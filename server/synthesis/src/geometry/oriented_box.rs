@@ -5,37 +5,36 @@ use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
 use super::mesh::TriangleMesh;
 use crate::base::pose::Pose;
 
-/// Directions in which the outermost vertices are looked up; the box is fitted to those. More fit rounded objects
-/// better and take longer: 256 are about 7° apart, which leaves a sphere's box 0.2 % loose before the last step makes
-/// it fit.
+/// Number of directions whose outermost vertices the box is fitted to, about 7° apart. More fit rounded objects
+/// better and take longer; the last step makes the box enclose every vertex in any case.
 const SUPPORT_DIRECTIONS: usize = 256;
 
-/// Orientations from which the fit starts beside the object's axes and its principal ones: a guard against the rare
-/// start that gets stuck. Of real objects 4 found the same boxes as 200; each costs about 0.2 ms.
-const EXTRA_STARTS: usize = 10;
+/// Number of initial orientations in addition to the object's axes and its principal axes, against local minima. Each
+/// costs about 0.2 ms; real objects need about 4.
+const EXTRA_ORIENTATIONS: usize = 10;
 
-/// Turns from one start. Most end after ten.
+/// Upper bound of turns from one initial orientation. Most fits end after ten.
 const MAX_TURNS: usize = 100;
 
-/// Thickness in shares of the diagonal that is added to the box when sizes are compared, so that among the boxes of a
-/// flat object, which have no volume, the one with the smallest face wins.
+/// Thickness added to the box when sizes are compared, as a share of the diagonal: among the boxes of a flat object,
+/// which have no volume, the one with the smallest face then wins.
 const COMPARED_THICKNESS: f64 = 1e-4;
 
-/// B of thesis 4.3: a box that fits snugly around an object.
+/// A tight box around an object: B of thesis 4.3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrientedBox {
-    /// The box's frame, with its centre as origin, in the object's frame.
+    /// The box's frame, with its origin at the centre, in the object's frame.
     pub object_from_box: Pose,
-    /// Half of its edge lengths along its own axes, in metres.
+    /// Half the edge lengths along the box's axes, in metres.
     pub half_extents: Vec3,
 }
 
 impl OrientedBox {
-    /// A snug box around a mesh, never larger than the axis-aligned one; the same on every run.
+    /// A tight box around a mesh, never larger than the axis-aligned one; deterministic.
     ///
-    /// From several fixed starts, the box is turned about each of its axes in turn to where its cross-section is
-    /// smallest, by rotating calipers, until that changes nothing: the local search of C.-T. Chang, B. Gorissen,
-    /// S. Melchior: Fast Oriented Bounding Box Optimization on the Rotation Group SO(3, R), 2011.
+    /// From each of several fixed initial orientations, the box is turned about one axis at a time to the smallest
+    /// cross-section, by rotating calipers, until no turn shrinks it: the local search of C.-T. Chang, B. Gorissen,
+    /// S. Melchior, "Fast Oriented Bounding Box Optimization on the Rotation Group SO(3, R)", 2011.
     pub fn around(mesh: &TriangleMesh) -> Self {
         let vertices = || {
             mesh.triangles()
@@ -48,9 +47,9 @@ impl OrientedBox {
         let size = |axes: DMat3| extents(&points, axes).map(|e| e + thickness).element_product();
 
         let mut best = DMat3::IDENTITY;
-        for start in starts(&points) {
-            let axes = refine(&points, start, size);
-            // A thousandth better, lest rounding choose between equals.
+        for initial in initial_axes(&points) {
+            let axes = refine(&points, initial, size);
+            // Smaller by a thousandth, so that rounding does not choose between equals.
             if size(axes) < 0.999 * size(best) {
                 best = axes;
             }
@@ -64,7 +63,7 @@ impl OrientedBox {
         }
     }
 
-    /// The tight box with given axes.
+    /// The tight box with the given axes.
     fn with_axes<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I, axes: DMat3) -> Self {
         let axes = nearest_to_identity(axes);
         let orientation = DQuat::from_mat3(&axes).normalize().as_quat();
@@ -75,7 +74,7 @@ impl OrientedBox {
                 (min.min(vertex), max.max(vertex))
             });
         let centre = box_from_object.conjugate() * ((min + max) * 0.5);
-        // What the rounding of centre and rotation to f32 may leave outside.
+        // Rounding centre and rotation to f32 may leave vertices this far outside.
         let rounding = 2.0 * f64::from(f32::EPSILON) * (centre.length() + (max - min).length());
         let half_extents = ((max - min) * 0.5 + DVec3::splat(rounding)).as_vec3();
         Self {
@@ -84,7 +83,7 @@ impl OrientedBox {
         }
     }
 
-    /// Volume in m³.
+    /// Volume, in m³.
     pub fn volume(&self) -> f32 {
         8.0 * self.half_extents.element_product()
     }
@@ -94,7 +93,7 @@ impl OrientedBox {
         self.local(point).abs().cmple(self.half_extents).all()
     }
 
-    /// How far a point of the object's frame is outside the box, in metres; 0 inside. The object's surface is at least
+    /// Distance from a point of the object's frame to the box, in metres; 0 inside. The object's surface is at least
     /// as far away.
     pub fn distance(&self, point: Vec3) -> f32 {
         (self.local(point).abs() - self.half_extents)
@@ -102,19 +101,19 @@ impl OrientedBox {
             .length()
     }
 
-    /// The distance to the box's faces in metres, negative inside.
+    /// Distance from a point of the object's frame to the box's surface, in metres; negative inside.
     pub fn signed_distance(&self, point: Vec3) -> f32 {
         let beyond = self.local(point).abs() - self.half_extents;
         beyond.max(Vec3::ZERO).length() + beyond.max_element().min(0.0)
     }
 
-    /// A point of the object's frame seen from the box.
+    /// A point of the object's frame in the box's frame.
     fn local(&self, point: Vec3) -> Vec3 {
         self.object_from_box.inverse().transform_point(point)
     }
 }
 
-/// The vertices that are outermost in one of many directions.
+/// The vertices that are outermost in at least one of [`SUPPORT_DIRECTIONS`] directions.
 fn outermost<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I) -> Vec<DVec3> {
     let all: Vec<DVec3> = vertices().collect();
     let mut chosen: Vec<usize> = directions(SUPPORT_DIRECTIONS)
@@ -127,8 +126,8 @@ fn outermost<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I) -> Vec<DVec3> 
     chosen.into_iter().map(|index| all[index]).collect()
 }
 
-/// Directions spread evenly over the sphere: a spiral with steps of the golden angle (R. Swinbank, R. J. Purser:
-/// Fibonacci grids, 2006).
+/// Directions spread evenly over the sphere by a golden-angle spiral (R. Swinbank, R. J. Purser: Fibonacci grids,
+/// 2006).
 fn directions(count: usize) -> impl Iterator<Item = DVec3> {
     let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |i| {
@@ -139,10 +138,10 @@ fn directions(count: usize) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// Axes from which the fit starts: the object's own, its principal ones, and some spread out between.
-fn starts(points: &[DVec3]) -> impl Iterator<Item = DMat3> {
-    let spread = directions(EXTRA_STARTS).map(|direction| {
-        // Each direction in the role of the z axis.
+/// Initial axes of the fit: the object's own, its principal axes, and some spread evenly over the sphere.
+fn initial_axes(points: &[DVec3]) -> impl Iterator<Item = DMat3> {
+    let spread = directions(EXTRA_ORIENTATIONS).map(|direction| {
+        // Each direction becomes the z axis.
         DMat3::from_quat(DQuat::from_rotation_arc(DVec3::Z, direction))
     });
     [DMat3::IDENTITY, principal_axes(points)]
@@ -150,15 +149,15 @@ fn starts(points: &[DVec3]) -> impl Iterator<Item = DMat3> {
         .chain(spread)
 }
 
-/// Turns the axes, each time about the one where that makes the box smallest, until none makes it smaller.
-fn refine(points: &[DVec3], start: DMat3, size: impl Fn(DMat3) -> f64) -> DMat3 {
-    let mut axes = start;
+/// Turns the box repeatedly, each time about the axis that shrinks it most, until no turn shrinks it.
+fn refine(points: &[DVec3], initial: DMat3, size: impl Fn(DMat3) -> f64) -> DMat3 {
+    let mut axes = initial;
     for _ in 0..MAX_TURNS {
         let turns = [0, 1, 2].map(|fixed| turn_about(points, axes, fixed));
         let Some(turned) = turns.into_iter().min_by(|&a, &b| size(a).total_cmp(&size(b))) else {
             break;
         };
-        // Less than a millionth is rounding.
+        // A gain below a millionth is rounding.
         if size(turned) > (1.0 - 1e-6) * size(axes) {
             break;
         }
@@ -167,9 +166,9 @@ fn refine(points: &[DVec3], start: DMat3, size: impl Fn(DMat3) -> f64) -> DMat3 
     axes
 }
 
-/// The axes with one kept and the other two where the rectangle around the points, seen along the first, is smallest.
-/// That rectangle has a side on an edge of the convex hull (H. Freeman, R. Shapira: Determining the Minimum-Area
-/// Encasing Rectangle for an Arbitrary Closed Curve, 1975).
+/// The axes turned about the `fixed` one to the smallest rectangle around the points as seen along it. That rectangle
+/// has a side on an edge of the convex hull (H. Freeman, R. Shapira: Determining the Minimum-Area Encasing Rectangle
+/// for an Arbitrary Closed Curve, 1975).
 fn turn_about(points: &[DVec3], axes: DMat3, fixed: usize) -> DMat3 {
     let (x, y) = (axes.col((fixed + 1) % 3), axes.col((fixed + 2) % 3));
     let hull = convex_hull(points.iter().map(|p| DVec2::new(p.dot(x), p.dot(y))).collect());
@@ -198,8 +197,8 @@ fn turn_about(points: &[DVec3], axes: DMat3, fixed: usize) -> DMat3 {
     DMat3::from_cols(columns[0], columns[1], columns[2])
 }
 
-/// The convex hull of points of a plane, counter-clockwise (A. M. Andrew: Another efficient algorithm for convex hulls
-/// in two dimensions, 1979).
+/// The convex hull of points in the plane, counter-clockwise (A. M. Andrew: Another efficient algorithm for convex
+/// hulls in two dimensions, 1979).
 fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
@@ -225,8 +224,8 @@ fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
     hull
 }
 
-/// The principal axes of points: eigenvectors of their covariance by Jacobi rotations (G. H. Golub, C. F. Van Loan:
-/// Matrix Computations, 8.5), right-handed.
+/// The principal axes of points, right-handed: eigenvectors of their covariance by Jacobi rotations (G. H. Golub, C.
+/// F. Van Loan: Matrix Computations, 8.5).
 fn principal_axes(points: &[DVec3]) -> DMat3 {
     let mean = points.iter().sum::<DVec3>() / points.len() as f64;
     let mut covariance = DMat3::ZERO;
@@ -235,7 +234,7 @@ fn principal_axes(points: &[DVec3]) -> DMat3 {
         covariance += DMat3::from_cols(offset * offset.x, offset * offset.y, offset * offset.z);
     }
     let mut axes = DMat3::IDENTITY;
-    // Convergence is quadratic: five sweeps reach the last digit.
+    // Convergence is quadratic: five sweeps reach machine precision.
     for _ in 0..5 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             let off_diagonal = covariance.col(q)[p];
@@ -255,7 +254,7 @@ fn principal_axes(points: &[DVec3]) -> DMat3 {
     axes
 }
 
-/// Edge lengths of the box with given axes.
+/// Edge lengths of the box with the given axes, in metres.
 fn extents(points: &[DVec3], axes: DMat3) -> DVec3 {
     let box_from_object = axes.transpose();
     let (min, max) = points
@@ -267,9 +266,9 @@ fn extents(points: &[DVec3], axes: DMat3) -> DVec3 {
     max - min
 }
 
-/// The same box with its axes renamed and reversed so that they are as close as possible to the object's.
+/// The axes of the same box, permuted and reversed to be as close to the object's as possible.
 fn nearest_to_identity(axes: DMat3) -> DMat3 {
-    /// The rotations among the permutations of the axes; reversals come on top.
+    /// The permutations of the axes; reversals restore a right-handed frame.
     const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     let columns = [axes.col(0), axes.col(1), axes.col(2)];
     let reversed_if_needed = |axis: DVec3, component: f64| if component < 0.0 { -axis } else { axis };
@@ -285,7 +284,7 @@ fn nearest_to_identity(axes: DMat3) -> DMat3 {
     DMat3::from_cols(x, y, x.cross(y))
 }
 
-/// A vector with one coordinate replaced, by index.
+/// Replaces one coordinate of a vector, by index.
 trait With {
     fn with(self, axis: usize, value: f64) -> Self;
 }

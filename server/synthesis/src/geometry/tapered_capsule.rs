@@ -1,28 +1,28 @@
-//! The tapered capsule, or cone-sphere: the convex hull of two balls.
+//! The tapered capsule, or cone-sphere: the convex hull of two spheres.
 
 use glam::{DVec3, Vec3};
 
 use crate::base::pose::Pose;
 
-/// Squared sine of the angle below which two axes count as parallel: over 10 cm, they part by a micrometre. There is always
-/// an end of parallel axes among their nearest points.
+/// Squared sine of the angle below which two axes count as parallel: they diverge by a micrometre over 10 cm. The
+/// closest points of parallel axes always include an end of one of them.
 const PARALLEL: f64 = 1e-10;
 
-/// The convex hull of two balls: everything within [`TaperedCapsule::radius_at`] of a point of the axis.
+/// The convex hull of two spheres: all points within [`TaperedCapsule::radius_at`] of a point of the axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TaperedCapsule {
-    /// Centre of one ball, in metres.
+    /// Centre of the first sphere, in metres.
     pub start: Vec3,
-    /// Centre of the other.
+    /// Centre of the second sphere, in metres.
     pub end: Vec3,
-    /// Radius of the ball around `start`, in metres.
+    /// Radius of the sphere around `start`, in metres.
     pub start_radius: f32,
-    /// Radius of the ball around `end`, in metres.
+    /// Radius of the sphere around `end`, in metres.
     pub end_radius: f32,
 }
 
 impl TaperedCapsule {
-    /// The hull of a ball of `start_radius` metres around `start` and one of `end_radius` around `end`.
+    /// The hull of a sphere of `start_radius` around `start` and one of `end_radius` around `end`, in metres.
     pub const fn new(start: Vec3, end: Vec3, start_radius: f32, end_radius: f32) -> Self {
         Self {
             start,
@@ -32,22 +32,22 @@ impl TaperedCapsule {
         }
     }
 
-    /// A point of the axis: 0 is the start, 1 the end.
+    /// The point of the axis at a parameter from 0 (start) to 1 (end).
     pub fn at(&self, along: f32) -> Vec3 {
         self.start + (self.end - self.start) * along
     }
 
-    /// The radius around a point of the axis, in metres: linear from start to end.
+    /// The radius at a parameter of the axis, in metres: linear from start to end.
     pub fn radius_at(&self, along: f32) -> f32 {
         self.start_radius + (self.end_radius - self.start_radius) * along
     }
 
-    /// Length of the axis in metres.
+    /// Length of the axis, in metres.
     pub fn length(&self) -> f32 {
         self.start.distance(self.end)
     }
 
-    /// The same solid seen from another frame.
+    /// The same solid in another frame.
     #[must_use]
     pub fn transformed(&self, a_from_b: Pose) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl TaperedCapsule {
         }
     }
 
-    /// The smallest ball around it: its centre and radius in metres.
+    /// Centre and radius of the smallest enclosing sphere, in metres.
     pub fn bounding_sphere(&self) -> (Vec3, f32) {
         let length = self.length();
         let (start, end) = (self.start_radius, self.end_radius);
@@ -72,15 +72,16 @@ impl TaperedCapsule {
         (self.at((radius - start) / length), radius)
     }
 
-    /// Distance from a point to the surface in metres, negative inside. Exact.
+    /// Exact distance from a point to the surface, in metres; negative inside.
     pub fn signed_distance(&self, point: Vec3) -> f32 {
         self.nearest(point.as_dvec3()).1 as f32
     }
 
-    /// Where on the axis (0 to 1) the ball is that comes closest to the point, and how close, in metres.
+    /// Axis parameter (0 to 1) of the sphere closest to the point, and the signed distance to it, in metres.
     ///
-    /// The solid is the union of the balls around its axis, so that the distance is the least of |p - a(t)| - r(t):
-    /// convex in t, and stationary where the way to the point leaves the axis at the angle at which the cone opens.
+    /// The solid is the union of the spheres around its axis, so the distance is the minimum of |p - a(t)| - r(t).
+    /// That function is convex in t, and stationary where the line to the point meets the axis at the cone's opening
+    /// angle.
     pub(crate) fn nearest(&self, point: DVec3) -> (f64, f64) {
         let start = self.start.as_dvec3();
         let axis = self.end.as_dvec3() - start;
@@ -88,7 +89,7 @@ impl TaperedCapsule {
         let length = axis.length();
         let value = |t: f64| (start + axis * t).distance(point) - (r0 + (r1 - r0) * t);
         let slope = (r1 - r0) / length;
-        // One ball contains the other (or they are one, and the slope is no number).
+        // One sphere contains the other, or both coincide and the slope is NaN.
         if slope.is_nan() || slope.abs() >= 1.0 {
             let t = if r1 > r0 { 1.0 } else { 0.0 };
             return (t, value(t));
@@ -101,17 +102,17 @@ impl TaperedCapsule {
         (t, value(t))
     }
 
-    /// Distance between the surfaces of two solids in metres; negative, how far one must move to leave the other.
+    /// Distance between the surfaces of two solids, in metres; if negative, how far one must move to clear the other.
     ///
-    /// The least of |a(t) - b(u)| - r(t) - q(u), which is convex in t and u: either stationary inside, where the way
-    /// from one axis to the other leaves each at its cone's angle, or at an end of one of them.
+    /// The minimum of |a(t) - b(u)| - r(t) - q(u), which is convex in t and u. It lies either at an interior
+    /// stationary point, where the line between the axes meets each at its cone's angle, or at an end of one axis.
     pub fn distance(&self, other: &Self) -> f32 {
         let axis = (other.end - other.start).as_dvec3();
         let rise = f64::from(other.end_radius) - f64::from(other.start_radius);
         let start_radius = f64::from(other.start_radius);
-        if let Some((_, between)) = self.stationary(other.start.as_dvec3(), axis, start_radius, rise) {
-            // Of a convex function, the least.
-            return between as f32;
+        if let Some((_, distance)) = self.stationary(other.start.as_dvec3(), axis, start_radius, rise) {
+            // A stationary point of a convex function is its minimum.
+            return distance as f32;
         }
         let ends = [
             self.nearest(other.start.as_dvec3()).1 - f64::from(other.start_radius),
@@ -122,8 +123,8 @@ impl TaperedCapsule {
         ends.into_iter().fold(f64::INFINITY, f64::min) as f32
     }
 
-    /// The stationary value of |a(t) - b(u)| - r(t) - q(u) with t and u inside of the axes, and t, if there is one. The
-    /// other axis goes from `b` along `along_b`, its radius from `radius_b` up by `rise_b`.
+    /// The stationary point of |a(t) - b(u)| - r(t) - q(u) with both t and u in [0, 1], if there is one: t and the
+    /// value there. The other axis runs from `b` to `b + along_b`; its radius grows from `radius_b` by `rise_b`.
     pub(super) fn stationary(
         &self,
         b: DVec3,
@@ -134,8 +135,8 @@ impl TaperedCapsule {
         let a = self.start.as_dvec3();
         let along_a = self.end.as_dvec3() - a;
         let rise_a = f64::from(self.end_radius) - f64::from(self.start_radius);
-        // The unit vector n from b(u) to a(t) has n · along_a = rise_a and n · along_b = -rise_b. That fixes its part
-        // in the plane of the axes; the rest is across both.
+        // The unit vector n from b(u) to a(t) satisfies n · along_a = rise_a and n · along_b = -rise_b. That fixes
+        // its component parallel to both axes; the rest is perpendicular to both.
         let across = along_a.cross(along_b);
         let (aa, ab, bb) = (along_a.dot(along_a), along_a.dot(along_b), along_b.dot(along_b));
         let determinant = across.length_squared();
@@ -150,7 +151,7 @@ impl TaperedCapsule {
         }
         let from_b = a - b;
         let distance = from_b.dot(across).abs() / (determinant * rest).sqrt();
-        // from_b + along_a t - along_b u = distance n; its part in the plane gives t and u.
+        // from_b + along_a t - along_b u = distance n; its component in the plane of the axes gives t and u.
         let (ta, tb) = (
             rise_a * distance - from_b.dot(along_a),
             -rise_b * distance - from_b.dot(along_b),

@@ -1,4 +1,4 @@
-//! How the triangles of a mesh hang together: what decides whether it encloses a volume.
+//! How the triangles of a mesh connect, which decides whether it encloses a volume.
 
 use std::collections::HashMap;
 
@@ -6,22 +6,22 @@ use glam::Vec3;
 
 use super::mesh::TriangleMesh;
 
-/// What the edges of a mesh say about it. Vertices at the same place count as one, so that seams of texture
-/// coordinates are no holes.
+/// Counts of a mesh's parts and of its irregular edges. Vertices at equal positions count as one, so that texture
+/// seams are not holes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topology {
     /// Number of connected parts.
     pub components: usize,
-    /// Edges with exactly one triangle: the rims of holes.
+    /// Edges of exactly one triangle: the rims of holes.
     pub boundary_edges: usize,
-    /// Edges with more than two triangles.
+    /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
-    /// Edges of two triangles that run through them in the same direction: one of the triangles is inside out.
+    /// Edges that two triangles traverse in the same direction: one of the two is inside out.
     pub miswound_edges: usize,
 }
 
 impl Topology {
-    /// True if the surface has no rim: every edge has at least two triangles.
+    /// True if every edge has at least two triangles.
     pub fn is_closed(&self) -> bool {
         self.boundary_edges == 0
     }
@@ -63,13 +63,13 @@ impl Topology {
     }
 }
 
-/// An edge of a triangle.
+/// One triangle's use of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct EdgeUse {
     /// The vertices, the lower index first.
     ends: [u32; 2],
     triangle: u32,
-    /// True if the triangle runs from the higher index to the lower.
+    /// True if the triangle traverses the edge from the higher index to the lower.
     reversed: bool,
 }
 
@@ -87,11 +87,11 @@ fn directed_edges(triangles: impl Iterator<Item = [u32; 3]>, capacity: usize) ->
     edges
 }
 
-/// The boundary of a mesh as a chain: edges from the first to the second position, each as often as triangles use it
-/// in that direction more than in the other. A mesh whose boundary is empty encloses a volume, whatever its seams and
-/// however its parts overlap.
+/// The boundary of a mesh as a chain of directed edges. The count of an edge is the number of triangles that traverse
+/// it in its direction minus the number that traverse it backward. A mesh with an empty boundary encloses a volume,
+/// whatever its seams and overlaps.
 pub(super) fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
-    // Closed without welding in the common case, which is much cheaper to find out.
+    // The common case, closed even without welding, is much cheaper to detect.
     if is_closed_by_index(mesh.triangles()) {
         return Vec::new();
     }
@@ -109,8 +109,8 @@ pub(super) fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
         .collect()
 }
 
-/// True if triangles use every edge equally often in both directions: then the hashes of the edges, added in one
-/// direction and subtracted in the other, cancel. By accident they do so once in 2^64 open meshes.
+/// True if triangles use every edge equally often in both directions: edge hashes, added in one direction and
+/// subtracted in the other, then cancel. An open mesh passes by accident with a probability of 2^-64.
 fn is_closed_by_index(triangles: &[[u32; 3]]) -> bool {
     let mut sum = 0_u64;
     for &[a, b, c] in triangles {
@@ -123,16 +123,15 @@ fn is_closed_by_index(triangles: &[[u32; 3]]) -> bool {
     sum == 0
 }
 
-/// A number of which every bit depends on every bit of another (S. Vigna: the finaliser of `SplitMix64`, after
-/// D. Stafford).
+/// A hash in which every bit depends on every input bit: the finaliser of `SplitMix64` (S. Vigna, after D. Stafford).
 fn mix(number: u64) -> u64 {
     let number = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let number = (number ^ (number >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     number ^ (number >> 31)
 }
 
-/// The edges that triangles do not use equally often in both directions, by their lower vertex: a counting sort
-/// followed by a look at the few edges of each vertex; O(n) for vertices of bounded valence.
+/// The edges that triangles do not use equally often in both directions, ordered by lower vertex: a counting sort by
+/// vertex, then a sort of each vertex's few edges; O(n) for bounded valence.
 fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) -> Vec<([u32; 2], i32)> {
     let directed = || {
         triangles
@@ -140,15 +139,15 @@ fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) 
             .flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]])
             .filter(|[from, to]| from != to)
     };
-    let mut starts = vec![0_u32; vertices + 1];
+    let mut offsets = vec![0_u32; vertices + 1];
     for [from, to] in directed() {
-        starts[from.min(to) as usize + 1] += 1;
+        offsets[from.min(to) as usize + 1] += 1;
     }
     for vertex in 0..vertices {
-        starts[vertex + 1] += starts[vertex];
+        offsets[vertex + 1] += offsets[vertex];
     }
-    let mut cursor = starts.clone();
-    let mut uses = vec![(0_u32, 0_i32); starts[vertices] as usize];
+    let mut cursor = offsets.clone();
+    let mut uses = vec![(0_u32, 0_i32); offsets[vertices] as usize];
     for [from, to] in directed() {
         let slot = &mut cursor[from.min(to) as usize];
         uses[*slot as usize] = (from.max(to), if from < to { 1 } else { -1 });
@@ -156,7 +155,7 @@ fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) 
     }
     let mut chain = Vec::new();
     for vertex in 0..vertices {
-        let row = &mut uses[starts[vertex] as usize..starts[vertex + 1] as usize];
+        let row = &mut uses[offsets[vertex] as usize..offsets[vertex + 1] as usize];
         row.sort_unstable();
         for same in row.chunk_by(|a, b| a.0 == b.0) {
             let count: i32 = same.iter().map(|&(_, direction)| direction).sum();
@@ -168,7 +167,7 @@ fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) 
     chain
 }
 
-/// For each vertex the first one at exactly the same place.
+/// For each vertex, the first vertex at exactly the same position.
 fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first = HashMap::with_capacity(positions.len());
     positions
@@ -182,7 +181,7 @@ fn weld(positions: &[Vec3]) -> Vec<u32> {
         .collect()
 }
 
-/// Sets that can be joined (union by halving paths).
+/// Disjoint sets (union-find with path halving).
 struct DisjointSets {
     parents: Vec<u32>,
 }

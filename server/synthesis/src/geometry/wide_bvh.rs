@@ -1,7 +1,7 @@
-//! The layout of the hierarchy: obvhs builds a binary tree, which is collapsed here into nodes of four children and
-//! packs of up to four triangles, so that one `Vec4` operation serves four boxes or four triangles
-//! (H. Dammertz, J. Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent
-//! Rays, 2008).
+//! The four-wide bounding volume hierarchy. The binary tree that obvhs builds is collapsed into nodes of four
+//! children
+//! and packs of up to four triangles, so that one `Vec4` operation tests four boxes or four triangles (H. Dammertz,
+//! J. Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays, 2008).
 
 use std::time::Duration;
 
@@ -15,38 +15,36 @@ use obvhs::{
 
 use super::mesh::TriangleMesh;
 
-/// How many children a node has, how many triangles a pack.
+/// Children per node and triangles per pack.
 pub(super) const WIDTH: usize = 4;
 
-/// Depth of the stack that queries keep on the machine's stack. Trees of a few thousand triangles need about 30
-/// entries; a deeper tree gets a stack from the heap, which costs about 20 ns a query.
+/// Entries of the traversal stack that queries keep on the call stack. Trees of a few thousand triangles need about
+/// 30; deeper trees use the heap, at about 20 ns per query.
 const STACK_ENTRIES: usize = 64;
 
-/// Marks a child that is a pack of triangles.
+/// Bit that marks a child as a pack of triangles.
 const PACK_FLAG: u32 = 1 << 31;
 
 /// Marks a lane of a pack that holds no triangle.
 const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Surface of the triangles' boxes, as a multiple of that of the box around all, up to which the tree is improved by
-/// reinsertion. That takes time with the square of the number of boxes that overlap each other: 5 s for 40,000 triangles
-/// that all cross each other (a multiple of 10,000), and minutes for more, though there is nothing to gain. The boxes of
-/// a surface overlap little: the multiple is below 10 for objects as they are held, and 89 in the worst mesh at hand. A
-/// higher bound lets uploads of nonsense take longer; a lower one leaves trees of crumpled surfaces slower to query.
-const MOST_OVERLAP: f32 = 100.0;
+/// Largest [`overlap`] up to which reinsertion improves the tree: ordinary objects stay below 10, crumpled ones below
+/// 90. Reinsertion takes time with the square of the overlap: a higher bound lets hostile uploads occupy the builder
+/// for seconds to minutes, a lower one slows queries on crumpled surfaces.
+const MAX_OVERLAP: f32 = 100.0;
 
-/// How much time building may take.
+/// How much time to spend on building.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BuildQuality {
     /// For meshes that are queried millions of times.
     Thorough,
-    /// For meshes that are built for one request.
+    /// For meshes that serve one request.
     Quick,
 }
 
 impl BuildQuality {
-    /// The builder's settings. No pre-splitting: it puts a triangle into several leaves, so that containment would
-    /// count its crossings more than once.
+    /// The builder's settings. No pre-splitting: it puts a triangle into several leaves, and containment would count
+    /// its crossings more than once.
     fn params(self) -> BvhBuildParams {
         let common = BvhBuildParams {
             pre_split: false,
@@ -56,8 +54,8 @@ impl BuildQuality {
             post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
             sort_precision: SortPrecision::U64,
             max_prims_per_leaf: WIDTH as u32,
-            // In tests of one triangle: less splits leaves further, more fills them up. Four triangles are tested at
-            // once, yet from 1 to 20 queries change by no more than a tenth; 2 is the fastest.
+            // Relative to the test of one triangle: a lower cost splits leaves further, a higher one fills them. From
+            // 1 to 20, query time changes by a tenth at most.
             collapse_traversal_cost: 2.0,
         };
         match self {
@@ -73,12 +71,12 @@ impl BuildQuality {
     }
 }
 
-/// Where a child of a node leads.
+/// What a child of a node refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Child {
-    /// To a node.
+    /// A node, by index.
     Node(usize),
-    /// To a pack of triangles.
+    /// A pack of triangles, by index.
     Pack(usize),
 }
 
@@ -94,7 +92,7 @@ impl ChildRef {
         }
     }
 
-    /// The four bytes.
+    /// The packed bits.
     pub(super) fn to_bits(self) -> u32 {
         self.0
     }
@@ -104,7 +102,7 @@ impl ChildRef {
         Self(bits)
     }
 
-    /// What it refers to.
+    /// The unpacked child.
     #[inline]
     pub(super) fn child(self) -> Child {
         if self.0 & PACK_FLAG == 0 {
@@ -115,11 +113,11 @@ impl ChildRef {
     }
 }
 
-/// A node: the boxes of up to four children, coordinate by coordinate.
+/// A node: the boxes of up to four children, stored by coordinate.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
-    /// Smallest (0) and largest (1) x, y and z of each child. An unused child has its smallest at +∞ and its largest
-    /// at -∞, so that no query enters it.
+    /// Smallest (0) and largest (1) x, y and z of each child's box, in metres. An unused child has +∞ as smallest and
+    /// -∞ as largest, so that no query enters it.
     pub(super) bounds: [[Vec4; 3]; 2],
     /// The children.
     pub(super) children: [ChildRef; WIDTH],
@@ -140,7 +138,7 @@ impl Node {
     }
 }
 
-/// Up to four triangles, coordinate by coordinate. Unused lanes hold NaN, which fails every comparison.
+/// Up to four triangles, stored by coordinate. Unused lanes hold NaN, which fails every comparison.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TrianglePack {
     /// First corner.
@@ -153,7 +151,7 @@ pub(super) struct TrianglePack {
     pub(super) normal: [Vec4; 3],
     /// Twice the area, in m².
     pub(super) doubled_area: Vec4,
-    /// An upper bound of the length of the longest edge in metres: the scale of the rounding errors.
+    /// Length of the longest edge, in metres: the scale of rounding errors.
     pub(super) reach: Vec4,
     /// Indices into the mesh, [`NO_TRIANGLE`] in unused lanes.
     triangles: [u32; WIDTH],
@@ -174,7 +172,7 @@ impl TrianglePack {
         for (lane, &triangle) in triangles.iter().enumerate() {
             let [a, b, c] = mesh.corners(triangle as usize);
             let (edge1, edge2) = (b - a, c - a);
-            // In f64, so that slivers get a sound normal.
+            // f64 gives slivers a sound normal.
             let [wide_a, wide_b, wide_c] = [a, b, c].map(Vec3::as_dvec3);
             let cross = (wide_b - wide_a).cross(wide_c - wide_a);
             let normal = cross.normalize_or(DVec3::Y).as_vec3();
@@ -191,7 +189,7 @@ impl TrianglePack {
         pack
     }
 
-    /// The mesh's triangle in a lane.
+    /// The mesh's index of the triangle in a lane.
     #[inline]
     pub(super) fn triangle(&self, lane: usize) -> u32 {
         self.triangles[lane]
@@ -201,11 +199,11 @@ impl TrianglePack {
 /// The hierarchy.
 #[derive(Clone, Debug)]
 pub(super) struct WideBvh {
-    /// The first is the root.
+    /// The nodes, the root first.
     pub(super) nodes: Vec<Node>,
     /// The triangles, in the order of the leaves.
     pub(super) packs: Vec<TrianglePack>,
-    /// The most entries that a query's stack may need.
+    /// Upper bound of the entries on a query's stack.
     stack_bound: usize,
 }
 
@@ -218,7 +216,7 @@ impl WideBvh {
                 BuilderAabb::new(a.min(b).min(c), a.max(b).max(c))
             })
             .collect();
-        let quality = if overlap(&boxes) > MOST_OVERLAP {
+        let quality = if overlap(&boxes) > MAX_OVERLAP {
             BuildQuality::Quick
         } else {
             quality
@@ -228,8 +226,8 @@ impl WideBvh {
         Self::collapse(&binary, mesh)
     }
 
-    /// Collapses a binary tree into one of four children a node: of the children gathered so far, the one with the
-    /// largest surface (the one most likely to be entered) is replaced by its own two until there are four.
+    /// Collapses a binary tree to four children per node: of the children gathered so far, the one with the largest
+    /// surface, which is most likely to be entered, is replaced by its own two until there are four.
     fn collapse(binary: &Bvh2, mesh: &TriangleMesh) -> Self {
         let mut wide = Self {
             nodes: Vec::with_capacity(binary.nodes.len() / 3 + 1),
@@ -237,7 +235,7 @@ impl WideBvh {
             stack_bound: 0,
         };
         let mut depth = 1;
-        // (wide node to fill, binary node it stands for, its depth)
+        // (wide node to fill, its binary node, its depth)
         let mut open = vec![(0, 0_u32, 1_usize)];
         wide.nodes.push(Node::UNUSED);
         while let Some((slot, root, level)) = open.pop() {
@@ -262,13 +260,13 @@ impl WideBvh {
             }
             wide.nodes[slot] = node;
         }
-        // Each level leaves at most three siblings behind while the fourth is entered, and a query may write a whole
-        // node's children at once before it counts them.
+        // Each level leaves at most three siblings on the stack while the fourth is visited, and a query may write
+        // all four children of a node before it counts them.
         wide.stack_bound = 3 * depth + WIDTH;
         wide
     }
 
-    /// Runs a query with a stack that is certainly large enough.
+    /// Runs a query with a stack large enough for this tree.
     #[inline]
     pub(super) fn with_stack<T: Copy + Default, R>(&self, query: impl FnOnce(&mut [T]) -> R) -> R {
         if self.stack_bound <= STACK_ENTRIES {
@@ -279,7 +277,7 @@ impl WideBvh {
     }
 }
 
-/// The surface of the boxes, as a multiple of the surface of the box around them.
+/// The summed surface of the boxes, as a multiple of the surface of the box around them all.
 fn overlap(boxes: &[BuilderAabb]) -> f32 {
     let mut whole = BuilderAabb::empty();
     let mut sum = 0.0;
@@ -291,7 +289,7 @@ fn overlap(boxes: &[BuilderAabb]) -> f32 {
     sum / whole.half_area()
 }
 
-/// The up to four descendants of a binary node that become the children of one wide node.
+/// The up to four descendants of a binary node that become one wide node's children, and their number.
 fn gather(binary: &Bvh2, root: u32) -> ([u32; WIDTH], usize) {
     let mut gathered = [root; WIDTH];
     let mut count = 1;
@@ -320,12 +318,12 @@ mod tests {
     }
 
     #[test]
-    fn boxes_beside_each_other_overlap_little_and_boxes_around_each_other_much() {
-        let beside: Vec<_> = (0..1000).map(|i| cube(Vec3A::X * i as f32, 0.5)).collect();
-        // 1000 cubes of 6 in a row, within a bar of 4 * 1000 + 2.
-        assert!((overlap(&beside) - 6000.0 / 4002.0).abs() < 1e-3);
-        let around: Vec<_> = (0..1000).map(|_| cube(Vec3A::ZERO, 1.0)).collect();
-        assert_eq!(overlap(&around), 1000.0);
-        assert!(overlap(&around) > MOST_OVERLAP);
+    fn overlap_is_small_for_adjacent_boxes_and_large_for_nested_ones() {
+        let adjacent: Vec<_> = (0..1000).map(|i| cube(Vec3A::X * i as f32, 0.5)).collect();
+        // 1000 cubes of surface 6 in a row, inside a bar of surface 4 * 1000 + 2.
+        assert!((overlap(&adjacent) - 6000.0 / 4002.0).abs() < 1e-3);
+        let nested: Vec<_> = (0..1000).map(|_| cube(Vec3A::ZERO, 1.0)).collect();
+        assert_eq!(overlap(&nested), 1000.0);
+        assert!(overlap(&nested) > MAX_OVERLAP);
     }
 }

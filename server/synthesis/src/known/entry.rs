@@ -69,7 +69,7 @@ impl Entry {
             grip.epsilon,
             solids,
         );
-        let of_grip = Score { values: grip_values }.of_grip();
+        let of_grip = Score { values: grip_values }.grip_total();
         let mut friction_uses = FrictionUses::default();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(direction(index));
@@ -85,7 +85,7 @@ impl Entry {
             })
         });
         let finger_subsets = FingerSubsets::of(grip.holding_digits(), |kept| {
-            let of_kept = contacts.iter().filter(|contact| contact.part.is_among(kept));
+            let of_kept = contacts.iter().filter(|contact| contact.part.is_palm_or_in(kept));
             soften(of_kept, scene.friction, &mut gripper.soft_contacts);
             gripper.closure(scene).is_some()
         });
@@ -106,7 +106,7 @@ impl Entry {
         let margins = grasp.margins?;
         let Score { mut values } = grasp.score?;
         for (term, value) in Term::ALL.into_iter().zip(&mut values) {
-            if !term.is_of_grip() {
+            if !term.is_grip_term() {
                 *value = 0.0;
             }
         }

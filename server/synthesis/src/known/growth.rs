@@ -314,7 +314,7 @@ impl<'a> Growth<'a> {
             &solids,
         );
         let cell = Cell::of(self.rig, &grip.pose, contacts);
-        if !is_needy && self.spread.room(cell, Score { values }.of_grip()) == Room::Crowded {
+        if !is_needy && self.spread.room(cell, Score { values }.grip_total()) == Room::Crowded {
             return None;
         }
         let entry = Entry::new(&self.scene, self.rig, grip, &solids, gripper);

@@ -193,7 +193,7 @@ impl Seeds {
         ];
         let contacts = entry.contacts.iter();
         let contacts: Vec<Contact> = contacts
-            .filter(|contact| contact.part.is_among(kept))
+            .filter(|contact| contact.part.is_palm_or_in(kept))
             .copied()
             .collect();
         let pivot = middle_of(&contacts);

@@ -96,7 +96,7 @@ pub(super) fn worth(entry: &Entry) -> f32 {
     Score {
         values: entry.grip_values,
     }
-    .of_grip()
+    .grip_total()
 }
 
 /// The axis that a direction is nearest to, from 0 to 5: x, -x, y, -y, z, -z.

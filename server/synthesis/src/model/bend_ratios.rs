@@ -1,11 +1,11 @@
-//! Bend ratios: how the joints of a closing digit share its flexion (Algorithm 4, Figure 5.20).
+//! Bend ratios: how a closing digit distributes flexion over its joints (Algorithm 4, Figure 5.20).
 
 use serde::{Deserialize, Serialize};
 
-/// The bend ratios of Algorithm 4: how many degrees the second joint bends for each degree of the base joint.
+/// The bend ratios of Algorithm 4: degrees of the second joint per degree of the base joint.
 pub const BEND_RATIOS: [f32; 3] = [0.7, 1.0, 1.42];
 
-/// Which bend ratios a finger tries: the columns of Figure 5.20.
+/// Which bend ratios a digit tries: the columns of Figure 5.20.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BendRatioChoice {
@@ -13,7 +13,7 @@ pub enum BendRatioChoice {
     All,
     /// (b) As (a), but the fingers skip 0.7.
     AllFingersWithoutLow,
-    /// (c) One of the three at random.
+    /// (c) One of the three, at random.
     OneRandom,
     /// (d) As (c), but the fingers skip 0.7.
     OneRandomFingersWithoutLow,
@@ -23,8 +23,8 @@ pub enum BendRatioChoice {
     OnlyHigh,
 }
 
-/// The bend ratios that a digit may try, as indices into [`BEND_RATIOS`] (Figure 5.20). The thumb keeps 0.7 where
-/// only the fingers go without.
+/// The bend ratios that a digit (0 is the thumb) may try, as indices into [`BEND_RATIOS`] (Figure 5.20). The thumb
+/// keeps 0.7 where only the fingers skip it.
 pub fn allowed_ratios(choice: BendRatioChoice, digit: usize) -> &'static [usize] {
     match choice {
         BendRatioChoice::All | BendRatioChoice::OneRandom => &[0, 1, 2],

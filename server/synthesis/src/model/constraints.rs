@@ -1,9 +1,9 @@
-//! What a client demands of a grasp beyond that it is valid: where the receiver stands, from where the hand comes, what
-//! kind of grasp it is and which digits take part.
+//! A client's demands on a grasp beyond validity: the receiver's reach, the approach direction, the grasp type, the
+//! digits that touch, and comfort.
 //!
-//! The functions `admits_*` come in the order in which an attempt learns what they need: [`Constraints::admits_wrist`]
-//! before the digits are posed, [`Constraints::admits_contacts`] and [`Constraints::admits_type`] once they are,
-//! [`Constraints::admits_comfort`] once the forces are known, and [`Constraints::admits`] asks for all of it at the end.
+//! The `admits_*` functions follow the order in which an attempt can check them: [`Constraints::admits_wrist`] before
+//! the digits are posed, [`Constraints::admits_contacts`] and [`Constraints::admits_type`] afterwards,
+//! [`Constraints::admits_comfort`] once the forces are known. [`Constraints::admits`] checks a finished grasp.
 
 use glam::Vec3;
 
@@ -14,46 +14,47 @@ use super::{
 };
 use crate::base::pose::Pose;
 
-/// What is demanded of a grasp. The default demands nothing.
+/// Demands on a grasp. The default demands nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Constraints {
-    /// Where the receiver's arm gets.
+    /// How far the receiver's arm reaches; none: anywhere.
     pub reach: Option<Reach>,
-    /// From where the hand may come.
+    /// The directions from which the hand may approach; none: any.
     pub approach: Option<ApproachCone>,
-    /// The only types that are wanted; none: any, also grasps that cannot be classified.
+    /// The only grasp types allowed; none: any, including grasps without a type.
     pub allowed_types: Option<TypeSet>,
-    /// Types that are not wanted. It excludes no grasps that cannot be classified.
+    /// Grasp types not allowed. Grasps without a type are unaffected.
     pub excluded_types: TypeSet,
-    /// Digits of which each must have a contact.
+    /// Digits that must each have a contact.
     pub must_touch: DigitSet,
-    /// Digits of which none may have a contact.
+    /// Digits that may not have a contact.
     pub must_not_touch: DigitSet,
-    /// The largest cost E of Eq. 4.6 that is comfortable enough; 0 is best. Lower demands more comfort.
+    /// Upper bound of the comfort cost E of Eq. 4.6, at least 0; 0 is the most comfortable.
     pub worst_comfort: Option<f32>,
 }
 
-/// The sphere around the shoulder in which the wrist must lie: an arm that bends freely.
+/// The sphere around the shoulder in which the wrist must lie, modelling an arm that bends freely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
-    /// The receiver's shoulder in the object's frame, in metres.
+    /// The receiver's shoulder, in the object's frame, in metres.
     pub shoulder: Vec3,
-    /// The greatest distance from the shoulder to the wrist, in metres, more than 0.
+    /// Largest distance from shoulder to wrist, in metres; more than 0.
     pub distance: f32,
 }
 
-/// The directions from which the hand may come.
+/// A cone of directions in which the hand may approach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ApproachCone {
-    /// The direction in which the hand moves toward the object, in the object's frame: a unit vector.
+    /// The direction of the hand's motion toward the object, a unit vector in the object's frame.
     pub axis: Vec3,
-    /// The largest angle between the axis and [`approach_direction`], in radians, more than 0; π and more admit all.
+    /// Largest angle between the axis and [`approach_direction`], in radians; more than 0, and from π on any
+    /// direction.
     pub half_angle: f32,
 }
 
-/// The direction in which a hand moves toward what it grasps: halfway between its fingers (+y of the wrist frame, along
-/// the forearm) and out of its palm (+z), since a hand arrives with both. A unit vector in the frame that
-/// `frame_from_wrist` leads to.
+/// The direction in which a hand moves toward what it grasps, a unit vector in the target frame of
+/// `frame_from_wrist`. It is halfway between the direction of the fingers (+y of the wrist frame) and of the palm
+/// (+z), since a hand leads with both.
 pub fn approach_direction(frame_from_wrist: Pose) -> Vec3 {
     const IN_WRIST: Vec3 = Vec3::new(
         0.0,
@@ -64,12 +65,12 @@ pub fn approach_direction(frame_from_wrist: Pose) -> Vec3 {
 }
 
 impl Constraints {
-    /// True if nothing is demanded.
+    /// True if there are no demands.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The same demands seen from frame b.
+    /// The same demands, expressed in frame b.
     #[must_use]
     pub fn transformed(&self, b_from_a: Pose) -> Self {
         Self {
@@ -85,7 +86,7 @@ impl Constraints {
         }
     }
 
-    /// May the wrist be here? Asks for reach and approach.
+    /// True if reach and approach allow this wrist pose.
     pub fn admits_wrist(&self, object_from_wrist: Pose) -> bool {
         self.reach.is_none_or(|reach| reach.admits(object_from_wrist))
             && self
@@ -93,14 +94,14 @@ impl Constraints {
                 .is_none_or(|cone| cone.contains(approach_direction(object_from_wrist)))
     }
 
-    /// Do the right digits touch? The palm may.
+    /// True if the required digits touch and no forbidden one does. The palm may always touch.
     pub fn admits_contacts(&self, contacts: &[Contact]) -> bool {
         let digits = contacts.iter().filter_map(|contact| contact.part.digit());
         let touching: DigitSet = digits.collect();
         touching.contains_all(self.must_touch) && !touching.intersects(self.must_not_touch)
     }
 
-    /// Is it the right type of grasp? None for one that cannot be classified.
+    /// True if the grasp type is allowed; pass none for a grasp without a type.
     pub fn admits_type(&self, grasp_type: Option<GraspType>) -> bool {
         match grasp_type {
             None => self.allowed_types.is_none(),
@@ -112,12 +113,12 @@ impl Constraints {
         }
     }
 
-    /// Is a grasp comfortable enough? `comfort` is E of Eq. 4.6.
+    /// True if the comfort cost E of Eq. 4.6 is within the bound.
     pub fn admits_comfort(&self, comfort: f32) -> bool {
         self.worst_comfort.is_none_or(|worst| comfort <= worst)
     }
 
-    /// Does a finished grasp meet every demand?
+    /// True if a finished grasp meets every demand.
     pub fn admits(&self, grasp: &Grasp) -> bool {
         self.admits_wrist(grasp.pose.frame_from_wrist)
             && self.admits_contacts(&grasp.contacts)
@@ -133,9 +134,9 @@ impl Reach {
 }
 
 impl ApproachCone {
-    /// May the hand move toward the object in this direction? A unit vector in the object's frame.
+    /// True if the cone contains the direction, a unit vector in the object's frame.
     pub fn contains(&self, direction: Vec3) -> bool {
-        // The cosine alone cannot tell angles below some 0.0003 rad apart, nor those as near to a half turn.
+        // The cosine alone does not resolve angles within about 0.0003 rad of 0 or π.
         let angle = f32::atan2(self.axis.cross(direction).length(), self.axis.dot(direction));
         angle <= self.half_angle
     }
@@ -146,7 +147,7 @@ impl ApproachCone {
 pub struct TypeSet(u64);
 
 impl TypeSet {
-    /// Is the type in the set?
+    /// True if the type is in the set.
     pub fn contains(self, grasp_type: GraspType) -> bool {
         self.0 & Self::bit(grasp_type) != 0
     }
@@ -158,7 +159,7 @@ impl TypeSet {
 
 impl FromIterator<GraspType> for TypeSet {
     fn from_iter<I: IntoIterator<Item = GraspType>>(types: I) -> Self {
-        Self(types.into_iter().fold(0, |bits, one| bits | Self::bit(one)))
+        Self(types.into_iter().fold(0, |bits, kind| bits | Self::bit(kind)))
     }
 }
 
@@ -167,17 +168,17 @@ impl FromIterator<GraspType> for TypeSet {
 pub struct DigitSet(u8);
 
 impl DigitSet {
-    /// Is the digit in the set?
+    /// True if the digit is in the set.
     pub fn contains(self, digit: Digit) -> bool {
         self.0 & Self::bit(digit) != 0
     }
 
-    /// Are all digits of the other set in this one?
+    /// True if the set contains every digit of the other.
     pub fn contains_all(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// Is any digit in both sets?
+    /// True if the sets share a digit.
     pub fn intersects(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }

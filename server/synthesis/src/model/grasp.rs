@@ -11,14 +11,14 @@ use super::{
 /// A point where the hand touches the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// On the surface, in metres.
+    /// The point on the object's surface, in metres.
     pub position: Vec3,
-    /// The surface's outward unit normal; at an edge or a corner, under `PHYSICAL` validity, that of the directions
-    /// between its faces' normals which points to the bone.
+    /// The surface's outward unit normal. Under `PHYSICAL` validity, a contact at an edge or a corner takes the
+    /// direction to the bone, within the range of the adjacent faces' normals.
     pub normal: Vec3,
-    /// The triangle that is touched.
+    /// The touched triangle.
     pub triangle: u32,
-    /// What touches there.
+    /// The part of the hand that touches.
     pub part: HandPart,
 }
 
@@ -27,55 +27,57 @@ pub struct Contact {
 pub struct Grasp {
     /// The receiving hand in the object's frame.
     pub pose: HandPose,
-    /// The bend ratio that each digit was closed with, thumb first; none where the digit found no contact.
+    /// The bend ratio with which each digit closed, thumb first; none for a digit without contact.
     pub bend_ratios: [Option<f32>; 5],
-    /// Where it touches, thumb first, the palm last.
+    /// The contacts, thumb first, palm last.
     pub contacts: Vec<Contact>,
-    /// The force that the hand applies on the object at each contact, in newtons.
+    /// The force that the hand exerts on the object at each contact, in newtons.
     pub forces: Vec<Vec3>,
-    /// The torsion of a soft finger at each contact, about the surface's inward normal, in newton metres; empty under the
-    /// thesis' validity, which knows none.
+    /// The soft-finger torsion at each contact about the surface's inward normal, in newton metres; empty under
+    /// `THESIS` validity, which has none.
     pub torsions: Vec<f32>,
-    /// Angle between the summed contact wrench and the one that opposes gravity (Eq. 4.5), in radians.
+    /// Angle between the total contact wrench and the one that opposes gravity (Eq. 4.5), in radians.
     pub wrench_angle: f32,
-    /// E of Eq. 4.6.
+    /// The comfort cost E of Eq. 4.6; 0 is best.
     pub comfort: f32,
-    /// By how much the grasp passes the checks of `PHYSICAL` validity; none under the thesis' own.
+    /// The margins of the `PHYSICAL` validity checks; none under `THESIS` validity.
     pub margins: Option<PhysicalMargins>,
-    /// What it is in the taxonomy.
+    /// The grasp type in the taxonomy.
     pub classification: Classification,
-    /// How good it is; none under the thesis' validity.
+    /// The score; none under `THESIS` validity.
     pub score: Option<Score>,
-    /// The way to it, once it was planned ([`crate::search::key_frames`]); none if there is no straight one.
+    /// The motion to the grasp, once planned ([`crate::search::key_frames`]); none before that, or if no straight
+    /// path
+    /// exists.
     pub key_frames: Option<[KeyFrame; 3]>,
 }
 
-/// By how much a grasp passes the checks of `PHYSICAL` validity.
+/// The margins by which a grasp passes the checks of `PHYSICAL` validity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhysicalMargins {
-    /// Length of the wrench that the forces leave unbalanced, torque over the object's characteristic length, as a share
-    /// of the weight.
+    /// Magnitude of the unbalanced wrench, as a share of the weight; torques are divided by the characteristic
+    /// length.
     pub residual: f32,
-    /// Ferrari-Canny epsilon of the contacts, torque over the characteristic length.
+    /// Ferrari-Canny epsilon of the contacts, with torques divided by the characteristic length.
     pub epsilon: f32,
-    /// How deep the hand sinks into the object at its deepest, in metres; 0 if it does nowhere.
+    /// Deepest penetration of the hand into the object, in metres; 0 without any.
     pub penetration: f32,
-    /// Smallest distance between the receiving hand or forearm and the giver's, in metres; none without a giver.
+    /// Smallest distance between the receiver's hand or forearm and the giver's, in metres; none without a giver.
     pub giver_clearance: Option<f32>,
 }
 
-/// A stage on the way to a grasp.
+/// A stage of the motion to a grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
-    /// The open hand is away from the object.
+    /// The open hand away from the object.
     Approach,
-    /// The open hand is around the object.
+    /// The open hand around the object.
     PreGrasp,
     /// The grasp itself.
     Close,
 }
 
-/// The receiving hand at a stage on the way to a grasp.
+/// The receiving hand at one stage of the motion to a grasp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyFrame {
     /// The stage.

@@ -1,17 +1,19 @@
-//! The 33 grasp types of the GRASP taxonomy (T. Feix et al., "The GRASP Taxonomy of Human Grasp Types", 2016; thesis 2.4,
-//! Figure 2.5) and the 17 cells that they share. Numbers and names are the paper's, which the thesis uses. The thesis says
-//! 34 types, but its figure and the paper list 33.
+//! The 33 grasp types of the GRASP taxonomy (T. Feix et al., "The GRASP Taxonomy of Human Grasp Types", 2016; thesis
+//! 2.4,
+//! Figure 2.5) and its 17 cells. Numbers and names are the paper's, as in the thesis, whose text says 34 types
+//! although
+//! its figure and the paper list 33.
 
 use serde::{Deserialize, Serialize};
 
-/// How firmly a type holds.
+/// How firmly a grasp holds the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum GraspClass {
     /// The object cannot be moved in the hand.
     Power,
-    /// It can be moved a little.
+    /// The object can be moved a little in the hand.
     Intermediate,
-    /// The fingers can move it.
+    /// The fingers can manipulate the object.
     Precision,
 }
 
@@ -20,14 +22,14 @@ pub enum GraspClass {
 pub enum Opposition {
     /// The palm.
     Palm,
-    /// The thumb's pad, with their own pads.
+    /// The pads of the fingers against that of the thumb.
     Pad,
-    /// The thumb's pad or another finger, with the side of a finger.
+    /// The side of a finger against the thumb's pad or another finger.
     Side,
 }
 
-/// The fingers that act as one against palm or thumb (VF 2), counted as in the taxonomy: 2 is the index finger, 5 the
-/// little one.
+/// The fingers that act as one against palm or thumb (VF 2), numbered as in the taxonomy: 2 is the index finger, 5
+/// the little finger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VirtualFinger {
     /// 2.
@@ -46,25 +48,25 @@ pub enum VirtualFinger {
     ThreeToFive,
 }
 
-/// Where the thumb is.
+/// The position of the thumb.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ThumbPosition {
-    /// It stands opposite to palm and fingers.
+    /// Opposite the palm and fingers.
     Abducted,
-    /// It lies beside the palm.
+    /// Alongside the palm.
     Adducted,
 }
 
-/// A cell of the taxonomy's table: types in the same one differ by the object's size and shape only.
+/// A cell of the taxonomy's table. Types in the same cell differ only by the object's size and shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cell {
-    /// How firmly.
+    /// How firmly the grasp holds.
     pub class: GraspClass,
-    /// Against what.
+    /// What the fingers push against.
     pub opposition: Opposition,
-    /// With which fingers.
+    /// The fingers that act as one.
     pub virtual_finger: VirtualFinger,
-    /// With the thumb where.
+    /// The position of the thumb.
     pub thumb: ThumbPosition,
 }
 
@@ -187,7 +189,7 @@ impl Cell {
     }
 }
 
-/// A grasp type; its value is its number in the taxonomy.
+/// A grasp type. Its discriminant is its number in the taxonomy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GraspType {
@@ -197,7 +199,7 @@ pub enum GraspType {
     SmallDiameter = 2,
     /// As [`GraspType::LargeDiameter`], around something between thick and thin.
     MediumWrap = 3,
-    /// Fingers and palm around a handle, the thumb's whole inside along it.
+    /// Fingers and palm around a handle, the full palmar side of the thumb along it.
     AdductedThumb = 4,
     /// Fingers and palm around a thin handle, the thumb's tip on it.
     LightTool = 5,
@@ -207,7 +209,7 @@ pub enum GraspType {
     /// The tips of three fingers in a row against the thumb's.
     #[serde(rename = "prismatic_3_finger")]
     Prismatic3Finger = 7,
-    /// The tips of two fingers beside each other against the thumb's.
+    /// The tips of two adjacent fingers against the thumb's.
     #[serde(rename = "prismatic_2_finger")]
     Prismatic2Finger = 8,
     /// The pads of thumb and index finger.
@@ -222,7 +224,7 @@ pub enum GraspType {
     PrecisionSphere = 13,
     /// The tips of thumb, index and middle finger around something round.
     Tripod = 14,
-    /// A handle hangs in the hooked fingers; the thumb has nothing to do.
+    /// A handle hangs in the hooked fingers; the thumb is passive.
     FixedHook = 15,
     /// The thumb's pad presses something flat onto the side of the index finger.
     Lateral = 16,
@@ -230,11 +232,11 @@ pub enum GraspType {
     IndexFingerExtension = 17,
     /// Stretched fingers against the thumb, on something flat.
     ExtensionType = 18,
-    /// More than the tips of all fingers against the thumb, as in the loops of scissors.
+    /// The thumb against more of all fingers than their tips, as in the loops of scissors.
     DistalType = 19,
     /// Pads of thumb and index finger, and the side of the middle finger, as on a pen.
     WritingTripod = 20,
-    /// As [`GraspType::WritingTripod`], with the ring finger beside the middle one.
+    /// As [`GraspType::WritingTripod`], with the ring finger next to the middle finger.
     TripodVariation = 21,
     /// Stretched fingers and the stretched thumb on both sides of something flat.
     ParallelExtension = 22,
@@ -242,14 +244,14 @@ pub enum GraspType {
     AdductionGrip = 23,
     /// The very tips of thumb and index finger.
     TipPinch = 24,
-    /// As [`GraspType::WritingTripod`], with the thumb flat beside the fingers.
+    /// As [`GraspType::WritingTripod`], with the thumb flat alongside the fingers.
     LateralTripod = 25,
-    /// More than the tips of three fingers, and the thumb, around a ball.
+    /// The thumb and more of three fingers than their tips, around a ball.
     #[serde(rename = "sphere_4_finger")]
     Sphere4Finger = 26,
     /// The tips of thumb and three fingers around something round.
     Quadpod = 27,
-    /// More than the tips of two fingers, and the thumb, around a ball. The thesis' figure says "Sphere Finger".
+    /// The thumb and more of two fingers than their tips, around a ball. The thesis's figure says "Sphere Finger".
     #[serde(rename = "sphere_3_finger")]
     Sphere3Finger = 28,
     /// As [`GraspType::Lateral`], on a rod that the other fingers' pads steady.
@@ -302,10 +304,10 @@ impl GraspType {
         Self::InferiorPincer,
     ];
 
-    /// The type of a number of the taxonomy; none but for 1 to 33.
-    pub fn of_number(number: u32) -> Option<Self> {
-        let place = usize::try_from(number.checked_sub(1)?).ok()?;
-        Self::ALL.get(place).copied()
+    /// The type with a number of the taxonomy, 1 to 33; none for any other.
+    pub fn from_number(number: u32) -> Option<Self> {
+        let index = usize::try_from(number.checked_sub(1)?).ok()?;
+        Self::ALL.get(index).copied()
     }
 
     /// Its number in the taxonomy, from 1 to 33.
@@ -384,15 +386,15 @@ impl GraspType {
     }
 }
 
-/// The confidence from which a grasp is said to be of a type. A higher one leaves more grasps without a type.
-pub const LEAST_CONFIDENCE: f32 = 0.25;
+/// Smallest confidence, 0 to 1, at which a grasp is assigned a type. A higher one leaves more grasps without a type.
+pub const MIN_CONFIDENCE: f32 = 0.25;
 
-/// What a grasp was found to be.
+/// The result of classifying a grasp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Classification {
-    /// The type; none if the grasp is not like any: a person would not call it natural.
+    /// The type; none if the grasp resembles none, and a person would not call it natural.
     pub grasp_type: Option<GraspType>,
-    /// How sure that is: how well the best type fits, less half of how well the next one does; 0 to 1. Without a type,
-    /// below [`LEAST_CONFIDENCE`].
+    /// The confidence, 0 to 1: the fit of the best type minus half the fit of the second best. Below
+    /// [`MIN_CONFIDENCE`] if there is no type.
     pub confidence: f32,
 }

@@ -1,4 +1,4 @@
-//! Holdouts: an object, how it hangs in the world, and the giver's hand.
+//! Holdouts: an object held out to the receiver, the up direction, and the giver's hand.
 
 use std::sync::Arc;
 
@@ -21,30 +21,30 @@ use crate::{
 pub struct PresentingHand {
     /// Its joints.
     pub joints: HandJoints,
-    /// Its posed skin and search structure; none where grasps are judged by solids alone, as under `PHYSICAL` validity.
+    /// Its posed skin with search structure; none under `PHYSICAL` validity, which uses the hand's solids alone.
     pub surface: Option<MeshBvh>,
-    /// The middle of its palm's skin.
+    /// The centre of the palm's skin, in metres.
     pub palm: Vec3,
 }
 
-/// What is held out to the receiver, in the object's frame.
+/// An object held out to the receiver, in the object's frame.
 #[derive(Clone, Debug)]
 pub struct Holdout {
     /// The object.
     pub object: Arc<GraspObject>,
     /// The giver's hand; none for an object that floats freely.
     pub presenting_hand: Option<PresentingHand>,
-    /// Against gravity: a unit vector.
+    /// The direction against gravity, a unit vector.
     pub up: Vec3,
 }
 
-/// Why a presenting hand was refused.
+/// Why a presenting hand was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PresentingHandError {
-    /// The joints collapse the skin.
+    /// The joints collapse every triangle of the skin.
     #[error("the joint poses fold the skin into triangles without area")]
     Collapsed,
-    /// A joint is not a number, or so far away that the skin is not.
+    /// A joint is not finite, or so far away that the skin is not.
     #[error(
         "the joint poses put vertex {vertex} of the skin at infinity; they must be finite and near the object"
     )]
@@ -52,21 +52,21 @@ pub enum PresentingHandError {
         /// Index of the vertex.
         vertex: usize,
     },
-    /// The skin itself is broken.
+    /// The skin itself is invalid.
     #[error("the skin is not a mesh: {0}")]
     Skin(MeshError),
 }
 
-/// Why a holdout was refused.
+/// Why a holdout was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HoldoutError {
-    /// Up is not a direction.
+    /// Up is not a unit vector.
     #[error("up is {0}; it must be a unit vector")]
     Up(Vec3),
 }
 
 impl Holdout {
-    /// An object held out, with everything in its own frame; `up` points against gravity.
+    /// A holdout with everything in the object's frame; `up` points against gravity.
     ///
     /// # Errors
     /// `up` is not a unit vector.
@@ -87,7 +87,7 @@ impl Holdout {
 }
 
 impl PresentingHand {
-    /// Poses a skin on joints that are given in the object's frame. Triangles that the pose collapses are left out.
+    /// Poses a skin on joints in the object's frame. Triangles that the pose collapses are dropped.
     ///
     /// # Errors
     /// The joints collapse the whole skin or are not finite.
@@ -109,8 +109,8 @@ impl PresentingHand {
         })
     }
 
-    /// A hand without skin, for `PHYSICAL` validity: its solids follow its joints, which are given in the object's frame
-    /// and are finite. A thousandth of the work.
+    /// A hand without skin, for `PHYSICAL` validity, whose solids follow from the joints alone: a thousandth of the
+    /// work. The joints must be finite and in the object's frame.
     pub fn of_joints(joints: HandJoints) -> Self {
         Self {
             palm: joints.palm_skin(),
@@ -119,7 +119,7 @@ impl PresentingHand {
         }
     }
 
-    /// The same for joints in another frame.
+    /// As [`PresentingHand::new`], for joints in another frame.
     ///
     /// # Errors
     /// The joints collapse the whole skin or are not finite.

@@ -1,4 +1,6 @@
-//! The nouns of the search, without any algorithm: hands, objects, holdouts, contacts, grasps and what is asked of them.
+//! The domain's data types, without search algorithms: hands, objects, holdouts, contacts, grasps, scores, strategies
+//! and
+//! a request's constraints.
 
 pub mod bend_ratios;
 pub mod constraints;

@@ -10,36 +10,35 @@ use crate::geometry::{
 /// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
 pub const THESIS_FRICTION: f32 = 0.34;
 
-/// Coefficient of static friction between dry skin and smooth plastic or metal where nobody knows better: measured ones
-/// lie between 0.4 and 1.0 (S. Derler and L.-C. Gerhardt, "Tribology of Skin", 2012). A higher one lets grasps hold that
-/// would slip.
+/// Default coefficient of static friction between dry skin and smooth plastic or metal, measured at 0.4 to 1.0 (S.
+/// Derler and L.-C. Gerhardt, "Tribology of Skin", 2012). A higher one accepts grasps that would slip.
 pub const SKIN_FRICTION: f32 = 0.6;
 
-/// How many forbidden triangles that do not exist are named one by one. More would help nobody and let a client ask
-/// for an answer as long as its request.
+/// Number of nonexistent forbidden triangles that are listed one by one; the rest are counted. It bounds the size of
+/// the error that a request can provoke.
 pub const MAX_NAMED_TRIANGLES: usize = 10;
 
-/// An object with everything that the synthesis asks of it, in the object's own frame.
+/// A graspable object with its search structures, in its own frame.
 #[derive(Clone, Debug)]
 pub struct GraspObject {
-    /// Its surface and search structure.
+    /// Its surface with search structure.
     pub surface: MeshBvh,
-    /// B of thesis 4.3.
+    /// Its tight bounding box: B of thesis 4.3.
     pub bounding_box: OrientedBox,
-    /// In kilograms.
+    /// Mass, in kilograms.
     pub mass: f32,
-    /// In metres, in the object's frame.
+    /// Centre of mass in the object's frame, in metres.
     pub centre_of_mass: Vec3,
-    /// Coefficient of static friction between skin and the surface; none if nobody said.
+    /// Coefficient of static friction between skin and surface; none if unknown.
     pub friction: Option<f32>,
-    /// One flag a triangle: may it not be touched?
+    /// One flag per triangle: true if it must not be touched.
     forbidden: Vec<bool>,
-    /// What these triangles make, if there are any. Much smaller than the whole in most cases, and far from most hands: it
-    /// is asked first.
+    /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried
+    /// first.
     forbidden_surface: Option<MeshBvh>,
 }
 
-/// Why an object was refused.
+/// Why an object was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObjectError {
     /// Mass is not a positive number.
@@ -54,17 +53,17 @@ pub enum ObjectError {
     /// A forbidden triangle does not exist.
     #[error("forbidden triangle {triangle} does not exist; the mesh has {triangles}")]
     ForbiddenTriangle {
-        /// The index that was given.
+        /// The given index.
         triangle: u32,
-        /// How many triangles there are.
+        /// Number of triangles.
         triangles: usize,
     },
-    /// Many forbidden triangles do not exist; the first are named one by one.
+    /// More than [`MAX_NAMED_TRIANGLES`] forbidden triangles do not exist.
     #[error("{count} more forbidden triangles do not exist; the mesh has {triangles}")]
     MoreForbiddenTriangles {
-        /// How many are not named.
+        /// How many are not listed.
         count: usize,
-        /// How many triangles there are.
+        /// Number of triangles.
         triangles: usize,
     },
 }
@@ -73,8 +72,8 @@ impl GraspObject {
     /// Builds the search structures of an object.
     ///
     /// # Errors
-    /// Every violation found, except that of forbidden triangles that do not exist only the first
-    /// [`MAX_NAMED_TRIANGLES`] are named and the others counted.
+    /// Every violation found. Of the forbidden triangles that do not exist, the first [`MAX_NAMED_TRIANGLES`] are
+    /// listed and the others counted.
     pub fn new(
         mesh: TriangleMesh,
         mass: f32,
@@ -124,14 +123,14 @@ impl GraspObject {
             friction,
             forbidden_surface: surface
                 .mesh()
-                .part(|triangle| forbidden[triangle])
+                .submesh(|triangle| forbidden[triangle])
                 .map(MeshBvh::build_quick),
             surface,
             forbidden,
         })
     }
 
-    /// The coefficient of friction that grasps are judged by: the object's own, or what the notion of valid assumes.
+    /// The coefficient of friction to judge grasps by: the object's own, or the default of the kind of validity.
     pub fn friction_under(&self, validity: Validity) -> f32 {
         self.friction.unwrap_or(match validity {
             Validity::Thesis => THESIS_FRICTION,
@@ -139,31 +138,31 @@ impl GraspObject {
         })
     }
 
-    /// True if the triangle may not be touched (Algorithm 7); O(1).
+    /// True if the triangle must not be touched (Algorithm 7); O(1).
     pub fn is_forbidden(&self, triangle: u32) -> bool {
         self.forbidden[triangle as usize]
     }
 
-    /// How many triangles may not be touched.
+    /// Number of triangles that must not be touched.
     pub fn forbidden_count(&self) -> usize {
         let surface = self.forbidden_surface.as_ref();
         surface.map_or(0, |surface| surface.mesh().triangles().len())
     }
 
-    /// What may not be touched, if there is such.
+    /// The surface that must not be touched; none if there is no forbidden triangle.
     pub fn forbidden_surface(&self) -> Option<&MeshBvh> {
         self.forbidden_surface.as_ref()
     }
 
-    /// True if what may not be touched is less than `distance` metres off a capsule's skin.
+    /// True if a forbidden surface comes closer than `distance` metres to a capsule's skin.
     pub fn is_forbidden_within(&self, capsule: &TaperedCapsule, distance: f32) -> bool {
         let surface = self.forbidden_surface.as_ref();
         surface.is_some_and(|surface| surface.comes_within(capsule, distance))
     }
 }
 
-/// The box around a mesh and its search structure, built at the same time: the box takes an eighth of the whole. Where the
-/// system has no thread for it, one after the other.
+/// Builds the bounding box of a mesh and its search structure in parallel, or in sequence if no thread can be
+/// spawned. The box takes an eighth of the work.
 fn box_and_surface(mesh: TriangleMesh) -> (OrientedBox, MeshBvh) {
     let copy = mesh.clone();
     std::thread::scope(|scope| {

@@ -1,41 +1,40 @@
-//! A grasp's score: named terms from 0 to 1, 1 being best, and their weighted mean.
+//! A grasp's score: the weighted mean of named terms from 0 (worst) to 1 (best).
 //!
-//! The weights are the project's choice: they put what an onlooker notices first, fingers and the place of the hand,
-//! before what only forces show. [`crate::rating::scoring`] computes the terms.
+//! The weights are the project's choice. [`crate::rating::scoring`] computes the terms.
 
-/// How many terms there are.
+/// Number of terms.
 pub const TERMS: usize = 12;
 
-/// A number for each term, in the order of [`Term::ALL`].
+/// One value per term, in the order of [`Term::ALL`].
 pub type Values = [f32; TERMS];
 
-/// What is judged.
+/// A term of the score.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Term {
-    /// E of Eq. 4.6 is small.
+    /// The comfort cost E of Eq. 4.6 is small.
     Comfort,
-    /// The forces that balance gravity press rather than rub.
+    /// The forces that balance gravity use little friction.
     FrictionReserve,
-    /// No contact has to press much harder than the weight asks for.
+    /// No contact presses much harder than the weight requires.
     Ease,
-    /// Neighbouring fingers bend alike.
+    /// Neighbouring fingers bend by similar angles.
     SharedFlexion,
-    /// As many digits touch as the weight asks for.
+    /// As many digits touch as the weight calls for.
     EnoughDigits,
-    /// The object lies on pads, not on the sides of digits.
+    /// The digits touch with their pads, not with their sides.
     Pads,
-    /// The grasp is of a type that people use: the taxonomy's, and surely. Grasps without a type look unnatural (thesis
+    /// The grasp belongs with high confidence to a type of the taxonomy. Grasps without a type look unnatural (thesis
     /// 5.2 and 6.1).
     NaturalType,
-    /// Ferrari-Canny epsilon is well above what validity asks for.
+    /// The Ferrari-Canny epsilon is well above what validity requires.
     Closure,
-    /// The object gives way little when it is pushed: palm and inner phalanges bear it, or many digits.
+    /// The grasp is stiff against pushes: palm and proximal phalanges, or many digits, support the object.
     Steadiness,
-    /// The palm comes from the side away from the giver's (palm-CoM-palm angle, thesis 5.3).
+    /// The palm is on the side opposite the giver's (palm-CoM-palm angle, thesis 5.3).
     AwayFromGiver,
-    /// The hand keeps off the giver's.
+    /// The hand keeps its distance from the giver's.
     GiverClearance,
-    /// The hand keeps off forbidden surfaces.
+    /// The hand keeps its distance from forbidden surfaces.
     SterileDistance,
 }
 
@@ -56,7 +55,7 @@ impl Term {
         Self::SterileDistance,
     ];
 
-    /// The name in answers.
+    /// The name used in answers.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Comfort => "comfort",
@@ -74,15 +73,14 @@ impl Term {
         }
     }
 
-    /// How much it counts.
+    /// The weight in the mean, relative to the other terms.
     pub const fn weight(self) -> f32 {
         match self {
             Self::Comfort | Self::Ease => 1.0,
             Self::Pads => 1.5,
             Self::EnoughDigits | Self::SharedFlexion => 2.0,
-            // Steadiness, closure and friction reserve tell whether a simulation by others keeps a grip against pushes from
-            // all sides, and are weighed as they do there: together, they tell the lost one of two grips in 79 of 100 cases
-            // (600 grips). The other terms tell nothing there, and are for the eye.
+            // Weighted by how well they predict which grips survive pushes from all sides in an independent
+            // simulation. The terms not weighted here judge appearance.
             Self::Steadiness => 4.0,
             Self::Closure | Self::FrictionReserve | Self::NaturalType => 6.0,
             Self::AwayFromGiver => 0.75,
@@ -90,8 +88,8 @@ impl Term {
         }
     }
 
-    /// True if it depends on the hand and the object alone, not on gravity or the giver.
-    pub const fn is_of_grip(self) -> bool {
+    /// True if the term depends on the hand and the object alone, not on gravity or the giver.
+    pub const fn is_grip_term(self) -> bool {
         matches!(
             self,
             Self::SharedFlexion
@@ -105,26 +103,26 @@ impl Term {
     }
 }
 
-/// A grasp's score by its terms.
+/// A grasp's score, term by term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
-    /// From 0 to 1, 1 being best; in the order of [`Term::ALL`].
+    /// Values from 0 (worst) to 1 (best), in the order of [`Term::ALL`].
     pub values: Values,
 }
 
 impl Score {
-    /// The terms' weighted mean.
+    /// The weighted mean of all terms, 0 to 1.
     pub fn total(&self) -> f32 {
         weighted_mean(&self.values, |_| true)
     }
 
-    /// The weighted mean of the terms that depend on hand and object alone, as a share of the whole.
-    pub fn of_grip(&self) -> f32 {
-        weighted_mean(&self.values, Term::is_of_grip)
+    /// The contribution to [`Score::total`] of the terms that depend on hand and object alone.
+    pub fn grip_total(&self) -> f32 {
+        weighted_mean(&self.values, Term::is_grip_term)
     }
 }
 
-/// Sum of weighted terms that count, over the weight of all.
+/// The weighted sum of the terms that `counts` accepts, divided by the weight of all terms.
 fn weighted_mean(values: &Values, counts: impl Fn(Term) -> bool) -> f32 {
     let whole: f32 = Term::ALL.iter().map(|term| term.weight()).sum();
     let sum: f32 = Term::ALL

@@ -1,10 +1,11 @@
-//! The ladder of search strategies of the thesis' chapter 5, and what goes beyond it.
+//! Search strategies: the ladder of the thesis's chapter 5, and the guided search.
 
 use serde::{Deserialize, Serialize};
 
 use super::bend_ratios::BendRatioChoice;
 
-/// How grasps are searched for. Of the ladder, each strategy adds a step to the one before.
+/// How to search for grasps. A to F form the ladder of chapter 5, in which each strategy adds a step to the previous
+/// one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Strategy {
     /// Naive synthesis (5.2).
@@ -15,57 +16,58 @@ pub enum Strategy {
     C,
     /// Early stop when the thumb has no contact (5.4, Algorithm 12).
     D,
-    /// One way of choosing the bend ratios (5.4, Algorithm 13).
+    /// One bend ratio per digit (5.4, Algorithm 13).
     E,
     /// First sufficient force distribution (5.6, Algorithm 14).
     F,
-    /// Hands are placed where opposed surfaces suggest it ([`crate::propose`]), and grips that are known are tried first
-    /// ([`crate::known::atlas`]). What counts as valid is the same.
+    /// Tries known grips first ([`crate::known::atlas`]), then places hands where opposed surfaces suggest a grasp
+    /// ([`crate::propose`]). Validity is the same as for the other strategies.
     Guided,
 }
 
-/// Which grasps count as valid. Separate from the strategy: how they are searched for.
+/// Which grasps count as valid, independently of the strategy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Validity {
-    /// As the thesis prints it (4.5).
+    /// As defined in the thesis (4.5).
     #[default]
     Thesis,
-    /// Hands are solid, and forces are solved for instead of drawn ([`crate::physical`]).
+    /// Hands are solids, and forces are solved for instead of sampled ([`crate::physical`]).
     Physical,
 }
 
-/// Which of the valid grasps is the answer.
+/// Which valid grasp to return.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Choice {
-    /// The first that is found.
+    /// The first one found.
     #[default]
     FirstValid,
-    /// The best of all that are found until the deadline.
+    /// The best one found before the deadline.
     BestWithinBudget,
 }
 
 impl Strategy {
-    /// The ladder of chapter 5 in order.
+    /// The ladder of chapter 5, in order.
     pub const LADDER: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F];
 
-    /// Are placements pruned by the measures relative to the object?
+    /// True if placements are pruned by measures relative to the object.
     pub fn prunes_by_object(self) -> bool {
         self >= Self::B
     }
 
-    /// Are placements pruned by the palm-CoM-palm angle?
+    /// True if placements are pruned by the palm-CoM-palm angle.
     pub fn prunes_by_presenting_hand(self) -> bool {
         self >= Self::C
     }
 
-    /// Does posing stop when the thumb has no contact?
+    /// True if posing stops when the thumb has no contact.
     pub fn stops_without_thumb(self) -> bool {
         self >= Self::D
     }
 
-    /// Are known grips tried, and hands perturbed near them? They are kept for what is valid under `PHYSICAL`.
+    /// True if the search tries known grips and hands perturbed about them. Known grips exist for `PHYSICAL` validity
+    /// only.
     pub fn uses_known_grips(self, validity: Validity) -> bool {
         self == Self::Guided && validity == Validity::Physical
     }
@@ -79,7 +81,7 @@ impl Strategy {
         }
     }
 
-    /// Is the first force distribution that suffices taken, instead of the best of a hundred?
+    /// True if the first sufficient force distribution is taken instead of the best of a hundred.
     pub fn takes_first_force_distribution(self) -> bool {
         self >= Self::F
     }

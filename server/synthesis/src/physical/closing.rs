@@ -207,7 +207,7 @@ impl Closing<'_> {
     /// [`COARSE_GAP`] and `reachable`.
     fn gap(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
         let obstructed = self.gap_to_obstacles(index, link, reachable);
-        let lower_bound = self.surface.least_gap(link);
+        let lower_bound = self.surface.gap_lower_bound(link);
         if lower_bound > COARSE_GAP {
             return lower_bound.min(obstructed);
         }

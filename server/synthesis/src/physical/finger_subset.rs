@@ -51,7 +51,7 @@ impl Gripper {
             contacts,
             solids,
         } = known;
-        let kept_contacts = contacts.iter().filter(|contact| contact.part.is_among(kept));
+        let kept_contacts = contacts.iter().filter(|contact| contact.part.is_palm_or_in(kept));
         self.contacts.clear();
         self.contacts.extend(kept_contacts.copied());
 

@@ -333,7 +333,7 @@ fn palm_advance(
         let reachable = max_advance - advanced + TOUCH_DEPTH;
         let lower_bound = parts
             .clone()
-            .fold(reachable, |least, part| least.min(surface.least_gap(part)));
+            .fold(reachable, |least, part| least.min(surface.gap_lower_bound(part)));
         let gap = if lower_bound > COARSE_GAP {
             lower_bound
         } else {

@@ -116,7 +116,7 @@ impl PlacementCaches {
         rig: &PreparedRig,
         mechanisms: Mechanisms,
     ) -> Arc<PlacementCache> {
-        let mechanisms = mechanisms.only_of(&RELEVANT_MECHANISMS);
+        let mechanisms = mechanisms.restricted_to(&RELEVANT_MECHANISMS);
         let slot = {
             let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let found = slots

@@ -16,7 +16,7 @@ pub(super) fn output_types(data: &Data<'_>) -> Figure {
     let counts: Vec<_> = negative_sets(data)
         .map(|set| negative_counts(data, set))
         .collect();
-    let series = Rejection::OF_THESIS.map(|rejection| Series {
+    let series = Rejection::THESIS.map(|rejection| Series {
         name: output_type(Some(rejection)).to_owned(),
         colour: palette::REJECTIONS[rejection.index()],
         values: counts

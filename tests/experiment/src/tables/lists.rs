@@ -30,7 +30,7 @@ const ORIGIN: [&str; 10] = [
 pub fn grasp_list(data: &Data<'_>) -> Table {
     let mut header: Vec<_> = ORIGIN.to_vec();
     header.extend(["attempts", "prunes", "milliseconds"]);
-    header.extend(Rejection::OF_THESIS.map(|rejection| output_type(Some(rejection))));
+    header.extend(Rejection::THESIS.map(|rejection| output_type(Some(rejection))));
     header.extend([
         "touching_digits",
         "contacts",

@@ -13,7 +13,7 @@ use crate::{
 /// positive set, in which each holdout counts the same.
 pub fn output_types(data: &Data<'_>) -> Table {
     let mut header = vec!["set".to_owned(), "attempts".to_owned()];
-    for rejection in Rejection::OF_THESIS {
+    for rejection in Rejection::THESIS {
         let name = output_type(Some(rejection));
         header.extend([name.to_owned(), format!("{name}, %"), format!("{name}, % of all")]);
     }
@@ -40,7 +40,7 @@ pub fn output_types(data: &Data<'_>) -> Table {
 
 /// Failed attempts of the negative set by kind.
 pub(crate) fn negative_counts(data: &Data<'_>, set: Set) -> [u64; 8] {
-    Rejection::OF_THESIS.map(|kind| {
+    Rejection::THESIS.map(|kind| {
         let of_kind = data.invalid(set).filter(|record| record.rejection == Some(kind));
         of_kind.count() as u64
     })
@@ -74,7 +74,7 @@ pub fn step_times(data: &Data<'_>) -> Table {
     header.push("together, µs".to_owned());
     let mut table = Table::new("step-times", "Time per attempt by step and output type", header);
     for set in data.sets() {
-        for kind in Rejection::OF_THESIS.map(Some).into_iter().chain([None]) {
+        for kind in Rejection::THESIS.map(Some).into_iter().chain([None]) {
             let (count, means) = mean_step_times(data, set, kind);
             if count == 0 {
                 continue;

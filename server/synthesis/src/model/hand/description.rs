@@ -1,4 +1,5 @@
-//! A rig as people write it: names, metres and degrees, checked as a whole before it becomes a [`Rig`].
+//! A rig in human-readable form, with names, metres and degrees. It is validated as a whole before it becomes a
+//! [`Rig`].
 
 use std::collections::BTreeMap;
 
@@ -13,29 +14,29 @@ use super::{
 };
 use crate::{base::pose::Pose, geometry::Segment};
 
-/// How far the length of a quaternion may be from one; it is normalised when used.
+/// Largest deviation of a quaternion's length from one; quaternions are normalised when used.
 const UNIT_TOLERANCE: f32 = 1e-3;
 
-/// The longest length and the largest coordinate of a hand in metres. Larger hands are files in another unit.
-const LARGEST_METRES: f32 = 1.0;
+/// Largest length and coordinate of a hand, in metres. Larger values mean a file in another unit.
+const MAX_METRES: f32 = 1.0;
 
 /// A hand's rig in the wrist frame: +y along the stretched fingers, +z out of the palm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigDescription {
-    /// The rig's name; not empty.
+    /// The rig's name, not empty.
     pub name: String,
     /// Which hand.
     pub handedness: Handedness,
-    /// The middle of the palm's skin in metres.
+    /// The centre of the palm's skin, in metres.
     pub palm_m: [f32; 3],
     /// The digit chains.
     pub digits: DigitDescriptions,
-    /// Where the metacarpals of index, middle, ring and little finger start, in metres.
+    /// The proximal ends of the metacarpals of index, middle, ring and little finger, in metres.
     pub finger_metacarpals_m: [[f32; 3]; 4],
     /// The ten collision segments under the palm's skin: both ends of each, in metres.
     pub palm_segments_m: [[[f32; 3]; 2]; 10],
-    /// Distance from joint to skin in metres by the joint's `WebXR` name, and "palm".
+    /// Distance from joint to skin, in metres, by the joint's `WebXR` name or "palm".
     pub joint_radii_m: BTreeMap<String, f32>,
 }
 
@@ -61,19 +62,19 @@ pub struct DigitDescriptions {
 pub struct DigitDescription {
     /// The base joint in the wrist frame, in metres.
     pub base_m: [f32; 3],
-    /// The stretched digit's frame in the wrist frame as a unit quaternion: +y along the digit, +z to its pad.
+    /// The stretched digit's frame in the wrist frame, a unit quaternion: +y along the digit, +z toward its pad.
     pub base_orientation_xyzw: [f32; 4],
-    /// +1 if a positive yaw turns counter-clockwise about the base's +z, else -1.
+    /// +1 if a positive yaw turns counter-clockwise about the base's +z, -1 if clockwise.
     pub yaw_sign: f32,
-    /// Lengths of the three links in metres; the last one reaches the fingertip.
+    /// Lengths of the three links, in metres; the last one ends at the fingertip.
     pub lengths_m: [f32; 3],
-    /// Diameters of the three links in metres.
+    /// Diameters of the three links, in metres.
     pub diameters_m: [f32; 3],
-    /// What the joints can do.
+    /// The joint limits, in degrees.
     pub limits_degrees: LimitsDescription,
 }
 
-/// Smallest and largest angle of each joint in degrees.
+/// Smallest and largest angle of each joint, in degrees.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LimitsDescription {
@@ -87,29 +88,29 @@ pub struct LimitsDescription {
     pub third_pitch: [f32; 2],
 }
 
-/// What is wrong with one field of a description.
+/// A violation in one field of a description.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RigViolation {
     /// The rig has no name.
     #[error("name is empty; every rig needs one")]
     NoName,
-    /// A number is NaN, infinite or too large to be a hand's.
-    #[error("{field} is {value}; must be finite and at most {LARGEST_METRES} m in size")]
+    /// A coordinate is NaN, infinite or too large for a hand.
+    #[error("{field} is {value}; must be finite and at most {MAX_METRES} m in size")]
     NotACoordinate {
         /// Path of the field.
         field: String,
-        /// What it holds.
+        /// Its value.
         value: f32,
     },
-    /// A length is not above zero.
-    #[error("{field} is {value}; must be above 0 and at most {LARGEST_METRES} m")]
+    /// A length is not positive, or too large for a hand.
+    #[error("{field} is {value}; must be above 0 and at most {MAX_METRES} m")]
     NotALength {
         /// Path of the field.
         field: String,
-        /// What it holds.
+        /// Its value.
         value: f32,
     },
-    /// A quaternion does not have length one.
+    /// A quaternion is not of length one.
     #[error("{field} has length {length}; must be a unit quaternion x y z w")]
     NotAUnitQuaternion {
         /// Path of the field.
@@ -117,7 +118,7 @@ pub enum RigViolation {
         /// Its length.
         length: f32,
     },
-    /// A range of angles is not finite, is turned round or leaves the half turn.
+    /// A range of angles is not finite, is descending or exceeds ±180 degrees.
     #[error("{field} is {min} to {max}; must be finite, ascending and within -180 to 180 degrees")]
     NotARange {
         /// Path of the field.
@@ -132,11 +133,11 @@ pub enum RigViolation {
     NotASign {
         /// Path of the field.
         field: String,
-        /// What it holds.
+        /// Its value.
         value: f32,
     },
-    /// There is no joint of that name.
-    #[error("joint_radii_m.{name} names no joint; the names are those of WebXR, and palm")]
+    /// No joint has that name.
+    #[error("joint_radii_m.{name} names no joint; must be a WebXR joint name or palm")]
     UnknownJoint {
         /// The name.
         name: String,
@@ -150,7 +151,7 @@ pub enum RigViolation {
 }
 
 impl RigDescription {
-    /// The description of a rig.
+    /// Describes a rig.
     pub fn of_rig(rig: &Rig) -> Self {
         let digit = |i: usize| {
             let digit = &rig.digits[i];
@@ -191,10 +192,10 @@ impl RigDescription {
         }
     }
 
-    /// The rig, with its reach measured on the stretched middle finger.
+    /// Builds the rig; its reach is measured on the stretched middle finger.
     ///
     /// # Errors
-    /// Everything that is wrong with the description, in the order of its fields.
+    /// Every violation, in the order of the fields.
     pub fn to_rig(&self) -> Result<Rig, Vec<RigViolation>> {
         let mut violations = Vec::new();
         if self.name.trim().is_empty() {
@@ -252,7 +253,7 @@ impl RigDescription {
 }
 
 impl DigitDescriptions {
-    /// The digits with their names, thumb first.
+    /// Names and descriptions of the digits, thumb first.
     fn named(&self) -> [(&'static str, &DigitDescription); 5] {
         [
             ("thumb", &self.thumb),
@@ -323,12 +324,12 @@ impl DigitDescription {
     }
 }
 
-/// A range in degrees, rounded to a ten-thousandth: what a person wrote comes back as it was.
+/// A range in degrees, rounded to a ten-thousandth, so that hand-written values survive a round trip.
 fn degrees(range: AngleRange) -> [f32; 2] {
     [range.min, range.max].map(|radians| ((f64::from(radians).to_degrees() * 1e4).round() / 1e4) as f32)
 }
 
-// NaN fails every comparison, so that the following are false for it.
+// NaN fails every comparison, so the following return false for it.
 
 fn is_unit(length: f32) -> bool {
     (length - 1.0).abs() <= UNIT_TOLERANCE
@@ -339,11 +340,11 @@ fn is_range(min: f32, max: f32) -> bool {
 }
 
 fn is_coordinate(value: f32) -> bool {
-    value.abs() <= LARGEST_METRES
+    value.abs() <= MAX_METRES
 }
 
 fn is_length(value: f32) -> bool {
-    value > 0.0 && value <= LARGEST_METRES
+    value > 0.0 && value <= MAX_METRES
 }
 
 fn check_point(violations: &mut Vec<RigViolation>, field: impl Fn() -> String, point: [f32; 3]) {

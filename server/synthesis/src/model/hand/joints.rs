@@ -1,4 +1,5 @@
-//! The 26 joints of `XR_EXT_hand_tracking`: the one place where the thesis' frames become `OpenXR` ones.
+//! The 26 joints of `XR_EXT_hand_tracking`: the only place that converts between the thesis's frames and `OpenXR`
+//! ones.
 
 use glam::{Quat, Vec3};
 
@@ -14,14 +15,15 @@ pub mod index {
     pub const PALM: usize = 0;
     /// The wrist.
     pub const WRIST: usize = 1;
-    /// First joint of each digit: thumb, index, middle, ring, little. The thumb has four joints (metacarpal, proximal,
-    /// distal, tip), the fingers five (metacarpal, proximal, intermediate, distal, tip).
+    /// First joint of each digit, thumb first. The thumb has four joints (metacarpal, proximal, distal, tip), the
+    /// fingers
+    /// five (metacarpal, proximal, intermediate, distal, tip).
     pub const FIRST_OF_DIGIT: [usize; 5] = [2, 6, 11, 16, 21];
-    /// The tip of each digit.
+    /// The tip of each digit, thumb first.
     pub const TIP_OF_DIGIT: [usize; 5] = [5, 10, 15, 20, 25];
 }
 
-/// The joints' names in `OpenXR` order, as the `WebXR` hand input module writes them ("palm" is `OpenXR`'s own).
+/// The joint names of the `WebXR` hand input module, in `OpenXR` order; "palm" exists in `OpenXR` only.
 pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
     "palm",
     "wrist",
@@ -51,8 +53,9 @@ pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
     "pinky-finger-tip",
 ];
 
-/// The rotation that takes the axes of an `OpenXR` joint (-Z to the tip, +Y out of the back) to those of the thesis'
-/// frame at the same place (+y to the tip, +z out of the palm): a half turn about (0, 1, -1), its own inverse.
+/// The rotation between the axes of an `OpenXR` joint (-Z to the tip, +Y out of the back of the hand) and the
+/// thesis's frame at the same point (+y to the tip, +z out of the palm): a half turn about (0, 1, -1), its own
+/// inverse.
 pub const THESIS_FROM_OPENXR: Quat = Quat::from_xyzw(
     0.0,
     std::f32::consts::FRAC_1_SQRT_2,
@@ -60,7 +63,7 @@ pub const THESIS_FROM_OPENXR: Quat = Quat::from_xyzw(
     0.0,
 );
 
-/// The `OpenXR` joint frame at the place of a thesis frame.
+/// The `OpenXR` joint frame that corresponds to a thesis frame.
 pub fn openxr_from_thesis_frame(frame: Pose) -> Pose {
     Pose {
         position: frame.position,
@@ -68,18 +71,18 @@ pub fn openxr_from_thesis_frame(frame: Pose) -> Pose {
     }
 }
 
-/// The thesis frame at the place of an `OpenXR` joint frame.
+/// The thesis frame that corresponds to an `OpenXR` joint frame.
 pub fn thesis_from_openxr_frame(joint: Pose) -> Pose {
     // The half turn is its own inverse.
     openxr_from_thesis_frame(joint)
 }
 
-/// One joint as a headset reports it.
+/// One joint, as headsets report it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
     /// The joint's `OpenXR` frame.
     pub pose: Pose,
-    /// Distance from the joint to the skin in metres.
+    /// Distance from the joint to the skin, in metres.
     pub radius: f32,
 }
 
@@ -93,7 +96,7 @@ pub struct HandJoints {
 }
 
 impl HandJoints {
-    /// The joints of a posed rig, in the frame of the pose.
+    /// The joints of a posed rig, in the pose's frame.
     pub fn of_pose(rig: &Rig, pose: &HandPose) -> Self {
         let frames = kinematics::hand_frames(rig, pose);
         let wrist = frames.wrist;
@@ -143,25 +146,25 @@ impl HandJoints {
         }
     }
 
-    /// The same joints seen from another frame.
+    /// The same joints in another frame.
     #[must_use]
     pub fn transformed(&self, a_from_b: Pose) -> Self {
         let mut transformed = self.clone();
-        // A loop, as mapped arrays stay calls.
+        // A loop, because `array::map` would not be inlined.
         for joint in &mut transformed.joints {
             joint.pose = a_from_b * joint.pose;
         }
         transformed
     }
 
-    /// The middle of the palm's skin: one radius out of the palm joint on the palm's side.
+    /// The centre of the palm's skin, in metres: one radius from the palm joint, on the palmar side.
     pub fn palm_skin(&self) -> Vec3 {
         let palm = self.joints[index::PALM];
         palm.pose.transform_point(Vec3::new(0.0, -palm.radius, 0.0))
     }
 }
 
-/// `orientation` turned by the smallest rotation that brings its +y axis along `direction`.
+/// `orientation` after the smallest rotation that aligns its +y axis with `direction`.
 fn aim_y(orientation: Quat, direction: Vec3) -> Quat {
     let y = orientation * Vec3::Y;
     Quat::from_rotation_arc(y, direction.normalize_or(y)) * orientation

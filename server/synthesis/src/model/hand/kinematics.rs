@@ -1,7 +1,8 @@
 //! Forward kinematics of the digit chains (thesis 4.4, Eq. 4.2 and 4.3, Table 4.2).
 //!
-//! The thesis prints pitch about z and yaw about x although +y runs along the phalanx and +z is forward; pitch is
-//! about x and yaw about z, as the order of angles in its Table 4.2 says.
+//! The thesis prints pitch about z and yaw about x, although +y runs along the phalanx and +z is forward. Here pitch
+//! is
+//! about x and yaw about z, which agrees with the order of angles in its Table 4.2.
 
 use glam::{Quat, Vec3};
 
@@ -14,9 +15,9 @@ use crate::base::pose::Pose;
 /// The frames of one posed digit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DigitFrames {
-    /// The frames of the three links: origin at the joint, +y along the link, +z to the pad.
+    /// The frames of the three links: origin at the joint, +y along the link, +z toward the pad.
     pub links: [Pose; 3],
-    /// Where the fingertip is.
+    /// The fingertip, in metres.
     pub tip: Vec3,
 }
 
@@ -29,12 +30,13 @@ pub struct HandFrames {
     pub digits: [DigitFrames; 5],
 }
 
-/// The local rotation of a digit's base joint: pitch θ1 about the x axis that yaw ψ1 about z has turned.
+/// The local rotation of a digit's base joint: yaw ψ1 about z, then pitch θ1 about the turned x axis. Angles in
+/// radians.
 pub fn base_rotation(digit: &DigitRig, base_yaw: f32, base_pitch: f32) -> Quat {
     Quat::from_rotation_z(digit.yaw_sign * base_yaw) * Quat::from_rotation_x(base_pitch)
 }
 
-/// The frames of a digit in the frame of `frame_from_wrist`.
+/// The frames of a digit, in the target frame of `frame_from_wrist`.
 pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngles) -> DigitFrames {
     let base = frame_from_wrist
         * digit.wrist_from_base
@@ -51,20 +53,21 @@ pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngle
     }
 }
 
-/// The plane in which a digit bends once its yaw is set: where its joints are takes a third of the time of their frames.
+/// The plane in which a digit of fixed yaw bends. It gives joint positions in a third of the time of
+/// [`digit_frames`].
 #[derive(Clone, Copy, Debug)]
 pub struct DigitPlane {
-    /// The base joint.
+    /// The base joint, in metres.
     base: Vec3,
-    /// The direction of the stretched digit, and the one that its pad faces then: where all pitches turn to.
+    /// The direction of the stretched digit, and the one its pad faces, toward which every pitch turns.
     along: Vec3,
     pad: Vec3,
-    /// Lengths of the links in metres.
+    /// Lengths of the links, in metres.
     lengths: [f32; 3],
 }
 
 impl DigitPlane {
-    /// The plane of a digit with a yaw of ψ1 radians, in the frame of `frame_from_wrist`.
+    /// The plane of a digit with a yaw of ψ1 radians, in the target frame of `frame_from_wrist`.
     pub fn new(digit: &DigitRig, frame_from_wrist: Pose, base_yaw: f32) -> Self {
         let frame_from_base = frame_from_wrist * digit.wrist_from_base;
         let (sin, cos) = (digit.yaw_sign * base_yaw).sin_cos();
@@ -76,27 +79,27 @@ impl DigitPlane {
         }
     }
 
-    /// The joints and the tip of the digit with these pitches; its yaw is the plane's.
+    /// The three joints and the tip for the pitches of `angles`, in metres; its yaw is ignored.
     pub fn joints(&self, angles: &DigitAngles) -> [Vec3; 4] {
         let mut joints = [self.base; 4];
         let mut pitch = 0.0;
         let pitches = [angles.base_pitch, angles.second_pitch, angles.third_pitch];
-        for (link, turned) in pitches.into_iter().enumerate() {
-            pitch += turned;
+        for (link, bend) in pitches.into_iter().enumerate() {
+            pitch += bend;
             let (sin, cos) = pitch.sin_cos();
             joints[link + 1] = joints[link] + (self.along * cos + self.pad * sin) * self.lengths[link];
         }
         joints
     }
 
-    /// The direction that the pad of the first link faces when it is bent by θ1 radians.
+    /// The direction that the first link's pad faces at a pitch of θ1 radians.
     pub fn first_pad(&self, base_pitch: f32) -> Vec3 {
         let (sin, cos) = base_pitch.sin_cos();
         self.pad * cos - self.along * sin
     }
 }
 
-/// The frames of all digits.
+/// The frames of all digits of a posed rig.
 pub fn hand_frames(rig: &Rig, pose: &HandPose) -> HandFrames {
     HandFrames {
         wrist: pose.frame_from_wrist,

@@ -1,4 +1,4 @@
-//! The hand: its rig, its pose, where its bones, joints and skin are.
+//! The hand: its rig and pose, and the kinematics of its bones, joints and skin.
 
 pub mod description;
 pub mod joints;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::base::pose::Pose;
 
-/// Which hand of a person.
+/// Left or right hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Handedness {
@@ -31,7 +31,7 @@ impl Handedness {
     }
 }
 
-/// A digit of the hand; the thesis' finger index i.
+/// A digit of the hand: the thesis's finger index i.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Digit {
@@ -48,16 +48,16 @@ pub enum Digit {
 }
 
 impl Digit {
-    /// All digits in the thesis' order.
+    /// All digits, thumb first, as in the thesis.
     pub const ALL: [Self; 5] = [Self::Thumb, Self::Index, Self::Middle, Self::Ring, Self::Little];
 
-    /// The thesis' finger index: 0 for the thumb to 4 for the little finger.
+    /// The thesis's finger index, from 0 for the thumb to 4 for the little finger.
     pub const fn index(self) -> usize {
         self as usize
     }
 }
 
-/// A link of a digit's chain; the thesis' phalanx index j.
+/// A link of a digit's chain: the thesis's phalanx index j.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phalanx {
@@ -73,7 +73,7 @@ impl Phalanx {
     /// All links from the wrist outward.
     pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::Third];
 
-    /// 0 for the link next to the palm to 2 for the distal one.
+    /// The index from 0 for the link next to the palm to 2 for the distal one.
     pub const fn index(self) -> usize {
         self as usize
     }
@@ -85,7 +85,7 @@ impl Phalanx {
 pub enum HandPart {
     /// A link of a digit.
     Phalanx(Digit, Phalanx),
-    /// The palm, with the ball of the thumb.
+    /// The palm, including the ball of the thumb.
     Palm,
 }
 
@@ -98,12 +98,12 @@ impl HandPart {
         }
     }
 
-    /// True of the palm, and of parts of some digits, thumb first.
-    pub fn is_among(self, digits: [bool; 5]) -> bool {
+    /// True for the palm and for links of the selected digits; one flag per digit, thumb first.
+    pub fn is_palm_or_in(self, digits: [bool; 5]) -> bool {
         self.digit().is_none_or(|digit| digits[digit.index()])
     }
 
-    /// True of the thumb's links, false of the fingers', none of the palm.
+    /// True for links of the thumb, false for those of fingers, none for the palm.
     pub fn is_thumb(self) -> Option<bool> {
         self.digit().map(|digit| digit == Digit::Thumb)
     }
@@ -117,24 +117,24 @@ impl HandPart {
     }
 }
 
-/// The joint angles of one digit, in radians: the thesis' q = (θ1, ψ1, θ2), with θ3 beside them.
+/// The joint angles of one digit, in radians: the thesis's q = (θ1, ψ1, θ2), and θ3.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DigitAngles {
-    /// ψ1: sideways rotation of the base joint, toward the little finger's side; for the thumb, off the palm's plane.
+    /// ψ1: sideways rotation of the base joint, toward the little finger; for the thumb, out of the palm's plane.
     pub base_yaw: f32,
-    /// θ1: bend of the base joint toward the palm.
+    /// θ1: flexion of the base joint.
     pub base_pitch: f32,
-    /// θ2: bend of the second joint.
+    /// θ2: flexion of the second joint.
     pub second_pitch: f32,
-    /// θ3: bend of the third joint; two thirds of θ2 in the thesis' model.
+    /// θ3: flexion of the third joint; two thirds of θ2 in the thesis's model.
     pub third_pitch: f32,
 }
 
 impl DigitAngles {
-    /// θ3 / θ2, from the dependency of DIP on PIP (thesis 4.4, Table 4.2).
+    /// θ3 / θ2: the coupling of the DIP joint to the PIP joint (thesis 4.4, Table 4.2).
     pub const THIRD_PITCH_SHARE: f32 = 2.0 / 3.0;
 
-    /// The thesis' finger pose, in which the third joint follows the second.
+    /// The thesis's finger pose, in which the third joint follows the second. Angles in radians.
     pub fn coupled(base_yaw: f32, base_pitch: f32, second_pitch: f32) -> Self {
         Self {
             base_yaw,
@@ -145,11 +145,12 @@ impl DigitAngles {
     }
 }
 
-/// A complete configuration of the hand: the thesis' 21-dimensional vector (and the third joints).
+/// A complete configuration of the hand: the thesis's 21-dimensional vector, and the third joints.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HandPose {
-    /// F0: the wrist frame (+y along the fingers, +z out of the palm) in the frame of the computation.
+    /// F0: the wrist frame (+y along the fingers, +z out of the palm) in the frame of the computation, mostly the
+    /// object's.
     pub frame_from_wrist: Pose,
-    /// The digits, thumb first.
+    /// The joint angles of the digits, thumb first.
     pub digits: [DigitAngles; 5],
 }

@@ -1,11 +1,11 @@
-//! A hand's bones, limits and widths.
+//! A hand's rig: bones, joint limits and diameters.
 
 use glam::Vec3;
 
 use super::{Digit, DigitAngles, Handedness, Phalanx};
 use crate::{base::pose::Pose, geometry::Segment};
 
-/// A closed range of angles in radians.
+/// A closed range of angles, in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleRange {
     /// Smallest angle.
@@ -23,7 +23,7 @@ impl AngleRange {
         }
     }
 
-    /// True if `angle` lies inside, with `slack` radians of room for rounding.
+    /// True if `angle` lies within the range, widened by `slack` radians at either end for rounding.
     pub fn contains(self, angle: f32, slack: f32) -> bool {
         angle >= self.min - slack && angle <= self.max + slack
     }
@@ -42,59 +42,59 @@ pub struct DigitLimits {
     pub third_pitch: AngleRange,
 }
 
-/// One digit chain: three links with a base that is fixed in the wrist frame.
+/// One digit chain: three links on a base that is fixed in the wrist frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DigitRig {
     /// The base joint's frame of the stretched digit (all angles zero) in the wrist frame: +y along the first link,
-    /// +z to the digit's pad.
+    /// +z toward the digit's pad.
     pub wrist_from_base: Pose,
-    /// The sense of a positive yaw ψ1: +1 turns counter-clockwise about the base's +z, -1 clockwise. A positive yaw
-    /// brings a finger toward the little finger's side (+1 on the right hand, thesis Figure 4.2b) and lifts the thumb
-    /// off the palm's plane (-1 on the right hand, because the thumb's pad faces the little finger's side).
+    /// The sense of a positive yaw ψ1 about the base's +z: +1 is counter-clockwise, -1 clockwise. A positive yaw
+    /// moves a finger toward the little finger (+1 on the right hand, thesis Figure 4.2b) and lifts the thumb out of
+    /// the palm's plane (-1 on the right hand, since the thumb's pad faces the little finger).
     pub yaw_sign: f32,
-    /// Lengths L of the three links in metres; the last one reaches the fingertip.
+    /// Lengths L of the three links, in metres; the last one ends at the fingertip.
     pub lengths: [f32; 3],
-    /// Diameters W of the three links in metres (Eq. 4.1).
+    /// Diameters W of the three links, in metres (Eq. 4.1).
     pub diameters: [f32; 3],
-    /// What its joints can do.
+    /// The joint limits.
     pub limits: DigitLimits,
 }
 
-/// A hand's rig. All of it in the wrist frame: +y along the stretched fingers, +z out of the palm.
+/// A hand's rig, in the wrist frame: +y along the stretched fingers, +z out of the palm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
-    /// "thesis", "adult" or an own name.
+    /// "thesis", "adult" or a custom name.
     pub name: String,
     /// Which hand.
     pub handedness: Handedness,
-    /// H: the middle of the palm's skin, from which the palm distance is measured (thesis 5.3).
+    /// H: the centre of the palm's skin, from which the palm distance is measured (thesis 5.3), in metres.
     pub palm: Vec3,
-    /// d: distance from the wrist to the tip of the stretched middle finger (thesis 4.3), in metres.
+    /// d: distance from wrist to tip of the stretched middle finger (thesis 4.3), in metres.
     pub reach: f32,
     /// The digit chains, thumb first.
     pub digits: [DigitRig; 5],
-    /// Where the metacarpals of index, middle, ring and little finger start.
+    /// The proximal ends of the metacarpals of index, middle, ring and little finger, in metres.
     pub finger_metacarpals: [Vec3; 4],
     /// The ten collision segments under the palm's skin (thesis 4.5, Figure 4.4).
     pub palm_segments: [Segment; 10],
-    /// Distance from joint to skin for the 26 `OpenXR` joints in their order, in metres. The tips lie on the skin
-    /// themselves, as in trackers' data; their radius is that of the fingertip's rounding, so that a capsule around
-    /// the last phalanx must end one radius before the tip.
+    /// Distance from joint to skin for the 26 joints in `OpenXR` order, in metres. Tips lie on the skin, as in
+    /// tracking data; their radius is that of the rounded fingertip, so a capsule around the last phalanx must end
+    /// one radius before the tip.
     pub joint_radii: [f32; 26],
 }
 
 impl Rig {
-    /// The digit's chain.
+    /// A digit's chain.
     pub fn digit(&self, digit: Digit) -> &DigitRig {
         &self.digits[digit.index()]
     }
 
-    /// Length of a link in metres.
+    /// Length of a link, in metres.
     pub fn length(&self, digit: Digit, phalanx: Phalanx) -> f32 {
         self.digits[digit.index()].lengths[phalanx.index()]
     }
 
-    /// The stretched hand: every angle at zero, or at the limit nearest to it.
+    /// The angles of the stretched hand, in radians: each as close to zero as its limits allow.
     pub fn stretched(&self) -> [DigitAngles; 5] {
         self.digits.map(|digit| DigitAngles {
             base_yaw: 0.0_f32.clamp(digit.limits.base_yaw.min, digit.limits.base_yaw.max),
@@ -104,7 +104,7 @@ impl Rig {
         })
     }
 
-    /// The other hand of the same person: the mirror image in the plane x = 0.
+    /// The same person's other hand: the mirror image in the plane x = 0.
     #[must_use]
     pub fn mirrored(&self) -> Self {
         let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);

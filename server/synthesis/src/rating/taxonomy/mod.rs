@@ -10,7 +10,7 @@ mod scores;
 
 use crate::model::{
     grasp::Contact,
-    grasp_type::{Classification, GraspType, LEAST_CONFIDENCE},
+    grasp_type::{Classification, GraspType, MIN_CONFIDENCE},
     hand::{HandPose, rig::Rig},
 };
 
@@ -34,7 +34,7 @@ pub fn classify(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> Classificat
     }
     let confidence = best - DOUBT * second;
     Classification {
-        grasp_type: best_type.filter(|_| confidence >= LEAST_CONFIDENCE),
+        grasp_type: best_type.filter(|_| confidence >= MIN_CONFIDENCE),
         confidence,
     }
 }

@@ -125,7 +125,7 @@ fn beside_giver(giver: &PreparedHand, solid: &TaperedCapsule, least: f32, travel
 fn beside_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, least: f32, travel: f32) -> Part {
     let object = obstacles.object;
     let surface = &object.surface;
-    let sure = surface.least_gap(solid) - least;
+    let sure = surface.gap_lower_bound(solid) - least;
     if sure >= travel {
         return Part::Free;
     }

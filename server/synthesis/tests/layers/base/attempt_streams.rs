@@ -20,7 +20,7 @@ fn streams_of_neighbouring_seeds_and_attempts_share_nothing() {
     }
 }
 
-/// Over many streams: a bad mix of seed and index would spoil it.
+/// Taken over many streams, since poor mixing of seed and index would distort the moments.
 #[test]
 fn draws_have_the_moments_of_their_distributions() {
     let rounds = 20_000_u32;

@@ -1,4 +1,4 @@
-//! Tapered capsules as sets of balls: against each other and against meshes.
+//! Distances of tapered capsules to points, capsules and meshes, against brute force over their spheres.
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
@@ -9,7 +9,7 @@ use grasp_synthesis::{
 
 use crate::fixtures::{data, meshes, random::Random};
 
-/// Points of the axis that brute force tries.
+/// Number of spheres along the axis that brute force tries.
 const SAMPLES: u16 = 1000;
 
 /// Rounding, in metres.
@@ -28,7 +28,7 @@ fn brute_slack(capsule: &TaperedCapsule) -> f32 {
     0.5 * change / f32::from(SAMPLES) + ROUNDING
 }
 
-/// Capsules of every kind: phalanges, cones, balls, balls within balls, needles.
+/// Capsules of every kind: phalanges, cones, spheres, nested spheres, needles.
 fn capsule(random: &mut Random, near: Vec3) -> TaperedCapsule {
     let start = near + random.direction() * random.between(0.0, 0.03);
     let direction = random.direction();
@@ -44,7 +44,7 @@ fn capsule(random: &mut Random, near: Vec3) -> TaperedCapsule {
 }
 
 #[test]
-fn point_distances_match_the_nearest_ball() {
+fn point_distances_match_nearest_sphere() {
     let mut random = Random::new(11);
     for i in 0..2000 {
         let capsule = capsule(&mut random, Vec3::ZERO);
@@ -61,7 +61,7 @@ fn point_distances_match_the_nearest_ball() {
 }
 
 #[test]
-fn capsule_distances_match_the_nearest_balls() {
+fn capsule_distances_match_nearest_spheres() {
     let mut random = Random::new(12);
     for i in 0..3000 {
         let a = capsule(&mut random, Vec3::ZERO);
@@ -116,10 +116,10 @@ fn distances_match_closed_forms() {
     near(cone.signed_distance(Vec3::X * 0.015 + normal * 0.03), 0.0225);
 }
 
-/// Compares the gap to a mesh's surface with the balls' gaps.
+/// Compares the gap to a mesh's surface with the gaps of the capsule's spheres.
 fn compare(name: &str, surface: &MeshBvh, count: usize) {
     let mut random = Random::new(13);
-    let part = |odd: usize| surface.mesh().part(|triangle| triangle % 2 == odd);
+    let part = |odd: usize| surface.mesh().submesh(|triangle| triangle % 2 == odd);
     let parts: Vec<MeshBvh> = [part(0), part(1)]
         .into_iter()
         .flatten()
@@ -139,7 +139,7 @@ fn compare(name: &str, surface: &MeshBvh, count: usize) {
             .fold(f32::INFINITY, f32::min);
         if (expected - within).abs() > brute_slack(&capsule) {
             let comes_within = surface.comes_within(&capsule, within);
-            // A part of the surface and the rest of it are all of it.
+            // The smaller of the gaps to two complementary submeshes is the gap to the whole.
             assert_eq!(
                 parts.iter().any(|part| part.comes_within(&capsule, within)),
                 comes_within,
@@ -172,22 +172,22 @@ fn compare(name: &str, surface: &MeshBvh, count: usize) {
 }
 
 #[test]
-fn gaps_to_meshes_match_the_nearest_balls() {
+fn gaps_to_meshes_match_nearest_spheres() {
     for (name, mesh) in meshes::all() {
         compare(name, &MeshBvh::build(mesh), 300);
     }
 }
 
 #[test]
-fn gaps_to_real_objects_match_the_nearest_balls() {
+fn gaps_to_real_objects_match_nearest_spheres() {
     for (name, mesh) in data::real_objects() {
         compare(&name, &MeshBvh::build(mesh), 30);
     }
 }
 
-/// Compares the clearance with the least signed distance of the axis less the radius.
+/// Compares the clearance with the smallest signed distance of a point of the axis minus its radius.
 #[test]
-fn clearances_from_solids_match_the_nearest_or_deepest_balls() {
+fn clearances_from_solids_match_nearest_or_deepest_spheres() {
     for (name, mesh) in meshes::solids() {
         let surface = MeshBvh::build(mesh);
         let mut random = Random::new(14);
@@ -244,7 +244,7 @@ fn clearances_from_boxes_match_closed_forms() {
             "{value} instead of {expected}"
         );
     };
-    // A finger over the top face, tilted, so that its thin end is the nearest: its height less the end's radius.
+    // A finger over the top face, tilted so that its thin end is nearest: the end's height minus its radius.
     for height in [0.03, 0.025, 0.021] {
         let finger = TaperedCapsule::new(
             Vec3::new(0.003, 0.002, height + 0.02),
@@ -266,7 +266,7 @@ fn clearances_from_boxes_match_closed_forms() {
     // In the middle of the box: half its thickness and the radius.
     let inside = TaperedCapsule::new(Vec3::X * -0.02, Vec3::X * 0.02, 0.008, 0.008);
     near(clearance(&inside, &solid, 1.0), -0.028, 1e-3);
-    // A sheet across a finger is as deep as the finger is thick there; off its axis, less by the offset.
+    // A sheet across a finger penetrates by the finger's radius there, reduced by its offset from the axis.
     let across = TaperedCapsule::new(Vec3::Z * -0.02, Vec3::Z * 0.02, 0.01, 0.006);
     near(clearance(&across, &sheet, 1.0), -0.008, 1e-3);
     let off_axis = TaperedCapsule::new(
@@ -309,7 +309,7 @@ fn clearances_do_not_depend_on_the_frame() {
 }
 
 #[test]
-fn capsules_that_are_not_finite_are_near_nothing() {
+fn non_finite_capsules_are_near_nothing() {
     let surface = MeshBvh::build(meshes::cuboid(Vec3::splat(0.02), 3));
     for broken in [f32::NAN, f32::INFINITY] {
         for capsule in [
@@ -323,7 +323,7 @@ fn capsules_that_are_not_finite_are_near_nothing() {
 }
 
 #[test]
-fn lower_bounds_of_gaps_never_exceed_the_gaps() {
+fn gap_lower_bounds_never_exceed_gaps() {
     let mut random = Random::new(17);
     let mut positive = 0;
     for (name, mesh) in meshes::all() {
@@ -333,7 +333,7 @@ fn lower_bounds_of_gaps_never_exceed_the_gaps() {
         for i in 0..400 {
             let near = random.near(&mesh, 0.1);
             let capsule = capsule(&mut random, near);
-            let bound = prepared.least_gap(&capsule);
+            let bound = prepared.gap_lower_bound(&capsule);
             let gap = exact.closest_to_capsule(&capsule, 1.0).map_or(1.0, |gap| gap.gap);
             assert!(
                 bound <= gap + ACCURACY,

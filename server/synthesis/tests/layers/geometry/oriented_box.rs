@@ -39,7 +39,7 @@ fn sorted(extents: Vec3) -> [f32; 3] {
 }
 
 #[test]
-fn boxes_contain_their_meshes_snugly() {
+fn boxes_fit_their_meshes_tightly() {
     for (name, mesh) in meshes::all() {
         check(name, &mesh);
     }

@@ -35,7 +35,7 @@ fn volume_and_centroid_match_closed_forms() {
 }
 
 #[test]
-fn the_centroid_is_weighted_by_volume_and_not_by_vertices() {
+fn centroid_is_weighted_by_volume_not_by_vertices() {
     let mesh = meshes::Parts::default()
         .cuboid(Vec3::ZERO, Vec3::splat(0.02), 20)
         .cuboid(Vec3::X, Vec3::splat(0.04), 1)
@@ -120,7 +120,7 @@ fn rejects_broken_meshes_with_the_reason() {
 }
 
 #[test]
-fn normals_point_outward_even_of_tiny_triangles() {
+fn normals_of_tiny_triangles_point_outward() {
     for scale in [1.0, 1e-4, 1e-8] {
         let turn = Quat::from_rotation_x(0.4);
         let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| turn * p * scale).to_vec();

@@ -23,7 +23,7 @@ use proptest::{
     test_runner::RngSeed,
 };
 
-/// Within this of a limit, single precision decides.
+/// Cases closer to a limit than this are skipped, since single precision decides them.
 const UNDECIDED: f64 = 1e-5;
 
 fn runs() -> ProptestConfig {
@@ -141,7 +141,7 @@ proptest! {
     }
 
     #[test]
-    fn a_cone_of_a_half_turn_admits_every_wrist(wrist in pose(), axis in direction()) {
+    fn half_turn_cone_admits_every_wrist(wrist in pose(), axis in direction()) {
         for axis in [axis, approach_direction(wrist), -approach_direction(wrist)] {
             let approach = Some(ApproachCone { axis, half_angle: PI });
             let constraints = Constraints { approach, ..Constraints::default() };
@@ -241,7 +241,7 @@ proptest! {
     }
 
     #[test]
-    fn sets_contain_exactly_what_they_were_made_of(
+    fn sets_contain_exactly_their_elements(
         a in types(),
         (c, d) in (digits(), digits()),
     ) {

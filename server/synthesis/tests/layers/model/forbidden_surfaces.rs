@@ -1,11 +1,11 @@
-//! Which capsules come near the forbidden surface of an object.
+//! Distance queries against an object's forbidden surface.
 
 use glam::Vec3;
 use grasp_synthesis::geometry::tapered_capsule::TaperedCapsule;
 
 use crate::fixtures::objects::object;
 
-/// Against points of the forbidden triangles.
+/// Compares with sampled points of the forbidden triangles.
 #[test]
 fn is_forbidden_within_matches_the_forbidden_triangles() {
     const STEPS: u16 = 12;

@@ -44,7 +44,7 @@ fn skin() -> Skin {
 }
 
 #[test]
-fn a_presenting_hands_skin_follows_its_joints() {
+fn presenting_hand_skin_follows_its_joints() {
     let mut random = Random::new(12);
     let object_from_frame = Pose::new(random.in_cube(), random.rotation());
     let hand = PresentingHand::in_frame(&skin(), &joints(), object_from_frame).expect("the hand is sound");
@@ -138,7 +138,7 @@ fn objects_report_every_violation_up_to_a_limit() {
 }
 
 #[test]
-fn rejects_an_up_that_is_no_unit_vector() {
+fn rejects_up_that_is_not_a_unit_vector() {
     let object = GraspObject::new(
         meshes::cuboid(Vec3::splat(0.05), 1),
         0.2,

@@ -81,7 +81,7 @@ fn a_skin_scales_with_its_joints() {
 
 #[test]
 fn a_skin_stretches_to_another_rigs_hand() {
-    // On the joints of the thesis' larger hand, the adult's skin has that hand's volume.
+    // On the joints of the thesis's larger hand, the adult's skin has that hand's volume.
     let (small, large) = (
         built_in_hand("adult", Handedness::Right),
         built_in_hand("thesis", Handedness::Right),

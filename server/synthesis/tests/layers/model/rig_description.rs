@@ -1,4 +1,4 @@
-//! Descriptions of rigs, and everything that can be wrong with them at once.
+//! Validation of rig descriptions.
 
 use grasp_synthesis::model::hand::description::{RigDescription, RigViolation};
 
@@ -37,7 +37,7 @@ fn reports_every_violation_of_a_description_at_once() {
     ] {
         assert!(
             messages.iter().any(|message| message.starts_with(part)),
-            "nothing says {part}: {messages:#?}"
+            "no message contains {part:?}: {messages:#?}"
         );
     }
     assert_eq!(messages.len(), 10, "{messages:#?}");

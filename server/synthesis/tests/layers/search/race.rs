@@ -31,7 +31,7 @@ fn hash(outcome: &SearchOutcome) -> u64 {
     add(report.attempts);
     add(report.pruned_placements);
     // Only the kinds of the thesis' Table 5.2: others were added after the golden hash.
-    for rejection in Rejection::OF_THESIS {
+    for rejection in Rejection::THESIS {
         add(report.rejections[rejection.index()]);
     }
     add(report.attempt.unwrap_or(u64::MAX));

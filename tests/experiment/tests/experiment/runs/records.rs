@@ -34,7 +34,7 @@ fn a_search_of_the_seed_finds_the_recorded_grasp_and_counts() {
             assert_eq!(found.report.attempts, figures.attempts);
             assert_eq!(found.report.pruned_placements, figures.pruned_placements);
             assert_eq!(
-                Rejection::OF_THESIS.map(|kind| found.report.rejections[kind.index()]),
+                Rejection::THESIS.map(|kind| found.report.rejections[kind.index()]),
                 figures.rejections
             );
             assert_eq!(figures.attempts, figures.rejections.iter().sum::<u64>() + 1);
@@ -84,7 +84,7 @@ fn the_negative_set_has_the_first_failures_of_its_seed() {
                 None => break,
             }
         }
-        for rejection in Rejection::OF_THESIS {
+        for rejection in Rejection::THESIS {
             let recorded = cell
                 .iter()
                 .filter(|record| record.rejection == Some(rejection))

@@ -5,7 +5,7 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::{
         grasp::Contact,
-        grasp_type::{GraspType, LEAST_CONFIDENCE},
+        grasp_type::{GraspType, MIN_CONFIDENCE},
         hand::{Digit, HandPart, Phalanx},
     },
 };
@@ -24,7 +24,7 @@ fn canonical_grasps_get_their_types() {
     for (expected, held) in cases() {
         let found = held.classify();
         assert_eq!(found.grasp_type, Some(expected), "{found:?}");
-        assert!(found.confidence >= LEAST_CONFIDENCE, "{expected:?}: {found:?}");
+        assert!(found.confidence >= MIN_CONFIDENCE, "{expected:?}: {found:?}");
         named.push(expected);
     }
     named.sort();
@@ -136,6 +136,6 @@ proptest! {
             .collect();
         let found = held.classify();
         prop_assert!((0.0..=1.0).contains(&found.confidence), "{found:?}");
-        prop_assert_eq!(found.grasp_type.is_some(), found.confidence >= LEAST_CONFIDENCE);
+        prop_assert_eq!(found.grasp_type.is_some(), found.confidence >= MIN_CONFIDENCE);
     }
 }
