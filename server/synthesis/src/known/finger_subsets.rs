@@ -95,11 +95,11 @@ impl FingerSubsets {
                 .iter()
                 .enumerate()
                 .filter(|(finger, _)| set >> finger & 1 == 1);
-            fingers.fold((0, f32::INFINITY), |least, (finger, &distance)| {
-                if distance < least.1 {
+            fingers.fold((0, f32::INFINITY), |nearest, (finger, &distance)| {
+                if distance < nearest.1 {
                     (finger, distance)
                 } else {
-                    least
+                    nearest
                 }
             })
         };

@@ -334,7 +334,7 @@ impl<'a> Growth<'a> {
         match giver.map(|giver| &giver.seeds) {
             Some(Some(seeds)) if is_perturbed => seeds.propose_evenly(self.grips.entries(), &place, stream),
             None if is_perturbed => Some(self.perturbed_known(stream)),
-            // A giver who leaves enough grips clear still collides with most known ones: do not perturb those.
+            // Perturbing known grips is wasted on a giver with enough clear ones: most of them collide.
             _ => propose_evenly(&place, stream, &|| false),
         }
     }
@@ -346,7 +346,7 @@ impl<'a> Growth<'a> {
         for _ in 0..MAX_REDRAWS {
             let entry = &self.grips.entries()[index];
             let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-            if stream.unit() * (self.spread.alike(cell) as f32) < 1.0 {
+            if stream.unit() * (self.spread.count_in(cell) as f32) < 1.0 {
                 break;
             }
             index = stream.below(self.len());

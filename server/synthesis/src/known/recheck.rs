@@ -16,7 +16,7 @@ use crate::{
 
 /// Checks known grips of an object against one holdout.
 #[derive(Clone, Copy, Debug)]
-pub struct Recheck<'a> {
+pub struct GripChecker<'a> {
     scene: &'a ObjectScene<'a>,
     rig: &'a Rig,
     presented: &'a Presented,
@@ -28,7 +28,7 @@ pub struct Recheck<'a> {
     knows_friction_uses: bool,
 }
 
-impl<'a> Recheck<'a> {
+impl<'a> GripChecker<'a> {
     /// Prepares checks of grips of an object and a rig.
     pub fn new(scene: &'a ObjectScene<'a>, rig: &'a Rig, presented: &'a Presented) -> Self {
         let friction_differs = scene.friction != scene.object.friction_under(Validity::Physical);
@@ -53,7 +53,7 @@ impl<'a> Recheck<'a> {
 
     /// The grasp of a known grip for the holdout, with its score; none if it is too close to the giver or the
     /// object slips. `solids` are the grip's, from [`Entry::tracked_solids`].
-    pub fn hold(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
+    pub fn check(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
         let Self {
             scene,
             rig,

@@ -119,14 +119,14 @@ impl Seeds {
                 return None;
             }
             count += 1;
-            let least = nearest
+            let min_clearance = nearest
                 .get(SEEDS - 1)
-                .map_or(f32::NEG_INFINITY, |(least, _)| *least);
-            if bound <= nanometres(least) {
+                .map_or(f32::NEG_INFINITY, |(min_clearance, _)| *min_clearance);
+            if bound <= nanometres(min_clearance) {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
-            let Some((clearance, kept)) = clearance(entry, rig, giver, least, screens) else {
+            let Some((clearance, kept)) = clearance(entry, rig, giver, min_clearance, screens) else {
                 continue;
             };
             let rank = nearest.partition_point(|&(other, _)| other >= clearance);
@@ -256,12 +256,12 @@ fn avoids_forbidden(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -
 }
 
 /// A grip's clearance from a giver, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of
-/// that subset; none if it is less than `least`.
+/// that subset; none if it is less than `min_clearance`.
 fn clearance(
     entry: &Entry,
     rig: &Rig,
     giver: &PreparedHand,
-    least: f32,
+    min_clearance: f32,
     screens: bool,
 ) -> Option<(f32, [bool; 5])> {
     let solids = entry.solids(rig);
@@ -269,19 +269,19 @@ fn clearance(
     if screens {
         let (fingers, others) =
             upper_bounds_from_second(&giver.distance_upper_bounds(&second_spheres(&solids)));
-        if sets.farthest(fingers).1.min(others) < least {
+        if sets.farthest(fingers).1.min(others) < min_clearance {
             return None;
         }
     }
     let no_fingers = [true, false, false, false, false];
-    let others = giver.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, least)?;
+    let others = giver.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, min_clearance)?;
     let distances = std::array::from_fn(|finger| {
         let links = solids.phalanges[1 + finger].iter();
-        let distance = giver.least_distance(links, GIVER_CLEARANCE, least);
+        let distance = giver.least_distance(links, GIVER_CLEARANCE, min_clearance);
         distance.unwrap_or(f32::NEG_INFINITY)
     });
     let (kept, of_fingers) = sets.farthest(distances);
-    (of_fingers >= least).then_some((of_fingers.min(others), kept))
+    (of_fingers >= min_clearance).then_some((of_fingers.min(others), kept))
 }
 
 /// A hand's solids without the fingers that do not hold, which rest elsewhere.

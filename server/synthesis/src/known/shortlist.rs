@@ -214,18 +214,18 @@ fn shortlist(score: impl Fn(usize) -> u8, clear_of: &[ClearOf]) -> Vec<u16> {
         .collect();
     let mut list = Vec::with_capacity(LIST_LENGTH);
     while list.len() < LIST_LENGTH {
-        let Some(mut most) = gains.peek_mut() else { break };
-        let (bound, Reverse(entry)) = *most;
+        let Some(mut top) = gains.peek_mut() else { break };
+        let (bound, Reverse(entry)) = *top;
         let (score, clear_of) = (score(usize::from(entry)), &clear_of[usize::from(entry)]);
         let gain = gain(score, clear_of, &served);
         if gain == bound {
-            PeekMut::pop(most);
+            PeekMut::pop(top);
             serve(&mut served, score, clear_of);
             list.push(entry);
         } else if gain > 0 {
-            most.0 = gain;
+            top.0 = gain;
         } else {
-            PeekMut::pop(most);
+            PeekMut::pop(top);
         }
     }
     list.sort_by_key(|&entry| Reverse(score(usize::from(entry))));
@@ -234,8 +234,8 @@ fn shortlist(score: impl Fn(usize) -> u8, clear_of: &[ClearOf]) -> Vec<u16> {
 
 /// Serves the givers that are clear of a grip, if it is better than what they have.
 fn serve(served: &mut [u8; SAMPLED_GIVERS], score: u8, clear_of: &ClearOf) {
-    for (served, left) in served.iter_mut().zip(clear_of) {
-        *served = (*served).max(score & left);
+    for (served, clear) in served.iter_mut().zip(clear_of) {
+        *served = (*served).max(score & clear);
     }
 }
 
@@ -261,8 +261,8 @@ mod tests {
     fn drawn(stream: &mut AttemptStream, count: usize, givers: usize, share: f32) -> (Vec<u8>, Vec<ClearOf>) {
         let grip = |_| {
             let mut clear_of = [0; SAMPLED_GIVERS];
-            for left in &mut clear_of[..givers] {
-                *left = if stream.unit() < share { u8::MAX } else { 0 };
+            for clear in &mut clear_of[..givers] {
+                *clear = if stream.unit() < share { u8::MAX } else { 0 };
             }
             // Some slip, and many have equal or similar scores.
             (stream.below(6) as u8 * 5 * stream.below(11) as u8, clear_of)
@@ -273,8 +273,8 @@ mod tests {
     /// The objective of a list: by how much the best clear grip of each giver exceeds what does not count.
     fn total_service(list: &[u16], scores: &[u8], clear_of: &[ClearOf]) -> u32 {
         let best = |entries: &mut dyn Iterator<Item = usize>, giver: usize| {
-            let left = entries.filter(|&entry| clear_of[entry][giver] != 0);
-            left.map(|entry| u32::from(scores[entry])).max().unwrap_or(0)
+            let clear = entries.filter(|&entry| clear_of[entry][giver] != 0);
+            clear.map(|entry| u32::from(scores[entry])).max().unwrap_or(0)
         };
         let served = |giver: usize| {
             let of_all = best(&mut (0..scores.len()), giver);
@@ -295,12 +295,12 @@ mod tests {
                     let longer = [plain.as_slice(), &[entry]].concat();
                     total_service(&longer, &scores, &clear_of)
                 };
-                let most = (0..150).max_by_key(|&entry| (with(entry), Reverse(entry)));
-                let most = most.expect("there are grips");
-                if with(most) == total_service(&plain, &scores, &clear_of) {
+                let top = (0..150).max_by_key(|&entry| (with(entry), Reverse(entry)));
+                let top = top.expect("there are grips");
+                if with(top) == total_service(&plain, &scores, &clear_of) {
                     break;
                 }
-                plain.push(most);
+                plain.push(top);
             }
             plain.sort_by_key(|&entry| Reverse(scores[usize::from(entry)]));
             assert_eq!(shortlist(|entry| scores[entry], &clear_of), plain, "seed {seed}");

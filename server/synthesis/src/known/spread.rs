@@ -76,7 +76,7 @@ impl Spread {
     }
 
     /// The number of grips in a cell.
-    pub(super) fn alike(&self, cell: Cell) -> usize {
+    pub(super) fn count_in(&self, cell: Cell) -> usize {
         self.cells.get(&cell).map_or(0, Vec::len)
     }
 

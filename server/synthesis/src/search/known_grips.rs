@@ -15,7 +15,7 @@ use crate::{
     known::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
-        recheck::Recheck,
+        recheck::GripChecker,
         subset_grasps::subset_grasp_with,
     },
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
@@ -44,7 +44,7 @@ pub(super) struct KnownGrips<'a> {
     /// Recent grips. Mostly they are worse than those of the atlas, which are a selection.
     recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
-    recheck: Recheck<'a>,
+    checker: GripChecker<'a>,
     giver: Option<&'a PreparedHand>,
     /// The start of `order` again, to try without the fingers that the giver obstructs.
     subset_order: &'a [u16],
@@ -98,7 +98,7 @@ enum Next<'a> {
 }
 
 /// The result of trying a known grip.
-pub(super) enum Tried {
+pub(super) enum TryResult {
     /// All have been tried.
     Exhausted,
     /// It is not valid.
@@ -152,7 +152,7 @@ impl<'a> KnownGrips<'a> {
             order: atlas.map_or(&[], order),
             recent,
             scene,
-            recheck: Recheck::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
+            checker: GripChecker::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
             subset_order: match (atlas, giver) {
                 _ if !mechanisms.has(Mechanism::FingerSubsets) => &[],
                 (Some(atlas), Some(_)) if by_gravity => atlas.holding_under(presented.up),
@@ -264,10 +264,10 @@ impl<'a> KnownGrips<'a> {
     }
 
     /// Tries the next grip.
-    pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
+    pub(super) fn try_next(&self, gripper: &mut Gripper) -> TryResult {
         let (source, grasp) = match self.next() {
-            Next::Exhausted => return Tried::Exhausted,
-            Next::AllExcluded => return Tried::Rejected,
+            Next::Exhausted => return TryResult::Exhausted,
+            Next::AllExcluded => return TryResult::Rejected,
             Next::Candidate(Candidate::Whole {
                 source,
                 entry,
@@ -279,12 +279,12 @@ impl<'a> KnownGrips<'a> {
             ),
         };
         match grasp {
-            Some(grasp) => Tried::Valid {
+            Some(grasp) => TryResult::Valid {
                 source,
                 value: grasp_value(&grasp),
                 grasp,
             },
-            None => Tried::Rejected,
+            None => TryResult::Rejected,
         }
     }
 
@@ -293,7 +293,7 @@ impl<'a> KnownGrips<'a> {
         if !entry.meets(constraints) {
             return None;
         }
-        let grasp = self.recheck.hold(entry, solids, gripper)?;
+        let grasp = self.checker.check(entry, solids, gripper)?;
         constraints.admits(&grasp).then(|| Box::new(grasp))
     }
 

@@ -12,7 +12,7 @@ use std::{
 use super::{
     SearchEnd, SearchOutcome,
     attempt::{Attempt, AttemptEnd},
-    known_grips::{KnownGrips, Tried, grasp_value},
+    known_grips::{KnownGrips, TryResult, grasp_value},
     report::{GraspSource, SearchReport},
     scene::Scene,
     settings::SearchSettings,
@@ -209,9 +209,9 @@ impl<'a> Race<'a> {
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) && until.is_none_or(|until| self.clock.now() < until) {
             match known.try_next(&mut gripper) {
-                Tried::Exhausted => return false,
-                Tried::Rejected => {}
-                Tried::Valid { source, grasp, value } => {
+                TryResult::Exhausted => return false,
+                TryResult::Rejected => {}
+                TryResult::Valid { source, grasp, value } => {
                     self.record_valid(source, grasp, value);
                     return true;
                 }
@@ -230,9 +230,9 @@ impl<'a> Race<'a> {
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) {
             match known.try_next(&mut gripper) {
-                Tried::Exhausted => return,
-                Tried::Rejected => {}
-                Tried::Valid { source, grasp, value } => {
+                TryResult::Exhausted => return,
+                TryResult::Rejected => {}
+                TryResult::Valid { source, grasp, value } => {
                     self.record_valid(source, grasp, value);
                 }
             }

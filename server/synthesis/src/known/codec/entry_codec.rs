@@ -222,11 +222,11 @@ fn read_digits(reader: &mut Reader<'_>, shape: &HandShape, rig: &Rig) -> Result<
 /// by the bit planes of the differences plus one; 0 marks a grip that slips.
 fn write_scores(writer: &mut Writer, scores: &[u8; DIRECTIONS]) {
     let holding = scores.iter().filter(|score| **score != SLIPS);
-    let least = holding.min().copied().unwrap_or(1);
-    let above = scores.map(|score| if score == SLIPS { 0 } else { score - least + 1 });
+    let lowest = holding.min().copied().unwrap_or(1);
+    let above = scores.map(|score| if score == SLIPS { 0 } else { score - lowest + 1 });
     let highest = above.iter().max().copied().unwrap_or(0);
     let planes = u8::BITS - highest.leading_zeros();
-    writer.u8(least);
+    writer.u8(lowest);
     writer.u8(planes as u8);
     for plane in 0..planes {
         let bits = above.iter().enumerate();
@@ -237,9 +237,9 @@ fn write_scores(writer: &mut Writer, scores: &[u8; DIRECTIONS]) {
 }
 
 fn read_scores(reader: &mut Reader<'_>) -> Result<[u8; DIRECTIONS], AtlasError> {
-    let least = reader.u8()?;
+    let lowest = reader.u8()?;
     let planes = reader.u8()?;
-    if least == SLIPS || planes > 8 {
+    if lowest == SLIPS || planes > 8 {
         return Err(AtlasError::Malformed("scores are out of range"));
     }
     let mut above = [0_u8; DIRECTIONS];
@@ -251,7 +251,7 @@ fn read_scores(reader: &mut Reader<'_>) -> Result<[u8; DIRECTIONS], AtlasError> 
     }
     let mut scores = [SLIPS; DIRECTIONS];
     for (score, above) in scores.iter_mut().zip(above).filter(|(_, above)| *above > 0) {
-        *score = (least - 1)
+        *score = (lowest - 1)
             .checked_add(above)
             .ok_or(AtlasError::Malformed("scores are out of range"))?;
     }

@@ -117,28 +117,28 @@ impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
 }
 
 /// Checks a solid that travels up to `travel` metres against the giver's hand.
-fn against_giver(giver: &PreparedHand, solid: &TaperedCapsule, least: f32, travel: f32) -> Verdict {
+fn against_giver(giver: &PreparedHand, solid: &TaperedCapsule, clearance: f32, travel: f32) -> Verdict {
     giver
-        .least_distance([solid].into_iter(), least + travel, least)
-        .map_or(Verdict::Blocked, |distance| classify(distance, least, travel))
+        .least_distance([solid].into_iter(), clearance + travel, clearance)
+        .map_or(Verdict::Blocked, |distance| classify(distance, clearance, travel))
 }
 
 /// Checks a solid that travels up to `travel` metres against the object.
-fn against_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, least: f32, travel: f32) -> Verdict {
+fn against_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, clearance: f32, travel: f32) -> Verdict {
     let object = obstacles.object;
     let surface = &object.surface;
-    let sure = surface.least_gap(solid) - least;
-    if sure >= travel {
+    let lower_bound = surface.least_gap(solid) - clearance;
+    if lower_bound >= travel {
         return Verdict::Free;
     }
-    if sure >= 0.0 && travel > sure + LOOKAHEAD {
+    if lower_bound >= 0.0 && travel > lower_bound + LOOKAHEAD {
         return Verdict::Undecided;
     }
-    let enough = least + travel.min(sure.max(0.0) + LOOKAHEAD);
+    let search_distance = clearance + travel.min(lower_bound.max(0.0) + LOOKAHEAD);
     let gap = surface
-        .closest_to_capsule(solid, enough)
-        .map_or(enough, |gap| gap.gap);
-    let verdict = classify(gap, least, travel);
+        .closest_to_capsule(solid, search_distance)
+        .map_or(search_distance, |gap| gap.gap);
+    let verdict = classify(gap, clearance, travel);
     // A part that is halved is checked again.
     if verdict == Verdict::Free && gap < travel && object.is_forbidden_within(solid, travel) {
         return if travel > RESOLUTION {
@@ -151,10 +151,10 @@ fn against_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, least: f32,
 }
 
 /// Classifies a part by the distance at its midpoint, which may shrink by `travel` toward the ends.
-fn classify(distance: f32, least: f32, travel: f32) -> Verdict {
-    if distance < least {
+fn classify(distance: f32, clearance: f32, travel: f32) -> Verdict {
+    if distance < clearance {
         Verdict::Blocked
-    } else if distance >= least + travel || travel <= RESOLUTION {
+    } else if distance >= clearance + travel || travel <= RESOLUTION {
         Verdict::Free
     } else {
         Verdict::Undecided
