@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// Grips, in the order of [`super::Atlas::entries`]. Callers pass the rig that the grips were made for.
+/// Grips, in the order of [`super::atlas::Atlas::entries`]. Callers pass the rig that the grips were made for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grips {
     entries: Vec<Entry>,

@@ -54,7 +54,7 @@ type ClearOf = [u8; SAMPLED_GIVERS];
 /// solids are kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Listed {
-    /// Its index in [`super::Atlas::entries`].
+    /// Its index in [`super::atlas::Atlas::entries`].
     pub entry: u16,
     second_spheres: Spheres,
     solids: TrackedSolids,
