@@ -6,7 +6,7 @@ use grasp_assets::hands::hand;
 use grasp_synthesis::{
     known::{
         codec::fingerprint,
-        growth::{EARLY_PROPOSALS, ENTRIES, Growth, MOST_PROPOSALS, ROUND},
+        growth::{EARLY_PROPOSALS, ENTRIES, Growth, MAX_PROPOSALS, ROUND},
         key::ALGORITHM,
         primitives::Primitive,
     },
@@ -49,7 +49,7 @@ fn reference() -> u64 {
         .map(|(object, side)| early_growth(object, &hand("adult", *side).expect("the rig is built in").rig))
         .collect();
     let mut hash = Sha256::new();
-    for bound in [ENTRIES as u64, MOST_PROPOSALS, ROUND] {
+    for bound in [ENTRIES as u64, MAX_PROPOSALS, ROUND] {
         hash.update(bound.to_le_bytes());
     }
     for fingerprint in fingerprints {

@@ -12,7 +12,7 @@ use grasp_synthesis::{
     known::{
         atlas::Atlas,
         codec::{AtlasError, decode, encode},
-        growth::{EARLY_PROPOSALS, Grown, Growth, MOST_PROPOSALS},
+        growth::{EARLY_PROPOSALS, Grown, Growth, MAX_PROPOSALS},
         key,
         primitives::Primitive,
     },
@@ -123,7 +123,7 @@ impl Collection {
             .par_iter()
             .map(|excerpt| {
                 let Excerpt { name, object, rig } = excerpt;
-                let bar = bars.add(ProgressBar::new(MOST_PROPOSALS).with_style(style.clone()));
+                let bar = bars.add(ProgressBar::new(MAX_PROPOSALS).with_style(style.clone()));
                 bar.set_message(name.clone());
                 let grown = grow(object, rig, &bar);
                 if let Some(folder) = complete {

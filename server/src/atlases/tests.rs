@@ -7,7 +7,7 @@ use grasp_assets::hands::hand;
 use grasp_synthesis::{
     known::{
         codec::{decode, encode},
-        growth::{Grown, Growth, MOST_PROPOSALS, ROUND},
+        growth::{Grown, Growth, MAX_PROPOSALS, ROUND},
         primitives::Primitive,
     },
     physical::grip::Gripper,
@@ -182,7 +182,7 @@ fn nearly_complete(object: &StoredObject) -> Grown {
     const PROPOSED: std::ops::Range<usize> = 47..55;
     const CHECKSUM_BYTES: usize = 32;
     let mut bytes = encode(&grown(object), &object.object, &adult().rig);
-    bytes[PROPOSED].copy_from_slice(&(MOST_PROPOSALS - ROUND).to_be_bytes());
+    bytes[PROPOSED].copy_from_slice(&(MAX_PROPOSALS - ROUND).to_be_bytes());
     let content = bytes.len() - CHECKSUM_BYTES;
     let checksum = Sha256::digest(&bytes[..content]);
     bytes[content..].copy_from_slice(&checksum);

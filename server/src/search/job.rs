@@ -16,7 +16,7 @@ use grasp_synthesis::{
     propose::prepared::PreparedObject,
     search::{
         GraspSource, LookUp, SearchOutcome, find_known_grasp,
-        key_frames::plan_way,
+        key_frames::plan_key_frames,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
     },
@@ -249,7 +249,7 @@ impl PreparedJob {
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
             let approach = self.settings.query.constraints.approach;
             let friction = self.settings.query.friction_on(&self.holdout.object);
-            plan_way(&self.holdout, rig, friction, approach, grasp);
+            plan_key_frames(&self.holdout, rig, friction, approach, grasp);
         }
         let frame = ClientFrame {
             convention: self.query.convention,
@@ -271,7 +271,7 @@ impl PreparedJob {
         let own_friction = self.holdout.object.friction_under(Validity::Physical);
         let is_new = matches!(
             outcome.report.source,
-            Some(GraspSource::Attempt(_) | GraspSource::Spared(_))
+            Some(GraspSource::Attempt(_) | GraspSource::FingerSubset(_))
         );
         let grasp = outcome.grasp.as_ref()?;
         (is_new && self.settings.query.friction_on(&self.holdout.object) == own_friction)

@@ -6,8 +6,9 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
-    base::{mechanisms::Mechanisms, random::AttemptStream, stopwatch::NoStopwatch},
-    known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::Recheck},
+    base::mechanisms::Mechanisms,
+    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::GripChecker},
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     physical::{
         grip::Gripper,
@@ -68,8 +69,8 @@ fn holds(criterion: &mut Criterion) {
     for name in OBJECTS {
         let (scene, atlas, presented) = (scene(object(name)), grown(object(name), ENTRIES), presented(name));
         let mut holds = |entry: &Entry, presented: &Presented| {
-            Recheck::new(&scene, rig(), presented)
-                .hold(entry, &entry.tracked_solids(rig()), &mut gripper)
+            GripChecker::new(&scene, rig(), presented)
+                .check(entry, &entry.tracked_solids(rig()), &mut gripper)
                 .is_some()
         };
         let pairs = presented

@@ -15,7 +15,7 @@ use grasp_assets::{
     atlas_folder::{AtlasFolder, AtlasFolderError},
     objects::object,
 };
-use grasp_synthesis::known::{atlas::Atlas, codec::AtlasError, growth::MOST_PROPOSALS};
+use grasp_synthesis::known::{atlas::Atlas, codec::AtlasError, growth::MAX_PROPOSALS};
 
 use crate::{
     folder::Folder,
@@ -75,7 +75,7 @@ impl Atlases {
                     object: object.name,
                     entries: now.entries,
                     proposed: now.proposed,
-                    total: MOST_PROPOSALS,
+                    total: MAX_PROPOSALS,
                     rejected: now.rejected,
                 });
                 !stop.load(Ordering::Relaxed)

@@ -15,7 +15,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::NoStopwatch},
-    known::{recheck::Recheck, seed_source::SeedSource},
+    known::{recheck::GripChecker, seed_source::SeedSource},
     model::{grasp::Grasp, hand::Handedness, holdout::Holdout, strategy::Validity},
     physical::grip::Gripper,
     propose::prepared::PreparedRig,
@@ -251,8 +251,8 @@ impl Maker {
         let (object, presented) = scene.physical()?;
         let entry = self.atlases.of(cell)?.entries().get(usize::from(entry))?;
         let solids = entry.tracked_solids(scene.rig());
-        let asked = Recheck::new(object, scene.rig(), presented);
-        let grasp = asked.hold(entry, &solids, &mut Gripper::default())?;
+        let checker = GripChecker::new(object, scene.rig(), presented);
+        let grasp = checker.check(entry, &solids, &mut Gripper::default())?;
         Some(Box::new(grasp))
     }
 

@@ -14,7 +14,7 @@ use crate::{
 pub use crate::known::occupancy::Excluded;
 pub use crate::known::shortlist::{Listed, Shortlist};
 
-/// What is known of how a hand holds an object.
+/// The known grips of one hand on one object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Atlas {
     grips: Grips,
@@ -26,7 +26,7 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// An atlas of what is known of an object and a rig; `complete` if it is not going to grow.
+    /// Builds the atlas of an object and a rig. `complete` if it will not grow any further.
     pub fn new(object: &GraspObject, rig: &Rig, grips: Grips, complete: bool) -> Self {
         let entries = grips.entries();
         let occupancy = Occupancy::of(object, rig, entries);
@@ -40,60 +40,60 @@ impl Atlas {
         }
     }
 
-    /// The grips: in the order in which they were found, or by falling score once they are complete.
+    /// The grips, in the order found; once complete, by falling score.
     pub fn entries(&self) -> &[Entry] {
         self.grips.entries()
     }
 
-    /// The same with what tells soonest that they are in a giver's way.
+    /// The same grips with the data that screens them against a giver.
     pub fn grips(&self) -> &Grips {
         &self.grips
     }
 
-    /// True if it is not going to grow.
+    /// True if the atlas will not grow any further.
     pub fn is_complete(&self) -> bool {
         self.complete
     }
 
-    /// A number that names these grips: the same for the same grips in the same order.
+    /// Identifies the grips: equal for the same grips in the same order.
     pub fn stamp(&self) -> u64 {
         self.stamp
     }
 
-    /// The grips in the order of their score when `up` (a unit vector in the object's frame) is against gravity, as
-    /// indices of [`Atlas::entries`]; those that the object would slip out of come last.
+    /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the
+    /// object's frame. Grips that let the object slip come last.
     pub fn by_score(&self, up: Vec3) -> &[u16] {
         self.order.under(up)
     }
 
-    /// Some of the grips that the object does not slip out of, by falling score, of which nearly every giver leaves one:
-    /// those to be tried first where there is a giver and any valid one will do.
+    /// A few grips that hold under this gravity, by falling score, chosen so that nearly every giver leaves
+    /// at least one free. Try these first when there is a giver and any valid grasp will do.
     pub fn shortlist(&self, up: Vec3) -> Shortlist<'_> {
         self.shortlists.under(up)
     }
 
-    /// The grips that are on any of these lists, as rising indices of [`Atlas::entries`].
+    /// The grips on any shortlist, as ascending indices into [`Atlas::entries`].
     pub fn listed(&self) -> impl Iterator<Item = u16> {
         self.shortlists.all().iter().map(|listed| listed.entry)
     }
 
-    /// Those of [`Atlas::by_score`] that the object does not slip out of.
+    /// The part of [`Atlas::by_score`] that holds the object.
     pub fn holding_under(&self, up: Vec3) -> &[u16] {
         self.order.holding_under(up)
     }
 
-    /// The grips that certainly come too near to a giver's hand, or to its forearm; others may, too.
+    /// The grips that certainly come too close to a giver's hand or forearm; others may, too.
     pub fn excluded_by(&self, giver: &PreparedHand) -> Excluded<'_> {
         self.occupancy.excluded_by(giver)
     }
 
-    /// Bytes that it takes in memory.
+    /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
         self.grips.bytes() + self.order.bytes() + self.shortlists.bytes() + self.occupancy.bytes()
     }
 }
 
-/// The first bytes of a hash over where the hands are and what they are worth.
+/// The first eight bytes of a hash of the hand poses and their scores.
 pub(super) fn stamp(entries: &[Entry]) -> u64 {
     let mut hash = Sha256::new();
     for entry in entries {

@@ -1,9 +1,9 @@
-//! Atlases as bytes.
+//! The binary format of atlases.
 //!
-//! A header (a mark, the format, the key, flags and counts), the grips, and the SHA-256 of all before. Numbers are
-//! big-endian, and every one is kept bit by bit, so that an atlas that was read is the one that was written. What
-//! follows from other numbers is not written but computed: yaws and bend ratios from the hand's shape, a contact's
-//! third coordinate from its triangle, the normal from that and the hand.
+//! A header (magic bytes, format, key, flags and counts), the grips, and the SHA-256 of everything before it.
+//! Numbers are big-endian and keep every bit, so decoding restores exactly the atlas that was encoded.
+//! Derived values are recomputed instead of stored: yaws and bend ratios from the hand's shape, a contact's
+//! third coordinate from its triangle, its normal from triangle and hand.
 
 mod entry_codec;
 mod numbers;
@@ -22,42 +22,42 @@ use crate::{
     model::{hand::rig::Rig, object::GraspObject},
     physical::shape::HandShape,
 };
-use entry_codec::{LEAST_ENTRY_BYTES, read_entry, write_entry};
+use entry_codec::{MIN_ENTRY_BYTES, read_entry, write_entry};
 use numbers::{Reader, Writer};
 
-/// What the bytes of every atlas start with.
+/// The magic bytes that every atlas starts with.
 const MARK: [u8; 8] = *b"GRASPATL";
 
-/// Counts the formats.
+/// Version of the format.
 const FORMAT: u16 = 5;
 
-/// Bytes of the checksum.
+/// Length of the checksum in bytes.
 const CHECKSUM_BYTES: usize = 32;
 
-/// Why bytes are not the atlas of an object and a hand.
+/// Why bytes cannot be decoded as the atlas of an object and a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AtlasError {
-    /// They do not start like an atlas.
-    #[error("it is not an atlas")]
+    /// The magic bytes are missing.
+    #[error("not an atlas")]
     NotAnAtlas,
-    /// They are in another format.
-    #[error("it has format {found}; this program reads format {FORMAT}")]
+    /// The format is not the current one.
+    #[error("unsupported format {found}; this program reads format {FORMAT}")]
     OtherFormat {
-        /// The format that they say.
+        /// The format in the header.
         found: u16,
     },
-    /// The checksum differs: they were changed or cut.
-    #[error("it is damaged: its checksum differs")]
+    /// The checksum does not match.
+    #[error("damaged: the checksum does not match")]
     Damaged,
-    /// They belong to another object or hand, or were made by another algorithm.
-    #[error("it was made for another object or hand, or by another version")]
+    /// The key belongs to another object, hand or algorithm.
+    #[error("made for another object or hand, or by another version of the algorithm")]
     Stale,
-    /// The checksum is right, but they do not make sense.
-    #[error("it makes no sense: {0}")]
+    /// The checksum matches, but a value is invalid.
+    #[error("malformed: {0}")]
     Malformed(&'static str),
 }
 
-/// The bytes of what has grown for an object and a hand: some 250 a grip.
+/// Encodes a grown atlas: about 250 bytes per grip.
 pub fn encode(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
     let entries = grown.atlas.entries();
     let mut writer = Writer::default();
@@ -77,7 +77,8 @@ pub fn encode(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
     bytes
 }
 
-/// The SHA-256 of everything that is kept of the grips, in their order: growth that differs in anything has another.
+/// The SHA-256 of all encoded grips in order. Growths that differ in any stored value have different
+/// fingerprints.
 pub fn fingerprint(grown: &Grown, object: &GraspObject, rig: &Rig) -> [u8; CHECKSUM_BYTES] {
     let mut writer = Writer::default();
     for (entry, shape) in grown.atlas.entries().iter().zip(&grown.shapes) {
@@ -86,10 +87,10 @@ pub fn fingerprint(grown: &Grown, object: &GraspObject, rig: &Rig) -> [u8; CHECK
     Sha256::digest(writer.into_bytes()).into()
 }
 
-/// What has grown for an object and a hand.
+/// Decodes a grown atlas of an object and a hand.
 ///
 /// # Errors
-/// The bytes are anything else; see [`AtlasError`].
+/// The bytes are not a current atlas of this object and hand; see [`AtlasError`].
 pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, AtlasError> {
     let Content {
         grips,
@@ -106,15 +107,15 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
     })
 }
 
-/// The grips alone of what has grown for an object and a hand: without the lists of an atlas, which take most of the time.
+/// Decodes the grips alone. Skips building the look-up structures of an atlas, which takes most of the time.
 ///
 /// # Errors
-/// The bytes are anything else; see [`AtlasError`].
+/// As [`decode`].
 pub fn decode_grips(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grips, AtlasError> {
     Ok(read(bytes, object, rig)?.grips)
 }
 
-/// What the bytes say.
+/// The decoded fields.
 struct Content {
     grips: Grips,
     shapes: Vec<HandShape>,
@@ -151,8 +152,10 @@ fn read(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Content, AtlasE
     let count = reader.u32()? as usize;
     let proposed = reader.u64()?;
     let early_stamp = reader.u64()?;
-    if count > ENTRIES || count > reader.left() / LEAST_ENTRY_BYTES {
-        return Err(AtlasError::Malformed("it cannot have as many grips as it says"));
+    if count > ENTRIES || count > reader.remaining() / MIN_ENTRY_BYTES {
+        return Err(AtlasError::Malformed(
+            "the grip count exceeds what the size allows",
+        ));
     }
     let mut entries = Vec::with_capacity(count);
     let mut shapes = Vec::with_capacity(count);
@@ -161,8 +164,8 @@ fn read(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Content, AtlasE
         entries.push(entry);
         shapes.push(shape);
     }
-    if reader.left() > 0 {
-        return Err(AtlasError::Malformed("something follows the last grip"));
+    if reader.remaining() > 0 {
+        return Err(AtlasError::Malformed("unexpected bytes after the last grip"));
     }
     Ok(Content {
         grips: Grips::new(rig, entries),

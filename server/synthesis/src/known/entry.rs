@@ -1,4 +1,4 @@
-//! A grip of the atlas.
+//! A known grip of an atlas.
 
 use super::{
     finger_subsets::FingerSubsets,
@@ -27,30 +27,30 @@ use crate::{
     },
 };
 
-/// The score of a grip that cannot hold the object in a direction.
+/// The score of a grip that lets the object slip.
 pub const SLIPS: u8 = 0;
 
-/// A grip with what was found out about it once.
+/// A grip with everything that depends on hand and object alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The hand on the object.
     pub grip: Grip,
-    /// Where it touches.
+    /// Where the hand touches.
     pub contacts: Vec<Contact>,
-    /// Its type of the taxonomy.
+    /// Its grasp type in the taxonomy.
     pub classification: Classification,
-    /// The score's terms that depend on hand and object alone.
+    /// The terms of the score that depend on hand and object alone.
     pub grip_values: Values,
-    /// For each of [`DIRECTIONS`] against gravity: the score of grip and comfort in 1 … 255, or [`SLIPS`].
+    /// For each of [`DIRECTIONS`] against gravity: the score of grip and comfort from 1 to 255, or [`SLIPS`].
     pub scores: [u8; DIRECTIONS],
-    /// For each of them, how much friction the forces use; all of it where there are none.
+    /// For each of them, how much friction the forces use; full where the object slips.
     pub friction_uses: FrictionUses,
-    /// Which fingers hold without the others.
+    /// The finger subsets that hold by themselves.
     pub finger_subsets: FingerSubsets,
 }
 
 impl Entry {
-    /// An entry from what a gripper has just closed.
+    /// Evaluates the grip that `gripper` has just closed.
     pub fn new(
         scene: &ObjectScene<'_>,
         rig: &Rig,
@@ -81,12 +81,12 @@ impl Entry {
             );
             held.map_or(SLIPS, |balance| {
                 let values = force_values(scene, &contacts, &balance.forces);
-                quantised(of_grip + Score { values }.total())
+                quantized(of_grip + Score { values }.total())
             })
         });
         let finger_subsets = FingerSubsets::of(grip.holding_digits(), |kept| {
-            let of_kept = contacts.iter().filter(|contact| contact.part.is_palm_or_in(kept));
-            soften(of_kept, scene.friction, &mut gripper.soft_contacts);
+            let kept_contacts = contacts.iter().filter(|contact| contact.part.is_palm_or_in(kept));
+            soften(kept_contacts, scene.friction, &mut gripper.soft_contacts);
             gripper.closure(scene).is_some()
         });
         Self {
@@ -100,8 +100,9 @@ impl Entry {
         }
     }
 
-    /// What a grasp is known as for other holdouts of its object. How it fares under which gravity, and without some of its
-    /// fingers, is not known. None if it is not valid under `PHYSICAL`, and only right under the friction that it was found under.
+    /// A grasp as a known grip for other holdouts of its object, under the friction that it was found with.
+    /// Its scores by gravity and its finger subsets are unknown. None if the grasp is not valid under
+    /// `PHYSICAL`.
     pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
         let margins = grasp.margins?;
         let Score { mut values } = grasp.score?;
@@ -127,7 +128,7 @@ impl Entry {
         })
     }
 
-    /// What a grip of the same hand and contacts is worth now; none if its closure is not enough.
+    /// The entry evaluated again from the same hand and contacts; none if its closure is insufficient.
     pub fn reassessed(&self, scene: &ObjectScene<'_>, rig: &Rig, gripper: &mut Gripper) -> Option<Self> {
         gripper.contacts.clone_from(&self.contacts);
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);
@@ -139,43 +140,43 @@ impl Entry {
         Some(Self::new(scene, rig, grip, &solids, gripper))
     }
 
-    /// The same grip moved and turned. Which triangles it touches and what it is worth stays as it was where it was tried.
+    /// The same grip displaced. Triangles and scores stay as they were at the original place.
     #[must_use]
-    pub fn moved(&self, way: Pose) -> Self {
+    pub fn moved(&self, displacement: Pose) -> Self {
         let mut moved = self.clone();
         let wrist = &mut moved.grip.pose.frame_from_wrist;
-        *wrist = way * *wrist;
+        *wrist = displacement * *wrist;
         for contact in &mut moved.contacts {
-            contact.position = way.transform_point(contact.position);
-            contact.normal = way.transform_vector(contact.normal);
+            contact.position = displacement.transform_point(contact.position);
+            contact.normal = displacement.transform_vector(contact.normal);
         }
         moved
     }
 
-    /// The hand as solids, in the object's frame. They are not kept, as they would take twice as much memory as the rest.
+    /// The solids of the hand in the object's frame. Storing them would triple the size of an entry.
     pub fn solids(&self, rig: &Rig) -> HandSolids {
         HandSolids::of_pose(rig, &self.grip.pose)
     }
 
-    /// The hand as solids for where it is beside a giver's, in the object's frame.
+    /// The solids of the hand as they are compared with a giver's, in the object's frame.
     pub fn tracked_solids(&self, rig: &Rig) -> TrackedSolids {
         TrackedSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids(rig))
     }
 
-    /// True if wrist, contacts and type are what is demanded.
-    pub fn is_wanted(&self, constraints: &Constraints) -> bool {
+    /// True if wrist, contacts and grasp type satisfy the constraints.
+    pub fn meets(&self, constraints: &Constraints) -> bool {
         constraints.admits_wrist(self.grip.pose.frame_from_wrist)
             && constraints.admits_contacts(&self.contacts)
             && constraints.admits_type(self.classification.grasp_type)
     }
 
-    /// Bytes that the entry takes.
+    /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + size_of_val(self.contacts.as_slice())
     }
 }
 
-/// A score as a number from 1 to 255.
-fn quantised(score: f32) -> u8 {
+/// A score in 0 … 1 as a number from 1 to 255.
+fn quantized(score: f32) -> u8 {
     (1.0 + score.clamp(0.0, 1.0) * 254.0).round() as u8
 }

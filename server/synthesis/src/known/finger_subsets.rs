@@ -1,33 +1,33 @@
-//! Which fingers of a grip can be spared.
+//! Which fingers a grip can do without.
 
 use crate::model::hand::Digit;
 
-/// Fingers; the thumb is not one.
+/// Number of fingers, the thumb not included.
 const FINGERS: usize = 4;
 
-/// Sets of fingers that hold without the others: a bit for each of the sixteen, whose number has a bit for each finger from
-/// the index finger on. The thumb always holds with them.
+/// The finger subsets that hold by themselves. Bit `s` stands for subset `s`, in which bit `f` stands for
+/// finger `f`, counted from the index finger. The thumb is part of every subset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FingerSubsets(u16);
 
-/// What a giver's hand is in the way of.
+/// The parts of a hand that a giver obstructs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InWay {
-    /// Fingers, a bit each from the index finger on.
+pub struct Obstruction {
+    /// Fingers, one bit each, counted from the index finger.
     fingers: u8,
-    /// What cannot be spared: thumb, palm or forearm.
+    /// A part that the hand cannot do without: thumb, palm or forearm.
     others: bool,
 }
 
-impl InWay {
-    /// Nothing.
-    pub const NOTHING: Self = Self {
+impl Obstruction {
+    /// Nothing is obstructed.
+    pub const NONE: Self = Self {
         fingers: 0,
         others: false,
     };
 
-    /// The digit of an index as well, thumb first; beyond the fingers, palm or forearm.
-    pub(super) const fn and_of(self, digit: usize) -> Self {
+    /// Adds a digit, thumb first; higher indices stand for palm and forearm.
+    pub(super) const fn with_digit(self, digit: usize) -> Self {
         if digit == 0 || digit > FINGERS {
             Self { others: true, ..self }
         } else {
@@ -40,34 +40,35 @@ impl InWay {
 }
 
 impl FingerSubsets {
-    /// All fingers that hold, and those of them that have enough closure alone, as `closes` says of digits, thumb first. It
-    /// is not asked of fewer fingers than do not close: every contact only adds to what can be resisted.
+    /// All fingers that hold, and those of their subsets that have enough closure by themselves according to
+    /// `closes`, which takes digits, thumb first. Subsets of a set that does not close are not tested:
+    /// removing a contact never adds closure.
     pub fn of(holding: [bool; 5], mut closes: impl FnMut([bool; 5]) -> bool) -> Self {
         let whole = number(holding);
         let mut sets = Self::whole(holding);
-        // Sets with one finger more have higher numbers.
+        // A superset with one more finger has a higher number.
         for set in (1..whole).rev().filter(|set| set & !whole == 0) {
             let others = (0..FINGERS).map(|finger| 1 << finger);
-            let mut with_one_more = others
+            let mut supersets = others
                 .filter(|finger| finger & whole & !set != 0)
                 .map(|finger| finger | set);
-            if with_one_more.all(|more| sets.has(more)) && closes(digits(set)) {
+            if supersets.all(|more| sets.has(more)) && closes(digits(set)) {
                 sets.0 |= 1 << set;
             }
         }
         sets
     }
 
-    /// Those that hold, of which none can be spared.
+    /// The fingers that hold, and no smaller subset.
     pub fn whole(holding: [bool; 5]) -> Self {
         Self(1 << number(holding))
     }
 
-    /// From bits; none if they are not sets of digits that hold, or if all of those are not among them.
+    /// From bits; none if a subset has fingers that do not hold, or if the set of all that hold is missing.
     pub(super) fn from_bits(bits: u16, holding: [bool; 5]) -> Option<Self> {
         let whole = number(holding);
-        let are_of_whole = (0..=15_u8).all(|set| bits >> set & 1 == 0 || set & !whole == 0);
-        (are_of_whole && bits >> whole & 1 == 1).then_some(Self(bits))
+        let are_subsets = (0..=15_u8).all(|set| bits >> set & 1 == 0 || set & !whole == 0);
+        (are_subsets && bits >> whole & 1 == 1).then_some(Self(bits))
     }
 
     /// The bits of [`FingerSubsets::from_bits`].
@@ -75,34 +76,35 @@ impl FingerSubsets {
         self.0
     }
 
-    /// True if some digits, thumb first, hold alone.
+    /// True if these digits, thumb first, hold by themselves.
     pub fn contains(self, kept: [bool; 5]) -> bool {
         kept[Digit::Thumb.index()] && self.has(number(kept))
     }
 
-    /// True if what a giver leaves holds.
+    /// True if the unobstructed fingers hold.
     #[inline]
-    pub fn hold_without(self, in_way: InWay) -> bool {
-        !in_way.others && self.has(self.whole_number() & !in_way.fingers)
+    pub fn hold_despite(self, obstruction: Obstruction) -> bool {
+        !obstruction.others && self.has(self.whole_number() & !obstruction.fingers)
     }
 
-    /// The fingers that hold without the others of which the nearest to something is farthest from it, with the thumb, thumb
-    /// first; and that one's distance, infinite for none. `distances` are the fingers', from the index finger on.
+    /// The subset whose nearest finger is farthest away, as digits, thumb first, and the distance of that
+    /// finger; infinite for the thumb alone. `distances` are those of the fingers, from the index finger.
     pub fn farthest(self, distances: [f32; FINGERS]) -> ([bool; 5], f32) {
         let nearest_of = |set: u8| {
             let fingers = distances
                 .iter()
                 .enumerate()
                 .filter(|(finger, _)| set >> finger & 1 == 1);
-            fingers.fold((0, f32::INFINITY), |least, (finger, &distance)| {
-                if distance < least.1 {
+            fingers.fold((0, f32::INFINITY), |nearest, (finger, &distance)| {
+                if distance < nearest.1 {
                     (finger, distance)
                 } else {
-                    least
+                    nearest
                 }
             })
         };
-        // Without the nearest one, others may be farther; if those do not hold, no fewer of them do.
+        // Removing the nearest finger may increase the distance. If the rest does not hold, no smaller subset
+        // does.
         let mut set = self.whole_number();
         loop {
             let (nearest, distance) = nearest_of(set);
@@ -119,7 +121,7 @@ impl FingerSubsets {
         digits(self.whole_number())
     }
 
-    /// All fingers that hold have the highest number.
+    /// The set of all fingers that hold has the highest number.
     fn whole_number(self) -> u8 {
         self.0.checked_ilog2().unwrap_or(0) as u8
     }
@@ -129,13 +131,13 @@ impl FingerSubsets {
     }
 }
 
-/// The number of the set of fingers among some digits.
+/// The number of the finger subset among these digits.
 fn number(digits: [bool; 5]) -> u8 {
     let fingers = digits[1..].iter().enumerate();
     fingers.map(|(finger, &is_in)| u8::from(is_in) << finger).sum()
 }
 
-/// The digits of a set, thumb included.
+/// The digits of a subset, thumb included.
 fn digits(set: u8) -> [bool; 5] {
     std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1)
 }
@@ -151,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn sets_are_those_that_close_of_fingers_that_hold() {
+    fn contains_subsets_of_holding_fingers_that_close() {
         let all = FingerSubsets::of([true; 5], closes);
         for set in 0..16 {
             assert_eq!(all.contains(digits(set)), closes(digits(set)), "{set:04b}");
@@ -164,16 +166,16 @@ mod tests {
         assert_eq!(sets.holding(), without_ring);
         assert!(
             !sets.contains([false, true, true, false, true]),
-            "the thumb is not subset_grasp"
+            "the thumb is never left out"
         );
     }
 
     #[test]
-    fn the_farthest_fingers_are_those_of_all_sets() {
+    fn farthest_matches_exhaustive_search() {
         let mut numbers = (1..).map(|number: u32| number.wrapping_mul(2_654_435_761) >> 24);
         for case in 0..250_u8 {
             let holding = digits(1 + case % 15);
-            // Any that grows by fingers, as closure does.
+            // Any monotone predicate will do, as closure is one.
             let weights = numbers.next().unwrap();
             let sets = FingerSubsets::of(holding, |kept| {
                 let weight_of = |finger: u32| weights >> (2 * finger) & 3;
@@ -201,21 +203,21 @@ mod tests {
     }
 
     #[test]
-    fn fewer_fingers_than_do_not_close_are_not_asked_about() {
-        let mut asked = Vec::new();
+    fn skips_subsets_of_sets_that_do_not_close() {
+        let mut tested = Vec::new();
         FingerSubsets::of([true, true, true, true, false], |digits| {
-            asked.push(number(digits));
+            tested.push(number(digits));
             number(digits) == 0b110
         });
         assert_eq!(
-            asked,
+            tested,
             [0b110, 0b101, 0b011],
             "no single finger, as each is part of a pair that fails"
         );
     }
 
     #[test]
-    fn bits_come_again_and_others_are_refused() {
+    fn bits_round_trip_and_invalid_bits_are_rejected() {
         let holding = [true, true, false, true, true];
         let sets = FingerSubsets::of(holding, closes);
         assert_eq!(FingerSubsets::from_bits(sets.to_bits(), holding), Some(sets));

@@ -3,21 +3,21 @@
 use super::gravity::DIRECTIONS;
 use crate::physical::immobility::FrictionUse;
 
-// A bit for each direction.
+// One bit per direction.
 const _: () = assert!(DIRECTIONS == 64);
 
-/// A use of friction for each of [`DIRECTIONS`].
+/// The friction use for each of [`DIRECTIONS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrictionUses {
-    /// Directions in which they use more than sparingly, a bit each.
+    /// Directions with more than sparing use, one bit each.
     more: u64,
-    /// Of those, the ones in which they use all.
+    /// Those of them with full use.
     all: u64,
 }
 
 impl FrictionUses {
-    /// From bits: the directions in which forces use more than sparingly, and those of them in which they use all. None if
-    /// the latter are not among the former.
+    /// From bits: directions with more than sparing use, and those with full use. None if the latter are not
+    /// a subset of the former.
     pub(super) fn from_bits([more, all]: [u64; 2]) -> Option<Self> {
         (all & !more == 0).then_some(Self { more, all })
     }
@@ -27,7 +27,7 @@ impl FrictionUses {
         [self.more, self.all]
     }
 
-    /// That of a direction.
+    /// The friction use for a direction.
     pub fn get(self, direction: usize) -> FrictionUse {
         match (self.more >> direction & 1, self.all >> direction & 1) {
             (0, _) => FrictionUse::Low,
@@ -36,7 +36,7 @@ impl FrictionUses {
         }
     }
 
-    /// Sets that of a direction.
+    /// Sets the friction use for a direction.
     pub fn set(&mut self, direction: usize, friction_use: FrictionUse) {
         let bit = 1_u64 << direction;
         let put = |bits: u64, is_set: bool| if is_set { bits | bit } else { bits & !bit };
@@ -50,10 +50,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_direction_has_its_own() {
+    fn set_overwrites_one_direction_only() {
         let of = |direction: usize| FrictionUse::ALL[direction * 7 % 11 % 3];
         let mut uses = FrictionUses::default();
-        // Another one before, so that setting takes bits away, too.
+        // Sets another value first, so that clearing bits is tested, too.
         for direction in (0..DIRECTIONS).chain(0..DIRECTIONS).rev() {
             uses.set(direction, FrictionUse::Full);
             uses.set(direction, of(direction));

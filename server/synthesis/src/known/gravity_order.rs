@@ -1,22 +1,22 @@
-//! The order of the grips by gravity's direction.
+//! Grips sorted by score for each direction of gravity.
 
 use glam::Vec3;
 
 use super::{
     entry::{Entry, SLIPS},
-    gravity::{DIRECTIONS, nearest},
+    gravity::{DIRECTIONS, nearest_direction},
 };
 
-/// The grips under one direction.
+/// The grips for one direction.
 #[derive(Clone, Debug, PartialEq)]
 struct Order {
     /// By falling score.
     entries: Vec<u16>,
-    /// How many of them the object does not slip out of: they come first.
+    /// How many of them hold the object: they come first.
     holding: usize,
 }
 
-/// For each direction, the grips by falling score.
+/// The grips by falling score, for each direction.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct GravityOrder {
     orders: Vec<Order>,
@@ -27,7 +27,7 @@ impl GravityOrder {
         let order = |direction: usize| {
             let score = |entry: u16| entries[usize::from(entry)].scores[direction];
             let mut order: Vec<u16> = (0..entries.len() as u16).collect();
-            // Stable, so that equal scores stay in the order of the entries.
+            // Stable: equal scores keep the order of the entries.
             order.sort_by_key(|&entry| std::cmp::Reverse(score(entry)));
             Order {
                 holding: order.partition_point(|&entry| score(entry) != SLIPS),
@@ -43,14 +43,14 @@ impl GravityOrder {
         self.order(up).map_or(&[], |order| &order.entries)
     }
 
-    /// Those that the object does not slip out of.
+    /// The grips that hold the object.
     pub(super) fn holding_under(&self, up: Vec3) -> &[u16] {
         self.order(up)
             .map_or(&[], |order| &order.entries[..order.holding])
     }
 
     fn order(&self, up: Vec3) -> Option<&Order> {
-        self.orders.get(nearest(up))
+        self.orders.get(nearest_direction(up))
     }
 
     pub(super) fn bytes(&self) -> usize {

@@ -1,9 +1,9 @@
-//! Known grips, each with what tells soonest that it is in a giver's way.
+//! Known grips with the data that screens them against a giver.
 
 use super::{
     entry::Entry,
     finger_subsets::FingerSubsets,
-    inner_spheres::{farthest_by_first, first_spheres, in_way_by_first, second_spheres},
+    inner_spheres::{first_spheres, obstruction_from_first, second_spheres, upper_bounds_from_first},
 };
 use crate::{
     base::pose::Pose,
@@ -14,22 +14,22 @@ use crate::{
     },
 };
 
-/// Grips, in the order of [`super::Atlas::entries`]. Whoever asks hands in the rig that they were made for.
+/// Grips, in the order of [`super::atlas::Atlas::entries`]. Callers pass the rig that the grips were made for.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grips {
     entries: Vec<Entry>,
-    /// The first balls inside each hand, side by side, so that looking at one mostly takes two lines of the cache.
+    /// The first inner spheres of each hand, contiguous: screening a grip mostly touches two cache lines.
     inner_spheres: Vec<Spheres>,
-    /// Which fingers hold without the others.
+    /// The finger subsets that hold, for each grip.
     finger_subsets: Vec<FingerSubsets>,
 }
 
 impl Grips {
-    /// Some grips of a rig.
+    /// Known grips of a rig.
     pub fn new(rig: &Rig, entries: Vec<Entry>) -> Self {
-        let core = |entry: &Entry| first_spheres(&entry.solids(rig));
+        let spheres = |entry: &Entry| first_spheres(&entry.solids(rig));
         Self {
-            inner_spheres: entries.iter().map(core).collect(),
+            inner_spheres: entries.iter().map(spheres).collect(),
             finger_subsets: entries.iter().map(|entry| entry.finger_subsets).collect(),
             entries,
         }
@@ -40,72 +40,82 @@ impl Grips {
         &self.entries
     }
 
-    /// Adds a grip.
+    /// Appends a grip.
     pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
         self.inner_spheres.push(first_spheres(&entry.solids(rig)));
         self.finger_subsets.push(entry.finger_subsets);
         self.entries.push(entry);
     }
 
-    /// Puts a grip in the place of another one.
+    /// Replaces a grip.
     pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
         self.inner_spheres[index] = first_spheres(&entry.solids(rig));
         self.finger_subsets[index] = entry.finger_subsets;
         self.entries[index] = entry;
     }
 
-    /// The solids of a grip, an index of [`Grips::entries`]; none only if it comes too near to a giver's hand, and not
-    /// always then. Sooner told than exactly: mostly by some 20 ns of work.
+    /// The solids of grip `entry`, an index into [`Grips::entries`], unless its inner spheres show that it is
+    /// too close to the giver. Conservative: a grip that passes may still collide. Mostly takes about 20 ns.
     #[inline]
-    pub fn unless_met(&self, entry: usize, rig: &Rig, giver: &PreparedHand) -> Option<Box<TrackedSolids>> {
+    pub fn screen_against_giver(
+        &self,
+        entry: usize,
+        rig: &Rig,
+        giver: &PreparedHand,
+    ) -> Option<Box<TrackedSolids>> {
         if giver.any_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE) {
             return None;
         }
-        self.unless_met_by_second(entry, rig, giver)
+        self.screen_by_second_spheres(entry, rig, giver)
     }
 
-    /// One in fifty that meet gets as far as the second balls, which are not kept for that.
+    /// Reached by one in fifty colliding grips; its spheres are computed on demand.
     #[inline(never)]
-    fn unless_met_by_second(
+    fn screen_by_second_spheres(
         &self,
         entry: usize,
         rig: &Rig,
         giver: &PreparedHand,
     ) -> Option<Box<TrackedSolids>> {
         let solids = self.entries[entry].tracked_solids(rig);
-        let is_met = giver.any_certainly_within(&second_spheres(&solids.hand), GIVER_CLEARANCE);
-        (!is_met).then(|| Box::new(solids))
+        let collides = giver.any_certainly_within(&second_spheres(&solids.hand), GIVER_CLEARANCE);
+        (!collides).then(|| Box::new(solids))
     }
 
-    /// False only if the giver's hand surely leaves too few digits of a grip to hold the object, or is too near to its palm or
-    /// forearm; not always then. Mostly by some 20 ns of work.
+    /// False only if the giver certainly obstructs thumb, palm or forearm of a grip, or so many fingers that
+    /// the others do not hold. Conservative, and mostly takes about 20 ns.
     #[inline]
-    pub fn may_hold_with_subset(&self, entry: usize, giver: &PreparedHand) -> bool {
+    pub fn subset_may_hold(&self, entry: usize, giver: &PreparedHand) -> bool {
         let sets = self.finger_subsets[entry];
-        let is_too_much = |near| !sets.hold_without(in_way_by_first(near));
-        let near = giver.which_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE, is_too_much);
-        !is_too_much(near)
+        let excludes_grip = |near| !sets.hold_despite(obstruction_from_first(near));
+        let near = giver.which_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE, excludes_grip);
+        !excludes_grip(near)
     }
 
-    /// What thumb, palm, forearm and those fingers of a grip that hold without the others are from the giver's hand at most, in
-    /// metres, by the first balls inside alone.
+    /// Upper bound of the giver's distance, in metres, from thumb, palm, forearm and the best finger subset
+    /// of a grip, by its first inner spheres.
     pub(super) fn clearance_upper_bound(&self, entry: usize, giver: &PreparedHand) -> f32 {
-        self.core_clearance(entry, &self.inner_spheres[entry], giver)
+        self.spheres_upper_bound(entry, &self.inner_spheres[entry], giver)
     }
 
-    /// The same for a grip that is moved.
-    pub(crate) fn moved_clearance_upper_bound(&self, entry: usize, way: Pose, giver: &PreparedHand) -> f32 {
-        self.core_clearance(entry, &self.inner_spheres[entry].transformed(way), giver)
+    /// The same for a displaced grip.
+    pub(crate) fn moved_clearance_upper_bound(
+        &self,
+        entry: usize,
+        displacement: Pose,
+        giver: &PreparedHand,
+    ) -> f32 {
+        self.spheres_upper_bound(entry, &self.inner_spheres[entry].transformed(displacement), giver)
     }
 
-    fn core_clearance(&self, entry: usize, core: &Spheres, giver: &PreparedHand) -> f32 {
-        let distances = giver.distance_upper_bounds(core);
-        let (fingers, others) = farthest_by_first(&distances);
+    fn spheres_upper_bound(&self, entry: usize, spheres: &Spheres, giver: &PreparedHand) -> f32 {
+        let distances = giver.distance_upper_bounds(spheres);
+        let (fingers, others) = upper_bounds_from_first(&distances);
         let (_, of_fingers) = self.finger_subsets[entry].farthest(fingers);
         of_fingers.min(others)
     }
 
-    /// Bytes that they take in memory.
+    /// Memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.entries.iter().map(Entry::bytes).sum::<usize>()
             + size_of_val(self.inner_spheres.as_slice())

@@ -1,11 +1,11 @@
-//! How an atlas grows: rounds of proposals, half of them new and half beside grips that are known, and a limit on how
-//! many grips may be alike (`spread.rs`), of which the better ones stay.
+//! Grows atlases in rounds of proposals, half of them fresh and half perturbed from known grips. At most a
+//! few similar grips are kept, the best ones (`spread.rs`).
 //!
-//! Every other round has a giver: one of the known grips is taken for the hand that holds the object out, and grips are
-//! looked for that keep clear of it. So the atlas comes to answer where a giver leaves little room.
+//! Every other round has a giver: a known grip plays the hand that holds the object out, and the round
+//! searches for grips clear of it. So the atlas also serves givers who leave little room.
 //!
-//! A round's proposals depend on the rounds before and on nothing else, and what comes of them is taken over in their
-//! order, so that an atlas is the same however many threads make it and whenever they are interrupted.
+//! A round's proposals depend only on the rounds before it, and their results are admitted in order. So an
+//! atlas is the same for any number of threads and any interruptions.
 
 use std::{cmp::Reverse, sync::Arc};
 
@@ -16,7 +16,7 @@ use super::{
     entry::Entry,
     grips::Grips,
     seeds::Seeds,
-    spread::{Cell, Room, Spread, worth},
+    spread::{Admission, Cell, Spread, base_score},
 };
 use crate::{
     base::mechanisms::Mechanisms,
@@ -41,66 +41,67 @@ use crate::{
     rating::{scoring::grip_values, taxonomy::classify},
 };
 
-/// Grips of a complete atlas. More leave more to choose from, and take more memory (some 1.2 kilobytes each) and time.
+/// Grips of a complete atlas. More offer more choice, and cost time and about 1.2 kilobytes each.
 pub const ENTRIES: usize = 8192;
 
-/// Proposals of a round.
+/// Proposals per round.
 pub const ROUND: u64 = 64;
 
-/// Proposals after which an atlas is complete even with fewer grips: an object that cannot be held must not be worked on
-/// forever. With half as many, atlases of thin objects are not filled.
-pub const MOST_PROPOSALS: u64 = 400_000;
+/// Proposals after which an atlas is complete even with fewer grips, so that work on objects that cannot be
+/// held ends. With half as many, atlases of thin objects are not filled.
+pub const MAX_PROPOSALS: u64 = 400_000;
 
-/// Proposals after which an atlas is stamped: what grows otherwise now shows there, after two seconds instead of minutes. With
-/// fewer, no round has had a giver yet.
+/// Proposals after which an atlas is stamped: a change of the algorithm shows there after seconds instead of
+/// minutes. With fewer, no round has had a giver yet.
 pub const EARLY_PROPOSALS: u64 = 96 * ROUND;
 
-/// The seed of all atlases.
+/// Seed of the proposals.
 const SEED: u64 = 0x4154_4c41;
 
-/// Share of proposals beside known grips, once there are any: they succeed ten times as often as new ones, which find
-/// what is not known yet.
+/// Share of perturbed proposals once grips are known. They succeed ten times as often as fresh ones, which
+/// discover new regions.
 const PERTURBED_SHARE: f32 = 0.5;
 
-/// The seed of the choice of givers.
+/// Seed of the givers.
 const GIVERS_SEED: u64 = 0x4749_5645;
 
-/// Grips from which on some are taken for givers.
-const ENOUGH_FOR_GIVERS: usize = 256;
+/// Number of grips from which on rounds have givers.
+const MIN_GRIPS_FOR_GIVERS: usize = 256;
 
-/// A giver that this many grips keep clear of leaves enough, whatever gravity does to them; for one that leaves fewer,
-/// grips are kept even where others are like them.
-const ENOUGH_FREE: usize = 60;
+/// A giver that leaves this many grips clear needs no more, whatever the gravity. For one that leaves fewer,
+/// grips are admitted even to full cells.
+const ENOUGH_CLEAR_GRIPS: usize = 60;
 
-/// How often a grip of a crowded cell is drawn again at most.
-const REDRAWS: usize = 8;
+/// Largest number of redraws of a grip from a crowded cell.
+const MAX_REDRAWS: usize = 8;
 
-/// What has grown so far, and all that it takes to go on.
+/// The state of a growth, with everything needed to resume it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grown {
     /// The grips.
     pub atlas: Arc<Atlas>,
-    /// The shape that each grip was closed from.
+    /// The shape that each grip's hand was closed from.
     pub(super) shapes: Vec<HandShape>,
-    /// Proposals that were tried.
+    /// Proposals tried.
     pub(super) proposed: u64,
     /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before.
     pub(super) early_stamp: u64,
 }
 
 impl Grown {
-    /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before. Growth that differs has another.
+    /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before. Growths that differ have different
+    /// stamps.
     pub fn early_stamp(&self) -> u64 {
         self.early_stamp
     }
 
-    /// How many proposals were tried; 0 if these are the listed grips of another atlas.
+    /// Number of proposals tried; 0 if these are the listed grips of another atlas.
     pub fn proposed(&self) -> u64 {
         self.proposed
     }
 
-    /// The grips of its shortlists alone, as an incomplete atlas: nearly every giver leaves some of these few free. The
-    /// atlas itself cannot be grown from them: growth would start over at its first proposal.
+    /// The shortlisted grips alone, as an incomplete atlas: nearly every giver leaves some of these few free.
+    /// Resuming from it does not continue the growth of the atlas, but starts over.
     #[must_use]
     pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
         let places: Vec<usize> = self.atlas.listed().map(usize::from).collect();
@@ -114,32 +115,32 @@ impl Grown {
         }
     }
 
-    /// Bytes that it takes in memory.
+    /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
         self.atlas.bytes() + size_of_val(self.shapes.as_slice())
     }
 }
 
-/// What a proposal gave.
-type Found = Option<(Entry, HandShape)>;
+/// The result of a proposal.
+type Outcome = Option<(Entry, HandShape)>;
 
-/// A grip that is taken for the giver's.
+/// A known grip that plays the giver's hand.
 #[derive(Debug)]
 struct Giver {
     presented: Presented,
     surface: SurfacePairs,
-    /// Known grips that it is nearly clear of, if there is need of more that keep clear of it.
+    /// Known grips that are nearly clear of it, if it needs more clear grips.
     seeds: Option<Seeds>,
 }
 
 impl Giver {
-    /// Is there need of grips that keep clear of it?
-    fn is_needy(&self) -> bool {
+    /// True if too few known grips are clear of it.
+    fn needs_grips(&self) -> bool {
         self.seeds.is_some()
     }
 }
 
-/// An atlas in the making.
+/// An atlas being grown.
 #[derive(Debug)]
 pub struct Growth<'a> {
     scene: ObjectScene<'a>,
@@ -167,7 +168,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Goes on from what grew for the same object and rig, if it is not complete: what comes of it is the same as without an
+    /// Resumes an incomplete growth of the same object and rig. The result is the same as without
     /// interruption.
     pub fn resume(object: &'a PreparedObject, rig: &'a PreparedRig, grown: &Grown) -> Self {
         let mut growth = Self::new(object, rig);
@@ -179,33 +180,33 @@ impl<'a> Growth<'a> {
         growth
     }
 
-    /// How many grips there are.
+    /// The number of grips.
     pub fn len(&self) -> usize {
         self.grips.entries().len()
     }
 
-    /// True if there is no grip yet.
+    /// True if there are no grips yet.
     pub fn is_empty(&self) -> bool {
         self.grips.entries().is_empty()
     }
 
-    /// How many proposals were tried.
+    /// The number of proposals tried.
     pub fn proposed(&self) -> u64 {
         self.proposed
     }
 
-    /// True if there is nothing left to do.
+    /// True if the growth has ended.
     pub fn is_complete(&self) -> bool {
-        self.len() >= ENTRIES || self.proposed >= MOST_PROPOSALS
+        self.len() >= ENTRIES || self.proposed >= MAX_PROPOSALS
     }
 
-    /// The atlas as it stands.
+    /// The atlas grown so far.
     pub fn atlas(&self) -> Atlas {
         Arc::unwrap_or_clone(self.grown().atlas)
     }
 
-    /// What has grown so far. When nothing more is going to, grips that score most come first: then those that are tried
-    /// first, whatever gravity's direction, lie side by side in memory.
+    /// The state of the growth. Once complete, grips with high scores come first: the ones that look-ups try
+    /// first are then adjacent in memory for any gravity.
     pub fn grown(&self) -> Grown {
         let is_complete = self.is_complete();
         let (grips, shapes) = if is_complete {
@@ -221,8 +222,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Grips and shapes by falling sum of the grips' scores under all directions of gravity; of equal ones, what was found
-    /// first.
+    /// Grips and shapes by falling sum of scores over all directions of gravity; ties keep the order found.
     fn by_score(&self) -> (Grips, Vec<HandShape>) {
         let entries = self.grips.entries();
         let mut order: Vec<usize> = (0..entries.len()).collect();
@@ -235,16 +235,16 @@ impl<'a> Growth<'a> {
         (Grips::new(self.rig, entries), shapes)
     }
 
-    /// One round: some milliseconds.
+    /// Runs one round, which takes some milliseconds.
     pub fn round(&mut self, gripper: &mut Gripper) {
-        let giver = self.giver();
-        let found: Vec<Found> = (self.proposed..self.proposed + ROUND)
+        let giver = self.draw_giver();
+        let found: Vec<Outcome> = (self.proposed..self.proposed + ROUND)
             .map(|index| self.try_proposal(index, giver.as_ref(), gripper))
             .collect();
         self.proposed += ROUND;
-        let is_needy = giver.as_ref().is_some_and(Giver::is_needy);
+        let needs_grips = giver.as_ref().is_some_and(Giver::needs_grips);
         for (entry, shape) in found.into_iter().flatten() {
-            self.take(entry, shape, is_needy);
+            self.admit(entry, shape, needs_grips);
         }
         if self.proposed == EARLY_PROPOSALS {
             self.early_stamp = stamp(self.grips.entries());
@@ -252,16 +252,16 @@ impl<'a> Growth<'a> {
     }
 
     /// The giver of this round, if it has one.
-    fn giver(&self) -> Option<Giver> {
+    fn draw_giver(&self) -> Option<Giver> {
         let round = self.proposed / ROUND;
-        if self.len() < ENOUGH_FOR_GIVERS || round.is_multiple_of(2) {
+        if self.len() < MIN_GRIPS_FOR_GIVERS || round.is_multiple_of(2) {
             return None;
         }
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
-        let pose = &self.grips.entries()[self.draw(&mut stream)].grip.pose;
+        let pose = &self.grips.entries()[self.draw_grip(&mut stream)].grip.pose;
         let hand = PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
         let all = 0..self.len() as u16;
-        let seeds = if self.count_free(&hand) < ENOUGH_FREE {
+        let seeds = if self.count_clear(&hand) < ENOUGH_CLEAR_GRIPS {
             Seeds::of(&self.grips, self.rig, all, Some(&hand), || false)
         } else {
             None
@@ -277,16 +277,16 @@ impl<'a> Growth<'a> {
         })
     }
 
-    /// How many grips keep clear of a giver's hand, up to enough.
-    fn count_free(&self, giver: &PreparedHand) -> usize {
-        let is_free = |&entry: &usize| {
-            let solids = self.grips.unless_met(entry, self.rig, giver);
+    /// The number of grips clear of a giver's hand, up to [`ENOUGH_CLEAR_GRIPS`].
+    fn count_clear(&self, giver: &PreparedHand) -> usize {
+        let is_clear = |&entry: &usize| {
+            let solids = self.grips.screen_against_giver(entry, self.rig, giver);
             solids.is_some_and(|solids| clear_of_giver(&solids, Some(giver)).is_some())
         };
-        (0..self.len()).filter(is_free).take(ENOUGH_FREE).count()
+        (0..self.len()).filter(is_clear).take(ENOUGH_CLEAR_GRIPS).count()
     }
 
-    fn try_proposal(&self, index: u64, giver: Option<&Giver>, gripper: &mut Gripper) -> Found {
+    fn try_proposal(&self, index: u64, giver: Option<&Giver>, gripper: &mut Gripper) -> Outcome {
         let mut stream = AttemptStream::new(SEED, index);
         let proposal = self.propose(giver, &mut stream)?;
         let presented = giver.map(|giver| &giver.presented);
@@ -300,8 +300,8 @@ impl<'a> Growth<'a> {
                 &|| false,
             )
             .ok()?;
-        // What comes next takes longest: what is crowded out anyhow is dropped before.
-        let is_needy = giver.is_some_and(Giver::is_needy);
+        // Evaluating the entry takes longest: drop it first if its cell is full.
+        let needs_grips = giver.is_some_and(Giver::needs_grips);
         let contacts = &gripper.contacts;
         let classification = classify(self.rig, &grip.pose, contacts);
         let values = grip_values(
@@ -314,7 +314,7 @@ impl<'a> Growth<'a> {
             &solids,
         );
         let cell = Cell::of(self.rig, &grip.pose, contacts);
-        if !is_needy && self.spread.room(cell, Score { values }.grip_total()) == Room::Crowded {
+        if !needs_grips && self.spread.admission(cell, Score { values }.grip_total()) == Admission::Reject {
             return None;
         }
         let entry = Entry::new(&self.scene, self.rig, grip, &solids, gripper);
@@ -322,7 +322,7 @@ impl<'a> Growth<'a> {
     }
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
-        let is_beside = !self.is_empty() && stream.unit() < PERTURBED_SHARE;
+        let is_perturbed = !self.is_empty() && stream.unit() < PERTURBED_SHARE;
         let place = ProposalContext {
             object: self.scene.object,
             surface: giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface),
@@ -332,23 +332,21 @@ impl<'a> Growth<'a> {
             mechanisms: Mechanisms::ALL,
         };
         match giver.map(|giver| &giver.seeds) {
-            Some(Some(seeds)) if is_beside => seeds.propose_evenly(self.grips.entries(), &place, stream),
-            None if is_beside => Some(self.perturbed_known(stream)),
-            // Beside a giver who leaves enough, most known grips are of no use.
+            Some(Some(seeds)) if is_perturbed => seeds.propose_evenly(self.grips.entries(), &place, stream),
+            None if is_perturbed => Some(self.perturbed_known(stream)),
+            // Perturbing known grips is wasted on a giver with enough clear ones: most of them collide.
             _ => propose_evenly(&place, stream, &|| false),
         }
     }
 
-    /// One of the grips, those of crowded cells no more likely than others: givers and hands like what is known in plenty
-    /// find nothing new. Of 1,600 holdouts of the built-in scalpel with 400 recorded givers, atlases that were grown so
-    /// left 4.3 to 5.6 % without an answer in 50 ms (five), and 4.7 to 7.4 % with half the proposals (nine, of three to eight
-    /// grips a cell); without, 5.6 to 6.4 % with three a cell (four), and 6.8 to 8.1 % with eight (three).
-    fn draw(&self, stream: &mut AttemptStream) -> usize {
+    /// Draws a grip. Redrawing from crowded cells makes all cells about equally likely, so that givers and
+    /// perturbed hands explore sparsely covered regions.
+    fn draw_grip(&self, stream: &mut AttemptStream) -> usize {
         let mut index = stream.below(self.len());
-        for _ in 0..REDRAWS {
+        for _ in 0..MAX_REDRAWS {
             let entry = &self.grips.entries()[index];
             let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-            if stream.unit() * (self.spread.alike(cell) as f32) < 1.0 {
+            if stream.unit() * (self.spread.count_in(cell) as f32) < 1.0 {
                 break;
             }
             index = stream.below(self.len());
@@ -356,9 +354,9 @@ impl<'a> Growth<'a> {
         index
     }
 
-    /// A hand beside a known grip.
+    /// A hand perturbed from a known grip.
     fn perturbed_known(&self, stream: &mut AttemptStream) -> Proposal {
-        let index = self.draw(stream);
+        let index = self.draw_grip(stream);
         let known = Proposal {
             object_from_wrist: self.grips.entries()[index].grip.pose.frame_from_wrist,
             shape: self.shapes[index],
@@ -367,16 +365,16 @@ impl<'a> Growth<'a> {
         known.perturbed(stream)
     }
 
-    /// Takes a grip over, if there is room for it or it is needed.
-    fn take(&mut self, entry: Entry, shape: HandShape, is_needed: bool) {
+    /// Admits a grip if its cell has room for it or if it is required.
+    fn admit(&mut self, entry: Entry, shape: HandShape, is_required: bool) {
         let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-        match self.spread.room(cell, worth(&entry)) {
-            Room::InsteadOf(index) if !is_needed => {
-                self.spread.note(cell, index, worth(&entry));
+        match self.spread.admission(cell, base_score(&entry)) {
+            Admission::Replace(index) if !is_required => {
+                self.spread.record(cell, index, base_score(&entry));
                 self.grips.replace(self.rig, index, entry);
                 self.shapes[index] = shape;
             }
-            Room::Crowded if !is_needed => {}
+            Admission::Reject if !is_required => {}
             _ if self.len() < ENTRIES => self.push(entry, shape),
             _ => {}
         }
@@ -384,7 +382,7 @@ impl<'a> Growth<'a> {
 
     fn push(&mut self, entry: Entry, shape: HandShape) {
         let cell = Cell::of(self.rig, &entry.grip.pose, &entry.contacts);
-        self.spread.note(cell, self.len(), worth(&entry));
+        self.spread.record(cell, self.len(), base_score(&entry));
         self.grips.push(self.rig, entry);
         self.shapes.push(shape);
     }

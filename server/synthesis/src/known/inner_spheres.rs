@@ -1,19 +1,20 @@
-//! Balls inside a hand: what they come too near to, the hand does.
+//! Spheres inside a hand: whatever comes too close to one of them comes too close to the hand.
 
-use super::finger_subsets::InWay;
+use super::finger_subsets::Obstruction;
 use crate::physical::solids::{HandSolids, SPHERES, Spheres};
 
-/// A ball inside a hand: the index of its solid in [`HandSolids::iter`], and where on its axis, from 0 to 1.
-type InnerSpheres = (usize, f32);
+/// A sphere inside a hand: the index of its solid in [`HandSolids::iter`], and its centre on the solid's
+/// axis, from 0 to 1.
+type InnerSphere = (usize, f32);
 
-/// Solids of a digit, which come first in [`HandSolids::iter`].
+/// Solids per digit; the digits come first in [`HandSolids::iter`].
 const LINKS: usize = 3;
 
-/// The balls that settle most, each the one that settled most of what those before it had left: of 32,203 pairs of hands
-/// that meet, grips of the built-in objects by falling score beside recorded givers, these leave 2 %, …
-const FIRST: [InnerSpheres; SPHERES] = [
-    // The middle finger's first link, the thumb's second, the tips of ring and index finger, the palm below the little
-    // finger, the little finger, the tips of middle finger and thumb.
+/// Chosen greedily, each for the most colliding pairs of hands (known grips and recorded givers) that the
+/// spheres before it do not detect. All eight miss 2 % of those pairs.
+const FIRST: [InnerSphere; SPHERES] = [
+    // Middle finger's first link, thumb's second, tips of ring and index finger, palm below the little
+    // finger, little finger, tips of middle finger and thumb.
     (6, 0.3),
     (1, 0.9),
     (11, 0.1),
@@ -24,10 +25,10 @@ const FIRST: [InnerSpheres; SPHERES] = [
     (2, 0.9),
 ];
 
-/// … and these 2 in a thousand. What is left takes fifty times as long each.
-const SECOND: [InnerSpheres; SPHERES] = [
-    // The ball of the thumb, the first links of index, little and ring finger, the tips of middle and index finger, the
-    // forearm, the tip of the little finger.
+/// With these as well, 0.2 % are missed. An exact comparison takes fifty times as long.
+const SECOND: [InnerSphere; SPHERES] = [
+    // Thenar, first links of index, little and ring finger, tips of middle and index finger, forearm, tip of
+    // the little finger.
     (26, 0.9),
     (3, 0.9),
     (12, 0.7),
@@ -38,42 +39,44 @@ const SECOND: [InnerSpheres; SPHERES] = [
     (14, 0.9),
 ];
 
-/// The first balls inside a hand.
+/// The first inner spheres of a hand.
 pub(super) fn first_spheres(solids: &HandSolids) -> Spheres {
     spheres(solids, &FIRST)
 }
 
-/// The second ones.
+/// The second inner spheres of a hand.
 pub(super) fn second_spheres(solids: &HandSolids) -> Spheres {
     spheres(solids, &SECOND)
 }
 
-/// Of first balls, those of some digits, palm and forearm; in place of the others nothing that is near to anything.
+/// The first spheres of some digits, palm and forearm; the others are replaced by spheres that are near
+/// nothing.
 pub(super) fn first_of_digits(first: Spheres, digits: [bool; 5]) -> Spheres {
-    of_digits(first, &FIRST, digits)
+    keep_digits(first, &FIRST, digits)
 }
 
-/// Of second ones, likewise.
+/// The same for the second spheres.
 pub(super) fn second_of_digits(second: Spheres, digits: [bool; 5]) -> Spheres {
-    of_digits(second, &SECOND, digits)
+    keep_digits(second, &SECOND, digits)
 }
 
-/// How far fingers, from the index finger on, and what cannot be spared are at most, by the distances of the first balls.
+/// Upper bounds of the distances of the fingers, from the index finger, and of thumb, palm and forearm
+/// together, by the distances of the first spheres.
 #[inline]
-pub(super) fn farthest_by_first(distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
-    by_owner(&FIRST, distances)
+pub(super) fn upper_bounds_from_first(distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
+    upper_bounds(&FIRST, distances)
 }
 
-/// The same by those of the second ones.
-pub(super) fn farthest_by_second(distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
-    by_owner(&SECOND, distances)
+/// The same by the second spheres.
+pub(super) fn upper_bounds_from_second(distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
+    upper_bounds(&SECOND, distances)
 }
 
 #[inline]
-fn by_owner(inner_spheres: &[InnerSpheres; SPHERES], distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
+fn upper_bounds(inner_spheres: &[InnerSphere; SPHERES], distances: &[f32; SPHERES]) -> ([f32; 4], f32) {
     let (mut fingers, mut others) = ([f32::INFINITY; 4], f32::INFINITY);
-    for (core, &distance) in inner_spheres.iter().zip(distances) {
-        let digit = core.0 / LINKS;
+    for (sphere, &distance) in inner_spheres.iter().zip(distances) {
+        let digit = sphere.0 / LINKS;
         let owner = match digit.checked_sub(1) {
             Some(finger) if finger < fingers.len() => &mut fingers[finger],
             _ => &mut others,
@@ -83,40 +86,40 @@ fn by_owner(inner_spheres: &[InnerSpheres; SPHERES], distances: &[f32; SPHERES])
     (fingers, others)
 }
 
-/// What a giver is in the way of who is near to some of the first balls, a bit each.
+/// What a giver obstructs that is near some of the first spheres, one bit each.
 #[inline]
-pub(super) fn in_way_by_first(near: u8) -> InWay {
-    OF_FIRST[usize::from(near)]
+pub(super) fn obstruction_from_first(near: u8) -> Obstruction {
+    FROM_FIRST[usize::from(near)]
 }
 
-/// The same of the second ones.
+/// The same for the second spheres.
 #[inline]
-pub(super) fn in_way_by_second(near: u8) -> InWay {
-    OF_SECOND[usize::from(near)]
+pub(super) fn obstruction_from_second(near: u8) -> Obstruction {
+    FROM_SECOND[usize::from(near)]
 }
 
-/// For any of the first balls, looked up: it is asked for every grip.
-static OF_FIRST: [InWay; 1 << SPHERES] = in_way_of(&FIRST);
+/// Precomputed for all sets of first spheres, because look-ups need it for every grip.
+static FROM_FIRST: [Obstruction; 1 << SPHERES] = obstruction_table(&FIRST);
 
-static OF_SECOND: [InWay; 1 << SPHERES] = in_way_of(&SECOND);
+static FROM_SECOND: [Obstruction; 1 << SPHERES] = obstruction_table(&SECOND);
 
-const fn in_way_of(inner_spheres: &[InnerSpheres; SPHERES]) -> [InWay; 1 << SPHERES] {
-    let mut in_way = [InWay::NOTHING; 1 << SPHERES];
+const fn obstruction_table(inner_spheres: &[InnerSphere; SPHERES]) -> [Obstruction; 1 << SPHERES] {
+    let mut table = [Obstruction::NONE; 1 << SPHERES];
     let mut near = 0;
-    while near < in_way.len() {
-        let mut ball = 0;
-        while ball < SPHERES {
-            if near >> ball & 1 == 1 {
-                in_way[near] = in_way[near].and_of(inner_spheres[ball].0 / LINKS);
+    while near < table.len() {
+        let mut sphere = 0;
+        while sphere < SPHERES {
+            if near >> sphere & 1 == 1 {
+                table[near] = table[near].with_digit(inner_spheres[sphere].0 / LINKS);
             }
-            ball += 1;
+            sphere += 1;
         }
         near += 1;
     }
-    in_way
+    table
 }
 
-fn of_digits(spheres: Spheres, inner_spheres: &[InnerSpheres; SPHERES], digits: [bool; 5]) -> Spheres {
+fn keep_digits(spheres: Spheres, inner_spheres: &[InnerSphere; SPHERES], digits: [bool; 5]) -> Spheres {
     spheres.kept(|i| {
         digits
             .get(inner_spheres[i].0 / LINKS)
@@ -125,7 +128,7 @@ fn of_digits(spheres: Spheres, inner_spheres: &[InnerSpheres; SPHERES], digits: 
 }
 
 #[inline]
-fn spheres(solids: &HandSolids, inner_spheres: &[InnerSpheres; SPHERES]) -> Spheres {
+fn spheres(solids: &HandSolids, inner_spheres: &[InnerSphere; SPHERES]) -> Spheres {
     Spheres::new(|i| {
         let (index, along) = inner_spheres[i];
         let solid = solids.solid(index);

@@ -1,4 +1,4 @@
-//! What an atlas was made of: another object, another hand or another algorithm makes other grips.
+//! The identity of an atlas: a different object, hand or algorithm makes different grips.
 
 mod algorithm;
 
@@ -21,10 +21,10 @@ use crate::{
 
 pub use crate::known::key::algorithm::ALGORITHM;
 
-/// Bytes of a key.
+/// Length of a key in bytes.
 pub const KEY_BYTES: usize = 32;
 
-/// Bytes of the key in a file name: 128 bits do not collide by chance.
+/// Bytes of the key used in a file name: 128 bits do not collide by chance.
 const FILE_NAME_BYTES: usize = 16;
 
 /// The SHA-256 of everything that the grips of an object and a hand depend on.
@@ -36,7 +36,7 @@ pub fn key(object: &GraspObject, rig: &Rig) -> [u8; KEY_BYTES] {
     hash.0.finalize().into()
 }
 
-/// The name of the file that keeps the atlas of an object and a hand: hexadecimal digits of the key and ".atlas".
+/// The file name of the atlas of an object and a hand: hexadecimal digits of the key and ".atlas".
 pub fn file_name(object: &GraspObject, rig: &Rig) -> String {
     let mut name = String::with_capacity(2 * FILE_NAME_BYTES + 6);
     for byte in &key(object, rig)[..FILE_NAME_BYTES] {
@@ -77,7 +77,7 @@ impl Hash {
         self.numbers(object.centre_of_mass.to_array());
     }
 
-    /// All of it but the name: a hand under another name holds alike.
+    /// Everything but the name, which does not affect grips.
     fn rig(&mut self, rig: &Rig) {
         self.0.update([u8::from(rig.handedness == Handedness::Right)]);
         self.numbers(rig.palm.to_array());

@@ -1,13 +1,14 @@
-//! What is known of how a hand can hold an object before anybody holds it out.
+//! Known grips: how a hand can hold an object, found before anyone holds it out.
 //!
-//! A grip that passes every check on object and hand alone fits every holdout whose giver and gravity allow it. So grips
-//! are collected once per object and rig ([`growth`]) into an [`atlas`]. A request tries them by their score under its
-//! gravity (`gravity_order`); with a giver, it first tries some that complement one another (`shortlist`). All that is
-//! left to check is the giver's hand and the forces ([`recheck`]). The thesis rejects precomputed grasps because a giver
-//! may spoil all of them (thesis 1). Hence the atlas never answers alone: a fresh search runs in parallel.
+//! A grip that passes every check on object and hand alone is valid for every holdout whose giver and gravity
+//! allow it. So grips are collected once per object and rig ([`growth`]) into an [`atlas`]. A request tries
+//! them by their score under its gravity (`gravity_order`); with a giver, it first tries a few that
+//! complement one another (`shortlist`). Only the giver's hand and the forces are left to check
+//! ([`recheck`]). The thesis rejects precomputed grasps because a giver may obstruct all of them (section 1).
+//! Hence the atlas never answers alone: a fresh search runs in parallel.
 //!
-//! Where no known grip is valid as it is, hands are perturbed near known ones ([`seeds`]). An object without an atlas
-//! takes its seeds from boxes like it ([`primitives`], [`transferred_grips`]).
+//! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]). An object without
+//! an atlas takes its seeds from similar boxes ([`primitives`], [`transferred_grips`]).
 
 pub mod atlas;
 mod closure_screen;

@@ -1,30 +1,31 @@
-//! Simple shapes that hands know beforehand, for objects that no hand knows yet.
+//! Boxes with known grips, for objects that have no atlas yet.
 //!
-//! What is as long, wide and thick as a box can mostly be held where the box can. So the atlases of some boxes are made
-//! once, as those of the built-in objects are, and the grips of their lists are kept: of these, nearly every giver leaves
-//! some. A search for an object without an atlas starts from those that fit it ([`super::transferred_grips`]). That primitives tell where
-//! to grasp is of A. T. Miller, S. Knoop, H. I. Christensen and P. K. Allen: Automatic Grasp Planning Using Shape
-//! Primitives, ICRA 2003; there they have rules, here grips that were tried.
+//! An object of about the same length, width and thickness as a box can mostly be held where the box can. So
+//! the atlases of some boxes are grown once, like those of the built-in objects, and their shortlisted grips
+//! are kept: nearly every giver leaves some of these free. A search for an object without an atlas starts
+//! from those that fit it ([`super::transferred_grips`]). Choosing grasps by shape primitives follows A. T.
+//! Miller, S. Knoop, H. I. Christensen and P. K. Allen, "Automatic Grasp Planning Using Shape Primitives",
+//! ICRA 2003, with tested grips instead of their rules.
 
 use glam::Vec3;
 
 use super::grips::Grips;
 use crate::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
-/// A box, its longest edges along x and its shortest along z.
+/// A box with its longest edges along x and its shortest along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Primitive {
-    /// Half of its edges, in metres.
+    /// Half of its edge lengths, in metres.
     pub half_extents: Vec3,
 }
 
-/// What a box weighs, in kilograms: what is held in one hand weighs some tens to hundreds of grams, and grips are tried
-/// anew with the object's own weight.
+/// Mass of a box, in kilograms: typical of objects held in one hand. Grips are checked again with the
+/// object's own mass.
 const MASS: f32 = 0.1;
 
 impl Primitive {
-    /// All whose grips are known. They are close where thickness decides which fingers get round: from blades and handles
-    /// over pens and bars to a phone, and one that is as wide as a mug. What is easy to hold needs none.
+    /// All boxes with known grips. They are dense where thickness decides which fingers reach around: from
+    /// blades and handles over pens and bars to a phone, and one as wide as a mug. Easy objects need none.
     pub const ALL: [Self; 12] = [
         Self::of_millimetres(160, 10, 5),
         Self::of_millimetres(160, 12, 3),
@@ -40,7 +41,7 @@ impl Primitive {
         Self::of_millimetres(120, 76, 76),
     ];
 
-    /// The one with these edges.
+    /// A box with these edge lengths.
     const fn of_millimetres(length: u16, width: u16, thickness: u16) -> Self {
         Self {
             half_extents: Vec3::new(
@@ -51,16 +52,16 @@ impl Primitive {
         }
     }
 
-    /// "box-160x10x5", by its edges in millimetres.
+    /// Its edge lengths in millimetres, such as "box-160x10x5".
     pub fn name(self) -> String {
         let [length, width, thickness] = (self.half_extents * 2000.0).to_array().map(f32::round);
         format!("box-{length}x{width}x{thickness}")
     }
 
-    /// The box as an object, centred.
+    /// The box as an object, centred on the origin.
     ///
     /// # Panics
-    /// Never for those of [`Primitive::ALL`]; if an edge is not a positive number.
+    /// If an edge is not a positive number; never for those of [`Primitive::ALL`].
     pub fn object(self) -> GraspObject {
         let corner = |k: usize| {
             let side = |axis: usize| if k >> axis & 1 == 0 { -1.0 } else { 1.0 };
@@ -82,11 +83,11 @@ impl Primitive {
     }
 }
 
-/// A box with grips of a hand at it.
+/// A box with a hand's grips on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldPrimitive {
     /// The box.
     pub primitive: Primitive,
-    /// The grips, in its frame.
+    /// The grips, in the frame of the box.
     pub grips: Grips,
 }

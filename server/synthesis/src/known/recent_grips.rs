@@ -1,25 +1,25 @@
-//! Grips that searches found lately: an object that is held out a moment later, or a little otherwise, is mostly held by
-//! one of them.
+//! Grips that recent searches found. If an object is held out again a moment later, or slightly differently,
+//! one of them is mostly still valid.
 //!
-//! A search runs only where no known grip is left by the giver, or none is known yet. Who asks again while the giver's hand
-//! moves would wait for another one each time. What the first one found is kept beside the atlas, not in it, so that the
-//! atlas stays the same for the same object and hand.
+//! A search runs only where the giver obstructs all known grips, or none is known yet. A client that asks
+//! repeatedly while the giver's hand moves would wait for a search each time. The grips found are kept next
+//! to the atlas, not in it, so that the atlas depends only on object and hand.
 
 use std::sync::Arc;
 
 use super::entry::Entry;
 
-/// Grips that are kept. They are tried one by one, in some microseconds each, where nothing else is left: more serve more
-/// places to which the giver may return, and keep searches waiting.
+/// Number of grips kept. Each takes some microseconds to try after all others failed: more cover more
+/// positions of the giver's hand, and delay fresh searches.
 const KEPT: usize = 32;
 
-/// Grips, the one that was found last first.
+/// Grips, the newest first.
 #[derive(Clone, Debug, Default)]
 pub struct RecentGrips(Arc<[Arc<Entry>]>);
 
 impl RecentGrips {
-    /// These and a newer one; where there are too many, without the oldest. The same hand is kept once: reproducible requests
-    /// find it again and again.
+    /// Adds a grip, dropping the oldest if there are too many. A hand that is already known moves to the
+    /// front: reproducible requests find the same one repeatedly.
     #[must_use]
     pub fn with(&self, newest: Entry) -> Self {
         let others = self.0.iter().filter(|entry| entry.grip.pose != newest.grip.pose);
@@ -27,7 +27,7 @@ impl RecentGrips {
         Self(std::iter::once(Arc::new(newest)).chain(older).collect())
     }
 
-    /// These without the oldest.
+    /// Drops the oldest grip.
     #[must_use]
     pub fn without_oldest(&self) -> Self {
         let count = self.0.len().saturating_sub(1);
@@ -39,7 +39,7 @@ impl RecentGrips {
         &self.0
     }
 
-    /// True if there is none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -1,6 +1,6 @@
-//! What is left to check of known grips when an object is held out.
+//! The checks of known grips that depend on the holdout: the giver's hand and the forces.
 
-use super::{entry::Entry, gravity::nearest};
+use super::{entry::Entry, gravity::nearest_direction};
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     model::{grasp::Grasp, hand::rig::Rig, strategy::Validity},
@@ -14,35 +14,35 @@ use crate::{
     rating::{assessment::unscored_grasp, scoring::score},
 };
 
-/// An object that is held out, as known grips are asked to hold it.
+/// Checks known grips of an object against one holdout.
 #[derive(Clone, Copy, Debug)]
-pub struct Recheck<'a> {
+pub struct GripChecker<'a> {
     scene: &'a ObjectScene<'a>,
     rig: &'a Rig,
     presented: &'a Presented,
-    /// The direction of [`super::gravity::DIRECTIONS`] that gravity's is nearest to.
+    /// The nearest of [`super::gravity::DIRECTIONS`] to the one against gravity.
     direction: usize,
-    /// Is the friction another than the one that grips are known under?
+    /// Does the friction differ from the one that the grips were evaluated under?
     friction_differs: bool,
-    /// Is the friction that they use known from before?
+    /// Do the grips' stored friction uses apply?
     knows_friction_uses: bool,
 }
 
-impl<'a> Recheck<'a> {
-    /// Asks grips of an object and a rig.
+impl<'a> GripChecker<'a> {
+    /// Prepares checks of grips of an object and a rig.
     pub fn new(scene: &'a ObjectScene<'a>, rig: &'a Rig, presented: &'a Presented) -> Self {
         let friction_differs = scene.friction != scene.object.friction_under(Validity::Physical);
         Self {
             scene,
             rig,
             presented,
-            direction: nearest(presented.up),
+            direction: nearest_direction(presented.up),
             friction_differs,
             knows_friction_uses: !friction_differs,
         }
     }
 
-    /// The same by some of the mechanisms.
+    /// The same with some mechanisms switched off.
     #[must_use]
     pub(crate) fn with_mechanisms(self, mechanisms: Mechanisms) -> Self {
         Self {
@@ -51,9 +51,9 @@ impl<'a> Recheck<'a> {
         }
     }
 
-    /// The grasp that a grip is for what is presented, with its score; none if it comes too near to the giver or the object
-    /// slips. `solids` are the grip's, as [`Entry::tracked_solids`] gives them.
-    pub fn hold(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
+    /// The grasp of a known grip for the holdout, with its score; none if it is too close to the giver or the
+    /// object slips. `solids` are the grip's, from [`Entry::tracked_solids`].
+    pub fn check(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
         let Self {
             scene,
             rig,
@@ -63,12 +63,12 @@ impl<'a> Recheck<'a> {
         let giver_clearance = clear_of_giver(solids, presented.giver.as_ref())?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(presented.up);
-        let least_use = if self.knows_friction_uses {
+        let known_use = if self.knows_friction_uses {
             entry.friction_uses.get(self.direction)
         } else {
             FrictionUse::default()
         };
-        let balance = balance_with(&gripper.soft_contacts, &load, least_use, &mut gripper.buffers)?;
+        let balance = balance_with(&gripper.soft_contacts, &load, known_use, &mut gripper.buffers)?;
         let epsilon = if self.friction_differs {
             gripper.closure(scene)?
         } else {

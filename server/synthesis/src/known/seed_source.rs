@@ -1,4 +1,4 @@
-//! The grips that attempts start from once a hand that was placed anew fails.
+//! The seeds that attempts continue with when a freshly placed hand fails.
 
 use std::sync::{Arc, OnceLock};
 
@@ -7,7 +7,7 @@ use super::{
     entry::Entry,
     grips::Grips,
     seeds::Seeds,
-    transferred_grips::{Among, TransferredGrips},
+    transferred_grips::{Candidates, TransferredGrips},
 };
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
@@ -15,26 +15,25 @@ use crate::{
     physical::scene::Presented,
 };
 
-/// Attempts that start from those known grips alone that are not certainly in the giver's way, which are found in a fifth of
-/// the time: 0.8 ms instead of 4. Of later ones, every other does. Of 51 holdouts that atlases of the built-in objects do
-/// not answer, hands beside these hold as soon as hands beside those that are nearest to keeping clear of all, and beside
-/// some givers sooner or later by a tenfold.
+/// The first attempts, which all take seeds from grips that are not excluded by the giver's cells: these are
+/// found in a fifth of the time. Later attempts alternate, because some givers are answered much sooner by
+/// one kind of seeds and some by the other.
 const ATTEMPTS_FROM_OPEN_SEEDS: u64 = 8;
 
-/// Where grips to start from come from.
+/// Where seeds come from.
 #[derive(Clone, Debug, Default)]
 pub enum SeedSource {
-    /// There are none.
+    /// Nowhere.
     #[default]
     Nothing,
-    /// Grips that hold the object.
+    /// Known grips of the object.
     Atlas(Arc<Atlas>),
-    /// Grips that hold something like it, where it has no atlas yet.
+    /// Grips transferred from similar boxes, for an object without an atlas.
     Transferred(Arc<TransferredGrips>),
 }
 
 impl SeedSource {
-    /// The atlas, if it is one.
+    /// The atlas, if seeds come from one.
     pub fn atlas(&self) -> Option<&Arc<Atlas>> {
         match self {
             Self::Atlas(atlas) => Some(atlas),
@@ -43,63 +42,63 @@ impl SeedSource {
     }
 }
 
-/// Beside whom grips are to start from, and what they are to be.
+/// What seeds are selected for.
 #[derive(Clone, Copy, Debug)]
-pub struct Demand<'a> {
+pub struct SeedContext<'a> {
     /// The receiving hand.
     pub rig: &'a Rig,
     /// The giver and gravity.
     pub presented: &'a Presented,
-    /// What is demanded of the grasp.
+    /// The constraints on the grasp.
     pub constraints: &'a Constraints,
-    /// Which mechanisms are on.
+    /// The mechanisms that are on.
     pub mechanisms: Mechanisms,
 }
 
-/// The grips to start from beside a giver, each kind once it was asked for.
+/// The seeds for a giver; each set is computed on first use.
 #[derive(Clone, Debug, Default)]
 pub struct SeedSets {
-    from: SeedSource,
-    /// Of an atlas, those that are nearest to keeping clear, …
+    source: SeedSource,
+    /// From the whole atlas: the grips nearest to being clear of the giver.
     nearest: OnceLock<Seeds>,
-    /// … or of those that are not certainly in the giver's way.
+    /// The same from the grips that the giver's cells do not exclude.
     open: OnceLock<Seeds>,
-    /// Of borrowed ones, those that are promising, …
+    /// From the transferred grips that pass the closure screen.
     passing: OnceLock<(Grips, Seeds)>,
-    /// … or of all.
+    /// From all transferred grips.
     fitting: OnceLock<(Grips, Seeds)>,
 }
 
 impl SeedSets {
-    /// No seeds yet: each kind is found on first use.
-    pub fn new(from: SeedSource) -> Self {
+    /// No set is computed yet.
+    pub fn new(source: SeedSource) -> Self {
         Self {
-            from,
+            source,
             ..Self::default()
         }
     }
 
-    /// True if there is nothing to start from.
+    /// True if there are no seeds.
     pub fn is_empty(&self) -> bool {
-        matches!(self.from, SeedSource::Nothing)
+        matches!(self.source, SeedSource::Nothing)
     }
 
-    /// Those that an attempt starts from, and the grips that they are of: of an atlas, the ones that hold under this
-    /// gravity and are what is demanded, if the giver were not in their way. None if interrupted.
+    /// The seeds of an attempt and the grips they index. Those of an atlas hold under this gravity and meet
+    /// the constraints, apart from the giver. None if interrupted.
     pub fn of_attempt(
         &self,
         attempt: u64,
-        demand: &Demand<'_>,
+        context: &SeedContext<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<(&Seeds, &[Entry])> {
-        match &self.from {
+        match &self.source {
             SeedSource::Nothing => None,
             SeedSource::Atlas(atlas) => {
-                let seeds = self.of_atlas(atlas, attempt, demand, interrupted)?;
+                let seeds = self.of_atlas(atlas, attempt, context, interrupted)?;
                 Some((seeds, atlas.entries()))
             }
-            SeedSource::Transferred(borrowed) => {
-                let (grips, seeds) = self.of_transferred(borrowed, attempt, demand, interrupted)?;
+            SeedSource::Transferred(transferred) => {
+                let (grips, seeds) = self.of_transferred(transferred, attempt, context, interrupted)?;
                 Some((seeds, grips.entries()))
             }
         }
@@ -109,16 +108,16 @@ impl SeedSets {
         &self,
         atlas: &Atlas,
         attempt: u64,
-        demand: &Demand<'_>,
+        context: &SeedContext<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&Seeds> {
-        let giver = demand.presented.giver.as_ref();
-        let mechanisms = demand.mechanisms;
+        let giver = context.presented.giver.as_ref();
+        let mechanisms = context.mechanisms;
         let may_be_open = mechanisms.has(Mechanism::OpenSeeds) && mechanisms.has(Mechanism::CellOccupancy);
         let must_be_open = !mechanisms.has(Mechanism::NearestSeeds);
-        let from_open_ones =
+        let from_open =
             may_be_open && (must_be_open || attempt < ATTEMPTS_FROM_OPEN_SEEDS || attempt.is_multiple_of(2));
-        let excluding = giver.filter(|_| from_open_ones);
+        let excluding = giver.filter(|_| from_open);
         let seeds = match excluding {
             Some(_) => &self.open,
             None => &self.nearest,
@@ -128,43 +127,50 @@ impl SeedSets {
         }
         let excluded = excluding.map(|giver| atlas.excluded_by(giver));
         let (holding, unordered) = if mechanisms.has(Mechanism::GravityOrder) {
-            (atlas.holding_under(demand.presented.up), 0)
+            (atlas.holding_under(context.presented.up), 0)
         } else {
             (&[][..], atlas.entries().len() as u16)
         };
-        let wanted = holding.iter().copied().chain(0..unordered).filter(|&entry| {
+        let candidates = holding.iter().copied().chain(0..unordered).filter(|&entry| {
             excluded.as_ref().is_none_or(|excluded| !excluded.contains(entry))
-                && atlas.entries()[usize::from(entry)].is_wanted(demand.constraints)
+                && atlas.entries()[usize::from(entry)].meets(context.constraints)
         });
-        let found = Seeds::of_with(mechanisms, atlas.grips(), demand.rig, wanted, giver, interrupted)?;
-        // Another worker may have found the same meanwhile.
-        Some(seeds.get_or_init(|| found))
+        let new_seeds = Seeds::of_with(
+            mechanisms,
+            atlas.grips(),
+            context.rig,
+            candidates,
+            giver,
+            interrupted,
+        )?;
+        // Another worker may have computed the same set meanwhile.
+        Some(seeds.get_or_init(|| new_seeds))
     }
 
-    /// Every other attempt starts from promising ones. Of the 96 that fit best, these hold more often than others on a scalpel (63 %
-    /// against 40) and less often on a remote (20 % against 37), and where one kind finds no way beside a giver, the other
-    /// may: of scalpels and scissors held out by 360 recorded givers, two workers answer 94.4 and 95.8 % in 33 ms where all start
-    /// from any that fit, and 96.5 and 97.1 so; three of four are no better.
+    /// Alternates between grips that pass the closure screen and all that fit. Passing grips hold more often
+    /// on some objects and less often on others, and where one kind finds nothing next to a giver, the other
+    /// may.
     fn of_transferred(
         &self,
-        borrowed: &TransferredGrips,
+        transferred: &TransferredGrips,
         attempt: u64,
-        demand: &Demand<'_>,
+        context: &SeedContext<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&(Grips, Seeds)> {
-        let screens = demand.mechanisms.has(Mechanism::ClosureScreen);
-        let (among, seeds) = if screens && attempt.is_multiple_of(2) {
-            (Among::Passing, &self.passing)
+        let screens = context.mechanisms.has(Mechanism::ClosureScreen);
+        let (candidates, seeds) = if screens && attempt.is_multiple_of(2) {
+            (Candidates::Passing, &self.passing)
         } else {
-            (Among::All, &self.fitting)
+            (Candidates::All, &self.fitting)
         };
-        if let Some(found) = seeds.get() {
-            return Some(found);
+        if let Some(new_seeds) = seeds.get() {
+            return Some(new_seeds);
         }
-        let giver = demand.presented.giver.as_ref();
-        let grips = borrowed.for_giver(among, demand.rig, giver, demand.constraints, interrupted)?;
+        let giver = context.presented.giver.as_ref();
+        let grips =
+            transferred.for_giver(candidates, context.rig, giver, context.constraints, interrupted)?;
         let all = 0..grips.entries().len() as u16;
-        let found = Seeds::of_with(demand.mechanisms, &grips, demand.rig, all, giver, interrupted)?;
-        Some(seeds.get_or_init(|| (grips, found)))
+        let new_seeds = Seeds::of_with(context.mechanisms, &grips, context.rig, all, giver, interrupted)?;
+        Some(seeds.get_or_init(|| (grips, new_seeds)))
     }
 }

@@ -1,7 +1,7 @@
-//! Hands beside known grips, for a giver of whom no known grip keeps clear.
+//! Hands perturbed from known grips, for givers who obstruct all known grips.
 //!
-//! A grip that a giver is in the way of by some millimetres holds the object; what is to be found is one like it that is
-//! turned out of the giver's way about what it touches.
+//! A grip that is a few millimetres too close to the giver does hold the object. So hands are searched that
+//! are rotated about its contacts until they clear the giver.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -10,7 +10,9 @@ use glam::Vec3;
 use super::{
     entry::Entry,
     grips::Grips,
-    inner_spheres::{farthest_by_second, first_of_digits, first_spheres, second_of_digits, second_spheres},
+    inner_spheres::{
+        first_of_digits, first_spheres, second_of_digits, second_spheres, upper_bounds_from_second,
+    },
 };
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
@@ -24,48 +26,48 @@ use crate::{
     propose::proposal::ProposalContext,
 };
 
-/// Grips to start from. With fewer, fewer givers are answered at all; more are farther from keeping clear, and hold less
+/// Number of seeds. Fewer answer fewer givers; more include grips that are farther from clear and hold less
 /// often.
 const SEEDS: usize = 32;
 
-/// Hands beside a grip that are looked at until one keeps clear, first by balls inside alone. More find one more often
-/// beside grips that are deep in the giver: of 31 holdouts of the built-in scalpel that the atlas does not answer, 22 had a
-/// hand that holds among 9,000 tries with 24 of them, and 26 with 48.
-const DRAWS: usize = 48;
+/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone. More find one more
+/// often near grips that are deep in the giver's hand.
+const MAX_DRAWS: usize = 48;
 
-/// How far the hand is shifted along each axis at most, in metres: farther ones miss what they touched.
-const SHIFT: f32 = 0.003;
+/// Largest displacement along each axis, in metres. Larger ones lose the contacts.
+const MAX_SHIFT: f32 = 0.003;
 
-/// How far it is turned about what it touches at most, in radians. Less does not get out of some givers' way, more finds
-/// fewer hands that hold.
-const TURN: f32 = 0.5;
+/// Largest rotation about the contacts, in radians. Less does not clear some givers; more finds fewer hands
+/// that hold.
+const MAX_TURN: f32 = 0.5;
 
-/// From where a known grip touched, when it is moved, to where the surface still is, in metres: those that are off by more
-/// mostly miss it.
-const TOUCHING: f32 = 0.003;
+/// Largest distance of a displaced contact from the surface, in metres. Hands with larger ones mostly miss
+/// the object.
+const CONTACT_TOLERANCE: f32 = 0.003;
 
-/// Grips that are compared with the giver between two looks at the clock: at most some forty microseconds' worth.
-const AT_ONCE: usize = 4;
+/// Grips compared exactly with the giver between two clock checks: up to forty microseconds of work.
+const EXACT_PER_CHECK: usize = 4;
 
-/// The same where they are compared by balls alone.
-const BOUNDED_AT_ONCE: usize = 64;
+/// Grips compared by inner spheres between two clock checks.
+const BOUNDS_PER_CHECK: usize = 64;
 
-/// A known grip to start from.
+/// A known grip to perturb.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seed {
-    /// Which of the entries it is.
+    /// Its index among the entries.
     pub entry: u16,
-    /// The digits that are to hold, thumb first; others that the giver is in the way of are spared.
+    /// The digits that have to hold, thumb first. Fingers that the giver obstructs are left out.
     pub kept: [bool; 5],
 }
 
-/// The known grips that are least in a giver's way, by its clearance of palm, forearm, thumb and those fingers that are
-/// farthest from it of those that hold without the others.
+/// The known grips that are nearest to being clear of a giver, by the clearance of palm, forearm, thumb and
+/// the finger subset that is farthest from the giver.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seeds(Vec<Seed>);
 
 impl Seeds {
-    /// Those of `candidates`, indices of the entries of `known`; of those that keep clear, the first. None if interrupted.
+    /// Selects from `candidates`, indices into the entries of `known`; earlier ones win ties. Without a
+    /// giver, the first ones. None if interrupted.
     pub fn of(
         known: &Grips,
         rig: &Rig,
@@ -76,7 +78,7 @@ impl Seeds {
         Self::of_with(Mechanisms::ALL, known, rig, candidates, giver, interrupted)
     }
 
-    /// [`Seeds::of`] by some of the mechanisms.
+    /// [`Seeds::of`] with some mechanisms switched off.
     pub(crate) fn of_with(
         mechanisms: Mechanisms,
         known: &Grips,
@@ -93,11 +95,11 @@ impl Seeds {
             };
             return Some(Self(candidates.take(SEEDS).map(whole).collect()));
         };
-        // What is found by balls alone is never too little: those for which it is most are looked at first, until no other can
-        // have more.
-        let mut at_most = Vec::new();
+        // Inner spheres give an upper bound of the clearance. Candidates are compared exactly by falling bound,
+        // until none can beat those selected.
+        let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
-            if count.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
+            if count.is_multiple_of(BOUNDS_PER_CHECK) && interrupted() {
                 return None;
             }
             let clearance = if screens {
@@ -105,56 +107,55 @@ impl Seeds {
             } else {
                 GIVER_CLEARANCE
             };
-            at_most.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
+            by_upper_bound.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
-        // Not sorted, as that would take longer than between two looks at the clock.
-        let mut at_most = BinaryHeap::from(at_most);
+        // A heap, because sorting would take longer than the interval between clock checks.
+        let mut by_upper_bound = BinaryHeap::from(by_upper_bound);
         // By falling clearance.
         let mut nearest: Vec<(f32, Seed)> = Vec::with_capacity(SEEDS + 1);
         let mut count = 0_usize;
-        while let Some((most, _, index)) = at_most.pop() {
-            if count.is_multiple_of(AT_ONCE) && interrupted() {
+        while let Some((bound, _, index)) = by_upper_bound.pop() {
+            if count.is_multiple_of(EXACT_PER_CHECK) && interrupted() {
                 return None;
             }
             count += 1;
-            let least = nearest
+            let min_clearance = nearest
                 .get(SEEDS - 1)
-                .map_or(f32::NEG_INFINITY, |(least, _)| *least);
-            if most <= nanometres(least) {
+                .map_or(f32::NEG_INFINITY, |(min_clearance, _)| *min_clearance);
+            if bound <= nanometres(min_clearance) {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
-            let Some((clearance, kept)) = clearance(entry, rig, giver, least, screens) else {
+            let Some((clearance, kept)) = clearance(entry, rig, giver, min_clearance, screens) else {
                 continue;
             };
-            let place = nearest.partition_point(|&(other, _)| other >= clearance);
-            nearest.insert(place, (clearance, Seed { entry: index, kept }));
+            let rank = nearest.partition_point(|&(other, _)| other >= clearance);
+            nearest.insert(rank, (clearance, Seed { entry: index, kept }));
             nearest.truncate(SEEDS);
         }
-        Some(Self(nearest.into_iter().map(|(_, start)| start).collect()))
+        Some(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
     }
 
-    /// Which they are, by falling clearance.
+    /// The seeds, by falling clearance.
     pub fn all(&self) -> &[Seed] {
         &self.0
     }
 
-    /// A hand beside one of them that may keep clear of the giver, more often beside the first; none if none was drawn.
-    /// `entries` are those that they are of.
+    /// A perturbed hand that may be clear of the giver, more often near the first seeds; none if none was
+    /// drawn. `entries` are those that the seeds index.
     pub fn propose(
         &self,
         entries: &[Entry],
         place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
-        // The first of 32 comes six times as often as if all did alike. Of 44 holdouts that atlases of the built-in objects do
-        // not answer, 27 are answered sooner so and 17 later: in four fifths of the time where it takes less than 5 ms,
-        // elsewhere in as much.
+        // The first of 32 is drawn six times as often as under a uniform choice: holdouts that are quick to
+        // answer are answered sooner, the others no later.
         let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
         Self::perturbed(*self.0.get(rank)?, entries, place, stream)
     }
 
-    /// The same, beside one as often as beside another: what is to be known for many givers is not to lie beside few.
+    /// The same with all seeds equally likely: what serves many givers should not concentrate on a few seeds.
     pub fn propose_evenly(
         &self,
         entries: &[Entry],
@@ -167,7 +168,7 @@ impl Seeds {
         Self::perturbed(self.0[stream.below(self.0.len())], entries, place, stream)
     }
 
-    /// A hand beside a known grip that may keep clear of the giver, if one is drawn.
+    /// A hand perturbed from a known grip that may be clear of the giver, if one is drawn.
     fn perturbed(
         Seed { entry, kept }: Seed,
         entries: &[Entry],
@@ -178,7 +179,7 @@ impl Seeds {
         let known = Proposal {
             object_from_wrist: entry.grip.pose.frame_from_wrist,
             shape: HandShape {
-                // What fingers that do not hold did is of no use: they may be what is in the way.
+                // The pose of fingers that do not hold is discarded: they may be the ones obstructed.
                 tucks: stream.unit() < 0.5,
                 closing: kept,
                 ..HandShape::of_grip(place.rig, &entry.grip)
@@ -196,48 +197,51 @@ impl Seeds {
             .filter(|contact| contact.part.is_palm_or_in(kept))
             .copied()
             .collect();
-        let pivot = middle_of(&contacts);
-        (0..DRAWS).find_map(|_| {
-            let perturbed = known.perturbed_about(pivot, [SHIFT, TURN], stream);
-            let way = perturbed.object_from_wrist * known.object_from_wrist.inverse();
-            let is_met = |giver: &PreparedHand| {
+        let pivot = centroid(&contacts);
+        (0..MAX_DRAWS).find_map(|_| {
+            let perturbed = known.perturbed_about(pivot, [MAX_SHIFT, MAX_TURN], stream);
+            let displacement = perturbed.object_from_wrist * known.object_from_wrist.inverse();
+            let collides = |giver: &PreparedHand| {
                 let nears = |spheres: &Spheres| {
-                    giver.any_certainly_within(&spheres.transformed(way), GIVER_CLEARANCE)
+                    giver.any_certainly_within(&spheres.transformed(displacement), GIVER_CLEARANCE)
                 };
                 inside.iter().any(nears)
             };
-            if screens && place.giver.is_some_and(is_met) {
+            if screens && place.giver.is_some_and(collides) {
                 return None;
             }
-            let moved = solids.transformed(way);
+            let moved = solids.transformed(displacement);
             let keeps_clear = place
                 .giver
                 .is_none_or(|giver| !giver.comes_within(solids_of(kept, &moved), GIVER_CLEARANCE));
-            let is_likely = keeps_clear
-                && still_touch(&contacts, place.object, way)
-                && keeps_off(kept, place.object, &moved);
-            is_likely.then_some(perturbed)
+            let is_promising = keeps_clear
+                && still_touches(&contacts, place.object, displacement)
+                && avoids_forbidden(kept, place.object, &moved);
+            is_promising.then_some(perturbed)
         })
     }
 }
 
-/// A distance in metres as a number that can be ordered.
+/// A distance in metres as a number that can be sorted.
 pub(crate) fn nanometres(distance: f32) -> i32 {
     (distance * 1e9) as i32
 }
 
-/// What a grip is turned about: the thumb and what is opposed to it stay where the object is, while palm and arm swing out of
-/// the giver's way.
-fn middle_of(contacts: &[Contact]) -> Vec3 {
+/// The pivot of the rotation: thumb and opposing fingers stay at the object, while palm and forearm swing
+/// away from the giver.
+fn centroid(contacts: &[Contact]) -> Vec3 {
     let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
     sum / contacts.len().max(1) as f32
 }
 
-/// True if thumb and a finger of a grip are still near to the object when they are moved: others do not touch it any more.
-fn still_touch(contacts: &[Contact], object: &GraspObject, way: Pose) -> bool {
+/// True if the thumb and a finger are still near the object after the displacement.
+fn still_touches(contacts: &[Contact], object: &GraspObject, displacement: Pose) -> bool {
     let is_near = |contact: &Contact| {
-        let place = way.transform_point(contact.position);
-        object.surface.closest_point_within(place, TOUCHING).is_some()
+        let place = displacement.transform_point(contact.position);
+        object
+            .surface
+            .closest_point_within(place, CONTACT_TOLERANCE)
+            .is_some()
     };
     let touches = |is_thumb: bool| {
         let of_part = |contact: &&Contact| contact.part.is_thumb() == Some(is_thumb);
@@ -246,40 +250,41 @@ fn still_touch(contacts: &[Contact], object: &GraspObject, way: Pose) -> bool {
     touches(true) && touches(false)
 }
 
-/// True if a moved hand keeps off forbidden surfaces.
-fn keeps_off(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -> bool {
+/// True if a displaced hand stays off forbidden surfaces.
+fn avoids_forbidden(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -> bool {
     solids_of(kept, moved).all(|part| !object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
 }
 
-/// How far a grip is from a giver's hand without the fingers that are nearest to it and can be spared, up to
-/// [`GIVER_CLEARANCE`], and which digits hold then; none if it is less than `least`.
+/// A grip's clearance from a giver, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of
+/// that subset; none if it is less than `min_clearance`.
 fn clearance(
     entry: &Entry,
     rig: &Rig,
     giver: &PreparedHand,
-    least: f32,
+    min_clearance: f32,
     screens: bool,
 ) -> Option<(f32, [bool; 5])> {
     let solids = entry.solids(rig);
     let sets = entry.finger_subsets;
     if screens {
-        let (fingers, others) = farthest_by_second(&giver.distance_upper_bounds(&second_spheres(&solids)));
-        if sets.farthest(fingers).1.min(others) < least {
+        let (fingers, others) =
+            upper_bounds_from_second(&giver.distance_upper_bounds(&second_spheres(&solids)));
+        if sets.farthest(fingers).1.min(others) < min_clearance {
             return None;
         }
     }
     let no_fingers = [true, false, false, false, false];
-    let others = giver.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, least)?;
+    let others = giver.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, min_clearance)?;
     let distances = std::array::from_fn(|finger| {
         let links = solids.phalanges[1 + finger].iter();
-        let distance = giver.least_distance(links, GIVER_CLEARANCE, least);
+        let distance = giver.least_distance(links, GIVER_CLEARANCE, min_clearance);
         distance.unwrap_or(f32::NEG_INFINITY)
     });
     let (kept, of_fingers) = sets.farthest(distances);
-    (of_fingers >= least).then_some((of_fingers.min(others), kept))
+    (of_fingers >= min_clearance).then_some((of_fingers.min(others), kept))
 }
 
-/// A hand's solids but those of fingers that do not hold: they rest where there is room.
+/// A hand's solids without the fingers that do not hold, which rest elsewhere.
 fn solids_of(kept: [bool; 5], solids: &HandSolids) -> impl Iterator<Item = &TaperedCapsule> + Clone {
     let HandSolids {
         phalanges,

@@ -1,14 +1,15 @@
-//! Few grips of an atlas of which nearly every giver leaves one.
+//! Shortlists: a few grips of an atlas of which nearly every giver leaves one free.
 //!
-//! By score alone, the first grips of an atlas lie side by side on the object, and a giver that is in the way of the first
-//! is in the way of hundreds. So a look-up starts with grips that complement one another: for each direction of gravity,
-//! those that together serve some givers best, where each giver is served by the best grip that keeps clear of it, if that
-//! is nearly as good as the best of all that do. They are tried by falling score, as all others are after them.
+//! The best grips by score lie next to each other on the object, and a giver that obstructs the first
+//! obstructs hundreds. So a look-up starts with grips that complement one another: for each direction of
+//! gravity, those that together serve a sample of givers best. A giver is served by the best listed grip that
+//! is clear of it, provided that its score is within [`SCORE_MARGIN`] of the best clear grip of all. They are
+//! tried by falling score, then all others are.
 //!
-//! What they serve is a sum of maxima, a facility location: monotone and submodular. Taking the grip that adds most, again
-//! and again, then serves at least 1 − 1/e of what the best choice could (G. L. Nemhauser, L. A. Wolsey and M. L. Fisher,
-//! "An analysis of approximations for maximizing submodular set functions I", 1978); and as no grip ever adds more than it
-//! did before, only those near the top are asked again (M. Minoux, "Accelerated greedy algorithms", 1978).
+//! The objective is a sum of maxima (facility location), which is monotone and submodular. Greedy selection
+//! then reaches at least 1 − 1/e of the optimum (G. L. Nemhauser, L. A. Wolsey and M. L. Fisher, "An analysis
+//! of approximations for maximizing submodular set functions I", 1978). As gains never grow, only the top
+//! candidates are evaluated again (M. Minoux, "Accelerated greedy algorithms", 1978).
 
 use std::{
     cmp::Reverse,
@@ -19,7 +20,7 @@ use glam::Vec3;
 
 use super::{
     entry::{Entry, SLIPS},
-    gravity::{DIRECTIONS, nearest},
+    gravity::{DIRECTIONS, nearest_direction},
     inner_spheres::{first_spheres, second_spheres},
     occupancy::Occupancy,
 };
@@ -31,32 +32,29 @@ use crate::{
     },
 };
 
-/// Grips that are on a list. With fewer, more givers are left without one, and those that are served get less of a grasp;
-/// with more, the first valid one comes later. Of 400 holdouts of the built-in remote, scalpel and scissors with recorded
-/// givers, about 84, 91 and 63 % leave one that holds, at the median the 26th, the 43rd and the 88th. The first 48 by score
-/// alone: 53, 19 and 6 %.
-const LISTED: usize = 96;
+/// Grips per list. Fewer leave more givers without a listed grip and lower the scores of the others; more
+/// delay the first valid one. The first 48 by score alone would serve far fewer givers.
+const LIST_LENGTH: usize = 96;
 
-/// Givers that are asked. With half as many, up to 4 of a hundred holdouts fewer leave a listed grip, with twice as many 1 to 6
-/// more (where any grip serves). They take time in proportion: a tenth of a second when an atlas is read.
-const GIVERS: usize = 512;
+/// Number of sampled givers. With half as many, up to 4 of a hundred holdouts more find no listed grip. They
+/// cost time in proportion: a tenth of a second when an atlas is loaded.
+const SAMPLED_GIVERS: usize = 512;
 
-/// How much worse than the best grip that a giver leaves one may be to serve it, in steps of 1/254 of a score. With more, more
-/// givers leave a grip of the list, but a worse one than they could: scores of what is found first are 0.4 % lower than
-/// without a list for the remote and 1.1 % for scalpel and scissors, and 0.9 and 1.3 % if any grip serves.
-const WORSE: u8 = 40;
+/// How far a grip's score may be below that of the best clear grip to serve a giver, in steps of 1/254. More
+/// finds a listed grip for more givers, at lower scores.
+const SCORE_MARGIN: u8 = 40;
 
-/// Givers whose gains are added up at once: a register's worth of bytes.
+/// Givers whose gains are added at once: a register of bytes.
 const LANES: usize = 32;
 
-/// For each giver, all bits if it leaves a grip, or none.
-type LeftBy = [u8; GIVERS];
+/// For each giver, all bits set if it is clear of a grip, else 0.
+type ClearOf = [u8; SAMPLED_GIVERS];
 
-/// A grip that is on a list. There are some hundreds in all, which nearly every look-up starts with, so that their solids
-/// are kept.
+/// A grip on a list. There are a few hundred in all, and nearly every look-up starts with them, so their
+/// solids are kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Listed {
-    /// Its index in [`super::Atlas::entries`].
+    /// Its index in [`super::atlas::Atlas::entries`].
     pub entry: u16,
     second_spheres: Spheres,
     solids: TrackedSolids,
@@ -66,74 +64,78 @@ pub struct Listed {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Shortlists {
     grips: Vec<Listed>,
-    /// The first balls inside each of them, side by side.
+    /// The first inner spheres of each listed grip, contiguous.
     inner_spheres: Vec<Spheres>,
-    /// For each direction, which of them are on its list.
-    of_directions: Vec<Vec<u16>>,
+    /// For each direction, the grips on its list.
+    by_direction: Vec<Vec<u16>>,
 }
 
-/// The list for one of them.
+/// The list for one direction of gravity.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shortlist<'a> {
-    /// The grips of all lists, and the first balls inside them.
+    /// The grips of all lists, and their first inner spheres.
     grips: &'a [Listed],
     inner_spheres: &'a [Spheres],
-    /// Which of them are on this one.
+    /// The indices of the grips on this list.
     places: &'a [u16],
 }
 
 impl<'a> Shortlist<'a> {
-    /// The grips on it, by falling score.
+    /// The grips on the list, by falling score.
     pub fn iter(self) -> impl Iterator<Item = &'a Listed> {
         let grips = self.grips;
         self.places.iter().map(|&place| &grips[usize::from(place)])
     }
 
-    /// How many there are.
+    /// The length of the list.
     pub fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// True if there is none.
+    /// True if the list is empty.
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
     }
 
-    /// The grip at a place of the list with its solids.
+    /// The grip at a place of the list, with its solids.
     pub fn at(&self, place: usize) -> (u16, &'a TrackedSolids) {
         let grip = &self.grips[usize::from(self.places[place])];
         (grip.entry, &grip.solids)
     }
 
-    /// The grip at a place of the list with its solids; none only if it comes too near to a giver's hand, and not always
-    /// then.
+    /// The grip at a place of the list with its solids, unless its inner spheres show that it is too close to
+    /// the giver. Conservative: a grip that passes may still collide.
     #[inline]
-    pub fn unless_met(&self, place: usize, giver: &PreparedHand) -> Option<(u16, &'a TrackedSolids)> {
+    pub fn screen_against_giver(
+        &self,
+        place: usize,
+        giver: &PreparedHand,
+    ) -> Option<(u16, &'a TrackedSolids)> {
         let place = usize::from(self.places[place]);
-        let meets = |spheres: &Spheres| giver.any_certainly_within(spheres, GIVER_CLEARANCE);
-        if meets(&self.inner_spheres[place]) {
+        let collides = |spheres: &Spheres| giver.any_certainly_within(spheres, GIVER_CLEARANCE);
+        if collides(&self.inner_spheres[place]) {
             return None;
         }
         let grip = &self.grips[place];
-        (!meets(&grip.second_spheres)).then_some((grip.entry, &grip.solids))
+        (!collides(&grip.second_spheres)).then_some((grip.entry, &grip.solids))
     }
 }
 
 impl Shortlists {
-    /// The lists of some grips of a rig that fill space as is said.
+    /// Builds the lists of a rig's grips, whose hands fill the cells of `occupancy`.
     pub(super) fn of(rig: &Rig, entries: &[Entry], occupancy: &Occupancy) -> Self {
-        let left_by = left_by_givers(entries.len(), occupancy);
-        let list = |direction: usize| shortlist(|entry| entries[entry].scores[direction], &left_by);
-        let mut of_directions: Vec<Vec<u16>> = (0..DIRECTIONS).map(list).collect();
-        let mut listed: Vec<u16> = of_directions.concat();
+        let clear_of = clear_of_sampled_givers(entries.len(), occupancy);
+        let list = |direction: usize| shortlist(|entry| entries[entry].scores[direction], &clear_of);
+        let mut by_direction: Vec<Vec<u16>> = (0..DIRECTIONS).map(list).collect();
+        let mut listed: Vec<u16> = by_direction.concat();
         listed.sort_unstable();
         listed.dedup();
-        for entry in of_directions.iter_mut().flatten() {
+        for entry in by_direction.iter_mut().flatten() {
             let place = listed.partition_point(|listed| listed < entry);
             *entry = place as u16;
         }
         let mut shortlists = Self {
-            of_directions,
+            by_direction,
             ..Self::default()
         };
         for entry in listed {
@@ -153,7 +155,10 @@ impl Shortlists {
         Shortlist {
             grips: &self.grips,
             inner_spheres: &self.inner_spheres,
-            places: self.of_directions.get(nearest(up)).map_or(&[], Vec::as_slice),
+            places: self
+                .by_direction
+                .get(nearest_direction(up))
+                .map_or(&[], Vec::as_slice),
         }
     }
 
@@ -162,85 +167,86 @@ impl Shortlists {
         &self.grips
     }
 
-    /// Bytes that they take in memory.
+    /// Memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
-        let lists = self.of_directions.iter();
+        let lists = self.by_direction.iter();
         let lists = lists.map(|list| size_of_val(list.as_slice()));
         size_of_val(self.grips.as_slice()) + size_of_val(self.inner_spheres.as_slice()) + lists.sum::<usize>()
     }
 }
 
-/// For each of `count` grips, which givers keep clear of it. The givers are grips of the same atlas, as the hands that
-/// objects are held out with hold them like others do.
-fn left_by_givers(count: usize, occupancy: &Occupancy) -> Vec<LeftBy> {
-    let givers = count.min(GIVERS);
-    let mut left_by = vec![[0; GIVERS]; count];
+/// For each of `count` grips, which givers are clear of it. Grips of the same atlas serve as givers: hands
+/// that hold an object out hold it like others do.
+fn clear_of_sampled_givers(count: usize, occupancy: &Occupancy) -> Vec<ClearOf> {
+    let givers = count.min(SAMPLED_GIVERS);
+    let mut clear_of = vec![[0; SAMPLED_GIVERS]; count];
     for giver in 0..givers {
-        // Evenly from the first to the last: complete atlases have the best first.
-        let met = occupancy.met_by(giver * count / givers);
-        for (entry, left_by) in left_by.iter_mut().enumerate() {
-            if !met.contains(entry) {
-                left_by[giver] = u8::MAX;
+        // Spread evenly over the entries, as complete atlases start with the best ones.
+        let colliding = occupancy.colliding_with(giver * count / givers);
+        for (entry, clear_of) in clear_of.iter_mut().enumerate() {
+            if !colliding.contains(entry) {
+                clear_of[giver] = u8::MAX;
             }
         }
     }
-    left_by
+    clear_of
 }
 
-/// Of grips that some givers leave, those that serve the givers best, by falling score.
-fn shortlist(score: impl Fn(usize) -> u8, left_by: &[LeftBy]) -> Vec<u16> {
-    // What each giver is served with so far; at first with what is as good as nothing beside the best that it leaves.
-    let mut served = [SLIPS; GIVERS];
-    for (entry, left_by) in left_by.iter().enumerate() {
-        serve(&mut served, score(entry), left_by);
+/// The list for one direction: the grips that serve the givers best, by falling score.
+fn shortlist(score: impl Fn(usize) -> u8, clear_of: &[ClearOf]) -> Vec<u16> {
+    // The score that each giver is served with so far. The initial one is what does not count next to its
+    // best clear grip.
+    let mut served = [SLIPS; SAMPLED_GIVERS];
+    for (entry, clear_of) in clear_of.iter().enumerate() {
+        serve(&mut served, score(entry), clear_of);
     }
     for best in &mut served {
-        *best = best.saturating_sub(WORSE);
+        *best = best.saturating_sub(SCORE_MARGIN);
     }
-    let mut gains: BinaryHeap<(u32, Reverse<u16>)> = (0..left_by.len())
+    let mut gains: BinaryHeap<(u32, Reverse<u16>)> = (0..clear_of.len())
         .map(|entry| {
             (
-                gain(score(entry), &left_by[entry], &served),
+                gain(score(entry), &clear_of[entry], &served),
                 Reverse(entry as u16),
             )
         })
         .filter(|&(gain, _)| gain > 0)
         .collect();
-    let mut list = Vec::with_capacity(LISTED);
-    while list.len() < LISTED {
-        let Some(mut most) = gains.peek_mut() else { break };
-        let (bound, Reverse(entry)) = *most;
-        let (score, left_by) = (score(usize::from(entry)), &left_by[usize::from(entry)]);
-        let gain = gain(score, left_by, &served);
+    let mut list = Vec::with_capacity(LIST_LENGTH);
+    while list.len() < LIST_LENGTH {
+        let Some(mut top) = gains.peek_mut() else { break };
+        let (bound, Reverse(entry)) = *top;
+        let (score, clear_of) = (score(usize::from(entry)), &clear_of[usize::from(entry)]);
+        let gain = gain(score, clear_of, &served);
         if gain == bound {
-            PeekMut::pop(most);
-            serve(&mut served, score, left_by);
+            PeekMut::pop(top);
+            serve(&mut served, score, clear_of);
             list.push(entry);
         } else if gain > 0 {
-            most.0 = gain;
+            top.0 = gain;
         } else {
-            PeekMut::pop(most);
+            PeekMut::pop(top);
         }
     }
     list.sort_by_key(|&entry| Reverse(score(usize::from(entry))));
     list
 }
 
-/// Serves the givers that leave a grip of a score with it, if they have no better one.
-fn serve(served: &mut [u8; GIVERS], score: u8, left_by: &LeftBy) {
-    for (served, left) in served.iter_mut().zip(left_by) {
-        *served = (*served).max(score & left);
+/// Serves the givers that are clear of a grip, if it is better than what they have.
+fn serve(served: &mut [u8; SAMPLED_GIVERS], score: u8, clear_of: &ClearOf) {
+    for (served, clear) in served.iter_mut().zip(clear_of) {
+        *served = (*served).max(score & clear);
     }
 }
 
-/// By how much a grip of a score serves the givers that leave it better than they are served.
-fn gain(score: u8, left_by: &LeftBy, served: &[u8; GIVERS]) -> u32 {
-    const { assert!(GIVERS / LANES * u8::MAX as usize <= u16::MAX as usize) };
-    let (left_by, served) = (left_by.as_chunks::<LANES>().0, served.as_chunks::<LANES>().0);
+/// The sum of the improvements that a grip brings to the givers that are clear of it.
+fn gain(score: u8, clear_of: &ClearOf, served: &[u8; SAMPLED_GIVERS]) -> u32 {
+    const { assert!(SAMPLED_GIVERS / LANES * u8::MAX as usize <= u16::MAX as usize) };
+    let (clear_of, served) = (clear_of.as_chunks::<LANES>().0, served.as_chunks::<LANES>().0);
     let mut gains = [0_u16; LANES];
-    for (left_by, served) in left_by.iter().zip(served) {
+    for (clear_of, served) in clear_of.iter().zip(served) {
         for lane in 0..LANES {
-            gains[lane] += u16::from(score.saturating_sub(served[lane]) & left_by[lane]);
+            gains[lane] += u16::from(score.saturating_sub(served[lane]) & clear_of[lane]);
         }
     }
     gains.into_iter().map(u32::from).sum()
@@ -251,66 +257,66 @@ mod tests {
     use super::*;
     use crate::base::random::AttemptStream;
 
-    /// Grips with a score each, and the first `givers` that leave some of them at random.
-    fn drawn(stream: &mut AttemptStream, count: usize, givers: usize, share: f32) -> (Vec<u8>, Vec<LeftBy>) {
+    /// Grips with random scores; each of the first `givers` is clear of a random share of them.
+    fn drawn(stream: &mut AttemptStream, count: usize, givers: usize, share: f32) -> (Vec<u8>, Vec<ClearOf>) {
         let grip = |_| {
-            let mut left_by = [0; GIVERS];
-            for left in &mut left_by[..givers] {
-                *left = if stream.unit() < share { u8::MAX } else { 0 };
+            let mut clear_of = [0; SAMPLED_GIVERS];
+            for clear in &mut clear_of[..givers] {
+                *clear = if stream.unit() < share { u8::MAX } else { 0 };
             }
-            // Some slip, and many are worth the same, or nearly.
-            (stream.below(6) as u8 * 5 * stream.below(11) as u8, left_by)
+            // Some slip, and many have equal or similar scores.
+            (stream.below(6) as u8 * 5 * stream.below(11) as u8, clear_of)
         };
         (0..count).map(grip).unzip()
     }
 
-    /// What a list is worth: of each giver, how much better the best that is left of it is than what is too bad to count.
-    fn worth(list: &[u16], scores: &[u8], left_by: &[LeftBy]) -> u32 {
+    /// The objective of a list: by how much the best clear grip of each giver exceeds what does not count.
+    fn total_service(list: &[u16], scores: &[u8], clear_of: &[ClearOf]) -> u32 {
         let best = |entries: &mut dyn Iterator<Item = usize>, giver: usize| {
-            let left = entries.filter(|&entry| left_by[entry][giver] != 0);
-            left.map(|entry| u32::from(scores[entry])).max().unwrap_or(0)
+            let clear = entries.filter(|&entry| clear_of[entry][giver] != 0);
+            clear.map(|entry| u32::from(scores[entry])).max().unwrap_or(0)
         };
         let served = |giver: usize| {
             let of_all = best(&mut (0..scores.len()), giver);
             let of_list = best(&mut list.iter().map(|&entry| usize::from(entry)), giver);
-            of_list.saturating_sub(of_all.saturating_sub(u32::from(WORSE)))
+            of_list.saturating_sub(of_all.saturating_sub(u32::from(SCORE_MARGIN)))
         };
-        (0..GIVERS).map(served).sum()
+        (0..SAMPLED_GIVERS).map(served).sum()
     }
 
     #[test]
-    fn a_list_is_what_adding_the_most_useful_again_and_again_gives() {
+    fn lazy_greedy_matches_plain_greedy() {
         for seed in 0..20 {
             let mut stream = AttemptStream::new(7, seed);
-            let (scores, left_by) = drawn(&mut stream, 150, 200, 0.05);
+            let (scores, clear_of) = drawn(&mut stream, 150, 200, 0.05);
             let mut plain: Vec<u16> = Vec::new();
-            while plain.len() < LISTED {
+            while plain.len() < LIST_LENGTH {
                 let with = |entry: u16| {
                     let longer = [plain.as_slice(), &[entry]].concat();
-                    worth(&longer, &scores, &left_by)
+                    total_service(&longer, &scores, &clear_of)
                 };
-                let most = (0..150).max_by_key(|&entry| (with(entry), Reverse(entry)));
-                let most = most.expect("there are grips");
-                if with(most) == worth(&plain, &scores, &left_by) {
+                let top = (0..150).max_by_key(|&entry| (with(entry), Reverse(entry)));
+                let top = top.expect("there are grips");
+                if with(top) == total_service(&plain, &scores, &clear_of) {
                     break;
                 }
-                plain.push(most);
+                plain.push(top);
             }
             plain.sort_by_key(|&entry| Reverse(scores[usize::from(entry)]));
-            assert_eq!(shortlist(|entry| scores[entry], &left_by), plain, "seed {seed}");
+            assert_eq!(shortlist(|entry| scores[entry], &clear_of), plain, "seed {seed}");
         }
     }
 
     #[test]
-    fn a_list_with_room_for_all_serves_as_much_as_all() {
+    fn list_longer_than_the_atlas_serves_as_well_as_all_grips() {
         for seed in 0..20 {
             let mut stream = AttemptStream::new(8, seed);
-            let (scores, left_by) = drawn(&mut stream, 12, 40, 0.3);
-            let list = shortlist(|entry| scores[entry], &left_by);
+            let (scores, clear_of) = drawn(&mut stream, 12, 40, 0.3);
+            let list = shortlist(|entry| scores[entry], &clear_of);
             let all: Vec<u16> = (0..12).collect();
             assert_eq!(
-                worth(&list, &scores, &left_by),
-                worth(&all, &scores, &left_by),
+                total_service(&list, &scores, &clear_of),
+                total_service(&all, &scores, &clear_of),
                 "seed {seed}"
             );
             assert!(list.iter().all(|&entry| scores[usize::from(entry)] != SLIPS));
@@ -318,16 +324,16 @@ mod tests {
     }
 
     #[test]
-    fn gains_are_sums_over_the_givers_that_leave_the_grip() {
+    fn gain_sums_improvements_over_givers_clear_of_the_grip() {
         let mut stream = AttemptStream::new(9, 0);
-        let served: [u8; GIVERS] = std::array::from_fn(|_| stream.below(256) as u8);
-        let (scores, left_by) = drawn(&mut stream, 50, GIVERS, 0.5);
-        for (&score, left_by) in scores.iter().zip(&left_by) {
-            let more = (0..GIVERS).filter(|&giver| left_by[giver] != 0 && score > served[giver]);
+        let served: [u8; SAMPLED_GIVERS] = std::array::from_fn(|_| stream.below(256) as u8);
+        let (scores, clear_of) = drawn(&mut stream, 50, SAMPLED_GIVERS, 0.5);
+        for (&score, clear_of) in scores.iter().zip(&clear_of) {
+            let more = (0..SAMPLED_GIVERS).filter(|&giver| clear_of[giver] != 0 && score > served[giver]);
             let sum: u32 = more
                 .map(|giver| u32::from(score) - u32::from(served[giver]))
                 .sum();
-            assert_eq!(gain(score, left_by, &served), sum);
+            assert_eq!(gain(score, clear_of, &served), sum);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! How the grips of an atlas are spread over an object: only so many may be alike, and the better ones stay.
+//! Limits how many similar grips an atlas keeps, in favour of the best.
 
 use std::collections::HashMap;
 
@@ -11,19 +11,18 @@ use crate::model::{
     score::Score,
 };
 
-/// Edge in metres of the cells that palms are sorted into, and …
+/// Edge of the cells that palms are sorted into, in metres.
 const CELL: f32 = 0.02;
 
-/// … how many grips a cell may hold for each of the 24 ways that a hand can lie along axes, few fingers and many apart. With
-/// fewer, an atlas of a thin object is not filled by as many proposals as there are; more are alike, and leave less to
-/// givers who are in the way of all of them.
-const MOST_IN_CELL: usize = 4;
+/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from
+/// many. Fewer leave atlases of thin objects unfilled; more leave less choice next to givers.
+const MAX_PER_CELL: usize = 4;
 
-/// Fingers from which a hand takes much room: two keep clear of givers that more do not.
+/// Number of touching fingers from which a hand counts as large: hands with fewer are clear of more givers.
 const MANY_FINGERS: usize = 3;
 
-/// Grips that are alike: where the palm is, which way it faces and which way its fingers go, and whether many of them
-/// touch.
+/// What similar grips have in common: the palm's place, the axes that palm and fingers point along, and
+/// whether many fingers touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Cell(IVec3, [u8; 2], bool);
 
@@ -47,59 +46,59 @@ impl Cell {
     }
 }
 
-/// What becomes of a grip that is found.
+/// What happens to a new grip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Room {
-    /// There are enough like it that are as good.
-    Crowded,
+pub(super) enum Admission {
+    /// Its cell is full of grips that are as good or better.
+    Reject,
     /// It is added.
-    Free,
-    /// It takes the place of this entry, which is worse.
-    InsteadOf(usize),
+    Add,
+    /// It replaces this entry, which is worse.
+    Replace(usize),
 }
 
-/// Which entries are alike, with what they are worth.
+/// The entries of each cell with their base scores.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Spread {
     cells: HashMap<Cell, Vec<(usize, f32)>>,
 }
 
 impl Spread {
-    /// What becomes of a grip of a cell that is worth so much.
-    pub(super) fn room(&self, cell: Cell, worth: f32) -> Room {
-        let Some(alike) = self.cells.get(&cell).filter(|alike| alike.len() >= MOST_IN_CELL) else {
-            return Room::Free;
+    /// What happens to a new grip of this cell and score.
+    pub(super) fn admission(&self, cell: Cell, base_score: f32) -> Admission {
+        let Some(alike) = self.cells.get(&cell).filter(|alike| alike.len() >= MAX_PER_CELL) else {
+            return Admission::Add;
         };
         match alike.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
-            Some(&(entry, least)) if worth > least => Room::InsteadOf(entry),
-            _ => Room::Crowded,
+            Some(&(entry, lowest)) if base_score > lowest => Admission::Replace(entry),
+            _ => Admission::Reject,
         }
     }
 
-    /// How many grips of a cell are known.
-    pub(super) fn alike(&self, cell: Cell) -> usize {
+    /// The number of grips in a cell.
+    pub(super) fn count_in(&self, cell: Cell) -> usize {
         self.cells.get(&cell).map_or(0, Vec::len)
     }
 
-    /// Notes the grip that is at an index of the entries from now on.
-    pub(super) fn note(&mut self, cell: Cell, index: usize, worth: f32) {
+    /// Records the grip at an index of the entries.
+    pub(super) fn record(&mut self, cell: Cell, index: usize, base_score: f32) {
         let alike = self.cells.entry(cell).or_default();
         match alike.iter_mut().find(|(entry, _)| *entry == index) {
-            Some(known) => known.1 = worth,
-            None => alike.push((index, worth)),
+            Some(known) => known.1 = base_score,
+            None => alike.push((index, base_score)),
         }
     }
 }
 
-/// What an entry is worth beside others like it: the part of its score that neither gravity nor giver change.
-pub(super) fn worth(entry: &Entry) -> f32 {
+/// The part of an entry's score that depends on neither gravity nor giver.
+pub(super) fn base_score(entry: &Entry) -> f32 {
     Score {
         values: entry.grip_values,
     }
     .grip_total()
 }
 
-/// The axis that a direction is nearest to, from 0 to 5: x, -x, y, -y, z, -z.
+/// The axis nearest to a direction: 0 to 5 for x, -x, y, -y, z, -z.
 fn nearest_axis(direction: Vec3) -> u8 {
     let axis = direction.abs().max_position();
     2 * axis as u8 + u8::from(direction[axis] < 0.0)
@@ -114,21 +113,29 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_keeps_the_best_that_it_has_room_for() {
+    fn full_cell_replaces_only_its_worst_grip() {
         let mut spread = Spread::default();
-        let worths = [0.5, 0.2, 0.7].into_iter().chain(std::iter::repeat(0.9));
-        for (index, worth) in worths.take(MOST_IN_CELL).enumerate() {
-            assert_eq!(spread.room(cell(0), worth), Room::Free);
-            spread.note(cell(0), index, worth);
+        let scores = [0.5, 0.2, 0.7].into_iter().chain(std::iter::repeat(0.9));
+        for (index, base_score) in scores.take(MAX_PER_CELL).enumerate() {
+            assert_eq!(spread.admission(cell(0), base_score), Admission::Add);
+            spread.record(cell(0), index, base_score);
         }
-        assert_eq!(spread.room(cell(0), 0.1), Room::Crowded);
-        assert_eq!(spread.room(cell(0), 0.2), Room::Crowded, "as good is not better");
-        assert_eq!(spread.room(cell(0), 0.3), Room::InsteadOf(1));
-        assert_eq!(spread.room(cell(1), 0.1), Room::Free, "the next cell is empty");
-        spread.note(cell(0), 1, 0.6);
-        assert_eq!(spread.room(cell(0), 0.55), Room::InsteadOf(0));
-        // One that was needed is noted beyond the room, and may give way later.
-        spread.note(cell(0), MOST_IN_CELL, 0.05);
-        assert_eq!(spread.room(cell(0), 0.1), Room::InsteadOf(MOST_IN_CELL));
+        assert_eq!(spread.admission(cell(0), 0.1), Admission::Reject);
+        assert_eq!(
+            spread.admission(cell(0), 0.2),
+            Admission::Reject,
+            "as good is not better"
+        );
+        assert_eq!(spread.admission(cell(0), 0.3), Admission::Replace(1));
+        assert_eq!(
+            spread.admission(cell(1), 0.1),
+            Admission::Add,
+            "the next cell is empty"
+        );
+        spread.record(cell(0), 1, 0.6);
+        assert_eq!(spread.admission(cell(0), 0.55), Admission::Replace(0));
+        // A required grip is recorded beyond the limit, and may be replaced later.
+        spread.record(cell(0), MAX_PER_CELL, 0.05);
+        assert_eq!(spread.admission(cell(0), 0.1), Admission::Replace(MAX_PER_CELL));
     }
 }

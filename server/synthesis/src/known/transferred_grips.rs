@@ -1,4 +1,4 @@
-//! Grips of boxes that an object is like, laid on the object.
+//! Grips of similar boxes, transferred to an object.
 
 use std::{cmp::Reverse, sync::Arc};
 
@@ -14,35 +14,32 @@ use crate::{
     physical::{grip::GIVER_CLEARANCE, solids::PreparedHand},
 };
 
-/// Grips that an object borrows at most, those that fit best. With twice as many, two scalpels of a hundred fewer are answered in
-/// 33 ms: each takes fifty nanoseconds to choose from, and two microseconds to look at once.
-const MOST: usize = 1024;
+/// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty
+/// nanoseconds per selection and two microseconds once.
+const MAX_GRIPS: usize = 1024;
 
-/// Boxes that it borrows from at most, those that are most like it. More find grips for parts that are not like the whole, as
-/// a knife's blade; of twice as many, most that seem to fit do not hold, and a remote is answered after twice the time. Of
-/// scissors held out by 48 recorded givers, two workers answer 98.0 % in 33 ms with five, 97.2 with ten, 93.1 with three.
-const BOXES: usize = 5;
+/// Number of boxes that grips are transferred from, the most similar ones. More cover parts that differ from
+/// the whole, such as a knife's blade; too many add grips that fit but do not hold.
+const NEAREST_BOXES: usize = 5;
 
-/// How far from the surface thumb and finger may come to be, in metres. Of those scissors, 97.2 % are answered in 33 ms with 4 mm,
-/// and 82.6 % without borrowed grips. With 1 mm, an eighth as many grips fit: as many are answered, but one scalpel of twenty
-/// takes 25 ms or more instead of 16.
-const WITHIN: f32 = 0.002;
+/// Largest distance of thumb and finger from the surface, in metres. More admits grips that do not hold; less
+/// leaves so few that answers come later.
+const MAX_CONTACT_OFFSET: f32 = 0.002;
 
-/// Borrowed grips that are looked at more closely for a giver: those of which the balls inside are farthest from its hand. With
-/// half as many, a scalpel and a scissors of a hundred fewer are answered in 33 ms; with more than twice as many, as many are,
-/// and a tenth later at the median.
-const NEAREST: usize = 96;
+/// Largest number of grips selected for a giver, the ones farthest from its hand by inner spheres. Fewer
+/// answer fewer givers, more delay answers.
+const MAX_PER_GIVER: usize = 96;
 
-/// Grips that are compared with the giver by balls between two looks at the clock, …
-const BOUNDED_AT_ONCE: usize = 128;
+/// Grips compared with the giver by inner spheres between two clock checks.
+const BOUNDS_PER_CHECK: usize = 128;
 
-/// … and grips that are laid on the object.
-const MOVED_AT_ONCE: usize = 32;
+/// Grips transferred to the object between two clock checks.
+const MOVES_PER_CHECK: usize = 32;
 
-/// What is thinner than this is compared as if it were this, in metres: logarithms have no zero.
-const LEAST_SIZE: f32 = 0.001;
+/// Smallest size in comparisons, in metres: logarithms need a positive one.
+const MIN_SIZE: f32 = 0.001;
 
-/// The turns that leave a box as it is: none, and half a turn about each axis.
+/// The rotations that map a box onto itself: identity, and half a turn about each axis.
 const TURNS: [Quat; 4] = [
     Quat::IDENTITY,
     Quat::from_xyzw(1.0, 0.0, 0.0, 0.0),
@@ -50,49 +47,49 @@ const TURNS: [Quat; 4] = [
     Quat::from_xyzw(0.0, 0.0, 1.0, 0.0),
 ];
 
-/// A grip of a box that is laid on the object. Where it is follows, so that it takes few bytes.
+/// A grip of a box on the object. Its pose is derived when needed, which saves memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Transferred {
-    /// Which of the boxes it is of, …
+    /// Index of the box.
     primitive: u8,
-    /// … by which of the turns, …
+    /// Index of the rotation in [`TURNS`].
     turn: u8,
-    /// … and which of its grips.
+    /// Index of the grip among those of the box.
     grip: u16,
-    /// Where it touches, it may hold the object.
+    /// Does it pass the closure screen on the object?
     passes_screen: bool,
 }
 
-/// Which of the grips that an object borrows are asked for.
+/// Which transferred grips to select from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Among {
+pub enum Candidates {
     /// All that fit.
     All,
-    /// Those that may hold the object where they touch it, as far as that shows; all, if none does.
+    /// Those that pass the closure screen; all, if none does.
     Passing,
 }
 
-/// Grips of boxes that fit an object, as far as that shows before a hand is closed. They hold the boxes, not the object:
-/// searches start from them.
+/// Grips of boxes that fit an object, as far as contact positions show. They are known to hold the boxes, not
+/// the object: searches use them as seeds.
 #[derive(Clone, Debug)]
 pub struct TransferredGrips {
     known: Arc<[HeldPrimitive]>,
-    around: SortedBox,
+    bounds: SortedBox,
     /// By how well they fit.
     transferred: Vec<Transferred>,
 }
 
 impl TransferredGrips {
-    /// Bytes that one takes at most, beside what all share.
-    pub const MOST_BYTES: usize = MOST * size_of::<Transferred>();
+    /// Largest memory use in bytes, without the shared boxes.
+    pub const MAX_BYTES: usize = MAX_GRIPS * size_of::<Transferred>();
 
-    /// What an object borrows of the boxes that a hand knows, at most 256: some milliseconds of work.
+    /// Transfers grips of up to 256 boxes to an object: some milliseconds of work.
     pub fn of(object: &GraspObject, known: &Arc<[HeldPrimitive]>) -> Self {
-        let around = SortedBox::of(&object.bounding_box);
-        let mut likest: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
-        likest.sort_by(|(_, a), (_, b)| around.unlikeness(a).total_cmp(&around.unlikeness(b)));
+        let bounds = SortedBox::of(&object.bounding_box);
+        let mut by_similarity: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
+        by_similarity.sort_by(|(_, a), (_, b)| bounds.dissimilarity(a).total_cmp(&bounds.dissimilarity(b)));
         let mut fitting: Vec<(f32, Transferred)> = Vec::new();
-        for (primitive, held) in likest.into_iter().take(BOXES) {
+        for (primitive, held) in by_similarity.into_iter().take(NEAREST_BOXES) {
             for turn in 0..TURNS.len() {
                 for (grip, entry) in held.grips.entries().iter().enumerate() {
                     let transferred = Transferred {
@@ -101,42 +98,42 @@ impl TransferredGrips {
                         grip: grip as u16,
                         passes_screen: false,
                     };
-                    let object_from_primitive = around.lay(held, transferred);
-                    if let Some(off) = farther_digit(&entry.contacts, object, object_from_primitive) {
-                        fitting.push((off, transferred));
+                    let object_from_primitive = bounds.place(held, transferred);
+                    if let Some(offset) = contact_offset(&entry.contacts, object, object_from_primitive) {
+                        fitting.push((offset, transferred));
                     }
                 }
             }
         }
         fitting.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        fitting.truncate(MOST);
-        let mut promise = ClosureScreen::new(object);
-        let looked_at = |(_, transferred): (f32, Transferred)| {
+        fitting.truncate(MAX_GRIPS);
+        let mut screen = ClosureScreen::new(object);
+        let screened = |(_, transferred): (f32, Transferred)| {
             let held = &known[usize::from(transferred.primitive)];
             let contacts = &held.grips.entries()[usize::from(transferred.grip)].contacts;
             Transferred {
-                passes_screen: promise.passes(contacts, around.lay(held, transferred)),
+                passes_screen: screen.passes(contacts, bounds.place(held, transferred)),
                 ..transferred
             }
         };
         Self {
             known: Arc::clone(known),
-            around,
-            transferred: fitting.into_iter().map(looked_at).collect(),
+            bounds,
+            transferred: fitting.into_iter().map(screened).collect(),
         }
     }
 
-    /// How many grips there are.
+    /// The number of grips.
     pub fn len(&self) -> usize {
         self.transferred.len()
     }
 
-    /// True if no box has a grip that fits.
+    /// True if no grip fits.
     pub fn is_empty(&self) -> bool {
         self.transferred.is_empty()
     }
 
-    /// How many of them are promising.
+    /// The number of grips that pass the closure screen.
     pub fn passing(&self) -> usize {
         self.transferred
             .iter()
@@ -144,24 +141,24 @@ impl TransferredGrips {
             .count()
     }
 
-    /// Those of the grips that are what is demanded and seem least in a giver's way, on the object; of those that are as little,
-    /// the ones that fit best. `rig` is the hand that knows the boxes. None if interrupted.
+    /// The grips that meet the constraints and are farthest from a giver's hand, on the object; the best
+    /// fitting ones win ties. `rig` is the hand that the grips were made for. None if interrupted.
     pub fn for_giver(
         &self,
-        among: Among,
+        candidates: Candidates,
         rig: &Rig,
         giver: Option<&PreparedHand>,
         constraints: &Constraints,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Grips> {
-        // What is unlike all that was tried promises nothing, and may do all the same.
-        let only_promising = among == Among::Passing && self.passing() > 0;
+        // An object unlike all boxes may have no passing grip and still be held by one that fits.
+        let only_passing = candidates == Candidates::Passing && self.passing() > 0;
         let mut by_clearance: Vec<(Reverse<i32>, usize)> = Vec::with_capacity(self.transferred.len());
         for (place, &transferred) in self.transferred.iter().enumerate() {
-            if place.is_multiple_of(BOUNDED_AT_ONCE) && interrupted() {
+            if place.is_multiple_of(BOUNDS_PER_CHECK) && interrupted() {
                 return None;
             }
-            if only_promising && !transferred.passes_screen {
+            if only_passing && !transferred.passes_screen {
                 continue;
             }
             let clearance = giver.map_or(GIVER_CLEARANCE, |giver| {
@@ -170,16 +167,16 @@ impl TransferredGrips {
             by_clearance.push((Reverse(nanometres(clearance.min(GIVER_CLEARANCE))), place));
         }
         by_clearance.sort_unstable();
-        let mut entries = Vec::with_capacity(NEAREST);
+        let mut entries = Vec::with_capacity(MAX_PER_GIVER);
         for (count, (_, place)) in by_clearance.into_iter().enumerate() {
-            if entries.len() == NEAREST {
+            if entries.len() == MAX_PER_GIVER {
                 break;
             }
-            if count.is_multiple_of(MOVED_AT_ONCE) && interrupted() {
+            if count.is_multiple_of(MOVES_PER_CHECK) && interrupted() {
                 return None;
             }
             let entry = self.entry(self.transferred[place]);
-            if entry.is_wanted(constraints) {
+            if entry.meets(constraints) {
                 entries.push(entry);
             }
         }
@@ -190,15 +187,15 @@ impl TransferredGrips {
         let held = self.held(transferred);
         held.grips.moved_clearance_upper_bound(
             usize::from(transferred.grip),
-            self.around.lay(held, transferred),
+            self.bounds.place(held, transferred),
             giver,
         )
     }
 
-    /// A grip where it is laid.
+    /// The grip on the object.
     fn entry(&self, transferred: Transferred) -> Entry {
         let held = self.held(transferred);
-        held.grips.entries()[usize::from(transferred.grip)].moved(self.around.lay(held, transferred))
+        held.grips.entries()[usize::from(transferred.grip)].moved(self.bounds.place(held, transferred))
     }
 
     fn held(&self, transferred: Transferred) -> &HeldPrimitive {
@@ -206,7 +203,7 @@ impl TransferredGrips {
     }
 }
 
-/// An object's box with its longest edges first, as those of primitives are.
+/// An object's bounding box with its longest edges first, as in primitives.
 #[derive(Clone, Copy, Debug)]
 struct SortedBox {
     object_from_box: Pose,
@@ -214,26 +211,26 @@ struct SortedBox {
 }
 
 impl SortedBox {
-    fn of(around: &OrientedBox) -> Self {
-        let mut axes = [0, 1, 2].map(|axis| (around.half_extents[axis], Vec3::AXES[axis]));
+    fn of(bounds: &OrientedBox) -> Self {
+        let mut axes = [0, 1, 2].map(|axis| (bounds.half_extents[axis], Vec3::AXES[axis]));
         axes.sort_by(|(a, _), (b, _)| b.total_cmp(a));
         let [x, y, _] = axes.map(|(_, axis)| axis);
         let turn = Quat::from_mat3(&Mat3::from_cols(x, y, x.cross(y))).normalize();
         Self {
-            object_from_box: around.object_from_box * Pose::new(Vec3::ZERO, turn),
-            half_extents: Vec3::from(axes.map(|(half, _)| half.max(LEAST_SIZE))),
+            object_from_box: bounds.object_from_box * Pose::new(Vec3::ZERO, turn),
+            half_extents: Vec3::from(axes.map(|(half, _)| half.max(MIN_SIZE))),
         }
     }
 
-    /// How much the sizes differ from those of a primitive: the sum of squared logarithms of their ratios.
-    fn unlikeness(&self, other: &HeldPrimitive) -> f32 {
+    /// The sum of squared logarithms of the ratios of the sizes.
+    fn dissimilarity(&self, other: &HeldPrimitive) -> f32 {
         let ratios = self.half_extents / other.primitive.half_extents;
         ratios.to_array().map(|ratio| ratio.ln().powi(2)).iter().sum()
     }
 
-    /// Where the frame of a primitive is laid for one of its grips: so that the middle of what touches comes to be where it was
-    /// by the boxes' sizes.
-    fn lay(&self, held: &HeldPrimitive, transferred: Transferred) -> Pose {
+    /// The frame of a primitive on the object for one of its grips: the centroid of the contacts keeps its
+    /// place relative to the box.
+    fn place(&self, held: &HeldPrimitive, transferred: Transferred) -> Pose {
         let contacts = &held.grips.entries()[usize::from(transferred.grip)].contacts;
         let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
         let middle = sum / contacts.len().max(1) as f32;
@@ -243,16 +240,18 @@ impl SortedBox {
     }
 }
 
-/// How far from the object's surface thumb or nearest finger come to be, whichever is farther; none if that is more than
-/// [`WITHIN`].
-fn farther_digit(contacts: &[Contact], object: &GraspObject, object_from_primitive: Pose) -> Option<f32> {
+/// The larger of the distances of the thumb and of the nearest finger from the object's surface; none if it
+/// exceeds [`MAX_CONTACT_OFFSET`].
+fn contact_offset(contacts: &[Contact], object: &GraspObject, object_from_primitive: Pose) -> Option<f32> {
     let nearest = |is_thumb: bool| {
         let of_part = contacts
             .iter()
             .filter(|contact| contact.part.is_thumb() == Some(is_thumb));
         let distances = of_part.filter_map(|contact| {
-            let place = object_from_primitive.transform_point(contact.position);
-            let closest = object.surface.closest_point_within(place, WITHIN)?;
+            let position = object_from_primitive.transform_point(contact.position);
+            let closest = object
+                .surface
+                .closest_point_within(position, MAX_CONTACT_OFFSET)?;
             Some(closest.distance)
         });
         distances.min_by(f32::total_cmp)

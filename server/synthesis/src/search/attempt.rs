@@ -1,5 +1,5 @@
-//! One attempt: a hand is placed, closed and checked as strategy and validity ask; where it fails and grips are known,
-//! hands perturbed near those follow.
+//! One attempt: places, closes and checks a hand according to strategy and validity. If that fails and seeds
+//! are known, hands perturbed from those follow.
 
 use super::{physical_attempt::PhysicalAttempt, scene::Scene};
 use crate::{
@@ -27,11 +27,8 @@ use crate::{
     },
 };
 
-/// Hands beside known grips that an attempt tries after its own. Where a giver leaves little room, they are what holds: of 62
-/// searches of a tenth of a second by one worker, for 31 holdouts of the built-in scalpel that its atlas does not answer,
-/// none found a grasp without them, and 39 with as few as eight an attempt. But they hold only where something like them is
-/// known, and fewer leave more of the time to hands that are placed anew: without any an attempt took 85 µs there, with
-/// eight 282.
+/// Perturbed hands that an attempt tries after its fresh one. They answer where a giver leaves little room,
+/// but only if a similar grip is known; fewer leave more time for fresh placements.
 const SEEDS_PER_ATTEMPT: usize = 16;
 
 /// How an attempt ended.
@@ -43,10 +40,10 @@ pub enum AttemptEnd {
     Rejected {
         /// The check.
         rejection: Rejection,
-        /// For `NotImmobilizing` by the thesis' validity: the smallest angle of Eq. 4.5, in radians.
+        /// For `NotImmobilizing` under `THESIS` validity: the smallest angle of Eq. 4.5, in radians.
         wrench_angle: Option<f32>,
     },
-    /// The stop signal came before it was over.
+    /// The stop signal came first.
     Interrupted,
 }
 
@@ -74,12 +71,12 @@ impl From<NoGrip> for AttemptEnd {
     }
 }
 
-/// The state of an attempt. Reuse it: the next attempt keeps its buffers.
+/// The state of an attempt. Reuse it for the next attempt to keep its buffers.
 #[derive(Clone, Debug)]
 pub struct Attempt {
     pruned_placements: u64,
     wrist: WristFrame,
-    /// The digits that this attempt posed, thumb first.
+    /// The digits posed by this attempt, thumb first.
     posed: Vec<DigitAngles>,
     thesis: ThesisAttempt,
     physical: PhysicalAttempt,
@@ -98,7 +95,7 @@ impl Default for Attempt {
 }
 
 impl Attempt {
-    /// How many placements the measures pruned before the attempt had one.
+    /// How many placements the pruning measures discarded before accepting one.
     pub fn pruned_placements(&self) -> u64 {
         self.pruned_placements
     }
@@ -108,18 +105,18 @@ impl Attempt {
         &self.wrist
     }
 
-    /// True if no digit was posed: the attempt failed before that.
+    /// True if the attempt failed before posing a digit.
     pub fn is_unposed(&self) -> bool {
         self.posed.is_empty()
     }
 
-    /// The digits as Algorithm 1 posed them, thumb first, under the thesis' validity: all five, or none, or the thumb
-    /// alone where the search stops without it.
+    /// The digits as Algorithm 1 posed them under `THESIS` validity, thumb first: all five, none, or the
+    /// thumb alone if the search stops without it.
     pub fn posed_digits(&self) -> &[PosedDigit] {
         self.thesis.posed_digits()
     }
 
-    /// The hand as far as the attempt came; digits that it did not pose are stretched.
+    /// The hand as far as the attempt got; digits that it did not pose are stretched.
     pub fn pose(&self, scene: &Scene<'_>) -> HandPose {
         let mut digits = scene.rig().stretched();
         for (angles, posed) in digits.iter_mut().zip(&self.posed) {
@@ -131,8 +128,8 @@ impl Attempt {
         }
     }
 
-    /// A newly placed hand; if that fails and grips are known, also some hands perturbed near those. `interrupted` is
-    /// called after at most some 50 µs of work.
+    /// Tries a freshly placed hand, and, if that fails and seeds are known, some hands perturbed from those.
+    /// Calls `interrupted` at least every 50 µs or so of work.
     pub fn run(
         &mut self,
         scene: &Scene<'_>,
@@ -152,13 +149,13 @@ impl Attempt {
         }
         match self.try_seeds(scene, &around, stream, stopwatch, interrupted) {
             Ok(Some(grasp)) => AttemptEnd::Valid(grasp),
-            // The report shows the newly placed hand of an attempt that fails.
+            // A failed attempt reports its freshly placed hand.
             Ok(None) => end,
             Err(Interrupted) => AttemptEnd::Interrupted,
         }
     }
 
-    /// Algorithm 1, with the wrist placed as the strategy says.
+    /// Algorithm 1, with the wrist placed according to the strategy.
     fn try_by_thesis(
         &mut self,
         scene: &Scene<'_>,
@@ -196,7 +193,7 @@ impl Attempt {
         }
     }
 
-    /// `PHYSICAL` validity, with the hand placed as the strategy says.
+    /// `PHYSICAL` validity, with the hand placed according to the strategy.
     fn try_physically(
         &mut self,
         scene: &Scene<'_>,
@@ -237,7 +234,7 @@ impl Attempt {
         held.map_or_else(AttemptEnd::from, AttemptEnd::Valid)
     }
 
-    /// Tries [`SEEDS_PER_ATTEMPT`] hands perturbed near known grips.
+    /// Tries [`SEEDS_PER_ATTEMPT`] hands perturbed from known grips.
     fn try_seeds(
         &mut self,
         scene: &Scene<'_>,
@@ -279,7 +276,7 @@ impl Attempt {
 /// The stop signal came.
 struct Interrupted;
 
-/// A hand as GUIDED search proposes it.
+/// A hand as `GUIDED` search proposes it.
 fn guided_proposal(
     scene: &Scene<'_>,
     stream: &mut AttemptStream,
@@ -307,7 +304,7 @@ fn place_by_ladder(
         .ok_or(Failure::Interrupted)
 }
 
-/// The wrist, if the request's constraints admit it.
+/// The wrist, if it meets the request's constraints.
 fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure> {
     if scene.constraints().admits_wrist(wrist.object_from_wrist) {
         Ok(*wrist)

@@ -1,10 +1,11 @@
-//! The way to a grasp, for who animates it: the hand comes on a straight line, open, and closes.
+//! Key frames for animation: the open hand approaches on a straight line, then closes.
 //!
-//! The thesis ends with the pose of the grasp. People open the hand beyond the object while they reach, and close it at
-//! the end of the way (M. Jeannerod, "The timing of natural prehension movements", 1984). So do these frames: from
-//! `APPROACH` to `PRE_GRASP` the open hand moves along a line, from `PRE_GRASP` to `CLOSE` its digits bend, all joints of
-//! a digit by the same share at a time. Between two frames the wrist moves straight without turning and joint angles
-//! change evenly; what is found free is that motion as a whole (`motion`), not points of it.
+//! The thesis ends with the pose of the grasp. People open the hand wider than the object while they reach,
+//! and close it at the end of the motion (M. Jeannerod, "The timing of natural prehension movements", 1984).
+//! So do these frames: from `APPROACH` to `PRE_GRASP` the open hand moves along a line; from `PRE_GRASP` to
+//! `CLOSE` its digits bend, all joints of a digit in proportion. Between two frames the wrist moves straight
+//! without turning, and joint angles change linearly. This motion is checked continuously (`motion`), not at
+//! samples.
 
 mod motion;
 
@@ -27,51 +28,51 @@ use crate::{
         solids::{HandSolids, TRACKED_SOLIDS, TrackedSolids, comes_within, self_clearance},
     },
 };
-use motion::{Keep, Motion, Obstacles};
+use motion::{Clearances, Motion, Obstacles};
 
-/// How far the hand of `PRE_GRASP` is from the object at least, in metres: seen as not touching yet. More opens hands
-/// wider and finds fewer ways.
+/// Least distance of the hand of `PRE_GRASP` from the object, in metres: visibly not touching yet. More opens
+/// hands wider and finds fewer motions.
 pub const OPEN_CLEARANCE: f32 = 0.002;
 
-/// How far `APPROACH` lies before `PRE_GRASP`, in metres: more than a finger's length, so that the hand is out of the
-/// object. More looks more like reaching, and meets the giver more often.
+/// Distance from `APPROACH` to `PRE_GRASP`, in metres: more than a finger's length, so that the hand is clear
+/// of the object. More looks more like reaching, and collides with the giver more often.
 pub const APPROACH_DISTANCE: f32 = 0.12;
 
-/// How far fingertips open at least, where their joints allow it, in metres: the first that is free for all digits is taken,
-/// and then for each digit the first that is free beside the others. Thumb and finger together open to some 4 cm more than
-/// the object is thick, as people's do; the others are for hands that are not free of the object or the giver by then.
+/// Distances by which fingertips open, in metres, or as far as the joints allow. The first that is free for
+/// all digits is taken, then the smallest that is free for each. The first opens thumb and finger about 4 cm
+/// wider than the object, as people do; the others serve hands that still collide then.
 const OPENINGS: [f32; 5] = [0.025, 0.035, 0.05, 0.07, f32::INFINITY];
 
-/// How far `PRE_GRASP` lies before `CLOSE`, in metres: nothing if the hand can open where it is, and some room for a palm
-/// that lies on the object.
-const DRAWN_BACK: [f32; 3] = [0.0, 0.01, 0.025];
+/// Distances from `PRE_GRASP` to `CLOSE`, in metres: none if the hand can open in place, and some for a palm
+/// that rests on the object.
+const BACK_OFFS: [f32; 3] = [0.0, 0.01, 0.025];
 
-/// Angles in degrees between the direction in which a hand comes by nature and those that are tried, and …
+/// Angles, in degrees, by which alternative approach directions deviate from the natural one.
 const TILTS: [f32; 4] = [20.0, 40.0, 60.0, 80.0];
 
-/// … where around it, in degrees from the side of the fingertips toward the thumb's: first those that keep the hand
-/// upright, straight ahead along the forearm or down on the palm.
+/// Where they lie around it, in degrees from the fingertips' side toward the thumb's: first those that keep
+/// the hand upright, straight ahead along the forearm or down on the palm.
 const AZIMUTHS: [f32; 8] = [0.0, 180.0, 90.0, 270.0, 45.0, 315.0, 135.0, 225.0];
 
-/// How often the hand is looked at, on all the ways that are tried, before there is none: some milliseconds. One in a
-/// hundred grasps needs more than half of it. Less leaves more grasps without a way.
-const MOST_LOOKS: u32 = 2000;
+/// Largest number of hand poses checked per grasp, in some milliseconds. One in a hundred grasps needs more
+/// than half of them.
+const MAX_POSES_CHECKED: u32 = 2000;
 
-/// What the hand keeps to while it comes.
-const COMING: Keep = Keep {
+/// Clearances during the approach.
+const APPROACH_CLEARANCES: Clearances = Clearances {
     object: 0.5 * OPEN_CLEARANCE,
     giver: 0.5 * GIVER_CLEARANCE,
 };
 
-/// What the hand keeps to while it closes: it may be as deep as in a grasp.
-const CLOSING: Keep = Keep {
+/// Clearances while closing: the hand may sink in as deep as in a grasp.
+const CLOSING_CLEARANCES: Clearances = Clearances {
     object: -MAX_PENETRATION,
     giver: 0.5 * GIVER_CLEARANCE,
 };
 
-/// Plans the way to a grasp that is valid under `PHYSICAL`; to others, which know no solids, there is none. `approach` is
-/// from where the hand may come, in the object's frame.
-pub fn plan_way(
+/// Plans the key frames of a grasp that is valid under `PHYSICAL`; others have none. `approach` limits the
+/// approach direction, in the object's frame.
+pub fn plan_key_frames(
     holdout: &Holdout,
     rig: &Rig,
     friction: f32,
@@ -84,14 +85,15 @@ pub fn plan_way(
     }
 }
 
-/// The way to a grasp: `APPROACH`, `PRE_GRASP` and `CLOSE`, in this order.
+/// The key frames of a grasp: `APPROACH`, `PRE_GRASP` and `CLOSE`, in this order.
 ///
-/// `PRE_GRASP` is [`OPEN_CLEARANCE`] and more off the object and [`GIVER_CLEARANCE`] and more off the giver's hand, and
-/// not through itself. On the way there the hand touches neither; closing, it sinks no deeper into the object than
-/// [`MAX_PENETRATION`], to a tenth of a millimetre, and touches no forbidden surface. The hand moves in a direction of the cone
-/// `approach`, which is in the object's frame as the rest is; none: in any.
+/// `PRE_GRASP` is at least [`OPEN_CLEARANCE`] off the object and [`GIVER_CLEARANCE`] off the giver's hand,
+/// and free of self-collision. On the approach the hand touches neither; closing, it sinks no deeper into the
+/// object than [`MAX_PENETRATION`], to a tenth of a millimetre, and touches no forbidden surface. The approach
+/// direction lies in the cone `approach`, in the object's frame like everything else; without a cone it is
+/// unrestricted.
 ///
-/// None if no straight way in was found. The grasp is as valid as others then, but the hand would have to wind its way in.
+/// None if no straight approach was found. The grasp is still valid, but only a curved motion could reach it.
 pub fn key_frames(
     scene: &ObjectScene<'_>,
     presented: &Presented,
@@ -107,7 +109,7 @@ pub fn key_frames(
         obstacles: Obstacles {
             object: scene.object,
             giver: presented.giver.as_ref(),
-            looks_left: Cell::new(MOST_LOOKS),
+            poses_left: Cell::new(MAX_POSES_CHECKED),
         },
     };
     let (direction, pre_grasp) = planner.plan()?;
@@ -119,14 +121,14 @@ pub fn key_frames(
     ])
 }
 
-/// The same hand elsewhere.
-fn moved(pose: &HandPose, way: Vec3) -> HandPose {
+/// The hand displaced.
+fn moved(pose: &HandPose, displacement: Vec3) -> HandPose {
     let Pose {
         position,
         orientation,
     } = pose.frame_from_wrist;
     HandPose {
-        frame_from_wrist: Pose::new(position + way, orientation),
+        frame_from_wrist: Pose::new(position + displacement, orientation),
         digits: pose.digits,
     }
 }
@@ -141,10 +143,10 @@ struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// The direction in which the hand comes, and the hand of `PRE_GRASP`.
+    /// The approach direction and the hand of `PRE_GRASP`.
     fn plan(&self) -> Option<(Vec3, HandPose)> {
-        // Digits that hold nothing open with the others, or stay out of the way where they are.
-        let opens_of = |i: usize| {
+        // Digits that hold nothing open with the others, or else stay where they are.
+        let opening_digits = |i: usize| {
             if i < OPENINGS.len() {
                 [true; 5]
             } else {
@@ -152,28 +154,28 @@ impl Planner<'_> {
             }
         };
         let opened: [_; 2 * OPENINGS.len()] = std::array::from_fn(|i| {
-            let pose = self.opened(OPENINGS[i % OPENINGS.len()], opens_of(i));
+            let pose = self.opened(OPENINGS[i % OPENINGS.len()], opening_digits(i));
             (pose, self.solids(&pose))
         });
-        // Where the hand opens in its place, that does not depend on the direction.
+        // Opening in place does not depend on the direction.
         let in_place: [OnceCell<bool>; 2 * OPENINGS.len()] = Default::default();
         for direction in self.directions() {
-            for back in DRAWN_BACK {
+            for back in BACK_OFFS {
                 for (i, ((pose, solids), in_place)) in opened.iter().zip(&in_place).enumerate() {
                     let opens = if back == 0.0 {
                         *in_place.get_or_init(|| self.is_clear(solids) && self.closes_from(pose, 0.0))
                     } else {
                         self.is_clear(&solids.moved(direction * -back))
                     };
-                    if !opens || !self.comes(&solids.moved(direction * -back), direction) {
+                    if !opens || !self.approach_is_free(&solids.moved(direction * -back), direction) {
                         continue;
                     }
                     let pose = moved(pose, direction * -back);
                     if back == 0.0 || self.closes_from(&pose, back) {
-                        let narrower = &OPENINGS[..i % OPENINGS.len()];
+                        let smaller_openings = &OPENINGS[..i % OPENINGS.len()];
                         return Some((
                             direction,
-                            self.narrowed(pose, narrower, opens_of(i), direction, back),
+                            self.narrowed(pose, smaller_openings, opening_digits(i), direction, back),
                         ));
                     }
                 }
@@ -182,8 +184,8 @@ impl Planner<'_> {
         None
     }
 
-    /// The hand with the digits that `opens` says opened in their place, until the tips are `opening` metres from where
-    /// they were, or as far as the joints go.
+    /// The hand in place with the digits in `opens` opened, until the tips have moved `opening` metres or the
+    /// joints reach their limits.
     fn opened(&self, opening: f32, opens: [bool; 5]) -> HandPose {
         let digits = Digit::ALL.map(|digit| {
             if opens[digit.index()] {
@@ -204,7 +206,7 @@ impl Planner<'_> {
         let flexing = Flexing {
             digit: rig,
             base_yaw: closed.base_yaw,
-            // How it bends does not matter to how it is when it is open.
+            // The bend ratio does not affect the open digit.
             bend_ratio: 1.0,
         };
         let open = flexing.opened();
@@ -213,22 +215,24 @@ impl Planner<'_> {
         between(&closed, &open, (opening / whole).min(1.0))
     }
 
-    /// An open hand, `back` metres before the grasp, whose digits open no farther than they must: one that lies on the object
-    /// with its first link opens far, and the others need not.
+    /// An open hand, `back` metres before the grasp, with each digit opened as little as possible: a digit
+    /// whose first link lies on the object has to open far, the others need not.
     fn narrowed(
         &self,
         mut pose: HandPose,
-        narrower: &[f32],
+        smaller_openings: &[f32],
         opens: [bool; 5],
         direction: Vec3,
         back: f32,
     ) -> HandPose {
         for digit in Digit::ALL.into_iter().filter(|digit| opens[digit.index()]) {
-            for &opening in narrower {
+            for &opening in smaller_openings {
                 let mut tried = pose;
                 tried.digits[digit.index()] = self.opened_digit(digit, opening);
                 let solids = self.solids(&tried);
-                if self.is_clear(&solids) && self.comes(&solids, direction) && self.closes_from(&tried, back)
+                if self.is_clear(&solids)
+                    && self.approach_is_free(&solids, direction)
+                    && self.closes_from(&tried, back)
                 {
                     pose = tried;
                     break;
@@ -238,8 +242,8 @@ impl Planner<'_> {
         pose
     }
 
-    /// The directions in which the hand may come, in the object's frame: first as hands do by nature, then more and more
-    /// from aside; of those, the ones in which it may.
+    /// The directions of approach to try, in the object's frame: the natural one first, then those that
+    /// deviate more and more. Only those that the cone allows.
     fn directions(&self) -> impl Iterator<Item = Vec3> {
         let wrist = self.close.frame_from_wrist;
         let natural = approach_direction(wrist);
@@ -261,7 +265,7 @@ impl Planner<'_> {
             .filter(|&direction| self.approach.is_none_or(|cone| cone.contains(direction)))
     }
 
-    /// A hand as it is beside the object, and beside the giver's.
+    /// The solids of the hand for comparison with the object and the giver.
     fn solids(&self, pose: &HandPose) -> TrackedSolids {
         TrackedSolids::of_rig(
             self.rig,
@@ -270,7 +274,7 @@ impl Planner<'_> {
         )
     }
 
-    /// True if an open hand is off the object and the giver's hand, and not through itself.
+    /// True if an open hand is clear of the object, the giver's hand and itself.
     fn is_clear(&self, solids: &TrackedSolids) -> bool {
         let surface = &self.obstacles.object.surface;
         let giver = self.obstacles.giver;
@@ -282,13 +286,13 @@ impl Planner<'_> {
             && self_clearance(&solids.hand) >= 0.0
     }
 
-    /// True if the straight way to an open hand is free.
-    fn comes(&self, pre_grasp: &TrackedSolids, direction: Vec3) -> bool {
+    /// True if the straight approach to an open hand is free.
+    fn approach_is_free(&self, pre_grasp: &TrackedSolids, direction: Vec3) -> bool {
         let motion = Motion {
             solids_at: |share: f32| pre_grasp.moved(direction * (APPROACH_DISTANCE * (share - 1.0))),
             travels: pre_grasp.iter().map(|_| APPROACH_DISTANCE).collect(),
         };
-        motion.is_free(&self.obstacles, COMING)
+        motion.is_free(&self.obstacles, APPROACH_CLEARANCES)
     }
 
     /// True if the hand can close from an open one whose wrist is `back` metres before it.
@@ -310,10 +314,10 @@ impl Planner<'_> {
             },
             travels: self.closing_travels(open, back),
         };
-        motion.is_free(&self.obstacles, CLOSING)
+        motion.is_free(&self.obstacles, CLOSING_CLEARANCES)
     }
 
-    /// Metres that any point of each of the hand's solids travels at most while it closes.
+    /// An upper bound, in metres, of the travel of any point of each of the hand's solids while it closes.
     fn closing_travels(&self, open: &HandPose, back: f32) -> Vec<f32> {
         let mut travels = Vec::new();
         let turns = |digit: usize| {
@@ -332,7 +336,7 @@ impl Planner<'_> {
                 thickest.max(link.start_radius).max(link.end_radius)
             });
             travels.extend((0..3).map(|link| {
-                // The farthest point of the link from each joint that carries it, with the digit stretched.
+                // The farthest point of the link from each joint that moves it, with the digit stretched.
                 let turned = (0..=link).map(|joint| {
                     let reach: f32 = lengths[joint..=link].iter().sum();
                     turns[joint] * (reach + thickest)
@@ -341,7 +345,7 @@ impl Planner<'_> {
             }));
         }
         travels.extend(solids.palm.iter().map(|_| back));
-        // The ball of the thumb turns with its metacarpal.
+        // The thenar turns with the thumb's metacarpal.
         let base = solids.phalanges[0][0].start;
         let turn = turns(Digit::Thumb.index())[0];
         travels.extend(solids.thenar.iter().map(|solid| {
@@ -355,7 +359,7 @@ impl Planner<'_> {
     }
 }
 
-/// A digit at a share of the way between two poses.
+/// A digit's angles interpolated between two poses.
 fn between(from: &DigitAngles, to: &DigitAngles, share: f32) -> DigitAngles {
     let lerp = |from: f32, to: f32| from + (to - from) * share;
     DigitAngles {

@@ -1,5 +1,5 @@
-//! Known grips as candidates of a race: those of an atlas, those that were found lately, and then those of the atlas without
-//! the fingers that the giver is in the way of.
+//! Known grips as candidates of a race: those of the atlas, then recent ones, then those of the atlas without
+//! the fingers that the giver obstructs.
 
 use std::{
     ops::Deref,
@@ -15,8 +15,8 @@ use crate::{
     known::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
-        recheck::Recheck,
-        subset_grasps::spared_with,
+        recheck::GripChecker,
+        subset_grasps::subset_grasp_with,
     },
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
     physical::{
@@ -26,43 +26,42 @@ use crate::{
     rating::scoring::comfort_value,
 };
 
-/// Grips that are passed over at most before somebody looks at the clock: one or two microseconds' worth.
-const PASSED_AT_ONCE: usize = 64;
+/// Grips skipped between two clock checks: one or two microseconds of work.
+const GRIPS_PER_CLOCK_CHECK: usize = 64;
 
-/// The order in which an atlas keeps its grips.
-static AS_KEPT: LazyLock<Vec<u16>> = LazyLock::new(|| (0..u16::MAX).collect());
+/// The indices of an atlas' entries in their stored order.
+static STORED_ORDER: LazyLock<Vec<u16>> = LazyLock::new(|| (0..u16::MAX).collect());
 
 /// Known grips in the order in which they are tried.
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
     atlas: Option<&'a Atlas>,
-    /// Those of the atlas that are tried first, one by one, beside a giver: it takes as long to ask which of all are out of
-    /// the question.
+    /// The atlas' shortlist for a giver. These are screened one by one, because excluding grips of the whole
+    /// atlas at once takes as long.
     shortlist: Shortlist<'a>,
-    /// All of the atlas.
+    /// All grips of the atlas.
     order: &'a [u16],
-    /// Those that were found lately. Mostly they are worse than the atlas' own, which were chosen from.
+    /// Recent grips. Mostly they are worse than those of the atlas, which are a selection.
     recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
-    asked: Recheck<'a>,
+    checker: GripChecker<'a>,
     giver: Option<&'a PreparedHand>,
-    /// The front of the order again, for where a giver is in the way of fingers that can be spared.
-    sparing: &'a [u16],
+    /// The start of `order` again, to try without the fingers that the giver obstructs.
+    subset_order: &'a [u16],
     rig: &'a Rig,
     mechanisms: Mechanisms,
-    /// Those that certainly meet the giver, once somebody asks.
+    /// Grips that certainly collide with the giver, computed on first use.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place that nobody has taken, in the shortlist or, counted on, in the order, among the recent ones or those
-    /// that are looked at for sparing fingers.
-    next: AtomicUsize,
+    /// The next place to try, counted through shortlist, `order`, `recent` and `subset_order`.
+    cursor: AtomicUsize,
 }
 
 /// The solids of a known grip's hand.
 enum Solids<'a> {
-    /// Those that the atlas keeps.
-    Kept(&'a TrackedSolids),
-    /// Made for this look.
-    Made(Box<TrackedSolids>),
+    /// Stored with the atlas.
+    Stored(&'a TrackedSolids),
+    /// Computed for this grip.
+    Computed(Box<TrackedSolids>),
 }
 
 impl Deref for Solids<'_> {
@@ -70,53 +69,53 @@ impl Deref for Solids<'_> {
 
     fn deref(&self) -> &TrackedSolids {
         match self {
-            Self::Kept(solids) => solids,
-            Self::Made(solids) => solids,
+            Self::Stored(solids) => solids,
+            Self::Computed(solids) => solids,
         }
     }
 }
 
-/// A known grip that may do.
-enum Open<'a> {
-    /// It may keep clear of the giver.
+/// A known grip that may be valid.
+enum Candidate<'a> {
+    /// It may be clear of the giver.
     Whole {
         source: GraspSource,
         entry: &'a Entry,
         solids: Solids<'a>,
     },
-    /// It may hold without the fingers that the giver is in the way of: this grip of the atlas.
-    Sparing(u16),
+    /// This grip of the atlas may hold without the fingers that the giver obstructs.
+    Subset(u16),
 }
 
-/// What was taken of the known grips.
-enum Taken<'a> {
-    /// There are no more.
-    NoneLeft,
-    /// Some that certainly meet the giver.
-    NoneOpen,
-    /// One that may not, and those before it.
-    Open(Open<'a>),
+/// The result of advancing through the known grips.
+enum Next<'a> {
+    /// All have been tried.
+    Exhausted,
+    /// The grips just passed certainly collide with the giver.
+    AllExcluded,
+    /// A grip to check; those passed before it certainly collide.
+    Candidate(Candidate<'a>),
 }
 
-/// What became of a known grip.
-pub(super) enum Tried {
-    /// There are no more.
-    NoneLeft,
-    /// It does not do.
-    Refused,
+/// The result of trying a known grip.
+pub(super) enum TryResult {
+    /// All have been tried.
+    Exhausted,
+    /// It is not valid.
+    Rejected,
     /// It is a valid grasp.
     Valid {
-        /// Where the grip is known from.
+        /// Where the grip comes from.
         source: GraspSource,
         /// The grasp.
         grasp: Box<Grasp>,
-        /// How good it is: more is better.
+        /// Its quality; higher is better.
         value: f32,
     },
 }
 
 impl<'a> KnownGrips<'a> {
-    /// The grips that a search may use, if any.
+    /// The known grips that a search may use; none if there are none.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
         let (object, presented) = scene.physical()?;
         let mechanisms = settings.run.mechanisms;
@@ -127,12 +126,12 @@ impl<'a> KnownGrips<'a> {
         } else {
             settings.known.recent.entries()
         };
-        let is_any = atlas.is_some() || !recent.is_empty();
-        if !is_any || !settings.query.uses_known_grips() {
+        let has_any = atlas.is_some() || !recent.is_empty();
+        if !has_any || !settings.query.uses_known_grips() {
             return None;
         }
         let giver = presented.giver.as_ref();
-        // The shortlist is for givers that are in the way, and the best is not wanted for being on it.
+        // The shortlist serves searches with a giver that any valid grasp ends; it is no better than the rest.
         let shortlist = match (atlas, settings.query.choice) {
             (Some(atlas), Choice::FirstValid) if giver.is_some() && mechanisms.has(Mechanism::Shortlists) => {
                 atlas.shortlist(presented.up)
@@ -144,7 +143,7 @@ impl<'a> KnownGrips<'a> {
             if by_gravity {
                 atlas.by_score(presented.up)
             } else {
-                &AS_KEPT[..atlas.entries().len()]
+                &STORED_ORDER[..atlas.entries().len()]
             }
         };
         Some(Self {
@@ -153,8 +152,8 @@ impl<'a> KnownGrips<'a> {
             order: atlas.map_or(&[], order),
             recent,
             scene,
-            asked: Recheck::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
-            sparing: match (atlas, giver) {
+            checker: GripChecker::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
+            subset_order: match (atlas, giver) {
                 _ if !mechanisms.has(Mechanism::FingerSubsets) => &[],
                 (Some(atlas), Some(_)) if by_gravity => atlas.holding_under(presented.up),
                 (Some(atlas), Some(_)) => order(atlas),
@@ -164,62 +163,63 @@ impl<'a> KnownGrips<'a> {
             rig: scene.rig(),
             mechanisms,
             excluded: OnceLock::new(),
-            next: AtomicUsize::new(settings.known.tried),
+            cursor: AtomicUsize::new(settings.known.tried),
         })
     }
 
-    /// How many were tried or are out of the question, all of those that others are trying included.
+    /// How many have been tried or excluded, including those that other workers are trying.
     pub(super) fn tried(&self) -> usize {
-        self.next.load(Ordering::Relaxed)
+        self.cursor.load(Ordering::Relaxed)
     }
 
-    /// How many of the atlas there are.
-    pub(super) fn of_atlas(&self) -> usize {
+    /// The number of grips in the atlas.
+    pub(super) fn atlas_len(&self) -> usize {
         self.order.len()
     }
 
-    /// Takes the next one that does not certainly meet the giver, if one of the next [`PASSED_AT_ONCE`] is such.
-    fn take(&self) -> Taken<'a> {
-        let end = self.shortlist.len() + self.order.len() + self.recent.len() + self.sparing.len();
+    /// Advances to the next grip that does not certainly collide with the giver, past at most
+    /// [`GRIPS_PER_CLOCK_CHECK`] grips.
+    fn next(&self) -> Next<'a> {
+        let end = self.shortlist.len() + self.order.len() + self.recent.len() + self.subset_order.len();
         loop {
-            let from = self.next.load(Ordering::Relaxed);
+            let from = self.cursor.load(Ordering::Relaxed);
             if from >= end {
-                return Taken::NoneLeft;
+                return Next::Exhausted;
             }
-            let mut to = end.min(from + PASSED_AT_ONCE);
-            let mut taken = Taken::NoneOpen;
-            let open = (from..to).find_map(|place| Some((place, self.unless_met(place)?)));
-            if let Some((place, open)) = open {
+            let mut to = end.min(from + GRIPS_PER_CLOCK_CHECK);
+            let mut next = Next::AllExcluded;
+            let candidate = (from..to).find_map(|place| Some((place, self.candidate_at(place)?)));
+            if let Some((place, found)) = candidate {
                 to = place + 1;
-                taken = Taken::Open(open);
+                next = Next::Candidate(found);
             }
-            // Another worker may have taken the same meanwhile; then they are looked at in vain.
+            // If another worker took the same grips meanwhile, this result is dropped.
             let exchanged = self
-                .next
+                .cursor
                 .compare_exchange(from, to, Ordering::Relaxed, Ordering::Relaxed);
             if exchanged.is_ok() {
-                return taken;
+                return next;
             }
         }
     }
 
-    /// The grip at a place, unless it certainly meets the giver.
-    fn unless_met(&self, place: usize) -> Option<Open<'a>> {
+    /// The grip at a place, unless it certainly collides with the giver.
+    fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(place) = place.checked_sub(self.shortlist.len()) else {
             let (index, solids) = if self.mechanisms.has(Mechanism::InnerSpheres) {
-                self.shortlist.unless_met(place, self.giver?)?
+                self.shortlist.screen_against_giver(place, self.giver?)?
             } else {
                 self.shortlist.at(place)
             };
-            return self.open(index, Solids::Kept(solids));
+            return self.whole(index, Solids::Stored(solids));
         };
         let Some(&index) = self.order.get(place) else {
-            return self.beyond_order(place - self.order.len());
+            return self.after_atlas(place - self.order.len());
         };
         let atlas = self.atlas?;
         let Some(giver) = self.giver else {
             let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
-            return self.open(index, Solids::Made(Box::new(solids)));
+            return self.whole(index, Solids::Computed(Box::new(solids)));
         };
         if self.mechanisms.has(Mechanism::CellOccupancy) {
             let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
@@ -229,82 +229,85 @@ impl<'a> KnownGrips<'a> {
         }
         if !self.mechanisms.has(Mechanism::InnerSpheres) {
             let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
-            return self.open(index, Solids::Made(Box::new(solids)));
+            return self.whole(index, Solids::Computed(Box::new(solids)));
         }
-        let solids = atlas.grips().unless_met(usize::from(index), self.rig, giver)?;
-        self.open(index, Solids::Made(solids))
+        let solids = atlas
+            .grips()
+            .screen_against_giver(usize::from(index), self.rig, giver)?;
+        self.whole(index, Solids::Computed(solids))
     }
 
-    /// The same of places after those of the order, which few look-ups come to.
+    /// The same for places after those of the atlas, which few look-ups reach.
     #[inline(never)]
-    fn beyond_order(&self, place: usize) -> Option<Open<'a>> {
+    fn after_atlas(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(entry) = self.recent.get(place) else {
-            let index = self.sparing[place - self.recent.len()];
+            let index = self.subset_order[place - self.recent.len()];
             let grips = self.atlas?.grips();
-            let is_open = !self.mechanisms.has(Mechanism::InnerSpheres)
-                || grips.may_hold_with_subset(usize::from(index), self.giver?);
-            return is_open.then_some(Open::Sparing(index));
+            let may_hold = !self.mechanisms.has(Mechanism::InnerSpheres)
+                || grips.subset_may_hold(usize::from(index), self.giver?);
+            return may_hold.then_some(Candidate::Subset(index));
         };
-        Some(Open::Whole {
+        Some(Candidate::Whole {
             source: GraspSource::Recent,
             entry,
-            solids: Solids::Made(Box::new(entry.tracked_solids(self.rig))),
+            solids: Solids::Computed(Box::new(entry.tracked_solids(self.rig))),
         })
     }
 
     /// A whole grip of the atlas.
-    fn open(&self, index: u16, solids: Solids<'a>) -> Option<Open<'a>> {
-        Some(Open::Whole {
+    fn whole(&self, index: u16, solids: Solids<'a>) -> Option<Candidate<'a>> {
+        Some(Candidate::Whole {
             source: GraspSource::Atlas(index),
             entry: &self.atlas?.entries()[usize::from(index)],
             solids,
         })
     }
 
-    /// Tries the next one.
-    pub(super) fn try_next(&self, gripper: &mut Gripper) -> Tried {
-        let (source, grasp) = match self.take() {
-            Taken::NoneLeft => return Tried::NoneLeft,
-            Taken::NoneOpen => return Tried::Refused,
-            Taken::Open(Open::Whole {
+    /// Tries the next grip.
+    pub(super) fn try_next(&self, gripper: &mut Gripper) -> TryResult {
+        let (source, grasp) = match self.next() {
+            Next::Exhausted => return TryResult::Exhausted,
+            Next::AllExcluded => return TryResult::Rejected,
+            Next::Candidate(Candidate::Whole {
                 source,
                 entry,
                 solids,
-            }) => (source, self.hold(entry, &solids, gripper)),
-            Taken::Open(Open::Sparing(index)) => {
-                (GraspSource::Spared(index), self.hold_with_subset(index, gripper))
-            }
+            }) => (source, self.recheck(entry, &solids, gripper)),
+            Next::Candidate(Candidate::Subset(index)) => (
+                GraspSource::FingerSubset(index),
+                self.subset_grasp(index, gripper),
+            ),
         };
         match grasp {
-            Some(grasp) => Tried::Valid {
+            Some(grasp) => TryResult::Valid {
                 source,
-                value: value(&grasp),
+                value: grasp_value(&grasp),
                 grasp,
             },
-            None => Tried::Refused,
+            None => TryResult::Rejected,
         }
     }
 
-    fn hold(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+    fn recheck(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let constraints = self.scene.constraints();
-        if !entry.is_wanted(constraints) {
+        if !entry.meets(constraints) {
             return None;
         }
-        let grasp = self.asked.hold(entry, solids, gripper)?;
+        let grasp = self.checker.check(entry, solids, gripper)?;
         constraints.admits(&grasp).then(|| Box::new(grasp))
     }
 
-    /// Apart, as its hands would make room for themselves on the stack of every look-up.
+    /// Not inlined: its hands would enlarge the stack frame of every look-up.
     #[inline(never)]
-    fn hold_with_subset(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+    fn subset_grasp(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let entry = &self.atlas?.entries()[usize::from(index)];
         let around = self.scene.surroundings()?;
-        spared_with(self.mechanisms, entry, &around, self.giver?, gripper)
+        subset_grasp_with(self.mechanisms, entry, &around, self.giver?, gripper)
     }
 }
 
-/// How good a grasp is: its score, or its comfort where it has none.
-pub(super) fn value(grasp: &Grasp) -> f32 {
+/// The quality of a grasp: its score, or its comfort if it has none.
+pub(super) fn grasp_value(grasp: &Grasp) -> f32 {
     let score = grasp.score.as_ref();
     score.map_or_else(|| comfort_value(grasp.comfort), Score::total)
 }

@@ -1,4 +1,5 @@
-//! The race: workers pull attempt indices until a valid grasp is found, the deadline passes or they are told to stop.
+//! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are
+//! stopped.
 
 pub mod attempt;
 pub mod key_frames;
@@ -34,39 +35,39 @@ pub enum SearchEnd {
     Found,
     /// The deadline passed first.
     DeadlinePassed,
-    /// The attempts were used up.
+    /// All attempts were used up.
     AttemptsExhausted,
     /// The stop flag was set.
     Stopped,
 }
 
-/// The end of a search.
+/// The outcome of a search.
 #[derive(Clone, Debug)]
 pub struct SearchOutcome {
-    /// How it ended.
+    /// How the search ended.
     pub end: SearchEnd,
     /// The grasp, if one was found.
     pub grasp: Option<Grasp>,
-    /// How good it is, where the best is wanted; more is better.
+    /// Its quality, if the best grasp is wanted; higher is better.
     pub value: f32,
     /// What the search did.
     pub report: SearchReport,
 }
 
-/// The end of a look at known grips.
+/// The outcome of a look-up of known grips.
 #[derive(Clone, Debug)]
 pub enum LookUp {
-    /// One of them holds.
+    /// A known grip is valid.
     Found(Box<SearchOutcome>),
-    /// Nothing was found in time.
+    /// No valid grip was found in time.
     NotFound {
-        /// How many were tried, or are out of the question.
+        /// How many were tried or excluded.
         tried: usize,
     },
 }
 
 impl LookUp {
-    /// What was found.
+    /// The outcome with a grasp, if there is one.
     pub fn found(self) -> Option<SearchOutcome> {
         match self {
             Self::Found(outcome) => Some(*outcome),
@@ -75,9 +76,9 @@ impl LookUp {
     }
 }
 
-/// Looks for a valid grip among those that `settings` say are known, for no longer than `within` and without any other
-/// thread. If none was found by then, [`find_grasp`] looks further, from there on where it is told how many were tried. For
-/// first answers only, not for the best.
+/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread
+/// only. If it finds none, [`find_grasp`] can continue: pass it the number tried in `settings.known.tried`.
+/// Applies to searches for the first valid grasp, not for the best or to reproducible ones.
 pub fn find_known_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
@@ -94,7 +95,7 @@ pub fn find_known_grasp(
     };
     let stop = AtomicBool::new(false);
     let race = Race::new(&scene, settings, Some(&known), clock, &stop);
-    if race.look_ahead(Some(clock.now() + within)) {
+    if race.try_known_until(Some(clock.now() + within)) {
         LookUp::Found(Box::new(race.outcome()))
     } else {
         LookUp::NotFound { tried: known.tried() }
@@ -103,11 +104,12 @@ pub fn find_known_grasp(
 
 /// Races `settings.run.workers` tasks of `pool` for a valid grasp. Returns when all of them have stopped.
 ///
-/// Called from a thread of `pool` itself, that thread is one of the workers; called from elsewhere, it waits.
+/// Called from a thread of `pool`, that thread is one of the workers; called from elsewhere, it waits.
 ///
-/// A worker looks at `stop`, at the clock and at what the others found at least every 50 µs or so of its own work.
-/// Without a deadline or with one that does not come, and without `stop`, a search with `settings.run.reproducible` has the
-/// same outcome for any number of workers, step times aside. If it is cut short, it has no grasp: never another one.
+/// A worker checks `stop`, the clock and the others' results at least every 50 µs or so of its own work. With
+/// `settings.run.reproducible`, a search that neither the deadline nor `stop` cuts short has the same outcome
+/// for any number of workers, apart from step times. If it is cut short, it has that grasp or none, never
+/// another one.
 ///
 /// # Panics
 /// If an attempt panics. The other workers stop first, and the pool stays usable.
@@ -121,8 +123,8 @@ pub fn find_grasp(
     find_grasp_in(pool, &prepare(task, settings), settings, clock, stop)
 }
 
-/// [`find_grasp`] in a scene that was prepared for the same settings, but for which of the attempts are to be run and
-/// whether known grips are tried before them: what attempts find out about the holdout once serves further ones.
+/// [`find_grasp`] in a scene prepared with the same settings, apart from the range of attempts and the known
+/// grips. Further searches reuse what earlier attempts computed about the holdout.
 ///
 /// # Panics
 /// As [`find_grasp`].
@@ -136,8 +138,9 @@ pub fn find_grasp_in(
     debug_assert!(settings.run.workers >= 1, "there must be at least one worker");
     let known = KnownGrips::of(scene, settings);
     let race = Race::new(scene, settings, known.as_ref(), clock, stop);
-    // Mostly one of the first known grips is the answer, and waking a worker takes longer than looking at some dozens.
-    if race.looks_ahead() {
+    // Mostly one of the first known grips is the answer, and waking a worker takes longer than trying some
+    // dozens.
+    if race.run_head_start() {
         return race.outcome();
     }
     let run = |worker: usize| {
@@ -160,7 +163,7 @@ pub fn find_grasp_in(
     race.outcome()
 }
 
-/// What the attempts of a search share.
+/// Prepares what all attempts of a search share.
 pub fn prepare<'a>(task: Task<'a>, settings: &SearchSettings) -> Scene<'a> {
     Scene::new(task, settings)
 }

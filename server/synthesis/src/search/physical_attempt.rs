@@ -1,4 +1,4 @@
-//! One attempt at a grasp under `PHYSICAL` validity: a grip that holds what is presented.
+//! One attempt at a grasp under `PHYSICAL` validity.
 
 use crate::{
     base::{random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
@@ -10,12 +10,11 @@ use crate::{
     rating::assessment::GraspContext,
 };
 
-/// How many hands are tried in vain beside one that nearly held. Of hands beside a near miss on scissors, one or two in a
-/// hundred hold, of those that are proposed evenly, one in four hundred; on what is easy to hold, as many of both. With twice
-/// as many, grasps of thin objects are found up to a tenth sooner, those of others a tenth to a fifth later.
-const PATIENCE: usize = 4;
+/// Consecutive perturbations without improvement after which a near miss is given up. More find grasps of
+/// thin objects sooner and those of others later.
+const MAX_FAILED_REFINEMENTS: usize = 4;
 
-/// The hand of an attempt, as far as it came, and its buffers.
+/// The hand of an attempt, as far as it got, and its buffers.
 #[derive(Clone, Debug, Default)]
 pub struct PhysicalAttempt {
     /// Closes the hand.
@@ -23,12 +22,12 @@ pub struct PhysicalAttempt {
 }
 
 impl PhysicalAttempt {
-    /// Everything after a hand was proposed; of one that has nearly enough closure, others beside it are tried, each beside
-    /// the one that had most.
+    /// Closes and checks a proposed hand. If it nearly has enough closure, perturbs it repeatedly, each time
+    /// from the hand with most closure so far.
     ///
     /// # Errors
-    /// The first check that the proposed hand fails, an unmet constraint if that is all that another one fails, or the stop
-    /// signal.
+    /// The first check that the proposed hand fails, an unmet constraint if a perturbed hand fails nothing
+    /// else, or the stop signal.
     pub fn hold_or_refine(
         &mut self,
         around: &GraspContext<'_>,
@@ -37,21 +36,21 @@ impl PhysicalAttempt {
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
     ) -> Result<Box<Grasp>, NoGrip> {
-        let mut refused = self.hold(around, proposal, stopwatch, interrupted);
-        let (Err(NoGrip::Rejected(_)), Some(share)) = (&refused, self.gripper.near_miss()) else {
-            return refused;
+        let mut rejected = self.hold(around, proposal, stopwatch, interrupted);
+        let (Err(NoGrip::Rejected(_)), Some(share)) = (&rejected, self.gripper.near_miss()) else {
+            return rejected;
         };
-        // What is told of a hand that fails is the proposed one's.
+        // A failed attempt reports the proposed hand, not a perturbed one.
         let posed = self.gripper.posed.clone();
         let mut nearest = (share, *proposal);
-        let mut in_vain = 0;
-        while in_vain < PATIENCE {
-            in_vain += 1;
+        let mut failures = 0;
+        while failures < MAX_FAILED_REFINEMENTS {
+            failures += 1;
             let perturbed = nearest.1.perturbed(stream);
             match self.hold(around, &perturbed, stopwatch, interrupted) {
-                // It holds, and is not wanted so.
+                // The hand holds, but not as the constraints demand.
                 Err(NoGrip::Rejected(Rejection::UnmetConstraint)) => {
-                    refused = Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+                    rejected = Err(NoGrip::Rejected(Rejection::UnmetConstraint));
                     break;
                 }
                 Err(NoGrip::Rejected(_)) => {}
@@ -59,14 +58,14 @@ impl PhysicalAttempt {
             }
             if let Some(share) = self.gripper.near_miss().filter(|&share| share > nearest.0) {
                 nearest = (share, perturbed);
-                in_vain = 0;
+                failures = 0;
             }
         }
         self.gripper.posed = posed;
-        refused
+        rejected
     }
 
-    /// Everything after a hand was proposed.
+    /// Closes and checks a proposed hand.
     ///
     /// # Errors
     /// The first check that fails, or the stop signal.

@@ -1,4 +1,4 @@
-//! The workers of a search and what they share.
+//! The workers of a search and the state that they share.
 
 use std::{
     sync::{
@@ -12,7 +12,7 @@ use std::{
 use super::{
     SearchEnd, SearchOutcome,
     attempt::{Attempt, AttemptEnd},
-    known_grips::{KnownGrips, Tried, value},
+    known_grips::{KnownGrips, TryResult, grasp_value},
     report::{GraspSource, SearchReport},
     scene::Scene,
     settings::SearchSettings,
@@ -25,14 +25,14 @@ use crate::{
     physical::grip::Gripper,
 };
 
-/// How long known grips are looked at before other workers are woken to look for fresh ones. Waking them takes about
+/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about
 /// 50 µs, and nine in ten requests have their answer by then.
 const HEAD_START: Duration = Duration::from_micros(300);
 
-/// A worker that is not running an attempt.
+/// Marks a worker that is not running an attempt.
 const IDLE: u64 = u64::MAX;
 
-/// What the workers of one search share.
+/// The shared state of the workers of one search.
 pub(super) struct Race<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
@@ -40,15 +40,16 @@ pub(super) struct Race<'a> {
     stop: &'a AtomicBool,
     /// One past the last attempt.
     end: u64,
-    /// The next attempt that nobody has taken yet. Indices are taken in order, so all below it are taken.
+    /// The next attempt to start. Indices are taken in order, so all below it are taken.
     next: AtomicU64,
-    /// Attempts above this index need not be run: the lowest valid one so far, if the search is reproducible.
+    /// Attempts above this index need not run: the lowest valid one so far, if the search is reproducible.
     bound: AtomicU64,
-    /// Nobody need go on: a grasp was found, if any will do, or a worker panicked.
+    /// Set to stop all workers: any grasp will do and one was found, or a worker panicked.
     over: AtomicBool,
-    /// The lowest attempt that was taken but not run to its end.
+    /// The lowest attempt that was started but interrupted.
     lowest_interrupted: AtomicU64,
-    /// What each worker is running, or an index below; [`IDLE`] before it starts and after it stops.
+    /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it
+    /// stops.
     running: Vec<AtomicU64>,
     known: Option<&'a KnownGrips<'a>>,
     /// Valid grasps so far.
@@ -57,17 +58,17 @@ pub(super) struct Race<'a> {
     tallies: Mutex<Vec<Tally>>,
 }
 
-/// The best valid grasp so far, by what the search prefers.
+/// The preferred valid grasp so far.
 struct Winner {
     source: GraspSource,
     grasp: Box<Grasp>,
     value: f32,
 }
 
-/// Tells the other workers that it is over, should its own worker panic.
-struct Alarm<'a>(&'a AtomicBool);
+/// Stops the other workers if its own worker panics.
+struct PanicGuard<'a>(&'a AtomicBool);
 
-impl Drop for Alarm<'_> {
+impl Drop for PanicGuard<'_> {
     fn drop(&mut self) {
         if thread::panicking() {
             self.0.store(true, Ordering::Relaxed);
@@ -106,7 +107,7 @@ impl<'a> Race<'a> {
 
     /// Runs attempts until the race is over.
     pub(super) fn run_worker(&self, worker: usize, mut stopwatch: impl Stopwatch) {
-        let alarm = Alarm(&self.over);
+        let guard = PanicGuard(&self.over);
         let mut tally = Tally::default();
         let mut attempt = Attempt::default();
         self.try_known_grips(worker);
@@ -119,21 +120,21 @@ impl<'a> Race<'a> {
             let rejection = match ended {
                 AttemptEnd::Interrupted => {
                     self.lowest_interrupted.fetch_min(index, Ordering::SeqCst);
-                    tally.note_interrupted(pruned);
+                    tally.record_interrupted(pruned);
                     break;
                 }
                 AttemptEnd::Valid(grasp) => {
                     let value = self.value_of(&grasp);
-                    self.enter_winner(GraspSource::Attempt(index), grasp, value);
+                    self.record_valid(GraspSource::Attempt(index), grasp, value);
                     None
                 }
                 AttemptEnd::Rejected {
                     rejection,
                     wrench_angle,
                 } => {
-                    // A wrist that may not be there is no near miss.
+                    // An inadmissible wrist is not a near miss.
                     if rejection != Rejection::UnmetConstraint || !attempt.is_unposed() {
-                        tally.note_miss(rejection, wrench_angle, index, || attempt.pose(self.scene));
+                        tally.record_miss(rejection, wrench_angle, index, || attempt.pose(self.scene));
                     }
                     Some(rejection)
                 }
@@ -150,28 +151,29 @@ impl<'a> Race<'a> {
             }
         }
         self.running[worker].store(IDLE, Ordering::SeqCst);
-        tally.note_times(stopwatch.times());
+        tally.record_times(stopwatch.times());
         self.tallies
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .push(tally);
-        drop(alarm);
+        drop(guard);
     }
 
-    /// The next attempt for a worker, if there is one and it is to be run.
+    /// Takes the next attempt, unless there is none left or it need not run.
     fn take_attempt(&self, worker: usize) -> Option<u64> {
-        // An index that is taken must be run, or the attempts below a winner would not all be settled: so look first.
+        // A taken index must run, or not all attempts below a winner would be settled: so check before taking
+        // it.
         let open = self.next.load(Ordering::SeqCst);
         if open >= self.end || self.is_over_for(open) {
             return None;
         }
-        // Before taking an index, announce that it will be this one or a higher one.
+        // Announce a lower bound of the index before taking it.
         self.running[worker].store(open, Ordering::SeqCst);
         let index = self.next.fetch_add(1, Ordering::SeqCst);
         (index < self.end).then_some(index)
     }
 
-    /// True if an attempt need not be run to its end.
+    /// True if an attempt need not run to its end.
     fn is_over_for(&self, index: u64) -> bool {
         self.over.load(Ordering::Relaxed)
             || self.bound.load(Ordering::Relaxed) < index
@@ -183,34 +185,34 @@ impl<'a> Race<'a> {
                 .is_some_and(|deadline| self.clock.now() >= deadline)
     }
 
-    /// Looks at the known grips before any other worker is woken: for as long as [`HEAD_START`], or at all of them if the
-    /// search is to be reproducible. True if the race is over.
-    pub(super) fn looks_ahead(&self) -> bool {
+    /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search
+    /// is reproducible. True if the race is over.
+    pub(super) fn run_head_start(&self) -> bool {
         if self.known.is_none() {
             return false;
         }
         match (self.settings.query.choice, self.settings.run.reproducible) {
             (Choice::BestWithinBudget, _) => false,
-            (Choice::FirstValid, true) => self.look_ahead(None),
+            (Choice::FirstValid, true) => self.try_known_until(None),
             (Choice::FirstValid, false) => {
                 self.settings.run.mechanisms.has(Mechanism::HeadStart)
-                    && self.look_ahead(Some(self.clock.now() + HEAD_START))
+                    && self.try_known_until(Some(self.clock.now() + HEAD_START))
             }
         }
     }
 
-    /// Tries known grips until one is valid or it is `until`. True if one is.
-    pub(super) fn look_ahead(&self, until: Option<Duration>) -> bool {
+    /// Tries known grips until one is valid or the clock reaches `until`. True if one is valid.
+    pub(super) fn try_known_until(&self, until: Option<Duration>) -> bool {
         let Some(known) = self.known else {
             return false;
         };
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) && until.is_none_or(|until| self.clock.now() < until) {
             match known.try_next(&mut gripper) {
-                Tried::NoneLeft => return false,
-                Tried::Refused => {}
-                Tried::Valid { source, grasp, value } => {
-                    self.enter_winner(source, grasp, value);
+                TryResult::Exhausted => return false,
+                TryResult::Rejected => {}
+                TryResult::Valid { source, grasp, value } => {
+                    self.record_valid(source, grasp, value);
                     return true;
                 }
             }
@@ -218,7 +220,8 @@ impl<'a> Race<'a> {
         false
     }
 
-    /// Tries known grips beside the other workers' fresh attempts: one worker does, or all if the best is wanted.
+    /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the
+    /// best grasp is wanted.
     fn try_known_grips(&self, worker: usize) {
         let Some(known) = self.known else { return };
         if worker > 0 && self.settings.query.choice == Choice::FirstValid {
@@ -227,24 +230,25 @@ impl<'a> Race<'a> {
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) {
             match known.try_next(&mut gripper) {
-                Tried::NoneLeft => return,
-                Tried::Refused => {}
-                Tried::Valid { source, grasp, value } => {
-                    self.enter_winner(source, grasp, value);
+                TryResult::Exhausted => return,
+                TryResult::Rejected => {}
+                TryResult::Valid { source, grasp, value } => {
+                    self.record_valid(source, grasp, value);
                 }
             }
         }
     }
 
-    /// Enters a valid grasp. The first ends the race, unless the best or the one of the lowest index is wanted.
-    fn enter_winner(&self, source: GraspSource, grasp: Box<Grasp>, value: f32) {
+    /// Records a valid grasp. It ends the race, unless the best one or the one with the lowest index is
+    /// wanted.
+    fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let mut winner = self.winner.lock().unwrap_or_else(PoisonError::into_inner);
         let is_preferred = match (self.settings.query.choice, source) {
             (Choice::BestWithinBudget, _) => winner.as_ref().is_none_or(|best| value > best.value),
             (Choice::FirstValid, GraspSource::Attempt(index)) if self.settings.run.reproducible => {
                 self.bound.fetch_min(index, Ordering::SeqCst);
-                // A known grip comes before every attempt.
+                // A known grip precedes every attempt.
                 winner.as_ref().is_none_or(
                     |lowest| matches!(lowest.source, GraspSource::Attempt(lowest) if index < lowest),
                 )
@@ -259,17 +263,18 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// How good a fresh grasp is; only asked where the best is wanted.
+    /// The quality of a fresh grasp; 0 unless the best one is wanted.
     fn value_of(&self, grasp: &Grasp) -> f32 {
         if self.settings.query.choice == Choice::FirstValid {
             return 0.0;
         }
-        value(grasp)
+        grasp_value(grasp)
     }
 
-    /// The highest index up to which every attempt has ended without being beaten by a valid one of a lower index.
+    /// The highest index such that all attempts up to it have ended and none below it has been beaten by a
+    /// valid attempt with a lower index.
     fn last_settled(&self) -> Option<u64> {
-        // The bound is read last: a valid attempt lowers it before its worker moves on.
+        // Reads the bound last: a valid attempt lowers it before its worker moves on.
         let lowest_running = self
             .running
             .iter()
@@ -289,10 +294,10 @@ impl<'a> Race<'a> {
             .winner
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner)
-            // Reproducible: an attempt of a lower index that was cut short might have won.
+            // Reproducible: an interrupted attempt with a lower index might have won.
             .filter(|winner| match winner.source {
                 GraspSource::Attempt(index) => !self.settings.run.reproducible || index < interrupted,
-                GraspSource::Atlas(_) | GraspSource::Spared(_) | GraspSource::Recent => true,
+                GraspSource::Atlas(_) | GraspSource::FingerSubset(_) | GraspSource::Recent => true,
             });
         let source = winner.as_ref().map(|winner| winner.source);
         let winning_index = match source {
@@ -311,13 +316,13 @@ impl<'a> Race<'a> {
         let mut report = SearchReport {
             attempt: winning_index,
             source,
-            // How many more others had found by then hangs on their number.
+            // How many others were found by then depends on the number of workers.
             candidates: if self.settings.run.reproducible {
                 u64::from(source.is_some())
             } else {
                 self.candidates.into_inner()
             },
-            known_grips: self.known.map_or(0, KnownGrips::of_atlas),
+            known_grips: self.known.map_or(0, KnownGrips::atlas_len),
             ..SearchReport::default()
         };
         let lowest_winner = winning_index.filter(|_| self.settings.run.reproducible);

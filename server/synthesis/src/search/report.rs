@@ -6,7 +6,7 @@ use crate::{
 };
 
 /// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of
-/// [`Rejection::ALL`]), of those the one with the smallest wrench angle, of those the one with the lowest index.
+/// [`Rejection::ALL`]); then by smallest wrench angle; then by lowest index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NearestMiss {
     /// Why it failed.
@@ -20,9 +20,14 @@ pub struct NearestMiss {
 }
 
 impl NearestMiss {
-    /// True if an attempt that failed in this way comes closer than `self`.
-    pub(super) fn is_beaten_by(&self, rejection: Rejection, wrench_angle: Option<f32>, attempt: u64) -> bool {
-        // All attempts that got to `NotImmobilizing` have an angle, no others do.
+    /// True if an attempt that failed in this way came closer than `self`.
+    pub(super) fn is_farther_than(
+        &self,
+        rejection: Rejection,
+        wrench_angle: Option<f32>,
+        attempt: u64,
+    ) -> bool {
+        // Exactly the attempts that reached `NotImmobilizing` have an angle.
         let angle = |angle: Option<f32>| angle.unwrap_or(0.0);
         rejection
             .index()
@@ -35,33 +40,33 @@ impl NearestMiss {
 
 /// What a search did.
 ///
-/// With `reproducible` and a grasp, it tells of the attempts up to the one that gave it, whatever else the workers had
-/// begun; the attempts and prunes are then the same for any number of workers.
+/// With `reproducible` and a grasp, it covers the attempts up to the one that found it, whatever else the
+/// workers had started: attempts and prunes are then the same for any number of workers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SearchReport {
-    /// Attempts that were run to their end: accepted placements, as the thesis counts.
+    /// Completed attempts: accepted placements, as the thesis counts.
     pub attempts: u64,
-    /// Placements that the measures pruned.
+    /// Placements discarded by the pruning measures.
     pub pruned_placements: u64,
     /// Rejections by kind, in the order of [`Rejection::ALL`].
     pub rejections: [u64; Rejection::ALL.len()],
-    /// Times by step, if they were asked for.
+    /// Times by step, if recorded.
     pub step_times: Option<StepTimes>,
-    /// The index of the attempt that gave the grasp.
+    /// The index of the attempt that found the grasp.
     pub attempt: Option<u64>,
-    /// The attempt that came closest, if none was valid.
+    /// The closest failed attempt, if none was valid.
     pub nearest_miss: Option<NearestMiss>,
     /// Where the grasp came from.
     pub source: Option<GraspSource>,
-    /// Valid grasps that were found.
+    /// Number of valid grasps found.
     pub candidates: u64,
-    /// Known grips that there were to try.
+    /// Number of known grips available.
     pub known_grips: usize,
 }
 
 impl SearchReport {
-    /// Adds another part of the same search: a worker's share, or a later slice. The nearest miss of both stays;
-    /// attempt and source of the grasp are those of `part` if its grasp `is_better`, otherwise they stay too.
+    /// Merges another part of the same search: a worker's share, or a later slice. Keeps the nearer miss of
+    /// both. Takes the attempt and source of `part` if its grasp `is_better`.
     pub fn merge(&mut self, part: Self, is_better: bool) {
         self.attempts += part.attempts;
         self.pruned_placements += part.pruned_placements;
@@ -76,15 +81,14 @@ impl SearchReport {
             self.source = part.source;
         }
         if let Some(miss) = part.nearest_miss
-            && self
-                .nearest_miss
-                .as_ref()
-                .is_none_or(|nearest| nearest.is_beaten_by(miss.rejection, miss.wrench_angle, miss.attempt))
+            && self.nearest_miss.as_ref().is_none_or(|nearest| {
+                nearest.is_farther_than(miss.rejection, miss.wrench_angle, miss.attempt)
+            })
         {
             self.nearest_miss = Some(miss);
         }
         self.candidates += part.candidates;
-        // Every part that tried known grips counted all of them.
+        // Every part that tried known grips counts all of them.
         self.known_grips = self.known_grips.max(part.known_grips);
     }
 }
@@ -92,13 +96,13 @@ impl SearchReport {
 /// Where a grasp came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GraspSource {
-    /// A fresh attempt of this index.
+    /// A fresh attempt, by index.
     Attempt(u64),
-    /// The atlas' grip of this index.
+    /// A grip of the atlas, by index.
     Atlas(u16),
-    /// The same without the fingers that the giver is in the way of: they rest elsewhere.
-    Spared(u16),
-    /// A grip that an earlier search found.
+    /// A grip of the atlas without the fingers that the giver obstructs, which rest elsewhere.
+    FingerSubset(u16),
+    /// A recent grip.
     Recent,
 }
 
@@ -165,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn merge_takes_the_origin_of_the_better_grasp() {
+    fn merge_takes_the_source_of_the_better_grasp() {
         let of_attempt = |attempt| SearchReport {
             attempt: Some(attempt),
             source: Some(GraspSource::Attempt(attempt)),

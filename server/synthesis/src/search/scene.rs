@@ -8,7 +8,7 @@ use crate::{
     base::random::AttemptStream,
     known::{
         entry::Entry,
-        seed_source::{Demand, SeedSets, SeedSource},
+        seed_source::{SeedContext, SeedSets, SeedSource},
         seeds::Seeds,
     },
     model::{
@@ -33,35 +33,36 @@ use crate::{
     thesis,
 };
 
-/// Attempts that ask of each pair of points that they draw whether it is off the giver's hand. Many searches end with
-/// them; from then on it is worth 180 µs to ask it of all pairs at once, of which a giver who covers the object leaves few.
+/// Attempts that test only the surface pairs they draw against the giver's hand. Many searches end within
+/// them; later attempts draw from all pairs tested at once, which takes 180 µs.
 const ATTEMPTS_BEFORE_FREE_SURFACE: u64 = 4;
 
-/// What is to be taken, and by which hand.
+/// What to grasp, and with which hand.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
     /// How the object is held out.
     pub holdout: &'a Holdout,
-    /// The same object, prepared. Of another one, proposals would be poor; the checks ask the holdout's.
+    /// The holdout's object, prepared for proposals. A different object gives poor proposals; the checks use
+    /// the holdout's.
     pub object: &'a PreparedObject,
     /// The receiving hand.
     pub rig: &'a PreparedRig,
 }
 
-/// A holdout and how attempts at it go, with what they find out about it once.
+/// A holdout and the way attempts run, with data about the holdout that is computed once.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {
     task: Task<'a>,
-    /// Strategy, friction and what Algorithm 1 derives of them.
+    /// Strategy, friction and what Algorithm 1 derives from them.
     thesis: thesis::thesis_scene::ThesisScene<'a>,
-    /// Under `PHYSICAL` validity.
+    /// Present under `PHYSICAL` validity.
     physical: Option<(ObjectScene<'a>, Presented)>,
-    /// What the giver's hand leaves of the object's surface, once it was asked for.
+    /// The part of the surface that the giver's hand leaves free, computed on first use.
     free_surface: OnceLock<SurfacePairs>,
-    /// Where the receiving hand has room at the object, once it was asked for.
+    /// Cached placements of the receiving hand, computed on first use.
     placements: OnceLock<Arc<PlacementCache>>,
     constraints: Constraints,
-    /// Grips that attempts start from, under `GUIDED` and `PHYSICAL`.
+    /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     seeds: SeedSets,
     mechanisms: Mechanisms,
 }
@@ -107,7 +108,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Under `PHYSICAL` validity: the object, and how it is held out.
+    /// Under `PHYSICAL` validity: the object and how it is presented.
     pub fn physical(&self) -> Option<(&ObjectScene<'a>, &Presented)> {
         self.physical
             .as_ref()
@@ -129,17 +130,17 @@ impl<'a> Scene<'a> {
         self.thesis.bend_ratios
     }
 
-    /// What is demanded of the grasps.
+    /// The constraints on grasps.
     pub fn constraints(&self) -> &Constraints {
         &self.constraints
     }
 
-    /// What Algorithm 1 works with.
+    /// The input of Algorithm 1.
     pub(super) fn thesis(&self) -> &thesis::thesis_scene::ThesisScene<'a> {
         &self.thesis
     }
 
-    /// Under `PHYSICAL` validity: what an attempt works with.
+    /// Under `PHYSICAL` validity: the input of an attempt.
     pub(super) fn surroundings(&self) -> Option<GraspContext<'_>> {
         let (object, presented) = self.physical.as_ref()?;
         Some(GraspContext {
@@ -150,7 +151,7 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// Where GUIDED search proposes the hand of an attempt.
+    /// Where `GUIDED` search may place the hand of an attempt.
     pub(super) fn place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
@@ -174,7 +175,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The same with the cached placements that the first attempts choose from.
+    /// The same with cached placements, which only the first attempts use.
     fn cached_place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let placements = || {
@@ -188,19 +189,19 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// A hand as GUIDED search proposes it, with the palm laid on where it is to be; none if the object has nothing for
-    /// it, or if interrupted.
+    /// A hand proposed by `GUIDED` search, with the palm settled on its target; none if the object offers no
+    /// placement, or if interrupted.
     pub(super) fn guided_proposal(
         &self,
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
         if self.physical.is_some() {
-            // Palm and forearm are looked at on the way there.
+            // The proposal has checked palm and forearm already.
             let proposal = propose(&self.cached_place(stream.attempt()), stream, interrupted)?;
             return Some(self.shaped(proposal));
         }
-        // What is likely to hold was learned of what holds by `PHYSICAL` validity.
+        // The success prior was learned under `PHYSICAL` validity.
         let proposal = propose_evenly(&self.place(stream.attempt()), stream, interrupted)?;
         let scene = ObjectScene::new(&self.task.holdout.object, self.thesis.load.friction);
         Some(Proposal {
@@ -210,7 +211,7 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// A proposal shaped by the mechanisms that are on.
+    /// Adapts the proposal to the mechanisms that are on.
     pub(super) fn shaped(&self, mut proposal: Proposal) -> Proposal {
         if !self.mechanisms.has(Mechanism::Preshape) {
             proposal.shape.preshape = [0.0; 2];
@@ -226,24 +227,24 @@ impl<'a> Scene<'a> {
         self.mechanisms
     }
 
-    /// True if there is no grip to perturb hands near.
+    /// True if there are no seeds.
     pub(super) fn has_no_seeds(&self) -> bool {
         self.seeds.is_empty()
     }
 
-    /// The grips that an attempt starts from, and those that they are of. None if there are none, or if interrupted.
+    /// The seeds of an attempt and the grips they index. None if there are none, or if interrupted.
     pub(super) fn seeds(
         &self,
         presented: &Presented,
         attempt: u64,
         interrupted: &impl Fn() -> bool,
     ) -> Option<(&Seeds, &[Entry])> {
-        let demand = Demand {
+        let context = SeedContext {
             rig: self.task.rig,
             presented,
             constraints: &self.constraints,
             mechanisms: self.mechanisms,
         };
-        self.seeds.of_attempt(attempt, &demand, interrupted)
+        self.seeds.of_attempt(attempt, &context, interrupted)
     }
 }

@@ -1,4 +1,4 @@
-//! What is asked of a search, what is known, and how it is run.
+//! The settings of a search: the query, what is known, and how to run it.
 
 use std::{sync::Arc, time::Duration};
 
@@ -13,7 +13,7 @@ use crate::{
     },
 };
 
-/// How to search.
+/// The settings of a search.
 #[derive(Clone, Debug, Default)]
 pub struct SearchSettings {
     /// What is asked.
@@ -24,7 +24,7 @@ pub struct SearchSettings {
     pub run: Run,
 }
 
-/// What is asked of a search. The default asks for any grasp that is valid under `PHYSICAL`.
+/// What is asked of a search. By default: any grasp that is valid under `PHYSICAL`.
 #[derive(Clone, Debug)]
 pub struct Query {
     /// How hands are placed.
@@ -33,11 +33,11 @@ pub struct Query {
     pub validity: Validity,
     /// Which bend ratios a digit tries.
     pub bend_ratios: BendRatioChoice,
-    /// Coefficient of static friction, more than 0; none: the object's own.
+    /// Coefficient of static friction, more than 0; none for the object's own.
     pub friction: Option<f32>,
-    /// What is demanded of grasps beyond being valid, in the object's frame.
+    /// Constraints beyond validity, in the object's frame.
     pub constraints: Constraints,
-    /// Which of the valid grasps is wanted.
+    /// Which valid grasp is wanted.
     pub choice: Choice,
 }
 
@@ -60,46 +60,46 @@ impl Query {
         self.strategy.uses_known_grips(self.validity)
     }
 
-    /// The coefficient of friction that grasps on an object are judged by.
+    /// The coefficient of friction for grasps on an object.
     pub fn friction_on(&self, object: &GraspObject) -> f32 {
         self.friction
             .unwrap_or_else(|| object.friction_under(self.validity))
     }
 }
 
-/// What is known before a search, of the same object and rig. The default knows nothing.
+/// What is known of the object and rig before the search. By default nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
-    /// Grips to try first, where [`Query::uses_known_grips`].
+    /// Grips to try first, if [`Query::uses_known_grips`].
     pub atlas: Option<Arc<Atlas>>,
-    /// Grips near which hands are perturbed where none of the known ones is valid; likewise.
+    /// Where attempts take seeds from if no known grip is valid; likewise.
     pub seeds: SeedSource,
-    /// Grips that earlier searches found, under the object's own friction. They are tried after those of the atlas; a
-    /// reproducible search ignores them.
+    /// Grips that earlier searches found, under the object's own friction. They are tried after those of the
+    /// atlas; reproducible searches ignore them.
     pub recent: RecentGrips,
-    /// How many known grips need not be tried again: [`super::LookUp::NotFound`] gave it for the same ones.
+    /// Number of known grips to skip, from [`super::LookUp::NotFound`] for the same ones.
     pub tried: usize,
 }
 
-/// How a search is run. The default runs one worker until it finds a grasp.
+/// How to run a search. By default, one worker until it finds a grasp.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Start of every attempt's random stream.
+    /// Seed of all attempts' random streams.
     pub seed: u64,
-    /// Answer with the first valid grip in the atlas' order, or else with the valid attempt of the lowest index, instead
-    /// of with the first to finish.
+    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index,
+    /// instead of the first to finish.
     pub reproducible: bool,
     /// The lowest attempt index.
     pub first_attempt: u64,
-    /// How many attempts may run.
+    /// Largest number of attempts.
     pub max_attempts: u64,
-    /// When to give up, by the clock that is handed in.
+    /// When to give up, by the search's clock.
     pub deadline: Option<Duration>,
-    /// How many workers race; at least 1.
+    /// Number of racing workers; at least 1.
     pub workers: usize,
-    /// Record the time spent in each step?
+    /// Record the time spent in each step.
     pub record_step_times: bool,
-    /// Which mechanisms of a default search are on.
+    /// The mechanisms that are on.
     pub mechanisms: Mechanisms,
 }
 

@@ -1,4 +1,4 @@
-//! What one worker counts.
+//! The counts of one worker.
 
 use super::report::{NearestMiss, SearchReport};
 use crate::{
@@ -6,16 +6,16 @@ use crate::{
     model::hand::HandPose,
 };
 
-/// Attempts that are kept apart before the worker asks which of them are settled. More cost memory (24 bytes each),
+/// Unsettled attempts kept before the worker checks which are settled. More cost memory (24 bytes each),
 /// fewer cost time.
-const UNSETTLED_AT_ONCE: usize = 4096;
+const SETTLE_INTERVAL: usize = 4096;
 
-/// An attempt that ended.
+/// A completed attempt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Record {
     /// Its index.
     pub(super) attempt: u64,
-    /// How many placements it pruned.
+    /// Number of placements it pruned.
     pub(super) pruned: u64,
     /// Why it failed; none if it was valid.
     pub(super) rejection: Option<Rejection>,
@@ -25,14 +25,14 @@ pub(super) struct Record {
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     settled: SearchReport,
-    /// Attempts that count only if no attempt before them turns out valid; empty unless the search is reproducible.
+    /// Attempts that count only if no earlier attempt is valid; empty unless the search is reproducible.
     unsettled: Vec<Record>,
-    /// Prunes of attempts that were interrupted.
+    /// Placements pruned by interrupted attempts.
     interrupted_prunes: u64,
 }
 
 impl Tally {
-    /// Counts an attempt at once.
+    /// Counts an attempt immediately.
     pub(super) fn count(&mut self, record: &Record) {
         self.settled.attempts += 1;
         self.settled.pruned_placements += record.pruned;
@@ -41,18 +41,18 @@ impl Tally {
         }
     }
 
-    /// Counts an attempt as soon as it is known that no attempt before it is the winner. From time to time
-    /// `last_settled` is asked for the highest index of which that is known.
+    /// Counts an attempt once no earlier attempt can be the winner. Occasionally calls `last_settled` for the
+    /// highest index for which this is known.
     pub(super) fn count_when_settled(&mut self, record: Record, last_settled: impl FnOnce() -> Option<u64>) {
         self.unsettled.push(record);
-        if self.unsettled.len().is_multiple_of(UNSETTLED_AT_ONCE)
+        if self.unsettled.len().is_multiple_of(SETTLE_INTERVAL)
             && let Some(last) = last_settled()
         {
             self.settle(last);
         }
     }
 
-    /// Counts the kept attempts up to the index `last`.
+    /// Counts the kept attempts up to index `last`.
     fn settle(&mut self, last: u64) {
         // A worker's indices ascend.
         let settled = self.unsettled.partition_point(|record| record.attempt <= last);
@@ -63,13 +63,13 @@ impl Tally {
         self.unsettled.drain(..settled);
     }
 
-    /// Notes the placements that an interrupted attempt pruned.
-    pub(super) fn note_interrupted(&mut self, pruned: u64) {
+    /// Records the placements pruned by an interrupted attempt.
+    pub(super) fn record_interrupted(&mut self, pruned: u64) {
         self.interrupted_prunes += pruned;
     }
 
-    /// Notes a failed attempt, if it comes closer than those before.
-    pub(super) fn note_miss(
+    /// Records a failed attempt, if it came closer than those before.
+    pub(super) fn record_miss(
         &mut self,
         rejection: Rejection,
         wrench_angle: Option<f32>,
@@ -79,7 +79,7 @@ impl Tally {
         let nearest = &mut self.settled.nearest_miss;
         if nearest
             .as_ref()
-            .is_none_or(|nearest| nearest.is_beaten_by(rejection, wrench_angle, attempt))
+            .is_none_or(|nearest| nearest.is_farther_than(rejection, wrench_angle, attempt))
         {
             *nearest = Some(NearestMiss {
                 rejection,
@@ -90,12 +90,12 @@ impl Tally {
         }
     }
 
-    /// Notes the times of the worker's steps.
-    pub(super) fn note_times(&mut self, times: Option<StepTimes>) {
+    /// Records the times of the worker's steps.
+    pub(super) fn record_times(&mut self, times: Option<StepTimes>) {
         self.settled.step_times = times;
     }
 
-    /// Adds this worker's counts to a report, attempts up to the winner only if there is one that was to be the lowest.
+    /// Adds this worker's counts to a report; only attempts up to `lowest_winner`, if given.
     pub(super) fn add_to(mut self, report: &mut SearchReport, lowest_winner: Option<u64>) {
         self.settle(lowest_winner.unwrap_or(u64::MAX));
         if lowest_winner.is_none() {

@@ -1,4 +1,4 @@
-//! A grip as bytes, with the shape that it was closed from.
+//! The binary format of one grip and the shape that its hand was closed from.
 
 use glam::{Quat, Vec3};
 
@@ -27,27 +27,27 @@ use crate::{
     rating::{scoring::posture_values, taxonomy::classify},
 };
 
-/// Bytes of a grip at least: the wrist, the shape, the digits, how deep and how safe, terms, sets of fingers, and scores, uses of
-/// friction and contacts of which there are none. It bounds what a count can ask for.
-pub(super) const LEAST_ENTRY_BYTES: usize = 28 + 25 + 61 + 8 + 4 * WRITTEN_TERMS.len() + 2 + 2 + 1 + 1;
+/// Smallest size of an encoded grip, in bytes: wrist, shape, digits, penetration and epsilon, terms, finger
+/// subsets, and empty scores, friction uses and contacts. It bounds the count that a header can claim.
+pub(super) const MIN_ENTRY_BYTES: usize = 28 + 25 + 61 + 8 + 4 * WRITTEN_TERMS.len() + 2 + 2 + 1 + 1;
 
-/// Terms of a grip's score that are written out; the others follow.
+/// Terms of a grip's score that are stored; the others are derived.
 const WRITTEN_TERMS: [Term; 3] = [Term::Closure, Term::Steadiness, Term::SterileDistance];
 
-/// By how much the square of a quaternion's length may differ from 1: what rounding leaves is a thousandth of it.
+/// Largest deviation of a quaternion's squared length from 1: a thousand times what rounding causes.
 const QUATERNION_SLACK: f32 = 1e-3;
 
-/// Parts of the hand that can touch, numbered: 15 links and the palm.
+/// Number of hand parts that can touch: 15 phalanges and the palm.
 const PARTS: u64 = 16;
 
-/// In the flags of a hand's angles, after a bit for each digit that touches: yaws and bend ratios are written out, because
-/// they do not follow from the shape.
+/// Flag next to the five bits of the touching digits: yaws and bend ratios are stored, because they cannot be
+/// derived from the shape.
 const WRITTEN_OUT: u8 = 1 << 5;
 
-/// A difference in the last places of a coordinate that says that the coordinate follows.
-const FAR_OFF: u8 = 0x80;
+/// Marks a coordinate that is stored in full instead of as a difference in units in the last place.
+const EXPLICIT: u8 = 0x80;
 
-// Scores are written as bit planes of 64 bits.
+// Scores are stored as bit planes of 64 bits.
 const _: () = assert!(DIRECTIONS == 64);
 
 pub(super) fn write_entry(
@@ -90,7 +90,7 @@ pub(super) fn read_entry(
     let position = Vec3::from(reader.floats()?);
     let orientation = Quat::from_array(reader.floats()?);
     if (orientation.length_squared() - 1.0).abs() > QUATERNION_SLACK {
-        return Err(AtlasError::Malformed("a quaternion is not a rotation"));
+        return Err(AtlasError::Malformed("a quaternion is not a unit quaternion"));
     }
     let shape = read_shape(reader)?;
     let (digits, bend_ratios) = read_digits(reader, &shape, rig)?;
@@ -121,9 +121,8 @@ pub(super) fn read_entry(
         penetration,
         epsilon,
     };
-    let finger_subsets = FingerSubsets::from_bits(sets, grip.holding_digits()).ok_or(
-        AtlasError::Malformed("sets of fingers are not of those that hold"),
-    )?;
+    let finger_subsets = FingerSubsets::from_bits(sets, grip.holding_digits())
+        .ok_or(AtlasError::Malformed("invalid finger subsets"))?;
     let classification = classify(rig, &pose, &contacts);
     let mut grip_values = posture_values(object, rig, &pose, &contacts, classification);
     for (term, value) in WRITTEN_TERMS.into_iter().zip(written) {
@@ -141,7 +140,7 @@ pub(super) fn read_entry(
     Ok((entry, shape))
 }
 
-/// The bit after those of the five digits that close.
+/// The bit after those of the five closing digits.
 const TUCKS_BIT: u32 = 5;
 
 fn write_shape(writer: &mut Writer, shape: &HandShape) {
@@ -165,8 +164,8 @@ fn read_shape(reader: &mut Reader<'_>) -> Result<HandShape, AtlasError> {
     })
 }
 
-/// A digit's yaw and bend ratio as they follow from the hand's shape.
-fn of_shape(shape: &HandShape, rig: &Rig, digit: usize) -> (f32, f32) {
+/// A digit's yaw and bend ratio, derived from the hand's shape.
+fn yaw_and_ratio_of_shape(shape: &HandShape, rig: &Rig, digit: usize) -> (f32, f32) {
     let flexing = shape.flexing(rig, Digit::ALL[digit]);
     (flexing.base_yaw, flexing.bend_ratio)
 }
@@ -178,17 +177,17 @@ fn write_digits(
     shape: &HandShape,
     rig: &Rig,
 ) {
-    let follows = (0..5).all(|digit| {
-        let (yaw, ratio) = of_shape(shape, rig, digit);
+    let is_derived = (0..5).all(|digit| {
+        let (yaw, ratio) = yaw_and_ratio_of_shape(shape, rig, digit);
         pose.digits[digit].base_yaw.to_bits() == yaw.to_bits()
             && bend_ratios[digit].is_none_or(|own| own.to_bits() == ratio.to_bits())
     });
     let touching: u8 = (0..5)
         .map(|digit| u8::from(bend_ratios[digit].is_some()) << digit)
         .sum();
-    writer.u8(touching | if follows { 0 } else { WRITTEN_OUT });
+    writer.u8(touching | if is_derived { 0 } else { WRITTEN_OUT });
     for (angles, ratio) in pose.digits.iter().zip(bend_ratios) {
-        if !follows {
+        if !is_derived {
             writer.floats(&[angles.base_yaw, ratio.unwrap_or_default()]);
         }
         writer.floats(&[angles.base_pitch, angles.second_pitch, angles.third_pitch]);
@@ -203,7 +202,7 @@ fn read_digits(reader: &mut Reader<'_>, shape: &HandShape, rig: &Rig) -> Result<
     let mut bend_ratios = [None; 5];
     for digit in 0..5 {
         let (base_yaw, ratio) = if flags & WRITTEN_OUT == 0 {
-            of_shape(shape, rig, digit)
+            yaw_and_ratio_of_shape(shape, rig, digit)
         } else {
             (reader.float()?, reader.float()?)
         };
@@ -219,15 +218,15 @@ fn read_digits(reader: &mut Reader<'_>, shape: &HandShape, rig: &Rig) -> Result<
     Ok((digits, bend_ratios))
 }
 
-/// A grip's scores differ by its comfort alone: less than six bits. So the least one is written, and of what the others
-/// have more one bit plane after the other; 0 is what slips.
+/// A grip's scores differ only in comfort, which needs less than six bits. So the lowest is stored, followed
+/// by the bit planes of the differences plus one; 0 marks a grip that slips.
 fn write_scores(writer: &mut Writer, scores: &[u8; DIRECTIONS]) {
     let holding = scores.iter().filter(|score| **score != SLIPS);
-    let least = holding.min().copied().unwrap_or(1);
-    let above = scores.map(|score| if score == SLIPS { 0 } else { score - least + 1 });
-    let most = above.iter().max().copied().unwrap_or(0);
-    let planes = u8::BITS - most.leading_zeros();
-    writer.u8(least);
+    let lowest = holding.min().copied().unwrap_or(1);
+    let above = scores.map(|score| if score == SLIPS { 0 } else { score - lowest + 1 });
+    let highest = above.iter().max().copied().unwrap_or(0);
+    let planes = u8::BITS - highest.leading_zeros();
+    writer.u8(lowest);
     writer.u8(planes as u8);
     for plane in 0..planes {
         let bits = above.iter().enumerate();
@@ -238,9 +237,9 @@ fn write_scores(writer: &mut Writer, scores: &[u8; DIRECTIONS]) {
 }
 
 fn read_scores(reader: &mut Reader<'_>) -> Result<[u8; DIRECTIONS], AtlasError> {
-    let least = reader.u8()?;
+    let lowest = reader.u8()?;
     let planes = reader.u8()?;
-    if least == SLIPS || planes > 8 {
+    if lowest == SLIPS || planes > 8 {
         return Err(AtlasError::Malformed("scores are out of range"));
     }
     let mut above = [0_u8; DIRECTIONS];
@@ -252,14 +251,15 @@ fn read_scores(reader: &mut Reader<'_>) -> Result<[u8; DIRECTIONS], AtlasError> 
     }
     let mut scores = [SLIPS; DIRECTIONS];
     for (score, above) in scores.iter_mut().zip(above).filter(|(_, above)| *above > 0) {
-        *score = (least - 1)
+        *score = (lowest - 1)
             .checked_add(above)
             .ok_or(AtlasError::Malformed("scores are out of range"))?;
     }
     Ok(scores)
 }
 
-/// Many grips need more than a little friction nowhere, and few need all of it: bits of which none is set are left out.
+/// Many grips need little friction in every direction, and few need all of it: trailing empty planes are
+/// omitted.
 fn write_friction_uses(writer: &mut Writer, uses: FrictionUses) {
     let planes = uses.to_bits();
     let count = planes
@@ -276,10 +276,14 @@ fn read_friction_uses(reader: &mut Reader<'_>) -> Result<FrictionUses, AtlasErro
     let mut planes = [0; 2];
     let count = usize::from(reader.u8()?);
     let written = planes.get_mut(..count);
-    for bits in written.ok_or(AtlasError::Malformed("uses of friction are out of range"))? {
+    for bits in written.ok_or(AtlasError::Malformed(
+        "the number of friction-use planes is out of range",
+    ))? {
         *bits = reader.u64()?;
     }
-    FrictionUses::from_bits(planes).ok_or(AtlasError::Malformed("a grip uses all friction and some of it"))
+    FrictionUses::from_bits(planes).ok_or(AtlasError::Malformed(
+        "a direction with full friction use is not among those with more than sparing use",
+    ))
 }
 
 fn write_contact(writer: &mut Writer, contact: &Contact, mesh: &TriangleMesh) {
@@ -287,16 +291,16 @@ fn write_contact(writer: &mut Writer, contact: &Contact, mesh: &TriangleMesh) {
         HandPart::Phalanx(digit, phalanx) => 3 * digit.index() + phalanx.index(),
         HandPart::Palm => 15,
     };
-    writer.short(u64::from(contact.triangle) * PARTS + part as u64);
-    let (axis, [first, second]) = axes(mesh, contact.triangle);
+    writer.varint(u64::from(contact.triangle) * PARTS + part as u64);
+    let (axis, [first, second]) = projection_axes(mesh, contact.triangle);
     let position = contact.position;
     writer.floats(&[position[first], position[second]]);
-    let expected = on_plane(mesh, contact.triangle, position);
-    let last_places = i64::from(ordered(position[axis])) - i64::from(ordered(expected));
-    match i8::try_from(last_places) {
+    let expected = coordinate_on_plane(mesh, contact.triangle, position);
+    let ulps = i64::from(ordered(position[axis])) - i64::from(ordered(expected));
+    match i8::try_from(ulps) {
         Ok(difference) if difference != i8::MIN => writer.u8(difference.cast_unsigned()),
         _ => {
-            writer.u8(FAR_OFF);
+            writer.u8(EXPLICIT);
             writer.floats(&[position[axis]]);
         }
     }
@@ -307,23 +311,23 @@ fn read_contact(
     mesh: &TriangleMesh,
     solids: &HandSolids,
 ) -> Result<Contact, AtlasError> {
-    let place = reader.short()?;
-    let triangle = u32::try_from(place / PARTS)
+    let code = reader.varint()?;
+    let triangle = u32::try_from(code / PARTS)
         .ok()
         .filter(|&triangle| (triangle as usize) < mesh.triangles().len())
-        .ok_or(AtlasError::Malformed("a contact is on no triangle"))?;
-    let part = match (place % PARTS) as usize {
+        .ok_or(AtlasError::Malformed("a contact refers to a missing triangle"))?;
+    let part = match (code % PARTS) as usize {
         15 => HandPart::Palm,
         link => HandPart::Phalanx(Digit::ALL[link / 3], Phalanx::ALL[link % 3]),
     };
-    let (axis, [first, second]) = axes(mesh, triangle);
+    let (axis, [first, second]) = projection_axes(mesh, triangle);
     let mut position = Vec3::ZERO;
     [position[first], position[second]] = reader.floats()?;
     let difference = reader.u8()?;
-    position[axis] = if difference == FAR_OFF {
+    position[axis] = if difference == EXPLICIT {
         reader.float()?
     } else {
-        let expected = ordered(on_plane(mesh, triangle, position));
+        let expected = ordered(coordinate_on_plane(mesh, triangle, position));
         from_ordered(expected.wrapping_add_signed(i32::from(difference.cast_signed())))
     };
     if !position.is_finite() {
@@ -338,22 +342,22 @@ fn read_contact(
 }
 
 /// The axis that a triangle faces most, and the two others.
-fn axes(mesh: &TriangleMesh, triangle: u32) -> (usize, [usize; 2]) {
+fn projection_axes(mesh: &TriangleMesh, triangle: u32) -> (usize, [usize; 2]) {
     let axis = mesh.normal(triangle as usize).abs().max_position();
     (axis, [(axis + 1) % 3, (axis + 2) % 3])
 }
 
-/// The coordinate along that axis of the point of the triangle's plane that has the two other coordinates.
-fn on_plane(mesh: &TriangleMesh, triangle: u32, position: Vec3) -> f32 {
-    let (axis, [first, second]) = axes(mesh, triangle);
+/// The coordinate along that axis of the point in the triangle's plane with the given other two coordinates.
+fn coordinate_on_plane(mesh: &TriangleMesh, triangle: u32, position: Vec3) -> f32 {
+    let (axis, [first, second]) = projection_axes(mesh, triangle);
     let [a, b, c] = mesh.corners(triangle as usize).map(Vec3::as_dvec3);
     let normal = (b - a).cross(c - a);
-    let way = position.as_dvec3() - a;
-    let along = (normal[first] * way[first] + normal[second] * way[second]) / normal[axis];
+    let offset = position.as_dvec3() - a;
+    let along = (normal[first] * offset[first] + normal[second] * offset[second]) / normal[axis];
     (a[axis] - along) as f32
 }
 
-/// A number that grows by one from a float to the next larger one.
+/// Maps floats to integers in ascending order: neighbouring floats differ by one.
 fn ordered(number: f32) -> u32 {
     let bits = number.to_bits();
     if number.is_sign_negative() {

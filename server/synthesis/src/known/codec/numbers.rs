@@ -1,4 +1,4 @@
-//! Numbers as bytes, big-endian.
+//! Big-endian numbers as bytes.
 
 use super::AtlasError;
 
@@ -37,8 +37,8 @@ impl Writer {
         }
     }
 
-    /// A number in as few bytes as it needs: seven bits each, the lowest first.
-    pub(super) fn short(&mut self, mut number: u64) {
+    /// A variable-length number: seven bits per byte, lowest first.
+    pub(super) fn varint(&mut self, mut number: u64) {
         while number >= 0x80 {
             self.u8(number as u8 | 0x80);
             number >>= 7;
@@ -47,7 +47,7 @@ impl Writer {
     }
 }
 
-/// Takes numbers from the front.
+/// Reads numbers from the front.
 #[derive(Debug)]
 pub(super) struct Reader<'a>(&'a [u8]);
 
@@ -56,8 +56,8 @@ impl<'a> Reader<'a> {
         Self(bytes)
     }
 
-    /// Bytes that are left.
-    pub(super) fn left(&self) -> usize {
+    /// The number of bytes left.
+    pub(super) fn remaining(&self) -> usize {
         self.0.len()
     }
 
@@ -65,7 +65,7 @@ impl<'a> Reader<'a> {
         self.0 = self
             .0
             .get(count..)
-            .ok_or(AtlasError::Malformed("it ends too early"))?;
+            .ok_or(AtlasError::Malformed("unexpected end"))?;
         Ok(())
     }
 
@@ -73,7 +73,7 @@ impl<'a> Reader<'a> {
         let (array, rest) = self
             .0
             .split_first_chunk()
-            .ok_or(AtlasError::Malformed("it ends too early"))?;
+            .ok_or(AtlasError::Malformed("unexpected end"))?;
         self.0 = rest;
         Ok(*array)
     }
@@ -94,7 +94,7 @@ impl<'a> Reader<'a> {
         self.array().map(u64::from_be_bytes)
     }
 
-    /// A number that is finite.
+    /// A finite number.
     pub(super) fn float(&mut self) -> Result<f32, AtlasError> {
         let number = f32::from_bits(self.u32()?);
         if number.is_finite() {
@@ -112,7 +112,7 @@ impl<'a> Reader<'a> {
         Ok(floats)
     }
 
-    pub(super) fn short(&mut self) -> Result<u64, AtlasError> {
+    pub(super) fn varint(&mut self) -> Result<u64, AtlasError> {
         let mut number = 0;
         for shift in (0..64).step_by(7) {
             let byte = self.u8()?;
@@ -121,6 +121,6 @@ impl<'a> Reader<'a> {
                 return Ok(number);
             }
         }
-        Err(AtlasError::Malformed("a number is too long"))
+        Err(AtlasError::Malformed("a number has too many bytes"))
     }
 }

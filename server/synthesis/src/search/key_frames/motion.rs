@@ -1,8 +1,8 @@
-//! Is a motion of the hand free, all of it?
+//! Continuous collision checks of a hand's motion.
 //!
-//! A part of the motion is free of the object if at its middle every solid is farther from the object than any of its
-//! points travels from there to the part's ends; a part that is not is halved (interval halving on the bound of
-//! conservative advancement: B. Mirtich, "Timewarp Rigid Body Simulation", 2000).
+//! A part of the motion is free if, at its midpoint, every solid is farther from all obstacles than any of
+//! its points travels from there to the part's ends; a part that is undecided is halved (interval halving on
+//! the bound of conservative advancement: B. Mirtich, "Timewarp Rigid Body Simulation", 2000).
 
 use std::cell::Cell;
 
@@ -11,150 +11,152 @@ use crate::{
     physical::solids::{HandSolids, PreparedHand, TaperedCapsule, TrackedSolids},
 };
 
-/// A part of a motion is not halved when nothing travels farther than this in half of it, in metres: what is found free
-/// is so to this. Less costs time where a hand passes close by.
+/// A part is not halved further if nothing travels farther than this in half of it, in metres: the accuracy
+/// of the check. Less costs time where a hand passes close by.
 const RESOLUTION: f32 = 0.0001;
 
-/// How much farther an obstacle may be than is sure, in metres: so much that it is hardly worth a look whether all of a
-/// longer part is free. Less halves parts that are, more looks at obstacles in vain.
-const NEAR: f32 = 0.008;
+/// Search distance beyond the known lower bound of an obstacle's distance, in metres. Less halves parts
+/// needlessly, more searches for obstacles in vain.
+const LOOKAHEAD: f32 = 0.008;
 
-/// What a moving hand may meet.
+/// What a moving hand may collide with.
 #[derive(Debug)]
 pub(super) struct Obstacles<'a> {
     /// The object.
     pub object: &'a GraspObject,
     /// The giver's hand, in the object's frame.
     pub giver: Option<&'a PreparedHand>,
-    /// How many more times a hand may be looked at until it counts as blocked: what bounds the time of hopeless cases.
-    pub looks_left: Cell<u32>,
+    /// How many more hand poses may be checked before the motion counts as blocked: bounds the time of
+    /// hopeless cases.
+    pub poses_left: Cell<u32>,
 }
 
-/// What a moving hand keeps to.
+/// The distances that a moving hand must keep.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Keep {
-    /// Least distance to the object's surface in metres; negative, how deep the hand may sink. Forbidden surfaces are
+pub(super) struct Clearances {
+    /// Least distance to the object's surface in metres; negative: the largest depth. Forbidden surfaces are
     /// never touched.
     pub object: f32,
     /// Least distance to the giver's hand and forearm in metres.
     pub giver: f32,
 }
 
-/// A motion of a hand that starts outside of the object.
+/// A motion of a hand that starts clear of the object.
 pub(super) struct Motion<F> {
-    /// The hand at a share of the motion, from 0 to 1.
+    /// The hand at a fraction of the motion, from 0 to 1.
     pub solids_at: F,
-    /// Metres that any point of each solid travels at most, in the order of [`TrackedSolids::iter`].
+    /// Upper bound, in metres, of the travel of any point of each solid, in the order of
+    /// [`TrackedSolids::iter`].
     pub travels: Vec<f32>,
 }
 
-/// What is known of a part of a motion, of which the middle was looked at.
+/// The result of checking a part of a motion at its midpoint.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum Verdict {
     Free,
     Blocked,
-    /// The halves may be either.
-    Open,
+    /// The halves have to be checked.
+    Undecided,
 }
 
 impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
-    /// True if the motion keeps to what it should.
-    pub(super) fn is_free(&self, obstacles: &Obstacles<'_>, keep: Keep) -> bool {
-        // What does not move is where it is in the grasp.
+    /// True if the motion keeps the clearances.
+    pub(super) fn is_free(&self, obstacles: &Obstacles<'_>, clearances: Clearances) -> bool {
+        // Solids that do not move stay where they are in the grasp.
         let moving = self
             .travels
             .iter()
             .enumerate()
             .filter(|(_, travel)| **travel > 0.0);
-        let open = moving.fold(0, |open, (place, _)| open | 1 << place);
-        // Beside the object, the hand is what comes first of its solids.
-        let beside_object = open & ((1 << HandSolids::COUNT) - 1);
-        let beside_giver = if obstacles.giver.is_some() { open } else { 0 };
-        self.is_part_free(obstacles, keep, [0.0, 1.0], [beside_object, beside_giver])
+        let undecided = moving.fold(0, |undecided, (place, _)| undecided | 1 << place);
+        // The hand's own solids come first; only they are compared with the object.
+        let against_object = undecided & ((1 << HandSolids::COUNT) - 1);
+        let against_giver = if obstacles.giver.is_some() { undecided } else { 0 };
+        self.is_part_free(obstacles, clearances, [0.0, 1.0], [against_object, against_giver])
     }
 
-    /// The same for a part. `open` has a bit for each solid that may meet the object in it, and for each that may meet the
-    /// giver.
+    /// Checks a part. `undecided` has one bit for each solid that may collide with the object, and one for
+    /// each that may collide with the giver.
     fn is_part_free(
         &self,
         obstacles: &Obstacles<'_>,
-        keep: Keep,
+        clearances: Clearances,
         [from, to]: [f32; 2],
-        open: [u64; 2],
+        undecided: [u64; 2],
     ) -> bool {
-        let Some(looks_left) = obstacles.looks_left.get().checked_sub(1) else {
+        let Some(poses_left) = obstacles.poses_left.get().checked_sub(1) else {
             return false;
         };
-        obstacles.looks_left.set(looks_left);
+        obstacles.poses_left.set(poses_left);
         let middle = 0.5 * (from + to);
         let half = 0.5 * (to - from);
-        let mut still_open = [0; 2];
+        let mut still_undecided = [0; 2];
         let solids = (self.solids_at)(middle);
         for (place, (solid, travel)) in solids.iter().zip(&self.travels).enumerate() {
             let travel = half * travel;
             for against in 0..2 {
-                if open[against] >> place & 1 == 0 {
+                if undecided[against] >> place & 1 == 0 {
                     continue;
                 }
-                let part = match (obstacles.giver, against) {
-                    (Some(giver), 1) => beside_giver(giver, solid, keep.giver, travel),
-                    _ => beside_object(obstacles, solids.hand.solid(place), keep.object, travel),
+                let verdict = match (obstacles.giver, against) {
+                    (Some(giver), 1) => against_giver(giver, solid, clearances.giver, travel),
+                    _ => against_object(obstacles, solids.hand.solid(place), clearances.object, travel),
                 };
-                match part {
-                    Part::Free => {}
-                    Part::Blocked => return false,
-                    Part::Open => still_open[against] |= 1 << place,
+                match verdict {
+                    Verdict::Free => {}
+                    Verdict::Blocked => return false,
+                    Verdict::Undecided => still_undecided[against] |= 1 << place,
                 }
             }
         }
-        still_open == [0; 2]
+        still_undecided == [0; 2]
             || [[from, middle], [middle, to]]
                 .into_iter()
-                .all(|part| self.is_part_free(obstacles, keep, part, still_open))
+                .all(|part| self.is_part_free(obstacles, clearances, part, still_undecided))
     }
 }
 
-/// Is a solid free of the giver's hand that travels `travel` metres from where it is?
-fn beside_giver(giver: &PreparedHand, solid: &TaperedCapsule, least: f32, travel: f32) -> Part {
+/// Checks a solid that travels up to `travel` metres against the giver's hand.
+fn against_giver(giver: &PreparedHand, solid: &TaperedCapsule, clearance: f32, travel: f32) -> Verdict {
     giver
-        .least_distance([solid].into_iter(), least + travel, least)
-        .map_or(Part::Blocked, |distance| settle(distance, least, travel))
+        .least_distance([solid].into_iter(), clearance + travel, clearance)
+        .map_or(Verdict::Blocked, |distance| classify(distance, clearance, travel))
 }
 
-/// Is a solid free of the object that travels `travel` metres from where it is?
-fn beside_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, least: f32, travel: f32) -> Part {
+/// Checks a solid that travels up to `travel` metres against the object.
+fn against_object(obstacles: &Obstacles<'_>, solid: &TaperedCapsule, clearance: f32, travel: f32) -> Verdict {
     let object = obstacles.object;
     let surface = &object.surface;
-    let sure = surface.gap_lower_bound(solid) - least;
-    if sure >= travel {
-        return Part::Free;
+    let lower_bound = surface.gap_lower_bound(solid) - clearance;
+    if lower_bound >= travel {
+        return Verdict::Free;
     }
-    if sure >= 0.0 && travel > sure + NEAR {
-        return Part::Open;
+    if lower_bound >= 0.0 && travel > lower_bound + LOOKAHEAD {
+        return Verdict::Undecided;
     }
-    let enough = least + travel.min(sure.max(0.0) + NEAR);
+    let search_distance = clearance + travel.min(lower_bound.max(0.0) + LOOKAHEAD);
     let gap = surface
-        .closest_to_capsule(solid, enough)
-        .map_or(enough, |gap| gap.gap);
-    let part = settle(gap, least, travel);
-    // A part that is halved is looked at again.
-    if part == Part::Free && gap < travel && object.is_forbidden_within(solid, travel) {
+        .closest_to_capsule(solid, search_distance)
+        .map_or(search_distance, |gap| gap.gap);
+    let verdict = classify(gap, clearance, travel);
+    // A part that is halved is checked again.
+    if verdict == Verdict::Free && gap < travel && object.is_forbidden_within(solid, travel) {
         return if travel > RESOLUTION {
-            Part::Open
+            Verdict::Undecided
         } else {
-            Part::Blocked
+            Verdict::Blocked
         };
     }
-    part
+    verdict
 }
 
-/// What a distance in the middle of a part says about it, if it may shrink by `travel` on the way to the ends.
-fn settle(distance: f32, least: f32, travel: f32) -> Part {
-    if distance < least {
-        Part::Blocked
-    } else if distance >= least + travel || travel <= RESOLUTION {
-        Part::Free
+/// Classifies a part by the distance at its midpoint, which may shrink by `travel` toward the ends.
+fn classify(distance: f32, clearance: f32, travel: f32) -> Verdict {
+    if distance < clearance {
+        Verdict::Blocked
+    } else if distance >= clearance + travel || travel <= RESOLUTION {
+        Verdict::Free
     } else {
-        Part::Open
+        Verdict::Undecided
     }
 }

@@ -176,7 +176,7 @@ fn fingers_that_a_giver_blocks_are_lifted() {
                 assert_eq!(grasp.pose, entry.grip.pose);
                 continue;
             }
-            assert_eq!(found.report.source, Some(GraspSource::Spared(0)));
+            assert_eq!(found.report.source, Some(GraspSource::FingerSubset(0)));
             subsets += 1;
             let fingers: Vec<usize> = (1..5).filter(|&finger| left[finger]).collect();
             let holds = entry.grip.bend_ratios.map(|ratio| ratio.is_some());
@@ -223,7 +223,7 @@ fn subsets_answer_where_no_whole_grip_is_left_and_are_reproducible() {
         let found = search(&holdout, &few, 1);
         let Some(grasp) = found.grasp else { continue };
         let index = match found.report.source {
-            Some(GraspSource::Spared(index)) => index,
+            Some(GraspSource::FingerSubset(index)) => index,
             Some(GraspSource::Atlas(_)) => continue,
             source => panic!("no attempt was allowed: {source:?}"),
         };
@@ -234,7 +234,7 @@ fn subsets_answer_where_no_whole_grip_is_left_and_are_reproducible() {
             let again = search(&holdout, &few, workers);
             assert_eq!(
                 (again.grasp.as_ref(), again.report.source),
-                (Some(&grasp), Some(GraspSource::Spared(index)))
+                (Some(&grasp), Some(GraspSource::FingerSubset(index)))
             );
         }
     }

@@ -57,7 +57,7 @@ fn entries_of(seeds: &Seeds) -> Vec<u16> {
 }
 
 #[test]
-fn seeds_are_the_grips_least_in_the_givers_way() {
+fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
     let (known, rig) = (complete_atlas("scissors"), right());
     for grip in [0, 700, 1400] {
         let holdout = scissors_held_by(&known, grip);
@@ -73,15 +73,15 @@ fn seeds_are_the_grips_least_in_the_givers_way() {
                 || false,
             )
         };
-        let seeds = of(holding).expect("nobody interrupts");
+        let seeds = of(holding).expect("not interrupted");
         let mut clearances: Vec<f32> = holding
             .iter()
             .map(|&entry| farthest_clearance(&known.entries()[usize::from(entry)], &giver))
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
         // Without a giver, as many of the best.
-        let nobody = Seeds::of(known.grips(), rig, holding.iter().copied(), None, || false);
-        let best = entries_of(&nobody.expect("nobody interrupts"));
+        let without_giver = Seeds::of(known.grips(), rig, holding.iter().copied(), None, || false);
+        let best = entries_of(&without_giver.expect("not interrupted"));
         assert!(best.len() >= 32 && holding.starts_with(&best));
         assert_eq!(seeds.all().len(), best.len());
         let distinct: HashSet<u16> = entries_of(&seeds).into_iter().collect();
@@ -125,7 +125,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
         let excluded = known.excluded_by(giver);
         let mut open = holding.clone().filter(|&entry| !excluded.contains(entry));
         let seeds = |of: &mut dyn Iterator<Item = u16>| {
-            Seeds::of(known.grips(), rig, of, Some(giver), || false).expect("nobody interrupts")
+            Seeds::of(known.grips(), rig, of, Some(giver), || false).expect("not interrupted")
         };
         let (seeds, open_seeds) = (seeds(&mut holding.clone()), seeds(&mut open));
         let pairs = pairs_free_of(scissors, giver);

@@ -7,7 +7,7 @@ use grasp_synthesis::{
         atlas::{Atlas, Listed},
         gravity::direction,
         grips::Grips,
-        recheck::Recheck,
+        recheck::GripChecker,
         subset_grasps::subset_grasp,
     },
     model::{hand::joints::HandJoints, holdout::Holdout, strategy::Choice},
@@ -119,13 +119,13 @@ fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<[bool; 2]> {
     let rig = right();
     let scene = object_scene(&holdout.object);
     let presented = Presented::of(holdout);
-    let asked = Recheck::new(&scene, rig, &presented);
+    let checker = GripChecker::new(&scene, rig, &presented);
     let around = surroundings(&holdout.object, &presented, rig);
     let mut gripper = Gripper::default();
     let entries = known.entries().iter();
     entries
         .map(|entry| {
-            let whole = asked.hold(entry, &entry.tracked_solids(rig), &mut gripper);
+            let whole = checker.check(entry, &entry.tracked_solids(rig), &mut gripper);
             let giver = presented.giver.as_ref();
             let by_subset = giver.and_then(|giver| subset_grasp(entry, &around, giver, &mut gripper));
             [whole.is_some(), by_subset.is_some()]

@@ -12,7 +12,7 @@ use grasp_synthesis::{
         grips::Grips,
         primitives::{HeldPrimitive, Primitive},
         seed_source::SeedSource,
-        transferred_grips::{Among, TransferredGrips},
+        transferred_grips::{Candidates, TransferredGrips},
     },
     model::{
         constraints::Constraints,
@@ -42,7 +42,7 @@ fn transferred_to(object: &GraspObject) -> TransferredGrips {
 
 /// All transferred grips, without a giver.
 fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
-    let grips = transferred.for_giver(Among::All, right(), None, &Constraints::default(), &|| false);
+    let grips = transferred.for_giver(Candidates::All, right(), None, &Constraints::default(), &|| false);
     grips.expect("nobody interrupts").entries().to_vec()
 }
 
@@ -142,7 +142,13 @@ fn transferred_grips_touch_a_similar_box_in_any_pose() {
 
 /// The transferred grips that pass the closure screen, without a giver.
 fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
-    let grips = transferred.for_giver(Among::Passing, right(), None, &Constraints::default(), &|| false);
+    let grips = transferred.for_giver(
+        Candidates::Passing,
+        right(),
+        None,
+        &Constraints::default(),
+        &|| false,
+    );
     grips.expect("nobody interrupts").entries().to_vec()
 }
 
@@ -210,7 +216,7 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
         ..Constraints::default()
     };
     let rest = transferred
-        .for_giver(Among::All, right(), None, &constraints, &|| false)
+        .for_giver(Candidates::All, right(), None, &constraints, &|| false)
         .expect("nobody interrupts");
     assert!(!rest.entries().is_empty());
     for entry in rest.entries() {
@@ -218,7 +224,7 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
     }
     assert!(
         transferred
-            .for_giver(Among::All, right(), None, &constraints, &|| true)
+            .for_giver(Candidates::All, right(), None, &constraints, &|| true)
             .is_none()
     );
 }
@@ -229,7 +235,10 @@ fn a_giver_gets_the_grips_least_in_its_way() {
         let transferred = transferred_to(&holdout.object);
         let giver = Presented::of(&holdout).giver.expect("there is one");
         let chosen_for = |giver| {
-            let grips = transferred.for_giver(Among::All, right(), giver, &Constraints::default(), &|| false);
+            let grips =
+                transferred.for_giver(Candidates::All, right(), giver, &Constraints::default(), &|| {
+                    false
+                });
             grips.expect("nobody interrupts")
         };
         let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();

@@ -1,4 +1,4 @@
-//! The ways to grasps on the built-in objects, checked at many moments of the motion.
+//! The motions to grasps on the built-in objects, checked at many moments of the motion.
 
 use std::sync::{Arc, LazyLock};
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
 use grasp_synthesis::{
     base::pose::Pose,
-    known::{growth::Growth, recheck::Recheck},
+    known::{growth::Growth, recheck::GripChecker},
     model::{
         constraints::ApproachCone,
         grasp::{Grasp, KeyFrame, Stage},
@@ -31,7 +31,7 @@ use crate::fixtures::{
     proposals::object_scene,
 };
 
-/// Rounding of distances, in metres, and the accuracy of a way.
+/// Rounding of distances, in metres, and the accuracy of a motion.
 const TOLERANCE: f32 = 0.00015;
 
 /// Grips tried per object.
@@ -43,30 +43,30 @@ const MOMENTS: usize = 120;
 /// Ways followed moment by moment per holdout: following takes far longer than planning.
 const FOLLOWED: usize = 4;
 
-/// A grasp on a holdout, and the way to it.
+/// A grasp on a holdout, and the motion to it.
 struct Planned {
     name: String,
     holdout: Holdout,
     grasp: Grasp,
-    way: Option<[KeyFrame; 3]>,
+    motion: Option<[KeyFrame; 3]>,
 }
 
-/// Grasps on a holdout, and their ways.
+/// Grasps on a holdout, and their motions.
 fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Planned> {
     let scene = object_scene(&holdout.object);
     let presented = Presented::of(holdout);
     let mut gripper = Gripper::default();
     let atlas = grips.atlas();
-    let asked = Recheck::new(&scene, rig, &presented);
+    let checker = GripChecker::new(&scene, rig, &presented);
     let grasps = atlas
         .entries()
         .iter()
-        .filter_map(|entry| asked.hold(entry, &entry.tracked_solids(rig), &mut gripper));
+        .filter_map(|entry| checker.check(entry, &entry.tracked_solids(rig), &mut gripper));
     grasps
         .map(|grasp| Planned {
             name: name.to_owned(),
             holdout: holdout.clone(),
-            way: key_frames(&scene, &presented, rig, None, &grasp),
+            motion: key_frames(&scene, &presented, rig, None, &grasp),
             grasp,
         })
         .collect()
@@ -95,12 +95,12 @@ static PLANNED: LazyLock<Vec<Planned>> = LazyLock::new(|| {
     planned
 });
 
-/// The first ways of each holdout.
+/// The first motions of each holdout.
 fn followed() -> impl Iterator<Item = (&'static Planned, &'static [KeyFrame; 3])> {
     let mut last = ("", 0);
     PLANNED
         .iter()
-        .filter_map(|planned| Some((planned, planned.way.as_ref()?)))
+        .filter_map(|planned| Some((planned, planned.motion.as_ref()?)))
         .filter(move |(planned, _)| {
             last = if planned.name == last.0 {
                 (last.0, last.1 + 1)
@@ -155,8 +155,8 @@ fn moments(from: &KeyFrame, to: &KeyFrame) -> impl Iterator<Item = HandPose> {
 }
 
 #[test]
-fn nearly_every_grasp_has_a_way() {
-    let without = PLANNED.iter().filter(|planned| planned.way.is_none()).count();
+fn nearly_every_grasp_has_a_motion() {
+    let without = PLANNED.iter().filter(|planned| planned.motion.is_none()).count();
     assert!(PLANNED.len() > 300, "{} grasps", PLANNED.len());
     assert!(
         20 * without < PLANNED.len(),
@@ -170,7 +170,7 @@ fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
     let rig = right();
     let mut widened = Vec::new();
     for planned in PLANNED.iter() {
-        let Some([approach, pre_grasp, close]) = &planned.way else {
+        let Some([approach, pre_grasp, close]) = &planned.motion else {
             continue;
         };
         let stages = [approach.stage, pre_grasp.stage, close.stage];
@@ -180,11 +180,11 @@ fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
         let [far, near, there] = [approach, pre_grasp, close].map(|frame| frame.pose.frame_from_wrist);
         assert_eq!(far.orientation, there.orientation);
         assert_eq!(near.orientation, there.orientation);
-        let way = near.position - far.position;
-        assert!((way.length() - APPROACH_DISTANCE).abs() < 1e-5, "{way}");
+        let motion = near.position - far.position;
+        assert!((motion.length() - APPROACH_DISTANCE).abs() < 1e-5, "{motion}");
         // The last stretch, if there is one, keeps the direction.
         let last = there.position - near.position;
-        assert!(last.length() < 0.026 && last.angle_between(way).abs() < 0.01 || last == Vec3::ZERO);
+        assert!(last.length() < 0.026 && last.angle_between(motion).abs() < 0.01 || last == Vec3::ZERO);
         let limits = rig.digits.map(|digit| digit.limits);
         for ((open, closed), limits) in pre_grasp.pose.digits.iter().zip(&close.pose.digits).zip(limits) {
             assert_eq!(open.base_yaw, closed.base_yaw);
@@ -228,7 +228,7 @@ fn the_open_hand_is_clear_of_everything() {
                 "{}: {object} m",
                 planned.name
             );
-            // At the approach, only the way must be free.
+            // At the approach, only the motion must be free.
             let least = if frame.stage == Stage::PreGrasp {
                 GIVER_CLEARANCE
             } else {
@@ -239,7 +239,7 @@ fn the_open_hand_is_clear_of_everything() {
         }
         count += 1;
     }
-    assert!(count > 30, "{count} ways");
+    assert!(count > 30, "{count} motions");
 }
 
 #[test]
@@ -275,8 +275,8 @@ fn closing_stays_within_the_grasps_depth_and_off_forbidden_surfaces() {
 }
 
 /// The direction of approach.
-fn direction_of(way: &[KeyFrame; 3]) -> Vec3 {
-    let [from, to] = [&way[0], &way[1]].map(|frame| frame.pose.frame_from_wrist.position);
+fn direction_of(motion: &[KeyFrame; 3]) -> Vec3 {
+    let [from, to] = [&motion[0], &motion[1]].map(|frame| frame.pose.frame_from_wrist.position);
     (to - from).normalize_or_zero()
 }
 
@@ -285,8 +285,8 @@ fn natural(grasp: &Grasp) -> Vec3 {
     (grasp.pose.frame_from_wrist.orientation * (Vec3::Y + Vec3::Z)).normalize_or_zero()
 }
 
-/// The way to a planned grasp within an approach cone.
-fn way_from(planned: &Planned, axis: Vec3, half_angle: f32) -> Option<[KeyFrame; 3]> {
+/// The motion to a planned grasp within an approach cone.
+fn motion_from(planned: &Planned, axis: Vec3, half_angle: f32) -> Option<[KeyFrame; 3]> {
     let object = &planned.holdout.object;
     let scene = object_scene(object);
     let presented = Presented::of(&planned.holdout);
@@ -296,36 +296,36 @@ fn way_from(planned: &Planned, axis: Vec3, half_angle: f32) -> Option<[KeyFrame;
 
 #[test]
 fn hands_approach_only_within_the_allowed_cone() {
-    let (mut natural_ways, mut blocked, mut others) = (0, 0, 0);
+    let (mut natural_motions, mut blocked, mut others) = (0, 0, 0);
     for (number, planned) in PLANNED.iter().enumerate() {
-        let Some(way) = &planned.way else { continue };
-        let (free, natural) = (direction_of(way), natural(&planned.grasp));
-        // Of all directions tried, only the natural one is within 10° of itself. As it is tried first, a way from
+        let Some(motion) = &planned.motion else { continue };
+        let (free, natural) = (direction_of(motion), natural(&planned.grasp));
+        // Of all directions tried, only the natural one is within 10° of itself. As it is tried first, a motion from
         // elsewhere means that it is blocked.
-        let only = way_from(planned, natural, 10_f32.to_radians());
+        let only = motion_from(planned, natural, 10_f32.to_radians());
         if free.angle_between(natural) < 0.01 {
-            assert_eq!(only.as_ref(), Some(way), "{}", planned.name);
-            natural_ways += 1;
+            assert_eq!(only.as_ref(), Some(motion), "{}", planned.name);
+            natural_motions += 1;
         } else {
             assert_eq!(only, None, "{}", planned.name);
             blocked += 1;
         }
         // All directions tried are within 80° of the natural one, so none is within 57° of its opposite.
-        assert_eq!(way_from(planned, -natural, 1.0), None, "{}", planned.name);
-        // A cone without the free choice: another way, or none.
+        assert_eq!(motion_from(planned, -natural, 1.0), None, "{}", planned.name);
+        // A cone without the free choice: another motion, or none.
         let side = free.any_orthonormal_vector();
         let side = if number % 2 == 0 { side } else { -side };
         let axis = (free * 0.5 + side).normalize_or_zero();
         let half_angle = 50_f32.to_radians();
-        if let Some(other) = way_from(planned, axis, half_angle) {
+        if let Some(other) = motion_from(planned, axis, half_angle) {
             let angle = direction_of(&other).angle_between(axis);
             assert!(angle <= half_angle + 1e-3, "{}: {angle}", planned.name);
             others += 1;
         }
     }
     assert!(
-        natural_ways > 20 && blocked > 10 && others > 20,
-        "{natural_ways} natural, {blocked} blocked, {others} from the side"
+        natural_motions > 20 && blocked > 10 && others > 20,
+        "{natural_motions} natural, {blocked} blocked, {others} from the side"
     );
 }
 
@@ -335,7 +335,7 @@ fn cuboid(half: Vec3) -> Arc<GraspObject> {
 }
 
 #[test]
-fn the_other_hand_takes_the_mirrored_way() {
+fn the_other_hand_takes_the_mirrored_motion() {
     let object = cuboid(Vec3::new(0.02, 0.06, 0.015));
     let holdout = floating(Arc::clone(&object));
     let (right, left) = (right(), adult(Handedness::Left));
@@ -346,8 +346,8 @@ fn the_other_hand_takes_the_mirrored_way() {
         let mut grasp = planned.grasp.clone();
         grasp.pose.frame_from_wrist = grasp.pose.frame_from_wrist.mirrored_x();
         let mirrored = key_frames(&scene, &Presented::of(&holdout), left, None, &grasp);
-        assert_eq!(mirrored.is_some(), planned.way.is_some());
-        for (ours, theirs) in planned.way.iter().flatten().zip(mirrored.iter().flatten()) {
+        assert_eq!(mirrored.is_some(), planned.motion.is_some());
+        for (ours, theirs) in planned.motion.iter().flatten().zip(mirrored.iter().flatten()) {
             let expected = ours.pose.frame_from_wrist.mirrored_x().position;
             let there = theirs.pose.frame_from_wrist.position;
             assert!(expected.distance(there) < 1e-5, "{expected} and {there}");
@@ -362,7 +362,7 @@ fn the_other_hand_takes_the_mirrored_way() {
 }
 
 #[test]
-fn a_hand_inside_a_block_has_no_way() {
+fn a_hand_inside_a_block_has_no_motion() {
     let object = cuboid(Vec3::new(0.02, 0.06, 0.015));
     let rig = right();
     let free = plan(
@@ -373,8 +373,8 @@ fn a_hand_inside_a_block_has_no_way() {
     );
     let grasp = &free
         .iter()
-        .find(|planned| planned.way.is_some())
-        .expect("a way")
+        .find(|planned| planned.motion.is_some())
+        .expect("a planned motion")
         .grasp;
     // The same hand inside a block.
     let block = cuboid(Vec3::splat(0.6));

@@ -61,7 +61,8 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
                     (whole.grasp, whole.report.source)
                 );
                 cut += usize::from(last.is_some());
-                subset_grasp += usize::from(matches!(whole.report.source, Some(GraspSource::Spared(_))));
+                subset_grasp +=
+                    usize::from(matches!(whole.report.source, Some(GraspSource::FingerSubset(_))));
             }
             (None, None) => {
                 assert_eq!(by_search.grasp, None);

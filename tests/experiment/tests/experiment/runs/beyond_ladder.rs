@@ -25,7 +25,7 @@ use grasp_synthesis::{
         atlas::Atlas,
         codec::{AtlasError, encode},
         growth::Growth,
-        recheck::Recheck,
+        recheck::GripChecker,
     },
     model::{hand::Handedness, strategy::Validity},
     physical::{
@@ -104,8 +104,8 @@ fn an_atlas_answers_with_its_first_holding_grip() {
         let presented = Presented::of(&holdout);
         let held = |entry: u16| {
             let entry = &SMALL_ATLAS.0.entries()[usize::from(entry)];
-            let asked = Recheck::new(&object, adult(), &presented);
-            asked.hold(entry, &entry.tracked_solids(adult()), &mut Gripper::default())
+            let checker = GripChecker::new(&object, adult(), &presented);
+            checker.check(entry, &entry.tracked_solids(adult()), &mut Gripper::default())
         };
         let (atlas, up) = (&SMALL_ATLAS.0, presented.up);
         let listed = atlas.shortlist(up).iter().map(|listed| listed.entry);
