@@ -72,7 +72,7 @@ fn pairs(known: &Atlas, rig: &Rig) -> Vec<Pair> {
                     giver_solids,
                     grip: solids,
                     is_left_by_cells: !excluded.contains(index as u16),
-                    is_settled: known.grips().unless_met(index, rig, &giver).is_none(),
+                    is_settled: known.grips().screen_against_giver(index, rig, &giver).is_none(),
                 })
             };
             (0..GRIPS).filter_map(pair).collect::<Vec<_>>()

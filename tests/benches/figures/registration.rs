@@ -31,7 +31,7 @@ const MAX_RATIO: f64 = 2.0;
 /// Mass of the objects in kilograms.
 const MASS: f32 = 0.1;
 
-/// Random holdouts that probe an atlas each time it has grown: enough to tell nine in ten from eight. Builders wait
+/// Random holdouts that probe an atlas each time it has grown: enough to distinguish nine in ten from eight. Builders wait
 /// while searches run, so more make growth look slower.
 const PROBES: usize = 60;
 

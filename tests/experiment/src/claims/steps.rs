@@ -153,7 +153,7 @@ pub(super) fn immobility(data: &Data<'_>) -> Vec<Claim> {
         claims.push(Claim {
             source: "5.6",
             thesis: "an average of 18 of 100 force distributions suffice",
-            run: format!("{ours:.1} of 100 drawn anew for each valid grasp"),
+            run: format!("{ours:.1} of 100 drawn again for each valid grasp"),
             verdict: verdict_of_ratio(ours, thesis::SUFFICIENT_DISTRIBUTIONS),
             why: "the thesis does not say how the four shares of a contact's lines are drawn; here every split is as \
                   likely as any other, so that with lines 70° off the normal the sum points almost anywhere, and the \
