@@ -75,11 +75,8 @@ impl Knowledge {
             | Mechanism::CellOccupancy
             | Mechanism::FrictionUses
             | Mechanism::FingerSubsets
-            | Mechanism::HeadStart
             | Mechanism::CallerLookUp
-            | Mechanism::Seeds
-            | Mechanism::OpenSeeds
-            | Mechanism::NearestSeeds => self == Self::Warm,
+            | Mechanism::Seeds => self == Self::Warm,
             Mechanism::TransferredGrips | Mechanism::ClosureScreen => self == Self::Cold,
             Mechanism::InnerSpheres
             | Mechanism::GiverOrder
@@ -87,7 +84,6 @@ impl Knowledge {
             | Mechanism::Oppositions
             | Mechanism::SuccessPrior
             | Mechanism::PlacementCache
-            | Mechanism::FreeSurface
             | Mechanism::RoomScreen
             | Mechanism::PalmPlacement
             | Mechanism::Preshape

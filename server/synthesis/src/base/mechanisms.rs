@@ -27,16 +27,10 @@ pub enum Mechanism {
     FingerSubsets,
     /// After the atlas, tries grips that recent searches found.
     RecentGrips,
-    /// Spends the first 300 µs of a search on known grips alone, before waking workers.
-    HeadStart,
     /// Looks up known grips on the caller's own thread before handing the search to workers.
     CallerLookUp,
     /// After failed attempts, tries hands perturbed about grips of the atlas.
     Seeds,
-    /// Takes seeds first from grips that do not certainly collide with the giver.
-    OpenSeeds,
-    /// Also takes seeds from all grips, ordered by clearance from the giver.
-    NearestSeeds,
     /// Without an atlas, perturbs hands about grips transferred from boxes that resemble the object.
     TransferredGrips,
     /// In every other attempt, uses only transferred grips whose contacts may have force closure on the object.
@@ -49,8 +43,6 @@ pub enum Mechanism {
     SuccessPrior,
     /// Draws the first attempts from placements sampled once per object and rig.
     PlacementCache,
-    /// From the fifth attempt, samples placements only on surface that the giver leaves free.
-    FreeSurface,
     /// Skips placements whose palm, forearm or links clearly collide before closing the hand.
     RoomScreen,
     /// Places some hands with the palm on the surface.
@@ -63,7 +55,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All mechanisms, in the order in which a search uses them.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 21] = [
         Self::AtlasLookUp,
         Self::Shortlists,
         Self::GravityOrder,
@@ -73,18 +65,14 @@ impl Mechanism {
         Self::FrictionUses,
         Self::FingerSubsets,
         Self::RecentGrips,
-        Self::HeadStart,
         Self::CallerLookUp,
         Self::Seeds,
-        Self::OpenSeeds,
-        Self::NearestSeeds,
         Self::TransferredGrips,
         Self::ClosureScreen,
         Self::NearMisses,
         Self::Oppositions,
         Self::SuccessPrior,
         Self::PlacementCache,
-        Self::FreeSurface,
         Self::RoomScreen,
         Self::PalmPlacement,
         Self::Preshape,
@@ -103,18 +91,14 @@ impl Mechanism {
             Self::FrictionUses => "friction-uses",
             Self::FingerSubsets => "finger-subsets",
             Self::RecentGrips => "recent-grips",
-            Self::HeadStart => "head-start",
             Self::CallerLookUp => "caller-look-up",
             Self::Seeds => "seeds",
-            Self::OpenSeeds => "open-seeds",
-            Self::NearestSeeds => "nearest-seeds",
             Self::TransferredGrips => "transferred-grips",
             Self::ClosureScreen => "closure-screen",
             Self::NearMisses => "near-misses",
             Self::Oppositions => "oppositions",
             Self::SuccessPrior => "success-prior",
             Self::PlacementCache => "placement-cache",
-            Self::FreeSurface => "free-surface",
             Self::RoomScreen => "room-screen",
             Self::PalmPlacement => "palm-placement",
             Self::Preshape => "preshape",

@@ -15,11 +15,6 @@ use crate::{
     physical::scene::Presented,
 };
 
-/// The first attempts, which all take seeds from grips that are not excluded by the giver's cells: these are
-/// found in a fifth of the time. Later attempts alternate, because some givers are answered much sooner by
-/// one kind of seeds and some by the other.
-const ATTEMPTS_FROM_OPEN_SEEDS: u64 = 8;
-
 /// Where seeds come from.
 #[derive(Clone, Debug, Default)]
 pub enum SeedSource {
@@ -61,8 +56,6 @@ pub struct SeedSets {
     source: SeedSource,
     /// From the whole atlas: the grips nearest to being clear of the giver.
     nearest: OnceLock<Seeds>,
-    /// The same from the grips that the giver's cells do not exclude.
-    open: OnceLock<Seeds>,
     /// From the transferred grips that pass the closure screen.
     passing: OnceLock<(Grips, Seeds)>,
     /// From all transferred grips.
@@ -94,7 +87,7 @@ impl SeedSets {
         match &self.source {
             SeedSource::Nothing => None,
             SeedSource::Atlas(atlas) => {
-                let seeds = self.of_atlas(atlas, attempt, context, interrupted)?;
+                let seeds = self.of_atlas(atlas, context, interrupted)?;
                 Some((seeds, atlas.entries()))
             }
             SeedSource::Transferred(transferred) => {
@@ -107,34 +100,24 @@ impl SeedSets {
     fn of_atlas(
         &self,
         atlas: &Atlas,
-        attempt: u64,
         context: &SeedContext<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&Seeds> {
         let giver = context.presented.giver.as_ref();
         let mechanisms = context.mechanisms;
-        let may_be_open = mechanisms.has(Mechanism::OpenSeeds) && mechanisms.has(Mechanism::CellOccupancy);
-        let must_be_open = !mechanisms.has(Mechanism::NearestSeeds);
-        let from_open =
-            may_be_open && (must_be_open || attempt < ATTEMPTS_FROM_OPEN_SEEDS || attempt.is_multiple_of(2));
-        let excluding = giver.filter(|_| from_open);
-        let seeds = match excluding {
-            Some(_) => &self.open,
-            None => &self.nearest,
-        };
-        if let Some(seeds) = seeds.get() {
+        if let Some(seeds) = self.nearest.get() {
             return Some(seeds);
         }
-        let excluded = excluding.map(|giver| atlas.excluded_by(giver));
         let (holding, unordered) = if mechanisms.has(Mechanism::GravityOrder) {
             (atlas.holding_under(context.presented.up), 0)
         } else {
             (&[][..], atlas.entries().len() as u16)
         };
-        let candidates = holding.iter().copied().chain(0..unordered).filter(|&entry| {
-            excluded.as_ref().is_none_or(|excluded| !excluded.contains(entry))
-                && atlas.entries()[usize::from(entry)].meets(context.constraints)
-        });
+        let candidates = holding
+            .iter()
+            .copied()
+            .chain(0..unordered)
+            .filter(|&entry| atlas.entries()[usize::from(entry)].meets(context.constraints));
         let new_seeds = Seeds::of_with(
             mechanisms,
             atlas.grips(),
@@ -144,7 +127,7 @@ impl SeedSets {
             interrupted,
         )?;
         // Another worker may have computed the same set meanwhile.
-        Some(seeds.get_or_init(|| new_seeds))
+        Some(self.nearest.get_or_init(|| new_seeds))
     }
 
     /// Alternates between grips that pass the closure screen and all that fit. Passing grips hold more often

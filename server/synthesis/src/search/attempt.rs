@@ -245,7 +245,7 @@ impl Attempt {
     ) -> Result<Option<Box<Grasp>>, Interrupted> {
         let seeds = scene.seeds(around.presented, stream.attempt(), interrupted);
         let (seeds, entries) = seeds.ok_or(Interrupted)?;
-        let place = scene.place(stream.attempt());
+        let place = scene.place();
         let refines = scene.mechanisms().has(Mechanism::NearMisses);
         for _ in 0..SEEDS_PER_ATTEMPT {
             if interrupted() {

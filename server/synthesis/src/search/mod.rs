@@ -138,9 +138,7 @@ pub fn find_grasp_in(
     debug_assert!(settings.run.workers >= 1, "there must be at least one worker");
     let known = KnownGrips::of(scene, settings);
     let race = Race::new(scene, settings, known.as_ref(), clock, stop);
-    // Mostly one of the first known grips is the answer, and waking a worker takes longer than trying some
-    // dozens.
-    if race.run_head_start() {
+    if race.tries_known_first() {
         return race.outcome();
     }
     let run = |worker: usize| {

@@ -27,15 +27,10 @@ use crate::{
         placement_cache::{PlacementCache, ROWS},
         prepared::{PreparedObject, PreparedRig},
         proposal::{ProposalContext, propose, propose_evenly},
-        surface_pairs::SurfacePairs,
     },
     rating::assessment::GraspContext,
     thesis,
 };
-
-/// Attempts that test only the surface pairs they draw against the giver's hand. Many searches end within
-/// them; later attempts draw from all pairs tested at once, which takes 180 µs.
-const ATTEMPTS_BEFORE_FREE_SURFACE: u64 = 4;
 
 /// What to grasp, and with which hand.
 #[derive(Clone, Copy, Debug)]
@@ -57,8 +52,6 @@ pub struct Scene<'a> {
     thesis: thesis::thesis_scene::ThesisScene<'a>,
     /// Present under `PHYSICAL` validity.
     physical: Option<(ObjectScene<'a>, Presented)>,
-    /// The part of the surface that the giver's hand leaves free, computed on first use.
-    free_surface: OnceLock<SurfacePairs>,
     /// Cached placements of the receiving hand, computed on first use.
     placements: OnceLock<Arc<PlacementCache>>,
     constraints: Constraints,
@@ -93,7 +86,6 @@ impl<'a> Scene<'a> {
                 query.bend_ratios,
                 friction,
             ),
-            free_surface: OnceLock::new(),
             placements: OnceLock::new(),
             constraints: query.constraints,
             seeds: SeedSets::new(seeds),
@@ -151,23 +143,14 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// Where `GUIDED` search may place the hand of an attempt.
-    pub(super) fn place(&self, attempt: u64) -> ProposalContext<'_> {
+    /// Where `GUIDED` search may place a hand.
+    pub(super) fn place(&self) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
         let giver = presented.and_then(|presented| presented.giver.as_ref());
-        let surface = match giver {
-            Some(giver)
-                if attempt >= ATTEMPTS_BEFORE_FREE_SURFACE && self.mechanisms.has(Mechanism::FreeSurface) =>
-            {
-                self.free_surface
-                    .get_or_init(|| object.surface_pairs().free_of(giver))
-            }
-            _ => object.surface_pairs(),
-        };
         ProposalContext {
             object: object.object(),
-            surface,
+            surface: object.surface_pairs(),
             giver,
             rig,
             placements: None,
@@ -185,7 +168,7 @@ impl<'a> Scene<'a> {
         let chooses = attempt < ROWS && self.mechanisms.has(Mechanism::PlacementCache);
         ProposalContext {
             placements: chooses.then(|| &**placements()),
-            ..self.place(attempt)
+            ..self.place()
         }
     }
 
@@ -202,7 +185,7 @@ impl<'a> Scene<'a> {
             return Some(self.shaped(proposal));
         }
         // The success prior was learned under `PHYSICAL` validity.
-        let proposal = propose_evenly(&self.place(stream.attempt()), stream, interrupted)?;
+        let proposal = propose_evenly(&self.place(), stream, interrupted)?;
         let scene = ObjectScene::new(&self.task.holdout.object, self.thesis.load.friction);
         Some(Proposal {
             object_from_wrist: wrist_after_advance(&scene, self.task.rig, &proposal)?,
