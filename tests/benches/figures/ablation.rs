@@ -74,7 +74,6 @@ impl Knowledge {
             | Mechanism::GravityOrder
             | Mechanism::CellOccupancy
             | Mechanism::FrictionUses
-            | Mechanism::FingerSubsets
             | Mechanism::HeadStart
             | Mechanism::CallerLookUp
             | Mechanism::Seeds

@@ -23,8 +23,6 @@ pub enum Mechanism {
     GiverOrder,
     /// Starts balancing a known grip's forces from the friction it is known to use.
     FrictionUses,
-    /// Also tries known grips without the fingers that the giver obstructs.
-    FingerSubsets,
     /// After the atlas, tries grips that recent searches found.
     RecentGrips,
     /// Spends the first 300 µs of a search on known grips alone, before waking workers.
@@ -63,7 +61,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All mechanisms, in the order in which a search uses them.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 24] = [
         Self::AtlasLookUp,
         Self::Shortlists,
         Self::GravityOrder,
@@ -71,7 +69,6 @@ impl Mechanism {
         Self::InnerSpheres,
         Self::GiverOrder,
         Self::FrictionUses,
-        Self::FingerSubsets,
         Self::RecentGrips,
         Self::HeadStart,
         Self::CallerLookUp,
@@ -101,7 +98,6 @@ impl Mechanism {
             Self::InnerSpheres => "inner-spheres",
             Self::GiverOrder => "giver-order",
             Self::FrictionUses => "friction-uses",
-            Self::FingerSubsets => "finger-subsets",
             Self::RecentGrips => "recent-grips",
             Self::HeadStart => "head-start",
             Self::CallerLookUp => "caller-look-up",
