@@ -262,7 +262,7 @@ fn report(
         candidates: report.candidates,
         source: match report.source {
             Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
-            Some(GraspSource::Atlas(_) | GraspSource::FingerSubset(_)) => v1::GraspSource::Atlas,
+            Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
             Some(GraspSource::Recent) => v1::GraspSource::Recent,
             None => v1::GraspSource::Unspecified,
         }

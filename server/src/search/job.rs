@@ -265,14 +265,11 @@ impl PreparedJob {
         })
     }
 
-    /// The grip to remember: one that was found by an attempt or with fewer fingers than its atlas entry, under the
-    /// object's own friction, which the grips of an atlas are made for.
+    /// The grip to remember: one that was found by an attempt under the object's own friction, which the grips of an
+    /// atlas are made for.
     fn new_grip(&self, outcome: &SearchOutcome) -> Option<Entry> {
         let own_friction = self.holdout.object.friction_under(Validity::Physical);
-        let is_new = matches!(
-            outcome.report.source,
-            Some(GraspSource::Attempt(_) | GraspSource::FingerSubset(_))
-        );
+        let is_new = matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
         let grasp = outcome.grasp.as_ref()?;
         (is_new && self.settings.query.friction_on(&self.holdout.object) == own_friction)
             .then(|| Entry::of_grasp(grasp))

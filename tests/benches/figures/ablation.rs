@@ -74,7 +74,6 @@ impl Knowledge {
             | Mechanism::GravityOrder
             | Mechanism::CellOccupancy
             | Mechanism::FrictionUses
-            | Mechanism::FingerSubsets
             | Mechanism::CallerLookUp
             | Mechanism::Seeds => self == Self::Warm,
             Mechanism::TransferredGrips | Mechanism::ClosureScreen => self == Self::Cold,

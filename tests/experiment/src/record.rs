@@ -51,7 +51,7 @@ impl Source {
     pub fn of(source: GraspSource) -> Option<Self> {
         match source {
             GraspSource::Attempt(index) => Some(Self::Attempt(index)),
-            GraspSource::Atlas(entry) | GraspSource::FingerSubset(entry) => Some(Self::AtlasEntry(entry)),
+            GraspSource::Atlas(entry) => Some(Self::AtlasEntry(entry)),
             GraspSource::Recent => None,
         }
     }

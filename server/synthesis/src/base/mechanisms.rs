@@ -23,8 +23,6 @@ pub enum Mechanism {
     GiverOrder,
     /// Starts balancing a known grip's forces from the friction it is known to use.
     FrictionUses,
-    /// Also tries known grips without the fingers that the giver obstructs.
-    FingerSubsets,
     /// After the atlas, tries grips that recent searches found.
     RecentGrips,
     /// Looks up known grips on the caller's own thread before handing the search to workers.
@@ -55,7 +53,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All mechanisms, in the order in which a search uses them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 20] = [
         Self::AtlasLookUp,
         Self::Shortlists,
         Self::GravityOrder,
@@ -63,7 +61,6 @@ impl Mechanism {
         Self::InnerSpheres,
         Self::GiverOrder,
         Self::FrictionUses,
-        Self::FingerSubsets,
         Self::RecentGrips,
         Self::CallerLookUp,
         Self::Seeds,
@@ -89,7 +86,6 @@ impl Mechanism {
             Self::InnerSpheres => "inner-spheres",
             Self::GiverOrder => "giver-order",
             Self::FrictionUses => "friction-uses",
-            Self::FingerSubsets => "finger-subsets",
             Self::RecentGrips => "recent-grips",
             Self::CallerLookUp => "caller-look-up",
             Self::Seeds => "seeds",

@@ -10,35 +10,6 @@ const FINGERS: usize = 4;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FingerSubsets(u16);
 
-/// The parts of a hand that a giver obstructs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Obstruction {
-    /// Fingers, one bit each, counted from the index finger.
-    fingers: u8,
-    /// A part that the hand cannot do without: thumb, palm or forearm.
-    others: bool,
-}
-
-impl Obstruction {
-    /// Nothing is obstructed.
-    pub const NONE: Self = Self {
-        fingers: 0,
-        others: false,
-    };
-
-    /// Adds a digit, thumb first; higher indices stand for palm and forearm.
-    pub(super) const fn with_digit(self, digit: usize) -> Self {
-        if digit == 0 || digit > FINGERS {
-            Self { others: true, ..self }
-        } else {
-            Self {
-                fingers: self.fingers | 1 << (digit - 1),
-                ..self
-            }
-        }
-    }
-}
-
 impl FingerSubsets {
     /// All fingers that hold, and those of their subsets that have enough closure by themselves according to
     /// `closes`, which takes digits, thumb first. Subsets of a set that does not close are not tested:
@@ -81,12 +52,6 @@ impl FingerSubsets {
         kept[Digit::Thumb.index()] && self.has(number(kept))
     }
 
-    /// True if the unobstructed fingers hold.
-    #[inline]
-    pub fn hold_despite(self, obstruction: Obstruction) -> bool {
-        !obstruction.others && self.has(self.whole_number() & !obstruction.fingers)
-    }
-
     /// The subset whose nearest finger is farthest away, as digits, thumb first, and the distance of that
     /// finger; infinite for the thumb alone. `distances` are those of the fingers, from the index finger.
     pub fn farthest(self, distances: [f32; FINGERS]) -> ([bool; 5], f32) {
@@ -114,11 +79,6 @@ impl FingerSubsets {
             }
             set = without;
         }
-    }
-
-    /// All digits that hold, thumb first.
-    pub fn holding(self) -> [bool; 5] {
-        digits(self.whole_number())
     }
 
     /// The set of all fingers that hold has the highest number.
@@ -158,12 +118,10 @@ mod tests {
         for set in 0..16 {
             assert_eq!(all.contains(digits(set)), closes(digits(set)), "{set:04b}");
         }
-        assert_eq!(all.holding(), [true; 5]);
         let without_ring = [true, true, true, false, true];
         let sets = FingerSubsets::of(without_ring, closes);
         assert!(sets.contains(without_ring) && sets.contains(digits(0b1001)));
         assert!(!sets.contains(digits(0b0111)), "the ring finger does not hold");
-        assert_eq!(sets.holding(), without_ring);
         assert!(
             !sets.contains([false, true, true, false, true]),
             "the thumb is never left out"

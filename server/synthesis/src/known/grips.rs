@@ -3,7 +3,7 @@
 use super::{
     entry::Entry,
     finger_subsets::FingerSubsets,
-    inner_spheres::{first_spheres, obstruction_from_first, second_spheres, upper_bounds_from_first},
+    inner_spheres::{first_spheres, second_spheres, upper_bounds_from_first},
 };
 use crate::{
     base::pose::Pose,
@@ -80,16 +80,6 @@ impl Grips {
         let solids = self.entries[entry].tracked_solids(rig);
         let collides = giver.any_certainly_within(&second_spheres(&solids.hand), GIVER_CLEARANCE);
         (!collides).then(|| Box::new(solids))
-    }
-
-    /// False only if the giver certainly obstructs thumb, palm or forearm of a grip, or so many fingers that
-    /// the others do not hold. Conservative, and mostly takes about 20 ns.
-    #[inline]
-    pub fn subset_may_hold(&self, entry: usize, giver: &PreparedHand) -> bool {
-        let sets = self.finger_subsets[entry];
-        let excludes_grip = |near| !sets.hold_despite(obstruction_from_first(near));
-        let near = giver.which_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE, excludes_grip);
-        !excludes_grip(near)
     }
 
     /// Upper bound of the giver's distance, in metres, from thumb, palm, forearm and the best finger subset

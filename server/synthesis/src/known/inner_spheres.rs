@@ -1,6 +1,5 @@
 //! Spheres inside a hand: whatever comes too close to one of them comes too close to the hand.
 
-use super::finger_subsets::Obstruction;
 use crate::physical::solids::{HandSolids, SPHERES, Spheres};
 
 /// A sphere inside a hand: the index of its solid in [`HandSolids::iter`], and its centre on the solid's
@@ -84,39 +83,6 @@ fn upper_bounds(inner_spheres: &[InnerSphere; SPHERES], distances: &[f32; SPHERE
         *owner = owner.min(distance);
     }
     (fingers, others)
-}
-
-/// What a giver obstructs that is near some of the first spheres, one bit each.
-#[inline]
-pub(super) fn obstruction_from_first(near: u8) -> Obstruction {
-    FROM_FIRST[usize::from(near)]
-}
-
-/// The same for the second spheres.
-#[inline]
-pub(super) fn obstruction_from_second(near: u8) -> Obstruction {
-    FROM_SECOND[usize::from(near)]
-}
-
-/// Precomputed for all sets of first spheres, because look-ups need it for every grip.
-static FROM_FIRST: [Obstruction; 1 << SPHERES] = obstruction_table(&FIRST);
-
-static FROM_SECOND: [Obstruction; 1 << SPHERES] = obstruction_table(&SECOND);
-
-const fn obstruction_table(inner_spheres: &[InnerSphere; SPHERES]) -> [Obstruction; 1 << SPHERES] {
-    let mut table = [Obstruction::NONE; 1 << SPHERES];
-    let mut near = 0;
-    while near < table.len() {
-        let mut sphere = 0;
-        while sphere < SPHERES {
-            if near >> sphere & 1 == 1 {
-                table[near] = table[near].with_digit(inner_spheres[sphere].0 / LINKS);
-            }
-            sphere += 1;
-        }
-        near += 1;
-    }
-    table
 }
 
 fn keep_digits(spheres: Spheres, inner_spheres: &[InnerSphere; SPHERES], digits: [bool; 5]) -> Spheres {

@@ -30,5 +30,4 @@ pub mod seed_source;
 pub mod seeds;
 mod shortlist;
 mod spread;
-pub mod subset_grasps;
 pub mod transferred_grips;

@@ -6,7 +6,7 @@ use super::{
     grip::{GIVER_CLEARANCE, NoGrip, nears_forbidden_surface},
     obstacle::Obstacle,
     scene::ObjectScene,
-    shape::{HandShape, MIN_RESTING_FLEXION, TUCKED_FLEXION},
+    shape::{HandShape, TUCKED_FLEXION},
     solids::{PreparedHand, link_radii},
 };
 use crate::{
@@ -65,7 +65,7 @@ impl Closer<'_> {
     }
 
     /// True if a digit keeps [`GIVER_CLEARANCE`] from the giver's hand.
-    pub(super) fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
+    fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
         self.giver
             .is_none_or(|giver| !giver.comes_within(digit.links.iter(), GIVER_CLEARANCE))
     }
@@ -138,22 +138,5 @@ impl Closer<'_> {
         let others = EVASIVE_FLEXIONS.map(|flexion| closing.relax(flexion));
         let free = others.into_iter().find(|other| self.is_clear_of_giver(other));
         free.unwrap_or(relaxed)
-    }
-
-    /// A resting pose, clear of the giver, for a finger taken off the object: relaxed, else tucked away. `None` if
-    /// there is no room to bend it, because one straight finger among holding ones reads as a gesture. Poses whose
-    /// unobstructed form already meets the giver are skipped, since relaxing a finger takes most of the time.
-    pub(super) fn rest_clear(
-        &self,
-        finger: Digit,
-        obstacles: &[Obstacle],
-        flexion: f32,
-    ) -> Option<ClosedDigit> {
-        let closing = self.closing(finger, obstacles);
-        [flexion, TUCKED_FLEXION]
-            .into_iter()
-            .filter(|&flexion| self.is_clear_of_giver(&closing.bent(flexion)))
-            .map(|flexion| closing.relax(flexion))
-            .find(|rested| rested.flexion() >= MIN_RESTING_FLEXION && self.is_clear_of_giver(rested))
     }
 }

@@ -137,17 +137,6 @@ impl Closing<'_> {
         })
     }
 
-    /// The digit bent by `flexion` radians in total, ignoring obstacles.
-    pub fn bent(&self, flexion: f32) -> ClosedDigit {
-        let sweep = self.flexing.sweep();
-        let angles = self.flexing.angles_at(&sweep, sweep_to(flexion, &sweep));
-        ClosedDigit {
-            angles,
-            links: self.links(&angles),
-            touches: [false; 3],
-        }
-    }
-
     /// A relaxed pose for a digit that touches nothing: bent by `flexion` radians in total, or less if something
     /// stops it. If the opened digit is inside the object, it bends from the first partly closed pose that is free.
     pub fn relax(&self, flexion: f32) -> ClosedDigit {

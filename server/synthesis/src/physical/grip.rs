@@ -76,34 +76,6 @@ impl Grip {
     }
 }
 
-/// A hand that passed every check but closure.
-#[derive(Clone, Debug)]
-pub(super) struct Posed {
-    pose: HandPose,
-    bend_ratios: [Option<f32>; 5],
-    penetration: f32,
-    solids: HandSolids,
-}
-
-impl Posed {
-    /// The grip with its closure, and the solids of its hand.
-    pub(super) fn with_closure(self, epsilon: f32) -> (Grip, HandSolids) {
-        let Self {
-            pose,
-            bend_ratios,
-            penetration,
-            solids,
-        } = self;
-        let grip = Grip {
-            pose,
-            bend_ratios,
-            penetration,
-            epsilon,
-        };
-        (grip, solids)
-    }
-}
-
 /// Closes hands. Keeps its buffers from one call to the next.
 #[derive(Clone, Debug, Default)]
 pub struct Gripper {
@@ -111,7 +83,7 @@ pub struct Gripper {
     pub posed: Vec<DigitAngles>,
     /// Contacts of the hand.
     pub contacts: Vec<Contact>,
-    pub(super) obstacles: Vec<Obstacle>,
+    obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
     /// Closure of the last hand as a share of the required one: an upper bound if below 1, 0 if no hand came that
@@ -223,17 +195,17 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
-        let posed = self.validate(&closer, &digits, stopwatch)?;
-        Ok(posed.with_closure(epsilon))
+        self.validate(&closer, &digits, epsilon, stopwatch)
     }
 
-    /// Every check but closure, for a hand whose digits are all posed.
-    pub(super) fn validate(
+    /// Every check but closure, for a hand whose digits are all posed and whose contacts have this epsilon.
+    fn validate(
         &mut self,
         closer: &Closer<'_>,
         digits: &[ClosedDigit; 5],
+        epsilon: f32,
         stopwatch: &mut impl Stopwatch,
-    ) -> Result<Posed, NoGrip> {
+    ) -> Result<(Grip, HandSolids), NoGrip> {
         let Closer {
             scene,
             giver,
@@ -262,12 +234,13 @@ impl Gripper {
                 .touches_object()
                 .then_some(shape.flexing(rig, Digit::ALL[digit]).bend_ratio)
         });
-        Ok(Posed {
+        let grip = Grip {
             pose,
             bend_ratios,
             penetration,
-            solids,
-        })
+            epsilon,
+        };
+        Ok((grip, solids))
     }
 
     /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.

@@ -7,7 +7,6 @@
 mod closer;
 pub mod closing;
 pub mod contacts;
-pub mod finger_subset;
 pub mod flexing;
 pub mod grip;
 pub mod immobility;

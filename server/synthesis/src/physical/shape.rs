@@ -19,7 +19,7 @@ use crate::{
 const RESTING_FLEXION: f32 = 1.15;
 
 /// Bounds of the total flexion of an idle finger next to straighter or more bent ones, in radians.
-pub(super) const MIN_RESTING_FLEXION: f32 = 0.5 * RESTING_FLEXION;
+const MIN_RESTING_FLEXION: f32 = 0.5 * RESTING_FLEXION;
 const MAX_RESTING_FLEXION: f32 = 1.5 * RESTING_FLEXION;
 
 /// Total flexion aimed at by tucked fingers, in radians: about nine tenths of full closure. The palm stops them

@@ -1,5 +1,4 @@
-//! Known grips as candidates of a race: those of the atlas, then recent ones, then those of the atlas without
-//! the fingers that the giver obstructs.
+//! Known grips as candidates of a race: those of the atlas, then recent ones.
 
 use std::{
     ops::Deref,
@@ -16,7 +15,6 @@ use crate::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
         recheck::GripChecker,
-        subset_grasps::subset_grasp_with,
     },
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
     physical::{
@@ -46,13 +44,11 @@ pub(super) struct KnownGrips<'a> {
     scene: &'a Scene<'a>,
     checker: GripChecker<'a>,
     giver: Option<&'a PreparedHand>,
-    /// The start of `order` again, to try without the fingers that the giver obstructs.
-    subset_order: &'a [u16],
     rig: &'a Rig,
     mechanisms: Mechanisms,
     /// Grips that certainly collide with the giver, computed on first use.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place to try, counted through shortlist, `order`, `recent` and `subset_order`.
+    /// The next place to try, counted through shortlist, `order` and `recent`.
     cursor: AtomicUsize,
 }
 
@@ -75,16 +71,11 @@ impl Deref for Solids<'_> {
     }
 }
 
-/// A known grip that may be valid.
-enum Candidate<'a> {
-    /// It may be clear of the giver.
-    Whole {
-        source: GraspSource,
-        entry: &'a Entry,
-        solids: Solids<'a>,
-    },
-    /// This grip of the atlas may hold without the fingers that the giver obstructs.
-    Subset(u16),
+/// A known grip that may be clear of the giver.
+struct Candidate<'a> {
+    source: GraspSource,
+    entry: &'a Entry,
+    solids: Solids<'a>,
 }
 
 /// The result of advancing through the known grips.
@@ -153,12 +144,6 @@ impl<'a> KnownGrips<'a> {
             recent,
             scene,
             checker: GripChecker::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
-            subset_order: match (atlas, giver) {
-                _ if !mechanisms.has(Mechanism::FingerSubsets) => &[],
-                (Some(atlas), Some(_)) if by_gravity => atlas.holding_under(presented.up),
-                (Some(atlas), Some(_)) => order(atlas),
-                _ => &[],
-            },
             giver,
             rig: scene.rig(),
             mechanisms,
@@ -180,7 +165,7 @@ impl<'a> KnownGrips<'a> {
     /// Advances to the next grip that does not certainly collide with the giver, past at most
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
-        let end = self.shortlist.len() + self.order.len() + self.recent.len() + self.subset_order.len();
+        let end = self.shortlist.len() + self.order.len() + self.recent.len();
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
             if from >= end {
@@ -211,15 +196,15 @@ impl<'a> KnownGrips<'a> {
             } else {
                 self.shortlist.at(place)
             };
-            return self.whole(index, Solids::Stored(solids));
+            return self.of_atlas(index, Solids::Stored(solids));
         };
         let Some(&index) = self.order.get(place) else {
-            return self.after_atlas(place - self.order.len());
+            return Some(self.recent_at(place - self.order.len()));
         };
         let atlas = self.atlas?;
         let Some(giver) = self.giver else {
             let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
-            return self.whole(index, Solids::Computed(Box::new(solids)));
+            return self.of_atlas(index, Solids::Computed(Box::new(solids)));
         };
         if self.mechanisms.has(Mechanism::CellOccupancy) {
             let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
@@ -229,34 +214,28 @@ impl<'a> KnownGrips<'a> {
         }
         if !self.mechanisms.has(Mechanism::InnerSpheres) {
             let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
-            return self.whole(index, Solids::Computed(Box::new(solids)));
+            return self.of_atlas(index, Solids::Computed(Box::new(solids)));
         }
         let solids = atlas
             .grips()
             .screen_against_giver(usize::from(index), self.rig, giver)?;
-        self.whole(index, Solids::Computed(solids))
+        self.of_atlas(index, Solids::Computed(solids))
     }
 
-    /// The same for places after those of the atlas, which few look-ups reach.
+    /// A recent grip, which few look-ups reach.
     #[inline(never)]
-    fn after_atlas(&self, place: usize) -> Option<Candidate<'a>> {
-        let Some(entry) = self.recent.get(place) else {
-            let index = self.subset_order[place - self.recent.len()];
-            let grips = self.atlas?.grips();
-            let may_hold = !self.mechanisms.has(Mechanism::InnerSpheres)
-                || grips.subset_may_hold(usize::from(index), self.giver?);
-            return may_hold.then_some(Candidate::Subset(index));
-        };
-        Some(Candidate::Whole {
+    fn recent_at(&self, index: usize) -> Candidate<'a> {
+        let entry = &self.recent[index];
+        Candidate {
             source: GraspSource::Recent,
             entry,
             solids: Solids::Computed(Box::new(entry.tracked_solids(self.rig))),
-        })
+        }
     }
 
-    /// A whole grip of the atlas.
-    fn whole(&self, index: u16, solids: Solids<'a>) -> Option<Candidate<'a>> {
-        Some(Candidate::Whole {
+    /// A grip of the atlas.
+    fn of_atlas(&self, index: u16, solids: Solids<'a>) -> Option<Candidate<'a>> {
+        Some(Candidate {
             source: GraspSource::Atlas(index),
             entry: &self.atlas?.entries()[usize::from(index)],
             solids,
@@ -265,20 +244,16 @@ impl<'a> KnownGrips<'a> {
 
     /// Tries the next grip.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> TryResult {
-        let (source, grasp) = match self.next() {
+        let Candidate {
+            source,
+            entry,
+            solids,
+        } = match self.next() {
             Next::Exhausted => return TryResult::Exhausted,
             Next::AllExcluded => return TryResult::Rejected,
-            Next::Candidate(Candidate::Whole {
-                source,
-                entry,
-                solids,
-            }) => (source, self.recheck(entry, &solids, gripper)),
-            Next::Candidate(Candidate::Subset(index)) => (
-                GraspSource::FingerSubset(index),
-                self.subset_grasp(index, gripper),
-            ),
+            Next::Candidate(candidate) => candidate,
         };
-        match grasp {
+        match self.recheck(entry, &solids, gripper) {
             Some(grasp) => TryResult::Valid {
                 source,
                 value: grasp_value(&grasp),
@@ -295,14 +270,6 @@ impl<'a> KnownGrips<'a> {
         }
         let grasp = self.checker.check(entry, solids, gripper)?;
         constraints.admits(&grasp).then(|| Box::new(grasp))
-    }
-
-    /// Not inlined: its hands would enlarge the stack frame of every look-up.
-    #[inline(never)]
-    fn subset_grasp(&self, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
-        let entry = &self.atlas?.entries()[usize::from(index)];
-        let around = self.scene.surroundings()?;
-        subset_grasp_with(self.mechanisms, entry, &around, self.giver?, gripper)
     }
 }
 

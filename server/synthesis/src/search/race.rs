@@ -283,7 +283,7 @@ impl<'a> Race<'a> {
             // Reproducible: an interrupted attempt with a lower index might have won.
             .filter(|winner| match winner.source {
                 GraspSource::Attempt(index) => !self.settings.run.reproducible || index < interrupted,
-                GraspSource::Atlas(_) | GraspSource::FingerSubset(_) | GraspSource::Recent => true,
+                GraspSource::Atlas(_) | GraspSource::Recent => true,
             });
         let source = winner.as_ref().map(|winner| winner.source);
         let winning_index = match source {

@@ -100,8 +100,6 @@ pub enum GraspSource {
     Attempt(u64),
     /// A grip of the atlas, by index.
     Atlas(u16),
-    /// A grip of the atlas without the fingers that the giver obstructs, which rest elsewhere.
-    FingerSubset(u16),
     /// A recent grip.
     Recent,
 }

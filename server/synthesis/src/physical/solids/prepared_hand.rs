@@ -154,34 +154,6 @@ impl PreparedHand {
         })
     }
 
-    /// The spheres that certainly come closer to the hand than `distance` metres, one bit each. Stops early, with
-    /// only some of them, once `is_settled` accepts the bits found.
-    #[inline]
-    pub fn which_certainly_within(
-        &self,
-        spheres: &Spheres,
-        distance: f32,
-        is_settled: impl Fn(u8) -> bool,
-    ) -> u8 {
-        let mut reaches = spheres.radii;
-        for reach in &mut reaches {
-            *reach += distance - ROUNDING;
-        }
-        let mut near = 0_u8;
-        for first in (0..LANES).step_by(SOLIDS_AT_ONCE) {
-            let nears = self.near_group(first, spheres, &reaches);
-            let bits = nears
-                .iter()
-                .enumerate()
-                .map(|(sphere, &nears)| (nears as u8) << sphere);
-            near |= bits.fold(0, |bits, bit| bits | bit);
-            if is_settled(near) {
-                break;
-            }
-        }
-        near
-    }
-
     /// Upper bounds on the distance of each sphere from the hand, in metres.
     #[inline]
     pub fn distance_upper_bounds(&self, spheres: &Spheres) -> [f32; SPHERES] {

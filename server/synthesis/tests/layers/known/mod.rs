@@ -2,7 +2,7 @@
 
 mod codec;
 mod exclusion;
-pub(crate) mod finger_subsets;
+mod finger_subsets;
 mod palm_contacts;
 mod recent_grips;
 mod seeds;

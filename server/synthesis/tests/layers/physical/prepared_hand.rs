@@ -127,9 +127,8 @@ fn moved_balls_are_near_where_any_one_of_them_is() {
             far += 1;
         }
 
-        // Each ball's upper bound holds, and it is near exactly where it is alone.
+        // Each ball's upper bound holds.
         let bounds = giver.distance_upper_bounds(&balls);
-        let near_ones = giver.which_certainly_within(&balls, 0.001, |_| false);
         for (ball, (middle, radius)) in middles.into_iter().zip(radii).enumerate() {
             let middle = way.transform_point(middle);
             let distances = solids.iter().map(|solid| solid.signed_distance(middle) - radius);
@@ -140,17 +139,7 @@ fn moved_balls_are_near_where_any_one_of_them_is() {
                 "case {case}, {ball}: bound {bound}, distance {least}"
             );
             close += usize::from(bound < least + 1e-3);
-            let is_near = near_ones >> ball & 1 == 1;
-            let nears = |distance: f32| giver.certainly_within(middle, radius, distance);
-            assert!(is_near || !nears(0.001 - 1e-6), "case {case}: {ball} is near");
-            assert!(!is_near || nears(0.001 + 1e-6), "case {case}: {ball} is not near");
         }
-        // Once one ball decides, the others may be skipped.
-        let settled = giver.which_certainly_within(&balls, 0.001, |near| near != 0);
-        assert!(
-            settled & !near_ones == 0 && (settled != 0) == (near_ones != 0),
-            "case {case}"
-        );
     }
     assert!(near > 300 && far > 300, "{near} near, {far} far");
     assert!(close > 4_000, "{close} bounds are within a millimetre");

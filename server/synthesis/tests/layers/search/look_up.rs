@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use grasp_synthesis::search::{GraspSource, LookUp};
+use grasp_synthesis::search::LookUp;
 
 use crate::fixtures::{
     atlases::{complete_atlas, scissors_held_by, sparse},
@@ -21,7 +21,7 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
     let known = complete_atlas("scissors");
     let pool = pool(1);
     let few = sparse(&known);
-    let (mut cut, mut subset_grasp, mut nothing) = (0, 0, 0);
+    let (mut cut, mut nothing) = (0, 0);
     let of_all = (0..known.entries().len())
         .step_by(71)
         .map(|giver| (giver, &known));
@@ -61,8 +61,6 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
                     (whole.grasp, whole.report.source)
                 );
                 cut += usize::from(last.is_some());
-                subset_grasp +=
-                    usize::from(matches!(whole.report.source, Some(GraspSource::FingerSubset(_))));
             }
             (None, None) => {
                 assert_eq!(by_search.grasp, None);
@@ -76,8 +74,8 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
         }
     }
     assert!(
-        cut >= 10 && subset_grasp >= 3 && nothing >= 3,
-        "{cut} look-ups were cut short, {subset_grasp} ended with a finger subset, {nothing} with nothing"
+        cut >= 10 && nothing >= 3,
+        "{cut} look-ups were cut short, {nothing} ended with nothing"
     );
 }
 

@@ -15,12 +15,9 @@ use grasp_synthesis::{
     search::{LookUp, SearchOutcome},
 };
 
-use crate::{
-    fixtures::{
-        atlases::complete_atlas, clocks::FakeClock, hands::right, holdouts::UP, objects::object,
-        searches::Search,
-    },
-    known::finger_subsets::assert_is_valid,
+use crate::fixtures::{
+    atlases::complete_atlas, clocks::FakeClock, grasps::assert_is_valid, hands::right, holdouts::UP,
+    objects::object, searches::Search,
 };
 
 /// Attempts that suffice for an easy holdout, whatever is switched off.
