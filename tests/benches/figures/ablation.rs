@@ -74,6 +74,7 @@ impl Knowledge {
             | Mechanism::GravityOrder
             | Mechanism::CellOccupancy
             | Mechanism::FrictionUses
+            | Mechanism::HeadStart
             | Mechanism::CallerLookUp
             | Mechanism::Seeds => self == Self::Warm,
             Mechanism::TransferredGrips | Mechanism::ClosureScreen => self == Self::Cold,

@@ -25,6 +25,8 @@ pub enum Mechanism {
     FrictionUses,
     /// After the atlas, tries grips that recent searches found.
     RecentGrips,
+    /// Spends the first 300 µs of a search on known grips alone, before waking workers.
+    HeadStart,
     /// Looks up known grips on the caller's own thread before handing the search to workers.
     CallerLookUp,
     /// After failed attempts, tries hands perturbed about grips of the atlas.
@@ -53,7 +55,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All mechanisms, in the order in which a search uses them.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::AtlasLookUp,
         Self::Shortlists,
         Self::GravityOrder,
@@ -62,6 +64,7 @@ impl Mechanism {
         Self::GiverOrder,
         Self::FrictionUses,
         Self::RecentGrips,
+        Self::HeadStart,
         Self::CallerLookUp,
         Self::Seeds,
         Self::TransferredGrips,
@@ -87,6 +90,7 @@ impl Mechanism {
             Self::GiverOrder => "giver-order",
             Self::FrictionUses => "friction-uses",
             Self::RecentGrips => "recent-grips",
+            Self::HeadStart => "head-start",
             Self::CallerLookUp => "caller-look-up",
             Self::Seeds => "seeds",
             Self::TransferredGrips => "transferred-grips",

@@ -19,10 +19,17 @@ use super::{
     tally::{Record, Tally},
 };
 use crate::{
-    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
+    base::{
+        clock::Clock, mechanisms::Mechanism, random::AttemptStream, rejection::Rejection,
+        stopwatch::Stopwatch,
+    },
     model::{grasp::Grasp, strategy::Choice},
     physical::grip::Gripper,
 };
+
+/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about 50 µs,
+/// and nine in ten requests have their answer by then.
+const HEAD_START: Duration = Duration::from_micros(300);
 
 /// Marks a worker that is not running an attempt.
 const IDLE: u64 = u64::MAX;
@@ -180,11 +187,20 @@ impl<'a> Race<'a> {
                 .is_some_and(|deadline| self.clock.now() >= deadline)
     }
 
-    /// Tries all known grips before any attempt if the search is reproducible and any valid grasp will do. True if
-    /// the race is over.
+    /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is
+    /// reproducible. True if the race is over.
     pub(super) fn tries_known_first(&self) -> bool {
-        let is_ordered = self.settings.run.reproducible && self.settings.query.choice == Choice::FirstValid;
-        is_ordered && self.try_known_until(None)
+        if self.known.is_none() {
+            return false;
+        }
+        match (self.settings.query.choice, self.settings.run.reproducible) {
+            (Choice::BestWithinBudget, _) => false,
+            (Choice::FirstValid, true) => self.try_known_until(None),
+            (Choice::FirstValid, false) => {
+                self.settings.run.mechanisms.has(Mechanism::HeadStart)
+                    && self.try_known_until(Some(self.clock.now() + HEAD_START))
+            }
+        }
     }
 
     /// Tries known grips until one is valid or the clock reaches `until`. True if one is valid.
