@@ -6,7 +6,10 @@ use std::{
     ffi::OsString,
     fs, io,
     path::{Path, PathBuf},
-    sync::{Arc, LazyLock, Mutex, PoisonError},
+    sync::{
+        Arc, LazyLock, Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -169,11 +172,14 @@ fn read(
     }
 }
 
-/// Writes an atlas to a temporary file and renames it, so that no reader sees half of one.
+/// Writes an atlas to a temporary file and renames it, so that no reader sees half of one. A server that is given the folder
+/// removes such files if a crash leaves them, so they are named as it names its own.
 fn write(path: &Path, object: &GraspObject, rig: &Rig, grown: &Grown) -> Result<(), AtlasFolderError> {
     let parent = path.parent().unwrap_or(Path::new(""));
     fs::create_dir_all(parent).map_err(failed_to("create", parent))?;
-    let unfinished = path.with_extension(format!("{}-complete.part", std::process::id()));
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    let unfinished = path.with_extension(format!("{}-{number}.part", std::process::id()));
     fs::write(&unfinished, encode(grown, object, rig))
         .and_then(|()| fs::rename(&unfinished, path))
         .map_err(failed_to("write", path))

@@ -87,8 +87,8 @@ enum Section {
     /// The network by which GUIDED search prefers hands that are likely to hold, which is part of `grasp-synthesis`;
     /// takes minutes.
     SuccessPrior,
-    /// Derives the tables that decide in which order hands are screened against each other, and prints them; writes
-    /// nothing.
+    /// The order in which hands are screened against each other, which is part of `grasp-synthesis`. Made from complete
+    /// atlases, which are grown first where none are kept.
     Screens,
     /// Objects, hands and holdouts; with --check, the algorithm, atlases and primitives too.
     All,
@@ -112,10 +112,7 @@ impl Section {
             Self::Holdouts => holdouts::generate(),
             Self::Algorithm => algorithm::generate(),
             Self::SuccessPrior => success_prior::generate(),
-            Self::Screens => {
-                screens::print();
-                Vec::new()
-            }
+            Self::Screens => screens::generate(),
             Self::All => [objects::generate(), hands::generate(), holdouts::generate()].concat(),
             Self::Atlases | Self::Primitives => Vec::new(),
         }
@@ -124,9 +121,9 @@ impl Section {
     /// Does growth decide what the section comes to?
     fn depends_on_growth(self, is_check: bool) -> bool {
         match self {
-            Self::Algorithm | Self::Atlases | Self::Primitives => true,
+            Self::Algorithm | Self::Atlases | Self::Primitives | Self::Screens => true,
             Self::All => is_check,
-            Self::Objects | Self::Hands | Self::Holdouts | Self::SuccessPrior | Self::Screens => false,
+            Self::Objects | Self::Hands | Self::Holdouts | Self::SuccessPrior => false,
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Derives the tables that show soonest that two hands meet: which spheres inside a hand to compare first, and which of a
-//! giver's solids.
+//! The tables that show soonest that two hands meet: which spheres inside a hand to compare first, and which of a giver's
+//! solids. They are part of `grasp-synthesis`.
 //!
 //! Each table is a greedy cover: its next member is the one that settles most of the pairs that those before it leave. The
 //! pairs are known grips of the built-in objects and givers, who hold the object by other known grips, that meet. Any order
@@ -18,6 +18,8 @@ use grasp_synthesis::{
 };
 use rayon::prelude::*;
 
+use crate::AssetFile;
+
 /// Givers per object.
 const GIVERS: usize = 48;
 
@@ -27,30 +29,28 @@ const GRIPS: usize = 400;
 /// Where along a solid's axis spheres may be.
 const ALONG: [f32; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 
+/// Paths below the assets folder.
+const SPHERES_PATH: &str = "../server/synthesis/src/known/inner_spheres/tables.rs";
+const ORDER_PATH: &str = "../server/synthesis/src/physical/solids/prepared_hand/collision_order.rs";
+
 /// A known grip and a giver that meet.
 struct Pair {
     giver: PreparedHand,
     giver_solids: TrackedSolids,
     grip: TrackedSolids,
-    /// Does no cell of the atlas show that they meet?
-    is_left_by_cells: bool,
-    /// Do the spheres that are in use show it?
-    is_settled: bool,
 }
 
-/// Prints the tables as Rust, and how much they settle next to those in use.
-pub(crate) fn print() {
+/// The tables as Rust.
+pub(crate) fn generate() -> Vec<AssetFile> {
     let rig = &hand("adult", Handedness::Right).expect("the rig is built in").rig;
     let pairs: Vec<Pair> = objects()
         .iter()
-        .flat_map(|object| {
-            let known = complete_atlas(object.name, rig);
-            pairs(&known, rig)
-        })
+        .flat_map(|object| pairs(&complete_atlas(object.name, rig), rig))
         .collect();
-    println!("{} pairs that meet", pairs.len());
-    print_spheres(&pairs);
-    print_giver_order(&pairs);
+    vec![
+        (SPHERES_PATH.to_owned(), inner_spheres(&pairs).into_bytes()),
+        (ORDER_PATH.to_owned(), collision_order(&pairs).into_bytes()),
+    ]
 }
 
 /// Those that meet of evenly chosen grips and givers of an atlas.
@@ -62,17 +62,13 @@ fn pairs(known: &Atlas, rig: &Rig) -> Vec<Pair> {
             let pose = &known.entries()[giver * count / GIVERS].grip.pose;
             let giver_solids = TrackedSolids::of_joints(&HandJoints::of_pose(rig, pose));
             let giver = PreparedHand::new(&giver_solids);
-            let excluded = known.excluded_by(&giver);
             let pair = |grip: usize| {
-                let index = grip * count / GRIPS;
-                let solids = known.entries()[index].tracked_solids(rig);
+                let solids = known.entries()[grip * count / GRIPS].tracked_solids(rig);
                 let meets = giver.clearance(&solids, GIVER_CLEARANCE).is_none();
                 meets.then(|| Pair {
                     giver: giver.clone(),
                     giver_solids,
                     grip: solids,
-                    is_left_by_cells: !excluded.contains(index as u16),
-                    is_settled: known.grips().screen_against_giver(index, rig, &giver).is_none(),
                 })
             };
             (0..GRIPS).filter_map(pair).collect::<Vec<_>>()
@@ -80,8 +76,9 @@ fn pairs(known: &Atlas, rig: &Rig) -> Vec<Pair> {
         .collect()
 }
 
-/// Members in the order of a greedy cover: `settles` says of a member which pairs it settles.
-fn cover(members: usize, length: usize, settles: &[Vec<bool>]) -> (Vec<usize>, Vec<f64>) {
+/// Members in the order of a greedy cover, and the share of pairs that each and those before it settle. `settles` says of a
+/// member which pairs it settles.
+fn cover(length: usize, settles: &[Vec<bool>]) -> (Vec<usize>, Vec<f64>) {
     let pairs = settles[0].len();
     let mut is_open = vec![true; pairs];
     let (mut order, mut settled) = (Vec::new(), Vec::new());
@@ -91,7 +88,7 @@ fn cover(members: usize, length: usize, settles: &[Vec<bool>]) -> (Vec<usize>, V
             both.filter(|(settles, open)| **settles && **open).count()
         };
         // Of members that settle as many, the first.
-        let left = (0..members).rev().filter(|member| !order.contains(member));
+        let left = (0..settles.len()).rev().filter(|member| !order.contains(member));
         let Some(best) = left.max_by_key(gain) else { break };
         for (open, settles) in is_open.iter_mut().zip(&settles[best]) {
             *open &= !settles;
@@ -103,7 +100,8 @@ fn cover(members: usize, length: usize, settles: &[Vec<bool>]) -> (Vec<usize>, V
     (order, settled)
 }
 
-fn print_spheres(pairs: &[Pair]) {
+/// The inner spheres of [`SPHERES_PATH`].
+fn inner_spheres(pairs: &[Pair]) -> String {
     let solids = pairs[0].grip.hand.iter().count();
     let spheres: Vec<(usize, f32)> = (0..solids)
         .flat_map(|solid| ALONG.map(|along| (solid, along)))
@@ -121,31 +119,46 @@ fn print_spheres(pairs: &[Pair]) {
             pairs.iter().map(settles).collect()
         })
         .collect();
-    let (order, settled) = cover(spheres.len(), 2 * SPHERES, &settles);
-    for (name, table) in ["FIRST", "SECOND"].into_iter().zip(order.chunks(SPHERES)) {
-        let mut text = format!("const {name}: [Core; SPHERES] = [\n");
-        for &sphere in table {
-            let (solid, along) = spheres[sphere];
-            let _ = writeln!(text, "    ({solid}, {along:?}),");
-        }
-        println!("{text}];");
-    }
-    let in_use = pairs.iter().filter(|pair| pair.is_settled).count();
-    println!(
-        "the first {SPHERES} settle {:.2} %, all {:.2} %; those in use {:.2} %\n",
-        100.0 * settled[SPHERES - 1],
-        100.0 * settled[2 * SPHERES - 1],
-        100.0 * in_use as f64 / pairs.len() as f64
+    let (order, settled) = cover(2 * SPHERES, &settles);
+    let missed = |count: usize| 100.0 * (1.0 - settled[count - 1]);
+    let mut text = String::from(
+        "//! Which spheres inside a hand detect most collisions of two hands: written by `grasp-assets-generator screens`, not by\n\
+         //! hand.\n\n\
+         use super::InnerSphere;\n\
+         use crate::physical::solids::SPHERES;\n",
     );
+    let _ = write!(
+        text,
+        "\n/// They miss {:.1} % of the collisions of known grips and givers.\n",
+        missed(SPHERES)
+    );
+    text += &table("FIRST", &spheres, &order[..SPHERES]);
+    let _ = write!(
+        text,
+        "\n/// With these as well, {:.1} % are missed.\n",
+        missed(2 * SPHERES)
+    );
+    text += &table("SECOND", &spheres, &order[SPHERES..]);
+    text
 }
 
-fn print_giver_order(pairs: &[Pair]) {
-    let pairs: Vec<&Pair> = pairs.iter().filter(|pair| pair.is_left_by_cells).collect();
+/// Spheres as a constant.
+fn table(name: &str, spheres: &[(usize, f32)], chosen: &[usize]) -> String {
+    let mut text = format!("pub(super) const {name}: [InnerSphere; SPHERES] = [\n");
+    for &sphere in chosen {
+        let (solid, along) = spheres[sphere];
+        let _ = writeln!(text, "    ({solid}, {along:?}),");
+    }
+    text + "];\n"
+}
+
+/// The order of a giver's solids of [`ORDER_PATH`].
+fn collision_order(pairs: &[Pair]) -> String {
     let solids = pairs[0].giver_solids.iter().count();
     let settles: Vec<Vec<bool>> = (0..solids)
         .into_par_iter()
         .map(|solid| {
-            let settles = |pair: &&Pair| {
+            let settles = |pair: &Pair| {
                 let theirs = pair.giver_solids.iter().nth(solid);
                 let nears = |ours: &TaperedCapsule| {
                     theirs.is_some_and(|theirs| ours.distance(theirs) < GIVER_CLEARANCE)
@@ -155,24 +168,24 @@ fn print_giver_order(pairs: &[Pair]) {
             pairs.iter().map(settles).collect()
         })
         .collect();
-    let (order, settled) = cover(solids, solids, &settles);
-    println!("const MET_FIRST: [usize; TrackedSolids::COUNT] = {order:?};");
-    // Which of the solids come first in a hand that is prepared as it is in use.
-    let in_use: Vec<usize> = pairs[0]
-        .giver
-        .iter()
-        .filter_map(|solid| pairs[0].giver_solids.iter().position(|other| other == solid))
-        .collect();
-    let settled_in_use = |count: usize| {
-        let first = &in_use[..count];
-        let is_settled = |pair: &usize| first.iter().any(|&solid| settles[solid][*pair]);
-        (0..pairs.len()).filter(is_settled).count() as f64 / pairs.len() as f64
-    };
-    for count in [4, 8] {
-        println!(
-            "the first {count} settle {:.2} %; those in use {:.2} %",
-            100.0 * settled[count - 1],
-            100.0 * settled_in_use(count)
-        );
+    let (order, settled) = cover(solids, &settles);
+    let found = |count: usize| 100.0 * settled[count - 1];
+    let mut text = String::from(
+        "//! Which of a giver's solids detect most collisions: written by `grasp-assets-generator screens`, not by hand.\n\n\
+         use crate::physical::solids::TrackedSolids;\n",
+    );
+    let _ = write!(
+        text,
+        "\n/// Indices of [`TrackedSolids::iter`]. The first four find {:.0} % of the collisions of known grips and givers, the first\n\
+         /// eight {:.0} %.\n\
+         #[rustfmt::skip]\n\
+         pub(super) const COLLISION_ORDER: [usize; TrackedSolids::COUNT] = [\n",
+        found(4),
+        found(8)
+    );
+    for row in order.chunks(20) {
+        let row: Vec<String> = row.iter().map(usize::to_string).collect();
+        let _ = writeln!(text, "    {},", row.join(", "));
     }
+    text + "];\n"
 }

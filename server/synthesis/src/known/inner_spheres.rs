@@ -1,5 +1,9 @@
 //! Spheres inside a hand: whatever comes too close to one of them comes too close to the hand.
 
+mod tables;
+
+use tables::{FIRST, SECOND};
+
 use crate::physical::solids::{HandSolids, SPHERES, Spheres};
 
 /// A sphere inside a hand: the index of its solid in [`HandSolids::iter`], and its centre on the solid's
@@ -8,35 +12,6 @@ type InnerSphere = (usize, f32);
 
 /// Solids per digit; the digits come first in [`HandSolids::iter`].
 const LINKS: usize = 3;
-
-/// Chosen greedily, each for the most colliding pairs of hands (known grips and recorded givers) that the
-/// spheres before it do not detect. All eight miss 2 % of those pairs.
-const FIRST: [InnerSphere; SPHERES] = [
-    // Middle finger's first link, thumb's second, tips of ring and index finger, palm below the little
-    // finger, little finger, tips of middle finger and thumb.
-    (6, 0.3),
-    (1, 0.9),
-    (11, 0.1),
-    (5, 0.1),
-    (22, 0.9),
-    (13, 0.9),
-    (8, 0.1),
-    (2, 0.9),
-];
-
-/// With these as well, 0.2 % are missed. An exact comparison takes fifty times as long.
-const SECOND: [InnerSphere; SPHERES] = [
-    // Thenar, first links of index, little and ring finger, tips of middle and index finger, forearm, tip of
-    // the little finger.
-    (26, 0.9),
-    (3, 0.9),
-    (12, 0.7),
-    (9, 0.9),
-    (8, 0.9),
-    (5, 0.9),
-    (29, 0.7),
-    (14, 0.9),
-];
 
 /// The first inner spheres of a hand.
 pub(super) fn first_spheres(solids: &HandSolids) -> Spheres {
