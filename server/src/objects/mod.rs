@@ -117,6 +117,7 @@ impl StoredObject {
                 .forbidden_surface()
                 .map_or(0, |surface| of_mesh(surface.mesh()))
             + self.object.surface.distance_field_bytes()
+            + self.object.local_thickness.bytes()
             + self.object.surface_pairs().bytes()
             + PlacementCaches::MAX_BYTES
             + self.transferred_grips.len() * TransferredGrips::MAX_BYTES

@@ -6,7 +6,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use grasp_synthesis::{
     model::hand::Digit,
-    physical::immobility::{Buffers, Load, SoftContact, balance, epsilon},
+    physical::immobility::{Buffers, Load, SoftContact, TorqueScale, balance, epsilon},
 };
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -28,7 +28,7 @@ fn grasps(count: usize) -> Vec<(Vec<SoftContact>, Load)> {
                 .unwrap_or(Vec3::X)
         };
         let up = around();
-        let contacts = (0..count)
+        let contacts: Vec<SoftContact> = (0..count)
             .map(|k| {
                 let side = if k % 3 == 0 { Vec3::X } else { Vec3::NEG_X };
                 let on_sphere = (side + around() * 0.7).normalize_or(Vec3::X);
@@ -41,11 +41,12 @@ fn grasps(count: usize) -> Vec<(Vec<SoftContact>, Load)> {
                 }
             })
             .collect();
+        let torque_scale = TorqueScale::of(&contacts);
         let load = Load {
             mass: 0.3,
             centre_of_mass: Vec3::ZERO,
             up,
-            characteristic_length: 0.1,
+            torque_scale,
         };
         (contacts, load)
     };

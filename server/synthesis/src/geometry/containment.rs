@@ -8,7 +8,8 @@
 //! of times that it enters: overlapping parts add up and cavities cancel. Holes are closed by cones from one apex
 //! over
 //! their rims: the ray counts mesh and cones, and the solid angles of the cones are subtracted (section 4.1 there).
-//! Only the rims cost extra, and the result equals the sum of solid angles over all triangles.
+//! Only the rims cost extra, and the result equals the sum of solid angles over all triangles. Sheets enclose nothing and
+//! are left out.
 
 use glam::{DVec3, Vec3};
 
@@ -46,6 +47,8 @@ struct Cap {
 #[derive(Clone, Debug)]
 pub(super) struct Containment {
     caps: Vec<Cap>,
+    /// One flag per triangle: true if it belongs to a sheet. Empty without sheets.
+    is_sheet: Vec<bool>,
     /// Length of the rays, in metres: enough to leave the box of mesh and cones from any point in it.
     ray_length: f32,
 }
@@ -53,7 +56,16 @@ pub(super) struct Containment {
 impl Containment {
     /// Finds the rims of a mesh's holes and closes them; O(n).
     pub(super) fn of(mesh: &TriangleMesh, aabb: &Aabb) -> Self {
-        let boundary = topology::boundary_chain(mesh);
+        let mut boundary = topology::boundary_chain(mesh);
+        let is_sheet = if boundary.is_empty() {
+            Vec::new()
+        } else {
+            topology::sheets(mesh)
+        };
+        if !is_sheet.is_empty() {
+            let volumes = mesh.submesh(|triangle| !is_sheet[triangle]);
+            boundary = volumes.map_or_else(Vec::new, |volumes| topology::boundary_chain(&volumes));
+        }
         // An apex inside the box keeps the cones inside.
         let apex = aabb.centre();
         let caps = boundary
@@ -66,6 +78,7 @@ impl Containment {
             .collect();
         Self {
             caps,
+            is_sheet,
             ray_length: 2.0 * aabb.diagonal(),
         }
     }
@@ -75,7 +88,7 @@ impl Containment {
         let winding = DIRECTIONS
             .iter()
             .find_map(|&direction| self.winding_along(bvh, mesh, point, direction))
-            .unwrap_or_else(|| winding_number(mesh, point));
+            .unwrap_or_else(|| self.winding_number(mesh, point));
         winding.abs() > INSIDE
     }
 
@@ -83,7 +96,10 @@ impl Containment {
     fn winding_along(&self, bvh: &WideBvh, mesh: &TriangleMesh, point: Vec3, direction: Vec3) -> Option<f64> {
         let ray = Segment::new(point, point + direction * self.ray_length);
         let mut crossings = Some(0.0);
-        crossing::visit_all(bvh, mesh, ray, |outcome| {
+        crossing::visit_all(bvh, mesh, ray, |triangle, outcome| {
+            if self.is_sheet(triangle as usize) {
+                return true;
+            }
             crossings = crossings.zip(signed(outcome)).map(|(sum, sign)| sum + sign);
             crossings.is_some()
         });
@@ -97,6 +113,19 @@ impl Containment {
         }
         Some(winding)
     }
+
+    /// The generalised winding number by its definition, from the solid angles of all triangles but those of sheets; O(n).
+    fn winding_number(&self, mesh: &TriangleMesh, point: Vec3) -> f64 {
+        (0..mesh.triangles().len())
+            .filter(|&triangle| !self.is_sheet(triangle))
+            .map(|triangle| solid_angle_share(mesh.corners(triangle), point))
+            .sum()
+    }
+
+    /// True if the triangle belongs to a sheet.
+    fn is_sheet(&self, triangle: usize) -> bool {
+        self.is_sheet.get(triangle).is_some_and(|&is_sheet| is_sheet)
+    }
 }
 
 /// +1 for leaving the volume, -1 for entering, 0 for a miss, none for a graze.
@@ -106,13 +135,6 @@ fn signed(outcome: ExactCrossing) -> Option<f64> {
         ExactCrossing::Hit(crossing) => Some(if crossing.leaves { 1.0 } else { -1.0 }),
         ExactCrossing::Graze(_) => None,
     }
-}
-
-/// The generalised winding number by its definition, from the solid angles of all triangles; O(n).
-fn winding_number(mesh: &TriangleMesh, point: Vec3) -> f64 {
-    (0..mesh.triangles().len())
-        .map(|triangle| solid_angle_share(mesh.corners(triangle), point))
-        .sum()
 }
 
 /// The signed solid angle of a triangle seen from a point, as a share of the full sphere; positive if the point sees

@@ -265,12 +265,12 @@ pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Opt
     best
 }
 
-/// Passes the exact outcome for every candidate triangle to `visit`, in no particular order, until it returns false.
+/// Passes every candidate triangle and its exact outcome to `visit`, in no particular order, until it returns false.
 pub(super) fn visit_all(
     bvh: &WideBvh,
     mesh: &TriangleMesh,
     segment: Segment,
-    mut visit: impl FnMut(ExactCrossing) -> bool,
+    mut visit: impl FnMut(u32, ExactCrossing) -> bool,
 ) {
     let query = Query::new(segment);
     let exact = ExactQuery::new(segment);
@@ -289,8 +289,8 @@ pub(super) fn visit_all(
                 Child::Pack(index) => {
                     let pack = &bvh.packs[index];
                     for lane in lanes(query.filter(pack).1.bitmask()) {
-                        let corners = mesh.corners(pack.triangle(lane) as usize);
-                        if !visit(exact.test(corners)) {
+                        let triangle = pack.triangle(lane);
+                        if !visit(triangle, exact.test(mesh.corners(triangle as usize))) {
                             return;
                         }
                     }

@@ -2,9 +2,13 @@
 
 use std::collections::HashMap;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::mesh::TriangleMesh;
+
+/// Minimum length of a connected part's summed area vectors, as a share of its area, for it to be a sheet. The sum is 0 for a
+/// closed surface and 1 for a flat sheet; a hemisphere, 0.5, still counts as a solid with a hole, a filled sail does not.
+const MIN_SHEET_FLATNESS: f64 = 0.6;
 
 /// Counts of a mesh's parts and of its irregular edges. Vertices at equal positions count as one, so that texture
 /// seams are not holes.
@@ -33,15 +37,8 @@ impl Topology {
 
     /// Counts the edges of a mesh; O(n log n).
     pub fn of(mesh: &TriangleMesh) -> Self {
-        let vertices = weld(mesh.positions());
-        let welded = mesh
-            .triangles()
-            .iter()
-            .map(|corners| corners.map(|corner| vertices[corner as usize]));
-        let mut edges = directed_edges(welded, mesh.positions().len());
-        edges.sort_unstable();
-
-        let mut parts = DisjointSets::new(mesh.triangles().len());
+        let edges = sorted_edges(mesh);
+        let mut parts = connected_parts(mesh, &edges);
         let mut topology = Self {
             components: 0,
             boundary_edges: 0,
@@ -49,9 +46,6 @@ impl Topology {
             miswound_edges: 0,
         };
         for users in edges.chunk_by(|a, b| a.ends == b.ends) {
-            for pair in users.windows(2) {
-                parts.join(pair[0].triangle, pair[1].triangle);
-            }
             match users {
                 [_] => topology.boundary_edges += 1,
                 [a, b] => topology.miswound_edges += usize::from(a.reversed == b.reversed),
@@ -61,6 +55,54 @@ impl Topology {
         topology.components = parts.count();
         topology
     }
+}
+
+/// One flag per triangle: true if it belongs to a sheet, an open connected part that encloses nothing, such as a card
+/// without thickness, a leaf or a sail. Empty if there is none; O(n log n).
+pub(super) fn sheets(mesh: &TriangleMesh) -> Vec<bool> {
+    let mut parts = connected_parts(mesh, &sorted_edges(mesh));
+    let mut sums = vec![(DVec3::ZERO, 0.0); mesh.triangles().len()];
+    for triangle in 0..mesh.triangles().len() {
+        let [a, b, c] = mesh.corners(triangle).map(Vec3::as_dvec3);
+        let area = (b - a).cross(c - a);
+        let (vector, size) = &mut sums[parts.root(triangle as u32) as usize];
+        *vector += area;
+        *size += area.length();
+    }
+    let is_sheet: Vec<bool> = (0..mesh.triangles().len())
+        .map(|triangle| {
+            let (vector, size) = sums[parts.root(triangle as u32) as usize];
+            vector.length() > MIN_SHEET_FLATNESS * size
+        })
+        .collect();
+    if is_sheet.contains(&true) {
+        is_sheet
+    } else {
+        Vec::new()
+    }
+}
+
+/// The triangles' edges, with vertices at equal positions as one, in the order of their ends.
+fn sorted_edges(mesh: &TriangleMesh) -> Vec<EdgeUse> {
+    let vertices = weld(mesh.positions());
+    let welded = mesh
+        .triangles()
+        .iter()
+        .map(|corners| corners.map(|corner| vertices[corner as usize]));
+    let mut edges = directed_edges(welded, mesh.positions().len());
+    edges.sort_unstable();
+    edges
+}
+
+/// The triangles joined across their edges.
+fn connected_parts(mesh: &TriangleMesh, edges: &[EdgeUse]) -> DisjointSets {
+    let mut parts = DisjointSets::new(mesh.triangles().len());
+    for users in edges.chunk_by(|a, b| a.ends == b.ends) {
+        for pair in users.windows(2) {
+            parts.join(pair[0].triangle, pair[1].triangle);
+        }
+    }
+    parts
 }
 
 /// One triangle's use of an edge.

@@ -74,7 +74,8 @@ impl<'a> ClosureScreen<'a> {
         }
         soften(&self.on_surface, self.scene.friction, &mut self.soft_contacts);
         // Closure does not depend on gravity.
-        let load = self.scene.load(Vec3::Y);
-        epsilon_upper_bound(&self.soft_contacts, &load, &mut self.buffers) >= self.scene.required_epsilon
+        let load = self.scene.load(&self.soft_contacts, Vec3::Y);
+        let bound = epsilon_upper_bound(&self.soft_contacts, &load, &mut self.buffers);
+        bound > 0.0 && bound >= self.scene.required_epsilon(&load.torque_scale)
     }
 }

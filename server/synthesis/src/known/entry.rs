@@ -66,13 +66,13 @@ impl Entry {
             &grip.pose,
             &contacts,
             classification,
-            grip.epsilon,
+            gripper.relative_closure(scene, grip.epsilon),
             solids,
         );
         let of_grip = Score { values: grip_values }.grip_total();
         let mut friction_uses = FrictionUses::default();
         let scores = std::array::from_fn(|index| {
-            let load = scene.load(direction(index));
+            let load = scene.load(&gripper.soft_contacts, direction(index));
             let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
             friction_uses.set(
                 index,

@@ -62,7 +62,7 @@ impl<'a> GripChecker<'a> {
         } = *self;
         let giver_clearance = clear_of_giver(solids, presented.giver.as_ref())?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
-        let load = scene.load(presented.up);
+        let load = scene.load(&gripper.soft_contacts, presented.up);
         let known_use = if self.knows_friction_uses {
             entry.friction_uses.get(self.direction)
         } else {

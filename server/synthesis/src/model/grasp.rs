@@ -55,10 +55,10 @@ pub struct Grasp {
 /// The margins by which a grasp passes the checks of `PHYSICAL` validity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhysicalMargins {
-    /// Magnitude of the unbalanced wrench, as a share of the weight; torques are divided by the characteristic
-    /// length.
+    /// Magnitude of the unbalanced wrench, as a share of the weight; torques about the middle of the contacts are divided
+    /// by half their span.
     pub residual: f32,
-    /// Ferrari-Canny epsilon of the contacts, with torques divided by the characteristic length.
+    /// Ferrari-Canny epsilon of the contacts, with torques scaled in the same way.
     pub epsilon: f32,
     /// Deepest penetration of the hand into the object, in metres; 0 without any.
     pub penetration: f32,

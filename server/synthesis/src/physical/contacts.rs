@@ -106,9 +106,10 @@ pub(super) fn are_opposed(contacts: &[Contact]) -> bool {
 /// The contact at a touch, if the surface faces the bone there.
 fn contact(solids: &HandSolids, touch: &Touch, part: HandPart) -> Option<Contact> {
     let outward = direction_to_bone(solids, part, touch.point);
-    (outward.dot(touch.normal) >= FACING_COS).then(|| Contact {
+    let facing = facing_normal(outward, touch.normal);
+    (outward.dot(facing) >= FACING_COS).then(|| Contact {
         position: touch.point,
-        normal: pressed_normal(outward, touch.normal),
+        normal: pressed_normal(outward, facing),
         triangle: touch.triangle,
         part,
     })
@@ -116,7 +117,18 @@ fn contact(solids: &HandSolids, touch: &Touch, part: HandPart) -> Option<Contact
 
 /// The normal at a contact whose part, position and triangle normal are known.
 pub(crate) fn contact_normal(solids: &HandSolids, part: HandPart, point: Vec3, of_triangle: Vec3) -> Vec3 {
-    pressed_normal(direction_to_bone(solids, part, point), of_triangle)
+    let outward = direction_to_bone(solids, part, point);
+    pressed_normal(outward, facing_normal(outward, of_triangle))
+}
+
+/// The triangle's normal on the side of the bone: a sheet is pressed from both sides. A hand with a bone behind a solid's
+/// surface is rejected anyway.
+fn facing_normal(direction_to_bone: Vec3, of_triangle: Vec3) -> Vec3 {
+    if direction_to_bone.dot(of_triangle) < 0.0 {
+        -of_triangle
+    } else {
+        of_triangle
+    }
 }
 
 /// Inside a triangle, round flesh presses along the triangle's normal; at an edge or corner, along the direction to

@@ -11,7 +11,7 @@ use super::{
     closer::Closer,
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
-    immobility::{Buffers, SoftContact, epsilon},
+    immobility::{Buffers, SoftContact, TorqueScale, epsilon},
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::Proposal,
@@ -246,15 +246,16 @@ impl Gripper {
     /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.
     pub fn closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
         // Closure does not depend on the direction of gravity.
-        let load = scene.load(Vec3::Y);
-        let epsilon = epsilon(
-            &self.soft_contacts,
-            &load,
-            scene.required_epsilon,
-            &mut self.buffers,
-        );
-        self.closure_share = epsilon / scene.required_epsilon;
-        (epsilon >= scene.required_epsilon).then_some(epsilon)
+        let load = scene.load(&self.soft_contacts, Vec3::Y);
+        let required = scene.required_epsilon(&load.torque_scale);
+        let epsilon = epsilon(&self.soft_contacts, &load, required, &mut self.buffers);
+        self.closure_share = epsilon / required;
+        (epsilon > 0.0 && epsilon >= required).then_some(epsilon)
+    }
+
+    /// The epsilon of the last hand's contacts as a multiple of the required one.
+    pub fn relative_closure(&self, scene: &ObjectScene<'_>, epsilon: f32) -> f32 {
+        epsilon / scene.required_epsilon(&TorqueScale::of(&self.soft_contacts))
     }
 
     /// After a rejected hand: an upper bound of its closure as a share of the required one, if that makes it a near

@@ -1,8 +1,8 @@
 //! Immobility: contact forces that hold the object, and closure.
 //!
-//! A wrench is six dimensionless numbers: force, and torque about the centre of mass divided by the object's
-//! characteristic length, so that units do not weight one against the other (the thesis mixes newtons and newton
-//! metres, Eq. 4.5). Contacts are soft fingers with exact, curved friction limits. Both solvers query those limits
+//! A wrench is six dimensionless numbers: force, and torque about the middle of the contacts divided by half their span,
+//! so that units do not weight one against the other (the thesis mixes newtons and newton metres, Eq. 4.5), and so that
+//! parts of the object that are far from the hand change nothing. Contacts are soft fingers with exact, curved friction limits. Both solvers query those limits
 //! only for the wrench that reaches farthest in a direction; whatever they build lies inside the true limits, so
 //! every answer is conservative.
 //!
@@ -28,6 +28,10 @@ pub use crate::physical::immobility::closure::{EPSILON_TOLERANCE, epsilon, epsil
 /// Upper bound on the contacts of a hand: one per link of a digit and one per solid of the palm.
 pub const MAX_CONTACTS: usize = 15 + PALM_SOLIDS;
 
+/// Range of the length that torques are divided by, in metres: half the width of a fingertip pinch, and half a hand's
+/// breadth with the thumb. Shorter ones demand more resistance to twist of contacts that are close together.
+pub const HAND_LENGTHS: [f32; 2] = [0.02, 0.06];
+
 /// A soft-finger contact: it pushes, resists sliding along the surface, and resists twist about the normal.
 ///
 /// With normal force N, tangential force T and torsion M, it holds while (T / μN)² + (M / ρN)² ≤ 1: the elliptical
@@ -47,6 +51,33 @@ pub struct SoftContact {
     pub torsion_radius: f32,
 }
 
+/// What torques are measured by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueScale {
+    /// The point that torques are about, in metres, in the object's frame.
+    pub centre: Vec3,
+    /// The divisor of torques, in metres, positive. Larger values weight twist less against force.
+    pub length: f32,
+}
+
+impl TorqueScale {
+    /// The middle of the contacts and half their span, within [`HAND_LENGTHS`].
+    pub fn of(contacts: &[SoftContact]) -> Self {
+        let positions = contacts.iter().map(|contact| contact.position);
+        let mut squared_span = 0.0_f32;
+        for (i, a) in contacts.iter().enumerate() {
+            for b in &contacts[..i] {
+                squared_span = squared_span.max(a.position.distance_squared(b.position));
+            }
+        }
+        let [shortest, longest] = HAND_LENGTHS;
+        Self {
+            centre: positions.sum::<Vec3>() / contacts.len().max(1) as f32,
+            length: (0.5 * squared_span.sqrt()).clamp(shortest, longest),
+        }
+    }
+}
+
 /// The load on the contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
@@ -56,9 +87,8 @@ pub struct Load {
     pub centre_of_mass: Vec3,
     /// Unit vector against gravity, in the object's frame.
     pub up: Vec3,
-    /// In metres, positive: the divisor of torques. The lever that matters for the object, such as half the diagonal
-    /// of its oriented box. Larger values weight twist less against force.
-    pub characteristic_length: f32,
+    /// What torques are measured by.
+    pub torque_scale: TorqueScale,
 }
 
 /// Contact forces that balance gravity, one entry per contact.
@@ -68,7 +98,7 @@ pub struct Balance {
     pub forces: Vec<Vec3>,
     /// Torsions about the inward normals, in newton metres.
     pub torsions: Vec<f32>,
-    /// Length of the unbalanced wrench (torque over characteristic length) as a share of the weight.
+    /// Length of the unbalanced wrench (torque over [`TorqueScale::length`]) as a share of the weight.
     pub residual: f32,
     /// The friction limits the forces respect.
     pub friction_use: FrictionUse,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    immobility::Load,
+    immobility::{Load, SoftContact, TorqueScale},
     solids::{PreparedHand, TrackedSolids},
 };
 use crate::{
@@ -16,47 +16,40 @@ use crate::{
 /// firmer but fewer grasps.
 const MIN_EPSILON: f32 = 0.02;
 
-/// Required share of the best epsilon that a thin object allows: only friction at its radius keeps a rod from
-/// rolling, however it is held.
+/// Required share of the best epsilon that a thin part allows: only friction at its radius keeps a rod from rolling,
+/// however it is held.
 const MIN_SHARE_OF_BEST: f32 = 0.25;
 
-/// An object to be grasped, with everything that does not depend on how it is held out.
+/// An object to be grasped, under the friction between it and the skin.
 #[derive(Clone, Copy, Debug)]
 pub struct ObjectScene<'a> {
     /// The object.
     pub object: &'a GraspObject,
     /// Coefficient of static friction between skin and object.
     pub friction: f32,
-    /// Half the diagonal of its oriented box, in metres: the largest lever of a force about the middle.
-    pub characteristic_length: f32,
-    /// Smallest Ferrari-Canny epsilon of a valid grip.
-    pub required_epsilon: f32,
 }
 
 impl<'a> ObjectScene<'a> {
     /// The object with a friction coefficient between skin and surface.
     pub fn new(object: &'a GraspObject, friction: f32) -> Self {
-        let half_extents = object.bounding_box.half_extents;
-        let characteristic_length = half_extents.length();
-        // Mean of the two smaller half extents: the distance of the surface from the long axis.
-        let thickness = 0.5 * (half_extents.element_sum() - half_extents.max_element());
-        let best = friction * thickness / characteristic_length;
-        Self {
-            object,
-            friction,
-            characteristic_length,
-            required_epsilon: MIN_EPSILON.min(MIN_SHARE_OF_BEST * best),
-        }
+        Self { object, friction }
     }
 
-    /// The load on the contacts when `up`, a unit vector in the object's frame, points against gravity.
-    pub fn load(&self, up: Vec3) -> Load {
+    /// The load on contacts when `up`, a unit vector in the object's frame, points against gravity.
+    pub fn load(&self, contacts: &[SoftContact], up: Vec3) -> Load {
         Load {
             mass: self.object.mass,
             centre_of_mass: self.object.centre_of_mass,
             up,
-            characteristic_length: self.characteristic_length,
+            torque_scale: TorqueScale::of(contacts),
         }
+    }
+
+    /// Smallest Ferrari-Canny epsilon of a valid grip whose torques are measured by `scale`. It depends on the object only
+    /// where the hand is.
+    pub fn required_epsilon(&self, scale: &TorqueScale) -> f32 {
+        let best = self.friction * self.object.local_thickness.near(scale.centre) / scale.length;
+        MIN_EPSILON.min(MIN_SHARE_OF_BEST * best)
     }
 }
 

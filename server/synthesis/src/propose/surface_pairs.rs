@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     base::random::AttemptStream,
-    geometry::{Segment, mesh_bvh::MeshBvh},
+    geometry::{Segment, mesh_bvh::MeshBvh, surface_samples::SurfaceSampler},
     physical::solids::PreparedHand,
 };
 
@@ -81,34 +81,15 @@ impl SurfacePairs {
     /// Samples a surface, without the triangles for which `is_forbidden` returns true.
     pub fn of(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Self {
         let mesh = surface.mesh();
-        let mut sum = 0.0;
-        let cumulative_areas: Vec<f64> = (0..mesh.triangles().len())
-            .map(|triangle| {
-                if !is_forbidden(triangle as u32) {
-                    let [a, b, c] = mesh.corners(triangle).map(Vec3::as_dvec3);
-                    sum += (b - a).cross(c - a).length();
-                }
-                sum
-            })
-            .collect();
+        let sampler = SurfaceSampler::new(mesh, |triangle| !is_forbidden(triangle));
         let mut sampled = Self::default();
-        if sum <= 0.0 {
-            return sampled;
-        }
         for sample in 0..SAMPLES {
             let mut stream = AttemptStream::new(SEED, sample);
-            // Stratified: each sample has its own share of the area.
-            let area = (sample as f64 + f64::from(stream.unit())) / SAMPLES as f64 * sum;
-            let triangle = cumulative_areas
-                .partition_point(|&end| end <= area)
-                .min(cumulative_areas.len() - 1);
-            let [a, b, c] = mesh.corners(triangle);
-            let (mut u, mut v) = (stream.unit(), stream.unit());
-            if u + v > 1.0 {
-                (u, v) = (1.0 - u, 1.0 - v);
-            }
+            let Some((triangle, position)) = sampler.sample(sample, SAMPLES, &mut stream) else {
+                return sampled;
+            };
             let point = SurfacePoint {
-                position: a + (b - a) * u + (c - a) * v,
+                position,
                 normal: mesh.normal(triangle),
             };
             sampled.points.push(point);
@@ -119,6 +100,14 @@ impl SurfacePairs {
             let start = point.position + inward * START_DEPTH;
             let ray = Segment::new(start, start + inward * MAX_THICKNESS);
             let Some(exit) = surface.first_hit(ray) else {
+                // Below a sheet lies no volume; it is pressed from both sides at the same point.
+                if !surface.contains(start) {
+                    sampled.pairs.push(SurfacePair {
+                        start: point.position,
+                        end: start,
+                        thickness: START_DEPTH,
+                    });
+                }
                 continue;
             };
             let opposite = mesh.normal(exit.triangle as usize);

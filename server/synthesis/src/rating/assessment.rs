@@ -63,7 +63,7 @@ impl GraspContext<'_> {
         }
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
-        let load = object.load(presented.up);
+        let load = object.load(&gripper.soft_contacts, presented.up);
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
@@ -85,7 +85,7 @@ impl GraspContext<'_> {
             &grip.pose,
             &grasp.contacts,
             classification,
-            grip.epsilon,
+            gripper.relative_closure(object, grip.epsilon),
             solids,
         );
         grasp.score = Some(score(grip_values, &grasp, object, rig, presented));

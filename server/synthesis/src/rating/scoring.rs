@@ -95,17 +95,18 @@ pub fn posture_values(
 }
 
 /// Values of the terms that depend only on hand and object, not on how it is presented; the others are 0.
+/// `relative_closure` is the epsilon of the contacts as a multiple of the required one.
 pub fn grip_values(
     scene: &ObjectScene<'_>,
     rig: &Rig,
     pose: &HandPose,
     contacts: &[Contact],
     classification: Classification,
-    epsilon: f32,
+    relative_closure: f32,
     solids: &HandSolids,
 ) -> Values {
     let mut values = posture_values(scene.object, rig, pose, contacts, classification);
-    values[Term::Closure as usize] = (epsilon / (SAFE_CLOSURE * scene.required_epsilon)).min(1.0);
+    values[Term::Closure as usize] = (relative_closure / SAFE_CLOSURE).min(1.0);
     values[Term::Steadiness as usize] = steadiness(scene.object, rig, pose, contacts);
     values[Term::SterileDistance as usize] = sterile_distance(scene.object, solids);
     values

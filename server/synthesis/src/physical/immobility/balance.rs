@@ -1,9 +1,9 @@
 //! Force balance: contact forces that hold the object against gravity.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::{
-    Balance, Buffers, FrictionUse, Load, MAX_CONTACTS, SoftContact,
+    Balance, Buffers, FrictionUse, Load, MAX_CONTACTS, SoftContact, TorqueScale,
     contact_model::{ContactCone, ScaledWrench, UnitPush, dot},
     least_squares::{Column, ConicLeastSquares},
 };
@@ -139,8 +139,10 @@ struct Problem<'a> {
     cones: &'a [ContactCone],
     /// In newtons.
     weight: f64,
+    /// Length of the torque scale, in metres.
     length: f64,
-    up: DVec3,
+    /// The wrench that holds one newton of weight.
+    needed: ScaledWrench,
     /// Comfortable shares of the touching digits, scaled to sum to one.
     shares: [f64; 5],
     /// Target sum of the digits' normal forces.
@@ -176,8 +178,8 @@ impl<'a> Problem<'a> {
             contacts,
             cones,
             weight,
-            length: f64::from(load.characteristic_length),
-            up: load.up.as_dvec3(),
+            length: f64::from(load.torque_scale.length),
+            needed: needed_wrench(load),
             shares: shares.map(|share| if sum > 0.0 { share / sum } else { 0.0 }),
             firm_sum,
             share_weight: SHARE_WEIGHT / firm_sum.max(1.0),
@@ -267,7 +269,7 @@ impl<'a> Problem<'a> {
         let rows = WRENCH_ROWS + self.limit_rows() + if self.comfortable { COMFORT_ROWS } else { 0 };
         entries.clear();
         entries.resize(rows, 0.0);
-        entries[..3].copy_from_slice(&self.up.to_array());
+        entries[..WRENCH_ROWS].copy_from_slice(&self.needed);
         entries[WRENCH_ROWS..WRENCH_ROWS + self.limit_rows()].fill(LIMIT_WEIGHT);
         if self.comfortable {
             entries[rows - 1] = self.firmness_weight * self.firm_sum;
@@ -405,8 +407,7 @@ impl<'a> Problem<'a> {
 
     /// Length of the wrench that the pushes leave unbalanced, over the weight.
     fn residual(&self, pushes: &[UnitPush]) -> f32 {
-        let [x, y, z] = self.up.to_array();
-        let mut left = [x, y, z, 0.0, 0.0, 0.0];
+        let mut left = self.needed;
         for (cone, push) in self.cones.iter().zip(pushes) {
             for (left, part) in left.iter_mut().zip(cone.wrench(push)) {
                 *left -= part;
@@ -438,6 +439,15 @@ impl<'a> Problem<'a> {
             .collect();
         balance.residual = self.residual(&pushes);
     }
+}
+
+/// The wrench that holds one newton of weight at the centre of mass.
+fn needed_wrench(load: &Load) -> ScaledWrench {
+    let up = load.up.as_dvec3();
+    let TorqueScale { centre, length } = load.torque_scale;
+    let arm = (load.centre_of_mass.as_dvec3() - centre.as_dvec3()) / f64::from(length);
+    let torque = arm.cross(up);
+    [up.x, up.y, up.z, torque.x, torque.y, torque.z]
 }
 
 /// Usable share of friction and torsion.

@@ -24,7 +24,7 @@ const NO_CLOSURE: f64 = 1e-6;
 /// Ferrari and Canny's epsilon (1992) of soft-finger contacts: the radius of the largest ball about the origin inside
 /// the convex hull of the unit wrenches of all contacts. This is the L1 convention, in which the normal forces sum to
 /// one newton: epsilon is the largest disturbance, as a share of the summed normal forces, that the contacts resist
-/// in every direction. Torque is divided by the characteristic length, so epsilon has no unit. 0 means no closure.
+/// in every direction. Torque is divided by the length of the torque scale, so epsilon has no unit. 0 means no closure.
 ///
 /// The value is a lower bound, within [`EPSILON_TOLERANCE`] of the true one unless that takes more than about 1 ms.
 /// With `required` above 0, the search ends as soon as epsilon cannot reach it, and the value is merely some number

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::{Load, SoftContact};
+use super::{Load, SoftContact, TorqueScale};
 
-/// A force, and its torque about the centre of mass over the characteristic length.
+/// A force, and its torque about the centre of the torque scale over its length.
 pub(super) type ScaledWrench = [f64; 6];
 
 /// Dot product of two slices of equal length.
@@ -35,11 +35,11 @@ const HALVINGS: usize = 24;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactCone {
     inward: DVec3,
-    /// From the centre of mass to the contact, over the characteristic length.
+    /// From the centre of the torque scale to the contact, over its length.
     arm: DVec3,
     /// μ².
     friction_squared: f64,
-    /// σ²: square of the torsion radius over the characteristic length.
+    /// σ²: square of the torsion radius over the length of the torque scale.
     torsion_squared: f64,
 }
 
@@ -47,7 +47,7 @@ pub(super) struct ContactCone {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct UnitPush {
     pub(super) force: DVec3,
-    /// About the inward normal, over the characteristic length.
+    /// About the inward normal, over the length of the torque scale.
     pub(super) torsion: f64,
 }
 
@@ -65,10 +65,11 @@ struct ContactDirection {
 
 impl ContactCone {
     pub(super) fn new(contact: &SoftContact, load: &Load) -> Self {
-        let length = f64::from(load.characteristic_length);
+        let TorqueScale { centre, length } = load.torque_scale;
+        let length = f64::from(length);
         Self {
             inward: -contact.normal.as_dvec3().normalize_or_zero(),
-            arm: (contact.position.as_dvec3() - load.centre_of_mass.as_dvec3()) / length,
+            arm: (contact.position.as_dvec3() - centre.as_dvec3()) / length,
             friction_squared: f64::from(contact.friction).powi(2),
             torsion_squared: (f64::from(contact.torsion_radius) / length).powi(2),
         }
@@ -251,8 +252,11 @@ mod tests {
         let load = Load {
             mass: 0.2,
             centre_of_mass: Vec3::ZERO,
-            characteristic_length: 0.05,
             up: Vec3::Y,
+            torque_scale: TorqueScale {
+                centre: Vec3::ZERO,
+                length: 0.05,
+            },
         };
         for case in 0..60 {
             let mut vector = || Vec3::from_array(std::array::from_fn(|_| random.random_range(-1.0..1.0)));

@@ -87,6 +87,42 @@ fn chosen_points_are_inside_or_outside_as_constructed() {
     );
 }
 
+#[test]
+fn sheets_enclose_nothing() {
+    for (bulge, name) in [(0.0, "a card"), (0.02, "a filled sail")] {
+        let sheet = meshes::sheet(0.05, bulge, 8);
+        let bvh = MeshBvh::build(sheet.clone());
+        for triangle in 0..sheet.triangles().len() {
+            let [a, b, c] = sheet.corners(triangle);
+            for side in [-1e-5, 1e-5] {
+                let point = (a + b + c) / 3.0 + sheet.normal(triangle) * side;
+                assert!(!bvh.contains(point), "{name}, triangle {triangle}");
+            }
+        }
+    }
+}
+
+/// A bottle without a bottom is a solid with a hole, whatever sheet is part of the same mesh.
+#[test]
+fn solids_next_to_sheets_keep_their_volume() {
+    let open_box = meshes::open_box();
+    let sheet = meshes::sheet(0.05, 0.0, 4);
+    let first = open_box.positions().len() as u32;
+    let positions = open_box.positions().iter().copied();
+    let moved = sheet.positions().iter().map(|&p| p + Vec3::new(0.0, 0.0, 0.2));
+    let triangles = open_box.triangles().iter().copied();
+    let shifted = sheet.triangles().iter().map(|corners| corners.map(|v| v + first));
+    let both = TriangleMesh::new(
+        positions.chain(moved).collect(),
+        triangles.chain(shifted).collect(),
+    )
+    .expect("the mesh is sound");
+    let bvh = MeshBvh::build(both);
+    assert!(bvh.contains(Vec3::new(0.0, 0.0, -0.02)));
+    assert!(!bvh.contains(Vec3::new(0.0, -1e-5, 0.2)));
+    assert!(!bvh.contains(Vec3::new(0.0, 1e-5, 0.2)));
+}
+
 /// Points on a grid line up with edges and vertices in as many directions as possible.
 #[test]
 fn points_in_line_with_vertices_are_classified_correctly() {

@@ -4,5 +4,6 @@ mod capsule;
 mod closest_point;
 mod containment;
 mod crossing;
+mod local_thickness;
 mod oriented_box;
 mod triangle_mesh;

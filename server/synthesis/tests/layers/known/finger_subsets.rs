@@ -3,7 +3,7 @@
 use grasp_synthesis::physical::immobility::EPSILON_TOLERANCE;
 
 use crate::fixtures::{
-    atlases::complete_atlas, grasps::epsilon_of, objects::object, proposals::object_scene,
+    atlases::complete_atlas, grasps::relative_closure_of, objects::object, proposals::object_scene,
 };
 
 /// The sixteen subsets of fingers with the thumb, thumb first.
@@ -27,11 +27,11 @@ fn recorded_finger_subsets_are_those_with_closure() {
                 continue;
             }
             // Epsilon is exact to its tolerance; within that, either answer is right.
-            let bound = epsilon_of(&entry.contacts, kept, &scene);
-            if bound >= scene.required_epsilon {
+            let bound = relative_closure_of(&entry.contacts, kept, &scene);
+            if bound >= 1.0 {
                 closing += 1;
                 assert!(is_set, "grip {place}, {kept:?}: {bound}");
-            } else if bound < (1.0 - EPSILON_TOLERANCE) * scene.required_epsilon {
+            } else if bound < 1.0 - EPSILON_TOLERANCE {
                 open += 1;
                 assert!(!is_set, "grip {place}, {kept:?}: {bound}");
             }

@@ -4,8 +4,8 @@ use glam::Vec3;
 use grasp_synthesis::{
     model::hand::Digit,
     physical::immobility::{
-        BALANCE_TOLERANCE, Balance, Buffers, FrictionUse, Load, MAX_CONTACT_FORCE, SoftContact, balance,
-        balance_with,
+        BALANCE_TOLERANCE, Balance, Buffers, FrictionUse, Load, MAX_CONTACT_FORCE, SoftContact, TorqueScale,
+        balance,        balance_with,
     },
     rating::comfort::comfort,
 };
@@ -22,13 +22,14 @@ fn solve(contacts: &[SoftContact], load: &Load) -> Option<Balance> {
 /// The unbalanced share of the weight, computed from the answer alone.
 fn residual(contacts: &[SoftContact], load: &Load, balance: &Balance) -> f32 {
     let weight = load.mass * 9.81;
+    let TorqueScale { centre, length } = load.torque_scale;
     let mut force = load.up * -weight;
-    let mut torque = Vec3::ZERO;
+    let mut torque = (load.centre_of_mass - centre).cross(force);
     for ((contact, &push), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
         force += push;
-        torque += (contact.position - load.centre_of_mass).cross(push) - contact.normal * torsion;
+        torque += (contact.position - centre).cross(push) - contact.normal * torsion;
     }
-    (force.length_squared() + (torque / load.characteristic_length).length_squared()).sqrt() / weight
+    (force.length_squared() + (torque / length).length_squared()).sqrt() / weight
 }
 
 fn assert_sound(contacts: &[SoftContact], load: &Load, balance: &Balance, what: &str) {
@@ -328,7 +329,10 @@ fn finds_a_balance_where_one_exists_by_construction() {
             mass: weight / 9.81,
             centre_of_mass: force.cross(torque) / (weight * weight),
             up,
-            characteristic_length: lever,
+            torque_scale: TorqueScale {
+                centre: Vec3::ZERO,
+                length: lever,
+            },
         };
         constructed += 1;
         let found = solve(&contacts, &load);

@@ -1,12 +1,18 @@
 //! Epsilon against closed forms and dense sampling, and its invariances.
 
 use glam::Vec3;
-use grasp_synthesis::physical::immobility::{
-    Buffers, EPSILON_TOLERANCE, Load, SoftContact, epsilon, epsilon_upper_bound,
+use grasp_synthesis::{
+    model::object::GraspObject,
+    physical::immobility::{
+        Buffers, EPSILON_TOLERANCE, HAND_LENGTHS, Load, SoftContact, TorqueScale, epsilon,
+        epsilon_upper_bound,
+    },
 };
 
 use crate::fixtures::{
     contacts::{contacts_at, load, moved, pyramid_wrenches, sampled_reach, scaled, unit},
+    meshes::Parts,
+    proposals::object_scene,
     random::Random,
 };
 
@@ -27,7 +33,7 @@ fn assert_near(epsilon: f32, truth: f64, what: &str) {
     );
 }
 
-/// Two soft contacts on a line through the centre of mass, r from it over the characteristic length. The hull of their
+/// Two soft contacts on a line through the centre of mass, r from it over the length that torques are divided by. The hull of their
 /// unit wrenches is least thick about the line, σ, or across: with force and torque about a perpendicular, contact one
 /// spans the segment ±μ (1, -r) at x = -1, contact two ±μ (1, r) at x = 1, together a tetrahedron whose faces are
 /// μ r / √(1 + r² + μ² r²) from its centre.
@@ -379,4 +385,53 @@ fn more_contacts_never_reduce_epsilon() {
             }
         }
     }
+}
+
+#[test]
+fn torques_are_scaled_by_half_the_span_of_the_contacts_within_a_hands_lengths() {
+    let pair = |half: f32| {
+        let place = Vec3::new(0.3, -0.2, 0.1);
+        contacts_at(
+            &[
+                (place + Vec3::X * half, Vec3::X),
+                (place - Vec3::X * half, Vec3::NEG_X),
+            ],
+            0.6,
+            0.002,
+        )
+    };
+    let [shortest, longest] = HAND_LENGTHS;
+    for (half, length) in [(0.001, shortest), (0.04, 0.04), (0.3, longest)] {
+        let scale = TorqueScale::of(&pair(half));
+        assert!((scale.centre - Vec3::new(0.3, -0.2, 0.1)).length() < 1e-6);
+        assert!((scale.length - length).abs() < 1e-6, "{half}: {}", scale.length);
+    }
+}
+
+/// What holds a stick holds it with a bar across its far end too.
+#[test]
+fn what_is_far_from_the_hand_changes_neither_closure_nor_its_requirement() {
+    let stick = Parts::default().cuboid(Vec3::ZERO, Vec3::new(0.012, 0.65, 0.012), 1);
+    let barred = stick
+        .clone()
+        .cuboid(Vec3::new(0.0, 0.64, 0.0), Vec3::new(0.15, 0.01, 0.01), 1);
+    let contacts = contacts_at(
+        &[
+            (Vec3::new(0.012, 0.0, 0.0), Vec3::X),
+            (Vec3::new(-0.012, 0.03, 0.0), Vec3::NEG_X),
+            (Vec3::new(-0.012, -0.03, 0.004), Vec3::NEG_X),
+            (Vec3::new(0.0, 0.01, 0.012), Vec3::Z),
+        ],
+        0.6,
+        0.002,
+    );
+    let [bare, barred] = [stick, barred].map(|parts| {
+        let object = GraspObject::new(parts.mesh(), 0.8, Vec3::ZERO, None, &[]).expect("the object is sound");
+        let scene = object_scene(&object);
+        let load = scene.load(&contacts, Vec3::Y);
+        (whole(&contacts, &load), scene.required_epsilon(&load.torque_scale))
+    });
+    assert_eq!(bare.0, barred.0);
+    assert!((bare.1 / barred.1 - 1.0).abs() < 0.1, "{bare:?}, {barred:?}");
+    assert!(bare.0 > bare.1, "{bare:?}");
 }

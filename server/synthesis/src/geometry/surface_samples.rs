@@ -1,0 +1,51 @@
+//! Points drawn evenly from a mesh's surface.
+
+use glam::Vec3;
+
+use super::mesh::TriangleMesh;
+use crate::base::random::AttemptStream;
+
+/// Draws points from some triangles of a mesh, each part of their area with the same probability.
+#[derive(Clone, Debug)]
+pub struct SurfaceSampler<'a> {
+    mesh: &'a TriangleMesh,
+    /// Twice the area of the used triangles up to and including each, in m².
+    cumulative_areas: Vec<f64>,
+}
+
+impl<'a> SurfaceSampler<'a> {
+    /// Prepares draws from the triangles that `is_used` accepts.
+    pub fn new(mesh: &'a TriangleMesh, is_used: impl Fn(u32) -> bool) -> Self {
+        let mut sum = 0.0;
+        let cumulative_areas = (0..mesh.triangles().len())
+            .map(|triangle| {
+                if is_used(triangle as u32) {
+                    let [a, b, c] = mesh.corners(triangle).map(Vec3::as_dvec3);
+                    sum += (b - a).cross(c - a).length();
+                }
+                sum
+            })
+            .collect();
+        Self {
+            mesh,
+            cumulative_areas,
+        }
+    }
+
+    /// Draws the triangle and the position of sample number `sample` of `count`. Samples are stratified: each has its own
+    /// share of the area. None if no triangle is used.
+    pub fn sample(&self, sample: u64, count: u64, stream: &mut AttemptStream) -> Option<(usize, Vec3)> {
+        let sum = self.cumulative_areas.last().copied().filter(|sum| *sum > 0.0)?;
+        let area = (sample as f64 + f64::from(stream.unit())) / count as f64 * sum;
+        let triangle = self
+            .cumulative_areas
+            .partition_point(|&end| end <= area)
+            .min(self.cumulative_areas.len() - 1);
+        let [a, b, c] = self.mesh.corners(triangle);
+        let (mut u, mut v) = (stream.unit(), stream.unit());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        Some((triangle, a + (b - a) * u + (c - a) * v))
+    }
+}
