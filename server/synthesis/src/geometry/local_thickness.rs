@@ -40,7 +40,11 @@ impl LocalThickness {
             .iter()
             .map(|&centre| {
                 by_distance.clear();
-                by_distance.extend(points.iter().map(|&point| (point.distance_squared(centre), point)));
+                by_distance.extend(
+                    points
+                        .iter()
+                        .map(|&point| (point.distance_squared(centre), point)),
+                );
                 let count = by_distance
                     .iter()
                     .filter(|(squared, _)| *squared <= REACH * REACH)

@@ -38,7 +38,7 @@ impl Topology {
     /// Counts the edges of a mesh; O(n log n).
     pub fn of(mesh: &TriangleMesh) -> Self {
         let edges = sorted_edges(mesh);
-        let mut parts = connected_parts(mesh, &edges);
+        let parts = connected_parts(mesh, &edges);
         let mut topology = Self {
             components: 0,
             boundary_edges: 0,

@@ -5,7 +5,7 @@ use grasp_synthesis::{
     model::hand::Digit,
     physical::immobility::{
         BALANCE_TOLERANCE, Balance, Buffers, FrictionUse, Load, MAX_CONTACT_FORCE, SoftContact, TorqueScale,
-        balance,        balance_with,
+        balance, balance_with,
     },
     rating::comfort::comfort,
 };

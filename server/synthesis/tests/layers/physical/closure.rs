@@ -429,7 +429,10 @@ fn what_is_far_from_the_hand_changes_neither_closure_nor_its_requirement() {
         let object = GraspObject::new(parts.mesh(), 0.8, Vec3::ZERO, None, &[]).expect("the object is sound");
         let scene = object_scene(&object);
         let load = scene.load(&contacts, Vec3::Y);
-        (whole(&contacts, &load), scene.required_epsilon(&load.torque_scale))
+        (
+            whole(&contacts, &load),
+            scene.required_epsilon(&load.torque_scale),
+        )
     });
     assert_eq!(bare.0, barred.0);
     assert!((bare.1 / barred.1 - 1.0).abs() < 0.1, "{bare:?}, {barred:?}");
