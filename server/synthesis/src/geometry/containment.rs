@@ -60,7 +60,7 @@ impl Containment {
         let is_sheet = if boundary.is_empty() {
             Vec::new()
         } else {
-            topology::sheets(mesh)
+            topology::sheets(mesh, |point| winding_number(mesh, point, |_| true))
         };
         if !is_sheet.is_empty() {
             let volumes = mesh.submesh(|triangle| !is_sheet[triangle]);
@@ -88,7 +88,7 @@ impl Containment {
         let winding = DIRECTIONS
             .iter()
             .find_map(|&direction| self.winding_along(bvh, mesh, point, direction))
-            .unwrap_or_else(|| self.winding_number(mesh, point));
+            .unwrap_or_else(|| winding_number(mesh, point, |triangle| !self.is_sheet(triangle)));
         winding.abs() > INSIDE
     }
 
@@ -114,14 +114,6 @@ impl Containment {
         Some(winding)
     }
 
-    /// The generalised winding number by its definition, from the solid angles of all triangles but those of sheets; O(n).
-    fn winding_number(&self, mesh: &TriangleMesh, point: Vec3) -> f64 {
-        (0..mesh.triangles().len())
-            .filter(|&triangle| !self.is_sheet(triangle))
-            .map(|triangle| solid_angle_share(mesh.corners(triangle), point))
-            .sum()
-    }
-
     /// True if the triangle belongs to a sheet.
     fn is_sheet(&self, triangle: usize) -> bool {
         self.is_sheet.get(triangle).is_some_and(|&is_sheet| is_sheet)
@@ -135,6 +127,14 @@ fn signed(outcome: ExactCrossing) -> Option<f64> {
         ExactCrossing::Hit(crossing) => Some(if crossing.leaves { 1.0 } else { -1.0 }),
         ExactCrossing::Graze(_) => None,
     }
+}
+
+/// The generalised winding number by its definition, from the solid angles of the triangles that `counts` accepts; O(n).
+fn winding_number(mesh: &TriangleMesh, point: Vec3, counts: impl Fn(usize) -> bool) -> f64 {
+    (0..mesh.triangles().len())
+        .filter(|&triangle| counts(triangle))
+        .map(|triangle| solid_angle_share(mesh.corners(triangle), point))
+        .sum()
 }
 
 /// The signed solid angle of a triangle seen from a point, as a share of the full sphere; positive if the point sees

@@ -1,6 +1,6 @@
-//! How thick a mesh is near a point: what fingers that hold it there can turn it by.
+//! How thick a mesh is near a point: the lever by which fingers that hold it there keep it from rolling.
 
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 use super::{mesh::TriangleMesh, principal_axes::principal_axes, surface_samples::SurfaceSampler};
 use crate::base::random::AttemptStream;
@@ -63,8 +63,8 @@ impl LocalThickness {
         Self { samples }
     }
 
-    /// Mean of the two smaller half extents of the part nearest to a point, in metres: for a rod, its radius. 0 if nothing
-    /// was sampled.
+    /// Root mean square distance of the surface near a point from the axis along which it is longest, in metres: the radius
+    /// of a rod. 0 if nothing was sampled.
     pub fn near(&self, point: Vec3) -> f32 {
         let mut nearest = (f32::INFINITY, 0.0);
         for &(position, thickness) in &self.samples {
@@ -82,14 +82,16 @@ impl LocalThickness {
     }
 }
 
-/// Mean of the two smaller half extents of points along their principal axes.
+/// Root mean square distance of points from the axis through their middle along which they spread most.
 fn thickness(points: &[DVec3]) -> f32 {
-    let axes: DMat3 = principal_axes(points);
-    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+    let axes = principal_axes(points);
+    let mut variances = DVec3::ZERO;
     for &point in points {
-        let local = axes.transpose() * point;
-        (min, max) = (min.min(local), max.max(local));
+        let local = axes.transpose() * (point - middle);
+        variances += local * local / points.len() as f64;
     }
-    let half = (max - min) * 0.5;
-    (0.5 * (half.element_sum() - half.max_element())) as f32
+    (variances.element_sum() - variances.max_element())
+        .max(0.0)
+        .sqrt() as f32
 }

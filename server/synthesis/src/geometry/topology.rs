@@ -6,6 +6,12 @@ use glam::{DVec3, Vec3};
 
 use super::mesh::TriangleMesh;
 
+/// Largest mean [`enclosure`] of a sheet: halfway between a flat sheet and the face of a solid.
+const MAX_SHEET_ENCLOSURE: f64 = 0.75;
+
+/// Bound on the triangles that winding numbers are computed at, each in time proportional to the mesh.
+const MAX_QUERIES: usize = 64;
+
 /// Minimum length of a connected part's summed area vectors, as a share of its area, for it to be a sheet. The sum is 0 for a
 /// closed surface and 1 for a flat sheet; a hemisphere, 0.5, still counts as a solid with a hole, a filled sail does not.
 const MIN_SHEET_FLATNESS: f64 = 0.6;
@@ -57,29 +63,69 @@ impl Topology {
     }
 }
 
-/// One flag per triangle: true if it belongs to a sheet, an open connected part that encloses nothing, such as a card
-/// without thickness, a leaf or a sail. Empty if there is none; O(n log n).
-pub(super) fn sheets(mesh: &TriangleMesh) -> Vec<bool> {
+/// One flag per triangle: true if it belongs to a sheet, a connected part that is nearly flat and not a face of something
+/// that encloses a volume: a card without thickness, a leaf, a sail. Empty if there is none. `winding` gives the winding
+/// number of the whole mesh at a point; it is asked [`MAX_QUERIES`] times.
+pub(super) fn sheets(mesh: &TriangleMesh, winding: impl Fn(Vec3) -> f64) -> Vec<bool> {
     let mut parts = connected_parts(mesh, &sorted_edges(mesh));
-    let mut sums = vec![(DVec3::ZERO, 0.0); mesh.triangles().len()];
-    for triangle in 0..mesh.triangles().len() {
+    let triangles = mesh.triangles().len();
+    let mut sums = vec![(DVec3::ZERO, 0.0_f64); triangles];
+    let mut members: Vec<Vec<(f64, usize)>> = vec![Vec::new(); triangles];
+    for triangle in 0..triangles {
         let [a, b, c] = mesh.corners(triangle).map(Vec3::as_dvec3);
         let area = (b - a).cross(c - a);
-        let (vector, size) = &mut sums[parts.root(triangle as u32) as usize];
-        *vector += area;
-        *size += area.length();
+        let part = parts.root(triangle as u32) as usize;
+        sums[part].0 += area;
+        sums[part].1 += area.length();
+        members[part].push((area.length(), triangle));
     }
-    let is_sheet: Vec<bool> = (0..mesh.triangles().len())
-        .map(|triangle| {
-            let (vector, size) = sums[parts.root(triangle as u32) as usize];
-            vector.length() > MIN_SHEET_FLATNESS * size
+    let mut flat: Vec<usize> = (0..triangles)
+        .filter(|&part| {
+            let (vector, size) = sums[part];
+            size > 0.0 && vector.length() > MIN_SHEET_FLATNESS * size
         })
         .collect();
+    if flat.is_empty() {
+        return Vec::new();
+    }
+    // Of very many parts, such as the leaves of a plant, the largest decide for the others.
+    flat.sort_by(|&a, &b| sums[b].1.total_cmp(&sums[a].1));
+    let queries = (MAX_QUERIES / flat.len()).max(1);
+    let mut is_sheet = vec![false; triangles];
+    let mut area_of_sheets = [0.0, 0.0];
+    for (place, &part) in flat.iter().enumerate() {
+        let is_open = if place < MAX_QUERIES {
+            members[part].sort_by(|a, b| b.0.total_cmp(&a.0));
+            let largest = &members[part][..queries.min(members[part].len())];
+            let enclosed: f64 = largest
+                .iter()
+                .map(|&(_, triangle)| enclosure(mesh, triangle, &winding))
+                .sum();
+            let is_open = enclosed < MAX_SHEET_ENCLOSURE * largest.len() as f64;
+            area_of_sheets[usize::from(is_open)] += sums[part].1;
+            is_open
+        } else {
+            area_of_sheets[1] > area_of_sheets[0]
+        };
+        for &(_, triangle) in &members[part] {
+            is_sheet[triangle] = is_open;
+        }
+    }
     if is_sheet.contains(&true) {
         is_sheet
     } else {
         Vec::new()
     }
+}
+
+/// The larger magnitude of the winding numbers on both sides of a triangle: 1 for a face of a solid, 0.5 for a flat sheet.
+fn enclosure(mesh: &TriangleMesh, triangle: usize, winding: impl Fn(Vec3) -> f64) -> f64 {
+    /// Distance from the triangle, as a share of the square root of its area: its own edges are far away in comparison.
+    const NEAR: f32 = 1e-3;
+    let [a, b, c] = mesh.corners(triangle);
+    let middle = (a + b + c) / 3.0;
+    let away = mesh.normal(triangle) * (NEAR * (b - a).cross(c - a).length().sqrt());
+    winding(middle - away).abs().max(winding(middle + away).abs())
 }
 
 /// The triangles' edges, with vertices at equal positions as one, in the order of their ends.

@@ -39,12 +39,10 @@ fn compare(name: &str, mesh: &TriangleMesh, count: usize) -> usize {
 
 #[test]
 fn containment_matches_the_winding_number() {
-    for (name, mesh) in meshes::all() {
+    // Each triangle of the soup is a sheet.
+    for (name, mesh) in meshes::all().into_iter().filter(|(name, _)| *name != "soup") {
         let inside = compare(name, &mesh, 5_000);
-        assert!(
-            inside > 50 || name == "soup",
-            "{name}: only {inside} points are inside"
-        );
+        assert!(inside > 50, "{name}: only {inside} points are inside");
     }
 }
 
@@ -98,6 +96,32 @@ fn sheets_enclose_nothing() {
                 let point = (a + b + c) / 3.0 + sheet.normal(triangle) * side;
                 assert!(!bvh.contains(point), "{name}, triangle {triangle}");
             }
+        }
+    }
+}
+
+/// As some programs export them: no two faces share a vertex, and rounding keeps them apart.
+#[test]
+fn faces_that_do_not_quite_meet_still_enclose_a_volume() {
+    let half = Vec3::new(0.03, 0.05, 0.02);
+    let whole = meshes::cuboid(half, 1);
+    let mut random = Random::new(5);
+    let mut positions = Vec::new();
+    for triangle in 0..whole.triangles().len() {
+        let shift = random.direction() * 1e-5;
+        positions.extend(whole.corners(triangle).map(|corner| corner + shift));
+    }
+    let triangles = (0..whole.triangles().len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
+    let apart = TriangleMesh::new(positions, triangles.collect()).expect("the mesh is sound");
+    let bvh = MeshBvh::build(apart);
+    for _ in 0..200 {
+        let share = Vec3::from_array(std::array::from_fn(|_| random.between(-1.2, 1.2)));
+        if (share.abs().max_element() - 1.0).abs() > 0.05 {
+            assert_eq!(
+                bvh.contains(share * half),
+                share.abs().max_element() < 1.0,
+                "{share}"
+            );
         }
     }
 }
