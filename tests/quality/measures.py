@@ -36,6 +36,8 @@ STRONGEST = 27.0
 # A contact's largest torsion over friction times force, in metres: two thirds of the radius, some 6 mm, of a pad's
 # evenly pressed patch under a few newtons. Slip and torsion share the friction (an ellipse).
 TORSION_RADIUS = 0.004
+# Range of the length that epsilon divides torques by, in metres.
+HAND_LENGTHS = (0.02, 0.06)
 # Comfortable shares of the force, thumb first (thesis 4.6).
 SHARES = np.array([0.25, 0.25, 0.25, 0.125, 0.125])
 
@@ -193,14 +195,18 @@ def epsilon(scene, contacts):
     """Upper bound on Ferrari and Canny's epsilon of the contacts as soft fingers.
 
     Epsilon is the smallest support of the convex hull of all wrenches that a press of one newton can exert; in each
-    direction of wrench space the support is that of the best contact. The search refines random directions by ever
+    direction of wrench space the support is that of the best contact. Torques are about the middle of the contacts and
+    divided by half their span, within a hand's lengths: what is far from the hand does not count. The search refines random directions by ever
     smaller random steps.
     """
     if not contacts:
         return {"epsilon": 0.0}
     inward = -np.array([contact["normal"] for contact in contacts])
-    arm = (np.array([contact["position"] for contact in contacts]) - scene.centre_of_mass) / scene.reach
-    twist = TORSION_RADIUS / scene.reach
+    positions = np.array([contact["position"] for contact in contacts])
+    span = np.linalg.norm(positions[:, None] - positions, axis=2).max()
+    length = np.clip(span / 2, *HAND_LENGTHS)
+    arm = (positions - positions.mean(axis=0)) / length
+    twist = TORSION_RADIUS / length
 
     def support(directions):
         push, turn = directions[..., :3], directions[..., 3:]

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import rankdata, spearmanr
 
-# Bounds of the classes of epsilon, which has no unit (presses of one newton, torque over reach).
+# Bounds of the classes of epsilon, which has no unit (presses of one newton, torque over half the span of the contacts).
 EPSILONS = [0.0, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, np.inf]
 
 

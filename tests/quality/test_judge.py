@@ -372,12 +372,13 @@ class TestFaults:
         assert "cone" in faults(scene, balanced)
 
     def test_epsilon_of_two_pads_is_their_torsion(self):
-        # Two pads are weakest about the line between them: friction times two thirds of the patch's radius over the
-        # reach.
+        # Two pads are weakest about the line between them: friction times two thirds of the patch's radius over half
+        # their distance.
         scene, grasp, _ = good()
-        assert judged(scene, grasp)["epsilon"] == pytest.approx(
-            FRICTION * measures.TORSION_RADIUS / scene.reach, rel=0.02
-        )
+        thumb, finger = (np.array(contact["client_position"]) for contact in grasp["contacts"])
+        length = np.linalg.norm(thumb - finger) / 2
+        assert 0.02 < length < 0.06
+        assert judged(scene, grasp)["epsilon"] == pytest.approx(FRICTION * measures.TORSION_RADIUS / length, rel=0.02)
         grasp["contacts"].pop()
         assert judged(scene, grasp)["epsilon"] == 0.0
 
@@ -385,7 +386,7 @@ class TestFaults:
         # With contacts far enough out, torques are easy and the hull of the forces decides. Frictionless pushes along
         # six axes make an octahedron, whose faces are 1 / sqrt 3 away.
         scene, _, _ = good()
-        scene.centre_of_mass, scene.friction, scene.reach = np.zeros(3), 1e-9, 1.0
+        scene.friction = 1e-9
         contacts = []
         for axis in np.concatenate([np.eye(3), -np.eye(3)]):
             for around in np.concatenate([np.eye(3), -np.eye(3)]):
