@@ -46,6 +46,8 @@ pub(super) fn search_in_slices(
     let mut left = settings.run.max_attempts;
     let mut per_worker = FIRST_ATTEMPTS_PER_WORKER;
     let mut best: Option<(Grasp, f32)> = None;
+    // The last attempt that may replace a grasp without a clear type.
+    let mut replaceable_until = None;
     loop {
         slice.run.max_attempts = left.min(per_worker.saturating_mul(workers));
         let start = clock.now();
@@ -54,14 +56,21 @@ pub(super) fn search_in_slices(
         slice.known.atlas = None;
         slice.known.recent = RecentGrips::default();
         left -= slice.run.max_attempts;
-        let is_better =
-            outcome.grasp.is_some() && best.as_ref().is_none_or(|(_, value)| outcome.value > *value);
+        let replaces = replaceable_until.is_some() && outcome.replaceable_until.is_none();
+        let is_better = outcome.grasp.is_some()
+            && (replaces || best.as_ref().is_none_or(|(_, value)| outcome.value > *value));
         total.merge(outcome.report, is_better);
         if is_better {
             best = outcome.grasp.map(|grasp| (grasp, outcome.value));
+            replaceable_until = outcome.replaceable_until;
         }
-        // The first valid grasp ends the search unless the best is wanted.
-        let is_enough = best.is_some() && slice.query.choice == Choice::FirstValid;
+        // The first valid grasp ends the search unless the best is wanted, or one with a clear type may replace it.
+        let next = slice.run.first_attempt + slice.run.max_attempts;
+        let open = replaceable_until.map_or(0, |last| (last + 1).saturating_sub(next));
+        let is_enough = best.is_some() && slice.query.choice == Choice::FirstValid && open == 0;
+        if best.is_some() && open > 0 {
+            left = left.min(open);
+        }
         let is_stopped = outcome.end == SearchEnd::Stopped || stop.load(Ordering::Relaxed);
         let is_late = outcome.end == SearchEnd::DeadlinePassed || has_passed(slice.run.deadline, clock);
         let goes_on = best.is_none() && slice.run.deadline < Some(patience);
@@ -72,6 +81,11 @@ pub(super) fn search_in_slices(
             slice.known.atlas.clone_from(&settings.known.atlas);
             slice.known.recent.clone_from(&settings.known.recent);
         } else if is_enough || is_stopped || is_late || left == 0 {
+            if slice.run.reproducible && is_late && open > 0 {
+                // An attempt that did not run might have replaced it.
+                best = None;
+                replaceable_until = None;
+            }
             if best.is_some() {
                 // The nearest miss is reported only if there is no grasp.
                 total.nearest_miss = None;
@@ -84,6 +98,7 @@ pub(super) fn search_in_slices(
             return SearchOutcome {
                 end,
                 value: best.as_ref().map_or(0.0, |(_, value)| *value),
+                replaceable_until,
                 grasp: best.map(|(grasp, _)| grasp),
                 report: total,
             };

@@ -389,6 +389,9 @@ impl GraspType {
 /// Smallest confidence, 0 to 1, at which a grasp is assigned a type. A higher one leaves more grasps without a type.
 pub const MIN_CONFIDENCE: f32 = 0.25;
 
+/// Smallest confidence, 0 to 1, of a clear type: below it, the grasp resembles several types, or hardly one.
+pub const CLEAR_CONFIDENCE: f32 = 0.5;
+
 /// The result of classifying a grasp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Classification {
@@ -397,4 +400,11 @@ pub struct Classification {
     /// The confidence, 0 to 1: the fit of the best type minus half the fit of the second best. Below
     /// [`MIN_CONFIDENCE`] if there is no type.
     pub confidence: f32,
+}
+
+impl Classification {
+    /// True if the grasp has a type with at least [`CLEAR_CONFIDENCE`].
+    pub fn is_clear(&self) -> bool {
+        self.grasp_type.is_some() && self.confidence >= CLEAR_CONFIDENCE
+    }
 }

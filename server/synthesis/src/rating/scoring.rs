@@ -14,7 +14,7 @@ use crate::{
     model::{
         forces::GRAVITY,
         grasp::{Contact, Grasp},
-        grasp_type::Classification,
+        grasp_type::{CLEAR_CONFIDENCE, Classification},
         hand::{Digit, HandPart, HandPose, kinematics::hand_frames, rig::Rig},
         object::GraspObject,
         score::{Score, TERMS, Term, Values},
@@ -50,10 +50,7 @@ const SAFE_CLOSURE: f32 = 6.0;
 /// in between.
 const DISPLACEMENT_RANGE: [f32; 2] = [1e-5, 1e-3];
 
-/// Confidence of a classification from which its type scores 1.
-const SURE_CONFIDENCE: f32 = 0.5;
-
-/// Value just below [`SURE_CONFIDENCE`], where the type is ambiguous; it falls linearly to 0.
+/// Value just below [`CLEAR_CONFIDENCE`], where the type is ambiguous; it falls linearly to 0.
 const AMBIGUOUS_TYPE_VALUE: f32 = 0.6;
 
 /// Force of the strongest contact, relative to the total force of a firm hold, at which ease scores 1 and 0; logarithmic in
@@ -112,11 +109,11 @@ pub fn grip_values(
     values
 }
 
-/// 0 without a type, rising with the confidence of one.
+/// 0 without a type, rising with the confidence of one up to [`CLEAR_CONFIDENCE`].
 fn natural_type(classification: Classification) -> f32 {
     classification
         .grasp_type
-        .map_or(0.0, |_| match classification.confidence / SURE_CONFIDENCE {
+        .map_or(0.0, |_| match classification.confidence / CLEAR_CONFIDENCE {
             sure if sure >= 1.0 => 1.0,
             share => AMBIGUOUS_TYPE_VALUE * share,
         })

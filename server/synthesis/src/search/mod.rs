@@ -50,6 +50,9 @@ pub struct SearchOutcome {
     pub grasp: Option<Grasp>,
     /// Its quality, if the best grasp is wanted; higher is better.
     pub value: f32,
+    /// If the grasp has no clear type: the last attempt that replaces it if its grasp has one. It may lie beyond the
+    /// search's attempts.
+    pub replaceable_until: Option<u64>,
     /// What the search did.
     pub report: SearchReport,
 }

@@ -95,10 +95,10 @@ impl Tally {
         self.settled.step_times = times;
     }
 
-    /// Adds this worker's counts to a report; only attempts up to `lowest_winner`, if given.
-    pub(super) fn add_to(mut self, report: &mut SearchReport, lowest_winner: Option<u64>) {
-        self.settle(lowest_winner.unwrap_or(u64::MAX));
-        if lowest_winner.is_none() {
+    /// Adds this worker's counts to a report; only attempts up to `last_counted`, if given.
+    pub(super) fn add_to(mut self, report: &mut SearchReport, last_counted: Option<u64>) {
+        self.settle(last_counted.unwrap_or(u64::MAX));
+        if last_counted.is_none() {
             report.pruned_placements += self.interrupted_prunes;
         }
         report.merge(self.settled, false);
