@@ -137,7 +137,7 @@ pub struct FindRequest {
     /// Seed of all random streams; none: drawn by the server. Reported in either case.
     #[serde(default, with = "json::optional_seed")]
     pub seed: Option<u64>,
-    /// Return the valid attempt with the lowest index: the answer does not depend on the number of workers.
+    /// Decide by the indices of the valid attempts: the answer does not depend on the number of workers.
     #[serde(default)]
     pub reproducible: bool,
     /// Replay: run only this attempt of the seed, without trying known grasps first. An attempt that fails continues near

@@ -68,7 +68,7 @@ pub(crate) struct FindQuery {
     pub bend_ratios: BendRatioChoice,
     /// Requested seed.
     pub seed: Option<u64>,
-    /// True if the valid attempt of the lowest index must win.
+    /// True if the indices of the valid attempts must decide, not which was found first.
     pub reproducible: bool,
     /// True to report the times of the steps.
     pub record_step_times: bool,

@@ -45,7 +45,7 @@ pub(crate) struct Arguments {
     /// The folder for pictures and scenes.
     #[arg(long, value_name = "FOLDER", default_value = "target/demo")]
     out: PathBuf,
-    /// Seed of all random streams. Each search returns the valid attempt with the lowest index: the same seed shows the
+    /// Seed of all random streams. Each search decides by the indices of its valid attempts: the same seed shows the
     /// same grasps.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,

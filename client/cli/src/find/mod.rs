@@ -98,7 +98,7 @@ pub(crate) struct Arguments {
     /// Replay: run only this attempt of the seed, without trying known grasps first.
     #[arg(long, value_name = "N", requires = "seed")]
     only_attempt: Option<u64>,
-    /// Return the valid attempt with the lowest index, whatever the number of workers.
+    /// Decide by the indices of the valid attempts, whatever the number of workers.
     #[arg(long)]
     reproducible: bool,
     /// Search from scratch, without the object's known grasps.

@@ -86,7 +86,8 @@ pub struct Known {
 pub struct Run {
     /// Seed of all attempts' random streams.
     pub seed: u64,
-    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index,
+    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index (under `PHYSICAL`,
+    /// the first with a clear type of those soon after it, if it has none),
     /// instead of the first to finish.
     pub reproducible: bool,
     /// The lowest attempt index.
