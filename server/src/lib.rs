@@ -16,7 +16,7 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! atlas_slots  budget  convention  error  health_check  limits  net
+//! atlas_slots  budget  convention  error  health_check  limits  net  reserve
 //! answer  call  config  executor  validate
 //! memory  objects
 //! atlases
@@ -43,6 +43,7 @@ mod limits;
 mod memory;
 mod net;
 mod objects;
+mod reserve;
 mod search;
 mod serve;
 mod services;

@@ -65,6 +65,8 @@ pub(crate) struct Answered {
     pub response: v1::FindGraspResponse,
     /// The grip if it was not known before, to be remembered.
     pub new_grip: Option<Entry>,
+    /// When the search ended, before the response was made.
+    pub ended: Instant,
 }
 
 /// A job whose holdout and settings are ready to be searched.
@@ -245,7 +247,8 @@ impl PreparedJob {
 
     fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
-        let search_time = self.start.elapsed();
+        let ended = Instant::now();
+        let search_time = ended - self.start;
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
             let approach = self.settings.query.constraints.approach;
             let friction = self.settings.query.friction_on(&self.holdout.object);
@@ -262,6 +265,7 @@ impl PreparedJob {
         Ok(Answered {
             response: find_response(&outcome, rig, frame, &self.settings, circumstances)?,
             new_grip: self.new_grip(&outcome),
+            ended,
         })
     }
 
@@ -460,7 +464,7 @@ mod tests {
             searched.set(counts);
             let budgets = config::Config::default().budgets;
             let job = FindJob {
-                budget: effective_budget(query.budget, budgets, arrived, None),
+                budget: effective_budget(query.budget, budgets, budgets.minimum_reserve, arrived, None),
                 patience: Duration::ZERO,
                 query,
                 object: Arc::clone(&object.object),
