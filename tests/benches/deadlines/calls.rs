@@ -10,7 +10,7 @@ use std::{
 
 use grasp_assets::holdouts::holdouts;
 use grasp_client::{
-    ClientError, Constraints, FindRequest, ForbiddenSurfaces, GraspClient, NewObject, Outcome, RetryPolicy,
+    ClientError, Constraints, Digit, FindRequest, ForbiddenSurfaces, GraspClient, NewObject, Outcome, RetryPolicy,
     built_in::request_for,
 };
 use tokio::{
@@ -30,6 +30,14 @@ f 1 2 4
 f 1 4 3
 f 2 3 4
 ";
+
+const ALL_DIGITS: [Digit; 5] = [
+    Digit::Thumb,
+    Digit::Index,
+    Digit::Middle,
+    Digit::Ring,
+    Digit::Little,
+];
 
 /// Calls of one cell.
 #[derive(Clone, Copy, Debug)]
@@ -104,9 +112,10 @@ impl Client {
                 .expect("the mesh is sound");
         });
         let ordinary: Vec<_> = holdouts().iter().map(request_for).collect();
-        // No grasp is perfectly comfortable.
+        // No grasp with all digits is perfectly comfortable.
         let perfect = ordinary.iter().map(|request| FindRequest {
             constraints: Constraints {
+                must_touch: ALL_DIGITS.to_vec(),
                 max_comfort_e: Some(0.0),
                 ..Constraints::default()
             },
