@@ -15,7 +15,7 @@ use grasp_synthesis::{
     },
     propose::prepared::PreparedObject,
     search::{
-        GraspSource, LookUp, SearchOutcome, find_known_grasp,
+        GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
@@ -23,12 +23,11 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-use super::slices::search_in_slices;
+use super::{progress::Progress, slices::search_in_slices};
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     atlases::KnownGrips,
     error::ServiceError,
-    executor::{Admission, SearchExecutor},
     objects::StoredObject,
     validate::FindQuery,
 };
@@ -50,6 +49,8 @@ pub(crate) struct FindJob {
     pub budget: Duration,
     /// How long the search continues for a first grasp if it finds none within the budget; at least the budget.
     pub patience: Duration,
+    /// Whether the call has a deadline, so that its answer must not wait for a search that ends late.
+    pub has_deadline: bool,
     /// Number of workers.
     pub workers: usize,
     /// Known grips of the object and the hand.
@@ -71,7 +72,7 @@ pub(crate) struct Answered {
 
 /// A job whose holdout and settings are ready to be searched.
 #[derive(Debug)]
-struct PreparedJob {
+pub(super) struct PreparedJob {
     query: FindQuery,
     object: Arc<PreparedObject>,
     holdout: Holdout,
@@ -96,32 +97,10 @@ impl Clock for SinceArrival {
     }
 }
 
-/// Runs a job: looks known grips up on this thread if that is quick, else searches on the executor.
-///
-/// # Errors
-/// The giver's joints fold its skin, or the search was stopped or panicked.
-pub(crate) async fn find(
-    job: FindJob,
-    executor: &SearchExecutor,
-    admission: Admission,
-) -> Result<Answered, ServiceError> {
-    if !job.is_quick_if_known() {
-        let run = executor.run(admission, move |pool, stop| job.prepare()?.run(pool, stop));
-        return run.await?;
-    }
-    let mut job = job.prepare()?;
-    if let Some(answered) = job.look_up() {
-        return answered;
-    }
-    executor
-        .run(admission, move |pool, stop| job.run(pool, stop))
-        .await?
-}
-
 impl FindJob {
     /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames is
     /// not.
-    fn is_quick_if_known(&self) -> bool {
+    pub(super) fn is_quick_if_known(&self) -> bool {
         (self.known.atlas.is_some() || !self.known.recent.is_empty())
             && !self.query.is_replay
             && self.query.choice == Choice::FirstValid
@@ -129,11 +108,16 @@ impl FindJob {
             && !self.query.plan_key_frames
     }
 
+    /// When the search has to end, with or without a grasp.
+    pub(crate) fn due(&self) -> Instant {
+        self.arrived + self.patience
+    }
+
     /// Poses the giver's hand and makes the settings.
     ///
     /// # Errors
     /// The giver's joints fold its skin.
-    fn prepare(self) -> Result<PreparedJob, ServiceError> {
+    pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
         let query = self.query;
         let object_from_client = query.client_from_object.inverse();
@@ -211,7 +195,7 @@ impl FindJob {
 
 impl PreparedJob {
     /// Answers with a known grip if one is found quickly; otherwise [`PreparedJob::run`] continues where this stopped.
-    fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
+    pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         match find_known_grasp(self.task(), &self.settings, &self.clock, LOOK_UP_TIME) {
             LookUp::Found(outcome) => Some(self.answer(*outcome)),
             LookUp::NotFound { tried } => {
@@ -225,7 +209,12 @@ impl PreparedJob {
     ///
     /// # Errors
     /// The search was stopped.
-    fn run(&self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Answered, ServiceError> {
+    pub(super) fn run(
+        &self,
+        pool: &ThreadPool,
+        stop: &AtomicBool,
+        progress: &Progress,
+    ) -> Result<Answered, ServiceError> {
         let outcome = search_in_slices(
             pool,
             self.task(),
@@ -233,8 +222,17 @@ impl PreparedJob {
             self.patience,
             &self.clock,
             stop,
+            progress,
         );
         self.answer(outcome)
+    }
+
+    /// Answers with what a search has found so far, as if its time had ended there.
+    ///
+    /// # Errors
+    /// None that the end of the search would not have.
+    pub(super) fn answer_so_far(&self, progress: &Progress) -> Result<Answered, ServiceError> {
+        self.answer(progress.outcome(SearchEnd::DeadlinePassed))
     }
 
     fn task(&self) -> Task<'_> {
@@ -466,6 +464,7 @@ mod tests {
             let job = FindJob {
                 budget: effective_budget(query.budget, budgets, budgets.minimum_reserve, arrived, None),
                 patience: Duration::ZERO,
+                has_deadline: false,
                 query,
                 object: Arc::clone(&object.object),
                 stored: Arc::new(object),
@@ -477,7 +476,7 @@ mod tests {
             };
             match job
                 .prepare()
-                .and_then(|job| job.run(&pool, &AtomicBool::new(false)))
+                .and_then(|job| job.run(&pool, &AtomicBool::new(false), &Progress::default()))
             {
                 Ok(Answered { response: answer, .. }) => {
                     let report = answer.report.expect("every answer has a report");

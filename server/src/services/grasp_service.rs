@@ -62,6 +62,7 @@ impl GraspHandler {
             } else {
                 budget
             },
+            has_deadline: call.deadline.is_some(),
             workers: shared.executor.workers(),
             mechanisms: shared.mechanisms,
             known: if uses_atlas {
@@ -71,7 +72,7 @@ impl GraspHandler {
             },
             query,
         };
-        call.search_is_due(call.arrived + job.patience);
+        call.search_is_due(job.due());
         let answered = search::find(job, &shared.executor, admission).await?;
         call.search_ended(answered.ended);
         if let Some(grip) = answered.new_grip.filter(|_| uses_atlas) {

@@ -10,8 +10,8 @@ use std::{
 
 use grasp_assets::holdouts::holdouts;
 use grasp_client::{
-    ClientError, Constraints, Digit, FindRequest, ForbiddenSurfaces, GraspClient, NewObject, Outcome, RetryPolicy,
-    built_in::request_for,
+    ClientError, Constraints, Digit, FindRequest, ForbiddenSurfaces, GraspClient, NewObject, Outcome,
+    RetryPolicy, built_in::request_for,
 };
 use tokio::{
     runtime::{Builder, Runtime},
