@@ -15,7 +15,7 @@ use grasp_synthesis::{
     },
     propose::prepared::PreparedObject,
     search::{
-        GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
+        GraspSource, LookUp, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
@@ -227,14 +227,6 @@ impl PreparedJob {
         self.answer(outcome)
     }
 
-    /// Answers with what a search has found so far, as if its time had ended there.
-    ///
-    /// # Errors
-    /// None that the end of the search would not have.
-    pub(super) fn answer_so_far(&self, progress: &Progress) -> Result<Answered, ServiceError> {
-        self.answer(progress.outcome(SearchEnd::DeadlinePassed))
-    }
-
     fn task(&self) -> Task<'_> {
         Task {
             holdout: &self.holdout,
@@ -243,7 +235,11 @@ impl PreparedJob {
         }
     }
 
-    fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
+    /// Makes the response of an outcome.
+    ///
+    /// # Errors
+    /// The search was stopped.
+    pub(super) fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
         let ended = Instant::now();
         let search_time = ended - self.start;

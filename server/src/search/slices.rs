@@ -142,6 +142,7 @@ mod tests {
         let stop = AtomicBool::new(false);
         let progress = Progress::default();
         let outcome = search_in_slices(&pool, task, &settings, patience, &clock, &stop, &progress);
+        assert_eq!(progress.outcome(outcome.end).report, outcome.report);
         (outcome, clock.0.into_inner())
     }
 
