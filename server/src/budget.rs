@@ -18,9 +18,9 @@ pub struct BudgetLimits {
 const ROUNDED_FROM: Duration = Duration::from_secs(1);
 
 /// The effective budget: the smallest of the requested one (or the default), the server's maximum, and the call's
-/// deadline less the reserve in force. It counts from the call's arrival, so waiting for a free worker uses it up. With a
-/// deadline shorter than two reserves, the budget is half of it: a grasp may still be found, and the response may still
-/// arrive.
+/// deadline less the reserve in force. It counts from the call's arrival, so waiting for a free worker uses it up. The
+/// search has at least a quarter of the deadline: known grips are tried in less, and under load the way back may need the
+/// rest.
 pub(crate) fn effective_budget(
     requested: Option<Duration>,
     limits: BudgetLimits,
@@ -40,7 +40,7 @@ pub(crate) fn effective_budget(
             };
             let left = allowed
                 .saturating_sub(reserve.saturating_add(rounding))
-                .max(allowed / 2);
+                .max(allowed / 4);
             wanted.min(left)
         }
     }
@@ -109,19 +109,19 @@ mod tests {
         );
         assert_eq!(
             budget(None, Some(4)),
-            ms(2),
-            "half of a deadline below two reserves"
+            ms(1),
+            "a quarter of a deadline below the reserve"
         );
         assert_eq!(budget(None, Some(0)), ms(0), "a deadline that has passed");
     }
 
     #[test]
-    fn long_reserve_leaves_half_of_the_deadline() {
+    fn long_reserve_leaves_a_quarter_of_the_deadline() {
         let ms = Duration::from_millis;
         assert_eq!(budget_with(ms(30), None, Some(200)), ms(170));
-        assert_eq!(budget_with(ms(30), None, Some(50)), ms(25));
-        assert_eq!(budget_with(ms(30), None, Some(10)), ms(5));
-        assert_eq!(budget_with(Duration::MAX, None, Some(2000)), ms(1000));
+        assert_eq!(budget_with(ms(40), None, Some(48)), ms(12));
+        assert_eq!(budget_with(ms(40), None, Some(8)), ms(2));
+        assert_eq!(budget_with(Duration::MAX, None, Some(2000)), ms(500));
         assert_eq!(
             budget_with(ms(30), Some(20), Some(200)),
             ms(20),

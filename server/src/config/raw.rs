@@ -38,7 +38,7 @@ pub struct RawConfig {
     pub maximum_budget_ms: Option<u64>,
     /// Smallest part of a call's deadline reserved for the response, in milliseconds [default: 5].
     ///
-    /// It grows with the delays of recent responses, up to half of the deadline.
+    /// It grows with the delays of recent responses, up to three quarters of the deadline.
     #[arg(long, env = "GRASP_DEADLINE_RESERVE_MS", value_name = "MS")]
     pub deadline_reserve_ms: Option<u64>,
     /// Most searches running or waiting; others are rejected [default: 64].
