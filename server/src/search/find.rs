@@ -42,19 +42,21 @@ pub(crate) async fn find(
     admission: Admission,
 ) -> Result<Answered, ServiceError> {
     let overdue = job.has_deadline.then(|| job.due() + OVERDUE_AFTER);
+    // Boxed: jobs of some kilobytes would make the futures of all calls large.
     if !job.is_quick_if_known() {
-        return search(move || job.prepare(), overdue, executor, admission).await;
+        let job = Box::new(job);
+        return search(move || job.prepare().map(Arc::new), overdue, executor, admission).await;
     }
-    let mut job = job.prepare()?;
+    let mut job = Box::new(job.prepare()?);
     match job.look_up() {
         Some(answered) => answered,
-        None => search(move || Ok(job), overdue, executor, admission).await,
+        None => search(move || Ok(Arc::from(job)), overdue, executor, admission).await,
     }
 }
 
 /// Searches on the executor, and waits for the end or until the search is overdue.
 async fn search(
-    prepare: impl FnOnce() -> Result<PreparedJob, ServiceError> + Send + 'static,
+    prepare: impl FnOnce() -> Result<Arc<PreparedJob>, ServiceError> + Send + 'static,
     overdue: Option<Instant>,
     executor: &SearchExecutor,
     admission: Admission,
@@ -63,7 +65,7 @@ async fn search(
     let end = {
         let running = Arc::clone(&running);
         executor.run(admission, move |pool, stop| {
-            let job = Arc::new(prepare()?);
+            let job = prepare()?;
             // Fails only if it is set, which happens here only.
             let _ = running.job.set(Arc::clone(&job));
             job.run(pool, stop, &running.progress)
