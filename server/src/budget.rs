@@ -9,8 +9,8 @@ pub struct BudgetLimits {
     pub default: Duration,
     /// Largest budget.
     pub maximum: Duration,
-    /// Part of a call's deadline reserved for the response.
-    pub reserve: Duration,
+    /// Smallest part of a call's deadline reserved for the response.
+    pub minimum_reserve: Duration,
 }
 
 /// Shortest timeout that clients of gRPC's C++ core (Python, Ruby, PHP …) round up to three digits: they may end the
@@ -18,12 +18,13 @@ pub struct BudgetLimits {
 const ROUNDED_FROM: Duration = Duration::from_secs(1);
 
 /// The effective budget: the smallest of the requested one (or the default), the server's maximum, and the call's
-/// deadline less the reserve. It counts from the call's arrival, so waiting for a free worker uses it up. With a
-/// deadline shorter than two reserves, the budget is half of it: a grasp may still be found, and the response may still
-/// arrive.
+/// deadline less the reserve in force. It counts from the call's arrival, so waiting for a free worker uses it up. The
+/// search has at least a quarter of the deadline: known grips are tried in less, and under load the way back may need the
+/// rest.
 pub(crate) fn effective_budget(
     requested: Option<Duration>,
     limits: BudgetLimits,
+    reserve: Duration,
     arrived: Instant,
     deadline: Option<Instant>,
 ) -> Duration {
@@ -37,7 +38,9 @@ pub(crate) fn effective_budget(
             } else {
                 Duration::ZERO
             };
-            let left = allowed.saturating_sub(limits.reserve + rounding).max(allowed / 2);
+            let left = allowed
+                .saturating_sub(reserve.saturating_add(rounding))
+                .max(allowed / 4);
             wanted.min(left)
         }
     }
@@ -69,14 +72,19 @@ mod tests {
     const LIMITS: BudgetLimits = BudgetLimits {
         default: Duration::from_secs(1),
         maximum: Duration::from_secs(10),
-        reserve: Duration::from_millis(5),
+        minimum_reserve: Duration::from_millis(5),
     };
 
     fn budget(requested_ms: Option<u64>, deadline_ms: Option<u64>) -> Duration {
+        budget_with(LIMITS.minimum_reserve, requested_ms, deadline_ms)
+    }
+
+    fn budget_with(reserve: Duration, requested_ms: Option<u64>, deadline_ms: Option<u64>) -> Duration {
         let arrived = Instant::now();
         effective_budget(
             requested_ms.map(Duration::from_millis),
             LIMITS,
+            reserve,
             arrived,
             deadline_ms.map(|ms| arrived + Duration::from_millis(ms)),
         )
@@ -101,10 +109,25 @@ mod tests {
         );
         assert_eq!(
             budget(None, Some(4)),
-            ms(2),
-            "half of a deadline below two reserves"
+            ms(1),
+            "a quarter of a deadline below the reserve"
         );
         assert_eq!(budget(None, Some(0)), ms(0), "a deadline that has passed");
+    }
+
+    #[test]
+    fn long_reserve_leaves_a_quarter_of_the_deadline() {
+        let ms = Duration::from_millis;
+        assert_eq!(budget_with(ms(30), None, Some(200)), ms(170));
+        assert_eq!(budget_with(ms(40), None, Some(48)), ms(12));
+        assert_eq!(budget_with(ms(40), None, Some(8)), ms(2));
+        assert_eq!(budget_with(Duration::MAX, None, Some(2000)), ms(500));
+        assert_eq!(
+            budget_with(ms(30), Some(20), Some(200)),
+            ms(20),
+            "a requested budget that ends before the reserve is left as it is"
+        );
+        assert_eq!(budget_with(ms(30), None, None), ms(1000), "without a deadline");
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! A layer around every call: records arrival and deadline, counts and logs calls, and bounds uploads.
+//! A layer around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
+//! their search, and bounds uploads.
 
 use std::{
     fmt,
@@ -19,6 +20,7 @@ use tower::{Layer, Service};
 use crate::{
     budget::parse_grpc_timeout,
     error::{Limit, ServiceError},
+    reserve::DeadlineReserve,
 };
 
 /// Path of the only method with large messages; its calls are admitted before the message is received.
@@ -41,13 +43,24 @@ pub(crate) struct CallContext {
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
     log_fields: Arc<LogFields>,
+    search_end: Arc<SearchEnd>,
 }
 
 /// What a handler adds to the log line.
 #[derive(Debug, Default)]
 struct LogFields {
     object: OnceLock<String>,
+    reserve: OnceLock<Duration>,
     search: OnceLock<SearchSummary>,
+}
+
+/// The end of a call's search, from which the delay of its answer counts.
+#[derive(Debug, Default)]
+struct SearchEnd {
+    /// When it has to end.
+    due: OnceLock<Instant>,
+    /// When it ended.
+    actual: OnceLock<Instant>,
 }
 
 /// A search as it is logged.
@@ -78,13 +91,32 @@ impl CallContext {
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
             log_fields: Arc::default(),
+            search_end: Arc::default(),
         }
+    }
+
+    /// Records when the search that starts now has to end. A time that has passed counts as now: what was waited before,
+    /// such as for the rest of a request, is no delay of the answer.
+    pub(crate) fn search_is_due(&self, due: Instant) {
+        let _ = self.search_end.due.set(due.max(Instant::now()));
+    }
+
+    /// Records when the search ended.
+    pub(crate) fn search_ended(&self, at: Instant) {
+        let _ = self.search_end.actual.set(at);
     }
 
     /// Adds the object's id to the log line.
     pub(crate) fn log_object(&self, id: &str) {
         // The first value stays.
         let _ = self.log_fields.object.set(id.to_owned());
+    }
+
+    /// Adds the part of the deadline that is kept for the answer to the log line, if there is a deadline.
+    pub(crate) fn log_reserve(&self, reserve: Duration) {
+        if self.deadline.is_some() {
+            let _ = self.log_fields.reserve.set(reserve);
+        }
     }
 
     /// Adds the search to the log line.
@@ -145,6 +177,8 @@ pub(crate) struct CallLayer {
     pub uploads: Arc<Semaphore>,
     /// Largest number of concurrent uploads.
     pub maximum_uploads: usize,
+    /// Learns the delays of answers.
+    pub reserve: Arc<DeadlineReserve>,
 }
 
 impl<S> Layer<S> for CallLayer {
@@ -193,6 +227,10 @@ where
             code: None,
             _in_flight: self.layer.in_flight.enter(),
         };
+        let delay = AnswerDelay {
+            search_end: Arc::clone(&context.search_end),
+            reserve: Arc::clone(&self.layer.reserve),
+        };
         let upload = if request.uri().path() == UPLOAD_METHOD {
             let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
                 line.set_code(Code::ResourceExhausted);
@@ -217,6 +255,7 @@ where
         let answer = self.inner.call(request);
         Box::pin(async move {
             let answer = answer.await;
+            drop(delay);
             line.set_code(match &answer {
                 Ok(response) => code_of(response),
                 Err(_) => Code::Internal,
@@ -238,6 +277,24 @@ fn code_of<R>(response: &Response<R>) -> Code {
         .headers()
         .get("grpc-status")
         .map_or(Code::Ok, |status| Code::from_bytes(status.as_bytes()))
+}
+
+/// Measures the delay from the end of a call's search to its answer. If the call is dropped first, which is what a
+/// client does at its deadline, the answer would have taken at least until then.
+struct AnswerDelay {
+    search_end: Arc<SearchEnd>,
+    reserve: Arc<DeadlineReserve>,
+}
+
+impl Drop for AnswerDelay {
+    fn drop(&mut self) {
+        let SearchEnd { due, actual } = &*self.search_end;
+        if let Some(&due) = due.get() {
+            let now = Instant::now();
+            let end = actual.get().map_or(due, |&actual| actual.min(due));
+            self.reserve.record(now.saturating_duration_since(end), now);
+        }
+    }
 }
 
 /// A call's log line, written when the call ends, for whatever reason.
@@ -269,6 +326,7 @@ impl Drop for LogLine {
                     outcome = search.map(|s| s.outcome),
                     attempts = search.map(|s| s.attempts),
                     search_us = search.map(|s| micros(s.time)),
+                    reserve_us = fields.reserve.get().copied().map(micros),
                     total_us,
                     %status,
                     "call"
@@ -349,6 +407,16 @@ mod tests {
         }
     }
 
+    /// A layer that admits one upload.
+    fn layer() -> CallLayer {
+        CallLayer {
+            in_flight: CallsInFlight::default(),
+            uploads: Arc::new(Semaphore::new(1)),
+            maximum_uploads: 1,
+            reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
+        }
+    }
+
     fn request(path: &str) -> Request<()> {
         Request::builder()
             .uri(path)
@@ -359,11 +427,7 @@ mod tests {
 
     #[tokio::test]
     async fn rejects_uploads_beyond_the_maximum_before_they_are_received() {
-        let layer = CallLayer {
-            in_flight: CallsInFlight::default(),
-            uploads: Arc::new(Semaphore::new(1)),
-            maximum_uploads: 1,
-        };
+        let layer = layer();
         let keeper = Keeper::default();
         let mut service = layer.layer(keeper.clone());
         let first = service.call(request(UPLOAD_METHOD));
@@ -384,11 +448,7 @@ mod tests {
     #[tokio::test]
     async fn passes_arrival_and_deadline_to_the_handler() {
         let keeper = Keeper::default();
-        let layer = CallLayer {
-            in_flight: CallsInFlight::default(),
-            uploads: Arc::new(Semaphore::new(1)),
-            maximum_uploads: 1,
-        };
+        let layer = layer();
         let before = Instant::now();
         let _call = layer
             .layer(keeper.clone())
@@ -397,5 +457,40 @@ mod tests {
         let context = kept[0].extensions().get::<CallContext>().unwrap();
         assert!(before <= context.arrived && context.arrived <= Instant::now());
         assert_eq!(context.deadline, Some(context.arrived + Duration::from_secs(3)));
+    }
+
+    /// The call of a request whose search is recorded with the given times, and the layer.
+    fn call_with_search(due: Instant, ended: Option<Instant>) -> (CallLayer, impl Future) {
+        let (layer, keeper) = (layer(), Keeper::default());
+        let call = layer
+            .layer(keeper.clone())
+            .call(request("/grasp.v1.GraspService/FindGrasp"));
+        let kept = keeper.0.lock().unwrap();
+        let context: &CallContext = kept[0].extensions().get().unwrap();
+        context.search_is_due(due);
+        if let Some(ended) = ended {
+            context.search_ended(ended);
+        }
+        (layer, call)
+    }
+
+    /// The reserve that a call leaves behind when it is dropped.
+    fn reserve_after(due: Instant, ended: Option<Instant>) -> Duration {
+        let (layer, call) = call_with_search(due, ended);
+        drop(call);
+        layer.reserve.at(Instant::now())
+    }
+
+    #[test]
+    fn delay_of_an_answer_counts_from_the_end_of_its_search() {
+        let now = Instant::now();
+        let (hour, second) = (Duration::from_hours(1), Duration::from_secs(1));
+        let past = now.checked_sub(second).unwrap();
+        // A search that ended a second before, and had an hour left.
+        assert!(reserve_after(now + hour, Some(past)) > second);
+        // One that runs, dropped before it has to end.
+        assert!(reserve_after(now + hour, None) < second);
+        // A time before the start of the search counts as its start.
+        assert!(reserve_after(past, None) < second);
     }
 }

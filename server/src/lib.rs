@@ -6,6 +6,7 @@
 //! message into checked values or a list of everything that is wrong; `objects` finds the object with its search
 //! structures, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
 //! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response.
+//! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
 //!
 //! Before serving, `memory` compares what the configuration may use with the limits of the process, and
 //! `objects::directory` loads the folder of objects. Between calls, `atlases` builds atlases in the background.
@@ -16,7 +17,7 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! atlas_slots  budget  convention  error  health_check  limits  net
+//! atlas_slots  budget  convention  error  health_check  limits  net  reserve
 //! answer  call  config  executor  validate
 //! memory  objects
 //! atlases
@@ -43,6 +44,7 @@ mod limits;
 mod memory;
 mod net;
 mod objects;
+mod reserve;
 mod search;
 mod serve;
 mod services;

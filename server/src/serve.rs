@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
     sync::Arc,
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use grasp_assets::hands::{self, RIG_NAMES};
@@ -30,6 +30,7 @@ use crate::{
         directory::{self, DirectoryError},
         store::ObjectStore,
     },
+    reserve::DeadlineReserve,
     services::{GraspHandler, ObjectHandler, Shared},
 };
 
@@ -186,6 +187,10 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             executor,
+            reserve: Arc::new(DeadlineReserve::new(
+                config.budgets.minimum_reserve,
+                Instant::now(),
+            )),
             budgets: config.budgets,
             obj_limits,
             default_rig: config.default_rig,
@@ -255,6 +260,7 @@ impl Server {
                 in_flight: self.calls.clone(),
                 uploads: Arc::new(Semaphore::new(self.maximum_uploads.get())),
                 maximum_uploads: self.maximum_uploads.get(),
+                reserve: Arc::clone(&self.shared.reserve),
             })
             .add_service(grasps)
             .add_service(objects)

@@ -20,6 +20,7 @@ const SERVER: &[&[&str]] = &[
         "health_check",
         "limits",
         "net",
+        "reserve",
     ],
     &["answer", "call", "config", "executor", "validate"],
     &["memory", "objects"],

@@ -127,11 +127,11 @@ impl RawConfig {
                 1..=600_000,
                 defaults.maximum,
             ),
-            reserve: check.time(
+            minimum_reserve: check.time(
                 "deadline_reserve_ms",
                 self.deadline_reserve_ms,
                 0..=1000,
-                defaults.reserve,
+                defaults.minimum_reserve,
             ),
         };
         if budgets.default > budgets.maximum {

@@ -74,7 +74,7 @@ impl Default for Config {
                 default: Duration::from_secs(1),
                 maximum: Duration::from_secs(10),
                 // Timers of the runtime are up to 6 ms late while all cores search.
-                reserve: Duration::from_millis(5),
+                minimum_reserve: Duration::from_millis(5),
             },
             maximum_searches: non_zero(64),
             maximum_uploads: non_zero(4),

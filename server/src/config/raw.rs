@@ -36,7 +36,9 @@ pub struct RawConfig {
     /// Largest budget of a search, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_MAXIMUM_BUDGET_MS", value_name = "MS")]
     pub maximum_budget_ms: Option<u64>,
-    /// Part of a call's deadline reserved for the response, in milliseconds [default: 5].
+    /// Smallest part of a call's deadline reserved for the response, in milliseconds [default: 5].
+    ///
+    /// It grows with the delays of recent responses, up to three quarters of the deadline.
     #[arg(long, env = "GRASP_DEADLINE_RESERVE_MS", value_name = "MS")]
     pub deadline_reserve_ms: Option<u64>,
     /// Most searches running or waiting; others are rejected [default: 64].
@@ -164,7 +166,7 @@ impl From<&Config> for RawConfig {
             io_threads: count(config.io_threads.get()),
             default_budget_ms: time(config.budgets.default),
             maximum_budget_ms: time(config.budgets.maximum),
-            deadline_reserve_ms: time(config.budgets.reserve),
+            deadline_reserve_ms: time(config.budgets.minimum_reserve),
             maximum_searches: count(config.maximum_searches.get()),
             maximum_uploads: count(config.maximum_uploads.get()),
             maximum_object_bytes: count(config.maximum_object_bytes.get()),

@@ -23,12 +23,11 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-use super::slices::search_in_slices;
+use super::{progress::Progress, slices::search_in_slices};
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     atlases::KnownGrips,
     error::ServiceError,
-    executor::{Admission, SearchExecutor},
     objects::StoredObject,
     validate::FindQuery,
 };
@@ -50,6 +49,8 @@ pub(crate) struct FindJob {
     pub budget: Duration,
     /// How long the search continues for a first grasp if it finds none within the budget; at least the budget.
     pub patience: Duration,
+    /// Whether the call has a deadline, so that its answer must not wait for a search that ends late.
+    pub has_deadline: bool,
     /// Number of workers.
     pub workers: usize,
     /// Known grips of the object and the hand.
@@ -65,11 +66,13 @@ pub(crate) struct Answered {
     pub response: v1::FindGraspResponse,
     /// The grip if it was not known before, to be remembered.
     pub new_grip: Option<Entry>,
+    /// When the search ended, before the response was made.
+    pub ended: Instant,
 }
 
 /// A job whose holdout and settings are ready to be searched.
 #[derive(Debug)]
-struct PreparedJob {
+pub(super) struct PreparedJob {
     query: FindQuery,
     object: Arc<PreparedObject>,
     holdout: Holdout,
@@ -94,32 +97,10 @@ impl Clock for SinceArrival {
     }
 }
 
-/// Runs a job: looks known grips up on this thread if that is quick, else searches on the executor.
-///
-/// # Errors
-/// The giver's joints fold its skin, or the search was stopped or panicked.
-pub(crate) async fn find(
-    job: FindJob,
-    executor: &SearchExecutor,
-    admission: Admission,
-) -> Result<Answered, ServiceError> {
-    if !job.is_quick_if_known() {
-        let run = executor.run(admission, move |pool, stop| job.prepare()?.run(pool, stop));
-        return run.await?;
-    }
-    let mut job = job.prepare()?;
-    if let Some(answered) = job.look_up() {
-        return answered;
-    }
-    executor
-        .run(admission, move |pool, stop| job.run(pool, stop))
-        .await?
-}
-
 impl FindJob {
     /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames is
     /// not.
-    fn is_quick_if_known(&self) -> bool {
+    pub(super) fn is_quick_if_known(&self) -> bool {
         (self.known.atlas.is_some() || !self.known.recent.is_empty())
             && !self.query.is_replay
             && self.query.choice == Choice::FirstValid
@@ -127,11 +108,16 @@ impl FindJob {
             && !self.query.plan_key_frames
     }
 
+    /// When the search has to end, with or without a grasp.
+    pub(crate) fn due(&self) -> Instant {
+        self.arrived + self.patience
+    }
+
     /// Poses the giver's hand and makes the settings.
     ///
     /// # Errors
     /// The giver's joints fold its skin.
-    fn prepare(self) -> Result<PreparedJob, ServiceError> {
+    pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
         let query = self.query;
         let object_from_client = query.client_from_object.inverse();
@@ -209,7 +195,7 @@ impl FindJob {
 
 impl PreparedJob {
     /// Answers with a known grip if one is found quickly; otherwise [`PreparedJob::run`] continues where this stopped.
-    fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
+    pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         match find_known_grasp(self.task(), &self.settings, &self.clock, LOOK_UP_TIME) {
             LookUp::Found(outcome) => Some(self.answer(*outcome)),
             LookUp::NotFound { tried } => {
@@ -223,7 +209,12 @@ impl PreparedJob {
     ///
     /// # Errors
     /// The search was stopped.
-    fn run(&self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Answered, ServiceError> {
+    pub(super) fn run(
+        &self,
+        pool: &ThreadPool,
+        stop: &AtomicBool,
+        progress: &Progress,
+    ) -> Result<Answered, ServiceError> {
         let outcome = search_in_slices(
             pool,
             self.task(),
@@ -231,6 +222,7 @@ impl PreparedJob {
             self.patience,
             &self.clock,
             stop,
+            progress,
         );
         self.answer(outcome)
     }
@@ -243,9 +235,14 @@ impl PreparedJob {
         }
     }
 
-    fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
+    /// Makes the response of an outcome.
+    ///
+    /// # Errors
+    /// The search was stopped.
+    pub(super) fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
         let rig = &self.query.receiving_hand.rig;
-        let search_time = self.start.elapsed();
+        let ended = Instant::now();
+        let search_time = ended - self.start;
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
             let approach = self.settings.query.constraints.approach;
             let friction = self.settings.query.friction_on(&self.holdout.object);
@@ -262,6 +259,7 @@ impl PreparedJob {
         Ok(Answered {
             response: find_response(&outcome, rig, frame, &self.settings, circumstances)?,
             new_grip: self.new_grip(&outcome),
+            ended,
         })
     }
 

@@ -1,6 +1,9 @@
 //! Runs grasp searches on the threads of the executor.
 
+mod find;
 mod job;
+mod progress;
 mod slices;
 
-pub(crate) use job::{FindJob, find};
+pub(crate) use find::find;
+pub(crate) use job::FindJob;

@@ -12,12 +12,12 @@ use std::{
 use grasp_synthesis::{
     base::clock::Clock,
     known::recent_grips::RecentGrips,
-    model::{grasp::Grasp, strategy::Choice},
-    search::{
-        SearchEnd, SearchOutcome, SearchReport, find_grasp_in, prepare, scene::Task, settings::SearchSettings,
-    },
+    model::strategy::Choice,
+    search::{SearchEnd, SearchOutcome, find_grasp_in, prepare, scene::Task, settings::SearchSettings},
 };
 use rayon::ThreadPool;
+
+use super::progress::{Found, Progress};
 
 /// Target duration of a slice: short compared to a budget of a second, so that searches share the workers evenly, and
 /// long compared to the 50 µs that starting and joining the workers costs.
@@ -30,7 +30,7 @@ const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 const MOST_ATTEMPTS_PER_WORKER: u64 = 8192;
 
 /// Runs a search to its end. If it finds nothing by its deadline and `patience` ends later, it continues until then and
-/// takes the first valid grasp.
+/// takes the first valid grasp. Adds each slice to `progress`, which must be empty.
 pub(super) fn search_in_slices(
     pool: &ThreadPool,
     task: Task<'_>,
@@ -38,16 +38,13 @@ pub(super) fn search_in_slices(
     patience: Duration,
     clock: &dyn Clock,
     stop: &AtomicBool,
+    progress: &Progress,
 ) -> SearchOutcome {
     let scene = prepare(task, settings);
     let workers = settings.run.workers as u64;
-    let mut total = SearchReport::default();
     let mut slice = settings.clone();
     let mut left = settings.run.max_attempts;
     let mut per_worker = FIRST_ATTEMPTS_PER_WORKER;
-    let mut best: Option<(Grasp, f32)> = None;
-    // The last attempt that may replace a grasp without a clear type.
-    let mut replaceable_until = None;
     loop {
         slice.run.max_attempts = left.min(per_worker.saturating_mul(workers));
         let start = clock.now();
@@ -56,24 +53,16 @@ pub(super) fn search_in_slices(
         slice.known.atlas = None;
         slice.known.recent = RecentGrips::default();
         left -= slice.run.max_attempts;
-        let replaces = replaceable_until.is_some() && outcome.replaceable_until.is_none();
-        let is_better = outcome.grasp.is_some()
-            && (replaces || best.as_ref().is_none_or(|(_, value)| outcome.value > *value));
-        total.merge(outcome.report, is_better);
-        if is_better {
-            best = outcome.grasp.map(|grasp| (grasp, outcome.value));
-            replaceable_until = outcome.replaceable_until;
+        let end = outcome.end;
+        let found = progress.add(outcome, &slice.run);
+        if let Found::Replaceable { attempts } = found {
+            left = left.min(attempts);
         }
-        // The first valid grasp ends the search unless the best is wanted, or one with a clear type may replace it.
-        let next = slice.run.first_attempt + slice.run.max_attempts;
-        let open = replaceable_until.map_or(0, |last| (last + 1).saturating_sub(next));
-        let is_enough = best.is_some() && slice.query.choice == Choice::FirstValid && open == 0;
-        if best.is_some() && open > 0 {
-            left = left.min(open);
-        }
-        let is_stopped = outcome.end == SearchEnd::Stopped || stop.load(Ordering::Relaxed);
-        let is_late = outcome.end == SearchEnd::DeadlinePassed || has_passed(slice.run.deadline, clock);
-        let goes_on = best.is_none() && slice.run.deadline < Some(patience);
+        // The first valid grasp ends the search unless the best is wanted.
+        let is_enough = found == Found::Settled && slice.query.choice == Choice::FirstValid;
+        let is_stopped = end == SearchEnd::Stopped || stop.load(Ordering::Relaxed);
+        let is_late = end == SearchEnd::DeadlinePassed || has_passed(slice.run.deadline, clock);
+        let goes_on = found == Found::Nothing && slice.run.deadline < Some(patience);
         if is_late && goes_on && !is_stopped && left > 0 {
             slice.query.choice = Choice::FirstValid;
             slice.run.deadline = Some(patience);
@@ -81,27 +70,7 @@ pub(super) fn search_in_slices(
             slice.known.atlas.clone_from(&settings.known.atlas);
             slice.known.recent.clone_from(&settings.known.recent);
         } else if is_enough || is_stopped || is_late || left == 0 {
-            if slice.run.reproducible && is_late && open > 0 {
-                // An attempt that did not run might have replaced it.
-                best = None;
-                replaceable_until = None;
-            }
-            if best.is_some() {
-                // The nearest miss is reported only if there is no grasp.
-                total.nearest_miss = None;
-            }
-            let end = match (&best, outcome.end) {
-                (_, SearchEnd::Stopped) => SearchEnd::Stopped,
-                (Some(_), _) => SearchEnd::Found,
-                (None, end) => end,
-            };
-            return SearchOutcome {
-                end,
-                value: best.as_ref().map_or(0.0, |(_, value)| *value),
-                replaceable_until,
-                grasp: best.map(|(grasp, _)| grasp),
-                report: total,
-            };
+            return progress.outcome(if is_late { SearchEnd::DeadlinePassed } else { end });
         }
         slice.run.first_attempt += slice.run.max_attempts;
         per_worker = next_size(per_worker, clock.now().saturating_sub(start));
@@ -174,7 +143,9 @@ mod tests {
         let clock = ReadingsClock::default();
         let patience = Duration::from_micros(patience);
         let stop = AtomicBool::new(false);
-        let outcome = search_in_slices(&pool, task, &settings, patience, &clock, &stop);
+        let progress = Progress::default();
+        let outcome = search_in_slices(&pool, task, &settings, patience, &clock, &stop, &progress);
+        assert_eq!(progress.outcome(outcome.end).report, outcome.report);
         (outcome, clock.0.into_inner())
     }
 

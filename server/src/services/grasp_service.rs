@@ -3,7 +3,7 @@
 use std::{
     hash::{BuildHasher as _, RandomState},
     sync::Arc,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use grasp_proto::v1::{self, grasp_service_server::GraspService};
@@ -41,7 +41,10 @@ impl GraspHandler {
         call.log_object(&query.object_id);
         let stored = shared.objects.get(&query.object_id)?;
         let object = Arc::clone(&stored.object);
-        let effective = |requested| effective_budget(requested, shared.budgets, call.arrived, call.deadline);
+        let reserve = shared.reserve.at(Instant::now());
+        call.log_reserve(reserve);
+        let effective =
+            |requested| effective_budget(requested, shared.budgets, reserve, call.arrived, call.deadline);
         let budget = effective(query.budget);
         if budget.is_zero() {
             return Err(ServiceError::DeadlineExceeded);
@@ -59,6 +62,7 @@ impl GraspHandler {
             } else {
                 budget
             },
+            has_deadline: call.deadline.is_some(),
             workers: shared.executor.workers(),
             mechanisms: shared.mechanisms,
             known: if uses_atlas {
@@ -68,7 +72,9 @@ impl GraspHandler {
             },
             query,
         };
+        call.search_is_due(job.due());
         let answered = search::find(job, &shared.executor, admission).await?;
+        call.search_ended(answered.ended);
         if let Some(grip) = answered.new_grip.filter(|_| uses_atlas) {
             shared.atlases.remember(&stored, hand, grip);
         }

@@ -11,7 +11,10 @@ use grasp_synthesis::base::mechanisms::Mechanisms;
 pub(crate) use grasp_service::GraspHandler;
 pub(crate) use object_service::ObjectHandler;
 
-use crate::{atlases::Atlases, budget::BudgetLimits, executor::SearchExecutor, objects::store::ObjectStore};
+use crate::{
+    atlases::Atlases, budget::BudgetLimits, executor::SearchExecutor, objects::store::ObjectStore,
+    reserve::DeadlineReserve,
+};
 
 /// State shared by the handlers.
 #[derive(Debug)]
@@ -24,6 +27,8 @@ pub(crate) struct Shared {
     pub executor: SearchExecutor,
     /// Bounds on search times.
     pub budgets: BudgetLimits,
+    /// The part of deadlines kept for answers.
+    pub reserve: Arc<DeadlineReserve>,
     /// Bounds on meshes.
     pub obj_limits: MeshLimits,
     /// Rig of the receiving hand if a request names none.

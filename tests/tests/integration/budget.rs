@@ -104,7 +104,8 @@ async fn without_a_budget_a_search_for_the_best_continues_for_the_first() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_deadline_less_the_reserve_bounds_the_budget() {
-    let server = TestServer::start_with(|config| config.budgets.reserve = Duration::from_millis(1400)).await;
+    let server =
+        TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::from_millis(1900)).await;
     let mut request = Request::new(v1::FindGraspRequest {
         budget: Some(seconds(10)),
         ..impossible(&server).await
@@ -113,8 +114,29 @@ async fn the_deadline_less_the_reserve_bounds_the_budget() {
     let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
     let answer = answer.expect("the answer comes before the deadline").into_inner();
     assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
-    // Half of the remaining time, as the reserve would take more.
-    assert_eq!(answer.report.unwrap().budget, Some(seconds(1)));
+    // A quarter of the deadline, as the reserve would take more.
+    assert_eq!(answer.report.unwrap().budget, Some(milliseconds(500)));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_reserve_grows_with_the_delays_of_answers() {
+    let server = TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::ZERO).await;
+    let message = v1::FindGraspRequest {
+        max_attempts: Some(1),
+        ..impossible(&server).await
+    };
+    let mut budgets = Vec::new();
+    for _ in 0..2 {
+        let mut request = Request::new(message.clone());
+        request.set_timeout(Duration::from_millis(500));
+        let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
+        let budget = answer.unwrap().into_inner().report.unwrap().budget.unwrap();
+        budgets.push(budget.nanos);
+    }
+    // No delay was known to the first; that of its answer, over threads and through the codec, exceeds a microsecond.
+    assert!((499_990_000..=500_000_000).contains(&budgets[0]), "{budgets:?}");
+    assert!((125_000_000..budgets[0]).contains(&budgets[1]), "{budgets:?}");
     server.stop().await;
 }
 

@@ -180,8 +180,9 @@ fn answers_every_request_that_passes_validation() {
         searched.set(counts);
         let budgets = config::Config::default().budgets;
         let job = FindJob {
-            budget: effective_budget(query.budget, budgets, arrived, None),
+            budget: effective_budget(query.budget, budgets, budgets.minimum_reserve, arrived, None),
             patience: Duration::ZERO,
+            has_deadline: false,
             query,
             object: Arc::clone(&object.object),
             stored: Arc::new(object),
@@ -193,7 +194,7 @@ fn answers_every_request_that_passes_validation() {
         };
         match job
             .prepare()
-            .and_then(|job| job.run(&pool, &AtomicBool::new(false)))
+            .and_then(|job| job.run(&pool, &AtomicBool::new(false), &Progress::default()))
         {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.expect("every answer has a report");
