@@ -102,7 +102,7 @@ async fn ask(object: EverydayObject, plan: &Plan, client: &GraspClient) -> Resul
 
 fn new_object(object: &EverydayObject) -> NewObject {
     NewObject {
-        centre_of_mass: object.centre_of_mass().as_ref().map(DVec3::as_vec3),
+        centre_of_mass: object.centre_of_mass().map(DVec3::as_vec3),
         friction: Some(object.surface.friction() as f32),
         forbidden: ForbiddenSurfaces {
             groups: object.forbidden.iter().map(|&group| group.to_owned()).collect(),

@@ -40,7 +40,10 @@ fn page(asked: &[Asked], budget: Duration) -> String {
         human_time(budget.as_secs_f64())
     );
     for section in Section::ALL {
-        let here: Vec<_> = asked.iter().filter(|asked| Section::of(asked) == section).collect();
+        let here: Vec<_> = asked
+            .iter()
+            .filter(|asked| Section::of(asked) == section)
+            .collect();
         let _ = write!(html, "<h2>{}: {}</h2>\n<main>\n", section.title(), here.len());
         for asked in here {
             write_figure(&mut html, asked);
