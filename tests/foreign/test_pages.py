@@ -7,7 +7,7 @@ import pytest
 from conftest import ROOT
 
 SERVER_PAGE = ROOT / "server/README.md"
-PAGES = ["server/README.md", "tests/README.md", "tests/quality/README.md"]
+PAGES = ["server/README.md", "tests/README.md", "tests/quality/README.md", "tests/quality/everyday/README.md"]
 
 
 @pytest.mark.parametrize("page", PAGES)

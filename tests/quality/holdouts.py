@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+import everyday
 import hand as hands
 from hand import ROOT, Hand
 from mesh import Mesh, thinned
@@ -46,14 +47,17 @@ def mesh_file(name):
     """The file of an object's mesh."""
     if name in BUILT_IN:
         return ROOT / "assets/objects" / f"{name}.obj"
+    if name not in REAL:
+        return everyday.mesh_file(name)
     return data_folder() / "objects" / f"{name}.obj"
 
 
-def forbidden_triangles(name, mesh):
-    """Indices of the triangles that may not be touched."""
-    if name not in BUILT_IN:
-        return np.empty(0, np.int64)
-    groups = json.loads((ROOT / "assets/objects" / f"{name}.json").read_text())["forbidden_groups"]
+def forbidden_triangles(name, mesh, thing=None):
+    """Indices of the triangles that may not be touched; `thing` is the everyday object, if it is one."""
+    if name in BUILT_IN:
+        groups = json.loads((ROOT / "assets/objects" / f"{name}.json").read_text())["forbidden_groups"]
+    else:
+        groups = thing.forbidden if thing else []
     return np.flatnonzero(np.isin(mesh.groups, groups))
 
 

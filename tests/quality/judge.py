@@ -16,6 +16,7 @@ import time
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+import everyday
 import holdouts
 import measures
 import pool
@@ -33,7 +34,9 @@ def arguments():
     parser.add_argument("--sample", type=int, default=10, help="random holdouts per object (default: 10)")
     parser.add_argument("--seeds", type=int, default=1, help="searches per built-in holdout (default: 1)")
     parser.add_argument(
-        "--objects", default="all", help="all, built-in, real, or comma-separated names, such as remote,osim_mug"
+        "--objects",
+        default="all",
+        help="all (built-in and real), built-in, real, everyday, or comma-separated names, such as remote,osim_mug,pan",
     )
     parser.add_argument("--validity", help="validity of the requests, such as thesis (default: the server's)")
     parser.add_argument("--strategy", help="strategy of the requests, such as F (default: the server's)")
@@ -60,23 +63,37 @@ def arguments():
 
 
 def chosen_objects(wanted):
-    """The names of the chosen objects; prints why real ones are skipped if there is no data."""
+    """The names of the chosen objects, and all everyday objects by name if one of those is chosen.
+
+    Prints why real ones are skipped if there is no data.
+    """
     real = sorted(holdouts.REAL) if holdouts.data_folder() else []
     known = {"built-in": holdouts.BUILT_IN, "real": real, "all": holdouts.BUILT_IN + real}
-    if wanted != "built-in" and not real:
-        print("SKIPPED real objects and recorded givers: no data (set GRASP_TEST_DATA to their folder)")
     names = known.get(wanted) or wanted.split(",")
+    if wanted not in ("built-in", "everyday") and not real:
+        print("SKIPPED real objects and recorded givers: no data (set GRASP_TEST_DATA to their folder)")
+    if set(names) <= set(known["all"]):
+        return names, {}
+    things = everyday.things()
+    if wanted == "everyday":
+        names = [name for name, thing in things.items() if not thing.beyond]
     for name in names:
-        if name not in known["all"]:
-            raise SystemExit(f"unknown object {name!r}; must be one of {', '.join(known['all'])}")
-    return names
+        if name not in known["all"] and name not in things:
+            choices = ", ".join([*known["all"], *things])
+            raise SystemExit(f"unknown object {name!r}; must be one of {choices}")
+    return names, things
 
 
-def cases(name, service, options, givers):
-    """Yields the requests on one object, each with a label and the scene that judging needs."""
+def cases(name, service, options, givers, thing):
+    """Yields the requests on one object, each with a label and the scene that judging needs.
+
+    `givers` are hands to place on the object; or, on an everyday one, `thing`, those that hold it.
+    """
     mesh = holdouts.load_mesh(name)
     if name in holdouts.BUILT_IN:
         description = service.object(name)
+    elif thing:
+        description = everyday.create(service, thing)
     else:
         description = service.create(name.replace("_", "-").lower(), holdouts.mesh_file(name), holdouts.REAL[name])
     requests = []
@@ -84,9 +101,11 @@ def cases(name, service, options, givers):
         for holdout in holdouts.built_in_holdouts(name):
             for turn in range(options.seeds):
                 requests.append((f"{holdout}", built_in_request(holdout), options.seed + turn))
+    if thing:
+        requests += everyday.requests(thing, givers, options.seed)
     # One random stream per holdout, so that adding an object or a holdout changes no other.
-    placer = holdouts.Placer(mesh)
-    for i in range(options.sample):
+    placer = None if thing else holdouts.Placer(mesh)
+    for i in range(0 if thing else options.sample):
         random = np.random.default_rng([options.seed, i, *name.encode()])
         request = holdouts.random_request(description["name"], placer, givers, random)
         requests.append((f"random {i}", request, int(random.integers(2**31))))
@@ -103,7 +122,7 @@ def cases(name, service, options, givers):
             centre_of_mass=np.array(description["centre_of_mass"]),
             friction=description["friction"],
             reach=float(np.linalg.norm(description["box_half_extents"])),
-            forbidden=holdouts.forbidden_triangles(name, mesh),
+            forbidden=holdouts.forbidden_triangles(name, mesh, thing),
             rotation=Rotation.from_quat(pose["orientation"]),
             translation=np.array(pose["position"]),
             up=np.array(request.get("up") or [0.0, 1.0, 0.0]),
@@ -134,9 +153,18 @@ def ask(service, request, options, **picture):
     return answer, in_time
 
 
-def collect(names, options):
+def everyday_givers(names, things, options):
+    """Givers of the everyday objects by name, from a server of their own: that which is judged must not know them."""
+    chosen = [things[name] for name in names if name in things]
+    if not chosen:
+        return {}
+    with Service(options.workers, "--builder-threads", "0") as service:
+        return everyday.make_givers(service, chosen, options.seed)
+
+
+def collect(names, things, options):
     """Requests all grasps. Returns a row per holdout, and the replies to judge by the index of their row."""
-    givers = holdouts.recorded_hands()
+    recorded, everyday_hands = holdouts.recorded_hands(), everyday_givers(names, things, options)
     pictures = options.out / "pictures"
     pictures.mkdir(parents=True, exist_ok=True)
     for old in pictures.glob("*.png"):
@@ -148,11 +176,14 @@ def collect(names, options):
             service.wait_for_atlases(name for name in names if name in holdouts.BUILT_IN)
         for name in pool.Progress("objects requested").over(names):
             mesh_file = None if name in holdouts.BUILT_IN else holdouts.mesh_file(name)
-            for label, request, scene in cases(name, service, options, givers):
+            thing = things.get(name)
+            givers = everyday_hands[name] if thing else recorded
+            for label, request, scene in cases(name, service, options, givers, thing):
                 picture = pictures / f"{name}-{drawn[name]:02}.png"
                 wanted = {"picture": picture, "mesh": mesh_file} if drawn[name] < share else {}
                 answer, in_time = ask(service, request, options, **wanted)
                 row = {"object": name, "holdout": label, "seed": request["seed"], "found": answer["grasp"] is not None}
+                row["everyday"] = thing is not None
                 row["search_ms"] = 1000 * answer["report"]["search_time_seconds"]
                 row["round_trip_ms"] = 1000 * answer["round_trip_seconds"]
                 row["in_time"] = in_time and row["search_ms"] <= 1000 * BUDGET_SECONDS
@@ -175,7 +206,8 @@ def collect(names, options):
 def main():
     options = arguments()
     began = time.monotonic()
-    rows, replies = collect(chosen_objects(options.objects), options)
+    names, things = chosen_objects(options.objects)
+    rows, replies = collect(names, things, options)
     # Judging takes all cores, so it starts after the server has ended: it would delay searches.
     judged = pool.judge_all(list(replies.values()), options.jobs, not options.no_simulation)
     for row, found in zip(replies, judged):
@@ -183,7 +215,7 @@ def main():
     targets = report.targets(rows)
     print()
     print(report.table(targets))
-    report.write(options.out, rows, targets, vars(options))
+    report.write(options.out, rows, targets, vars(options), everyday.table(rows, things))
     print(f"\n{len(rows)} holdouts in {time.monotonic() - began:.0f} s; the report is {options.out}/README.md")
     if not any(row["found"] for row in rows):
         raise SystemExit("no grasp was found, so there is nothing to judge")

@@ -129,6 +129,15 @@ class Mesh:
                     groups.append(group)
         return cls(vertices, faces, groups)
 
+    def closed(self):
+        """Whether the surface encloses a volume: along every edge run as many triangles one way as the other."""
+        _, merged = np.unique(np.round(self.vertices, 7), axis=0, return_inverse=True)
+        corners = merged.ravel()[self.faces]
+        edges = np.concatenate([corners[:, [i, (i + 1) % 3]] for i in range(3)])
+        turns = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+        _, of_edge = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+        return not np.bincount(of_edge.ravel(), weights=turns).any()
+
     def winding(self, points):
         """How often the surface winds round each point: 1 inside a closed surface, 0 outside."""
         return _winding(np.ascontiguousarray(points, float).reshape(-1, 3), self.triangles)

@@ -41,7 +41,7 @@ def judged(case, simulated):
     """All measures of a case by name."""
     case.scene.mesh = mesh_of(case.object)
     row = measures.judge(case.scene, case.grasp)
-    if simulated:
+    if simulated and case.scene.mesh.closed():
         row.update(survival(case.scene, case.grasp))
     if case.drawing:
         matplotlib.image.imsave(case.drawing, draw.picture(case.scene, case.grasp))
@@ -69,8 +69,9 @@ def survival(scene, grasp):
 
 
 def decomposed(name):
-    """Makes the convex pieces of an object and caches them."""
-    convex.pieces(mesh_of(name))
+    """Makes the convex pieces of an object and caches them. Sheets of no thickness have none and are not simulated."""
+    if mesh_of(name).closed():
+        convex.pieces(mesh_of(name))
 
 
 def judge_all(cases, jobs, simulated):

@@ -9,6 +9,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+import everyday
 import measures
 import relations
 
@@ -43,6 +44,7 @@ def targets(rows):
     share = 100 * in_time / n if n else 0.0
     figure = f"{share:.1f} % ({in_time} of {n}; {len(rows) - n} more have none)"
     lines.append(Target("answered within 50 ms (search), where there is any", "≥ 99.5 %", figure, share >= 99.5))
+    lines += within_reach(rows)
     if n == 0:
         return lines
     in_time = sum(row["round_trip_in_time"] for row in rows)
@@ -89,6 +91,18 @@ def targets(rows):
     return lines
 
 
+def within_reach(rows):
+    """How much of what one hand can take is answered in time; nothing without everyday objects."""
+    lines = []
+    kinds = [("alone", everyday.ALONE), ("with a giver who leaves room", everyday.GIVEN)]
+    for (kind, least), (asked, in_time) in zip(kinds, everyday.shares(rows)):
+        if asked:
+            share = 100 * in_time / asked
+            figure = f"{share:.1f} % ({in_time} of {asked})"
+            lines.append(Target(f"everyday objects, {kind}, within 50 ms", f"≥ {least} %", figure, share >= least))
+    return lines
+
+
 def sound_share(rows):
     """The share of the found grasps that have no fault."""
     found = [row for row in rows if row["found"]]
@@ -97,7 +111,8 @@ def sound_share(rows):
 
 def held(found):
     """How many grasps survive in the physics engine; nothing without a simulation."""
-    if "survives_gravity" not in found[0]:
+    found = [row for row in found if "survives_gravity" in row]
+    if not found:
         return []
     lines = []
     for name, measure, least in [
@@ -177,7 +192,7 @@ def markdown(lines):
     return "\n".join(rows)
 
 
-def write(folder, rows, lines, options):
+def write(folder, rows, lines, options, everyday_table=""):
     """Writes the report of a run: CSV, Markdown, plots and contact sheet."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     with open(folder / "grasps.csv", "w", newline="", encoding="utf-8") as file:
@@ -189,12 +204,16 @@ def write(folder, rows, lines, options):
     given = ", ".join(f"{key} {value}" for key, value in options.items() if key not in ("out", "strict") and value)
     text += [f"{len(rows)} holdouts, {len(found)} grasps judged; {given}. Every grasp: [grasps.csv](grasps.csv).", ""]
     text += [markdown(lines), ""]
+    if everyday_table:
+        text += ["## Everyday objects", "", everyday_table, ""]
     if found:
         text += ["## By object", "", by_object(rows), ""]
-        if "survives_gravity" in found[0]:
-            text += ["## Survival by epsilon", "", relations.survival_by_epsilon(found), ""]
-        text += ["## Comfort E against the verdict", "", relations.comfort_and_verdict(found, acceptable, faults), ""]
-        relations.scatter(folder / "comfort.svg", found, acceptable)
+        # Sheets of no thickness are not simulated.
+        rated = [row for row in found if "survives_gravity" in row] or found
+        if "survives_gravity" in rated[0]:
+            text += ["## Survival by epsilon", "", relations.survival_by_epsilon(rated), ""]
+        text += ["## Comfort E against the verdict", "", relations.comfort_and_verdict(rated, acceptable, faults), ""]
+        relations.scatter(folder / "comfort.svg", rated, acceptable)
         text += ["![E against epsilon, by verdict](comfort.svg)", ""]
         if any("type" in row for row in found):
             text += ["## Types", "", relations.types(found), ""]
@@ -229,10 +248,11 @@ def by_object(rows):
         cells.append(f"{np.median(depth):.1f} / {max(depth):.1f}")
         cells.append(share(lambda row: row["imbalance"] <= 0.02 and not row["force_outside_cone"]))
         cells += [share(lambda row: not row["giver_touched"]), share(acceptable)]
-        if simulated:
+        if "survives_gravity" in found[0]:
             cells.append(share(lambda row: row["survives_gravity"]))
             cells.append(f"{100 * np.mean([row['survives_pushes'] for row in found]) / 6:.0f} %")
             cells.append(share(lambda row: row["survives_all"]))
+        cells += [""] * (len(heads) - len(cells))
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

@@ -17,12 +17,13 @@ EXHAUSTED = 3
 class Service:
     """A running server, as a context manager."""
 
-    def __init__(self, workers=None):
+    def __init__(self, workers=None, *more):
         command = [ROOT / "target/release/grasp-server", "--listen", "127.0.0.1:0", "--log", "grasp_server=info"]
         # Complete atlases are grown once and shared with the Rust tests and benches.
         command += ["--atlas-directory", ROOT / "target/atlases"]
         if workers:
             command += ["--workers", str(workers)]
+        command += more
         self.process = subprocess.Popen(
             command,
             stdout=subprocess.DEVNULL,
@@ -58,9 +59,9 @@ class Service:
             raise RuntimeError(f"grasp {arguments[0]} exited with {done.returncode}: {done.stderr.strip()}")
         return json.loads(done.stdout)
 
-    def create(self, identifier, path, mass):
-        """Creates an object from a file and returns the server's description of it."""
-        return self._client("objects", "create", identifier, "--obj", path, "--mass", mass)
+    def create(self, identifier, path, mass, *more):
+        """Creates an object from a file and returns the server's description of it; `more` are options of the client."""
+        return self._client("objects", "create", identifier, "--obj", path, "--mass", mass, *more)
 
     def object(self, name):
         """The server's description of an object."""

@@ -1,18 +1,18 @@
 //! Scissors, scalpel and remote: the objects of thesis 5.1, with the thesis' masses and about its triangle counts.
 
-mod builder;
 mod remote;
 mod scalpel;
 mod scissors;
 
-use std::fmt::Write as _;
-
 use glam::{Quat, Vec3};
 use grasp_assets::objects::{Manifest, ManifestBox};
-use grasp_synthesis::{geometry::oriented_box::OrientedBox, model::object::THESIS_FRICTION};
+use grasp_mesh_builder::Shape;
+use grasp_synthesis::{
+    geometry::{mesh::TriangleMesh, oriented_box::OrientedBox},
+    model::object::THESIS_FRICTION,
+};
 
 use crate::AssetFile;
-use builder::Shape;
 
 /// Properties that do not follow from a mesh.
 struct About {
@@ -86,8 +86,9 @@ fn files(about: &About) -> [AssetFile; 2] {
     };
     let mut json = serde_json::to_vec_pretty(&manifest).expect("a manifest is plain data");
     json.push(b'\n');
+    let comment = format!("{name}, in metres; made by grasp-assets-generator");
     [
-        (format!("objects/{name}.obj"), obj(name, &shape).into_bytes()),
+        (format!("objects/{name}.obj"), shape.obj(&comment).into_bytes()),
         (format!("objects/{name}.json"), json),
     ]
 }
@@ -100,7 +101,7 @@ fn oriented_box(shape: &Shape) -> ManifestBox {
     let OrientedBox {
         object_from_box,
         half_extents,
-    } = OrientedBox::around(&shape.mesh());
+    } = OrientedBox::around(&mesh(shape));
     ManifestBox {
         centre_m: object_from_box.position.to_array().map(rounded).into(),
         orientation: Quat::from_array(object_from_box.orientation.to_array().map(rounded)),
@@ -108,29 +109,15 @@ fn oriented_box(shape: &Shape) -> ManifestBox {
     }
 }
 
-/// The mesh as OBJ text in metres with six decimals.
-fn obj(name: &str, shape: &Shape) -> String {
-    let mut text = format!("# {name}, in metres; made by grasp-assets-generator\n");
-    let mut line = |arguments: std::fmt::Arguments<'_>| {
-        text.write_fmt(arguments).expect("a string takes any text");
-    };
-    for vertex in &shape.micrometres {
-        let [x, y, z] = vertex.map(metres);
-        line(format_args!("v {x} {y} {z}\n"));
-    }
-    for (group, triangles) in &shape.groups {
-        line(format_args!("g {group}\n"));
-        for triangle in triangles {
-            let [a, b, c] = triangle.map(|vertex| vertex + 1);
-            line(format_args!("f {a} {b} {c}\n"));
-        }
-    }
-    text
-}
-
-/// Whole micrometres as metres with six decimals.
-fn metres(micrometres: i64) -> String {
-    let sign = if micrometres < 0 { "-" } else { "" };
-    let size = micrometres.unsigned_abs();
-    format!("{sign}{}.{:06}", size / 1_000_000, size % 1_000_000)
+/// The mesh as the synthesis takes it.
+fn mesh(shape: &Shape) -> TriangleMesh {
+    let metres = |vertex: &[i64; 3]| Vec3::from(vertex.map(|coordinate| (coordinate as f64 * 1e-6) as f32));
+    let triangles = shape.groups.iter().flat_map(|(_, triangles)| triangles);
+    TriangleMesh::new(
+        shape.micrometres.iter().map(metres).collect(),
+        triangles
+            .map(|triangle| triangle.map(|vertex| vertex as u32))
+            .collect(),
+    )
+    .expect("the shapes have sound triangles")
 }

@@ -7,8 +7,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3};
-
-use super::builder::{MeshBuilder, Ring, Shape, on_rounded_rectangle, sin_cos_degrees};
+use grasp_mesh_builder::{MeshBuilder, Ring, Shape, on_rounded_rectangle, sin_cos_degrees};
 
 /// Everything but the buttons.
 const BODY: &str = "body";

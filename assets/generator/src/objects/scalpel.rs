@@ -4,8 +4,7 @@
 //! One loft along the long axis with 16 vertices per cross-section. The blade's edge looks toward +X.
 
 use glam::{DVec2, DVec3};
-
-use super::builder::{MeshBuilder, Ring, Shape, on_rounded_rectangle, sin_cos_degrees};
+use grasp_mesh_builder::{MeshBuilder, Ring, Shape, on_rounded_rectangle, sin_cos_degrees};
 
 /// Handle and the blade's flats.
 const BODY: &str = "body";

@@ -4,8 +4,7 @@
 //! and once at each finger ring, whose ends meet again at the fork.
 
 use glam::{DVec2, DVec3};
-
-use super::builder::{MeshBuilder, Ring, Shape, fork, sin_cos_degrees};
+use grasp_mesh_builder::{MeshBuilder, Ring, Shape, fork, sin_cos_degrees};
 
 /// The only group.
 const BODY: &str = "body";

@@ -2,25 +2,36 @@
 
 use std::path::{Path, PathBuf};
 
-use grasp_client::Outcome;
 use grasp_scene::{Image, contact_sheet};
 
-use super::{Asked, demo_progress::DemoProgress};
+use super::demo_progress::DemoProgress;
 use crate::{
     blocking,
     failure::Failure,
-    picture::{Model, Picture, write_file},
+    picture::{Picture, write_file},
     values::ViewSize,
 };
 
-/// Pixels of a view in the overview, unless the pictures are smaller: a row of five fills a wide screen.
-const SMALL_VIEW: ViewSize = ViewSize {
-    width: 480,
-    height: 400,
-};
+/// What to draw.
+#[derive(Debug)]
+pub(super) struct Drawing {
+    /// Name of the files.
+    pub(super) name: String,
+    /// Line below it in the overview.
+    pub(super) caption: String,
+    pub(super) picture: Picture,
+}
 
-/// Pictures per row of the overview: the number of holdouts per object, which gives each object a row.
-const COLUMNS: usize = 5;
+/// The sizes of the pictures.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    /// Pixels of each of a picture's two views.
+    pub(super) view_size: ViewSize,
+    /// Pixels of a view in the overview, unless the pictures are smaller.
+    pub(super) small_view: ViewSize,
+    /// Pictures per row of the overview.
+    pub(super) columns: usize,
+}
 
 /// The files written.
 #[derive(Debug)]
@@ -32,14 +43,15 @@ pub(super) struct Drawn {
 
 /// Writes a picture and a scene of each answer, and an overview picture.
 pub(super) async fn draw_all(
-    asked: &[Asked],
+    drawings: Vec<Drawing>,
     folder: &Path,
-    size: ViewSize,
+    layout: Layout,
     progress: &DemoProgress,
 ) -> Result<Drawn, Failure> {
+    let size = layout.view_size;
     let small_size = ViewSize {
-        width: size.width.min(SMALL_VIEW.width),
-        height: size.height.min(SMALL_VIEW.height),
+        width: size.width.min(layout.small_view.width),
+        height: size.height.min(layout.small_view.height),
     };
     let mut drawn = Drawn {
         pictures: Vec::new(),
@@ -47,12 +59,15 @@ pub(super) async fn draw_all(
         overview: None,
     };
     let mut small_pictures = Vec::new();
-    for asked in asked {
-        let name = &asked.holdout.name;
+    for Drawing {
+        name,
+        caption,
+        picture,
+    } in drawings
+    {
         progress.step(&format!("drawing {name}"));
         let png = folder.join(format!("{name}.png"));
         let glb = folder.join(format!("{name}.glb"));
-        let picture = picture_of(asked)?;
         let (png_path, glb_path) = (png.clone(), glb.clone());
         let small = blocking(move || {
             write_file(&png_path, &picture.draw(size)?.to_png())?;
@@ -60,37 +75,27 @@ pub(super) async fn draw_all(
             picture.draw_best_view(small_size)
         })
         .await?;
-        small_pictures.push((small, caption(asked)));
+        small_pictures.push((small, caption));
         drawn.pictures.push(png);
         drawn.scenes.push(glb);
     }
     progress.step("drawing the overview");
-    drawn.overview = write_overview(small_pictures, folder).await?;
+    drawn.overview = write_overview(small_pictures, folder, layout.columns).await?;
     Ok(drawn)
 }
 
-async fn write_overview(pictures: Vec<(Image, String)>, folder: &Path) -> Result<Option<PathBuf>, Failure> {
+async fn write_overview(
+    pictures: Vec<(Image, String)>,
+    folder: &Path,
+    columns: usize,
+) -> Result<Option<PathBuf>, Failure> {
     let path = folder.join("overview.png");
     blocking(move || {
-        let Some(sheet) = contact_sheet(&pictures, COLUMNS) else {
+        let Some(sheet) = contact_sheet(&pictures, columns) else {
             return Ok(None);
         };
         write_file(&path, &sheet.to_png())?;
         Ok(Some(path))
     })
     .await
-}
-
-fn picture_of(asked: &Asked) -> Result<Picture, Failure> {
-    let object = &asked.request.object;
-    let model = Model::built_in(object)
-        .ok_or_else(|| Failure::Usage(format!("{object} is not built in, so it cannot be drawn")))?;
-    Ok(Picture::new(model, asked.request.clone())?.with_grasp(asked.answer.grasp.clone()))
-}
-
-fn caption(asked: &Asked) -> String {
-    match asked.answer.outcome {
-        Outcome::Found => asked.holdout.name.clone(),
-        Outcome::BudgetExhausted => format!("{}: no grasp", asked.holdout.name),
-    }
 }

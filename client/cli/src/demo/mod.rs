@@ -2,6 +2,7 @@
 
 mod demo_progress;
 mod draw;
+mod everyday;
 mod local_server;
 mod results;
 
@@ -22,9 +23,11 @@ use crate::{
     failure::Failure,
     holdout,
     output::Output,
+    picture::{Model, Picture},
     values::{StrategyName, ViewSize, parse_duration, parse_view_size},
 };
 use demo_progress::DemoProgress;
+use draw::{Drawing, Layout};
 
 const ABOUT: &str = r#"Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
 
@@ -32,21 +35,37 @@ The server listens on a free port of the loopback interface and answers over rea
 search; the output folder receives a picture (PNG) and a scene (GLB) per holdout, and overview.png with all of them.
 
 With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "outcome", "grasp",
-"report", "round_trip_seconds"}]}, the last four as `grasp find --json` writes them."#;
+"report", "round_trip_seconds"}]}, the last four as `grasp find --json` writes them.
+
+With --everyday, the service takes a hundred everyday objects instead, from a needle to a chair, that nobody holds out. Each is
+created and requested at once with the default settings, so no search has an atlas. The folder receives index.html, a page
+of all pictures that also says what is beyond one hand and why. A grasp that is not found in time is a result: the exit
+code is 0. In the output of --json, "one_hand" objects are within one hand and "found" of these have a grasp, "page" is the
+page, and each of "grasps" has "what", "mass_kg" and "beyond_one_hand", null or the reason, instead of "holdout"."#;
+
+/// How the pictures of holdouts are laid out: a row of five in the overview fills a wide screen and gives each object a row.
+const SMALL_VIEW: ViewSize = ViewSize {
+    width: 480,
+    height: 400,
+};
+const COLUMNS: usize = 5;
 
 /// Time limit for the server to load the built-in atlases, usually done in some tenths of a second. Without them, searches
 /// start from scratch.
 const ATLAS_LOAD_TIME: Duration = Duration::from_secs(10);
 
-/// Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
+/// Ask a server inside this process for a grasp on every built-in holdout or everyday object, and draw the grasps.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 pub(crate) struct Arguments {
-    /// The folder for pictures and scenes.
-    #[arg(long, value_name = "FOLDER", default_value = "target/demo")]
-    out: PathBuf,
-    /// Seed of all random streams. Each search decides by the indices of its valid attempts: the same seed shows the
-    /// same grasps.
+    /// Everyday objects instead of the built-in holdouts.
+    #[arg(long, conflicts_with_all = ["strategy", "holdout"])]
+    everyday: bool,
+    /// The folder for pictures and scenes. Default: target/demo, or target/everyday with --everyday.
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+    /// Seed of all random streams. Searches on holdouts decide by the indices of their valid attempts: the same
+    /// seed shows the same grasps.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Search strategy: GUIDED, the server's default, or A to F of chapter 5 with the thesis's hand and checks.
@@ -55,11 +74,20 @@ pub(crate) struct Arguments {
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
-    /// Pixels of each of a picture's two views.
-    #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
+    /// Pixels of each of a picture's two views. Default: 900x700, or 480x400 with --everyday.
+    #[arg(long, value_name = "SIZE", value_parser = parse_view_size)]
+    view_size: Option<ViewSize>,
+    /// Time limit of each search. Default: 20s, or 50ms with --everyday.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    budget: Option<Duration>,
+}
+
+/// What the options say, or their defaults.
+#[derive(Clone, Debug)]
+struct Plan {
+    folder: PathBuf,
+    seed: u64,
     view_size: ViewSize,
-    /// Time limit of each search.
-    #[arg(long, value_name = "DURATION", default_value = "20s", value_parser = parse_duration)]
     budget: Duration,
 }
 
@@ -73,22 +101,65 @@ struct Asked {
 }
 
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    if arguments.everyday {
+        return everyday::run(
+            &arguments.plan("target/everyday", (480, 400), Duration::from_millis(50)),
+            output,
+        )
+        .await;
+    }
     let chosen = arguments.chosen()?;
-    let server = local_server::start(arguments.budget).await?;
+    let plan = arguments.plan("target/demo", (900, 700), Duration::from_secs(20));
+    let server = local_server::start(plan.budget).await?;
     let progress = DemoProgress::new(2 * chosen.len() as u64 + 1);
     if arguments.validity().is_none() {
         wait_for_atlases(&server.client).await?;
     }
-    let asked = ask_all(&arguments, &chosen, &server.client, &progress).await?;
+    let asked = ask_all(&arguments, &plan, &chosen, &server.client, &progress).await?;
     server.stop().await?;
-    let drawn = draw::draw_all(&asked, &arguments.out, arguments.view_size, &progress).await?;
+    let drawings = asked.iter().map(drawing).collect::<Result<_, _>>()?;
+    let layout = Layout {
+        view_size: plan.view_size,
+        small_view: SMALL_VIEW,
+        columns: COLUMNS,
+    };
+    let drawn = draw::draw_all(drawings, &plan.folder, layout, &progress).await?;
     progress.finish();
-    results::write(&arguments.out, &asked, &drawn, output)?;
+    results::write(&plan.folder, &asked, &drawn, output)?;
     let all_found = asked.iter().all(|asked| asked.answer.outcome == Outcome::Found);
     Ok(if all_found { Ending::Done } else { Ending::NoGrasp })
 }
 
+fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
+    let object = &asked.request.object;
+    let model = Model::built_in(object)
+        .ok_or_else(|| Failure::Usage(format!("{object} is not built in, so it cannot be drawn")))?;
+    let name = asked.holdout.name.clone();
+    Ok(Drawing {
+        caption: caption(&name, asked.answer.outcome),
+        name,
+        picture: Picture::new(model, asked.request.clone())?.with_grasp(asked.answer.grasp.clone()),
+    })
+}
+
+/// The line below a picture in the overview.
+fn caption(name: &str, outcome: Outcome) -> String {
+    match outcome {
+        Outcome::Found => name.to_owned(),
+        Outcome::BudgetExhausted => format!("{name}: no grasp"),
+    }
+}
+
 impl Arguments {
+    fn plan(&self, folder: &str, (width, height): (u32, u32), budget: Duration) -> Plan {
+        Plan {
+            folder: self.out.clone().unwrap_or_else(|| folder.into()),
+            seed: self.seed,
+            view_size: self.view_size.unwrap_or(ViewSize { width, height }),
+            budget: self.budget.unwrap_or(budget),
+        }
+    }
+
     /// The thesis's checks for the strategies of its ladder.
     fn validity(&self) -> Option<Validity> {
         match self.strategy {
@@ -122,6 +193,7 @@ async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
 /// Asks for one grasp at a time: each search has the whole machine.
 async fn ask_all(
     arguments: &Arguments,
+    plan: &Plan,
     chosen: &[&'static BuiltInHoldout],
     client: &GraspClient,
     progress: &DemoProgress,
@@ -134,10 +206,10 @@ async fn ask_all(
                 rig: None,
                 handedness: Some(Handedness::Right),
             },
-            budget: Some(arguments.budget),
+            budget: Some(plan.budget),
             strategy: Some(arguments.strategy.into()),
             validity: arguments.validity(),
-            seed: Some(arguments.seed),
+            seed: Some(plan.seed),
             reproducible: true,
             ..request_for(holdout)
         };

@@ -1,9 +1,13 @@
 //! The object of a picture. The server does not return meshes: they come from the built-in assets or from a file.
 
-use std::{path::Path, sync::Arc};
+use std::{fmt::Display, path::Path, sync::Arc};
 
 use grasp_assets::objects::object;
-use grasp_import::{MeshLimits, obj::read_obj};
+use grasp_everyday::{EverydayObject, Surface as Material};
+use grasp_import::{
+    MeshLimits,
+    obj::{ObjMesh, read_obj},
+};
 use grasp_scene::{Finish, linear_from_srgb};
 use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
@@ -51,14 +55,25 @@ impl Model {
         })
     }
 
+    /// An everyday object.
+    pub(crate) fn everyday(object: &EverydayObject) -> Result<Self, Failure> {
+        let read = read_text(object.obj().as_bytes(), 1.0, object.name)?;
+        let is_forbidden = |name: &String| object.forbidden.contains(&name.as_str());
+        let groups = read.groups.iter().filter(|(name, _)| is_forbidden(name));
+        let (colour, finish) = look(object.surface);
+        Ok(Self {
+            forbidden: groups.flat_map(|(_, triangles)| triangles).copied().collect(),
+            surface: Surface::File(read.mesh),
+            colour,
+            finish,
+        })
+    }
+
     /// The mesh of an OBJ file with units of `unit_metres`.
     pub(crate) fn from_file(path: &Path, unit_metres: f32) -> Result<Self, Failure> {
         let text = std::fs::read(path)
             .map_err(|error| Failure::other(format!("cannot read {}", path.display()), error))?;
-        let read = read_obj(&text, unit_metres, LIMITS).map_err(|errors| {
-            let errors: Vec<_> = errors.iter().map(ToString::to_string).collect();
-            Failure::other(format!("cannot read {}", path.display()), errors.join("; "))
-        })?;
+        let read = read_text(&text, unit_metres, path.display())?;
         Ok(Self {
             surface: Surface::File(read.mesh),
             forbidden: Vec::new(),
@@ -85,4 +100,29 @@ impl Model {
     pub(super) fn finish(&self) -> Finish {
         self.finish
     }
+}
+
+/// Reads OBJ text; an error names its `source`.
+fn read_text(text: &[u8], unit_metres: f32, source: impl Display) -> Result<ObjMesh, Failure> {
+    read_obj(text, unit_metres, LIMITS).map_err(|errors| {
+        let errors: Vec<_> = errors.iter().map(ToString::to_string).collect();
+        Failure::other(format!("cannot read {source}"), errors.join("; "))
+    })
+}
+
+/// Colour and finish of what everyday objects are made of.
+fn look(material: Material) -> ([f32; 4], Finish) {
+    let ([red, green, blue], finish) = match material {
+        Material::Metal => ([198, 203, 210], Finish::Metal),
+        Material::Glass => ([202, 216, 222], Finish::Satin),
+        Material::Plastic => ([92, 128, 168], Finish::Satin),
+        Material::Rubber => ([84, 88, 94], Finish::Satin),
+        Material::Wood => ([186, 148, 98], Finish::Satin),
+        Material::Paper => ([226, 220, 202], Finish::Cloth),
+        Material::Cloth => ([146, 168, 96], Finish::Cloth),
+        Material::Leather => ([142, 86, 54], Finish::Satin),
+        Material::Rough => ([168, 84, 62], Finish::Cloth),
+        Material::Natural => ([214, 186, 92], Finish::Satin),
+    };
+    (linear_from_srgb(red, green, blue), finish)
 }

@@ -50,6 +50,54 @@ async fn demo_shows_table_without_progress_bar_unless_on_a_terminal() {
     assert!(folder.join(format!("{}.glb", holdout.name)).exists());
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn everyday_demo_shows_every_object_on_a_page() {
+    let folder = empty_folder("the_everyday_demo");
+    let output = run(&[
+        "demo",
+        "--everyday",
+        "--json",
+        "--out",
+        folder.to_str().unwrap(),
+        "--view-size",
+        "24x20",
+    ]);
+    assert_eq!(text(&output.stderr), "");
+    assert_eq!(code(&output), 0);
+    let results = json(&output.stdout);
+    let page = std::fs::read_to_string(results["page"].as_str().unwrap()).unwrap();
+    let grasps = results["grasps"].as_array().unwrap();
+    let objects = grasp_everyday::everyday_objects();
+    assert_eq!(grasps.len(), objects.len());
+    let (mut one_hand, mut found) = (0, 0);
+    for (grasp, object) in grasps.iter().zip(objects) {
+        assert_eq!(grasp["object"], object.name);
+        assert!(
+            page.contains(&format!("src=\"{}.png\"", object.name)),
+            "{}",
+            object.name
+        );
+        let png = std::fs::read(grasp["picture"].as_str().unwrap()).unwrap();
+        assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"), "{}", object.name);
+        match object.hands {
+            grasp_everyday::Hands::One => {
+                assert!(grasp["beyond_one_hand"].is_null(), "{}", object.name);
+                one_hand += 1;
+                found += usize::from(grasp["outcome"] == "found");
+            }
+            grasp_everyday::Hands::Beyond { why } => {
+                assert_eq!(grasp["beyond_one_hand"], why);
+                assert!(page.contains(why), "{}", object.name);
+            }
+        }
+    }
+    assert_eq!(
+        (&results["one_hand"], &results["found"]),
+        (&one_hand.into(), &found.into())
+    );
+    assert!(found > 0);
+}
+
 /// Starts a real server on a free port until the test's runtime ends; returns its URL.
 pub(crate) async fn real_server() -> String {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();

@@ -3,63 +3,80 @@
 //! A ring runs counter-clockwise about the direction in which the surface is built. Strips between rings then face
 //! outward by construction. Lengths are millimetres until [`MeshBuilder::finish`].
 
-use glam::{DVec2, DVec3, Vec3};
-use grasp_synthesis::geometry::mesh::TriangleMesh;
+use std::fmt::Write as _;
+
+use glam::{DVec2, DVec3};
 
 /// Vertices of a closed curve, in order.
-pub(crate) type Ring = Vec<usize>;
+pub type Ring = Vec<usize>;
 
 /// A mesh in metres with the names of its groups, ready to be written.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Shape {
+pub struct Shape {
     /// Vertices in whole micrometres, centred on their bounding box.
-    pub(crate) micrometres: Vec<[i64; 3]>,
+    pub micrometres: Vec<[i64; 3]>,
     /// Group names and their triangles, in the order of the file.
-    pub(crate) groups: Vec<(&'static str, Vec<[usize; 3]>)>,
+    pub groups: Vec<(&'static str, Vec<[usize; 3]>)>,
 }
 
 impl Shape {
-    /// The mesh as the synthesis takes it.
-    pub(crate) fn mesh(&self) -> TriangleMesh {
-        let positions = self
-            .micrometres
-            .iter()
-            .map(|vertex| Vec3::from(vertex.map(|coordinate| (coordinate as f64 * 1e-6) as f32)))
-            .collect();
-        let triangles = self
-            .groups
-            .iter()
-            .flat_map(|(_, triangles)| triangles)
-            .map(|triangle| triangle.map(|vertex| vertex as u32))
-            .collect();
-        TriangleMesh::new(positions, triangles).expect("the shapes have sound triangles")
+    /// The mesh as OBJ text in metres with six decimals; `comment` is its first line.
+    pub fn obj(&self, comment: &str) -> String {
+        let mut text = format!("# {comment}\n");
+        let mut line = |arguments: std::fmt::Arguments<'_>| {
+            text.write_fmt(arguments).expect("a string takes any text");
+        };
+        for vertex in &self.micrometres {
+            let [x, y, z] = vertex.map(metres);
+            line(format_args!("v {x} {y} {z}\n"));
+        }
+        for (group, triangles) in &self.groups {
+            line(format_args!("g {group}\n"));
+            for triangle in triangles {
+                let [a, b, c] = triangle.map(|vertex| vertex + 1);
+                line(format_args!("f {a} {b} {c}\n"));
+            }
+        }
+        text
     }
+}
+
+/// Whole micrometres as metres with six decimals.
+fn metres(micrometres: i64) -> String {
+    let sign = if micrometres < 0 { "-" } else { "" };
+    let size = micrometres.unsigned_abs();
+    format!("{sign}{}.{:06}", size / 1_000_000, size % 1_000_000)
 }
 
 /// A mesh under construction.
 #[derive(Debug)]
-pub(crate) struct MeshBuilder {
+pub struct MeshBuilder {
     positions: Vec<DVec3>,
     groups: Vec<(&'static str, Vec<[usize; 3]>)>,
 }
 
 impl MeshBuilder {
     /// Nothing yet; triangles will be sorted into these groups.
-    pub(crate) fn new(groups: &[&'static str]) -> Self {
+    pub fn new(groups: &[&'static str]) -> Self {
         Self {
             positions: Vec::new(),
             groups: groups.iter().map(|&name| (name, Vec::new())).collect(),
         }
     }
 
+    /// Adds a group, empty so far.
+    pub fn group(&mut self, name: &'static str) {
+        self.groups.push((name, Vec::new()));
+    }
+
     /// Adds a vertex.
-    pub(crate) fn vertex(&mut self, position: DVec3) -> usize {
+    pub fn vertex(&mut self, position: DVec3) -> usize {
         self.positions.push(position);
         self.positions.len() - 1
     }
 
     /// Adds the vertices of a ring.
-    pub(crate) fn ring(&mut self, positions: impl IntoIterator<Item = DVec3>) -> Ring {
+    pub fn ring(&mut self, positions: impl IntoIterator<Item = DVec3>) -> Ring {
         positions
             .into_iter()
             .map(|position| self.vertex(position))
@@ -67,12 +84,12 @@ impl MeshBuilder {
     }
 
     /// Where a vertex is.
-    pub(crate) fn position(&self, vertex: usize) -> DVec3 {
+    pub fn position(&self, vertex: usize) -> DVec3 {
         self.positions[vertex]
     }
 
     /// Adds a triangle, counter-clockwise seen from outside.
-    pub(crate) fn triangle(&mut self, group: &str, corners: [usize; 3]) {
+    pub fn triangle(&mut self, group: &str, corners: [usize; 3]) {
         self.groups
             .iter_mut()
             .find(|(name, _)| *name == group)
@@ -83,12 +100,7 @@ impl MeshBuilder {
 
     /// Joins two rings of equal length; `group` names the group of the quad between vertex `k` and the one after it,
     /// or none where the surface stays open.
-    pub(crate) fn strip(
-        &mut self,
-        from: &[usize],
-        to: &[usize],
-        group: impl Fn(usize) -> Option<&'static str>,
-    ) {
+    pub fn strip(&mut self, from: &[usize], to: &[usize], group: impl Fn(usize) -> Option<&'static str>) {
         assert_eq!(from.len(), to.len(), "a strip joins rings of equal length");
         for k in 0..from.len() {
             let next = (k + 1) % from.len();
@@ -99,7 +111,7 @@ impl MeshBuilder {
     }
 
     /// Adds a quad, split along its shorter diagonal.
-    pub(crate) fn quad(&mut self, group: &str, [a, b, c, d]: [usize; 4]) {
+    pub fn quad(&mut self, group: &str, [a, b, c, d]: [usize; 4]) {
         let diagonal = |p: usize, q: usize| self.positions[p].distance_squared(self.positions[q]);
         if diagonal(a, c) <= diagonal(b, d) {
             self.triangle(group, [a, b, c]);
@@ -111,14 +123,14 @@ impl MeshBuilder {
     }
 
     /// Closes a ring with a point ahead of it.
-    pub(crate) fn fan(&mut self, ring: &[usize], apex: usize, group: impl Fn(usize) -> &'static str) {
+    pub fn fan(&mut self, ring: &[usize], apex: usize, group: impl Fn(usize) -> &'static str) {
         for k in 0..ring.len() {
             self.triangle(group(k), [ring[k], ring[(k + 1) % ring.len()], apex]);
         }
     }
 
     /// Closes a ring whose first and last vertices are one end of it, with triangles from side to side.
-    pub(crate) fn cap(&mut self, group: &str, ring: &[usize]) {
+    pub fn cap(&mut self, group: &str, ring: &[usize]) {
         let (mut low, mut high) = (0, ring.len() - 1);
         while high - low > 2 {
             self.quad(group, [ring[low], ring[low + 1], ring[high - 1], ring[high]]);
@@ -132,7 +144,7 @@ impl MeshBuilder {
     /// Drops vertices that no triangle uses, centres the mesh on its bounding box and rounds it to micrometres.
     ///
     /// Rounding makes the file's decimals exact and hides what the last bits of the arithmetic were.
-    pub(crate) fn finish(mut self) -> Shape {
+    pub fn finish(mut self) -> Shape {
         self.drop_unused();
         let low = self
             .positions
@@ -182,7 +194,7 @@ impl MeshBuilder {
 ///
 /// The rings share the path `first` → `crotch` → `second` of vertices that lies ahead between them: the first result
 /// holds the ring's vertices from `second` to `first`, the other those from `first` to `second`.
-pub(crate) fn fork(ring: &[usize], second: usize, first: usize, crotch: &[usize]) -> (Ring, Ring) {
+pub fn fork(ring: &[usize], second: usize, first: usize, crotch: &[usize]) -> (Ring, Ring) {
     let arc = |from: usize, to: usize| {
         let length = (to + ring.len() - from) % ring.len();
         (0..=length).map(move |step| ring[(from + step) % ring.len()])
@@ -197,7 +209,7 @@ pub(crate) fn fork(ring: &[usize], second: usize, first: usize, crotch: &[usize]
 /// remains when the corners' radius is taken off all sides.
 ///
 /// `point` must lie outside the core.
-pub(crate) fn on_rounded_rectangle(point: DVec2, half_size: DVec2, radius: f64) -> DVec2 {
+pub fn on_rounded_rectangle(point: DVec2, half_size: DVec2, radius: f64) -> DVec2 {
     let core = half_size - DVec2::splat(radius);
     let nearest = point.clamp(-core, core);
     nearest + (point - nearest).normalize_or_zero() * radius
@@ -206,7 +218,7 @@ pub(crate) fn on_rounded_rectangle(point: DVec2, half_size: DVec2, radius: f64) 
 /// Sine and cosine of an angle in degrees.
 ///
 /// From their power series rather than the platform's library, whose last bit differs from platform to platform.
-pub(crate) fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let x = (degrees - 360.0 * (degrees / 360.0).round()).to_radians();
     // |x| is at most π: the 28th power over 28 factorial is below 1e-15.
     let (mut sine, mut cosine, mut term) = (0.0, 0.0, 1.0);

@@ -1,0 +1,122 @@
+//! `grasp demo --everyday`: what the service makes of everyday objects that nobody holds out.
+
+mod page;
+mod results;
+
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use grasp_client::{
+    FindAnswer, FindRequest, ForbiddenSurfaces, GraspClient, Handedness, NewObject, Outcome, ReceivingHand,
+};
+use grasp_everyday::{EverydayObject, Hands, everyday_objects};
+
+use super::{
+    Plan, caption,
+    demo_progress::DemoProgress,
+    draw::{self, Drawing, Layout},
+    local_server,
+};
+use crate::{
+    Ending,
+    failure::Failure,
+    output::Output,
+    picture::{Model, Picture},
+    values::ViewSize,
+};
+
+/// The overview: as wide as the longest caption, in about as many rows as columns.
+const SMALL_VIEW: ViewSize = ViewSize {
+    width: 340,
+    height: 280,
+};
+const COLUMNS: usize = 10;
+
+/// The result for one object.
+#[derive(Clone, Debug)]
+struct Asked {
+    object: EverydayObject,
+    request: FindRequest,
+    answer: FindAnswer,
+    round_trip: Duration,
+}
+
+impl Asked {
+    fn is_found(&self) -> bool {
+        self.answer.outcome == Outcome::Found
+    }
+
+    /// Why one hand cannot hold it; none if it can.
+    fn beyond(&self) -> Option<&'static str> {
+        match self.object.hands {
+            Hands::One => None,
+            Hands::Beyond { why } => Some(why),
+        }
+    }
+}
+
+pub(super) async fn run(plan: &Plan, output: Output) -> Result<Ending, Failure> {
+    let objects = everyday_objects();
+    let server = local_server::start(plan.budget).await?;
+    let progress = DemoProgress::new(2 * objects.len() as u64 + 1);
+    let mut asked = Vec::new();
+    for object in objects {
+        progress.step(&format!("asking for {}", object.name));
+        asked.push(ask(object, plan, &server.client).await?);
+    }
+    server.stop().await?;
+    let drawings = asked.iter().map(drawing).collect::<Result<_, _>>()?;
+    let layout = Layout {
+        view_size: plan.view_size,
+        small_view: SMALL_VIEW,
+        columns: COLUMNS,
+    };
+    let drawn = draw::draw_all(drawings, &plan.folder, layout, &progress).await?;
+    let page = page::write(&plan.folder, &asked, plan.budget)?;
+    progress.finish();
+    results::write(plan, &page, &asked, &drawn, output)?;
+    Ok(Ending::Done)
+}
+
+/// Creates an object and requests a grasp at once, with the server's defaults but for hand and time.
+async fn ask(object: EverydayObject, plan: &Plan, client: &GraspClient) -> Result<Asked, Failure> {
+    let created = client.create_object(&new_object(&object)).await?;
+    let request = FindRequest {
+        receiving_hand: ReceivingHand {
+            rig: None,
+            handedness: Some(Handedness::Right),
+        },
+        budget: Some(plan.budget),
+        seed: Some(plan.seed),
+        ..FindRequest::new(created.name)
+    };
+    let start = Instant::now();
+    let answer = client.find_grasp(&request).await?;
+    Ok(Asked {
+        object,
+        request,
+        answer,
+        round_trip: start.elapsed(),
+    })
+}
+
+fn new_object(object: &EverydayObject) -> NewObject {
+    NewObject {
+        centre_of_mass: object.centre_of_mass().map(DVec3::as_vec3),
+        friction: Some(object.surface.friction() as f32),
+        forbidden: ForbiddenSurfaces {
+            groups: object.forbidden.iter().map(|&group| group.to_owned()).collect(),
+            triangles: Vec::new(),
+        },
+        ..NewObject::new(object.name, object.obj(), object.mass_kg() as f32)
+    }
+}
+
+fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
+    let model = Model::everyday(&asked.object)?;
+    Ok(Drawing {
+        name: asked.object.name.to_owned(),
+        caption: caption(asked.object.name, asked.answer.outcome),
+        picture: Picture::new(model, asked.request.clone())?.with_grasp(asked.answer.grasp.clone()),
+    })
+}

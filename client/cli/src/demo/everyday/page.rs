@@ -1,0 +1,143 @@
+//! A page with the pictures of all everyday objects.
+
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use super::{
+    Asked,
+    results::{human_mass, outcome_name},
+};
+use crate::{
+    failure::Failure,
+    format::{grasp_type_name, human_time},
+    picture::write_file,
+};
+
+const STYLE: &str = "\
+body { font: 15px/1.4 system-ui, sans-serif; margin: 2em; color: #222; background: #fafafa; }
+main { display: grid; grid-template-columns: repeat(auto-fill, minmax(26em, 1fr)); gap: 1.2em; }
+figure { margin: 0; padding: .6em; background: #fff; border-top: 4px solid #3a8a4a; }
+figure.none { border-color: #c03030; }
+figure.beyond { border-color: #8a8a8a; }
+img { width: 100%; }
+h3 { margin: .2em 0; }
+p { margin: 0; }";
+
+/// Writes `index.html`, which shows the pictures next to it; returns its path.
+pub(super) fn write(folder: &Path, asked: &[Asked], budget: Duration) -> Result<PathBuf, Failure> {
+    let path = folder.join("index.html");
+    write_file(&path, page(asked, budget).as_bytes())?;
+    Ok(path)
+}
+
+fn page(asked: &[Asked], budget: Duration) -> String {
+    let mut html = format!(
+        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>Everyday objects</title>\n\
+         <style>\n{STYLE}\n</style>\n<h1>Everyday objects</h1>\n<p>Time limit: {}.</p>\n",
+        human_time(budget.as_secs_f64())
+    );
+    for section in Section::ALL {
+        let here: Vec<_> = asked
+            .iter()
+            .filter(|asked| Section::of(asked) == section)
+            .collect();
+        let _ = write!(html, "<h2>{}: {}</h2>\n<main>\n", section.title(), here.len());
+        for asked in here {
+            write_figure(&mut html, asked);
+        }
+        html.push_str("</main>\n");
+    }
+    html.push_str("</html>\n");
+    html
+}
+
+/// A part of the page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Section {
+    Found,
+    NotFound,
+    BeyondOneHand,
+}
+
+impl Section {
+    const ALL: [Self; 3] = [Self::Found, Self::NotFound, Self::BeyondOneHand];
+
+    fn of(asked: &Asked) -> Self {
+        match (asked.beyond(), asked.is_found()) {
+            (Some(_), _) => Self::BeyondOneHand,
+            (None, true) => Self::Found,
+            (None, false) => Self::NotFound,
+        }
+    }
+
+    fn title(self) -> &'static str {
+        match self {
+            Self::Found => "Found",
+            Self::NotFound => "Not found in time",
+            Self::BeyondOneHand => "Beyond one hand",
+        }
+    }
+
+    /// The class of its figures in the style sheet.
+    fn class(self) -> &'static str {
+        match self {
+            Self::Found => "found",
+            Self::NotFound => "none",
+            Self::BeyondOneHand => "beyond",
+        }
+    }
+}
+
+fn write_figure(html: &mut String, asked: &Asked) {
+    let object = &asked.object;
+    let report = &asked.answer.report;
+    let how = asked.answer.grasp.as_ref().map_or_else(String::new, |grasp| {
+        format!(", {}, comfort E {:.4}", grasp_type_name(grasp), grasp.comfort)
+    });
+    let mut lines = vec![
+        format!(
+            "{}. {}, {}.",
+            object.what,
+            human_mass(object.mass_kg()),
+            object.surface.name()
+        ),
+        format!(
+            "{}{how}: {} attempts, {}",
+            outcome_name(asked),
+            report.attempts,
+            human_time(report.search_time.as_secs_f64())
+        ),
+    ];
+    lines.extend(asked.beyond().map(|why| format!("Two hands: {why}.")));
+    let _ = write!(
+        html,
+        "<figure class=\"{class}\">\n<a href=\"{name}.glb\"><img src=\"{name}.png\" alt=\"{name}\" loading=\"lazy\"></a>\n\
+         <h3>{name}</h3>\n",
+        class = Section::of(asked).class(),
+        name = object.name
+    );
+    for line in lines {
+        let _ = writeln!(html, "<p>{}</p>", escaped(&line));
+    }
+    html.push_str("</figure>\n");
+}
+
+/// Text with the characters replaced that mean something in HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn escapes_markup() {
+        assert_eq!(escaped("a < b & c > d"), "a &lt; b &amp; c &gt; d");
+    }
+}

@@ -1,0 +1,15 @@
+//! Everyday objects, from a needle to a chair: meshes by formula, with the sizes and masses of real ones and the friction
+//! of skin on what they are made of.
+//!
+//! The judge of quality measures on them how much of what a hand can take the service takes, and `grasp demo --everyday`
+//! shows the hands. The README next to this crate lists the objects and their sources.
+
+mod about;
+mod curves;
+mod objects;
+mod sketch;
+mod surface;
+
+pub use about::{EverydayObject, Fill, Hands, Part, Source, table};
+pub use objects::everyday_objects;
+pub use surface::Surface;
