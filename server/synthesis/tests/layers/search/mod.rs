@@ -2,6 +2,7 @@
 
 mod built_in_holdouts;
 mod key_frames;
+mod limits;
 mod look_up;
 mod mechanisms;
 mod race;
