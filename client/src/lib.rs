@@ -59,9 +59,9 @@ pub use pose::Pose;
 pub use retry::RetryPolicy;
 pub use score::{Score, ScoreTerm};
 pub use search::{
-    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-    NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy,
-    Validity,
+    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource, Limit,
+    LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step,
+    StepTime, Strategy, Validity,
 };
 
 /// The README's Rust example compiles.

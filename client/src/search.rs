@@ -371,6 +371,45 @@ pub enum GraspSource {
     Recent,
 }
 
+/// What can keep one hand from holding an object, whatever its pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitKind {
+    /// The object's mass in kilograms, against the largest that all contacts of a hand carry.
+    Mass,
+    /// The weight's torque about the nearest place that may be held, in newton metres, against the largest that all
+    /// contacts of a hand resist there.
+    Torque,
+    /// The distance in metres between the closest two places that can be pressed against each other, against the hand's
+    /// span.
+    Width,
+    /// The share of the surface's area that is forbidden, from 0 to 1: the rest has no two places that one hand can press
+    /// against each other.
+    Forbidden,
+    /// The room in metres that the giver leaves above the freest place that may be held, against the room that the
+    /// thinnest finger needs.
+    Giver,
+    /// The distance in metres from the receiver's shoulder to the nearest place that may be held, against what arm and
+    /// hand reach.
+    Reach,
+    /// A kind unknown to this version of the library.
+    Unrecognised,
+}
+
+/// A condition that every valid grasp meets and that a holdout does not allow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Limit {
+    /// What it is.
+    pub kind: LimitKind,
+    /// The holdout's figure, in the unit of the kind.
+    pub value: f32,
+    /// The bound that the figure exceeds (falls short of, for [`LimitKind::Giver`]), in the same unit; none for
+    /// [`LimitKind::Forbidden`].
+    pub bound: Option<f32>,
+    /// Both in words, to complete "limited by".
+    pub description: String,
+}
+
 /// Report of a search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchReport {
@@ -413,6 +452,10 @@ pub struct SearchReport {
     /// Identifies the state of the atlas used, in hexadecimal; none if none was used.
     #[serde(default)]
     pub atlas_stamp: Option<String>,
+    /// Why one hand cannot hold the object, if no grasp was found under [`Validity::Physical`]: more time would not help.
+    /// Empty if a longer search may find a grasp, as far as these checks show.
+    #[serde(default)]
+    pub limits: Vec<Limit>,
 }
 
 /// The answer to a holdout.

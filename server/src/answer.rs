@@ -18,7 +18,11 @@ use grasp_synthesis::{
         score::{Score, Term},
         strategy::{Strategy, Validity},
     },
-    search::{GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, settings::SearchSettings},
+    search::{
+        GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport,
+        limits::{Limit, LimitKind},
+        settings::SearchSettings,
+    },
 };
 
 use crate::{convention::Convention, error::ServiceError};
@@ -274,6 +278,24 @@ fn report(
             .atlas()
             .map(|atlas| atlas_stamp(atlas))
             .unwrap_or_default(),
+        limits: report.limits.iter().map(wire_limit).collect(),
+    }
+}
+
+fn wire_limit(limit: &Limit) -> v1::Limit {
+    v1::Limit {
+        kind: match limit.kind {
+            LimitKind::Mass => v1::LimitKind::Mass,
+            LimitKind::Torque => v1::LimitKind::Torque,
+            LimitKind::Width => v1::LimitKind::Width,
+            LimitKind::Forbidden => v1::LimitKind::Forbidden,
+            LimitKind::Giver => v1::LimitKind::Giver,
+            LimitKind::Reach => v1::LimitKind::Reach,
+        }
+        .into(),
+        value: limit.value,
+        bound: limit.bound,
+        description: limit.to_string(),
     }
 }
 

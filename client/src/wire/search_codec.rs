@@ -21,8 +21,8 @@ use crate::{
     score::{Score, ScoreTerm},
     search::{
         AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-        NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
-        Strategy, Validity,
+        Limit, LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport,
+        Step, StepTime, Strategy, Validity,
     },
 };
 
@@ -307,7 +307,25 @@ fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed>
         source: source_from_wire(report.source),
         atlas_entries: report.atlas_entries,
         atlas_stamp: Some(report.atlas_stamp).filter(|stamp| !stamp.is_empty()),
+        limits: report.limits.into_iter().map(limit_from_wire).collect(),
     })
+}
+
+fn limit_from_wire(limit: v1::Limit) -> Limit {
+    Limit {
+        kind: match v1::LimitKind::try_from(limit.kind) {
+            Ok(v1::LimitKind::Mass) => LimitKind::Mass,
+            Ok(v1::LimitKind::Torque) => LimitKind::Torque,
+            Ok(v1::LimitKind::Width) => LimitKind::Width,
+            Ok(v1::LimitKind::Forbidden) => LimitKind::Forbidden,
+            Ok(v1::LimitKind::Giver) => LimitKind::Giver,
+            Ok(v1::LimitKind::Reach) => LimitKind::Reach,
+            Ok(v1::LimitKind::Unspecified) | Err(_) => LimitKind::Unrecognised,
+        },
+        value: limit.value,
+        bound: limit.bound,
+        description: limit.description,
+    }
 }
 
 #[cfg(test)]

@@ -106,6 +106,20 @@ fn wire_answer() -> v1::FindGraspResponse {
             source: v1::GraspSource::Atlas.into(),
             atlas_entries: 25,
             atlas_stamp: "26".to_owned(),
+            limits: vec![
+                v1::Limit {
+                    kind: v1::LimitKind::Torque.into(),
+                    value: 28.0,
+                    bound: Some(29.0),
+                    description: "30".to_owned(),
+                },
+                v1::Limit {
+                    kind: 99,
+                    value: 31.0,
+                    bound: None,
+                    description: "32".to_owned(),
+                },
+            ],
         }),
     }
 }
@@ -169,6 +183,17 @@ fn converts_every_number_of_an_answer() {
     assert_eq!((report.candidates, report.atlas_entries), (24, 25));
     assert_eq!(report.source, Some(GraspSource::Atlas));
     assert_eq!(report.atlas_stamp.as_deref(), Some("26"));
+    let limits = [
+        (LimitKind::Torque, 28.0, Some(29.0), "30"),
+        (LimitKind::Unrecognised, 31.0, None, "32"),
+    ];
+    let limits = limits.map(|(kind, value, bound, description)| Limit {
+        kind,
+        value,
+        bound,
+        description: description.to_owned(),
+    });
+    assert_eq!(report.limits, limits);
     assert_eq!((report.attempts, report.pruned_placements), (12, 13));
     assert_eq!(report.rejections[0].rejection, Rejection::PalmCollision);
     assert_eq!(report.rejections[0].count, 14);

@@ -80,6 +80,12 @@ impl GraspService for Scripted {
             grasp: None,
             report: Some(v1::SearchReport {
                 attempts: 5,
+                limits: vec![v1::Limit {
+                    kind: v1::LimitKind::Mass.into(),
+                    value: 80.0,
+                    bound: Some(70.0),
+                    description: "mass: 80 kg".to_owned(),
+                }],
                 search_time: Some(prost_types::Duration::default()),
                 budget: request
                     .into_inner()

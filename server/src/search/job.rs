@@ -15,8 +15,9 @@ use grasp_synthesis::{
     },
     propose::prepared::PreparedObject,
     search::{
-        GraspSource, LookUp, SearchOutcome, find_known_grasp,
+        GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
+        limits::limits,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
     },
@@ -247,6 +248,13 @@ impl PreparedJob {
             let approach = self.settings.query.constraints.approach;
             let friction = self.settings.query.friction_on(&self.holdout.object);
             plan_key_frames(&self.holdout, rig, friction, approach, grasp);
+        }
+        if matches!(
+            outcome.end,
+            SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted
+        ) {
+            // A small part of what the budget leaves for the way back.
+            outcome.report.limits = limits(self.task(), &self.settings.query);
         }
         let frame = ClientFrame {
             convention: self.query.convention,

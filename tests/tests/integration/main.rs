@@ -8,6 +8,7 @@ mod fixtures;
 mod health;
 mod invalid;
 mod key_frames;
+mod limits;
 mod load;
 mod objects;
 mod objects_directory;

@@ -112,6 +112,9 @@ fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
             format!("attempt {}: {}{angle}", miss.attempt, name_of(&miss.rejection)),
         ));
     }
+    for limit in &report.limits {
+        lines.push(("limited by", limit.description.clone()));
+    }
     for time in &report.step_times {
         lines.push((
             "time in step",

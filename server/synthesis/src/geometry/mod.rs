@@ -9,6 +9,7 @@ mod distance_field;
 pub mod local_thickness;
 pub mod mesh;
 pub mod mesh_bvh;
+pub mod opposed;
 pub mod oriented_box;
 mod principal_axes;
 mod stack_entry;

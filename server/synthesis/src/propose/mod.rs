@@ -6,6 +6,7 @@
 //! not depend on the giver, so the first attempts choose from placements sampled once ([`placement_cache`]). Proposals
 //! pass no check here; a hand that nearly passes them is perturbed a few times (`PhysicalAttempt::hold_or_refine`).
 
+pub mod holdable;
 pub mod opposition;
 pub mod placement_cache;
 pub mod prepared;

@@ -6,6 +6,7 @@ use std::{
 };
 
 use super::{
+    holdable::HoldableSurface,
     opposition::Oppositions,
     placement_cache::{PlacementCache, PlacementCaches},
     surface_pairs::SurfacePairs,
@@ -63,6 +64,7 @@ impl Deref for PreparedRig {
 pub struct PreparedObject {
     object: Arc<GraspObject>,
     surface_pairs: SurfacePairs,
+    holdable: HoldableSurface,
     placements: PlacementCaches,
 }
 
@@ -70,9 +72,11 @@ impl PreparedObject {
     /// Samples the object's surface for opposed points, which takes some milliseconds.
     pub fn new(object: Arc<GraspObject>) -> Self {
         let surface_pairs = SurfacePairs::of(&object.surface, |triangle| object.is_forbidden(triangle));
+        let holdable = HoldableSurface::of(&object, &surface_pairs);
         Self {
             object,
             surface_pairs,
+            holdable,
             placements: PlacementCaches::default(),
         }
     }
@@ -85,6 +89,11 @@ impl PreparedObject {
     /// The points where opposed digits or the palm may press.
     pub fn surface_pairs(&self) -> &SurfacePairs {
         &self.surface_pairs
+    }
+
+    /// Bounds on where it may be held.
+    pub fn holdable(&self) -> &HoldableSurface {
+        &self.holdable
     }
 
     /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five

@@ -61,6 +61,11 @@ pub struct SurfacePair {
 }
 
 impl SurfacePair {
+    /// True for the two sides of a sheet, which has no thickness.
+    pub fn is_of_sheet(&self) -> bool {
+        self.thickness <= START_DEPTH
+    }
+
     /// True unless an end is certainly too close to the giver's hand for a finger.
     pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
         [self.start, self.end]
@@ -143,6 +148,16 @@ impl SurfacePairs {
                 .copied()
                 .collect(),
         }
+    }
+
+    /// The pairs.
+    pub fn pairs(&self) -> &[SurfacePair] {
+        &self.pairs
+    }
+
+    /// The points that may be touched.
+    pub fn points(&self) -> &[SurfacePoint] {
+        &self.points
     }
 
     /// Size of pairs and points, in bytes.

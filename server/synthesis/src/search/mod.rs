@@ -4,6 +4,7 @@
 pub mod attempt;
 pub mod key_frames;
 mod known_grips;
+pub mod limits;
 pub mod physical_attempt;
 mod race;
 mod report;

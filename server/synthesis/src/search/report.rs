@@ -1,5 +1,6 @@
 //! What a search did.
 
+use super::limits::Limit;
 use crate::{
     base::{rejection::Rejection, stopwatch::StepTimes},
     model::hand::HandPose,
@@ -62,6 +63,9 @@ pub struct SearchReport {
     pub candidates: u64,
     /// Number of known grips available.
     pub known_grips: usize,
+    /// What keeps one hand from holding the object, if no grasp was found; left empty by the search itself, see
+    /// [`limits`](super::limits::limits).
+    pub limits: Vec<Limit>,
 }
 
 impl SearchReport {

@@ -5,5 +5,6 @@ mod closest_point;
 mod containment;
 mod crossing;
 mod local_thickness;
+mod opposed;
 mod oriented_box;
 mod triangle_mesh;

@@ -3,6 +3,7 @@
 mod built_in_holdouts;
 mod clear_types;
 mod key_frames;
+mod limits;
 mod look_up;
 mod mechanisms;
 mod race;

@@ -1,0 +1,319 @@
+//! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot.
+//!
+//! Each is necessary under `PHYSICAL` validity, so that nothing possible is called impossible. They are not sufficient: a
+//! search that finds nothing although no limit applies may have had too little time.
+
+use std::fmt;
+
+use glam::Vec3;
+
+use super::{scene::Task, settings::Query};
+use crate::{
+    base::pose::Pose,
+    geometry::oriented_box::OrientedBox,
+    model::{
+        constraints::Reach,
+        forces::GRAVITY,
+        hand::{
+            Digit, DigitAngles, HandPose,
+            kinematics::DigitPlane,
+            rig::{AngleRange, Rig},
+        },
+        holdout::Holdout,
+        object::GraspObject,
+        strategy::Validity,
+    },
+    physical::{
+        contacts::TORSION_LEVER,
+        immobility::{BALANCE_TOLERANCE, HAND_LENGTHS, MAX_CONTACT_FORCE, MAX_CONTACTS},
+        scene::Presented,
+        solids::{HandSolids, PreparedHand, link_radii},
+    },
+    propose::{holdable::HoldableSurface, surface_pairs::SurfacePairs},
+};
+
+/// What all contacts of a hand can push together, in newtons.
+const HAND_FORCE: f32 = MAX_CONTACTS as f32 * MAX_CONTACT_FORCE;
+
+/// Largest distance of points from the centre of the smallest ball around them, over the largest distance of two: √(3/8),
+/// by Jung's theorem.
+const JUNG: f32 = 0.612_373;
+
+/// Friction up to which normals that are pairwise at most a right angle apart cannot hold. By Jung's theorem on the sphere
+/// they lie within 55° of one direction, and nothing resists a pull along it while the friction cone is narrower than the
+/// other 35°; palm contacts, whose normals may be 10° off, take four of them.
+const MAX_FRICTION_OF_WIDTH: f32 = 0.6;
+
+/// Angles tried per joint range for a hand's span, and the factor that covers those between them: cos(7°) for a digit's
+/// widest range, and then some.
+const ANGLES: usize = 5;
+const BETWEEN_ANGLES: f32 = 1.03;
+
+/// Height above a touched point of a point inside the touching finger, over the finger's radius. It is inside by more than
+/// this height, although the bone may be up to 45° off the normal and the flesh 2 mm deep in the object.
+const INSIDE_FINGER: f32 = 0.4;
+
+/// Something that keeps one hand from holding an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// What it is.
+    pub kind: LimitKind,
+    /// The figure of this holdout, in the unit of its kind.
+    pub value: f32,
+    /// The bound that a valid grasp needs it to keep, in the same unit; none where there is no bound in advance.
+    pub bound: Option<f32>,
+}
+
+/// Kinds of limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LimitKind {
+    /// The mass, and the largest mass that all contacts of a hand can carry, in kilograms.
+    Mass,
+    /// The weight's torque about the nearest place that may be held, and the largest torque of all contacts of a hand
+    /// there, in newton metres.
+    Torque,
+    /// The distance between the closest places that can be pressed against each other, and the hand's span, in metres.
+    Width,
+    /// The share of the surface's area that is forbidden: no two of the remaining places can be pressed against each
+    /// other by one hand.
+    Forbidden,
+    /// The room that the giver's hands leave above the freest place that may be held, and the room that a finger needs,
+    /// in metres.
+    Giver,
+    /// The distance from the shoulder to the nearest place that may be held, and that from the shoulder to the farthest
+    /// contact within reach, in metres.
+    Reach,
+}
+
+/// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes 0.2 ms,
+/// whatever the object.
+pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
+    if query.validity != Validity::Physical {
+        return Vec::new();
+    }
+    let Task { holdout, object, rig } = task;
+    let holdable = object.holdable();
+    let friction = query.friction_on(&holdout.object);
+    let span = hand_span(rig);
+    let of_region = |region: OrientedBox| {
+        let reach = query.constraints.reach;
+        [
+            torque_limit(holdout, &region, friction, span),
+            giver_limit(&Presented::of(holdout), object.surface_pairs(), rig),
+            reach.and_then(|reach| reach_limit(reach, &region, rig)),
+        ]
+    };
+    let [torque, giver, reach] = holdable.region.map_or([None; 3], of_region);
+    [
+        mass_limit(&holdout.object),
+        torque,
+        width_limit(holdable, friction, span),
+        giver,
+        reach,
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// All contacts push up as hard as they can.
+fn mass_limit(object: &GraspObject) -> Option<Limit> {
+    let bound = HAND_FORCE / (GRAVITY * (1.0 - BALANCE_TOLERANCE));
+    (object.mass > bound).then_some(Limit {
+        kind: LimitKind::Mass,
+        value: object.mass,
+        bound: Some(bound),
+    })
+}
+
+/// Torques balance about the middle of the contacts, which lies in the region. The root mean square distance of contacts
+/// from their middle is at most the radius of any ball around them.
+fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f32) -> Option<Limit> {
+    let weight = holdout.object.mass * GRAVITY;
+    let arm = horizontal_distance(region, holdout.object.centre_of_mass, holdout.up);
+    let lever = region.half_extents.length().min(JUNG * span);
+    let unbalanced = BALANCE_TOLERANCE * weight * HAND_LENGTHS[1];
+    let bound = HAND_FORCE * (lever + friction * TORSION_LEVER) + unbalanced;
+    (weight * arm > bound).then_some(Limit {
+        kind: LimitKind::Torque,
+        value: weight * arm,
+        bound: Some(bound),
+    })
+}
+
+/// Contacts that hold have normals more than a right angle apart, at most a hand's span from each other.
+fn width_limit(holdable: &HoldableSurface, friction: f32, span: f32) -> Option<Limit> {
+    let forbidden = Limit {
+        kind: LimitKind::Forbidden,
+        value: holdable.forbidden_share,
+        bound: None,
+    };
+    if holdable.region.is_none() {
+        return Some(forbidden);
+    }
+    let is_wide =
+        |width: Option<f32>| width.filter(|&width| width > span && friction <= MAX_FRICTION_OF_WIDTH);
+    is_wide(holdable.width)?;
+    Some(is_wide(holdable.width_of_all).map_or(forbidden, |width| Limit {
+        kind: LimitKind::Width,
+        value: width,
+        bound: Some(span),
+    }))
+}
+
+/// The thinnest finger fits nowhere between the object and the giver.
+fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Option<Limit> {
+    let giver: &PreparedHand = presented.giver.as_ref()?;
+    let radii = Digit::ALL.map(|digit| link_radii(rig, digit).into_iter().fold(f32::INFINITY, f32::min));
+    let needed = INSIDE_FINGER * radii.into_iter().fold(f32::INFINITY, f32::min);
+    let sides: &[f32] = if surface.pairs().iter().any(|pair| pair.is_of_sheet()) {
+        &[1.0, -1.0]
+    } else {
+        &[1.0]
+    };
+    let mut room = 0.0_f32;
+    for point in surface.points() {
+        for side in sides {
+            let above: Vec3 = point.position + point.normal * (side * needed);
+            room = room.max(giver.point_distance_upper_bound(above));
+        }
+        if room >= needed {
+            return None;
+        }
+    }
+    (!surface.points().is_empty()).then_some(Limit {
+        kind: LimitKind::Giver,
+        value: room,
+        bound: Some(needed),
+    })
+}
+
+/// The wrist is within reach of the shoulder, and every contact within the hand's length of the wrist.
+fn reach_limit(reach: Reach, region: &OrientedBox, rig: &Rig) -> Option<Limit> {
+    let length = rig
+        .digits
+        .iter()
+        .map(|digit| digit.wrist_from_base.position.length() + digit.lengths.iter().sum::<f32>());
+    let value = region.distance(reach.shoulder);
+    let bound = reach.distance + length.fold(rig.reach, f32::max);
+    (value > bound).then_some(Limit {
+        kind: LimitKind::Reach,
+        value,
+        bound: Some(bound),
+    })
+}
+
+/// The distance of a box from the vertical line through a point, in metres; 0 if they meet.
+///
+/// Seen along the line, the box is a polygon. A point outside is separated from it along the normal of an edge or along the
+/// direction to a corner; each such gap is a lower bound.
+fn horizontal_distance(region: &OrientedBox, point: Vec3, up: Vec3) -> f32 {
+    let OrientedBox {
+        object_from_box,
+        half_extents,
+    } = *region;
+    let offset = object_from_box.position - point;
+    let half_edges = Vec3::AXES.map(|axis| object_from_box.transform_vector(axis) * half_extents.dot(axis));
+    let gap = |direction: Vec3| {
+        let direction = direction.normalize_or_zero();
+        let extent: f32 = half_edges.iter().map(|edge| edge.dot(direction).abs()).sum();
+        offset.dot(direction).abs() - extent
+    };
+    let of_edges = half_edges.into_iter().map(|edge| gap(up.cross(edge)));
+    let of_corners = (0..8).map(|corner| {
+        let to_corner = (0..3).fold(offset, |sum, axis| {
+            sum + half_edges[axis] * if corner >> axis & 1 == 0 { 1.0 } else { -1.0 }
+        });
+        gap(to_corner - up * to_corner.dot(up))
+    });
+    of_edges.chain(of_corners).fold(0.0, f32::max)
+}
+
+/// An upper bound on the distance of two contacts of a hand, in metres: from fingertip to fingertip or palm, over all poses.
+fn hand_span(rig: &Rig) -> f32 {
+    let stretched = HandPose {
+        frame_from_wrist: Pose::IDENTITY,
+        digits: rig.stretched(),
+    };
+    let palm = HandSolids::of_pose(rig, &stretched).palm;
+    let palm: Vec<(Vec3, f32)> = palm
+        .iter()
+        .flat_map(|solid| [(solid.start, solid.start_radius), (solid.end, solid.end_radius)])
+        .collect();
+    let tips = Digit::ALL.map(|digit| fingertips(rig, digit));
+    let mut span = 0.0_f32;
+    for (i, tips_of_digit) in tips.iter().enumerate() {
+        for &(tip, radius) in tips_of_digit {
+            let others = tips[i + 1..].iter().flatten().chain(&palm);
+            for &(other, other_radius) in others {
+                span = span.max(tip.distance(other) + radius + other_radius);
+            }
+        }
+    }
+    span * BETWEEN_ANGLES
+}
+
+/// The spheres at the tip of a digit over its range of poses, its outer joints straight or bent back, in the wrist's frame.
+fn fingertips(rig: &Rig, digit: Digit) -> Vec<(Vec3, f32)> {
+    let digit_rig = rig.digit(digit);
+    let [.., tip_radius] = link_radii(rig, digit);
+    let limits = &digit_rig.limits;
+    let over = |range: AngleRange| {
+        (0..ANGLES).map(move |i| range.min + (range.max - range.min) * i as f32 / (ANGLES - 1) as f32)
+    };
+    let straight = |range: AngleRange| [range.min, 0.0_f32.clamp(range.min, range.max)];
+    let mut tips = Vec::new();
+    for base_yaw in over(limits.base_yaw) {
+        let plane = DigitPlane::new(digit_rig, Pose::IDENTITY, base_yaw);
+        for base_pitch in over(limits.base_pitch) {
+            for second_pitch in straight(limits.second_pitch) {
+                for third_pitch in straight(limits.third_pitch) {
+                    let [.., joint, tip] = plane.joints(&DigitAngles {
+                        base_yaw,
+                        base_pitch,
+                        second_pitch,
+                        third_pitch,
+                    });
+                    // The tip lies on the skin.
+                    let inset = (joint - tip).normalize_or_zero() * tip_radius;
+                    tips.push((tip + inset, tip_radius));
+                }
+            }
+        }
+    }
+    tips
+}
+
+impl fmt::Display for Limit {
+    /// A phrase that completes "limited by".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.value;
+        let bound = self.bound.unwrap_or_default();
+        match self.kind {
+            LimitKind::Mass => write!(f, "mass: {value:.1} kg, one hand carries up to {bound:.1} kg"),
+            LimitKind::Torque => write!(
+                f,
+                "torque: {value:.1} N·m about the nearest place that may be held, one hand resists up to {bound:.1} N·m"
+            ),
+            LimitKind::Width => write!(
+                f,
+                "width: {value:.2} m between the closest opposed places, a hand spans {bound:.2} m"
+            ),
+            LimitKind::Forbidden => write!(
+                f,
+                "forbidden surfaces: {:.0} % of the surface, and the rest offers one hand no opposed places",
+                100.0 * value
+            ),
+            LimitKind::Giver => write!(
+                f,
+                "the giver: {:.1} mm are free at the freest place, a finger needs {:.1} mm",
+                1e3 * value,
+                1e3 * bound
+            ),
+            LimitKind::Reach => write!(
+                f,
+                "reach: {value:.2} m from the shoulder to the nearest place that may be held, arm and hand reach {bound:.2} m"
+            ),
+        }
+    }
+}

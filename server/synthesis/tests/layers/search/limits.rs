@@ -1,0 +1,360 @@
+//! What limits one hand, in closed forms; and that nothing is called impossible for which there is a grasp.
+
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    base::pose::Pose,
+    geometry::mesh::TriangleMesh,
+    model::{
+        constraints::{Constraints, Reach},
+        hand::{HandPose, Handedness, joints::HandJoints, kinematics::digit_frames, rig::Rig},
+        holdout::{Holdout, PresentingHand},
+        object::GraspObject,
+        strategy::Validity,
+    },
+    physical::{
+        immobility::{MAX_CONTACT_FORCE, MAX_CONTACTS},
+        solids::HandSolids,
+    },
+    propose::prepared::PreparedRig,
+    search::limits::{Limit, LimitKind},
+};
+
+use crate::fixtures::{
+    data::real_objects,
+    hands::{adult, all_hands, right},
+    holdouts::{floating, tracked_holdouts},
+    meshes::{cuboid, gridded_box, moved, open_box, sphere},
+    objects::{OBJECT_NAMES, bar, object, object_of, plate, rod},
+    random::Random,
+    searches::Search,
+};
+
+fn of_mass(mesh: TriangleMesh, mass: f32, forbidden: &[u32]) -> GraspObject {
+    GraspObject::new(mesh, mass, Vec3::ZERO, None, forbidden).expect("the object is sound")
+}
+
+fn all_triangles(mesh: &TriangleMesh) -> Vec<u32> {
+    (0..mesh.triangles().len() as u32).collect()
+}
+
+/// The limits of a right hand.
+fn limits_of(object: GraspObject) -> Vec<Limit> {
+    limits_in(&floating(object))
+}
+
+fn limits_in(holdout: &Holdout) -> Vec<Limit> {
+    Search::guided(holdout, right()).limits()
+}
+
+/// The only limit.
+fn only(limits: &[Limit]) -> Limit {
+    assert_eq!(limits.len(), 1, "{limits:?}");
+    limits[0]
+}
+
+#[test]
+fn a_box_heavier_than_all_contacts_carry_is_limited_by_mass() {
+    let cube = |mass| of_mass(cuboid(Vec3::splat(0.025), 2), mass, &[]);
+    let limit = only(&limits_of(cube(80.0)));
+    assert_eq!((limit.kind, limit.value), (LimitKind::Mass, 80.0));
+    let carried = MAX_CONTACTS as f32 * MAX_CONTACT_FORCE / 9.81;
+    // And 2 % may be unbalanced.
+    assert!(
+        (limit.bound.unwrap() / carried - 1.0 / 0.98).abs() < 1e-3,
+        "{limit:?}"
+    );
+    assert_eq!(limits_of(cube(70.0)), []);
+}
+
+/// A level bar of 1.5 m of which only the last 10 cm may be touched.
+fn bar_held_at_its_end(mass: f32) -> Holdout {
+    let mesh = gridded_box(Vec3::new(0.015, 0.75, 0.015), 30);
+    let forbidden: Vec<u32> = all_triangles(&mesh)
+        .into_iter()
+        .filter(|&triangle| {
+            mesh.corners(triangle as usize)
+                .iter()
+                .any(|corner| corner.y < 0.649)
+        })
+        .collect();
+    Holdout {
+        up: Vec3::Z,
+        ..floating(of_mass(mesh, mass, &forbidden))
+    }
+}
+
+#[test]
+fn a_long_bar_by_its_end_is_limited_by_torque() {
+    let limit = only(&limits_in(&bar_held_at_its_end(8.0)));
+    assert_eq!(limit.kind, LimitKind::Torque);
+    let torque = 8.0 * 9.81 * 0.65;
+    assert!((limit.value - torque).abs() < 1e-3 * torque, "{limit:?}");
+    // All contacts at the corners of the allowed end, with the torsion of their pads.
+    let lever = Vec3::new(0.015, 0.05, 0.015).length() + 0.6 * 0.0033;
+    let bound = MAX_CONTACTS as f32 * MAX_CONTACT_FORCE * lever + 0.02 * 8.0 * 9.81 * 0.06;
+    assert!((limit.bound.unwrap() - bound).abs() < 1e-3 * bound, "{limit:?}");
+    assert_eq!(limits_in(&bar_held_at_its_end(5.0)), [], "32 N·m");
+    let upright = Holdout {
+        up: Vec3::Y,
+        ..bar_held_at_its_end(8.0)
+    };
+    assert_eq!(limits_in(&upright), [], "the weight hangs below the hand");
+}
+
+#[test]
+fn boxes_and_balls_beyond_a_hands_span_are_limited_by_width() {
+    let turned = moved(
+        &cuboid(Vec3::splat(0.2), 3),
+        Quat::from_rotation_x(0.6),
+        Vec3::ZERO,
+    );
+    for (mesh, narrowest) in [
+        (cuboid(Vec3::splat(0.2), 1), 0.4),
+        (turned, 0.4),
+        (sphere(0.2, 24), 0.2 * std::f32::consts::SQRT_2),
+    ] {
+        let limit = only(&limits_of(object_of(mesh, &[])));
+        assert_eq!(limit.kind, LimitKind::Width);
+        // A lower bound within 5 %, and the ball has facets of 7.5°.
+        let share = limit.value / narrowest;
+        assert!((0.85..=1.0).contains(&share), "{limit:?} for {narrowest}");
+        assert!(limit.value > limit.bound.unwrap());
+    }
+}
+
+#[test]
+fn width_is_not_judged_where_it_proves_nothing() {
+    let cube = floating(object_of(cuboid(Vec3::splat(0.2), 2), &[]));
+    let sticky = Search {
+        friction: 0.9,
+        ..Search::guided(&cube, right())
+    };
+    assert_eq!(sticky.limits(), [], "three faces at a corner hold");
+    let thesis = Search {
+        validity: Validity::Thesis,
+        ..Search::guided(&cube, right())
+    };
+    assert_eq!(thesis.limits(), []);
+    let flat = object_of(cuboid(Vec3::new(0.4, 0.4, 0.01), 4), &[]);
+    assert_eq!(limits_of(flat), [], "its rim is thin");
+    let scaled = |mesh: &TriangleMesh, factor: f32| {
+        let positions = mesh.positions().iter().map(|&p| p * factor).collect();
+        TriangleMesh::new(positions, mesh.triangles().to_vec()).expect("it stays a mesh")
+    };
+    assert_eq!(
+        limits_of(object_of(scaled(&open_box(), 8.0), &[])),
+        [],
+        "its walls are sheets"
+    );
+}
+
+#[test]
+fn a_narrow_box_that_is_all_forbidden_is_limited_by_forbidden_surfaces() {
+    let mesh = cuboid(Vec3::splat(0.025), 2);
+    let forbidden = all_triangles(&mesh);
+    let limit = only(&limits_of(object_of(mesh, &forbidden)));
+    assert_eq!(
+        limit,
+        Limit {
+            kind: LimitKind::Forbidden,
+            value: 1.0,
+            bound: None
+        }
+    );
+}
+
+#[test]
+fn forbidden_narrow_sides_leave_only_wide_ones() {
+    // 40 × 40 × 5 cm, its two large faces forbidden.
+    let mesh = cuboid(Vec3::new(0.2, 0.2, 0.025), 4);
+    let forbidden: Vec<u32> = all_triangles(&mesh)
+        .into_iter()
+        .filter(|&triangle| mesh.normal(triangle as usize).z.abs() > 0.9)
+        .collect();
+    let limit = only(&limits_of(object_of(mesh, &forbidden)));
+    assert_eq!((limit.kind, limit.bound), (LimitKind::Forbidden, None));
+    assert!(
+        (limit.value - 0.8).abs() < 1e-3,
+        "2 × 40 × 40 of 2 × 40 × 40 + 4 × 40 × 5 cm²"
+    );
+}
+
+/// A ball in a giver's flat hand, `height` metres above the middle of its thickest palm solid.
+fn in_the_palm(radius: f32, height: f32) -> Holdout {
+    let pose = HandPose {
+        frame_from_wrist: Pose::IDENTITY,
+        digits: right().stretched(),
+    };
+    let solids = HandSolids::of_pose(right(), &pose);
+    let thickest = solids
+        .palm
+        .iter()
+        .max_by(|a, b| a.radius_at(0.5).total_cmp(&b.radius_at(0.5)))
+        .expect("a palm has solids");
+    // The fixture's ball is around this point.
+    let ball = Vec3::new(0.01, -0.02, 0.03);
+    let offset = ball - thickest.at(0.5) - Vec3::Z * height;
+    let joints = HandJoints::of_pose(right(), &pose).transformed(Pose::from_position(offset));
+    Holdout {
+        presenting_hand: Some(PresentingHand::of_joints(joints)),
+        ..floating(object_of(sphere(radius, 12), &[]))
+    }
+}
+
+#[test]
+fn a_ball_inside_the_givers_hand_is_limited_by_the_giver() {
+    let limit = only(&limits_in(&in_the_palm(0.004, 0.0)));
+    assert_eq!(limit.kind, LimitKind::Giver);
+    assert!(limit.value < limit.bound.unwrap());
+    assert_eq!(limits_in(&in_the_palm(0.02, 0.03)), [], "most of it is free");
+}
+
+#[test]
+fn an_object_beyond_the_receivers_arm_is_limited_by_reach() {
+    let cube = floating(object_of(cuboid(Vec3::splat(0.025), 2), &[]));
+    let at_distance = |metres: f32| Search {
+        constraints: Constraints {
+            reach: Some(Reach {
+                shoulder: Vec3::X * (metres + 0.025),
+                distance: 0.7,
+            }),
+            ..Constraints::default()
+        },
+        ..Search::guided(&cube, right())
+    };
+    let limit = only(&at_distance(1.2).limits());
+    assert_eq!(limit.kind, LimitKind::Reach);
+    assert!((limit.value - 1.2).abs() < 1e-4 && limit.bound.unwrap() > 0.7 + right().reach - 1e-6);
+    assert_eq!(at_distance(0.8).limits(), []);
+}
+
+#[test]
+fn limits_name_their_figures() {
+    let texts = [
+        (
+            LimitKind::Mass,
+            80.0,
+            Some(70.2),
+            "mass: 80.0 kg, one hand carries up to 70.2 kg",
+        ),
+        (
+            LimitKind::Width,
+            0.38,
+            Some(0.22),
+            "width: 0.38 m between the closest opposed places, a hand spans 0.22 m",
+        ),
+    ];
+    for (kind, value, bound, text) in texts {
+        assert_eq!(Limit { kind, value, bound }.to_string(), text);
+    }
+}
+
+/// The largest distance of two fingertips over random poses.
+fn farthest_fingertips(rig: &Rig, random: &mut Random) -> f32 {
+    let mut farthest = 0.0_f32;
+    for _ in 0..20_000 {
+        let angles = random.angles(rig);
+        let tips: [Vec3; 5] =
+            std::array::from_fn(|i| digit_frames(&rig.digits[i], Pose::IDENTITY, angles[i]).tip);
+        for (i, a) in tips.iter().enumerate() {
+            farthest = tips[..i]
+                .iter()
+                .fold(farthest, |most, b| most.max(a.distance(*b)));
+        }
+    }
+    farthest
+}
+
+#[test]
+fn no_pose_exceeds_the_span() {
+    let cube = floating(object_of(cuboid(Vec3::splat(0.22), 2), &[]));
+    let mut random = Random::new(21);
+    for hand in all_hands() {
+        let rig: &PreparedRig = &hand.rig;
+        let span = only(&Search::guided(&cube, rig).limits()).bound.unwrap();
+        let farthest = farthest_fingertips(rig, &mut random);
+        // The span includes the palm's heel and the skin around the fingertips.
+        assert!(
+            farthest < span && span < 1.6 * farthest,
+            "{}: {farthest}, {span}",
+            rig.name
+        );
+    }
+}
+
+/// Objects that people hold.
+fn everyday_objects() -> Vec<(String, Arc<GraspObject>)> {
+    let mut objects: Vec<_> = OBJECT_NAMES
+        .iter()
+        .map(|name| ((*name).to_owned(), Arc::clone(object(name))))
+        .collect();
+    for (name, made) in [("bar", bar()), ("plate", plate()), ("rod", rod())] {
+        objects.push((name.to_owned(), Arc::new(made)));
+    }
+    let real = real_objects().into_iter().filter_map(|(path, mesh)| {
+        let centre = mesh.volume_centroid()?;
+        let object = GraspObject::new(mesh, 0.3, centre, None, &[]).ok()?;
+        Some((path, Arc::new(object)))
+    });
+    objects.extend(real);
+    objects
+}
+
+#[test]
+fn everyday_objects_have_no_limits() {
+    for hand in [Handedness::Left, Handedness::Right] {
+        for holdout in tracked_holdouts() {
+            assert_eq!(Search::guided(&holdout, adult(hand)).limits(), []);
+        }
+        for (name, object) in everyday_objects() {
+            let holdout = floating(object);
+            assert_eq!(Search::guided(&holdout, adult(hand)).limits(), [], "{name}");
+        }
+    }
+}
+
+#[test]
+fn what_is_found_has_no_limits() {
+    let mut random = Random::new(22);
+    let mut found = 0;
+    for (name, object) in everyday_objects() {
+        for _ in 0..6 {
+            let mass = 0.05 * 1000.0_f32.powf(random.between(0.0, 1.0));
+            let forbidden_below = random.in_cube().x * 0.1;
+            let mesh = object.surface.mesh();
+            let forbidden: Vec<u32> = all_triangles(mesh)
+                .into_iter()
+                .filter(|&triangle| {
+                    mesh.corners(triangle as usize)
+                        .iter()
+                        .any(|p| p.y < forbidden_below)
+                })
+                .collect();
+            let heavier = GraspObject::new(mesh.clone(), mass, object.centre_of_mass, None, &forbidden)
+                .expect("the object stays sound");
+            let holdout = Holdout {
+                up: random.direction(),
+                ..floating(heavier)
+            };
+            let search = Search {
+                friction: random.between(0.3, 1.2),
+                max_attempts: 60,
+                constraints: Constraints {
+                    reach: Some(Reach {
+                        shoulder: random.direction(),
+                        distance: random.between(0.7, 1.2),
+                    }),
+                    ..Constraints::default()
+                },
+                ..Search::guided(&holdout, right())
+            };
+            if search.run().grasp.is_some() {
+                found += 1;
+                assert_eq!(search.limits(), [], "{name}, {mass} kg");
+            }
+        }
+    }
+    assert!(found >= 6, "only {found} were found");
+}

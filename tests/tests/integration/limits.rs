@@ -1,0 +1,145 @@
+//! A search that finds nothing says what limits one hand.
+
+use std::sync::Arc;
+
+use grasp_assets::{hands::hand, objects::object};
+use grasp_proto::v1;
+use grasp_synthesis::{
+    model::hand::Handedness,
+    search::{limits::limits, scene::Task, settings::Query},
+};
+use grasp_tests::{
+    TestServer,
+    random_holdouts::{Givers, giving_hands, place},
+};
+use rand::SeedableRng as _;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::fixtures::{box_request, floating_remote, impossible, milliseconds, seconds};
+
+/// Givers placed on each object, and holdouts drawn from them.
+const GIVERS: u64 = 3;
+const HOLDOUTS: usize = 8;
+
+async fn report_of(server: &TestServer, request: v1::FindGraspRequest) -> (v1::Outcome, v1::SearchReport) {
+    let answer = server.grasps().await.find_grasp(request).await;
+    let answer = answer.expect("the request is valid").into_inner();
+    (
+        answer.outcome(),
+        answer.report.expect("every answer has a report"),
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_unliftable_box_is_limited_by_mass_alone() {
+    let server = TestServer::start().await;
+    let create = v1::CreateObjectRequest {
+        mass_kg: 80.0,
+        ..box_request("anvil")
+    };
+    server
+        .objects()
+        .await
+        .create_object(create)
+        .await
+        .expect("the box is sound");
+    let mut request = v1::FindGraspRequest {
+        object: "objects/anvil".to_owned(),
+        budget: Some(milliseconds(60)),
+        ..Default::default()
+    };
+    let (outcome, report) = report_of(&server, request.clone()).await;
+    assert_eq!(outcome, v1::Outcome::BudgetExhausted);
+    let [limit] = &report.limits[..] else {
+        panic!("{:?}", report.limits);
+    };
+    assert_eq!((limit.kind(), limit.value), (v1::LimitKind::Mass, 80.0));
+    let bound = limit.bound.expect("masses have a bound");
+    assert!((60.0..80.0).contains(&bound), "{bound}");
+    assert!(
+        limit.description.starts_with("mass: 80.0 kg"),
+        "{}",
+        limit.description
+    );
+    // The conditions are those of `PHYSICAL`.
+    request.set_validity(v1::Validity::Thesis);
+    request.max_attempts = Some(1);
+    assert_eq!(report_of(&server, request).await.1.limits, []);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_untouchable_box_is_limited_by_its_forbidden_surfaces() {
+    let server = TestServer::start().await;
+    let request = v1::FindGraspRequest {
+        max_attempts: Some(3),
+        ..impossible(&server).await
+    };
+    let (outcome, report) = report_of(&server, request).await;
+    assert_eq!(outcome, v1::Outcome::BudgetExhausted);
+    let kinds: Vec<_> = report.limits.iter().map(v1::Limit::kind).collect();
+    assert_eq!(kinds, [v1::LimitKind::Forbidden]);
+    assert_eq!((report.limits[0].value, report.limits[0].bound), (1.0, None));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn too_little_time_is_no_limit() {
+    let server = TestServer::start().await;
+    let short = v1::FindGraspRequest {
+        atlas: v1::AtlasUse::None.into(),
+        max_attempts: Some(1),
+        ..floating_remote()
+    };
+    let mut exhausted = 0;
+    for seed in 0..20 {
+        let (outcome, report) = report_of(
+            &server,
+            v1::FindGraspRequest {
+                seed: Some(seed),
+                ..short.clone()
+            },
+        )
+        .await;
+        assert_eq!(report.limits, []);
+        exhausted += u32::from(outcome == v1::Outcome::BudgetExhausted);
+    }
+    assert!(exhausted > 0, "one attempt rarely succeeds");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn random_holdouts_that_are_answered_have_no_limits() {
+    let server = TestServer::start().await;
+    let hands = giving_hands();
+    let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(18);
+    let mut found = 0;
+    for name in ["remote", "scalpel", "scissors"] {
+        let object = object(name).expect("it is built in");
+        let placed: Vec<_> = (0..GIVERS)
+            .map(|seed| place(&object.object, &hands, seed))
+            .collect();
+        let givers = Givers::new(&hands, &placed).expect("the givers are of these hands");
+        for _ in 0..HOLDOUTS {
+            let drawn = givers.draw(&mut random);
+            let request = v1::FindGraspRequest {
+                budget: Some(seconds(1)),
+                ..drawn.request(&format!("objects/{name}"))
+            };
+            if report_of(&server, request).await.0 != v1::Outcome::Found {
+                continue;
+            }
+            found += 1;
+            let holdout = drawn.holdout(Arc::clone(&object.object));
+            let task = Task {
+                holdout: &holdout,
+                object: &object.prepared,
+                rig,
+            };
+            assert_eq!(limits(task, &Query::default()), [], "{name}");
+        }
+    }
+    assert!(found > 12, "only {found} were found");
+    server.stop().await;
+}
