@@ -413,6 +413,9 @@ pub struct SearchReport {
     /// Identifies the state of the atlas used, in hexadecimal; none if none was used.
     #[serde(default)]
     pub atlas_stamp: Option<String>,
+    /// What the server repaired in the request, such as radii of the giver's joints that were 0.
+    #[serde(default)]
+    pub warnings: Vec<String>,
 }
 
 /// The answer to a holdout.

@@ -127,6 +127,7 @@ mod tests {
             source: None,
             atlas_entries: 0,
             atlas_stamp: None,
+            warnings: Vec::new(),
         };
         let at_a_glance = rejections_at_a_glance(&report);
         assert_eq!(at_a_glance, "palm 65%, not immobile 25%, no contacts 10%");

@@ -307,6 +307,7 @@ fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed>
         source: source_from_wire(report.source),
         atlas_entries: report.atlas_entries,
         atlas_stamp: Some(report.atlas_stamp).filter(|stamp| !stamp.is_empty()),
+        warnings: report.warnings,
     })
 }
 

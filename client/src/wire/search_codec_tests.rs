@@ -106,6 +106,7 @@ fn wire_answer() -> v1::FindGraspResponse {
             source: v1::GraspSource::Atlas.into(),
             atlas_entries: 25,
             atlas_stamp: "26".to_owned(),
+            warnings: vec!["27".to_owned()],
         }),
     }
 }
@@ -169,6 +170,7 @@ fn converts_every_number_of_an_answer() {
     assert_eq!((report.candidates, report.atlas_entries), (24, 25));
     assert_eq!(report.source, Some(GraspSource::Atlas));
     assert_eq!(report.atlas_stamp.as_deref(), Some("26"));
+    assert_eq!(report.warnings, ["27"]);
     assert_eq!((report.attempts, report.pruned_placements), (12, 13));
     assert_eq!(report.rejections[0].rejection, Rejection::PalmCollision);
     assert_eq!(report.rejections[0].count, 14);

@@ -112,6 +112,7 @@ fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
             format!("attempt {}: {}{angle}", miss.attempt, name_of(&miss.rejection)),
         ));
     }
+    lines.extend(report.warnings.iter().map(|warning| ("warning", warning.clone())));
     for time in &report.step_times {
         lines.push((
             "time in step",

@@ -1,0 +1,239 @@
+//! Any request that passes validation is answered.
+
+use std::cell::Cell;
+
+use glam::{Quat, Vec3};
+use grasp_assets::hands::{self, RIG_NAMES};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{Handedness, rig::AngleRange},
+};
+use proptest::{
+    prelude::*,
+    test_runner::{Config, RngSeed, TestRunner},
+};
+
+use super::*;
+use crate::{
+    budget::effective_budget,
+    config,
+    convention::Convention,
+    objects::{StoredObject, tests::tetrahedron},
+    validate::{find_query, fixtures},
+};
+
+/// Any number that a client may send, most of them ordinary.
+fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
+    prop_oneof![1000 => ordinary, 1 => any::<f32>(), 1 => Just(0.0)]
+}
+
+fn vector(ordinary: f32) -> impl Strategy<Value = v1::Vector3> {
+    [
+        number(-ordinary..ordinary),
+        number(-ordinary..ordinary),
+        number(-ordinary..ordinary),
+    ]
+    .prop_map(|[x, y, z]| v1::Vector3 { x, y, z })
+}
+
+/// Mostly unit quaternions.
+fn quaternion() -> impl Strategy<Value = v1::Quaternion> {
+    let turned = (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0, -4.0_f32..4.0).prop_map(|(x, y, z, angle)| {
+        let axis = Vec3::new(x, y, z).normalize_or(Vec3::X);
+        let [x, y, z, w] = Quat::from_axis_angle(axis, angle).to_array();
+        v1::Quaternion { x, y, z, w }
+    });
+    let any = any::<[f32; 4]>().prop_map(|[x, y, z, w]| v1::Quaternion { x, y, z, w });
+    prop_oneof![500 => turned, 1 => any]
+}
+
+fn pose(ordinary: f32) -> impl Strategy<Value = Option<v1::Pose>> {
+    let pose = (
+        proptest::option::of(vector(ordinary)),
+        proptest::option::of(quaternion()),
+    );
+    proptest::option::weighted(
+        0.998,
+        pose.prop_map(|(position, orientation)| v1::Pose {
+            position,
+            orientation,
+        }),
+    )
+}
+
+/// A hand in any pose, seldom with a joint that is anywhere.
+fn tracked_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
+    let moved = (vector(1.0), quaternion()).prop_map(|(v, q)| Pose {
+        position: Vec3::new(v.x, v.y, v.z),
+        orientation: Quat::from_xyzw(q.x, q.y, q.z, q.w),
+    });
+    let stray = (0..25_usize, pose(0.12), number(0.0..0.05));
+    (
+        moved,
+        proptest::option::weighted(0.1, stray),
+        any::<bool>(),
+        any::<bool>(),
+    )
+        .prop_map(|(client_from_hand, stray, is_left, is_webxr)| {
+            let (handedness, set) = (
+                if is_left {
+                    Handedness::Left
+                } else {
+                    Handedness::Right
+                },
+                if is_webxr {
+                    v1::JointSet::Webxr25
+                } else {
+                    v1::JointSet::Openxr26
+                },
+            );
+            let hand = fixtures::joints_of_a_rig(handedness).transformed(client_from_hand);
+            let mut hand = fixtures::sent(&hand, Convention::OpenXr, set);
+            if let Some((joint, client_from_joint, radius)) = stray {
+                hand.joints[joint] = v1::JointPose {
+                    client_from_joint,
+                    radius,
+                };
+            }
+            v1::presenting_hand::Form::Joints(hand)
+        })
+}
+
+/// Angles given as shares of their ranges.
+fn angled_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
+    let shares = proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5);
+    (shares, pose(0.2), 1..=2_i32, 0..RIG_NAMES.len()).prop_map(
+        |(shares, client_from_wrist, handedness, rig)| {
+            let rig = RIG_NAMES[rig];
+            let hand = hands::hand(rig, Handedness::Right).expect("the rig is built in");
+            let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
+            let digits = hand.rig.digits.iter().zip(shares);
+            v1::presenting_hand::Form::Angles(v1::HandAngles {
+                rig: rig.to_owned(),
+                handedness,
+                client_from_wrist,
+                digits: digits
+                    .map(|(digit, share)| v1::DigitAngles {
+                        base_yaw: within(digit.limits.base_yaw, share[0]),
+                        base_pitch: within(digit.limits.base_pitch, share[1]),
+                        second_pitch: within(digit.limits.second_pitch, share[2]),
+                        third_pitch: None,
+                    })
+                    .collect(),
+            })
+        },
+    )
+}
+
+fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
+    let hand =
+        prop_oneof![tracked_hand(), angled_hand()].prop_map(|form| v1::PresentingHand { form: Some(form) });
+    (
+        proptest::option::of(hand),
+        pose(2.0),
+        proptest::option::of(vector(1.0)),
+        (0..8_i32, 0..8_i32, 0..6_i32),
+        any::<(Option<u64>, Option<u64>, bool)>(),
+        proptest::option::of(number(0.05..2.0)),
+    )
+        .prop_map(
+            |(
+                presenting_hand,
+                client_from_object,
+                up,
+                enums,
+                (seed, only_attempt, reproducible),
+                friction,
+            )| {
+                v1::FindGraspRequest {
+                    object: "objects/any".to_owned(),
+                    client_from_object,
+                    presenting_hand,
+                    up,
+                    max_attempts: Some(2),
+                    strategy: enums.0,
+                    bend_ratios: enums.1,
+                    convention: enums.2,
+                    seed,
+                    only_attempt,
+                    reproducible,
+                    friction,
+                    plan_key_frames: true,
+                    ..Default::default()
+                }
+            },
+        )
+}
+
+/// Objects from a speck to a beam.
+fn objects() -> impl Strategy<Value = StoredObject> {
+    prop_oneof![Just(0.002_f32), Just(0.05), Just(9.0)].prop_map(|edge| tetrahedron("any", edge, &[1]))
+}
+
+fn runs() -> Config {
+    Config {
+        cases: 1000,
+        rng_seed: RngSeed::Fixed(2),
+        failure_persistence: None,
+        ..Config::default()
+    }
+}
+
+#[test]
+fn answers_every_request_that_passes_validation() {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a thread");
+    let searched = Cell::new([0; 3]);
+    let outcome = TestRunner::new(runs()).run(&(request(), objects()), |(request, object)| {
+        let arrived = Instant::now();
+        let Ok(query) = find_query(request, "thesis", |_| true) else {
+            return Ok(());
+        };
+        let kind = match &query.presenting_hand {
+            None => 0,
+            Some(giver) if giver.field.ends_with("angles") => 1,
+            Some(_) => 2,
+        };
+        let mut counts = searched.get();
+        counts[kind] += 1;
+        searched.set(counts);
+        let budgets = config::Config::default().budgets;
+        let job = FindJob {
+            budget: effective_budget(query.budget, budgets, arrived, None),
+            patience: Duration::ZERO,
+            query,
+            object: Arc::clone(&object.object),
+            stored: Arc::new(object),
+            seed: 3,
+            arrived,
+            workers: 1,
+            known: KnownGrips::default(),
+            mechanisms: Mechanisms::ALL,
+        };
+        match job
+            .prepare()
+            .and_then(|job| job.run(&pool, &AtomicBool::new(false)))
+        {
+            Ok(Answered { response: answer, .. }) => {
+                let report = answer.report.expect("every answer has a report");
+                prop_assert!(report.attempts <= 2);
+                prop_assert_eq!(
+                    answer.grasp.is_some(),
+                    answer.outcome == i32::from(v1::Outcome::Found)
+                );
+                for joint in answer.grasp.iter().flat_map(|grasp| &grasp.joints) {
+                    let pose = joint.client_from_joint.expect("every joint has a pose");
+                    let position = pose.position.expect("every pose has a position");
+                    prop_assert!(position.x.is_finite() && position.y.is_finite() && position.z.is_finite());
+                }
+            }
+            Err(error) => prop_assert!(matches!(error, ServiceError::Invalid(_)), "{}", error),
+        }
+        Ok(())
+    });
+    outcome.unwrap_or_else(|failure| panic!("{failure}"));
+    // The test is meaningful only if many requests of every kind pass validation.
+    assert!(searched.get().iter().all(|&count| count >= 20), "{searched:?}");
+}
