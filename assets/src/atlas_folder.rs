@@ -175,9 +175,10 @@ fn read(
 /// Writes an atlas to a temporary file and renames it, so that no reader sees half of one. A server that is given the folder
 /// removes such files if a crash leaves them, so they are named as it names its own.
 fn write(path: &Path, object: &GraspObject, rig: &Rig, grown: &Grown) -> Result<(), AtlasFolderError> {
+    /// Number of the next file, unique in this process.
+    static NEXT: AtomicU64 = AtomicU64::new(0);
     let parent = path.parent().unwrap_or(Path::new(""));
     fs::create_dir_all(parent).map_err(failed_to("create", parent))?;
-    static NEXT: AtomicU64 = AtomicU64::new(0);
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
     let unfinished = path.with_extension(format!("{}-{number}.part", std::process::id()));
     fs::write(&unfinished, encode(grown, object, rig))

@@ -66,7 +66,9 @@ pub struct DigitAngles {
 pub struct JointPose {
     /// The joint's frame in the client's frame.
     pub client_from_joint: Pose,
-    /// Distance from the joint to the skin; more than 0. Metres, or centimetres in the Unreal convention.
+    /// Distance from the joint to the skin. Metres, or centimetres in the Unreal convention. 0 in a request: unknown; the
+    /// server derives it and warns in [`SearchReport::warnings`](crate::SearchReport::warnings).
+    #[serde(default)]
     pub radius: f32,
 }
 

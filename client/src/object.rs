@@ -58,7 +58,8 @@ pub struct AtlasState {
 pub struct ForbiddenSurfaces {
     /// Names of OBJ groups (`g`), objects (`o`) or materials (`usemtl`).
     pub groups: Vec<String>,
-    /// Indices of triangles, counted from 0 in the file's order after polygons are split into fans.
+    /// Indices of triangles, counted from 0 in the file's order after polygons are split: n - 2 for a polygon of n corners,
+    /// the fan from its first corner if that corner sees all others.
     pub triangles: Vec<u32>,
 }
 

@@ -452,6 +452,9 @@ pub struct SearchReport {
     /// Identifies the state of the atlas used, in hexadecimal; none if none was used.
     #[serde(default)]
     pub atlas_stamp: Option<String>,
+    /// What the server repaired in the request, such as radii of the giver's joints that were 0.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// Why one hand cannot hold the object, if no grasp was found under [`Validity::Physical`]: more time would not help.
     /// Empty if a longer search may find a grasp, as far as these checks show.
     #[serde(default)]

@@ -38,11 +38,13 @@ pub(crate) struct ClientFrame {
 
 /// What a report contains in addition to the search's own report.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Circumstances {
+pub(crate) struct Circumstances<'a> {
     /// Wall time of the search.
     pub search_time: Duration,
     /// Effective budget.
     pub budget: Duration,
+    /// What was repaired in the request.
+    pub warnings: &'a [String],
 }
 
 /// The response to a `FindGrasp` request.
@@ -54,7 +56,7 @@ pub(crate) fn find_response(
     rig: &Rig,
     frame: ClientFrame,
     settings: &SearchSettings,
-    circumstances: Circumstances,
+    circumstances: Circumstances<'_>,
 ) -> Result<v1::FindGraspResponse, ServiceError> {
     let wire_outcome = match outcome.end {
         SearchEnd::Found => v1::Outcome::Found,
@@ -240,7 +242,7 @@ fn report(
     report: &SearchReport,
     frame: ClientFrame,
     settings: &SearchSettings,
-    circumstances: Circumstances,
+    circumstances: Circumstances<'_>,
 ) -> v1::SearchReport {
     v1::SearchReport {
         attempts: report.attempts,
@@ -278,6 +280,7 @@ fn report(
             .atlas()
             .map(|atlas| atlas_stamp(atlas))
             .unwrap_or_default(),
+        warnings: circumstances.warnings.to_vec(),
         limits: report.limits.iter().map(wire_limit).collect(),
     }
 }

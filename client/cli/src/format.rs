@@ -128,6 +128,7 @@ mod tests {
             atlas_entries: 0,
             atlas_stamp: None,
             limits: Vec::new(),
+            warnings: Vec::new(),
         };
         let at_a_glance = rejections_at_a_glance(&report);
         assert_eq!(at_a_glance, "palm 65%, not immobile 25%, no contacts 10%");

@@ -308,6 +308,7 @@ fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed>
         atlas_entries: report.atlas_entries,
         atlas_stamp: Some(report.atlas_stamp).filter(|stamp| !stamp.is_empty()),
         limits: report.limits.into_iter().map(limit_from_wire).collect(),
+        warnings: report.warnings,
     })
 }
 

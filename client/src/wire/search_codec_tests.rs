@@ -16,111 +16,120 @@ fn wire_vector(x: f32) -> v1::Vector3 {
 fn wire_answer() -> v1::FindGraspResponse {
     v1::FindGraspResponse {
         outcome: v1::Outcome::Found.into(),
-        grasp: Some(v1::Grasp {
-            rig: "thesis".to_owned(),
-            handedness: v1::Handedness::Left.into(),
-            client_from_wrist: Some(v1::Pose {
-                position: Some(wire_vector(1.0)),
-                orientation: None,
-            }),
-            object_from_wrist: Some(v1::Pose {
-                position: Some(wire_vector(2.0)),
-                orientation: None,
-            }),
-            digits: vec![v1::DigitAngles::default(); 5],
-            joints: (0..26_u8)
-                .map(|i| v1::JointPose {
-                    client_from_joint: None,
-                    radius: f32::from(i),
-                })
-                .collect(),
-            contacts: vec![v1::Contact {
-                torsion: 0.002,
-                client_position: Some(wire_vector(3.0)),
-                client_normal: Some(wire_vector(4.0)),
-                object_position: Some(wire_vector(5.0)),
-                object_normal: Some(wire_vector(6.0)),
-                digit: v1::Digit::Ring.into(),
-                phalanx: v1::Phalanx::Third.into(),
-                triangle: 7,
-                client_force: Some(wire_vector(8.0)),
-                object_force: Some(wire_vector(9.0)),
-            }],
-            margins: Some(v1::PhysicalMargins {
-                residual: 0.01,
-                epsilon: 0.03,
-                penetration: 0.001,
-                giver_clearance: None,
-            }),
-            comfort: 10.0,
-            wrench_angle: 11.0,
-            r#type: v1::GraspType::Quadpod.into(),
-            type_confidence: 0.75,
-            score: Some(v1::Score {
-                total: 0.21,
-                terms: vec![v1::ScoreTerm {
-                    name: "comfort".to_owned(),
-                    value: 0.22,
-                    weight: 0.23,
-                }],
-            }),
-            key_frames: [v1::KeyFrameKind::Approach, v1::KeyFrameKind::Close]
-                .map(wire_key_frame)
-                .to_vec(),
+        grasp: Some(wire_grasp()),
+        report: Some(wire_report()),
+    }
+}
+
+fn wire_grasp() -> v1::Grasp {
+    v1::Grasp {
+        rig: "thesis".to_owned(),
+        handedness: v1::Handedness::Left.into(),
+        client_from_wrist: Some(v1::Pose {
+            position: Some(wire_vector(1.0)),
+            orientation: None,
         }),
-        report: Some(v1::SearchReport {
-            attempts: 12,
-            pruned_placements: 13,
-            rejections: vec![
-                v1::RejectionCount {
-                    rejection: v1::Rejection::PalmCollision.into(),
-                    count: 14,
-                },
-                v1::RejectionCount {
-                    rejection: 99,
-                    count: 15,
-                },
-            ],
-            step_times: vec![v1::StepTime {
-                step: v1::Step::FingerPosing.into(),
-                time: Some(prost_types::Duration {
-                    seconds: 16,
-                    nanos: 0,
-                }),
+        object_from_wrist: Some(v1::Pose {
+            position: Some(wire_vector(2.0)),
+            orientation: None,
+        }),
+        digits: vec![v1::DigitAngles::default(); 5],
+        joints: (0..26_u8)
+            .map(|i| v1::JointPose {
+                client_from_joint: None,
+                radius: f32::from(i),
+            })
+            .collect(),
+        contacts: vec![v1::Contact {
+            torsion: 0.002,
+            client_position: Some(wire_vector(3.0)),
+            client_normal: Some(wire_vector(4.0)),
+            object_position: Some(wire_vector(5.0)),
+            object_normal: Some(wire_vector(6.0)),
+            digit: v1::Digit::Ring.into(),
+            phalanx: v1::Phalanx::Third.into(),
+            triangle: 7,
+            client_force: Some(wire_vector(8.0)),
+            object_force: Some(wire_vector(9.0)),
+        }],
+        margins: Some(v1::PhysicalMargins {
+            residual: 0.01,
+            epsilon: 0.03,
+            penetration: 0.001,
+            giver_clearance: None,
+        }),
+        comfort: 10.0,
+        wrench_angle: 11.0,
+        r#type: v1::GraspType::Quadpod.into(),
+        type_confidence: 0.75,
+        score: Some(v1::Score {
+            total: 0.21,
+            terms: vec![v1::ScoreTerm {
+                name: "comfort".to_owned(),
+                value: 0.22,
+                weight: 0.23,
             }],
-            seed: u64::MAX,
-            attempt: Some(17),
-            search_time: Some(prost_types::Duration {
-                seconds: 0,
-                nanos: 18,
-            }),
-            budget: Some(prost_types::Duration {
-                seconds: 19,
+        }),
+        key_frames: [v1::KeyFrameKind::Approach, v1::KeyFrameKind::Close]
+            .map(wire_key_frame)
+            .to_vec(),
+    }
+}
+
+fn wire_report() -> v1::SearchReport {
+    v1::SearchReport {
+        attempts: 12,
+        pruned_placements: 13,
+        rejections: vec![
+            v1::RejectionCount {
+                rejection: v1::Rejection::PalmCollision.into(),
+                count: 14,
+            },
+            v1::RejectionCount {
+                rejection: 99,
+                count: 15,
+            },
+        ],
+        step_times: vec![v1::StepTime {
+            step: v1::Step::FingerPosing.into(),
+            time: Some(prost_types::Duration {
+                seconds: 16,
                 nanos: 0,
             }),
-            workers: 20,
-            nearest_miss: None,
-            strategy: v1::Strategy::F.into(),
-            validity: v1::Validity::Thesis.into(),
-            candidates: 24,
-            source: v1::GraspSource::Atlas.into(),
-            atlas_entries: 25,
-            atlas_stamp: "26".to_owned(),
-            limits: vec![
-                v1::Limit {
-                    kind: v1::LimitKind::Torque.into(),
-                    value: 28.0,
-                    bound: Some(29.0),
-                    description: "30".to_owned(),
-                },
-                v1::Limit {
-                    kind: 99,
-                    value: 31.0,
-                    bound: None,
-                    description: "32".to_owned(),
-                },
-            ],
+        }],
+        seed: u64::MAX,
+        attempt: Some(17),
+        search_time: Some(prost_types::Duration {
+            seconds: 0,
+            nanos: 18,
         }),
+        budget: Some(prost_types::Duration {
+            seconds: 19,
+            nanos: 0,
+        }),
+        workers: 20,
+        nearest_miss: None,
+        strategy: v1::Strategy::F.into(),
+        validity: v1::Validity::Thesis.into(),
+        candidates: 24,
+        source: v1::GraspSource::Atlas.into(),
+        atlas_entries: 25,
+        atlas_stamp: "26".to_owned(),
+        limits: vec![
+            v1::Limit {
+                kind: v1::LimitKind::Torque.into(),
+                value: 28.0,
+                bound: Some(29.0),
+                description: "30".to_owned(),
+            },
+            v1::Limit {
+                kind: 99,
+                value: 31.0,
+                bound: None,
+                description: "32".to_owned(),
+            },
+        ],
+        warnings: vec!["27".to_owned()],
     }
 }
 
@@ -194,6 +203,7 @@ fn converts_every_number_of_an_answer() {
         description: description.to_owned(),
     });
     assert_eq!(report.limits, limits);
+    assert_eq!(report.warnings, ["27"]);
     assert_eq!((report.attempts, report.pruned_placements), (12, 13));
     assert_eq!(report.rejections[0].rejection, Rejection::PalmCollision);
     assert_eq!(report.rejections[0].count, 14);

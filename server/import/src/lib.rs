@@ -7,9 +7,11 @@
 //!
 //! What a reader accepts is welded and checked: see [`obj::ObjMesh`].
 
+mod ears;
 mod edges;
 mod limits;
 pub mod obj;
+mod polygon;
 mod weld;
 
 pub use limits::{MAX_COORDINATE_METRES, MeshLimits};

@@ -11,6 +11,6 @@ pub struct MeshLimits {
     pub bytes: usize,
     /// Number of vertices.
     pub vertices: usize,
-    /// Number of triangles, after polygons are split into fans.
+    /// Number of triangles, after polygons are split.
     pub triangles: usize,
 }

@@ -260,9 +260,11 @@ impl PreparedJob {
             convention: self.query.convention,
             client_from_object: self.query.client_from_object,
         };
+        let giver = self.query.presenting_hand.as_ref();
         let circumstances = Circumstances {
             search_time,
             budget: self.budget,
+            warnings: giver.map_or(&[], |giver| &giver.warnings),
         };
         Ok(Answered {
             response: find_response(&outcome, rig, frame, &self.settings, circumstances)?,

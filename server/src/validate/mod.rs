@@ -18,6 +18,8 @@ use grasp_synthesis::base::pose::Pose;
 
 pub(crate) use find_grasp::{FindQuery, find_query};
 pub(crate) use hand::GiverHand;
+#[cfg(test)]
+pub(crate) use hand::fixtures;
 pub(crate) use object::{ObjectFields, object_fields, object_id_of};
 pub(crate) use page::{page_query, page_token};
 

@@ -219,7 +219,7 @@ async fn every_field_of_a_tracked_hand_is_validated() {
         ("joint_set", |hand| hand.joint_set = 5),
         ("joints", |hand| hand.joints.clear()),
         ("joints", |hand| hand.joint_set = v1::JointSet::Openxr26.into()),
-        ("joints[3].radius", |hand| hand.joints[3].radius = 0.0),
+        ("joints[3].radius", |hand| hand.joints[3].radius = -0.001),
         ("joints[3].radius", |hand| hand.joints[3].radius = f32::NAN),
         ("joints[3].radius", |hand| hand.joints[3].radius = 1.0),
         ("joints[24].client_from_joint", |hand| {
@@ -228,7 +228,7 @@ async fn every_field_of_a_tracked_hand_is_validated() {
         ("joints[1].client_from_joint.orientation", |hand| {
             hand.joints[1].client_from_joint = Some(quaternion(2.0));
         }),
-        ("joints", |hand| {
+        ("joints[9]", |hand| {
             hand.joints[9].client_from_joint = Some(position(10.0));
         }),
         ("joints", |hand| {

@@ -15,5 +15,8 @@ mod objects_directory;
 mod physical;
 mod real_input;
 mod reflection;
+mod reported;
 mod reproducible;
 mod shutdown;
+mod tracked_hands;
+mod uploads;

@@ -115,6 +115,7 @@ fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
     for limit in &report.limits {
         lines.push(("limited by", limit.description.clone()));
     }
+    lines.extend(report.warnings.iter().map(|warning| ("warning", warning.clone())));
     for time in &report.step_times {
         lines.push((
             "time in step",

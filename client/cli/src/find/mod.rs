@@ -54,8 +54,8 @@ API's FindGraspRequest; only "object" is required:
   }
 
 Instead of angles, the presenting hand may be the joints of a headset: {"joints": {"handedness": "left",
-"joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}. Metres, radians,
-quaternions x y z w. Options on the command line override the file. --print-request prints the request instead of
+"joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}; a radius that the
+headset does not report is 0. Metres, radians, quaternions x y z w. Options on the command line override the file. --print-request prints the request instead of
 sending it, as a template.
 
 With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},

@@ -164,6 +164,34 @@ async fn found_grasp_is_drawn_and_replayed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn prints_what_the_server_repaired() {
+    let url = real_server().await;
+    let folder = empty_folder("tips_without_radius");
+    let hand = include_str!("../../../examples/data/tracked_hand.json");
+    let mut hand: serde_json::Value = serde_json::from_str(hand).unwrap();
+    for tip in [5, 10, 15, 20, 25] {
+        hand["joints"][tip].as_object_mut().unwrap().remove("radius");
+    }
+    let file = folder.join("request.json");
+    let request = serde_json::json!({"object": "objects/remote", "presenting_hand": {"joints": hand}});
+    std::fs::write(&file, request.to_string()).unwrap();
+    let find = |options: &[&str]| {
+        let common = ["find", "--request", file.to_str().unwrap(), "--server", &url];
+        run(&[&common[..], options].concat())
+    };
+    let output = find(&[]);
+    let text_output = text(&output.stdout);
+    let printed = text_output.lines().find(|line| line.contains("warning"));
+    assert!(
+        printed.is_some_and(|line| line.contains("presenting_hand.joints.joints: 5 radii are 0")),
+        "{text_output}{}",
+        text(&output.stderr)
+    );
+    let answer = json(&find(&["--json"]).stdout);
+    assert_eq!(answer["report"]["warnings"].as_array().unwrap().len(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn rejects_picture_without_mesh_before_the_search() {
     let folder = empty_folder("a_picture_without_a_mesh");
     let request = folder.join("request.json");

@@ -1,4 +1,4 @@
-//! Parses the scanned text with `tobj`, then welds and checks the mesh.
+//! Parses the scanned text with `tobj`, then splits polygons, welds and checks the mesh.
 
 use std::collections::HashSet;
 
@@ -7,6 +7,7 @@ use grasp_synthesis::geometry::mesh::TriangleMesh;
 
 use super::{
     ObjError,
+    faces::triangles,
     scan::{Occurrences, Scan},
 };
 use crate::{
@@ -27,29 +28,23 @@ pub(super) struct Cleaned {
 
 /// Parses the scanned text, welds it, drops degenerate and repeated triangles, and checks how the rest join.
 pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjError>> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ..tobj::LoadOptions::default()
-    };
+    // tobj would split every polygon into a fan, convex or not.
+    let options = tobj::LoadOptions::default();
     // The scan drops references to material libraries; if one got through, it would be rejected, not opened.
     let reject = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut scan.plain.as_bytes(), &options, reject)
         .map_err(|error| vec![ObjError::Unreadable(error)])?;
     // Without groups in its input, tobj returns one model.
     let Some(parsed) = models.into_iter().next().map(|model| model.mesh) else {
-        return Err(vec![ObjError::Empty {
-            dropped: scan.without_area.count,
-        }]);
+        return Err(vec![scan.empty(0)]);
     };
 
+    let split = triangles(scan, &parsed)?;
     let (positions, welded) = weld(&parsed.positions, unit_metres);
-    let corners: Vec<[u32; 3]> = parsed
-        .indices
-        .as_chunks()
-        .0
+    let corners = split
+        .corners
         .iter()
-        .map(|triangle| triangle.map(|vertex| welded[vertex as usize]))
-        .collect();
+        .map(|triangle| triangle.map(|vertex| welded[vertex as usize]));
     let origins = scan
         .faces
         .iter()
@@ -63,7 +58,7 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
     let mut indices_in_file = Vec::new();
     // Slivers with three distinct vertices have no area but still close the gap between their neighbours.
     let mut joined = Vec::new();
-    for (index, (triangle, face)) in corners.into_iter().zip(origins).enumerate() {
+    for (index, (triangle, face)) in corners.zip(origins).enumerate() {
         let line = scan.faces[face].line;
         if has_repeated_corner(triangle) {
             dropped.without_area.note(line);
@@ -81,20 +76,14 @@ pub(super) fn clean(scan: &Scan, unit_metres: f32) -> Result<Cleaned, Vec<ObjErr
         }
     }
     if triangles.is_empty() {
-        return Err(vec![ObjError::Empty {
-            dropped: scan.without_area.count + dropped.without_area.count,
-        }]);
+        return Err(vec![scan.empty(dropped.without_area.count)]);
     }
 
-    let mut warnings = dropped.warnings(scan);
+    let mut warnings = scan.warnings.clone();
+    warnings.extend(dropped.warnings(scan, split.overlapping));
     let unused = scan.vertices - parsed.positions.len() / 3;
     if unused > 0 {
         warnings.push(format!("{unused} vertices are not used by any face"));
-    }
-    if let Some(line) = first_concave_polygon(scan, &parsed) {
-        warnings.push(format!(
-            "line {line}: a polygon is not convex; its fan of triangles overlaps itself"
-        ));
     }
     let edges = Edges::of(&joined, positions.len());
     warnings.extend(edges.warnings());
@@ -124,7 +113,7 @@ struct Dropped {
 }
 
 impl Dropped {
-    fn warnings(&self, scan: &Scan) -> Vec<String> {
+    fn warnings(&self, scan: &Scan, overlapping: Occurrences) -> impl Iterator<Item = String> {
         [
             (
                 scan.unknown,
@@ -136,36 +125,15 @@ impl Dropped {
             ),
             (self.without_area, "triangles without area were dropped"),
             (self.repeated, "triangles that repeat an earlier one were dropped"),
+            (
+                overlapping,
+                "polygons intersect themselves; their fans of triangles overlap",
+            ),
         ]
         .into_iter()
         .filter(|(oddity, _)| oddity.count > 0)
         .map(|(Occurrences { count, first_line }, what)| {
             format!("{count} {what}; the first is on line {first_line}")
         })
-        .collect()
     }
-}
-
-/// The line of the first polygon with a triangle in its fan that is wound against the others.
-fn first_concave_polygon(scan: &Scan, parsed: &tobj::Mesh) -> Option<usize> {
-    let position = |vertex: u32| {
-        let start = 3 * vertex as usize;
-        Vec3::from_slice(&parsed.positions[start..start + 3]).as_dvec3()
-    };
-    let mut triangles = parsed.indices.as_chunks::<3>().0.iter();
-    scan.faces.iter().find_map(|face| {
-        let normals: Vec<_> = triangles
-            .by_ref()
-            .take(face.corners - 2)
-            .map(|triangle| {
-                let [a, b, c] = triangle.map(position);
-                (b - a).cross(c - a)
-            })
-            .collect();
-        let mean: glam::DVec3 = normals.iter().sum();
-        normals
-            .iter()
-            .any(|normal| normal.dot(mean) < 0.0)
-            .then_some(face.line)
-    })
 }

@@ -3,7 +3,7 @@
 use grasp_synthesis::geometry::mesh::MeshError;
 
 use super::MAX_NAMES_PER_LINE;
-use crate::limits::MAX_COORDINATE_METRES;
+use crate::{limits::MAX_COORDINATE_METRES, polygon::MAX_CLIPPED_CORNERS};
 
 /// Violations listed before the rest is only counted; bounds the size of the answer.
 const LISTED_ERRORS: usize = 16;
@@ -40,7 +40,8 @@ pub enum ObjError {
     },
     /// A vertex has too few or too many numbers.
     #[error(
-        "line {line}: a vertex has {found} numbers; it must have 3, 4 with a weight, 6 or 7 with a colour"
+        "line {line}: a vertex has {found} numbers; it must have 3, 4 with a weight, 6 with a colour, or 7 with a colour and \
+         its alpha or a weight"
     )]
     NumberCount {
         /// The line, counted from 1.
@@ -105,11 +106,42 @@ pub enum ObjError {
         /// Their number.
         found: usize,
     },
+    /// A polygon that is not convex has too many corners.
+    #[error(
+        "line {line}: a polygon that is not convex has {corners} corners; at most {MAX_CLIPPED_CORNERS} are allowed, \
+         split it into triangles"
+    )]
+    TooManyCorners {
+        /// The line, counted from 1.
+        line: usize,
+        /// Their number.
+        corners: usize,
+    },
+    /// There is no statement at all.
+    #[error(
+        "the text is empty or has only blank lines and comments; a mesh is required as Wavefront OBJ text"
+    )]
+    Blank,
+    /// The bytes are not OBJ text.
+    #[error("{}; this looks like {looks_like}", statements_of(*.statements, *.lines))]
+    NotObj {
+        /// Number of lines that are neither blank nor comments.
+        lines: usize,
+        /// How many of them start with a word of OBJ.
+        statements: usize,
+        /// What the bytes probably are, and what to do about it.
+        looks_like: &'static str,
+    },
     /// No triangle is left.
-    #[error("the mesh has no triangles; {dropped} points, lines and faces without area were ignored")]
+    #[error(
+        "the mesh has no triangles; {dropped} points, lines and faces without area and {unknown} lines with an unknown \
+         keyword were ignored"
+    )]
     Empty {
         /// Number of points, lines and faces without area.
         dropped: usize,
+        /// Number of lines that start with an unknown keyword.
+        unknown: usize,
     },
     /// The parser rejected what the scan accepted.
     #[error("the mesh cannot be parsed")]
@@ -120,6 +152,14 @@ pub enum ObjError {
     /// Violations beyond those listed.
     #[error("and {0} more violations")]
     More(usize),
+}
+
+fn statements_of(statements: usize, lines: usize) -> String {
+    if statements == 0 {
+        format!("none of the {lines} lines begins with a word of OBJ (v, f, ...)")
+    } else {
+        format!("words of OBJ (v, f, ...) begin only {statements} of the {lines} lines")
+    }
 }
 
 /// A bounded list of violations.

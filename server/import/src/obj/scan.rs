@@ -9,6 +9,7 @@ use super::{
     MAX_NAMES_PER_LINE,
     error::{ObjError, Violations},
     lines::{Lines, shown, words},
+    seven_numbers::SevenNumbers,
 };
 use crate::limits::{MAX_COORDINATE_METRES, MeshLimits};
 
@@ -54,6 +55,8 @@ pub(super) struct Scan {
     pub(super) without_area: Occurrences,
     /// Lines that start with an unknown keyword.
     pub(super) unknown: Occurrences,
+    /// How vertices were read, where that may surprise.
+    pub(super) warnings: Vec<String>,
     /// Names by index.
     names: Vec<String>,
     /// Sets of names shared by faces, as ranges of `listed_names`.
@@ -66,11 +69,14 @@ impl Scan {
     /// Scans the text; allocates in proportion to what was read within the limits.
     pub(super) fn of(text: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<Self, Vec<ObjError>> {
         let mut scanner = Scanner {
+            text,
             unit_metres,
             limits,
             scan: Self::default(),
             violations: Violations::default(),
             over_limit: false,
+            seven_numbers: None,
+            weighted: Occurrences::default(),
             forward: Vec::new(),
             names: HashMap::new(),
             current: Names::default(),
@@ -83,6 +89,14 @@ impl Scan {
             }
         }
         scanner.finish()
+    }
+
+    /// The error for a mesh without triangles, of which `without_area` were dropped for their area.
+    pub(super) fn empty(&self, without_area: usize) -> ObjError {
+        ObjError::Empty {
+            dropped: self.without_area.count + without_area,
+            unknown: self.unknown.count,
+        }
     }
 
     /// The triangles of each name; `faces[t]` is the face of triangle t.
@@ -111,13 +125,18 @@ struct Names {
     material: Option<u32>,
 }
 
-struct Scanner {
+struct Scanner<'t> {
+    text: &'t [u8],
     unit_metres: f32,
     limits: MeshLimits,
     scan: Scan,
     violations: Violations,
     /// A limit was exceeded: scanning stopped, and the rest of the text is unknown.
     over_limit: bool,
+    /// How vertices of seven numbers are read, once the first one was found.
+    seven_numbers: Option<SevenNumbers>,
+    /// Vertices with a weight other than 1.
+    weighted: Occurrences,
     /// Line and index of corners that refer to a vertex further down.
     forward: Vec<(usize, usize)>,
     names: HashMap<String, u32>,
@@ -125,7 +144,7 @@ struct Scanner {
     names_changed: bool,
 }
 
-impl Scanner {
+impl Scanner<'_> {
     fn line(&mut self, number: usize, line: &[u8]) {
         let mut words = words(line);
         let Some(keyword) = words.next() else {
@@ -139,7 +158,7 @@ impl Scanner {
             b"o" => self.current.object = self.rest_of_line(line, keyword),
             b"usemtl" => self.current.material = self.rest_of_line(line, keyword),
             // Appearance only.
-            b"vt" | b"vn" | b"s" | b"mtllib" => {}
+            b"vt" | b"vn" | b"vp" | b"s" | b"mtllib" => {}
             _ => self.scan.unknown.note(number),
         }
         self.names_changed |= matches!(keyword, b"g" | b"o" | b"usemtl");
@@ -152,10 +171,15 @@ impl Scanner {
             return self.violations.push(ObjError::TooManyVertices { line, limit });
         }
         self.scan.vertices += 1;
-        // Three coordinates, then a weight, a colour or both; the colour is ignored.
+        // Three coordinates, then a weight or a colour, which is ignored.
         let read = match numbers.len() {
             3 | 6 => 3,
-            4 | 7 => 4,
+            4 => 4,
+            7 => {
+                let text = self.text;
+                let seven = self.seven_numbers.get_or_insert_with(|| SevenNumbers::of(text));
+                if seven.have_weights { 4 } else { 3 }
+            }
             found => {
                 return self.violations.push(ObjError::NumberCount { line, found });
             }
@@ -188,6 +212,9 @@ impl Scanner {
         if largest > MAX_COORDINATE_METRES {
             let metres = largest;
             return self.violations.push(ObjError::TooFar { line, metres });
+        }
+        if weight != 1.0 {
+            self.weighted.note(line);
         }
         self.scan.plain.push('v');
         self.write_numbers(&numbers[..read]);
@@ -314,6 +341,16 @@ impl Scanner {
             });
         }
         self.violations.into_result()?;
+        self.scan
+            .warnings
+            .extend(self.seven_numbers.and_then(|seven| seven.warning));
+        if self.weighted.count > 0 {
+            let Occurrences { count, first_line } = self.weighted;
+            self.scan.warnings.push(format!(
+                "{count} vertices have a weight other than 1, by which their coordinates were divided; the first is on \
+                 line {first_line}"
+            ));
+        }
         self.scan.names = vec![String::new(); self.names.len()];
         for (name, index) in self.names {
             self.scan.names[index as usize] = name;

@@ -1,10 +1,13 @@
 //! The OBJ reader: accepted and rejected text, robustness, files from elsewhere.
 
 mod files;
+mod foreign;
+mod polygons;
 mod properties;
 mod reading;
 mod reference;
 mod rejecting;
+mod vertices;
 
 use grasp_import::{
     MeshLimits,

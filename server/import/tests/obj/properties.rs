@@ -78,11 +78,25 @@ fn statement() -> impl Strategy<Value = String> {
 /// A well-formed file with everything that reorders or drops triangles.
 fn well_formed() -> impl Strategy<Value = String> {
     let name = || prop::sample::select(vec!["a", "b", "c", "d"]);
+    // Any triangle of the first twelve vertices, or a convex polygon of the last eight.
+    let corners = prop_oneof![
+        vec(1..=12_i64, 3..4),
+        (
+            prop::sample::subsequence((13..=20).collect::<Vec<_>>(), 3..=8),
+            any::<bool>()
+        )
+            .prop_map(|(mut corners, reversed)| {
+                if reversed {
+                    corners.reverse();
+                }
+                corners
+            }),
+    ];
     let line = prop_oneof![
-        4 => (vec(1..=12_i64, 3..6), any::<bool>()).prop_map(|(corners, backward)| {
+        4 => (corners, any::<bool>()).prop_map(|(corners, backward)| {
             let corners: Vec<_> = corners
                 .into_iter()
-                .map(|corner| (if backward { corner - 13 } else { corner }).to_string())
+                .map(|corner| (if backward { corner - 21 } else { corner }).to_string())
                 .collect();
             format!("f {}", corners.join(" "))
         }),
@@ -93,7 +107,18 @@ fn well_formed() -> impl Strategy<Value = String> {
     ];
     (vec((-3..3_i32, -3..3_i32, -3..3_i32), 12), vec(line, 1..40)).prop_map(|(vertices, lines)| {
         let vertices = vertices.into_iter().map(|(x, y, z)| format!("v {x} {y} {z}"));
-        let text: Vec<String> = vertices.chain(lines).collect();
+        let octagon = [
+            (2, 1),
+            (1, 2),
+            (-1, 2),
+            (-2, 1),
+            (-2, -1),
+            (-1, -2),
+            (1, -2),
+            (2, -1),
+        ];
+        let octagon = octagon.map(|(x, y)| format!("v {x} {y} {}", x - y));
+        let text: Vec<String> = vertices.chain(octagon).chain(lines).collect();
         text.join("\n")
     })
 }

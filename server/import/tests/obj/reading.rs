@@ -54,11 +54,42 @@ fn ignores_line_endings_continuations_and_comments() {
         CUBE.replace("f 4 3 2 1", "f 4 3 \\\n2 1"),
         CUBE.replace("f 4 3 2 1", "f 4 3 \\\r\n2 1 # below"),
         CUBE.replace("v ", "  v\t"),
+        CUBE.replace("f 4 3 2 1", "# in C:\\cubes\\\nf 4 3 2 1 # of C:\\"),
+        CUBE.replace("f 4 3 2 1", "# in C:\\cubes\\\r\nf 4 3 2 \\\r\n1"),
         format!("\u{feff}# a cube\n\n{CUBE}"),
         CUBE.trim_end().to_owned(),
     ] {
         assert_eq!(read(&text).unwrap().mesh, plain, "{text:?}");
     }
+}
+
+#[test]
+fn reads_utf16_like_utf8() {
+    let text = format!("# café\ng café\n{CUBE}");
+    let plain = read(&text).unwrap();
+    let encoded = |mark: &str, unit: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        format!("{mark}{text}").encode_utf16().flat_map(unit).collect()
+    };
+    for unit in [u16::to_le_bytes, u16::to_be_bytes] {
+        let marked = read_obj(&encoded("\u{feff}", unit), 1.0, LIMITS).unwrap();
+        assert_eq!(marked.mesh, plain.mesh);
+        assert_eq!(marked.groups, plain.groups);
+        assert_eq!(marked.warnings, [""; 0]);
+        let unmarked = read_obj(&encoded("", unit), 1.0, LIMITS).unwrap();
+        assert_eq!(unmarked.mesh, plain.mesh);
+        assert_eq!(
+            unmarked.warnings,
+            ["the text is UTF-16 without a byte order mark"]
+        );
+    }
+}
+
+#[test]
+fn backslash_in_name_swallows_no_statement() {
+    let text = format!("mtllib C:\\\n{}", CUBE.replace("f 4", "usemtl parts\\\nf 4"));
+    let cube = read(&text).unwrap();
+    assert_eq!(cube.mesh, read(CUBE).unwrap().mesh);
+    assert_eq!(cube.groups, [("parts\\".to_owned(), (0..12).collect())]);
 }
 
 #[test]
@@ -68,14 +99,6 @@ fn replaces_invalid_utf8_in_names() {
     let cube = read_obj(&text, 1.0, LIMITS).unwrap();
     assert_eq!(cube.groups.len(), 1);
     assert_eq!(cube.groups[0].0, "caf\u{fffd}");
-}
-
-#[test]
-fn divides_by_weights_and_ignores_colours() {
-    let weighted = read("v 0 0 0 2\nv 4 0 0 2\nv 0 2 0\nf 1 2 3\n").unwrap();
-    assert_eq!(weighted.mesh.corners(0)[1], Vec3::new(2.0, 0.0, 0.0));
-    let coloured = read("v 0 0 0 1 0 0\nv 2 0 0 nan nan nan\nv 0 2 0 1 0.5 0.5 0.5\nf 1 2 3\n").unwrap();
-    assert_eq!(coloured.mesh, weighted.mesh);
 }
 
 #[test]
@@ -223,22 +246,4 @@ fn shifted(corners: &str, by: usize) -> String {
         .map(|corner| (corner.parse::<usize>().unwrap() + by).to_string())
         .collect();
     shifted.join(" ")
-}
-
-#[test]
-fn warns_of_polygon_whose_fan_overlaps() {
-    // The second corner from the end is reflex as seen from the first corner.
-    let arrow = "v 0 0 0\nv 4 0 0\nv 1 1 0\nv 0 4 0\n";
-    assert!(
-        read(&format!("{arrow}f 2 3 4 1\n")).unwrap().warnings[0]
-            .starts_with("line 5: a polygon is not convex")
-    );
-    // The same polygon can be a fan from its reflex corner.
-    let from_reflex = read(&format!("{arrow}f 3 4 1 2\n")).unwrap();
-    assert!(
-        !from_reflex
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("convex"))
-    );
 }

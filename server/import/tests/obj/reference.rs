@@ -1,4 +1,4 @@
-//! A second, simple reader for well-formed text, to compare with.
+//! A second, simple reader for well-formed text whose polygons are all convex, to compare with.
 
 use std::collections::{BTreeMap, BTreeSet};
 

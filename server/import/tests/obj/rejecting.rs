@@ -17,16 +17,20 @@ fn messages(text: &str) -> Vec<String> {
 
 #[test]
 fn rejects_text_without_triangles() {
-    for text in ["", "\n", "# only a comment", "v 0 0 0\n", "\\", "\u{feff}"] {
-        assert_eq!(
-            read(text).unwrap_err(),
-            [ObjError::Empty { dropped: 0 }],
-            "{text:?}"
-        );
+    for text in ["", "\n", "# only a comment", "\\", "\u{feff}"] {
+        assert_eq!(read(text).unwrap_err(), [ObjError::Blank], "{text:?}");
     }
+    let empty = ObjError::Empty {
+        dropped: 0,
+        unknown: 0,
+    };
+    assert_eq!(read("v 0 0 0\n").unwrap_err(), [empty]);
     assert_eq!(
-        messages("v 0 0 0\nv 1 0 0\nv 2 0 0\np 1\nf 1 2\nf 1 2 3\n"),
-        ["the mesh has no triangles; 3 points, lines and faces without area were ignored"]
+        messages("v 0 0 0\nv 1 0 0\nv 2 0 0\np 1\nf 1 2\nf 1 2 3\ncurv 0 1\n"),
+        [
+            "the mesh has no triangles; 3 points, lines and faces without area and 1 lines with an unknown keyword \
+             were ignored"
+        ]
     );
 }
 
@@ -97,7 +101,8 @@ fn lists_sixteen_violations_and_counts_the_rest() {
         errors,
         [
             "line 1: \"nan\" is not finite or makes the vertex infinite",
-            "line 2: a vertex has 2 numbers; it must have 3, 4 with a weight, 6 or 7 with a colour",
+            "line 2: a vertex has 2 numbers; it must have 3, 4 with a weight, 6 with a colour, or 7 with a colour and \
+             its alpha or a weight",
             "line 4: \"a\" is not a vertex reference; it must be an index, or up to three indices separated by /",
             "line 3: vertex 7 does not exist; 2 are known, counted from 1 or backward from -1",
         ]
@@ -162,6 +167,19 @@ fn bounds_triangles_of_a_face_and_names_of_a_group() {
         [ObjError::TooManyNames { line: 1, found: 17 }]
     );
     assert!(read(&names.replacen(" a", "", 1)).is_ok());
+}
+
+#[test]
+fn rejects_concave_polygon_of_too_many_corners() {
+    let corners = 10_001;
+    let teeth: Vec<_> = (0..corners)
+        .map(|k| format!("v {k} {} 0\n", if k == 0 { 9 } else { k % 2 }))
+        .collect();
+    let face: Vec<_> = (1..=corners).map(|k| k.to_string()).collect();
+    let text = format!("{}f {}\n", teeth.concat(), face.join(" "));
+    let errors = read_obj(text.as_bytes(), 0.01, LIMITS).unwrap_err();
+    let line = corners + 1;
+    assert_eq!(errors, [ObjError::TooManyCorners { line, corners }]);
 }
 
 #[test]

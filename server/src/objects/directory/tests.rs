@@ -177,6 +177,19 @@ fn rejects_a_folder_named_like_a_mesh() {
 }
 
 #[test]
+fn names_a_mesh_that_is_not_obj_text() {
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    let folder = Folder::new("pointer", &[("mug.obj", pointer), ("mug.toml", MASS)]);
+    let problems = folder.problems();
+    assert!(
+        problems.len() == 1
+            && problems[0].starts_with("mug.obj: none of the 3 lines begins with a word of OBJ")
+            && problems[0].contains("Git LFS pointer"),
+        "{problems:?}"
+    );
+}
+
+#[test]
 fn bounds_all_objects_together() {
     let folder = Folder::new(
         "bounded",

@@ -2,8 +2,12 @@
 
 use std::cell::Cell;
 
+use glam::{Quat, Vec3};
 use grasp_assets::hands::{self, RIG_NAMES};
-use grasp_synthesis::model::hand::{Handedness, rig::AngleRange};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{Handedness, rig::AngleRange},
+};
 use proptest::{
     prelude::*,
     test_runner::{Config, RngSeed, TestRunner},
@@ -13,8 +17,9 @@ use super::*;
 use crate::{
     budget::effective_budget,
     config,
+    convention::Convention,
     objects::{StoredObject, tests::tetrahedron},
-    validate::find_query,
+    validate::{find_query, fixtures},
 };
 
 /// Any number that a client may send, most of them ordinary.
@@ -34,8 +39,8 @@ fn vector(ordinary: f32) -> impl Strategy<Value = v1::Vector3> {
 /// Mostly unit quaternions.
 fn quaternion() -> impl Strategy<Value = v1::Quaternion> {
     let turned = (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0, -4.0_f32..4.0).prop_map(|(x, y, z, angle)| {
-        let axis = glam::Vec3::new(x, y, z).normalize_or(glam::Vec3::X);
-        let [x, y, z, w] = glam::Quat::from_axis_angle(axis, angle).to_array();
+        let axis = Vec3::new(x, y, z).normalize_or(Vec3::X);
+        let [x, y, z, w] = Quat::from_axis_angle(axis, angle).to_array();
         v1::Quaternion { x, y, z, w }
     });
     let any = any::<[f32; 4]>().prop_map(|[x, y, z, w]| v1::Quaternion { x, y, z, w });
@@ -56,26 +61,42 @@ fn pose(ordinary: f32) -> impl Strategy<Value = Option<v1::Pose>> {
     )
 }
 
+/// A hand in any pose, seldom with a joint that is anywhere.
 fn tracked_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
-    let joint = (pose(0.12), number(0.001..0.05)).prop_map(|(client_from_joint, radius)| v1::JointPose {
-        client_from_joint,
-        radius,
+    let moved = (vector(1.0), quaternion()).prop_map(|(v, q)| Pose {
+        position: Vec3::new(v.x, v.y, v.z),
+        orientation: Quat::from_xyzw(q.x, q.y, q.z, q.w),
     });
-    (proptest::collection::vec(joint, 26), 1..=2_i32, any::<bool>()).prop_map(
-        |(mut joints, handedness, webxr)| {
-            let joint_set = if webxr {
-                joints.pop();
-                v1::JointSet::Webxr25
-            } else {
-                v1::JointSet::Openxr26
-            };
-            v1::presenting_hand::Form::Joints(v1::HandJoints {
-                handedness,
-                joint_set: joint_set.into(),
-                joints,
-            })
-        },
+    let stray = (0..25_usize, pose(0.12), number(0.0..0.05));
+    (
+        moved,
+        proptest::option::weighted(0.1, stray),
+        any::<bool>(),
+        any::<bool>(),
     )
+        .prop_map(|(client_from_hand, stray, is_left, is_webxr)| {
+            let (handedness, set) = (
+                if is_left {
+                    Handedness::Left
+                } else {
+                    Handedness::Right
+                },
+                if is_webxr {
+                    v1::JointSet::Webxr25
+                } else {
+                    v1::JointSet::Openxr26
+                },
+            );
+            let hand = fixtures::joints_of_a_rig(handedness).transformed(client_from_hand);
+            let mut hand = fixtures::sent(&hand, Convention::OpenXr, set);
+            if let Some((joint, client_from_joint, radius)) = stray {
+                hand.joints[joint] = v1::JointPose {
+                    client_from_joint,
+                    radius,
+                };
+            }
+            v1::presenting_hand::Form::Joints(hand)
+        })
 }
 
 /// Angles given as shares of their ranges.

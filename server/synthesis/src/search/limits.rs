@@ -29,7 +29,10 @@ use crate::{
         scene::Presented,
         solids::{HandSolids, PreparedHand, link_radii},
     },
-    propose::{holdable::HoldableSurface, surface_pairs::SurfacePairs},
+    propose::{
+        holdable::HoldableSurface,
+        surface_pairs::{SurfacePair, SurfacePairs},
+    },
 };
 
 /// What all contacts of a hand can push together, in newtons.
@@ -166,7 +169,7 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
     let giver: &PreparedHand = presented.giver.as_ref()?;
     let radii = Digit::ALL.map(|digit| link_radii(rig, digit).into_iter().fold(f32::INFINITY, f32::min));
     let needed = INSIDE_FINGER * radii.into_iter().fold(f32::INFINITY, f32::min);
-    let sides: &[f32] = if surface.pairs().iter().any(|pair| pair.is_of_sheet()) {
+    let sides: &[f32] = if surface.pairs().iter().any(SurfacePair::is_of_sheet) {
         &[1.0, -1.0]
     } else {
         &[1.0]

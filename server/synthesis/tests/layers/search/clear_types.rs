@@ -1,5 +1,7 @@
 //! Of attempts close together, one with a clear grasp type wins.
 
+use std::sync::Arc;
+
 use grasp_synthesis::model::{grasp::Grasp, holdout::Holdout};
 
 use crate::fixtures::{
@@ -57,7 +59,7 @@ fn expected(holdout: &Holdout, seed: u64) -> (u64, Grasp) {
 fn a_clear_type_replaces_an_unclear_one_within_some_attempts() {
     let mut replaced = 0;
     for name in ["remote", "scissors"] {
-        let holdout = floating(object(name));
+        let holdout = floating(Arc::clone(object(name)));
         for seed in 0..SEEDS {
             let (index, grasp) = expected(&holdout, seed);
             replaced += usize::from((0..index).any(|attempt| grasp_of(&holdout, seed, attempt).is_some()));
@@ -86,7 +88,7 @@ fn a_clear_type_replaces_an_unclear_one_within_some_attempts() {
 
 #[test]
 fn without_reproducible_a_clear_type_is_nearly_always_found() {
-    let holdout = floating(object("scissors"));
+    let holdout = floating(Arc::clone(object("scissors")));
     let pool = pool(2);
     let clear = (0..4 * SEEDS).filter(|&seed| {
         let racing = Search {

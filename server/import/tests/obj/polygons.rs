@@ -1,0 +1,425 @@
+//! Polygons are covered once by their triangles, wherever they lie and whatever their shape.
+
+use glam::{DVec2, DVec3, Quat, Vec3};
+use grasp_import::obj::{ObjMesh, read_obj};
+use proptest::{
+    collection::vec,
+    prelude::*,
+    test_runner::{RngAlgorithm, RngSeed},
+};
+
+use crate::{LIMITS, read};
+
+/// Largest error of an area relative to the square of the mesh's extent: rounding of positions to `f32`.
+const AREA_ERROR: f64 = 1e-5;
+
+/// The vertices of well-formed text, and its faces as indices of these.
+fn parsed(text: &str) -> (Vec<DVec3>, Vec<Vec<usize>>) {
+    let text = text.replace("\\\r\n", " ").replace("\\\n", " ");
+    let numbers = |keyword: &'static str| {
+        text.lines()
+            .filter_map(move |line| line.trim().strip_prefix(keyword))
+            .map(str::split_whitespace)
+    };
+    let vertices = numbers("v ")
+        .map(|words| {
+            let n: Vec<f32> = words.map(|word| word.parse().unwrap()).collect();
+            Vec3::new(n[0], n[1], n[2]).as_dvec3()
+        })
+        .collect();
+    let faces = numbers("f ")
+        .map(|words| {
+            words
+                .map(|word| word.split('/').next().unwrap().parse::<usize>().unwrap() - 1)
+                .collect()
+        })
+        .collect();
+    (vertices, faces)
+}
+
+/// Twice the area of a polygon as a vector along its normal, by the shoelace formula.
+fn shoelace(corners: &[DVec3]) -> DVec3 {
+    (0..corners.len())
+        .map(|k| corners[k].cross(corners[(k + 1) % corners.len()]))
+        .sum()
+}
+
+/// Asserts that the triangles of each face have the face's winding, and together its area. A polygon that folds over
+/// itself has triangles of both windings, or more area.
+pub(crate) fn assert_areas_match(text: &str, read: &ObjMesh) {
+    let (vertices, faces) = parsed(text);
+    let extent = vertices.iter().map(|vertex| vertex.length()).fold(0.0, f64::max);
+    let tolerance = AREA_ERROR * extent * extent;
+    let mut first = 0;
+    for (number, face) in faces.iter().enumerate() {
+        let corners: Vec<_> = face.iter().map(|&vertex| vertices[vertex]).collect();
+        let expected = shoelace(&corners);
+        let normal = expected.normalize_or(DVec3::Z);
+        let last = first + face.len() - 2;
+        let mut area = 0.0;
+        for (triangle, &index) in read.indices_in_file.iter().enumerate() {
+            if !(first..last).contains(&(index as usize)) {
+                continue;
+            }
+            let [a, b, c] = read.mesh.corners(triangle).map(Vec3::as_dvec3);
+            let twice = (b - a).cross(c - a).dot(normal);
+            assert!(
+                twice >= -tolerance,
+                "a triangle of face {number} is turned over: {twice}"
+            );
+            area += twice;
+        }
+        let difference = area - expected.length();
+        assert!(
+            difference.abs() <= tolerance,
+            "face {number}: {area}, not {}",
+            expected.length()
+        );
+        first = last;
+    }
+    assert_eq!(read.triangles_in_file, first);
+}
+
+/// Asserts that no triangle reaches out of the polygon: that points of each lie inside.
+fn assert_inside(outline: &[DVec2], plane: Plane, read: &ObjMesh) {
+    for triangle in 0..read.mesh.triangles().len() {
+        let [a, b, c] = read.mesh.corners(triangle).map(|corner| plane.flatten(corner));
+        for weights in [[1.0, 1.0, 1.0], [8.0, 1.0, 1.0], [1.0, 8.0, 1.0], [1.0, 1.0, 8.0]] {
+            let [u, v, w] = weights;
+            let point = (a * u + b * v + c * w) / (u + v + w);
+            let distance = (0..outline.len())
+                .map(|k| distance(point, outline[k], outline[(k + 1) % outline.len()]))
+                .fold(f64::INFINITY, f64::min);
+            assert!(
+                distance < 1e-5 || is_inside(outline, point),
+                "{point} of triangle {triangle} is {distance} outside of {outline:?}"
+            );
+        }
+    }
+}
+
+fn distance(point: DVec2, a: DVec2, b: DVec2) -> f64 {
+    let along = ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    point.distance(a + (b - a) * along)
+}
+
+/// Whether a ray from the point crosses the outline an odd number of times.
+fn is_inside(outline: &[DVec2], point: DVec2) -> bool {
+    (0..outline.len())
+        .filter(|&k| {
+            let (a, b) = (outline[k], outline[(k + 1) % outline.len()]);
+            (a.y > point.y) != (b.y > point.y) && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x)
+        })
+        .count()
+        % 2
+        == 1
+}
+
+/// A plane in space.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    orientation: Quat,
+    origin: Vec3,
+}
+
+impl Plane {
+    fn any() -> impl Strategy<Value = Self> {
+        let number = || -1.0_f32..1.0;
+        (
+            [number(), number(), number()],
+            0.0_f32..6.3,
+            [number(), number(), number()],
+        )
+            .prop_map(|(axis, angle, origin)| Self {
+                orientation: Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle),
+                origin: Vec3::from(origin),
+            })
+    }
+
+    fn lift(self, point: DVec2) -> Vec3 {
+        self.orientation * point.extend(0.0).as_vec3() + self.origin
+    }
+
+    fn flatten(self, point: Vec3) -> DVec2 {
+        (self.orientation.inverse() * (point - self.origin))
+            .as_dvec3()
+            .truncate()
+    }
+}
+
+/// Text of one polygon, in a plane.
+fn text_of(outline: &[DVec2], plane: Plane) -> String {
+    let vertices: Vec<_> = outline
+        .iter()
+        .map(|&point| {
+            let [x, y, z] = plane.lift(point).to_array();
+            format!("v {x} {y} {z}\n")
+        })
+        .collect();
+    let face: Vec<_> = (1..=outline.len()).map(|k| k.to_string()).collect();
+    format!("{}f {}\n", vertices.concat(), face.join(" "))
+}
+
+fn assert_covered(outline: &[DVec2], plane: Plane) {
+    let read = assert_areas_covered(outline, plane);
+    assert_inside(outline, plane, &read);
+}
+
+fn assert_areas_covered(outline: &[DVec2], plane: Plane) -> ObjMesh {
+    let text = text_of(outline, plane);
+    let read = read(&text).unwrap();
+    assert!(
+        !read.warnings.iter().any(|warning| warning.contains("intersect")),
+        "{:?}",
+        read.warnings
+    );
+    assert_areas_match(&text, &read);
+    read
+}
+
+/// A simple polygon: random points, whose tour is untangled by reversing parts of it as long as that shortens it.
+fn simple_polygon() -> impl Strategy<Value = Vec<DVec2>> {
+    vec((-1.0_f64..1.0, -1.0_f64..1.0).prop_map(DVec2::from), 4..40).prop_map(|mut tour| {
+        let count = tour.len();
+        let mut improved = true;
+        while improved {
+            improved = false;
+            for i in 0..count - 1 {
+                for j in i + 2..count {
+                    let next = (j + 1) % count;
+                    if next == i {
+                        continue;
+                    }
+                    let now = tour[i].distance(tour[i + 1]) + tour[j].distance(tour[next]);
+                    let then = tour[i].distance(tour[j]) + tour[i + 1].distance(tour[next]);
+                    if then < now - 1e-12 {
+                        tour[i + 1..=j].reverse();
+                        improved = true;
+                    }
+                }
+            }
+        }
+        tour
+    })
+}
+
+/// The polygon with corners on its sides, which in `f32` are only nearly collinear, and some corners twice.
+fn with_more_corners(outline: &[DVec2], extra: &[u8]) -> Vec<DVec2> {
+    let mut more = Vec::new();
+    for (k, &corner) in outline.iter().enumerate() {
+        more.push(corner);
+        let next = outline[(k + 1) % outline.len()];
+        match extra[k % extra.len()] {
+            0 => more.push(corner),
+            1 => more.push(corner.midpoint(next)),
+            2 => more.extend([corner.lerp(next, 0.2), corner.lerp(next, 0.5)]),
+            _ => {}
+        }
+    }
+    more
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 1000,
+        failure_persistence: None,
+        rng_algorithm: RngAlgorithm::ChaCha,
+        rng_seed: RngSeed::Fixed(0x0B2),
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn covers_simple_polygons_in_any_plane(outline in simple_polygon(), plane in Plane::any(), reversed: bool) {
+        let mut outline = outline;
+        if reversed {
+            outline.reverse();
+        }
+        assert_covered(&outline, plane);
+    }
+
+    #[test]
+    fn covers_polygons_with_collinear_and_repeated_corners(
+        outline in simple_polygon(),
+        extra in vec(0..5_u8, 1..8),
+        plane in Plane::any(),
+        start: prop::sample::Index,
+    ) {
+        let mut outline = with_more_corners(&outline, &extra);
+        let start = start.index(outline.len());
+        outline.rotate_left(start);
+        assert_covered(&outline, plane);
+    }
+
+    #[test]
+    fn covers_strips_with_holes_at_bridges(
+        holes in vec(([0.1_f64..0.4, 0.1_f64..0.4], [0.5_f64..0.9, 0.5_f64..0.9]), 1..6),
+        plane in Plane::any(),
+        start: prop::sample::Index,
+        reversed: bool,
+    ) {
+        // Each unit of the strip has a rectangular hole, reached from the lower side over a side that is passed twice.
+        let mut outline = vec![DVec2::ZERO];
+        let mut area = holes.len() as f64;
+        for (place, &([left, low], [right, high])) in holes.iter().enumerate() {
+            let corner = |x: f64, y: f64| DVec2::new(place as f64 + x, y);
+            let entry = corner(left, low);
+            let hole = [entry, corner(left, high), corner(right, high), corner(right, low), entry];
+            outline.push(corner(left, 0.0));
+            outline.extend(hole);
+            outline.push(corner(left, 0.0));
+            area -= (right - left) * (high - low);
+        }
+        let length = holes.len() as f64;
+        outline.extend([DVec2::new(length, 0.0), DVec2::new(length, 1.0), DVec2::new(0.0, 1.0)]);
+        if reversed {
+            outline.reverse();
+        }
+        let start = start.index(outline.len());
+        outline.rotate_left(start);
+        let read = assert_areas_covered(&outline, plane);
+        let covered: f64 = (0..read.mesh.triangles().len())
+            .map(|triangle| {
+                let [a, b, c] = read.mesh.corners(triangle).map(Vec3::as_dvec3);
+                (b - a).cross(c - a).length() / 2.0
+            })
+            .sum();
+        prop_assert!((covered - area).abs() < 1e-5 * length * length, "{} is not {}", covered, area);
+    }
+
+    #[test]
+    fn covers_polygons_on_a_grid(
+        outline in simple_polygon(),
+        extra in vec(0..5_u8, 1..8),
+    ) {
+        // Exact coordinates: corners are exactly collinear, and sides touch or coincide.
+        let snapped: Vec<_> = outline.iter().map(|point| (point * 4.0).round()).collect();
+        let snapped = with_more_corners(&snapped, &extra);
+        let text = text_of(&snapped, Plane { orientation: Quat::IDENTITY, origin: Vec3::ZERO });
+        if let Ok(read) = read_obj(text.as_bytes(), 1.0, LIMITS)
+            && !read.warnings.iter().any(|warning| warning.contains("intersect"))
+        {
+            assert_areas_match(&text, &read);
+        }
+    }
+}
+
+#[test]
+fn convex_polygons_are_fans_from_their_first_corner() {
+    for corners in [4, 5, 17, 300] {
+        let circle: Vec<_> = (0..corners)
+            .map(|k| DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(corners)))
+            .collect();
+        for start in 0..4 {
+            let mut turned = circle.clone();
+            turned.rotate_left(start);
+            let plane = Plane {
+                orientation: Quat::from_xyzw(0.1, 0.7, -0.1, 0.7).normalize(),
+                origin: Vec3::new(0.3, 5.0, -1.0),
+            };
+            let read = read(&text_of(&turned, plane)).unwrap();
+            let fan: Vec<_> = (2..corners as usize).map(|k| [0, k - 1, k]).collect();
+            let fan: Vec<_> = fan
+                .iter()
+                .map(|triangle| triangle.map(|k| plane.lift(turned[k])))
+                .collect();
+            let triangles: Vec<_> = (0..fan.len()).map(|t| read.mesh.corners(t)).collect();
+            assert_eq!(triangles, fan);
+        }
+    }
+}
+
+#[test]
+fn concave_caps_close_the_profile_of_an_l() {
+    // Legs of 2 in a square of 10, 3 thick; the caps start at the corner next to the notch.
+    let text = "v 0 0 0\nv 10 0 0\nv 10 2 0\nv 2 2 0\nv 2 10 0\nv 0 10 0\nv 0 0 3\nv 10 0 3\nv 10 2 3\nv 2 2 3\nv 2 10 3
+v 0 10 3\nf 9 10 11 12 7 8\nf 2 1 6 5 4 3\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
+    let read = read(text).unwrap();
+    assert_eq!(read.warnings, [""; 0]);
+    assert_eq!(read.mesh.triangles().len(), 20);
+    assert!((crate::volume(&read) - 3.0 * 36.0).abs() < 1e-9);
+    assert_areas_match(text, &read);
+}
+
+#[test]
+fn corners_on_straight_sides_stay_joined_to_the_neighbouring_face() {
+    // Two concave faces share a straight side with a corner that both have.
+    let text = "v 0 0 0\nv 2 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nv 4 -4 0\nv 2 -1 0\nv 0 -4 0
+f 1 2 3 4 5 6\nf 3 2 1 9 8 7\n";
+    let read = read(text).unwrap();
+    assert_areas_match(text, &read);
+    assert_eq!(
+        read.warnings,
+        ["8 edges are open: the surface has holes and its volume is an estimate"]
+    );
+}
+
+#[test]
+fn covers_a_spiral_and_a_comb_of_thousands_of_corners() {
+    let plane = Plane {
+        orientation: Quat::from_rotation_x(0.4),
+        origin: Vec3::new(0.1, 0.2, 0.3),
+    };
+    let turns = |k: u32, inner: f64| {
+        let angle = f64::from(k) * 0.05;
+        DVec2::from_angle(angle) * (0.1 + 0.01 * angle + inner)
+    };
+    let spiral: Vec<_> = (0..1500)
+        .map(|k| turns(k, 0.03))
+        .chain((0..1500).rev().map(|k| turns(k, 0.0)))
+        .collect();
+    assert_areas_covered(&spiral, plane);
+    let comb: Vec<_> = std::iter::once(DVec2::new(0.0, -0.1))
+        .chain(std::iter::once(DVec2::new(3.0, -0.1)))
+        .chain(
+            (0..3000_u32)
+                .rev()
+                .map(|k| DVec2::new(f64::from(k) * 1e-3, f64::from(k % 2))),
+        )
+        .collect();
+    assert_areas_covered(&comb, plane);
+}
+
+#[test]
+fn warped_polygon_is_covered_as_seen_along_its_normal() {
+    let outline = [
+        (0.0, 0.0),
+        (4.0, 0.0),
+        (4.0, 1.0),
+        (1.0, 1.0),
+        (1.0, 4.0),
+        (0.0, 4.0),
+    ];
+    for start in 0..outline.len() {
+        let mut turned = outline;
+        turned.rotate_left(start);
+        let vertices: Vec<_> = turned
+            .iter()
+            .map(|&(x, y)| format!("v {x} {y} {}\n", 0.02 * x * y - 0.01 * x * x))
+            .collect();
+        let read = read(&format!("{}f 1 2 3 4 5 6\n", vertices.concat())).unwrap();
+        let area: f64 = (0..read.mesh.triangles().len())
+            .map(|triangle| {
+                let [a, b, c] = read.mesh.corners(triangle).map(Vec3::as_dvec3);
+                let twice = (b - a).cross(c - a);
+                assert!(twice.z > 0.0, "{start}");
+                twice.z / 2.0
+            })
+            .sum();
+        assert!((area - 7.0).abs() < 1e-5, "{start}: {area}");
+    }
+}
+
+#[test]
+fn polygon_that_intersects_itself_stays_a_fan_with_a_warning() {
+    let read = read("v 0 0 0\nv 3 3 0\nv 3 0 0\nv 0 2 0\nf 1 2 3 4\n").unwrap();
+    let corner = |x: u8, y: u8| Vec3::new(x.into(), y.into(), 0.0);
+    let fan = [
+        [corner(0, 0), corner(3, 3), corner(3, 0)],
+        [corner(0, 0), corner(3, 0), corner(0, 2)],
+    ];
+    assert_eq!([read.mesh.corners(0), read.mesh.corners(1)], fan);
+    assert_eq!(
+        read.warnings[0],
+        "1 polygons intersect themselves; their fans of triangles overlap; the first is on line 5"
+    );
+}

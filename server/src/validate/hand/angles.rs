@@ -1,0 +1,131 @@
+//! Checks a hand given as joint angles of a rig.
+
+use grasp_proto::v1;
+use grasp_synthesis::model::hand::{
+    DigitAngles, HandPose, Handedness,
+    joints::{HandJoints, thesis_from_openxr_frame},
+    rig::{AngleRange, DigitRig},
+};
+
+use super::{GiverHand, built_in, required_handedness};
+use crate::{
+    convention::Convention,
+    validate::{Field, Violations, pose},
+};
+
+/// How far a joint angle may be outside its limits, in radians, before it is rejected rather than clamped: room for the
+/// rounding of clients that clamp in degrees.
+const ANGLE_SLACK: f32 = 1e-3;
+
+/// The hand in the client's frame; none if it is wrong.
+pub(super) fn angled_hand(
+    field: Field<'_>,
+    angles: &v1::HandAngles,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<GiverHand> {
+    let handedness = required_handedness(field.child("handedness"), angles.handedness, violations);
+    // Both hands have the same limits, which are checked even if the handedness is missing.
+    let hand = built_in(
+        field.child("rig"),
+        &angles.rig,
+        handedness.unwrap_or(Handedness::Right),
+        violations,
+    );
+    let client_from_wrist = pose(
+        field.child("client_from_wrist"),
+        angles.client_from_wrist,
+        convention.metres_per_unit(),
+        violations,
+    );
+    let digits_field = field.child("digits");
+    if angles.digits.len() != 5 {
+        violations.add(
+            digits_field,
+            format_args!("has {} digits; it must have 5, thumb first", angles.digits.len()),
+        );
+    }
+    let hand = hand?;
+    let mut digits = [DigitAngles::default(); 5];
+    for (place, (digit, sent)) in digits.iter_mut().zip(&angles.digits).enumerate() {
+        *digit = digit_angles(digits_field.at(place), sent, &hand.rig.digits[place], violations);
+    }
+    handedness?;
+    let pose = HandPose {
+        frame_from_wrist: thesis_from_openxr_frame(convention.joint_to_openxr(client_from_wrist)),
+        digits,
+    };
+    Some(GiverHand {
+        joints: HandJoints::of_pose(&hand.rig, &pose),
+        skin: &hand.skin,
+        field: "presenting_hand.angles",
+        warnings: Vec::new(),
+    })
+}
+
+fn digit_angles(
+    field: Field<'_>,
+    sent: &v1::DigitAngles,
+    rig: &DigitRig,
+    violations: &mut Violations,
+) -> DigitAngles {
+    let limits = &rig.limits;
+    let mut checked = |name, angle: f32, range: AngleRange| {
+        if !range.contains(angle, ANGLE_SLACK) {
+            violations.add(
+                field.child(name),
+                format_args!("is {angle} rad; the rig allows {} to {}", range.min, range.max),
+            );
+            return range.min;
+        }
+        angle.clamp(range.min, range.max)
+    };
+    let base_yaw = checked("base_yaw", sent.base_yaw, limits.base_yaw);
+    let base_pitch = checked("base_pitch", sent.base_pitch, limits.base_pitch);
+    let second_pitch = checked("second_pitch", sent.second_pitch, limits.second_pitch);
+    let third_pitch = match sent.third_pitch {
+        Some(angle) => checked("third_pitch", angle, limits.third_pitch),
+        None => (DigitAngles::THIRD_PITCH_SHARE * second_pitch)
+            .clamp(limits.third_pitch.min, limits.third_pitch.max),
+    };
+    DigitAngles {
+        base_yaw,
+        base_pitch,
+        second_pitch,
+        third_pitch,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use grasp_assets::hands;
+
+    use super::*;
+
+    const FIELD: Field<'static> = Field::root("presenting_hand");
+
+    #[test]
+    fn clamps_angles_within_the_slack_and_couples_absent_ones() {
+        let hand = hands::hand("thesis", Handedness::Right).expect("the rig is built in");
+        let rig = &hand.rig.digits[1];
+        let limit = rig.limits.second_pitch.max;
+        let angles = v1::DigitAngles {
+            base_yaw: 0.0,
+            base_pitch: 0.1,
+            second_pitch: limit + 0.5 * ANGLE_SLACK,
+            third_pitch: None,
+        };
+        let mut violations = Violations::default();
+        let read = digit_angles(FIELD, &angles, rig, &mut violations);
+        assert!(violations.is_empty());
+        assert_eq!(read.second_pitch, limit);
+        let coupled = (limit * 2.0 / 3.0).min(rig.limits.third_pitch.max);
+        assert!((read.third_pitch - coupled).abs() < 1e-6);
+        let over = v1::DigitAngles {
+            second_pitch: limit + 2.0 * ANGLE_SLACK,
+            ..angles
+        };
+        digit_angles(FIELD, &over, rig, &mut violations);
+        assert_eq!(violations.len(), 1);
+    }
+}

@@ -1,0 +1,122 @@
+//! Checks hands: joint angles of a rig, and tracked joints.
+
+mod angles;
+mod axes;
+#[cfg(test)]
+pub(crate) mod fixtures;
+mod proportions;
+mod radii;
+mod reference;
+#[cfg(test)]
+mod tests;
+mod tracked;
+
+use glam::Vec3;
+use grasp_assets::hands::{self, Hand, RIG_NAMES};
+use grasp_proto::v1;
+use grasp_synthesis::model::hand::{Handedness, joints::HandJoints, skin::Skin};
+
+use super::{Field, Violations, direction, known, quoted};
+use crate::convention::Convention;
+use angles::angled_hand;
+use tracked::tracked_hand;
+
+/// The giver's hand, in the client's frame and `OpenXR` axes.
+#[derive(Clone, Debug)]
+pub(crate) struct GiverHand {
+    /// Its joints.
+    pub joints: HandJoints,
+    /// The skin to pose on them.
+    pub skin: &'static Skin,
+    /// The field that gave the joints, for the error if they fold the skin.
+    pub field: &'static str,
+    /// What was repaired, for the report.
+    pub warnings: Vec<String>,
+}
+
+/// The giver's hand; none if it is wrong.
+pub(super) fn presenting_hand(
+    field: Field<'_>,
+    hand: v1::PresentingHand,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<GiverHand> {
+    match hand.form {
+        None => {
+            violations.add(field, "is empty; it must have angles or joints, or be absent");
+            None
+        }
+        Some(v1::presenting_hand::Form::Angles(angles)) => {
+            angled_hand(field.child("angles"), &angles, convention, violations)
+        }
+        Some(v1::presenting_hand::Form::Joints(joints)) => {
+            tracked_hand(field.child("joints"), &joints, convention, violations)
+        }
+    }
+}
+
+/// The receiving hand; by default the right hand of the default rig.
+pub(super) fn receiving_hand(
+    field: Field<'_>,
+    hand: Option<v1::ReceivingHand>,
+    default_rig: &str,
+    violations: &mut Violations,
+) -> Option<&'static Hand> {
+    let hand = hand.unwrap_or_default();
+    let handedness = match known(field.child("handedness"), hand.handedness, violations) {
+        v1::Handedness::Left => Handedness::Left,
+        v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
+    };
+    let rig = if hand.rig.is_empty() {
+        default_rig
+    } else {
+        &hand.rig
+    };
+    built_in(field.child("rig"), rig, handedness, violations)
+}
+
+fn built_in(
+    field: Field<'_>,
+    rig: &str,
+    handedness: Handedness,
+    violations: &mut Violations,
+) -> Option<&'static Hand> {
+    let hand = hands::hand(rig, handedness);
+    if hand.is_none() {
+        violations.add(
+            field,
+            format_args!(
+                "is {}; the built-in rigs are {}",
+                quoted(rig),
+                RIG_NAMES.join(" and ")
+            ),
+        );
+    }
+    hand
+}
+
+/// A handedness without a default.
+fn required_handedness(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Handedness> {
+    if v1::Handedness::try_from(value) == Ok(v1::Handedness::Unspecified) {
+        violations.add(field, "is required: HANDEDNESS_LEFT or HANDEDNESS_RIGHT");
+        return None;
+    }
+    match known(field, value, violations) {
+        v1::Handedness::Left => Some(Handedness::Left),
+        v1::Handedness::Right => Some(Handedness::Right),
+        v1::Handedness::Unspecified => None,
+    }
+}
+
+/// The direction against gravity, in `OpenXR` axes: a unit vector.
+pub(super) fn up(
+    field: Field<'_>,
+    up: Option<v1::Vector3>,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Vec3 {
+    up.and_then(|up| direction(field, up, violations)).map_or_else(
+        || convention.up_in_openxr(),
+        |up| convention.direction_to_openxr(up),
+    )
+}

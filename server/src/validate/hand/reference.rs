@@ -1,0 +1,88 @@
+//! The proportions of a hand: those of the adult rig.
+
+use std::sync::LazyLock;
+
+use glam::Vec3;
+use grasp_assets::hands;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        HandPose, Handedness,
+        joints::{HandJoints, JOINT_COUNT, index},
+    },
+};
+
+/// The rig for tracked joints: its skin is posed on them, and its proportions are compared with theirs.
+pub(super) const TRACKED_HAND_RIG: &str = "adult";
+
+/// The joints of the palm and of each digit, from the wrist outward.
+pub(super) const CHAINS: [&[usize]; 6] = [
+    &[index::WRIST, index::PALM],
+    &[index::WRIST, 2, 3, 4, 5],
+    &[index::WRIST, 6, 7, 8, 9, 10],
+    &[index::WRIST, 11, 12, 13, 14, 15],
+    &[index::WRIST, 16, 17, 18, 19, 20],
+    &[index::WRIST, 21, 22, 23, 24, 25],
+];
+
+/// The adult hand; both hands have the same proportions.
+pub(super) static REFERENCE: LazyLock<Reference> = LazyLock::new(Reference::of_rig);
+
+/// Lengths of a hand, in metres, by the joint's `OpenXR` index.
+#[derive(Debug)]
+pub(super) struct Reference {
+    /// Length of the bone that ends at the joint; 0 for the wrist.
+    pub bones: [f32; JOINT_COUNT],
+    /// Distance of the joint from the wrist with the hand stretched.
+    pub reach: [f32; JOINT_COUNT],
+    /// Distance from the joint to the skin.
+    pub radii: [f32; JOINT_COUNT],
+}
+
+impl Reference {
+    fn of_rig() -> Self {
+        let rig = &hands::hand(TRACKED_HAND_RIG, Handedness::Right)
+            .expect("the rig is built in")
+            .rig;
+        let stretched = HandPose {
+            frame_from_wrist: Pose::IDENTITY,
+            digits: rig.stretched(),
+        };
+        let joints = HandJoints::of_pose(rig, &stretched).joints;
+        let mut bones = [0.0; JOINT_COUNT];
+        for chain in CHAINS {
+            for pair in chain.windows(2) {
+                let [start, end] = [pair[0], pair[1]].map(|joint| joints[joint].pose.position);
+                bones[pair[1]] = start.distance(end);
+            }
+        }
+        Self {
+            bones,
+            reach: joints.map(|joint| joint.pose.position.distance(joints[index::WRIST].pose.position)),
+            radii: joints.map(|joint| joint.radius),
+        }
+    }
+
+    /// The size of a hand relative to this one: the median of its bones' ratios. Bones between joints that are not
+    /// `trusted`, and those without length, do not count; none if there are no others.
+    pub(super) fn scale_of(
+        &self,
+        positions: &[Vec3; JOINT_COUNT],
+        trusted: &[bool; JOINT_COUNT],
+    ) -> Option<f32> {
+        let mut ratios = [0.0; JOINT_COUNT];
+        let mut count = 0;
+        for chain in CHAINS {
+            for pair in chain.windows(2) {
+                let length = positions[pair[0]].distance(positions[pair[1]]);
+                if trusted[pair[0]] && trusted[pair[1]] && length > 0.0 {
+                    ratios[count] = length / self.bones[pair[1]];
+                    count += 1;
+                }
+            }
+        }
+        let ratios = &mut ratios[..count];
+        ratios.sort_unstable_by(f32::total_cmp);
+        ratios.get(count / 2).copied()
+    }
+}

@@ -1,0 +1,320 @@
+//! Tracked hands that are read, repaired and rejected.
+
+use glam::{Quat, Vec3};
+use grasp_assets::hands::{self, RIG_NAMES};
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        DigitAngles, HandPose, Handedness,
+        joints::{HandJoints, JOINT_COUNT, index},
+        rig::AngleRange,
+    },
+};
+use proptest::{
+    array::{uniform4, uniform5},
+    prelude::*,
+    test_runner::{Config, RngSeed},
+};
+
+use super::{
+    GiverHand,
+    fixtures::{joints_of_a_rig, sent},
+    tracked::tracked_hand,
+};
+use crate::{
+    convention::Convention,
+    error::ServiceError,
+    validate::{Field, Violations},
+};
+
+const FIELD: Field<'static> = Field::root("hand");
+
+const CONVENTIONS: [Convention; 4] = [
+    Convention::OpenXr,
+    Convention::Unity,
+    Convention::Unreal,
+    Convention::Godot,
+];
+
+const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
+
+/// The hand, or the fields of its violations and their descriptions.
+fn read(hand: &v1::HandJoints, convention: Convention) -> Result<GiverHand, Vec<(String, String)>> {
+    let mut violations = Violations::default();
+    let read = tracked_hand(FIELD, hand, convention, &mut violations);
+    match violations.finish(()) {
+        Ok(()) => Ok(read.expect("a hand without violations is read")),
+        Err(ServiceError::Invalid(violations)) => {
+            assert!(read.is_none());
+            Err(violations.into_iter().map(|v| (v.field, v.description)).collect())
+        }
+        Err(other) => panic!("{other}"),
+    }
+}
+
+fn blamed(hand: &HandJoints, convention: Convention, set: v1::JointSet) -> Vec<String> {
+    match read(&sent(hand, convention, set), convention) {
+        Ok(_) => Vec::new(),
+        Err(violations) => violations.into_iter().map(|(field, _)| field).collect(),
+    }
+}
+
+/// The field of a joint, in the convention's order of 26 joints.
+fn field_of(joint: usize, convention: Convention) -> String {
+    format!("hand.joints[{}]", convention.joint_at(joint))
+}
+
+#[test]
+fn reads_joints_in_every_convention_and_set() {
+    for convention in CONVENTIONS {
+        for set in [v1::JointSet::Openxr26, v1::JointSet::Webxr25] {
+            for handedness in HANDS {
+                let expected = joints_of_a_rig(handedness);
+                let hand = read(&sent(&expected, convention, set), convention).unwrap();
+                assert!(hand.warnings.is_empty(), "{:?}", hand.warnings);
+                assert_eq!(hand.joints.handedness, handedness);
+                for (joint, (read, expected)) in hand.joints.joints.iter().zip(&expected.joints).enumerate() {
+                    let context = format!("{convention:?} {set:?} {joint}: {read:?} {expected:?}");
+                    assert!(
+                        read.pose.position.distance(expected.pose.position) < 1e-5,
+                        "{context}"
+                    );
+                    assert!(
+                        read.pose.orientation.dot(expected.pose.orientation).abs() > 1.0 - 1e-5,
+                        "{context}"
+                    );
+                    // WebXR's set does not contain the palm's radius.
+                    if joint != index::PALM || set == v1::JointSet::Openxr26 {
+                        assert!((read.radius - expected.radius).abs() < 1e-6, "{context}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn names_joint_at_the_origin() {
+    for convention in CONVENTIONS {
+        for joint in 0..JOINT_COUNT {
+            for turned in [false, true] {
+                let mut hand = joints_of_a_rig(Handedness::Left);
+                hand.joints[joint].pose.position = Vec3::ZERO;
+                if turned {
+                    hand.joints[joint].pose.orientation = Quat::IDENTITY;
+                }
+                let fields = blamed(&hand, convention, v1::JointSet::Openxr26);
+                assert_eq!(fields, [field_of(joint, convention)], "{convention:?} {joint}");
+            }
+        }
+    }
+}
+
+#[test]
+fn names_every_joint_that_is_elsewhere() {
+    for (lost, place) in [
+        (vec![10, 15], Vec3::ZERO),
+        (vec![1, 8], Vec3::ZERO),
+        (vec![6, 7, 8, 9, 10], Vec3::ZERO),
+        (vec![5, 10, 15, 20, 25], Vec3::ZERO),
+        ((2..26).filter(|joint| joint % 2 == 0).collect(), Vec3::ZERO),
+        (vec![12], Vec3::new(0.4, 1.5, -0.3)),
+        (vec![9, 22], Vec3::new(-3.0, 1.0, 8.0)),
+    ] {
+        let mut hand = joints_of_a_rig(Handedness::Right);
+        for &joint in &lost {
+            hand.joints[joint].pose.position = place;
+        }
+        let fields = blamed(&hand, Convention::OpenXr, v1::JointSet::Openxr26);
+        let expected: Vec<_> = lost
+            .iter()
+            .map(|&joint| field_of(joint, Convention::OpenXr))
+            .collect();
+        assert_eq!(fields, expected, "{lost:?} at {place}");
+    }
+}
+
+#[test]
+fn names_joint_at_the_wrist_that_is_the_origin() {
+    // Metacarpal joints may be there.
+    for joint in [
+        0, 3, 4, 5, 7, 8, 9, 10, 12, 13, 14, 15, 17, 18, 19, 20, 22, 23, 24, 25,
+    ] {
+        let hand = joints_of_a_rig(Handedness::Right);
+        let mut hand = hand.transformed(hand.joints[index::WRIST].pose.inverse());
+        hand.joints[joint].pose.position = hand.joints[index::WRIST].pose.position;
+        let fields = blamed(&hand, Convention::OpenXr, v1::JointSet::Openxr26);
+        assert_eq!(fields, [format!("hand.joints[{joint}]")]);
+    }
+}
+
+#[test]
+fn explains_what_is_wrong_and_right() {
+    let mut hand = sent(
+        &joints_of_a_rig(Handedness::Left),
+        Convention::Unreal,
+        v1::JointSet::Openxr26,
+    );
+    hand.joints[10].client_from_joint.as_mut().unwrap().position = Some(v1::Vector3::default());
+    hand.joints[11].radius = -1.0;
+    hand.joints[12].client_from_joint.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
+    let violations = read(&hand, Convention::Unreal).unwrap_err();
+    let fields: Vec<_> = violations.iter().map(|(field, _)| field.as_str()).collect();
+    assert_eq!(
+        fields,
+        [
+            "hand.joints[11].radius",
+            "hand.joints[12].client_from_joint.orientation",
+            "hand.joints[10]"
+        ]
+    );
+    let description = &violations[2].1;
+    assert!(
+        description.starts_with("(index-finger-tip) is at [0, 0, 0], 1.")
+            && description.contains("m from index-finger-phalanx-distal")
+            && description.contains("at most 0.0"),
+        "{description}"
+    );
+}
+
+#[test]
+fn names_joint_that_is_turned_around() {
+    for convention in CONVENTIONS {
+        for joint in 0..JOINT_COUNT {
+            for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+                let mut hand = joints_of_a_rig(Handedness::Right);
+                let orientation = &mut hand.joints[joint].pose.orientation;
+                *orientation *= Quat::from_axis_angle(axis, std::f32::consts::PI);
+                let fields = blamed(&hand, convention, v1::JointSet::Openxr26);
+                // The thumb's roll differs between headsets.
+                if axis == Vec3::Z && (2..6).contains(&joint) {
+                    assert_eq!(fields, [""; 0]);
+                } else {
+                    assert_eq!(fields, [field_of(joint, convention)], "{convention:?} {joint}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn names_joint_that_lost_its_orientation() {
+    for convention in CONVENTIONS {
+        let mut hand = joints_of_a_rig(Handedness::Left);
+        let turn = Pose::new(Vec3::ZERO, Quat::from_rotation_x(1.0));
+        hand = hand.transformed(turn);
+        for joint in 0..JOINT_COUNT {
+            let mut sent = sent(&hand, convention, v1::JointSet::Openxr26);
+            sent.joints[convention.joint_at(joint)]
+                .client_from_joint
+                .as_mut()
+                .unwrap()
+                .orientation = None;
+            let violations = read(&sent, convention).unwrap_err();
+            assert_eq!(violations.len(), 1, "{convention:?} {joint}: {violations:?}");
+            assert_eq!(violations[0].0, field_of(joint, convention));
+        }
+    }
+}
+
+#[test]
+fn names_handedness_of_the_other_hand() {
+    for convention in CONVENTIONS {
+        for set in [v1::JointSet::Openxr26, v1::JointSet::Webxr25] {
+            for handedness in HANDS {
+                let mut hand = joints_of_a_rig(handedness);
+                hand.handedness = match handedness {
+                    Handedness::Left => Handedness::Right,
+                    Handedness::Right => Handedness::Left,
+                };
+                assert_eq!(blamed(&hand, convention, set), ["hand.handedness"]);
+            }
+        }
+    }
+}
+
+#[test]
+fn names_convention_of_another_engine() {
+    let hand = joints_of_a_rig(Handedness::Right);
+    for (actual, claimed) in [
+        (Convention::Unity, Convention::OpenXr),
+        (Convention::OpenXr, Convention::Unity),
+        (Convention::Godot, Convention::OpenXr),
+        (Convention::OpenXr, Convention::Godot),
+        (Convention::Unity, Convention::Godot),
+    ] {
+        let sent = sent(&hand, actual, v1::JointSet::Webxr25);
+        let violations = read(&sent, claimed).unwrap_err();
+        assert_eq!(violations[0].0, "convention", "{actual:?} as {claimed:?}");
+    }
+}
+
+#[test]
+fn replaces_missing_radii_with_a_warning() {
+    for convention in CONVENTIONS {
+        let hand = joints_of_a_rig(Handedness::Left);
+        for lost in [vec![5, 10, 15, 20, 25], (0..26).collect()] {
+            let mut sent = sent(&hand, convention, v1::JointSet::Openxr26);
+            for &place in &lost {
+                sent.joints[place].radius = 0.0;
+            }
+            let read = read(&sent, convention).unwrap();
+            for (read, whole) in read.joints.joints.iter().zip(&hand.joints) {
+                assert!((read.radius / whole.radius - 1.0).abs() < 1e-3);
+            }
+            assert_eq!(read.warnings.len(), 1);
+            let start = format!("hand.joints: {} radii are 0", lost.len());
+            assert!(read.warnings[0].starts_with(&start), "{:?}", read.warnings);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(Config {
+        cases: 300,
+        rng_seed: RngSeed::Fixed(7),
+        failure_persistence: None,
+        ..Config::default()
+    })]
+
+    #[test]
+    fn accepts_every_pose_of_every_rig_and_size(
+        shares in uniform5(uniform4(0.0_f32..1.0)),
+        (axis, angle) in ([-1.0_f32..1.0, -1.0..1.0, -1.0..1.0], 0.0_f32..6.3),
+        size in 0.4_f32..2.2,
+        at_wrist: bool,
+    ) {
+        let turn = Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle);
+        for rig in RIG_NAMES {
+            for handedness in HANDS {
+                let rig = &hands::hand(rig, handedness).unwrap().rig;
+                let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
+                let digits = std::array::from_fn(|digit| {
+                    let (limits, shares) = (&rig.digits[digit].limits, shares[digit]);
+                    DigitAngles {
+                        base_yaw: within(limits.base_yaw, shares[0]),
+                        base_pitch: within(limits.base_pitch, shares[1]),
+                        second_pitch: within(limits.second_pitch, shares[2]),
+                        third_pitch: within(limits.third_pitch, shares[3]),
+                    }
+                });
+                let frame_from_wrist = if at_wrist {
+                    Pose::IDENTITY
+                } else {
+                    Pose::new(Vec3::new(0.2, 0.9, -0.4), turn)
+                };
+                let mut hand = HandJoints::of_pose(rig, &HandPose { frame_from_wrist, digits });
+                for joint in &mut hand.joints {
+                    joint.pose.position *= size;
+                }
+                for convention in CONVENTIONS {
+                    for set in [v1::JointSet::Openxr26, v1::JointSet::Webxr25] {
+                        let read = read(&sent(&hand, convention, set), convention);
+                        prop_assert!(read.is_ok(), "{:?}", read.unwrap_err());
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! Checks a hand given as tracked joints, and repairs missing radii.
+
+use std::fmt::Write as _;
+
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        Handedness,
+        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index},
+    },
+};
+
+use super::{
+    GiverHand,
+    axes::{Fault, Turned, axes},
+    built_in,
+    proportions::{Stray, strays},
+    radii::{LARGEST_RADIUS, replace_missing},
+    reference::{REFERENCE, TRACKED_HAND_RIG},
+    required_handedness,
+};
+use crate::{
+    convention::Convention,
+    validate::{Field, Violations, known, pose},
+};
+
+/// Largest distance from the wrist to any other joint, in metres. The longest hand on record has 0.33.
+const LARGEST_REACH: f32 = 0.5;
+
+/// Smallest distance from the wrist to the middle finger's knuckle, in metres.
+const SMALLEST_PALM: f32 = 0.01;
+
+/// Largest vector part of a quaternion that counts as the identity: rounding of the conversion between conventions.
+const IDENTITY_TOLERANCE: f32 = 1e-6;
+
+/// The joints of a request.
+struct SentJoints<'a> {
+    /// The field of their list.
+    field: Field<'a>,
+    convention: Convention,
+    /// In `OpenXR` order and axes.
+    joints: [Joint; JOINT_COUNT],
+    /// The place in the list of each joint that was sent.
+    places: [Option<usize>; JOINT_COUNT],
+    /// Whether the joint was sent and its pose is well-formed.
+    readable: [bool; JOINT_COUNT],
+}
+
+/// The hand in the client's frame; none if it is wrong.
+pub(super) fn tracked_hand(
+    field: Field<'_>,
+    hand: &v1::HandJoints,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<GiverHand> {
+    let before = violations.len();
+    let handedness_field = field.child("handedness");
+    let handedness = required_handedness(handedness_field, hand.handedness, violations);
+    let set_field = field.child("joint_set");
+    let set = known(set_field, hand.joint_set, violations);
+    let expected = match set {
+        v1::JointSet::Openxr26 => Some(JOINT_COUNT),
+        v1::JointSet::Webxr25 => Some(JOINT_COUNT - 1),
+        v1::JointSet::Unspecified => None,
+    };
+    if hand.joint_set == v1::JointSet::Unspecified as i32 {
+        violations.add(
+            set_field,
+            "is required: JOINT_SET_OPENXR_26 or JOINT_SET_WEBXR_25",
+        );
+    }
+    let joints_field = field.child("joints");
+    if expected.is_some_and(|count| count != hand.joints.len()) || hand.joints.len() > JOINT_COUNT {
+        violations.add(
+            joints_field,
+            format!(
+                "has {} joints; {} needs {}",
+                hand.joints.len(),
+                set.as_str_name(),
+                expected.map_or("26 or 25".to_owned(), |count| count.to_string()),
+            ),
+        );
+        return None;
+    }
+    let mut sent = SentJoints::read(joints_field, &hand.joints, set, convention, violations);
+    let (Some(handedness), Some(_)) = (handedness, expected) else {
+        return None;
+    };
+    sent.check(handedness_field, handedness, violations);
+    if violations.len() > before {
+        return None;
+    }
+    let warnings = sent.replace_missing_radii();
+    if sent.places[index::PALM].is_none() {
+        sent.joints[index::PALM] = synthesised_palm(&sent.joints);
+    }
+    Some(GiverHand {
+        joints: HandJoints {
+            handedness,
+            joints: sent.joints,
+        },
+        skin: &built_in(field, TRACKED_HAND_RIG, handedness, violations)?.skin,
+        field: "presenting_hand.joints",
+        warnings,
+    })
+}
+
+impl<'a> SentJoints<'a> {
+    fn read(
+        field: Field<'a>,
+        list: &[v1::JointPose],
+        set: v1::JointSet,
+        convention: Convention,
+        violations: &mut Violations,
+    ) -> Self {
+        let nowhere = Joint {
+            pose: Pose::IDENTITY,
+            radius: 0.0,
+        };
+        let mut sent = Self {
+            field,
+            convention,
+            joints: [nowhere; JOINT_COUNT],
+            places: [None; JOINT_COUNT],
+            readable: [false; JOINT_COUNT],
+        };
+        for (place, joint) in list.iter().enumerate() {
+            let index = match set {
+                v1::JointSet::Webxr25 => place + 1,
+                v1::JointSet::Openxr26 | v1::JointSet::Unspecified => convention.joint_at(place),
+            };
+            sent.places[index] = Some(place);
+            (sent.joints[index], sent.readable[index]) =
+                joint_pose(field.at(place), joint, convention, violations);
+        }
+        sent
+    }
+
+    /// Checks that the joints are those of a hand: positions first, then axes. Joints that are not readable already have
+    /// a violation.
+    fn check(&self, handedness_field: Field<'_>, handedness: Handedness, violations: &mut Violations) {
+        let positions = self.joints.map(|joint| joint.pose.position);
+        let wrist = positions[index::WRIST];
+        let knuckle = index::FIRST_OF_DIGIT[2] + 1;
+        let reach = |joint: usize| positions[joint].distance(wrist);
+        let mut trusted = self.readable;
+        let farthest = (0..JOINT_COUNT)
+            .filter(|&joint| trusted[joint] && trusted[index::WRIST])
+            .map(reach)
+            .fold(0.0, f32::max);
+        if farthest < SMALLEST_PALM && self.readable[knuckle] && self.readable[index::WRIST] {
+            self.add_small_palm(reach(knuckle), violations);
+            return;
+        }
+        let strays = strays(&positions, &mut trusted);
+        for &stray in &strays {
+            self.add_stray(stray, violations);
+        }
+        if strays.is_empty() && trusted[index::WRIST] {
+            if farthest > LARGEST_REACH {
+                violations.add(
+                    self.field,
+                    format_args!("reach {farthest} m from the wrist; the limit is {LARGEST_REACH} m"),
+                );
+            }
+            if trusted[knuckle] && reach(knuckle) < SMALLEST_PALM {
+                self.add_small_palm(reach(knuckle), violations);
+            }
+        }
+        let is_identity = self.joints.map(|joint| {
+            let orientation = self.convention.joint_from_openxr(joint.pose).orientation;
+            orientation.xyz().length() < IDENTITY_TOLERANCE
+        });
+        let axes = axes(&self.joints, &trusted, &is_identity, handedness);
+        if axes.are_foreign {
+            violations.add(
+                Field::root("convention"),
+                "does not fit: most joints of the presenting hand point away from their bones, as those of another \
+                 convention do",
+            );
+        }
+        if axes.are_mirrored {
+            violations.add(
+                handedness_field,
+                format_args!(
+                    "is {}, but the joints are those of the other hand or upside down: +Y must point out of the back \
+                     of the hand",
+                    match handedness {
+                        Handedness::Left => v1::Handedness::Left,
+                        Handedness::Right => v1::Handedness::Right,
+                    }
+                    .as_str_name()
+                ),
+            );
+        }
+        for &turned in &axes.turned {
+            if turned.fault == Fault::Direction || !axes.are_mirrored {
+                self.add_turned(turned, violations);
+            }
+        }
+    }
+
+    fn add_small_palm(&self, distance: f32, violations: &mut Violations) {
+        violations.add(
+            self.field,
+            format_args!(
+                "have the middle finger's proximal joint {distance} m from the wrist; it must be at least \
+                 {SMALLEST_PALM} m"
+            ),
+        );
+    }
+
+    fn add_stray(&self, stray: Stray, violations: &mut Violations) {
+        let Some(place) = self.places[stray.joint] else {
+            return;
+        };
+        let [joint, neighbour] = [stray.joint, stray.neighbour].map(|joint| JOINT_NAMES[joint]);
+        let position = self
+            .convention
+            .point_from_openxr(self.joints[stray.joint].pose.position);
+        let Stray { length, limit, .. } = stray;
+        if length > limit {
+            violations.add(
+                self.field.at(place),
+                format_args!(
+                    "({joint}) is at {position}, {length:.3} m from {neighbour}; in a hand of this size it can be at \
+                     most {limit:.3} m (did it lose tracking?)"
+                ),
+            );
+        } else {
+            violations.add(
+                self.field.at(place),
+                format_args!(
+                    "({joint}) is at {position}, exactly where another joint is; no two joints but those at the wrist \
+                     may coincide (did it lose tracking?)"
+                ),
+            );
+        }
+    }
+
+    fn add_turned(&self, turned: Turned, violations: &mut Violations) {
+        let Some(place) = self.places[turned.joint] else {
+            return;
+        };
+        let what = match turned.fault {
+            Fault::Direction => "points away from the tip: its -Z must follow the bone",
+            Fault::Roll => {
+                "is rolled: its +X must lie across the knuckles, and +Y point out of the back of the hand,"
+            }
+        };
+        let orientation = self
+            .convention
+            .joint_from_openxr(self.joints[turned.joint].pose)
+            .orientation;
+        violations.add(
+            self.field.at(place),
+            format_args!(
+                "({}) is turned by {orientation} and {what} in OpenXR's axes, within {:.0}°, and is {:.0}° off (did it \
+                 lose tracking?)",
+                JOINT_NAMES[turned.joint], turned.limit, turned.angle,
+            ),
+        );
+    }
+
+    /// Replaces missing radii; returns a warning if there are any.
+    fn replace_missing_radii(&mut self) -> Vec<String> {
+        let is_missing = |joint: usize| self.places[joint].is_some() && self.joints[joint].radius == 0.0;
+        if !(0..JOINT_COUNT).any(is_missing) {
+            return Vec::new();
+        }
+        let positions = self.joints.map(|joint| joint.pose.position);
+        let scale = REFERENCE.scale_of(&positions, &self.readable).unwrap_or(1.0);
+        let replaced = replace_missing(&mut self.joints, scale);
+        let mut list = String::new();
+        let mut count = 0;
+        for place in 0..JOINT_COUNT {
+            let Some(joint) = self.places.iter().position(|&other| other == Some(place)) else {
+                continue;
+            };
+            if replaced[joint] {
+                count += 1;
+                let radius = self.convention.length_from_openxr(self.joints[joint].radius);
+                let _ = write!(list, " [{place}] {radius:.4}");
+            }
+        }
+        vec![format!(
+            "{}: {count} radii are 0 and were replaced by the adult rig's, scaled to the neighbouring joints or the \
+             hand:{list}",
+            self.field
+        )]
+    }
+}
+
+/// A joint, and whether its pose is well-formed.
+fn joint_pose(
+    field: Field<'_>,
+    sent: &v1::JointPose,
+    convention: Convention,
+    violations: &mut Violations,
+) -> (Joint, bool) {
+    let unit = convention.metres_per_unit();
+    let radius = convention.length_to_openxr(sent.radius);
+    if !(0.0..=LARGEST_RADIUS).contains(&radius) {
+        violations.add(
+            field.child("radius"),
+            format_args!(
+                "is {}; it must be more than 0 and at most {}, or 0 if it is unknown",
+                sent.radius,
+                convention.length_from_openxr(LARGEST_RADIUS)
+            ),
+        );
+    }
+    let pose_field = field.child("client_from_joint");
+    let before = violations.len();
+    if sent.client_from_joint.is_none() {
+        violations.add(pose_field, "is absent; every joint must have a pose");
+    }
+    let pose = convention.joint_to_openxr(pose(pose_field, sent.client_from_joint, unit, violations));
+    (Joint { pose, radius }, violations.len() == before)
+}
+
+/// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, with its axes and radius.
+fn synthesised_palm(joints: &[Joint; JOINT_COUNT]) -> Joint {
+    let metacarpal = joints[index::FIRST_OF_DIGIT[2]];
+    let proximal = joints[index::FIRST_OF_DIGIT[2] + 1];
+    Joint {
+        pose: Pose {
+            position: (metacarpal.pose.position + proximal.pose.position) * 0.5,
+            orientation: metacarpal.pose.orientation,
+        },
+        radius: metacarpal.radius,
+    }
+}

@@ -1,0 +1,271 @@
+//! Requests made after reports of faults in programs of this kind, with the answers that are right. They are JSON as
+//! protobuf maps it, in the folder `reports` of the test data.
+
+use std::path::{Path, PathBuf};
+
+use glam::Vec3;
+use grasp_proto::v1::{self, presenting_hand::Form};
+use grasp_tests::{TestServer, recorded::data_folder_or_skip};
+use serde_json::Value;
+use tonic::{Code, Status};
+
+use crate::fixtures::{blamed_fields, seconds};
+
+/// The folder of one report, if the test data have it.
+fn report(test: &str, name: &str) -> Option<PathBuf> {
+    let folder = data_folder_or_skip(test)?.join("reports").join(name);
+    if !folder.is_dir() {
+        eprintln!("SKIPPED {test}: the test data have no {}", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+fn json(file: &Path) -> Value {
+    let text = std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+    serde_json::from_str(&text).expect("a request is JSON")
+}
+
+/// A number; 0 where protobuf's JSON leaves it out.
+fn number(value: &Value, key: &str) -> f32 {
+    value[key].as_f64().unwrap_or_default() as f32
+}
+
+fn text(value: &Value, key: &str) -> String {
+    value[key].as_str().unwrap_or_default().to_owned()
+}
+
+/// Bytes from base64 with padding.
+fn bytes(base64: &str) -> Vec<u8> {
+    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let digits: Vec<u32> = base64
+        .bytes()
+        .filter_map(|byte| DIGITS.iter().position(|&digit| digit == byte))
+        .map(|digit| digit as u32)
+        .collect();
+    digits
+        .chunks(4)
+        .flat_map(|group| {
+            let bits = group
+                .iter()
+                .enumerate()
+                .fold(0, |bits, (k, digit)| bits | digit << (18 - 6 * k));
+            bits.to_be_bytes()[1..group.len()].to_vec()
+        })
+        .collect()
+}
+
+async fn create(server: &TestServer, file: &Path) -> Result<v1::Object, Status> {
+    let value = json(file);
+    let request = v1::CreateObjectRequest {
+        object_id: text(&value, "objectId"),
+        obj: bytes(&text(&value, "obj")),
+        mass_kg: number(&value, "massKg"),
+        ..Default::default()
+    };
+    let answer = server.objects().await.create_object(request).await?;
+    Ok(answer.into_inner().object.expect("an answer has the object"))
+}
+
+fn vector(value: &Value) -> v1::Vector3 {
+    let [x, y, z] = ["x", "y", "z"].map(|key| number(value, key));
+    v1::Vector3 { x, y, z }
+}
+
+fn pose(value: &Value) -> v1::Pose {
+    let orientation = &value["orientation"];
+    let [x, y, z, w] = ["x", "y", "z", "w"].map(|key| number(orientation, key));
+    v1::Pose {
+        position: Some(vector(&value["position"])),
+        orientation: Some(v1::Quaternion { x, y, z, w }),
+    }
+}
+
+/// A request with 26 joints of a left hand.
+fn find_request(file: &Path) -> v1::FindGraspRequest {
+    let value = json(file);
+    let hand = &value["presentingHand"]["joints"];
+    assert_eq!(hand["handedness"], "HANDEDNESS_LEFT");
+    assert_eq!(hand["jointSet"], "JOINT_SET_OPENXR_26");
+    let joints = hand["joints"].as_array().expect("a hand has joints");
+    v1::FindGraspRequest {
+        object: text(&value, "object"),
+        client_from_object: Some(pose(&value["clientFromObject"])),
+        presenting_hand: Some(v1::PresentingHand {
+            form: Some(Form::Joints(v1::HandJoints {
+                handedness: v1::Handedness::Left.into(),
+                joint_set: v1::JointSet::Openxr26.into(),
+                joints: joints
+                    .iter()
+                    .map(|joint| v1::JointPose {
+                        client_from_joint: Some(pose(&joint["clientFromJoint"])),
+                        radius: number(joint, "radius"),
+                    })
+                    .collect(),
+            })),
+        }),
+        budget: Some(seconds(2)),
+        seed: Some(1),
+        atlas: v1::AtlasUse::None.into(),
+        ..Default::default()
+    }
+}
+
+/// The edges of an object's box in millimetres, sorted and rounded.
+fn edges(object: &v1::Object) -> [i32; 3] {
+    let v1::Vector3 { x, y, z } = object.box_half_extents.expect("an object has a box");
+    let mut edges = [x, y, z].map(|half| (2000.0 * half).round() as i32);
+    edges.sort_unstable();
+    edges
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn concave_caps_of_a_profile_keep_contacts_on_its_surface() {
+    let Some(folder) = report(
+        "concave_caps_of_a_profile_keep_contacts_on_its_surface",
+        "concave-ngon",
+    ) else {
+        return;
+    };
+    let server = TestServer::start().await;
+    let object = create(&server, &folder.join("create.json")).await.unwrap();
+    assert_eq!(object.triangle_count, 20);
+    assert_eq!(object.warnings, [""; 0]);
+    let up = Some(vector(&json(&folder.join("find.json"))["up"]));
+    for seed in 1..=40 {
+        let request = v1::FindGraspRequest {
+            object: object.name.clone(),
+            up,
+            seed: Some(seed),
+            atlas: v1::AtlasUse::None.into(),
+            ..Default::default()
+        };
+        let answer = server
+            .grasps()
+            .await
+            .find_grasp(request)
+            .await
+            .unwrap()
+            .into_inner();
+        for contact in answer.grasp.iter().flat_map(|grasp| &grasp.contacts) {
+            let v1::Vector3 { x, y, z } = contact.object_position.unwrap();
+            let p = Vec3::new(x, y, z);
+            // Legs of 20 mm along x and y, from z = -15 to 15 mm.
+            let low = Vec3::new(0.0, 0.0, -0.015);
+            let outside = |high: Vec3| (p - p.clamp(low, high)).length();
+            let distance = outside(Vec3::new(0.1, 0.02, 0.015)).min(outside(Vec3::new(0.02, 0.1, 0.015)));
+            assert!(distance < 1e-4, "seed {seed}: {distance} m off at {p}");
+        }
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn vertices_with_colour_and_alpha_keep_the_shape() {
+    let Some(folder) = report(
+        "vertices_with_colour_and_alpha_keep_the_shape",
+        "seven-value-vertex",
+    ) else {
+        return;
+    };
+    let server = TestServer::start().await;
+    let object = create(&server, &folder.join("create.json")).await.unwrap();
+    assert_eq!(edges(&object), [30, 60, 120]);
+    assert!(
+        object.warnings[0].contains("seven numbers"),
+        "{:?}",
+        object.warnings
+    );
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn utf16_is_read_and_other_formats_are_named() {
+    let Some(folder) = report("utf16_is_read_and_other_formats_are_named", "not-utf8") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    for name in ["utf16le", "utf16be"] {
+        let object = create(&server, &folder.join(format!("create-{name}.json")))
+            .await
+            .unwrap();
+        assert_eq!((object.vertex_count, object.triangle_count), (8, 12), "{name}");
+        assert_eq!(edges(&object), [30, 60, 120], "{name}");
+    }
+    for (name, format) in [
+        ("gltf", "glTF"),
+        ("html", "HTML"),
+        ("lfs", "Git LFS"),
+        ("stl", "STL"),
+    ] {
+        let status = create(&server, &folder.join(format!("create-{name}.json")))
+            .await
+            .expect_err("it is not OBJ text");
+        assert_eq!(status.code(), Code::InvalidArgument);
+        assert_eq!(blamed_fields(&status), ["obj"]);
+        assert!(status.message().contains(format), "{name}: {}", status.message());
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn joint_without_tracking_is_named() {
+    let Some(folder) = report("joint_without_tracking_is_named", "untracked-joint") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    let good = find_request(&folder.join("find-good.json"));
+    let status = server
+        .grasps()
+        .await
+        .find_grasp(find_request(&folder.join("find.json")))
+        .await
+        .expect_err("a joint is lost");
+    assert_eq!(status.code(), Code::InvalidArgument);
+    assert_eq!(blamed_fields(&status), ["presenting_hand.joints.joints[10]"]);
+    let answer = server.grasps().await.find_grasp(good.clone()).await;
+    assert!(answer.is_ok(), "{answer:?}");
+    // The same for every other joint.
+    for place in 0..26 {
+        let mut request = good.clone();
+        if let Some(Form::Joints(hand)) = request
+            .presenting_hand
+            .as_mut()
+            .and_then(|hand| hand.form.as_mut())
+        {
+            hand.joints[place].client_from_joint.as_mut().unwrap().position = Some(v1::Vector3::default());
+        }
+        let status = server
+            .grasps()
+            .await
+            .find_grasp(request)
+            .await
+            .expect_err("a joint is lost");
+        assert_eq!(
+            blamed_fields(&status),
+            [format!("presenting_hand.joints.joints[{place}]")]
+        );
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn tips_without_radius_are_accepted_with_a_warning() {
+    let Some(folder) = report(
+        "tips_without_radius_are_accepted_with_a_warning",
+        "tip-radius-zero",
+    ) else {
+        return;
+    };
+    let server = TestServer::start().await;
+    for (file, warnings) in [("find.json", 1), ("find-good.json", 0)] {
+        let answer = server
+            .grasps()
+            .await
+            .find_grasp(find_request(&folder.join(file)))
+            .await;
+        let report = answer.expect("the hand is accepted").into_inner().report.unwrap();
+        assert_eq!(report.warnings.len(), warnings, "{file}: {:?}", report.warnings);
+    }
+    server.stop().await;
+}
