@@ -37,11 +37,12 @@ search; the output folder receives a picture (PNG) and a scene (GLB) per holdout
 With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "outcome", "grasp",
 "report", "round_trip_seconds"}]}, the last four as `grasp find --json` writes them.
 
-With --everyday, the service takes a hundred everyday objects instead, from a needle to a chair, that nobody holds out. Each is
-created and requested at once with the default settings, so no search has an atlas. The folder receives index.html, a page
-of all pictures that also says what is beyond one hand and why. A grasp that is not found in time is a result: the exit
-code is 0. In the output of --json, "one_hand" objects are within one hand and "found" of these have a grasp, "page" is the
-page, and each of "grasps" has "what", "mass_kg" and "beyond_one_hand", null or the reason, instead of "holdout"."#;
+With --everyday, the service takes a hundred everyday objects instead, from a needle to a chair, that nobody holds
+out. Each is created and requested at once with the default settings, so no search has an atlas. The folder receives
+index.html, a page of all pictures that also says what is beyond one hand and why. A grasp that is not found in time
+is a result: the exit code is 0. In the output of --json, "one_hand" objects are within one hand and "found" of these
+have a grasp, "page" is the page, and each of "grasps" has "what", "mass_kg" and "beyond_one_hand", null or the
+reason, instead of "holdout"."#;
 
 /// How the pictures of holdouts are laid out: a row of five in the overview fills a wide screen and gives each object a row.
 const SMALL_VIEW: ViewSize = ViewSize {
