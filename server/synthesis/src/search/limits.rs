@@ -29,7 +29,10 @@ use crate::{
         scene::Presented,
         solids::{HandSolids, PreparedHand, link_radii},
     },
-    propose::{holdable::HoldableSurface, surface_pairs::SurfacePairs},
+    propose::{
+        holdable::HoldableSurface,
+        surface_pairs::{SurfacePair, SurfacePairs},
+    },
 };
 
 /// What all contacts of a hand can push together, in newtons.
@@ -49,9 +52,9 @@ const MAX_FRICTION_OF_WIDTH: f32 = 0.6;
 const ANGLES: usize = 5;
 const BETWEEN_ANGLES: f32 = 1.03;
 
-/// Height above a touched point of a point inside the touching finger, over the finger's radius. It is inside by more than
-/// this height, although the bone may be up to 45° off the normal and the flesh 2 mm deep in the object.
-const INSIDE_FINGER: f32 = 0.4;
+/// Height above a touched point, over the finger's radius, of a point that is at least as far from the giver: it is inside
+/// the finger, up to a millimetre less deep than high, even if the bone is 45° off the normal.
+const INSIDE_FINGER: f32 = 0.3;
 
 /// Something that keeps one hand from holding an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,8 +88,8 @@ pub enum LimitKind {
     Reach,
 }
 
-/// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes 0.2 ms,
-/// whatever the object.
+/// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes a fraction
+/// of a millisecond, whatever the object.
 pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     if query.validity != Validity::Physical {
         return Vec::new();
@@ -166,7 +169,7 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
     let giver: &PreparedHand = presented.giver.as_ref()?;
     let radii = Digit::ALL.map(|digit| link_radii(rig, digit).into_iter().fold(f32::INFINITY, f32::min));
     let needed = INSIDE_FINGER * radii.into_iter().fold(f32::INFINITY, f32::min);
-    let sides: &[f32] = if surface.pairs().iter().any(|pair| pair.is_of_sheet()) {
+    let sides: &[f32] = if surface.pairs().iter().any(SurfacePair::is_of_sheet) {
         &[1.0, -1.0]
     } else {
         &[1.0]
