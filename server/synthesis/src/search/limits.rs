@@ -52,9 +52,9 @@ const MAX_FRICTION_OF_WIDTH: f32 = 0.6;
 const ANGLES: usize = 5;
 const BETWEEN_ANGLES: f32 = 1.03;
 
-/// Height above a touched point of a point inside the touching finger, over the finger's radius. It is inside by more than
-/// this height, although the bone may be up to 45° off the normal and the flesh 2 mm deep in the object.
-const INSIDE_FINGER: f32 = 0.4;
+/// Height above a touched point, over the finger's radius, of a point that is at least as far from the giver: it is inside
+/// the finger, up to a millimetre less deep than high, even if the bone is 45° off the normal.
+const INSIDE_FINGER: f32 = 0.3;
 
 /// Something that keeps one hand from holding an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,8 +88,8 @@ pub enum LimitKind {
     Reach,
 }
 
-/// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes 0.2 ms,
-/// whatever the object.
+/// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes a fraction
+/// of a millisecond, whatever the object.
 pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     if query.validity != Validity::Physical {
         return Vec::new();
