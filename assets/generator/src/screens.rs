@@ -12,6 +12,7 @@ use grasp_synthesis::{
     known::atlas::Atlas,
     model::hand::{Handedness, joints::HandJoints, rig::Rig},
     physical::{
+        barriers::Barriers,
         grip::GIVER_CLEARANCE,
         solids::{PreparedHand, SPHERES, TaperedCapsule, TrackedSolids},
     },
@@ -72,7 +73,10 @@ fn pairs(known: &Atlas, rig: &Rig) -> Vec<Pair> {
                     giver_solids,
                     grip: solids,
                     is_left_by_cells: !excluded.contains(index as u16),
-                    is_settled: known.grips().screen_against_giver(index, rig, &giver).is_none(),
+                    is_settled: known
+                        .grips()
+                        .screen(index, rig, Barriers::of_giver(&giver))
+                        .is_none(),
                 })
             };
             (0..GRIPS).filter_map(pair).collect::<Vec<_>>()

@@ -10,7 +10,7 @@ use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
     known::{entry::Entry, recent_grips::RecentGrips, seed_source::SeedSource},
     model::{
-        holdout::{Holdout, PresentingHand},
+        holdout::Holdout,
         strategy::{Choice, Validity},
     },
     propose::prepared::PreparedObject,
@@ -23,7 +23,7 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-use super::slices::search_in_slices;
+use super::{holdout::holdout, slices::search_in_slices};
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     atlases::KnownGrips,
@@ -127,7 +127,7 @@ impl FindJob {
             && !self.query.plan_key_frames
     }
 
-    /// Poses the giver's hand and makes the settings.
+    /// Places hands and obstacles around the object and makes the settings.
     ///
     /// # Errors
     /// The giver's joints fold its skin.
@@ -135,21 +135,7 @@ impl FindJob {
         let start = Instant::now();
         let query = self.query;
         let object_from_client = query.client_from_object.inverse();
-        let presenting_hand = match &query.presenting_hand {
-            None => None,
-            Some(giver) if query.validity == Validity::Physical => Some(PresentingHand::of_joints(
-                giver.joints.transformed(object_from_client),
-            )),
-            Some(giver) => Some(
-                PresentingHand::in_frame(giver.skin, &giver.joints, object_from_client)
-                    .map_err(|error| ServiceError::invalid(giver.field, error.to_string()))?,
-            ),
-        };
-        let holdout = Holdout {
-            object: Arc::clone(self.object.object()),
-            presenting_hand,
-            up: object_from_client.transform_vector(query.up),
-        };
+        let holdout = holdout(&query, self.object.object())?;
         // Reproducible answers need a complete atlas: a growing one would change them.
         let atlas = self
             .known
@@ -293,7 +279,7 @@ mod tests {
         budget::effective_budget,
         config,
         objects::{StoredObject, tests::tetrahedron},
-        validate::find_query,
+        validate::{any_obstacles, find_query},
     };
 
     /// Any number that a client may send, most of them ordinary.
@@ -385,10 +371,13 @@ mod tests {
     }
 
     fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
-        let hand = prop_oneof![tracked_hand(), angled_hand()]
-            .prop_map(|form| v1::PresentingHand { form: Some(form) });
+        let hand = || {
+            prop_oneof![tracked_hand(), angled_hand()]
+                .prop_map(|form| v1::PresentingHand { form: Some(form) })
+        };
+        let others = (proptest::option::weighted(0.2, hand()), any_obstacles());
         (
-            proptest::option::of(hand),
+            (proptest::option::of(hand()), others),
             pose(2.0),
             proptest::option::of(vector(1.0)),
             (0..8_i32, 0..8_i32, 0..6_i32),
@@ -397,7 +386,7 @@ mod tests {
         )
             .prop_map(
                 |(
-                    presenting_hand,
+                    (presenting_hand, (other_hand, obstacles)),
                     client_from_object,
                     up,
                     enums,
@@ -418,6 +407,8 @@ mod tests {
                         reproducible,
                         friction,
                         plan_key_frames: true,
+                        other_hands: other_hand.into_iter().collect(),
+                        obstacles,
                         ..Default::default()
                     }
                 },

@@ -1,5 +1,6 @@
 //! Runs grasp searches on the threads of the executor.
 
+mod holdout;
 mod job;
 mod slices;
 

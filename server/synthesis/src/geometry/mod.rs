@@ -9,6 +9,7 @@ mod distance_field;
 pub mod mesh;
 pub mod mesh_bvh;
 pub mod oriented_box;
+pub mod solid_box;
 mod stack_entry;
 pub mod tapered_capsule;
 pub mod topology;

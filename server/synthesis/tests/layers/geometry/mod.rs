@@ -5,4 +5,5 @@ mod closest_point;
 mod containment;
 mod crossing;
 mod oriented_box;
+mod solid_box;
 mod triangle_mesh;
