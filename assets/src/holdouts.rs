@@ -135,6 +135,8 @@ impl BuiltInHoldout {
                 &joints_in_world,
                 object_from_world,
             )?),
+            other_hands: Vec::new(),
+            obstacles: Vec::new(),
             up: object_from_world.transform_vector(Vec3::Y),
         })
     }

@@ -110,7 +110,7 @@ pub struct HandJoints {
     pub joints: Vec<JointPose>,
 }
 
-/// The giver's hand. In JSON: `{"angles": {…}}` or `{"joints": {…}}`.
+/// The giver's hand, or another one to keep clear of. In JSON: `{"angles": {…}}` or `{"joints": {…}}`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PresentingHand {

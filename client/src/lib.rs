@@ -19,7 +19,7 @@
 //!
 //! - [`GraspClient`] connects and calls, with deadlines and retries; it is cheap to clone.
 //! - [`FindRequest`] describes the holdout and the search, [`FindAnswer`] the result. [`PresentingHand`] is the giver's
-//!   hand; [`Constraints`] are requirements on the grasp.
+//!   hand; [`Obstacle`]s are kept clear of like it; [`Constraints`] are requirements on the grasp.
 //! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
 //!
 //! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
@@ -39,6 +39,7 @@ mod hand;
 mod json;
 mod key_frame;
 mod object;
+mod obstacle;
 mod pose;
 mod retry;
 mod score;
@@ -55,6 +56,7 @@ pub use hand::{
 };
 pub use key_frame::{KeyFrame, KeyFrameKind};
 pub use object::{AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage};
+pub use obstacle::{Capsule, Obstacle, SolidBox};
 pub use pose::Pose;
 pub use retry::RetryPolicy;
 pub use score::{Score, ScoreTerm};

@@ -11,6 +11,7 @@ use crate::{
     hand::{Digit, DigitAngles, Handedness, JOINT_COUNT, JointPose, Phalanx, PresentingHand, ReceivingHand},
     json,
     key_frame::KeyFrame,
+    obstacle::Obstacle,
     pose::Pose,
     score::Score,
 };
@@ -99,7 +100,7 @@ pub enum AtlasUse {
     None,
 }
 
-/// A holdout (an object, its pose and the giver's hand), and how to search for a grasp.
+/// A holdout (an object, its pose, the giver's hand and what else is near), and how to search for a grasp.
 ///
 /// In JSON, fields keep their names, except that `budget` is `budget_seconds`; all but `object` are optional.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -166,6 +167,13 @@ pub struct FindRequest {
     /// sometimes longer; counts neither toward the budget nor toward [`SearchReport::search_time`].
     #[serde(default)]
     pub plan_key_frames: bool,
+    /// Up to 3 further hands to keep clear of: the giver's other hand, or the receiver's if it is already at the object. Score
+    /// terms about the giver refer to `presenting_hand`. Only under [`Validity::Physical`].
+    #[serde(default)]
+    pub other_hands: Vec<PresentingHand>,
+    /// Up to 64 obstacles to keep clear of. Only under [`Validity::Physical`].
+    #[serde(default)]
+    pub obstacles: Vec<Obstacle>,
 }
 
 impl FindRequest {
@@ -192,7 +200,27 @@ impl FindRequest {
             choice: None,
             atlas: None,
             plan_key_frames: false,
+            other_hands: Vec::new(),
+            obstacles: Vec::new(),
         }
+    }
+
+    /// The same request with another hand to keep clear of. The first one is the presenting hand.
+    #[must_use]
+    pub fn with_hand(mut self, hand: PresentingHand) -> Self {
+        if self.presenting_hand.is_none() {
+            self.presenting_hand = Some(hand);
+        } else {
+            self.other_hands.push(hand);
+        }
+        self
+    }
+
+    /// The same request with another obstacle.
+    #[must_use]
+    pub fn with_obstacle(mut self, obstacle: Obstacle) -> Self {
+        self.obstacles.push(obstacle);
+        self
     }
 }
 
@@ -242,8 +270,11 @@ pub struct PhysicalMargins {
     pub epsilon: f32,
     /// Deepest penetration of the hand into the object, in metres.
     pub penetration: f32,
-    /// Smallest distance of the receiver's hand and forearm from the giver's, in metres; none without a giver.
+    /// Smallest distance of the receiver's hand and forearm from the request's hands, in metres; none without any.
     pub giver_clearance: Option<f32>,
+    /// Smallest distance of the receiver's hand and forearm from the obstacles, in metres; none without any.
+    #[serde(default)]
+    pub obstacle_clearance: Option<f32>,
 }
 
 /// A pose of the receiving hand that holds the object.
@@ -295,9 +326,9 @@ pub enum Rejection {
     NoThumbEarlyStop,
     /// No finger has a contact.
     NoFingers,
-    /// The palm collides with the object or the presenting hand.
+    /// The palm or the forearm collides with the object, another hand or an obstacle.
     PalmCollision,
-    /// A finger collides with the object or the presenting hand.
+    /// A finger collides with the object, another hand or an obstacle.
     FingerCollision,
     /// A contact lies on a forbidden surface.
     UnwantedContact,

@@ -162,6 +162,7 @@ fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
             epsilon: margins.epsilon,
             penetration: margins.penetration,
             giver_clearance: margins.giver_clearance,
+            obstacle_clearance: margins.obstacle_clearance,
         }),
         r#type: grasp
             .classification

@@ -217,6 +217,8 @@ impl ClientHoldout {
             presenting_hand: Some(PresentingHand::of_joints(
                 self.giver.transformed(object_from_client),
             )),
+            other_hands: Vec::new(),
+            obstacles: Vec::new(),
             up: object_from_client.transform_vector(Vec3::Y),
         }
     }

@@ -7,6 +7,7 @@ mod constraint_codec;
 mod geometry_codec;
 mod hand_codec;
 mod object_codec;
+mod obstacle_codec;
 mod search_codec;
 
 pub(crate) use object_codec::{

@@ -13,6 +13,7 @@ use super::{
         digit_angles_from_wire, digit_from_wire, handedness_from_wire, joint_from_wire, phalanx_from_wire,
         presenting_hand_to_wire, receiving_hand_to_wire,
     },
+    obstacle_codec::obstacle_to_wire,
     required,
 };
 use crate::{
@@ -73,6 +74,8 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         }
         .into(),
         plan_key_frames: request.plan_key_frames,
+        other_hands: request.other_hands.iter().map(presenting_hand_to_wire).collect(),
+        obstacles: request.obstacles.iter().map(obstacle_to_wire).collect(),
     }
 }
 
@@ -209,6 +212,7 @@ fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
             epsilon: margins.epsilon,
             penetration: margins.penetration,
             giver_clearance: margins.giver_clearance,
+            obstacle_clearance: margins.obstacle_clearance,
         }),
         grasp_type: grasp_type_from_wire(grasp.r#type),
         type_confidence: grasp.type_confidence,

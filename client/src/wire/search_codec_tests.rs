@@ -5,7 +5,9 @@ use glam::Vec3;
 use super::*;
 use crate::{
     constraints::Constraints,
-    hand::{Digit, Handedness, JOINT_COUNT, Phalanx},
+    hand::{Digit, DigitAngles, HandAngles, Handedness, JOINT_COUNT, Phalanx, PresentingHand},
+    obstacle::Obstacle,
+    pose::Pose,
 };
 
 fn wire_vector(x: f32) -> v1::Vector3 {
@@ -56,7 +58,8 @@ fn wire_grasp() -> v1::Grasp {
             residual: 0.01,
             epsilon: 0.03,
             penetration: 0.001,
-            giver_clearance: None,
+            giver_clearance: Some(0.031),
+            obstacle_clearance: Some(0.032),
         }),
         comfort: 10.0,
         wrench_angle: 11.0,
@@ -178,7 +181,12 @@ fn converts_every_number_of_an_answer() {
         (grasp.grasp_type, grasp.type_confidence),
         (Some(GraspType::Quadpod), 0.75)
     );
-    assert_eq!(grasp.margins.map(|margins| margins.epsilon), Some(0.03));
+    let margins = grasp.margins.unwrap();
+    assert_eq!(margins.epsilon, 0.03);
+    assert_eq!(
+        (margins.giver_clearance, margins.obstacle_clearance),
+        (Some(0.031), Some(0.032))
+    );
     let score = grasp.score.unwrap();
     let term = &score.terms[0];
     assert_eq!(
@@ -319,8 +327,29 @@ fn default_request_leaves_everything_to_the_server() {
     assert_eq!(wire.atlas(), v1::AtlasUse::Unspecified);
     assert_eq!(wire.constraints, None);
     assert!(!wire.plan_key_frames);
+    assert!(wire.other_hands.is_empty() && wire.obstacles.is_empty());
     assert_eq!(wire.convention(), v1::Convention::Openxr);
     assert_eq!((wire.budget, wire.seed, wire.up), (None, None, None));
+}
+
+fn hand(handedness: Handedness) -> PresentingHand {
+    PresentingHand::Angles(HandAngles {
+        rig: "adult".to_owned(),
+        handedness,
+        client_from_wrist: Pose::IDENTITY,
+        digits: [DigitAngles::default(); 5],
+    })
+}
+
+#[test]
+fn a_request_without_a_giver_presents_the_first_hand() {
+    let request = FindRequest::new("objects/remote")
+        .with_hand(hand(Handedness::Left))
+        .with_hand(hand(Handedness::Right))
+        .with_obstacle(Obstacle::capsule(Vec3::ZERO, Vec3::ZERO, 0.1));
+    assert_eq!(request.presenting_hand, Some(hand(Handedness::Left)));
+    assert_eq!(request.other_hands, [hand(Handedness::Right)]);
+    assert_eq!(request.obstacles.len(), 1);
 }
 
 #[test]
@@ -345,6 +374,8 @@ fn converts_every_field_of_a_request() {
         choice: Some(Choice::BestWithinBudget),
         atlas: Some(AtlasUse::None),
         plan_key_frames: true,
+        other_hands: vec![hand(Handedness::Left), hand(Handedness::Right)],
+        obstacles: vec![Obstacle::capsule(Vec3::X, Vec3::Y, 0.1)],
         ..FindRequest::new("objects/remote")
     };
     let wire = find_request_to_wire(&request);
@@ -364,5 +395,15 @@ fn converts_every_field_of_a_request() {
     assert_eq!(wire.choice(), v1::Choice::BestWithinBudget);
     assert_eq!(wire.atlas(), v1::AtlasUse::None);
     assert!(wire.plan_key_frames);
+    assert_eq!(
+        wire.other_hands,
+        request
+            .other_hands
+            .iter()
+            .map(presenting_hand_to_wire)
+            .collect::<Vec<_>>()
+    );
+    assert_ne!(wire.other_hands[0], wire.other_hands[1]);
+    assert_eq!(wire.obstacles, [obstacle_to_wire(&request.obstacles[0])]);
     assert_eq!(wire.constraints.unwrap().max_comfort_e, Some(0.25));
 }

@@ -10,7 +10,7 @@ use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
     known::{entry::Entry, recent_grips::RecentGrips, seed_source::SeedSource},
     model::{
-        holdout::{Holdout, PresentingHand},
+        holdout::Holdout,
         strategy::{Choice, Validity},
     },
     propose::prepared::PreparedObject,
@@ -24,7 +24,7 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-use super::{progress::Progress, slices::search_in_slices};
+use super::{holdout::holdout, progress::Progress, slices::search_in_slices};
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     atlases::KnownGrips,
@@ -114,7 +114,7 @@ impl FindJob {
         self.arrived + self.patience
     }
 
-    /// Poses the giver's hand and makes the settings.
+    /// Places hands and obstacles around the object and makes the settings.
     ///
     /// # Errors
     /// The giver's joints fold its skin.
@@ -122,21 +122,7 @@ impl FindJob {
         let start = Instant::now();
         let query = self.query;
         let object_from_client = query.client_from_object.inverse();
-        let presenting_hand = match &query.presenting_hand {
-            None => None,
-            Some(giver) if query.validity == Validity::Physical => Some(PresentingHand::of_joints(
-                giver.joints.transformed(object_from_client),
-            )),
-            Some(giver) => Some(
-                PresentingHand::in_frame(giver.skin, &giver.joints, object_from_client)
-                    .map_err(|error| ServiceError::invalid(giver.field, error.to_string()))?,
-            ),
-        };
-        let holdout = Holdout {
-            object: Arc::clone(self.object.object()),
-            presenting_hand,
-            up: object_from_client.transform_vector(query.up),
-        };
+        let holdout = holdout(&query, self.object.object())?;
         // Reproducible answers need a complete atlas: a growing one would change them.
         let atlas = self
             .known
@@ -260,11 +246,12 @@ impl PreparedJob {
             convention: self.query.convention,
             client_from_object: self.query.client_from_object,
         };
-        let giver = self.query.presenting_hand.as_ref();
+        let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
+        let warnings: Vec<String> = hands.flat_map(|hand| hand.warnings.iter().cloned()).collect();
         let circumstances = Circumstances {
             search_time,
             budget: self.budget,
-            warnings: giver.map_or(&[], |giver| &giver.warnings),
+            warnings: &warnings,
         };
         Ok(Answered {
             response: find_response(&outcome, rig, frame, &self.settings, circumstances)?,

@@ -1,6 +1,7 @@
 //! Runs grasp searches on the threads of the executor.
 
 mod find;
+mod holdout;
 mod job;
 mod progress;
 mod slices;

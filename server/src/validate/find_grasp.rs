@@ -10,12 +10,14 @@ use grasp_synthesis::{
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
+        obstacle::Obstacle,
         strategy::{Choice, Strategy, Validity},
     },
 };
 
 use super::{
-    Field, GiverHand, Violations, constraints::constraints, friction, hand, known, object_id_of, pose,
+    Field, GiverHand, Violations, constraints::constraints, friction, hand, known, object_id_of, obstacles,
+    pose,
 };
 use crate::{convention::Convention, error::ServiceError};
 
@@ -47,6 +49,10 @@ pub(crate) struct FindQuery {
     pub client_from_object: Pose,
     /// The giver's hand.
     pub presenting_hand: Option<GiverHand>,
+    /// Further hands to keep clear of, in the client's frame and `OpenXR` axes.
+    pub other_hands: Vec<GiverHand>,
+    /// Obstacles to keep clear of, in the client's frame and `OpenXR` axes.
+    pub obstacles: Vec<Obstacle>,
     /// The hand to pose.
     pub receiving_hand: &'static Hand,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
@@ -117,6 +123,20 @@ pub(crate) fn find_query(
         .presenting_hand
         .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, v));
     let validity = validity(known(Field::root("validity"), request.validity, v));
+    let other_hands = obstacles::other_hands(
+        Field::root("other_hands"),
+        request.other_hands,
+        validity,
+        convention,
+        v,
+    );
+    let obstacles = obstacles::obstacles(
+        Field::root("obstacles"),
+        &request.obstacles,
+        validity,
+        convention,
+        v,
+    );
     let default_rig = match validity {
         Validity::Thesis => THESIS_RIG,
         Validity::Physical => default_rig,
@@ -165,6 +185,8 @@ pub(crate) fn find_query(
         convention,
         client_from_object: convention.pose_to_openxr(client_from_object),
         presenting_hand,
+        other_hands,
+        obstacles,
         receiving_hand,
         up,
         budget,

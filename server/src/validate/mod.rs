@@ -1,13 +1,14 @@
 //! Turns requests into checked values, or into a list of everything that is wrong with them.
 //!
 //! Every function takes the field's path and the violations so far, and returns a usable value even for wrong input, so
-//! that all violations are found; [`Violations::finish`] decides in the end. A valid request causes no allocations
-//! here.
+//! that all violations are found; [`Violations::finish`] decides in the end. A valid request without further hands and
+//! obstacles causes no allocations here.
 
 mod constraints;
 mod find_grasp;
 mod hand;
 mod object;
+mod obstacles;
 mod page;
 
 use std::fmt;
@@ -21,6 +22,8 @@ pub(crate) use hand::GiverHand;
 #[cfg(test)]
 pub(crate) use hand::fixtures;
 pub(crate) use object::{ObjectFields, object_fields, object_id_of};
+#[cfg(test)]
+pub(crate) use obstacles::tests::any_obstacles;
 pub(crate) use page::{page_query, page_token};
 
 use crate::error::{ServiceError, Violation};

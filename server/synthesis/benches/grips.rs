@@ -11,6 +11,7 @@ use grasp_synthesis::{
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::GripChecker},
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     physical::{
+        barriers::Barriers,
         grip::Gripper,
         scene::{ObjectScene, Presented},
     },
@@ -118,7 +119,7 @@ fn proposals(criterion: &mut Criterion) {
         let place = ProposalContext {
             object: scene.object,
             surface: object(name).surface_pairs(),
-            giver: None,
+            barriers: Barriers::NONE,
             rig: rig(),
             placements: None,
             mechanisms: Mechanisms::ALL,

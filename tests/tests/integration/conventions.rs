@@ -4,7 +4,7 @@
 //! components.
 
 use glam::{Mat3, Quat, Vec3};
-use grasp_proto::v1::{self, presenting_hand::Form};
+use grasp_proto::v1::{self, obstacle::Shape, presenting_hand::Form};
 use grasp_tests::{TestServer, wire_pose};
 
 use crate::fixtures::held_remote;
@@ -70,6 +70,41 @@ impl Engine {
         })
     }
 
+    /// A hand by its joint angles.
+    fn hand(&self, hand: &mut v1::PresentingHand) {
+        if let Some(Form::Angles(angles)) = &mut hand.form {
+            let wrist = angles.client_from_wrist.as_ref().unwrap();
+            angles.client_from_wrist = Some(self.wire(wrist, self.joint_turn));
+        }
+    }
+
+    fn obstacle(&self, obstacle: &mut v1::Obstacle) {
+        let wire = |v: Vec3| {
+            Some(v1::Vector3 {
+                x: v.x,
+                y: v.y,
+                z: v.z,
+            })
+        };
+        let point = |p: Option<v1::Vector3>| wire(self.vector(p.unwrap(), self.units_per_metre));
+        match obstacle.shape.as_mut().unwrap() {
+            Shape::Capsule(capsule) => {
+                capsule.client_start = point(capsule.client_start);
+                capsule.client_end = point(capsule.client_end);
+                capsule.radius *= self.units_per_metre;
+            }
+            Shape::Box(solid) => {
+                solid.client_from_box = solid
+                    .client_from_box
+                    .as_ref()
+                    .map(|pose| self.wire(pose, Quat::IDENTITY));
+                // Sizes follow the axes, without a sign.
+                let half = self.vector(solid.half_extents.unwrap(), self.units_per_metre);
+                solid.half_extents = wire(half.abs());
+            }
+        }
+    }
+
     fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
         let mut request = openxr.clone();
         request.convention = self.convention.into();
@@ -77,9 +112,11 @@ impl Engine {
             .client_from_object
             .as_ref()
             .map(|pose| self.wire(pose, Quat::IDENTITY));
-        if let Some(Form::Angles(angles)) = &mut request.presenting_hand.as_mut().unwrap().form {
-            let wrist = angles.client_from_wrist.as_ref().unwrap();
-            angles.client_from_wrist = Some(self.wire(wrist, self.joint_turn));
+        for hand in request.presenting_hand.iter_mut().chain(&mut request.other_hands) {
+            self.hand(hand);
+        }
+        for obstacle in &mut request.obstacles {
+            self.obstacle(obstacle);
         }
         request
     }
@@ -99,12 +136,46 @@ impl Engine {
     }
 }
 
+/// The giver's other hand: the same hand, 10 cm farther along x.
+fn hand_beyond_the_remote() -> v1::PresentingHand {
+    let mut hand = held_remote().presenting_hand.expect("it is held");
+    if let Some(Form::Angles(angles)) = &mut hand.form {
+        angles.handedness = v1::Handedness::Right.into();
+        let wrist = angles.client_from_wrist.as_mut().unwrap();
+        wrist.position.as_mut().unwrap().x += 0.1;
+    }
+    hand
+}
+
+/// A turned box of three different sizes and a capsule, near the remote on sides that leave room for a hand.
+fn obstacles_around_the_remote() -> Vec<v1::Obstacle> {
+    let vector = |x: f32, y: f32, z: f32| Some(v1::Vector3 { x, y, z });
+    let shapes = [
+        Shape::Box(v1::BoxShape {
+            client_from_box: Some(wire_pose(grasp_synthesis::base::pose::Pose {
+                position: Vec3::new(0.25, 1.3, -0.15),
+                orientation: Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.4, -0.2),
+            })),
+            half_extents: vector(0.2, 0.06, 0.03),
+        }),
+        Shape::Capsule(v1::CapsuleShape {
+            client_start: vector(0.1, 1.25, 0.05),
+            client_end: vector(0.12, 1.5, 0.3),
+            radius: 0.03,
+            end_radius: None,
+        }),
+    ];
+    shapes.map(|shape| v1::Obstacle { shape: Some(shape) }).to_vec()
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_holdout_gets_the_same_grasp_in_every_convention() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
     let request = v1::FindGraspRequest {
         reproducible: true,
+        other_hands: vec![hand_beyond_the_remote()],
+        obstacles: obstacles_around_the_remote(),
         ..held_remote()
     };
     let answer = client.find_grasp(request.clone()).await.unwrap().into_inner();

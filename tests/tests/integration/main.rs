@@ -1,12 +1,14 @@
 //! The server over real gRPC, in one binary that is linked once.
 
 mod atlases;
+mod barriers;
 mod budget;
 mod constraints;
 mod conventions;
 mod fixtures;
 mod health;
 mod invalid;
+mod invalid_barriers;
 mod key_frames;
 mod limits;
 mod load;

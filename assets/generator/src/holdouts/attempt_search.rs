@@ -78,6 +78,8 @@ fn free(object: &Arc<PreparedObject>, up: Vec3) -> Holdout {
     Holdout {
         object: object.object().clone(),
         presenting_hand: None,
+        other_hands: Vec::new(),
+        obstacles: Vec::new(),
         up,
     }
 }

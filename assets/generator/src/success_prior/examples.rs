@@ -70,7 +70,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
         let place = ProposalContext {
             object: &object,
             surface: object.surface_pairs(),
-            giver: presented.giver.as_ref(),
+            barriers: presented.barriers(),
             rig,
             placements: None,
             mechanisms: Mechanisms::ALL,
@@ -94,7 +94,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
                     rig,
                     candidate.opposition,
                     candidate.object_from_wrist,
-                    place.giver,
+                    place.barriers,
                 ),
                 holds: held.is_ok(),
             });
@@ -114,6 +114,8 @@ fn present(holding: &[HandPose], rig: &Rig, stream: &mut AttemptStream, by_giver
     });
     Presented {
         giver,
+        other_hands: Vec::new(),
+        obstacles: Vec::new(),
         giver_palm: None,
         up,
     }

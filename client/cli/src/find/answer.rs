@@ -55,12 +55,15 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
     ];
     if let Some(margins) = &grasp.margins {
         let giver = margins.giver_clearance.map_or_else(String::new, |clearance| {
-            format!(", {:.1} mm clear of the giver", 1e3 * clearance)
+            format!(", {:.1} mm clear of other hands", 1e3 * clearance)
+        });
+        let obstacles = margins.obstacle_clearance.map_or_else(String::new, |clearance| {
+            format!(", {:.1} mm clear of obstacles", 1e3 * clearance)
         });
         lines.push((
             "margins",
             format!(
-                "epsilon {:.3}, {:.1} % of the weight unbalanced, {:.1} mm deep{giver}",
+                "epsilon {:.3}, {:.1} % of the weight unbalanced, {:.1} mm deep{giver}{obstacles}",
                 margins.epsilon,
                 100.0 * margins.residual,
                 1e3 * margins.penetration

@@ -11,7 +11,7 @@ use std::{
 
 use clap::{ArgGroup, Args};
 use grasp_client::{AtlasUse, FindAnswer, FindRequest, Outcome, built_in::request_for};
-use serde::Serialize;
+use serde::{Serialize, de::DeserializeOwned};
 
 use constraints::ConstraintOptions;
 
@@ -46,6 +46,10 @@ API's FindGraspRequest; only "object" is required:
     "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
     "record_step_times": false, "convention": "openxr", "friction": null,
     "choice": "first_valid", "atlas": "allowed", "plan_key_frames": false,
+    "other_hands": [{"angles": {…}}, …up to three],
+    "obstacles": [
+      {"box": {"client_from_box": {"position": [0, 0.7, 0]}, "half_extents": [0.6, 0.02, 0.4]}},
+      {"capsule": {"client_start": [0, 0, 0], "client_end": [0, 0.7, 0], "radius": 0.05, "end_radius": null}}],
     "constraints": {
       "receiver_reach": {"client_shoulder": [0.2, 1.4, 1], "reach": 0.7},
       "approach": {"client_direction": [0, 0, -1], "half_angle": 0.8},
@@ -53,9 +57,10 @@ API's FindGraspRequest; only "object" is required:
       "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1}
   }
 
-Instead of angles, the presenting hand may be the joints of a headset: {"joints": {"handedness": "left",
+Instead of angles, a hand may be the joints of a headset: {"joints": {"handedness": "left",
 "joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}; a radius that the
-headset does not report is 0. Metres, radians, quaternions x y z w. Options on the command line override the file. --print-request prints the request instead of
+headset does not report is 0. Metres, radians, quaternions x y z w. Options on the command line override the file.
+--print-request prints the request instead of
 sending it, as a template.
 
 With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
@@ -104,6 +109,9 @@ pub(crate) struct Arguments {
     /// Search from scratch, without the object's known grasps.
     #[arg(long)]
     no_atlas: bool,
+    /// A JSON file with a list of obstacles to keep clear of, as in a request; - for standard input.
+    #[arg(long, value_name = "FILE")]
+    obstacles: Option<PathBuf>,
     /// The hand to pose. Default: right.
     #[arg(long, value_name = "HAND")]
     receiving_hand: Option<HandName>,
@@ -205,7 +213,7 @@ impl Arguments {
             (Some(name), _) => request_for(holdout::built_in(name)?),
             (None, Some(path)) => {
                 let path = path.clone();
-                blocking(move || read_request(&path)).await?
+                blocking(move || read_json("request", &path)).await?
             }
             (None, None) => {
                 return Err(Failure::Usage(
@@ -213,6 +221,9 @@ impl Arguments {
                 ));
             }
         };
+        if let Some(path) = self.obstacles.clone() {
+            request.obstacles = blocking(move || read_json("obstacles", &path)).await?;
+        }
         request.strategy = self.strategy.map(Into::into).or(request.strategy);
         request.validity = self.validity.map(Into::into).or(request.validity);
         request.bend_ratios = self.bend_ratios.map(Into::into).or(request.bend_ratios);
@@ -255,8 +266,8 @@ async fn draw(
     .await
 }
 
-/// Reads a request from a file or, for `-`, from standard input.
-fn read_request(path: &Path) -> Result<FindRequest, Failure> {
+/// Reads a value from a JSON file or, for `-`, from standard input; `what` names it in errors.
+fn read_json<T: DeserializeOwned>(what: &str, path: &Path) -> Result<T, Failure> {
     let cannot_read = |error| Failure::other(format!("cannot read {}", path.display()), error);
     let text = if path == Path::new("-") {
         let mut text = String::new();
@@ -265,6 +276,5 @@ fn read_request(path: &Path) -> Result<FindRequest, Failure> {
     } else {
         std::fs::read_to_string(path).map_err(cannot_read)?
     };
-    serde_json::from_str(&text)
-        .map_err(|error| Failure::Usage(format!("request {}: {error}", path.display())))
+    serde_json::from_str(&text).map_err(|error| Failure::Usage(format!("{what} {}: {error}", path.display())))
 }

@@ -307,6 +307,32 @@ async fn printed_request_can_be_read_again() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn obstacles_come_from_a_file() {
+    let arguments = [
+        "find",
+        "--holdout",
+        "remote-hold1",
+        "--obstacles",
+        "-",
+        "--print-request",
+    ];
+    let table =
+        r#"[{"box": {"client_from_box": {"position": [0.0, -2.0, 0.0]}, "half_extents": [1.0, 0.5, 1.0]}}]"#;
+    let printed = run_with_input(&arguments, table);
+    assert_eq!(code(&printed), 0);
+    let request = json(&printed.stdout);
+    assert_eq!(request["obstacles"][0]["box"]["half_extents"][1], 0.5);
+    assert!(request["presenting_hand"].is_object());
+    let wrong = run_with_input(&arguments, r#"[{"sphere": {}}]"#);
+    assert_eq!(code(&wrong), 2);
+    assert!(
+        text(&wrong.stderr).contains("obstacles -: unknown variant `sphere`"),
+        "{}",
+        text(&wrong.stderr)
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn options_override_constraints_of_the_file() {
     let file = r#"{"object": "objects/remote",
         "choice": "first_valid", "constraints": {"excluded_grasp_types": ["stick"], "must_touch": ["ring"], "must_not_touch": ["middle"], "max_comfort_e": 0.5}}"#;

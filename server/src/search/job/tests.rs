@@ -19,7 +19,7 @@ use crate::{
     config,
     convention::Convention,
     objects::{StoredObject, tests::tetrahedron},
-    validate::{find_query, fixtures},
+    validate::{any_obstacles, find_query, fixtures},
 };
 
 /// Any number that a client may send, most of them ordinary.
@@ -126,10 +126,12 @@ fn angled_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
 }
 
 fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
-    let hand =
-        prop_oneof![tracked_hand(), angled_hand()].prop_map(|form| v1::PresentingHand { form: Some(form) });
+    let hand = || {
+        prop_oneof![tracked_hand(), angled_hand()].prop_map(|form| v1::PresentingHand { form: Some(form) })
+    };
+    let others = (proptest::option::weighted(0.2, hand()), any_obstacles());
     (
-        proptest::option::of(hand),
+        (proptest::option::of(hand()), others),
         pose(2.0),
         proptest::option::of(vector(1.0)),
         (0..8_i32, 0..8_i32, 0..6_i32),
@@ -138,7 +140,7 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
     )
         .prop_map(
             |(
-                presenting_hand,
+                (presenting_hand, (other_hand, obstacles)),
                 client_from_object,
                 up,
                 enums,
@@ -159,6 +161,8 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
                     reproducible,
                     friction,
                     plan_key_frames: true,
+                    other_hands: other_hand.into_iter().collect(),
+                    obstacles,
                     ..Default::default()
                 }
             },

@@ -34,7 +34,7 @@ pub(crate) struct GiverHand {
     pub warnings: Vec<String>,
 }
 
-/// The giver's hand; none if it is wrong.
+/// The giver's hand or another one to keep clear of; none if it is wrong.
 pub(super) fn presenting_hand(
     field: Field<'_>,
     hand: v1::PresentingHand,

@@ -11,13 +11,13 @@ use std::{fmt, str::FromStr};
 pub enum Mechanism {
     /// Tries the atlas's grips before any new attempt.
     AtlasLookUp,
-    /// With a giver present, tries a shortlist of complementary atlas grips first.
+    /// With barriers present, tries a shortlist of complementary atlas grips first.
     Shortlists,
     /// Tries atlas grips by descending score under the request's gravity instead of in stored order.
     GravityOrder,
     /// Skips, in one step, all grips that share a grid cell with the giver's hand.
     CellOccupancy,
-    /// Rejects a known hand whose inner spheres hit the giver before the exact collision test.
+    /// Rejects a known hand whose inner spheres hit a barrier before the exact collision test.
     InnerSpheres,
     /// Tests the giver's most decisive solids first instead of following anatomical order.
     GiverOrder,

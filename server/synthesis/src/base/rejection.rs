@@ -14,9 +14,9 @@ pub enum Rejection {
     NoThumbEarlyStop,
     /// No finger has a contact.
     NoFingers,
-    /// The palm collides with the object or the presenting hand.
+    /// The palm or the forearm collides with the object, another hand or an obstacle.
     PalmCollision,
-    /// A finger collides with the object or the presenting hand.
+    /// A finger collides with the object, another hand or an obstacle.
     FingerCollision,
     /// A contact lies on a forbidden surface.
     UnwantedContact,

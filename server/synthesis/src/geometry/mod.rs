@@ -12,6 +12,7 @@ pub mod mesh_bvh;
 pub mod opposed;
 pub mod oriented_box;
 mod principal_axes;
+pub mod solid_box;
 mod stack_entry;
 pub mod surface_samples;
 pub mod tapered_capsule;

@@ -1,4 +1,4 @@
-//! Known grips with the data that screens them against a giver.
+//! Known grips with the data that screens them against barriers.
 
 use super::{
     entry::Entry,
@@ -9,8 +9,9 @@ use crate::{
     base::pose::Pose,
     model::hand::rig::Rig,
     physical::{
+        barriers::Barriers,
         grip::GIVER_CLEARANCE,
-        solids::{PreparedHand, Spheres, TrackedSolids},
+        solids::{Spheres, TrackedSolids},
     },
 };
 
@@ -55,18 +56,13 @@ impl Grips {
     }
 
     /// The solids of grip `entry`, an index into [`Grips::entries`], unless its inner spheres show that it is
-    /// too close to the giver. Conservative: a grip that passes may still collide. Mostly takes about 20 ns.
+    /// too close to a barrier. Conservative: a grip that passes may still collide. Mostly takes about 20 ns.
     #[inline]
-    pub fn screen_against_giver(
-        &self,
-        entry: usize,
-        rig: &Rig,
-        giver: &PreparedHand,
-    ) -> Option<Box<TrackedSolids>> {
-        if giver.any_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE) {
+    pub fn screen(&self, entry: usize, rig: &Rig, barriers: Barriers<'_>) -> Option<Box<TrackedSolids>> {
+        if barriers.any_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE) {
             return None;
         }
-        self.screen_by_second_spheres(entry, rig, giver)
+        self.screen_by_second_spheres(entry, rig, barriers)
     }
 
     /// Reached by one in fifty colliding grips; its spheres are computed on demand.
@@ -75,17 +71,17 @@ impl Grips {
         &self,
         entry: usize,
         rig: &Rig,
-        giver: &PreparedHand,
+        barriers: Barriers<'_>,
     ) -> Option<Box<TrackedSolids>> {
         let solids = self.entries[entry].tracked_solids(rig);
-        let collides = giver.any_certainly_within(&second_spheres(&solids.hand), GIVER_CLEARANCE);
+        let collides = barriers.any_certainly_within(&second_spheres(&solids.hand), GIVER_CLEARANCE);
         (!collides).then(|| Box::new(solids))
     }
 
-    /// Upper bound of the giver's distance, in metres, from thumb, palm, forearm and the best finger subset
+    /// Upper bound of the barriers' distance, in metres, from thumb, palm, forearm and the best finger subset
     /// of a grip, by its first inner spheres.
-    pub(super) fn clearance_upper_bound(&self, entry: usize, giver: &PreparedHand) -> f32 {
-        self.spheres_upper_bound(entry, &self.inner_spheres[entry], giver)
+    pub(super) fn clearance_upper_bound(&self, entry: usize, barriers: Barriers<'_>) -> f32 {
+        self.spheres_upper_bound(entry, &self.inner_spheres[entry], barriers)
     }
 
     /// The same for a displaced grip.
@@ -93,13 +89,17 @@ impl Grips {
         &self,
         entry: usize,
         displacement: Pose,
-        giver: &PreparedHand,
+        barriers: Barriers<'_>,
     ) -> f32 {
-        self.spheres_upper_bound(entry, &self.inner_spheres[entry].transformed(displacement), giver)
+        self.spheres_upper_bound(
+            entry,
+            &self.inner_spheres[entry].transformed(displacement),
+            barriers,
+        )
     }
 
-    fn spheres_upper_bound(&self, entry: usize, spheres: &Spheres, giver: &PreparedHand) -> f32 {
-        let distances = giver.distance_upper_bounds(spheres);
+    fn spheres_upper_bound(&self, entry: usize, spheres: &Spheres, barriers: Barriers<'_>) -> f32 {
+        let distances = barriers.distance_upper_bounds(spheres);
         let (fingers, others) = upper_bounds_from_first(&distances);
         let (_, of_fingers) = self.finger_subsets[entry].farthest(fingers);
         of_fingers.min(others)

@@ -28,7 +28,8 @@ use crate::{
         strategy::Validity,
     },
     physical::{
-        grip::{Gripper, clear_of_giver},
+        barriers::Barriers,
+        grip::{Gripper, clear_of_barriers},
         scene::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
         solids::{PreparedHand, TrackedSolids},
@@ -262,14 +263,16 @@ impl<'a> Growth<'a> {
         let hand = PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
         let all = 0..self.len() as u16;
         let seeds = if self.count_clear(&hand) < ENOUGH_CLEAR_GRIPS {
-            Seeds::of(&self.grips, self.rig, all, Some(&hand), || false)
+            Seeds::of(&self.grips, self.rig, all, Barriers::of_giver(&hand), || false)
         } else {
             None
         };
         Some(Giver {
-            surface: self.prepared.surface_pairs().free_of(&hand),
+            surface: self.prepared.surface_pairs().free_of(Barriers::of_giver(&hand)),
             presented: Presented {
                 giver: Some(hand),
+                other_hands: Vec::new(),
+                obstacles: Vec::new(),
                 giver_palm: None,
                 up: Vec3::Y,
             },
@@ -279,9 +282,10 @@ impl<'a> Growth<'a> {
 
     /// The number of grips clear of a giver's hand, up to [`ENOUGH_CLEAR_GRIPS`].
     fn count_clear(&self, giver: &PreparedHand) -> usize {
+        let barriers = Barriers::of_giver(giver);
         let is_clear = |&entry: &usize| {
-            let solids = self.grips.screen_against_giver(entry, self.rig, giver);
-            solids.is_some_and(|solids| clear_of_giver(&solids, Some(giver)).is_some())
+            let solids = self.grips.screen(entry, self.rig, barriers);
+            solids.is_some_and(|solids| clear_of_barriers(&solids, barriers).is_some())
         };
         (0..self.len()).filter(is_clear).take(ENOUGH_CLEAR_GRIPS).count()
     }
@@ -326,7 +330,7 @@ impl<'a> Growth<'a> {
         let place = ProposalContext {
             object: self.scene.object,
             surface: giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface),
-            giver: giver.and_then(|giver| giver.presented.giver.as_ref()),
+            barriers: giver.map_or(Barriers::NONE, |giver| giver.presented.barriers()),
             rig: self.rig,
             placements: None,
             mechanisms: Mechanisms::ALL,

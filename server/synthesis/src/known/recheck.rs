@@ -1,4 +1,4 @@
-//! The checks of known grips that depend on the holdout: the giver's hand and the forces.
+//! The checks of known grips that depend on the holdout: its barriers and the forces.
 
 use super::{entry::Entry, gravity::nearest_direction};
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     model::{grasp::Grasp, hand::rig::Rig, strategy::Validity},
     physical::{
         contacts::soften,
-        grip::{Gripper, clear_of_giver},
+        grip::{Gripper, clear_of_barriers},
         immobility::{FrictionUse, balance_with},
         scene::{ObjectScene, Presented},
         solids::TrackedSolids,
@@ -51,7 +51,7 @@ impl<'a> GripChecker<'a> {
         }
     }
 
-    /// The grasp of a known grip for the holdout, with its score; none if it is too close to the giver or the
+    /// The grasp of a known grip for the holdout, with its score; none if it is too close to a barrier or the
     /// object slips. `solids` are the grip's, from [`Entry::tracked_solids`].
     pub fn check(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
         let Self {
@@ -60,7 +60,7 @@ impl<'a> GripChecker<'a> {
             presented,
             ..
         } = *self;
-        let giver_clearance = clear_of_giver(solids, presented.giver.as_ref())?;
+        let clearances = clear_of_barriers(solids, presented.barriers())?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(&gripper.soft_contacts, presented.up);
         let known_use = if self.knows_friction_uses {
@@ -81,7 +81,7 @@ impl<'a> GripChecker<'a> {
             epsilon,
             balance,
             presented,
-            giver_clearance,
+            clearances,
         );
         grasp.score = Some(score(entry.grip_values, &grasp, scene, rig, presented));
         Some(grasp)

@@ -42,7 +42,7 @@ impl SeedSource {
 pub struct SeedContext<'a> {
     /// The receiving hand.
     pub rig: &'a Rig,
-    /// The giver and gravity.
+    /// The barriers and gravity.
     pub presented: &'a Presented,
     /// The constraints on the grasp.
     pub constraints: &'a Constraints,
@@ -50,11 +50,11 @@ pub struct SeedContext<'a> {
     pub mechanisms: Mechanisms,
 }
 
-/// The seeds for a giver; each set is computed on first use.
+/// The seeds for a holdout; each set is computed on first use.
 #[derive(Clone, Debug, Default)]
 pub struct SeedSets {
     source: SeedSource,
-    /// From the whole atlas: the grips nearest to being clear of the giver.
+    /// From the whole atlas: the grips nearest to being clear of the barriers.
     nearest: OnceLock<Seeds>,
     /// From the transferred grips that pass the closure screen.
     passing: OnceLock<(Grips, Seeds)>,
@@ -77,7 +77,7 @@ impl SeedSets {
     }
 
     /// The seeds of an attempt and the grips they index. Those of an atlas hold under this gravity and meet
-    /// the constraints, apart from the giver. None if interrupted.
+    /// the constraints, apart from the barriers. None if interrupted.
     pub fn of_attempt(
         &self,
         attempt: u64,
@@ -103,7 +103,7 @@ impl SeedSets {
         context: &SeedContext<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&Seeds> {
-        let giver = context.presented.giver.as_ref();
+        let barriers = context.presented.barriers();
         let mechanisms = context.mechanisms;
         if let Some(seeds) = self.nearest.get() {
             return Some(seeds);
@@ -123,7 +123,7 @@ impl SeedSets {
             atlas.grips(),
             context.rig,
             candidates,
-            giver,
+            barriers,
             interrupted,
         )?;
         // Another worker may have computed the same set meanwhile.
@@ -149,11 +149,23 @@ impl SeedSets {
         if let Some(new_seeds) = seeds.get() {
             return Some(new_seeds);
         }
-        let giver = context.presented.giver.as_ref();
-        let grips =
-            transferred.for_giver(candidates, context.rig, giver, context.constraints, interrupted)?;
+        let barriers = context.presented.barriers();
+        let grips = transferred.away_from(
+            candidates,
+            context.rig,
+            barriers,
+            context.constraints,
+            interrupted,
+        )?;
         let all = 0..grips.entries().len() as u16;
-        let new_seeds = Seeds::of_with(context.mechanisms, &grips, context.rig, all, giver, interrupted)?;
+        let new_seeds = Seeds::of_with(
+            context.mechanisms,
+            &grips,
+            context.rig,
+            all,
+            barriers,
+            interrupted,
+        )?;
         Some(seeds.get_or_init(|| (grips, new_seeds)))
     }
 }

@@ -1,7 +1,7 @@
-//! Hands perturbed from known grips, for givers who obstruct all known grips.
+//! Hands perturbed from known grips, for barriers that obstruct all known grips.
 //!
-//! A grip that is a few millimetres too close to the giver does hold the object. So hands are searched that
-//! are rotated about its contacts until they clear the giver.
+//! A grip that is a few millimetres too close to a barrier does hold the object. So hands are searched that
+//! are rotated about its contacts until they clear the barriers.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -19,9 +19,10 @@ use crate::{
     base::{pose::Pose, random::AttemptStream},
     model::{grasp::Contact, hand::rig::Rig, object::GraspObject},
     physical::{
+        barriers::Barriers,
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},
         shape::{HandShape, Proposal},
-        solids::{HandSolids, PreparedHand, Spheres, TaperedCapsule},
+        solids::{HandSolids, Spheres, TaperedCapsule},
     },
     propose::proposal::ProposalContext,
 };
@@ -45,7 +46,7 @@ const MAX_TURN: f32 = 0.5;
 /// the object.
 const CONTACT_TOLERANCE: f32 = 0.003;
 
-/// Grips compared exactly with the giver between two clock checks: up to forty microseconds of work.
+/// Grips compared exactly with one giver between two clock checks: up to forty microseconds of work.
 const EXACT_PER_CHECK: usize = 4;
 
 /// Grips compared by inner spheres between two clock checks.
@@ -56,26 +57,26 @@ const BOUNDS_PER_CHECK: usize = 64;
 pub struct Seed {
     /// Its index among the entries.
     pub entry: u16,
-    /// The digits that have to hold, thumb first. Fingers that the giver obstructs are left out.
+    /// The digits that have to hold, thumb first. Fingers that a barrier obstructs are left out.
     pub kept: [bool; 5],
 }
 
-/// The known grips that are nearest to being clear of a giver, by the clearance of palm, forearm, thumb and
-/// the finger subset that is farthest from the giver.
+/// The known grips that are nearest to being clear of the barriers, by the clearance of palm, forearm, thumb
+/// and the finger subset that is farthest from them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seeds(Vec<Seed>);
 
 impl Seeds {
-    /// Selects from `candidates`, indices into the entries of `known`; earlier ones win ties. Without a
-    /// giver, the first ones. None if interrupted.
+    /// Selects from `candidates`, indices into the entries of `known`; earlier ones win ties. Without
+    /// barriers, the first ones. None if interrupted.
     pub fn of(
         known: &Grips,
         rig: &Rig,
         candidates: impl Iterator<Item = u16>,
-        giver: Option<&PreparedHand>,
+        barriers: Barriers<'_>,
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
-        Self::of_with(Mechanisms::ALL, known, rig, candidates, giver, interrupted)
+        Self::of_with(Mechanisms::ALL, known, rig, candidates, barriers, interrupted)
     }
 
     /// [`Seeds::of`] with some mechanisms switched off.
@@ -84,26 +85,28 @@ impl Seeds {
         known: &Grips,
         rig: &Rig,
         candidates: impl Iterator<Item = u16>,
-        giver: Option<&PreparedHand>,
+        barriers: Barriers<'_>,
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
         let screens = mechanisms.has(Mechanism::InnerSpheres);
-        let Some(giver) = giver else {
+        if barriers.is_empty() {
             let whole = |entry: u16| Seed {
                 entry,
                 kept: known.entries()[usize::from(entry)].grip.holding_digits(),
             };
             return Some(Self(candidates.take(SEEDS).map(whole).collect()));
-        };
+        }
+        let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
+        let exact_per_check = barriers.comparisons_per_check(EXACT_PER_CHECK);
         // Inner spheres give an upper bound of the clearance. Candidates are compared exactly by falling bound,
         // until none can beat those selected.
         let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
-            if count.is_multiple_of(BOUNDS_PER_CHECK) && interrupted() {
+            if count.is_multiple_of(bounds_per_check) && interrupted() {
                 return None;
             }
             let clearance = if screens {
-                known.clearance_upper_bound(usize::from(index), giver)
+                known.clearance_upper_bound(usize::from(index), barriers)
             } else {
                 GIVER_CLEARANCE
             };
@@ -115,7 +118,7 @@ impl Seeds {
         let mut nearest: Vec<(f32, Seed)> = Vec::with_capacity(SEEDS + 1);
         let mut count = 0_usize;
         while let Some((bound, _, index)) = by_upper_bound.pop() {
-            if count.is_multiple_of(EXACT_PER_CHECK) && interrupted() {
+            if count.is_multiple_of(exact_per_check) && interrupted() {
                 return None;
             }
             count += 1;
@@ -126,7 +129,7 @@ impl Seeds {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
-            let Some((clearance, kept)) = clearance(entry, rig, giver, min_clearance, screens) else {
+            let Some((clearance, kept)) = clearance(entry, rig, barriers, min_clearance, screens) else {
                 continue;
             };
             let rank = nearest.partition_point(|&(other, _)| other >= clearance);
@@ -141,7 +144,7 @@ impl Seeds {
         &self.0
     }
 
-    /// A perturbed hand that may be clear of the giver, more often near the first seeds; none if none was
+    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; none if none was
     /// drawn. `entries` are those that the seeds index.
     pub fn propose(
         &self,
@@ -168,7 +171,7 @@ impl Seeds {
         Self::perturbed(self.0[stream.below(self.0.len())], entries, place, stream)
     }
 
-    /// A hand perturbed from a known grip that may be clear of the giver, if one is drawn.
+    /// A hand perturbed from a known grip that may be clear of the barriers, if one is drawn.
     fn perturbed(
         Seed { entry, kept }: Seed,
         entries: &[Entry],
@@ -201,20 +204,17 @@ impl Seeds {
         (0..MAX_DRAWS).find_map(|_| {
             let perturbed = known.perturbed_about(pivot, [MAX_SHIFT, MAX_TURN], stream);
             let displacement = perturbed.object_from_wrist * known.object_from_wrist.inverse();
-            let collides = |giver: &PreparedHand| {
-                let nears = |spheres: &Spheres| {
-                    giver.any_certainly_within(&spheres.transformed(displacement), GIVER_CLEARANCE)
-                };
-                inside.iter().any(nears)
+            let nears = |spheres: &Spheres| {
+                let moved = spheres.transformed(displacement);
+                place.barriers.any_certainly_within(&moved, GIVER_CLEARANCE)
             };
-            if screens && place.giver.is_some_and(collides) {
+            if screens && !place.barriers.is_empty() && inside.iter().any(nears) {
                 return None;
             }
             let moved = solids.transformed(displacement);
-            let keeps_clear = place
-                .giver
-                .is_none_or(|giver| !giver.comes_within(solids_of(kept, &moved), GIVER_CLEARANCE));
-            let is_promising = keeps_clear
+            let is_promising = !place
+                .barriers
+                .comes_within(solids_of(kept, &moved), GIVER_CLEARANCE)
                 && still_touches(&contacts, place.object, displacement)
                 && avoids_forbidden(kept, place.object, &moved);
             is_promising.then_some(perturbed)
@@ -255,12 +255,12 @@ fn avoids_forbidden(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -
     solids_of(kept, moved).all(|part| !object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
 }
 
-/// A grip's clearance from a giver, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of
+/// A grip's clearance from the barriers, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of
 /// that subset; none if it is less than `min_clearance`.
 fn clearance(
     entry: &Entry,
     rig: &Rig,
-    giver: &PreparedHand,
+    barriers: Barriers<'_>,
     min_clearance: f32,
     screens: bool,
 ) -> Option<(f32, [bool; 5])> {
@@ -268,16 +268,16 @@ fn clearance(
     let sets = entry.finger_subsets;
     if screens {
         let (fingers, others) =
-            upper_bounds_from_second(&giver.distance_upper_bounds(&second_spheres(&solids)));
+            upper_bounds_from_second(&barriers.distance_upper_bounds(&second_spheres(&solids)));
         if sets.farthest(fingers).1.min(others) < min_clearance {
             return None;
         }
     }
     let no_fingers = [true, false, false, false, false];
-    let others = giver.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, min_clearance)?;
+    let others = barriers.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, min_clearance)?;
     let distances = std::array::from_fn(|finger| {
         let links = solids.phalanges[1 + finger].iter();
-        let distance = giver.least_distance(links, GIVER_CLEARANCE, min_clearance);
+        let distance = barriers.least_distance(links, GIVER_CLEARANCE, min_clearance);
         distance.unwrap_or(f32::NEG_INFINITY)
     });
     let (kept, of_fingers) = sets.farthest(distances);

@@ -27,8 +27,9 @@ use super::{
 use crate::{
     model::hand::rig::Rig,
     physical::{
+        barriers::Barriers,
         grip::GIVER_CLEARANCE,
-        solids::{PreparedHand, Spheres, TrackedSolids},
+        solids::{Spheres, TrackedSolids},
     },
 };
 
@@ -104,15 +105,11 @@ impl<'a> Shortlist<'a> {
     }
 
     /// The grip at a place of the list with its solids, unless its inner spheres show that it is too close to
-    /// the giver. Conservative: a grip that passes may still collide.
+    /// a barrier. Conservative: a grip that passes may still collide.
     #[inline]
-    pub fn screen_against_giver(
-        &self,
-        place: usize,
-        giver: &PreparedHand,
-    ) -> Option<(u16, &'a TrackedSolids)> {
+    pub fn screen(&self, place: usize, barriers: Barriers<'_>) -> Option<(u16, &'a TrackedSolids)> {
         let place = usize::from(self.places[place]);
-        let collides = |spheres: &Spheres| giver.any_certainly_within(spheres, GIVER_CLEARANCE);
+        let collides = |spheres: &Spheres| barriers.any_certainly_within(spheres, GIVER_CLEARANCE);
         if collides(&self.inner_spheres[place]) {
             return None;
         }

@@ -11,7 +11,7 @@ use crate::{
     base::pose::Pose,
     geometry::oriented_box::OrientedBox,
     model::{constraints::Constraints, grasp::Contact, hand::rig::Rig, object::GraspObject},
-    physical::{grip::GIVER_CLEARANCE, solids::PreparedHand},
+    physical::{barriers::Barriers, grip::GIVER_CLEARANCE},
 };
 
 /// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty
@@ -26,11 +26,11 @@ const NEAREST_BOXES: usize = 5;
 /// leaves so few that answers come later.
 const MAX_CONTACT_OFFSET: f32 = 0.002;
 
-/// Largest number of grips selected for a giver, the ones farthest from its hand by inner spheres. Fewer
+/// Largest number of grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer
 /// answer fewer givers, more delay answers.
-const MAX_PER_GIVER: usize = 96;
+const MAX_SELECTED: usize = 96;
 
-/// Grips compared with the giver by inner spheres between two clock checks.
+/// Grips compared with one giver by inner spheres between two clock checks.
 const BOUNDS_PER_CHECK: usize = 128;
 
 /// Grips transferred to the object between two clock checks.
@@ -141,35 +141,38 @@ impl TransferredGrips {
             .count()
     }
 
-    /// The grips that meet the constraints and are farthest from a giver's hand, on the object; the best
+    /// The grips that meet the constraints and are farthest from the barriers, on the object; the best
     /// fitting ones win ties. `rig` is the hand that the grips were made for. None if interrupted.
-    pub fn for_giver(
+    pub fn away_from(
         &self,
         candidates: Candidates,
         rig: &Rig,
-        giver: Option<&PreparedHand>,
+        barriers: Barriers<'_>,
         constraints: &Constraints,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Grips> {
         // An object unlike all boxes may have no passing grip and still be held by one that fits.
         let only_passing = candidates == Candidates::Passing && self.passing() > 0;
+        let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
         let mut by_clearance: Vec<(Reverse<i32>, usize)> = Vec::with_capacity(self.transferred.len());
         for (place, &transferred) in self.transferred.iter().enumerate() {
-            if place.is_multiple_of(BOUNDS_PER_CHECK) && interrupted() {
+            if place.is_multiple_of(bounds_per_check) && interrupted() {
                 return None;
             }
             if only_passing && !transferred.passes_screen {
                 continue;
             }
-            let clearance = giver.map_or(GIVER_CLEARANCE, |giver| {
-                self.clearance_upper_bound(transferred, giver)
-            });
+            let clearance = if barriers.is_empty() {
+                GIVER_CLEARANCE
+            } else {
+                self.clearance_upper_bound(transferred, barriers)
+            };
             by_clearance.push((Reverse(nanometres(clearance.min(GIVER_CLEARANCE))), place));
         }
         by_clearance.sort_unstable();
-        let mut entries = Vec::with_capacity(MAX_PER_GIVER);
+        let mut entries = Vec::with_capacity(MAX_SELECTED);
         for (count, (_, place)) in by_clearance.into_iter().enumerate() {
-            if entries.len() == MAX_PER_GIVER {
+            if entries.len() == MAX_SELECTED {
                 break;
             }
             if count.is_multiple_of(MOVES_PER_CHECK) && interrupted() {
@@ -183,12 +186,12 @@ impl TransferredGrips {
         Some(Grips::new(rig, entries))
     }
 
-    fn clearance_upper_bound(&self, transferred: Transferred, giver: &PreparedHand) -> f32 {
+    fn clearance_upper_bound(&self, transferred: Transferred, barriers: Barriers<'_>) -> f32 {
         let held = self.held(transferred);
         held.grips.moved_clearance_upper_bound(
             usize::from(transferred.grip),
             self.bounds.place(held, transferred),
-            giver,
+            barriers,
         )
     }
 

@@ -62,8 +62,10 @@ pub struct PhysicalMargins {
     pub epsilon: f32,
     /// Deepest penetration of the hand into the object, in metres; 0 without any.
     pub penetration: f32,
-    /// Smallest distance between the receiver's hand or forearm and the giver's, in metres; none without a giver.
+    /// Smallest distance between the receiver's hand or forearm and the holdout's hands, in metres; none without any.
     pub giver_clearance: Option<f32>,
+    /// Smallest distance between the receiver's hand or forearm and the obstacles, in metres; none without any.
+    pub obstacle_clearance: Option<f32>,
 }
 
 /// A stage of the motion to a grasp.

@@ -1,4 +1,4 @@
-//! Holdouts: an object held out to the receiver, the up direction, and the giver's hand.
+//! Holdouts: an object held out to the receiver, the up direction, the giver's hand, and what else is near.
 
 use std::sync::Arc;
 
@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::{
     hand::{joints::HandJoints, skin::Skin},
     object::GraspObject,
+    obstacle::Obstacle,
 };
 use crate::{
     base::pose::Pose,
@@ -34,6 +35,10 @@ pub struct Holdout {
     pub object: Arc<GraspObject>,
     /// The giver's hand; none for an object that floats freely.
     pub presenting_hand: Option<PresentingHand>,
+    /// Further hands to keep clear of. `THESIS` validity knows the presenting hand only.
+    pub other_hands: Vec<HandJoints>,
+    /// Obstacles to keep clear of. `THESIS` validity knows none.
+    pub obstacles: Vec<Obstacle>,
     /// The direction against gravity, a unit vector.
     pub up: Vec3,
 }
@@ -66,7 +71,8 @@ pub enum HoldoutError {
 }
 
 impl Holdout {
-    /// A holdout with everything in the object's frame; `up` points against gravity.
+    /// A holdout with everything in the object's frame, without further hands or obstacles; `up` points against
+    /// gravity.
     ///
     /// # Errors
     /// `up` is not a unit vector.
@@ -81,6 +87,8 @@ impl Holdout {
         Ok(Self {
             object,
             presenting_hand,
+            other_hands: Vec::new(),
+            obstacles: Vec::new(),
             up,
         })
     }

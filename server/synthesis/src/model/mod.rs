@@ -10,5 +10,6 @@ pub mod grasp_type;
 pub mod hand;
 pub mod holdout;
 pub mod object;
+pub mod obstacle;
 pub mod score;
 pub mod strategy;

@@ -32,7 +32,7 @@ pub enum Term {
     Steadiness,
     /// The palm is on the side opposite the giver's (palm-CoM-palm angle, thesis 5.3).
     AwayFromGiver,
-    /// The hand keeps its distance from the giver's.
+    /// The hand keeps its distance from the giver's and other hands.
     GiverClearance,
     /// The hand keeps its distance from forbidden surfaces.
     SterileDistance,

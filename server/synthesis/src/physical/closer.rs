@@ -2,19 +2,20 @@
 //! rest.
 
 use super::{
+    barriers::Barriers,
     closing::{ClosedDigit, Closing},
     grip::{GIVER_CLEARANCE, NoGrip, nears_forbidden_surface},
     obstacle::Obstacle,
     scene::ObjectScene,
     shape::{HandShape, TUCKED_FLEXION},
-    solids::{PreparedHand, link_radii},
+    solids::link_radii,
 };
 use crate::{
     base::{pose::Pose, rejection::Rejection},
     model::hand::{Digit, HandPose, kinematics::DigitPlane, rig::Rig},
 };
 
-/// Flexions in radians, in order of preference, that take an idle finger clear of the giver: tucked into the palm, or
+/// Flexions in radians, in order of preference, that take an idle finger clear of the barriers: tucked into the palm, or
 /// nearly straight.
 const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
 
@@ -23,8 +24,8 @@ const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
 pub(super) struct Closer<'a> {
     /// The object being grasped.
     pub scene: &'a ObjectScene<'a>,
-    /// The giver's hand.
-    pub giver: Option<&'a PreparedHand>,
+    /// What the hand keeps clear of.
+    pub barriers: Barriers<'a>,
     /// The rig of the closing hand.
     pub rig: &'a Rig,
     /// The shape the hand closes from.
@@ -54,20 +55,19 @@ impl Closer<'_> {
         }
     }
 
-    /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to the giver.
+    /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to a barrier.
     fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
         let closed = self.closing(digit, obstacles).close()?;
-        self.is_clear_of_giver(&closed).then_some(closed)
+        self.is_clear(&closed).then_some(closed)
     }
 
     fn nears_forbidden(&self, digit: &ClosedDigit) -> bool {
         nears_forbidden_surface(self.scene, digit.links.iter())
     }
 
-    /// True if a digit keeps [`GIVER_CLEARANCE`] from the giver's hand.
-    fn is_clear_of_giver(&self, digit: &ClosedDigit) -> bool {
-        self.giver
-            .is_none_or(|giver| !giver.comes_within(digit.links.iter(), GIVER_CLEARANCE))
+    /// True if a digit keeps [`GIVER_CLEARANCE`] from the barriers.
+    fn is_clear(&self, digit: &ClosedDigit) -> bool {
+        !self.barriers.comes_within(digit.links.iter(), GIVER_CLEARANCE)
     }
 
     /// Closes the thumb.
@@ -127,16 +127,16 @@ impl Closer<'_> {
         rested
     }
 
-    /// A relaxed pose for a finger that holds nothing; where that is too close to the giver, tucked away or nearly
+    /// A relaxed pose for a finger that holds nothing; where that is too close to a barrier, tucked away or nearly
     /// straight.
     fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
         let closing = self.closing(finger, obstacles);
         let relaxed = closing.relax(flexion);
-        if self.is_clear_of_giver(&relaxed) {
+        if self.is_clear(&relaxed) {
             return relaxed;
         }
         let others = EVASIVE_FLEXIONS.map(|flexion| closing.relax(flexion));
-        let free = others.into_iter().find(|other| self.is_clear_of_giver(other));
+        let free = others.into_iter().find(|other| self.is_clear(other));
         free.unwrap_or(relaxed)
     }
 }

@@ -8,6 +8,7 @@
 use glam::Vec3;
 
 use super::{
+    barriers::{BarrierClearances, Barriers},
     closer::Closer,
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
@@ -15,9 +16,7 @@ use super::{
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::Proposal,
-    solids::{
-        HandSolids, PreparedHand, TaperedCapsule, TrackedSolids, clearance, comes_within, self_clearance,
-    },
+    solids::{HandSolids, TaperedCapsule, TrackedSolids, clearance, comes_within, self_clearance},
 };
 use crate::{
     base::{
@@ -35,8 +34,8 @@ use crate::{
 /// under a firm grip. Larger values let hands look sunken.
 pub const MAX_PENETRATION: f32 = 0.002;
 
-/// Clearance between the receiving hand and forearm and the giver's, in metres. Larger values are safer and find
-/// fewer grasps.
+/// Clearance between the receiving hand and forearm and other hands, in metres; how much closer obstacles may be is up to
+/// [`Barriers`]. Larger values are safer and find fewer grasps.
 pub const GIVER_CLEARANCE: f32 = 0.001;
 
 /// Clearance between the hand and forbidden surfaces, in metres: flesh may yield by two millimetres, and skin is one
@@ -93,7 +92,7 @@ pub struct Gripper {
 
 impl Gripper {
     /// Closes a proposed hand; its contacts are in `contacts` afterwards. With `presented`, hands that come too close
-    /// to the giver are rejected on the way.
+    /// to its barriers are rejected on the way.
     ///
     /// # Errors
     /// The first check that fails, or the stop signal.
@@ -108,7 +107,7 @@ impl Gripper {
     ) -> Result<(Grip, HandSolids), NoGrip> {
         self.posed.clear();
         self.closure_share = 0.0;
-        let giver = presented.and_then(|presented| presented.giver.as_ref());
+        let barriers = presented.map_or(Barriers::NONE, Presented::barriers);
 
         // Steps 3 and 4 for palm and forearm, which do not move with the digits, and for the ball of the thumb in its
         // start pose.
@@ -134,7 +133,7 @@ impl Gripper {
         }
         let collides = collides_without_digits(
             scene,
-            giver,
+            barriers,
             &TrackedSolids::of_rig(rig, object_from_wrist, &still),
         );
         stopwatch.lap(Step::CollisionValidation);
@@ -151,7 +150,7 @@ impl Gripper {
         self.obstacles.extend(Obstacle::of_palm(&still));
         let closer = Closer {
             scene,
-            giver,
+            barriers,
             rig,
             shape,
             object_from_wrist,
@@ -208,7 +207,7 @@ impl Gripper {
     ) -> Result<(Grip, HandSolids), NoGrip> {
         let Closer {
             scene,
-            giver,
+            barriers,
             rig,
             shape,
             ..
@@ -219,7 +218,7 @@ impl Gripper {
         // Step 3, Collision Validation.
         let pose = closer.pose(digits);
         let solids = HandSolids::of_pose(rig, &pose);
-        let penetration = penetration(scene, *giver, &solids);
+        let penetration = penetration(scene, *barriers, &solids);
         stopwatch.lap(Step::CollisionValidation);
         let penetration = penetration.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
 
@@ -267,13 +266,9 @@ impl Gripper {
     }
 }
 
-/// A hand's distance from the giver's in metres: `None` if it is below [`GIVER_CLEARANCE`], `Some(None)` without a
-/// giver.
-pub fn clear_of_giver(hand: &TrackedSolids, giver: Option<&PreparedHand>) -> Option<Option<f32>> {
-    match giver {
-        None => Some(None),
-        Some(giver) => giver.clearance(hand, GIVER_CLEARANCE).map(Some),
-    }
+/// A hand's distances from its barriers: `None` if it is too close to one.
+pub fn clear_of_barriers(hand: &TrackedSolids, barriers: Barriers<'_>) -> Option<BarrierClearances> {
+    barriers.clearances(hand, GIVER_CLEARANCE)
 }
 
 /// The wrist pose of a proposal after its advance; `None` if the palm touches nothing within it.
@@ -329,29 +324,25 @@ fn palm_advance(
     Some(direction * advanced)
 }
 
-/// True if palm or forearm penetrate the object or come too close to the giver.
-fn collides_without_digits(
-    scene: &ObjectScene<'_>,
-    giver: Option<&PreparedHand>,
-    still: &TrackedSolids,
-) -> bool {
+/// True if palm or forearm penetrate the object or come too close to a barrier.
+fn collides_without_digits(scene: &ObjectScene<'_>, barriers: Barriers<'_>, still: &TrackedSolids) -> bool {
     let HandSolids { palm, forearm, .. } = &still.hand;
     let surface = &scene.object.surface;
     palm.iter()
         .chain(forearm)
         .any(|part| comes_within(part, surface, -MAX_PENETRATION))
-        || giver.is_some_and(|giver| giver.comes_within(still.still(), GIVER_CLEARANCE))
+        || barriers.comes_within(still.still(), GIVER_CLEARANCE)
 }
 
-/// The deepest penetration into the object in metres. `None` if it is too deep, the hand is too close to the giver,
+/// The deepest penetration into the object in metres. `None` if it is too deep, the hand is too close to a barrier,
 /// or parts of the hand go through each other.
-fn penetration(scene: &ObjectScene<'_>, giver: Option<&PreparedHand>, solids: &HandSolids) -> Option<f32> {
+fn penetration(scene: &ObjectScene<'_>, barriers: Barriers<'_>, solids: &HandSolids) -> Option<f32> {
     if self_clearance(solids) < 0.0 {
         return None;
     }
     // Palm and forearm were checked before the digits closed.
     let moving = solids.phalanges.as_flattened().iter().chain(&solids.thenar);
-    if giver.is_some_and(|giver| giver.comes_within(moving, GIVER_CLEARANCE)) {
+    if barriers.comes_within(moving, GIVER_CLEARANCE) {
         return None;
     }
     let surface = &scene.object.surface;

@@ -2,8 +2,9 @@
 //!
 //! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
 //! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
-//! ([`immobility`]). A [`grip`] is a hand closed on an object.
+//! ([`immobility`]). A [`grip`] is a hand closed on an object, clear of [`barriers`].
 
+pub mod barriers;
 mod closer;
 pub mod closing;
 pub mod contacts;

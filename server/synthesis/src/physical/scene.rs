@@ -3,12 +3,13 @@
 use glam::Vec3;
 
 use super::{
+    barriers::{Barriers, PreparedObstacle},
     immobility::{Load, SoftContact, TorqueScale},
     solids::{PreparedHand, TrackedSolids},
 };
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
-    model::{holdout::Holdout, object::GraspObject},
+    model::{hand::joints::HandJoints, holdout::Holdout, object::GraspObject},
 };
 
 /// Smallest Ferrari-Canny epsilon of a valid grasp, without unit, for objects that fingers reach around. In
@@ -53,11 +54,15 @@ impl<'a> ObjectScene<'a> {
     }
 }
 
-/// What a holdout adds to its object: the giver and the direction of gravity.
+/// What a holdout adds to its object: the giver, what else to keep clear of, and the direction of gravity.
 #[derive(Clone, Debug)]
 pub struct Presented {
-    /// The giver's hand, in the object's frame.
+    /// The giver's hand, in the object's frame; without one, the first of the other hands.
     pub giver: Option<PreparedHand>,
+    /// Further hands.
+    pub other_hands: Vec<PreparedHand>,
+    /// Obstacles.
+    pub obstacles: Vec<PreparedObstacle>,
     /// Centre of the giver's palm, in metres, in the object's frame.
     pub giver_palm: Option<Vec3>,
     /// Unit vector against gravity, in the object's frame.
@@ -72,18 +77,32 @@ impl Presented {
 
     /// [`Presented::of`] with some of the mechanisms.
     pub(crate) fn with_mechanisms(mechanisms: Mechanisms, holdout: &Holdout) -> Self {
-        let prepared = |solids: &TrackedSolids| {
+        let prepared = |joints: &HandJoints| {
+            let solids = TrackedSolids::of_joints(joints);
             if mechanisms.has(Mechanism::GiverOrder) {
-                PreparedHand::new(solids)
+                PreparedHand::new(&solids)
             } else {
-                PreparedHand::in_anatomical_order(solids)
+                PreparedHand::in_anatomical_order(&solids)
             }
         };
         let giver = holdout.presenting_hand.as_ref();
+        let hands = giver.map(|hand| &hand.joints).into_iter();
+        let mut hands = hands.chain(&holdout.other_hands).map(prepared);
         Self {
-            giver: giver.map(|hand| prepared(&TrackedSolids::of_joints(&hand.joints))),
+            giver: hands.next(),
+            other_hands: hands.collect(),
+            obstacles: holdout.obstacles.iter().map(PreparedObstacle::new).collect(),
             giver_palm: giver.map(|hand| hand.palm),
             up: holdout.up,
+        }
+    }
+
+    /// What a hand keeps clear of.
+    pub fn barriers(&self) -> Barriers<'_> {
+        Barriers {
+            giver: self.giver.as_ref(),
+            other_hands: &self.other_hands,
+            obstacles: &self.obstacles,
         }
     }
 }

@@ -11,10 +11,13 @@ use super::{
     success_prior::ObjectFeatures,
     surface_pairs::SurfacePair,
 };
-use crate::base::{
-    mechanisms::{Mechanism, Mechanisms},
-    pose::Pose,
-    random::AttemptStream,
+use crate::{
+    base::{
+        mechanisms::{Mechanism, Mechanisms},
+        pose::Pose,
+        random::AttemptStream,
+    },
+    physical::barriers::Barriers,
 };
 
 /// Number of leading attempts of a search that choose from the cache, each from its own row. Most searches end within them;
@@ -61,7 +64,7 @@ impl PlacementCache {
         let context = ProposalContext {
             object,
             surface: object.surface_pairs(),
-            giver: None,
+            barriers: Barriers::NONE,
             rig,
             placements: None,
             mechanisms,

@@ -16,9 +16,10 @@ use crate::{
     base::{pose::Pose, random::AttemptStream},
     model::object::GraspObject,
     physical::{
-        grip::MAX_PENETRATION,
+        barriers::Barriers,
+        grip::{GIVER_CLEARANCE, MAX_PENETRATION},
         shape::{HandShape, Proposal},
-        solids::{PreparedHand, Spheres},
+        solids::Spheres,
     },
 };
 
@@ -48,8 +49,12 @@ const PREFERENCE: f32 = 2.0;
 /// Share of proposals drawn without the success prior, so that grasps it misjudges are found too.
 const EVEN_SHARE: f32 = 0.2;
 
-/// Largest number of pairs or points drawn until one is clear of the giver's hand.
+/// Largest number of pairs or points drawn until one is clear of the barriers.
 const MAX_DRAWS: usize = 64;
+
+/// Largest distance, in metres, by which a hand placed in an obstacle is moved out of it: about a fingertip's thickness. A
+/// thin object on a table offers points too low for the tips, and edges just above. More moves the digits off the object.
+const MAX_WAY_OUT: f32 = 0.015;
 
 /// How deep inner spheres of the digits may be in the object at the opposed pose, in metres, where it is thin (up to
 /// [`THIN`]) and thicker. Closing stops earlier, so smaller values reject hands that would fit.
@@ -69,10 +74,10 @@ const PALM_START_HEIGHT: f32 = 0.03;
 pub struct ProposalContext<'a> {
     /// The object to be held.
     pub object: &'a GraspObject,
-    /// Where it may be held: the object's pairs and points, or those that the giver's hand leaves free.
+    /// Where it may be held: the object's pairs and points, or those that the barriers leave free.
     pub surface: &'a SurfacePairs,
-    /// The giver's hand, if there is one.
-    pub giver: Option<&'a PreparedHand>,
+    /// What the hand keeps clear of.
+    pub barriers: Barriers<'a>,
     /// The receiving hand.
     pub rig: &'a PreparedRig,
     /// Cached placements to choose from, if they are to be used.
@@ -170,14 +175,34 @@ impl<'a> ProposalContext<'a> {
         let pair = self.free_pair(stream)?;
         let opposition = self.opposition_for(&pair, stream)?;
         (0..MAX_ROTATIONS)
-            .map(|_| Candidate::draw(opposition, pair, stream))
+            .map(|_| self.settled(Candidate::draw(opposition, pair, stream), stream))
             .find(|candidate| self.fits(candidate))
     }
 
-    /// Chooses a cached placement that is clear of the giver, preferring likely ones.
+    /// In every other attempt, the hand moved out of obstacles that it is slightly in, as far as its digits show. Such hands
+    /// take what is thinner than a fingertip from a table; thicker objects are held sooner without.
+    fn settled(&self, candidate: Candidate<'a>, stream: &AttemptStream) -> Candidate<'a> {
+        if self.barriers.obstacles.is_empty() || stream.attempt().is_multiple_of(2) {
+            return candidate;
+        }
+        let placed = candidate.object_from_wrist;
+        let links = candidate.opposition.links.map(|links| links.transformed(placed));
+        let way = self.barriers.way_out_of_obstacles(&links, GIVER_CLEARANCE);
+        if way.length() > MAX_WAY_OUT {
+            return candidate;
+        }
+        Candidate {
+            object_from_wrist: Pose::new(placed.position + way, placed.orientation),
+            ..candidate
+        }
+    }
+
+    /// Chooses a cached placement that is clear of the barriers, preferring likely ones.
     fn propose_from_cache(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let row = self.placements?.row(stream.attempt(), self.rig);
-        let free = row.filter(|candidate| self.giver.is_none_or(|giver| candidate.pair.is_free_of(giver)));
+        let free = row
+            .filter(|candidate| candidate.pair.is_free_of(self.barriers))
+            .map(|candidate| self.settled(candidate, stream));
         let ordered = self.order_by_success_prior(
             &ObjectFeatures::of(self.object),
             PREFERENCE,
@@ -186,7 +211,7 @@ impl<'a> ProposalContext<'a> {
         );
         let clear = ordered
             .iter()
-            .find(|candidate| self.is_clear_of_giver(candidate))?;
+            .find(|candidate| self.is_clear_of_barriers(candidate))?;
         Some(clear.proposal())
     }
 
@@ -206,14 +231,15 @@ impl<'a> ProposalContext<'a> {
             .take(MAX_LOCATIONS)
             .take_while(|_| !interrupted())
             .find_map(|&Candidate { opposition, pair, .. }| {
-                let rotated = (0..MAX_ROTATIONS).map(|_| Candidate::draw(opposition, pair, stream));
+                let rotated = (0..MAX_ROTATIONS)
+                    .map(|_| self.settled(Candidate::draw(opposition, pair, stream), stream));
                 let rotated = self.order_by_success_prior(&features, PREFERENCE, rotated.collect(), stream);
                 let fitting = rotated.iter().find(|candidate| self.fits(candidate))?;
                 Some(fitting.proposal())
             })
     }
 
-    /// Samples up to `count` candidates whose pads are clear of the giver's hand, without testing whether they fit.
+    /// Samples up to `count` candidates whose pads are clear of the barriers, without testing whether they fit.
     pub(super) fn sample_candidates(&self, count: usize, stream: &mut AttemptStream) -> Vec<Candidate<'a>> {
         let mut candidates = Vec::with_capacity(count);
         for _ in 0..count {
@@ -243,7 +269,7 @@ impl<'a> ProposalContext<'a> {
                     ..
                 } = candidate;
                 let log_probability = if uses_prior {
-                    let inputs = features.inputs(self.rig, opposition, object_from_wrist, self.giver);
+                    let inputs = features.inputs(self.rig, opposition, object_from_wrist, self.barriers);
                     -(-TRAINED.log_odds(&inputs)).exp().ln_1p()
                 } else {
                     0.0
@@ -266,21 +292,21 @@ impl<'a> ProposalContext<'a> {
         self.rig.oppositions().draw(widths, stream)
     }
 
-    /// A pair clear of the giver's hand; `None` if none of [`MAX_DRAWS`] is.
+    /// A pair clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
     fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
         (0..MAX_DRAWS)
             .map_while(|_| self.surface.pair(stream))
-            .find(|pair| self.giver.is_none_or(|giver| pair.is_free_of(giver)))
+            .find(|pair| pair.is_free_of(self.barriers))
     }
 
-    /// A point clear of the giver's hand; `None` if none of [`MAX_DRAWS`] is.
+    /// A point clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
     fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
         (0..MAX_DRAWS)
             .map_while(|_| self.surface.point(stream))
-            .find(|point| self.giver.is_none_or(|giver| point.is_free_of(giver)))
+            .find(|point| point.is_free_of(self.barriers))
     }
 
-    /// True if palm, forearm and digits collide with neither object nor giver, as far as inner spheres show.
+    /// True if palm, forearm and digits collide with neither object nor barriers, as far as inner spheres show.
     pub(super) fn fits(&self, candidate: &Candidate<'_>) -> bool {
         let max_depth = MAX_DIGIT_DEPTHS[usize::from(candidate.pair.thickness > THIN)];
         self.palm_fits(candidate.object_from_wrist)
@@ -291,8 +317,8 @@ impl<'a> ProposalContext<'a> {
             )
     }
 
-    /// True if palm, forearm and digits are clear of the giver's hand, as far as inner spheres show.
-    fn is_clear_of_giver(&self, candidate: &Candidate<'_>) -> bool {
+    /// True if palm, forearm and digits are clear of the barriers, as far as inner spheres show.
+    fn is_clear_of_barriers(&self, candidate: &Candidate<'_>) -> bool {
         let spheres = [
             self.rig.oppositions().inner_spheres(),
             &candidate.opposition.links,
@@ -300,7 +326,7 @@ impl<'a> ProposalContext<'a> {
         !self.mechanisms.has(Mechanism::RoomScreen)
             || spheres
                 .iter()
-                .all(|spheres| !self.spheres_meet_giver(candidate.object_from_wrist, spheres))
+                .all(|spheres| !self.spheres_meet_barrier(candidate.object_from_wrist, spheres))
     }
 
     /// Places the palm on the surface at the first of some points where it fits.
@@ -341,20 +367,20 @@ impl<'a> ProposalContext<'a> {
         })
     }
 
-    /// True if inner spheres of palm and forearm are clear of object and giver. This is a hundred times cheaper than the
+    /// True if inner spheres of palm and forearm are clear of object and barriers. This is a hundred times cheaper than the
     /// whole hand's clearance, which is checked later.
     fn palm_fits(&self, object_from_wrist: Pose) -> bool {
         let spheres = self.rig.oppositions().inner_spheres();
         self.spheres_fit(object_from_wrist, spheres, MAX_PENETRATION)
     }
 
-    /// True if spheres, given in the wrist's frame, are clear of the giver's hand and at most `depth` metres deep in the
+    /// True if spheres, given in the wrist's frame, are clear of the barriers and at most `depth` metres deep in the
     /// object.
     fn spheres_fit(&self, object_from_wrist: Pose, spheres: &[Spheres], depth: f32) -> bool {
         if !self.mechanisms.has(Mechanism::RoomScreen) {
             return true;
         }
-        !self.spheres_meet_giver(object_from_wrist, spheres)
+        !self.spheres_meet_barrier(object_from_wrist, spheres)
             && spheres.iter().all(|spheres| {
                 spheres
                     .transformed(object_from_wrist)
@@ -366,12 +392,12 @@ impl<'a> ProposalContext<'a> {
             })
     }
 
-    /// True if one of the spheres, given in the wrist's frame, certainly meets the giver's hand.
-    fn spheres_meet_giver(&self, object_from_wrist: Pose, spheres: &[Spheres]) -> bool {
-        self.giver.is_some_and(|giver| {
-            spheres
-                .iter()
-                .any(|spheres| giver.any_certainly_within(&spheres.transformed(object_from_wrist), 0.0))
-        })
+    /// True if one of the spheres, given in the wrist's frame, certainly meets a barrier.
+    fn spheres_meet_barrier(&self, object_from_wrist: Pose, spheres: &[Spheres]) -> bool {
+        let meets = |spheres: &Spheres| {
+            let placed = spheres.transformed(object_from_wrist);
+            self.barriers.any_certainly_within(&placed, 0.0)
+        };
+        !self.barriers.is_empty() && spheres.iter().any(meets)
     }
 }

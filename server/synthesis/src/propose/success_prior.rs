@@ -17,7 +17,7 @@ use crate::{
         hand::{Handedness, rig::Rig},
         object::GraspObject,
     },
-    physical::solids::PreparedHand,
+    physical::barriers::Barriers,
 };
 
 /// Number of inputs of the network.
@@ -112,13 +112,13 @@ impl ObjectFeatures {
         }
     }
 
-    /// The network's inputs for a hand with this opposition at `object_from_wrist`, near the giver's hand if there is one.
+    /// The network's inputs for a hand with this opposition at `object_from_wrist`, near other hands if there are any.
     pub fn inputs(
         &self,
         rig: &Rig,
         opposition: &Opposition,
         object_from_wrist: Pose,
-        giver: Option<&PreparedHand>,
+        barriers: Barriers<'_>,
     ) -> [f32; INPUTS] {
         let wrist_from_object = object_from_wrist.inverse();
         let mut centre_of_mass = wrist_from_object.transform_point(self.centre_of_mass);
@@ -135,11 +135,11 @@ impl ObjectFeatures {
         let [from_thumb, from_fingers, from_palm] =
             [opposition.thumb, opposition.fingers, rig.palm].map(|point| {
                 let point = object_from_wrist.transform_point(point);
-                giver.map_or(MAX_GIVER_DISTANCE, |giver| {
-                    giver
-                        .point_distance_upper_bound(point)
-                        .clamp(0.0, MAX_GIVER_DISTANCE)
-                })
+                barriers
+                    .hand_distance_upper_bound(point)
+                    .map_or(MAX_GIVER_DISTANCE, |distance| {
+                        distance.clamp(0.0, MAX_GIVER_DISTANCE)
+                    })
             });
         let shape = &opposition.shape;
         let digits = shape.closing.iter().filter(|&&closes| closes).count();

@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::{
     base::random::AttemptStream,
     geometry::{Segment, mesh_bvh::MeshBvh, surface_samples::SurfaceSampler},
-    physical::solids::PreparedHand,
+    physical::barriers::Barriers,
 };
 
 /// Points sampled on the surface. More cover small parts of large objects better, but each adds about a microsecond to the
@@ -27,11 +27,15 @@ const MAX_SLANT: f32 = 0.4;
 /// Minimum cosine between the ray and the normals at both ends: 45°. Pads would slip beyond it.
 const MIN_COS: f32 = 0.7;
 
-/// Minimum distance in metres between a point pressed by a finger and the giver's hand: half a finger's thickness.
+/// Minimum distance in metres between a point pressed by a finger and another hand: half a finger's thickness.
 const FINGER_CLEARANCE: f32 = 0.006;
 
-/// Minimum distance in metres between a point touched by the palm and the giver's hand.
+/// Minimum distance in metres between a point touched by the palm and another hand.
 const PALM_CLEARANCE: f32 = 0.012;
+
+/// Minimum distance in metres between either point and an obstacle. Fingers reach closer to a flat one, such as the
+/// table under a pen, than to a hand's bulges: with a finger's distance, thin objects on a table offer no points.
+const OBSTACLE_CLEARANCE: f32 = 0.003;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,9 +47,9 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
-    /// True unless the point is certainly too close to the giver's hand for a palm.
-    pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
-        !giver.certainly_within(self.position, 0.0, PALM_CLEARANCE)
+    /// True unless the point is certainly too close to a barrier for a palm.
+    pub fn is_free_of(&self, barriers: Barriers<'_>) -> bool {
+        !barriers.certainly_cover(self.position, PALM_CLEARANCE, OBSTACLE_CLEARANCE)
     }
 }
 
@@ -66,11 +70,11 @@ impl SurfacePair {
         self.thickness <= START_DEPTH
     }
 
-    /// True unless an end is certainly too close to the giver's hand for a finger.
-    pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
+    /// True unless an end is certainly too close to a barrier for a finger.
+    pub fn is_free_of(&self, barriers: Barriers<'_>) -> bool {
         [self.start, self.end]
             .iter()
-            .all(|&end| !giver.certainly_within(end, 0.0, FINGER_CLEARANCE))
+            .all(|&end| !barriers.certainly_cover(end, FINGER_CLEARANCE, OBSTACLE_CLEARANCE))
     }
 }
 
@@ -131,20 +135,20 @@ impl SurfacePairs {
         sampled
     }
 
-    /// The pairs and points that are not too close to the giver's hand. Filtering pays off only if many draws follow.
+    /// The pairs and points that are not too close to a barrier. Filtering pays off only if many draws follow.
     #[must_use]
-    pub fn free_of(&self, giver: &PreparedHand) -> Self {
+    pub fn free_of(&self, barriers: Barriers<'_>) -> Self {
         Self {
             pairs: self
                 .pairs
                 .iter()
-                .filter(|pair| pair.is_free_of(giver))
+                .filter(|pair| pair.is_free_of(barriers))
                 .copied()
                 .collect(),
             points: self
                 .points
                 .iter()
-                .filter(|point| point.is_free_of(giver))
+                .filter(|point| point.is_free_of(barriers))
                 .copied()
                 .collect(),
         }

@@ -17,7 +17,8 @@ use crate::{
         hand::rig::Rig,
     },
     physical::{
-        grip::{Grip, Gripper, NoGrip, clear_of_giver},
+        barriers::BarrierClearances,
+        grip::{Grip, Gripper, NoGrip, clear_of_barriers},
         immobility::{Balance, balance},
         scene::{ObjectScene, Presented},
         solids::{HandSolids, TrackedSolids},
@@ -68,8 +69,8 @@ impl GraspContext<'_> {
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         let tracked = TrackedSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
-        let giver_clearance = clear_of_giver(&tracked, presented.giver.as_ref());
-        let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        let clearances = clear_of_barriers(&tracked, presented.barriers());
+        let clearances = clearances.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         let mut grasp = unscored_grasp(
             grip,
             &gripper.contacts,
@@ -77,7 +78,7 @@ impl GraspContext<'_> {
             grip.epsilon,
             balance,
             presented,
-            giver_clearance,
+            clearances,
         );
         let grip_values = grip_values(
             object,
@@ -105,7 +106,7 @@ pub fn unscored_grasp(
     epsilon: f32,
     balance: Balance,
     presented: &Presented,
-    giver_clearance: Option<f32>,
+    clearances: BarrierClearances,
 ) -> Grasp {
     let total_force: glam::Vec3 = balance.forces.iter().sum();
     let comfort = comfort(digit_totals(contacts, &balance.forces));
@@ -121,7 +122,8 @@ pub fn unscored_grasp(
             residual: balance.residual,
             epsilon,
             penetration: grip.penetration,
-            giver_clearance,
+            giver_clearance: clearances.hands,
+            obstacle_clearance: clearances.obstacles,
         }),
         classification,
         score: None,

@@ -35,7 +35,7 @@ use motion::{Clearances, Motion, Obstacles};
 pub const OPEN_CLEARANCE: f32 = 0.002;
 
 /// Distance from `APPROACH` to `PRE_GRASP`, in metres: more than a finger's length, so that the hand is clear
-/// of the object. More looks more like reaching, and collides with the giver more often.
+/// of the object. More looks more like reaching, and collides with barriers more often.
 pub const APPROACH_DISTANCE: f32 = 0.12;
 
 /// Distances by which fingertips open, in metres, or as far as the joints allow. The first that is free for
@@ -58,16 +58,20 @@ const AZIMUTHS: [f32; 8] = [0.0, 180.0, 90.0, 270.0, 45.0, 315.0, 135.0, 225.0];
 /// than half of them.
 const MAX_POSES_CHECKED: u32 = 2000;
 
+/// Least distance from the barriers on the way, in metres: a little less than in a grasp, so that the accuracy of the check
+/// does not reject the grasp itself.
+const BARRIER_CLEARANCE: f32 = 0.9 * GIVER_CLEARANCE;
+
 /// Clearances during the approach.
 const APPROACH_CLEARANCES: Clearances = Clearances {
     object: 0.5 * OPEN_CLEARANCE,
-    giver: 0.5 * GIVER_CLEARANCE,
+    barriers: BARRIER_CLEARANCE,
 };
 
 /// Clearances while closing: the hand may sink in as deep as in a grasp.
 const CLOSING_CLEARANCES: Clearances = Clearances {
     object: -MAX_PENETRATION,
-    giver: 0.5 * GIVER_CLEARANCE,
+    barriers: BARRIER_CLEARANCE,
 };
 
 /// Plans the key frames of a grasp that is valid under `PHYSICAL`; others have none. `approach` limits the
@@ -87,8 +91,8 @@ pub fn plan_key_frames(
 
 /// The key frames of a grasp: `APPROACH`, `PRE_GRASP` and `CLOSE`, in this order.
 ///
-/// `PRE_GRASP` is at least [`OPEN_CLEARANCE`] off the object and [`GIVER_CLEARANCE`] off the giver's hand,
-/// and free of self-collision. On the approach the hand touches neither; closing, it sinks no deeper into the
+/// `PRE_GRASP` is at least [`OPEN_CLEARANCE`] off the object and [`GIVER_CLEARANCE`] off other hands,
+/// and free of self-collision. On the approach the hand touches none of them and no obstacle; closing, it sinks no deeper into the
 /// object than [`MAX_PENETRATION`], to a tenth of a millimetre, and touches no forbidden surface. The approach
 /// direction lies in the cone `approach`, in the object's frame like everything else; without a cone it is
 /// unrestricted.
@@ -108,7 +112,7 @@ pub fn key_frames(
         holding: grasp.bend_ratios.map(|ratio| ratio.is_some()),
         obstacles: Obstacles {
             object: scene.object,
-            giver: presented.giver.as_ref(),
+            barriers: presented.barriers(),
             poses_left: Cell::new(MAX_POSES_CHECKED),
         },
     };
@@ -265,7 +269,7 @@ impl Planner<'_> {
             .filter(|&direction| self.approach.is_none_or(|cone| cone.contains(direction)))
     }
 
-    /// The solids of the hand for comparison with the object and the giver.
+    /// The solids of the hand for comparison with the object and the barriers.
     fn solids(&self, pose: &HandPose) -> TrackedSolids {
         TrackedSolids::of_rig(
             self.rig,
@@ -274,15 +278,17 @@ impl Planner<'_> {
         )
     }
 
-    /// True if an open hand is clear of the object, the giver's hand and itself.
+    /// True if an open hand is clear of the object, the barriers and itself.
     fn is_clear(&self, solids: &TrackedSolids) -> bool {
         let surface = &self.obstacles.object.surface;
-        let giver = self.obstacles.giver;
         !solids
             .hand
             .iter()
             .any(|solid| comes_within(solid, surface, OPEN_CLEARANCE))
-            && giver.is_none_or(|giver| !giver.comes_within(solids.iter(), GIVER_CLEARANCE))
+            && !self
+                .obstacles
+                .barriers
+                .comes_within(solids.iter(), GIVER_CLEARANCE)
             && self_clearance(&solids.hand) >= 0.0
     }
 

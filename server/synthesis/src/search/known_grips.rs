@@ -17,10 +17,7 @@ use crate::{
         recheck::GripChecker,
     },
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
-    physical::{
-        grip::Gripper,
-        solids::{PreparedHand, TrackedSolids},
-    },
+    physical::{barriers::Barriers, grip::Gripper, solids::TrackedSolids},
     rating::scoring::comfort_value,
 };
 
@@ -34,7 +31,7 @@ static STORED_ORDER: LazyLock<Vec<u16>> = LazyLock::new(|| (0..u16::MAX).collect
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
     atlas: Option<&'a Atlas>,
-    /// The atlas' shortlist for a giver. These are screened one by one, because excluding grips of the whole
+    /// The atlas' shortlist for givers. These are screened one by one, because excluding grips of the whole
     /// atlas at once takes as long.
     shortlist: Shortlist<'a>,
     /// All grips of the atlas.
@@ -43,7 +40,7 @@ pub(super) struct KnownGrips<'a> {
     recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
     checker: GripChecker<'a>,
-    giver: Option<&'a PreparedHand>,
+    barriers: Barriers<'a>,
     rig: &'a Rig,
     mechanisms: Mechanisms,
     /// Grips that certainly collide with the giver, computed on first use.
@@ -71,7 +68,7 @@ impl Deref for Solids<'_> {
     }
 }
 
-/// A known grip that may be clear of the giver.
+/// A known grip that may be clear of the barriers.
 struct Candidate<'a> {
     source: GraspSource,
     entry: &'a Entry,
@@ -82,7 +79,7 @@ struct Candidate<'a> {
 enum Next<'a> {
     /// All have been tried.
     Exhausted,
-    /// The grips just passed certainly collide with the giver.
+    /// The grips just passed certainly collide with a barrier.
     AllExcluded,
     /// A grip to check; those passed before it certainly collide.
     Candidate(Candidate<'a>),
@@ -121,10 +118,12 @@ impl<'a> KnownGrips<'a> {
         if !has_any || !settings.query.uses_known_grips() {
             return None;
         }
-        let giver = presented.giver.as_ref();
-        // The shortlist serves searches with a giver that any valid grasp ends; it is no better than the rest.
+        let barriers = presented.barriers();
+        // The shortlist serves searches with barriers that any valid grasp ends; it is no better than the rest.
         let shortlist = match (atlas, settings.query.choice) {
-            (Some(atlas), Choice::FirstValid) if giver.is_some() && mechanisms.has(Mechanism::Shortlists) => {
+            (Some(atlas), Choice::FirstValid)
+                if !barriers.is_empty() && mechanisms.has(Mechanism::Shortlists) =>
+            {
                 atlas.shortlist(presented.up)
             }
             _ => Shortlist::default(),
@@ -144,7 +143,7 @@ impl<'a> KnownGrips<'a> {
             recent,
             scene,
             checker: GripChecker::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
-            giver,
+            barriers,
             rig: scene.rig(),
             mechanisms,
             excluded: OnceLock::new(),
@@ -162,16 +161,17 @@ impl<'a> KnownGrips<'a> {
         self.order.len()
     }
 
-    /// Advances to the next grip that does not certainly collide with the giver, past at most
+    /// Advances to the next grip that does not certainly collide with a barrier, past at most
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let end = self.shortlist.len() + self.order.len() + self.recent.len();
+        let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
             if from >= end {
                 return Next::Exhausted;
             }
-            let mut to = end.min(from + GRIPS_PER_CLOCK_CHECK);
+            let mut to = end.min(from + at_once);
             let mut next = Next::AllExcluded;
             let candidate = (from..to).find_map(|place| Some((place, self.candidate_at(place)?)));
             if let Some((place, found)) = candidate {
@@ -188,11 +188,11 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// The grip at a place, unless it certainly collides with the giver.
+    /// The grip at a place, unless it certainly collides with a barrier.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(place) = place.checked_sub(self.shortlist.len()) else {
             let (index, solids) = if self.mechanisms.has(Mechanism::InnerSpheres) {
-                self.shortlist.screen_against_giver(place, self.giver?)?
+                self.shortlist.screen(place, self.barriers)?
             } else {
                 self.shortlist.at(place)
             };
@@ -202,23 +202,21 @@ impl<'a> KnownGrips<'a> {
             return Some(self.recent_at(place - self.order.len()));
         };
         let atlas = self.atlas?;
-        let Some(giver) = self.giver else {
-            let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
-            return self.of_atlas(index, Solids::Computed(Box::new(solids)));
-        };
-        if self.mechanisms.has(Mechanism::CellOccupancy) {
+        if let Some(giver) = self.barriers.giver
+            && self.mechanisms.has(Mechanism::CellOccupancy)
+        {
             let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
             if excluded.contains(index) {
                 return None;
             }
         }
-        if !self.mechanisms.has(Mechanism::InnerSpheres) {
+        if self.barriers.is_empty() || !self.mechanisms.has(Mechanism::InnerSpheres) {
             let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
             return self.of_atlas(index, Solids::Computed(Box::new(solids)));
         }
         let solids = atlas
             .grips()
-            .screen_against_giver(usize::from(index), self.rig, giver)?;
+            .screen(usize::from(index), self.rig, self.barriers)?;
         self.of_atlas(index, Solids::Computed(solids))
     }
 

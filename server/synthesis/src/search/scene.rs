@@ -19,6 +19,7 @@ use crate::{
         strategy::{Strategy, Validity},
     },
     physical::{
+        barriers::Barriers,
         grip::wrist_after_advance,
         scene::{ObjectScene, Presented},
         shape::Proposal,
@@ -147,11 +148,10 @@ impl<'a> Scene<'a> {
     pub(super) fn place(&self) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
-        let giver = presented.and_then(|presented| presented.giver.as_ref());
         ProposalContext {
             object: object.object(),
             surface: object.surface_pairs(),
-            giver,
+            barriers: presented.map_or(Barriers::NONE, Presented::barriers),
             rig,
             placements: None,
             mechanisms: self.mechanisms,

@@ -43,7 +43,7 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
 
 /// A solid with its bounding sphere.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::physical) struct Bounded {
+pub struct Bounded {
     pub(in crate::physical) solid: TaperedCapsule,
     pub(in crate::physical) centre: Vec3,
     pub(in crate::physical) radius: f32,
@@ -69,7 +69,7 @@ impl Bounded {
 
     /// True if the other is certainly farther away than `distance`: by the bounding spheres, then by one sphere and
     /// the longer solid's axis, because the sphere around a forearm is wide.
-    pub(super) fn is_beyond(&self, other: &Self, distance: f32) -> bool {
+    pub(in crate::physical) fn is_beyond(&self, other: &Self, distance: f32) -> bool {
         let reach = distance + self.radius + other.radius;
         if reach < 0.0 || self.centre.distance_squared(other.centre) > reach * reach {
             return true;

@@ -8,7 +8,10 @@ use std::cell::Cell;
 
 use crate::{
     model::object::GraspObject,
-    physical::solids::{HandSolids, PreparedHand, TaperedCapsule, TrackedSolids},
+    physical::{
+        barriers::Barriers,
+        solids::{HandSolids, TaperedCapsule, TrackedSolids},
+    },
 };
 
 /// A part is not halved further if nothing travels farther than this in half of it, in metres: the accuracy
@@ -24,8 +27,8 @@ const LOOKAHEAD: f32 = 0.008;
 pub(super) struct Obstacles<'a> {
     /// The object.
     pub object: &'a GraspObject,
-    /// The giver's hand, in the object's frame.
-    pub giver: Option<&'a PreparedHand>,
+    /// Other hands and obstacles.
+    pub barriers: Barriers<'a>,
     /// How many more hand poses may be checked before the motion counts as blocked: bounds the time of
     /// hopeless cases.
     pub poses_left: Cell<u32>,
@@ -37,8 +40,8 @@ pub(super) struct Clearances {
     /// Least distance to the object's surface in metres; negative: the largest depth. Forbidden surfaces are
     /// never touched.
     pub object: f32,
-    /// Least distance to the giver's hand and forearm in metres.
-    pub giver: f32,
+    /// Least distance to the barriers in metres.
+    pub barriers: f32,
 }
 
 /// A motion of a hand that starts clear of the object.
@@ -71,12 +74,21 @@ impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
         let undecided = moving.fold(0, |undecided, (place, _)| undecided | 1 << place);
         // The hand's own solids come first; only they are compared with the object.
         let against_object = undecided & ((1 << HandSolids::COUNT) - 1);
-        let against_giver = if obstacles.giver.is_some() { undecided } else { 0 };
-        self.is_part_free(obstacles, clearances, [0.0, 1.0], [against_object, against_giver])
+        let against_barriers = if obstacles.barriers.is_empty() {
+            0
+        } else {
+            undecided
+        };
+        self.is_part_free(
+            obstacles,
+            clearances,
+            [0.0, 1.0],
+            [against_object, against_barriers],
+        )
     }
 
     /// Checks a part. `undecided` has one bit for each solid that may collide with the object, and one for
-    /// each that may collide with the giver.
+    /// each that may collide with a barrier.
     fn is_part_free(
         &self,
         obstacles: &Obstacles<'_>,
@@ -98,9 +110,10 @@ impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
                 if undecided[against] >> place & 1 == 0 {
                     continue;
                 }
-                let verdict = match (obstacles.giver, against) {
-                    (Some(giver), 1) => against_giver(giver, solid, clearances.giver, travel),
-                    _ => against_object(obstacles, solids.hand.solid(place), clearances.object, travel),
+                let verdict = if against == 0 {
+                    against_object(obstacles, solids.hand.solid(place), clearances.object, travel)
+                } else {
+                    against_barriers(obstacles.barriers, solid, clearances.barriers, travel)
                 };
                 match verdict {
                     Verdict::Free => {}
@@ -116,9 +129,9 @@ impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
     }
 }
 
-/// Checks a solid that travels up to `travel` metres against the giver's hand.
-fn against_giver(giver: &PreparedHand, solid: &TaperedCapsule, clearance: f32, travel: f32) -> Verdict {
-    giver
+/// Checks a solid that travels up to `travel` metres against the barriers.
+fn against_barriers(barriers: Barriers<'_>, solid: &TaperedCapsule, clearance: f32, travel: f32) -> Verdict {
+    barriers
         .least_distance([solid].into_iter(), clearance + travel, clearance)
         .map_or(Verdict::Blocked, |distance| classify(distance, clearance, travel))
 }

@@ -7,4 +7,5 @@ mod crossing;
 mod local_thickness;
 mod opposed;
 mod oriented_box;
+mod solid_box;
 mod triangle_mesh;

@@ -12,6 +12,7 @@ use grasp_synthesis::{
     },
     model::holdout::Holdout,
     physical::{
+        barriers::Barriers,
         grip::GIVER_CLEARANCE,
         scene::Presented,
         shape::Proposal,
@@ -69,7 +70,7 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
                 known.grips(),
                 rig,
                 order.iter().copied(),
-                presented.giver.as_ref(),
+                presented.barriers(),
                 || false,
             )
         };
@@ -80,7 +81,13 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
         // Without a giver, as many of the best.
-        let without_giver = Seeds::of(known.grips(), rig, holding.iter().copied(), None, || false);
+        let without_giver = Seeds::of(
+            known.grips(),
+            rig,
+            holding.iter().copied(),
+            Barriers::NONE,
+            || false,
+        );
         let best = entries_of(&without_giver.expect("not interrupted"));
         assert!(best.len() >= 32 && holding.starts_with(&best));
         assert_eq!(seeds.all().len(), best.len());
@@ -99,7 +106,7 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
             known.grips(),
             rig,
             holding.iter().copied(),
-            presented.giver.as_ref(),
+            presented.barriers(),
             || true,
         );
         assert_eq!(interrupted, None);
@@ -125,7 +132,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
         let excluded = known.excluded_by(giver);
         let mut open = holding.clone().filter(|&entry| !excluded.contains(entry));
         let seeds = |of: &mut dyn Iterator<Item = u16>| {
-            Seeds::of(known.grips(), rig, of, Some(giver), || false).expect("not interrupted")
+            Seeds::of(known.grips(), rig, of, presented.barriers(), || false).expect("not interrupted")
         };
         let (seeds, open_seeds) = (seeds(&mut holding.clone()), seeds(&mut open));
         let pairs = pairs_free_of(scissors, giver);

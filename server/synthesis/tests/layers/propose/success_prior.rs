@@ -9,6 +9,7 @@ use grasp_synthesis::{
         object::GraspObject,
     },
     physical::{
+        barriers::Barriers,
         shape::Proposal,
         solids::{PreparedHand, TrackedSolids},
     },
@@ -40,7 +41,12 @@ fn hands_rated_better_hold_more_often() {
             .filter_map(|index| {
                 let candidate =
                     place(object, right()).fitting_candidate(&mut AttemptStream::new(41, index))?;
-                let features = bulk.inputs(right(), candidate.opposition, candidate.object_from_wrist, None);
+                let features = bulk.inputs(
+                    right(),
+                    candidate.opposition,
+                    candidate.object_from_wrist,
+                    Barriers::NONE,
+                );
                 let holds = holds_freely(object, &candidate.proposal(), &mut attempt);
                 Some((TRAINED.log_odds(&features), holds))
             })
@@ -148,8 +154,13 @@ fn mirrored_hands_get_equal_features() {
             flip(place.position),
             Quat::from_xyzw(turn.x, -turn.y, -turn.z, turn.w),
         );
-        let features = bulk.inputs(right, opposition, place, Some(&giver));
-        let mirrored_features = mirrored_bulk.inputs(&left, &mirrored, mirrored_place, Some(&mirrored_giver));
+        let features = bulk.inputs(right, opposition, place, Barriers::of_giver(&giver));
+        let mirrored_features = mirrored_bulk.inputs(
+            &left,
+            &mirrored,
+            mirrored_place,
+            Barriers::of_giver(&mirrored_giver),
+        );
         for (i, (feature, mirrored)) in features.iter().zip(mirrored_features).enumerate() {
             // The box around a mirrored mesh is a mirrored box only up to rounding.
             assert!((feature - mirrored).abs() < 5e-3, "{i}: {feature} and {mirrored}");

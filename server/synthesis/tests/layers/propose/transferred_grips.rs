@@ -21,7 +21,7 @@ use grasp_synthesis::{
         holdout::Holdout,
         object::GraspObject,
     },
-    physical::scene::Presented,
+    physical::{barriers::Barriers, scene::Presented},
     search::SearchOutcome,
 };
 
@@ -42,7 +42,13 @@ fn transferred_to(object: &GraspObject) -> TransferredGrips {
 
 /// All transferred grips, without a giver.
 fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
-    let grips = transferred.for_giver(Candidates::All, right(), None, &Constraints::default(), &|| false);
+    let grips = transferred.away_from(
+        Candidates::All,
+        right(),
+        Barriers::NONE,
+        &Constraints::default(),
+        &|| false,
+    );
     grips.expect("nobody interrupts").entries().to_vec()
 }
 
@@ -142,10 +148,10 @@ fn transferred_grips_touch_a_similar_box_in_any_pose() {
 
 /// The transferred grips that pass the closure screen, without a giver.
 fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
-    let grips = transferred.for_giver(
+    let grips = transferred.away_from(
         Candidates::Passing,
         right(),
-        None,
+        Barriers::NONE,
         &Constraints::default(),
         &|| false,
     );
@@ -216,7 +222,7 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
         ..Constraints::default()
     };
     let rest = transferred
-        .for_giver(Candidates::All, right(), None, &constraints, &|| false)
+        .away_from(Candidates::All, right(), Barriers::NONE, &constraints, &|| false)
         .expect("nobody interrupts");
     assert!(!rest.entries().is_empty());
     for entry in rest.entries() {
@@ -224,7 +230,7 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
     }
     assert!(
         transferred
-            .for_giver(Candidates::All, right(), None, &constraints, &|| true)
+            .away_from(Candidates::All, right(), Barriers::NONE, &constraints, &|| true)
             .is_none()
     );
 }
@@ -234,16 +240,19 @@ fn a_giver_gets_the_grips_least_in_its_way() {
     for holdout in tracked_holdouts() {
         let transferred = transferred_to(&holdout.object);
         let giver = Presented::of(&holdout).giver.expect("there is one");
-        let chosen_for = |giver| {
-            let grips =
-                transferred.for_giver(Candidates::All, right(), giver, &Constraints::default(), &|| {
-                    false
-                });
+        let chosen_for = |barriers| {
+            let grips = transferred.away_from(
+                Candidates::All,
+                right(),
+                barriers,
+                &Constraints::default(),
+                &|| false,
+            );
             grips.expect("nobody interrupts")
         };
         let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();
         let count = |grips: &Grips| grips.entries().iter().filter(|entry| clear(entry)).count();
-        let (chosen, any) = (chosen_for(Some(&giver)), chosen_for(None));
+        let (chosen, any) = (chosen_for(Barriers::of_giver(&giver)), chosen_for(Barriers::NONE));
         assert_eq!(chosen.entries().len(), any.entries().len());
         assert!(
             count(&chosen) >= count(&any),

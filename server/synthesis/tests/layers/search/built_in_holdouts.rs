@@ -32,6 +32,8 @@ fn synthesized_givers_are_found_again_by_seed_and_attempt() {
         let free = Holdout {
             object: Arc::clone(object(&built_in.object)),
             presenting_hand: None,
+            other_hands: Vec::new(),
+            obstacles: Vec::new(),
             up,
         };
         let search = Search {

@@ -1,5 +1,6 @@
 //! Whole searches: the race, how it stops, look-ups of known grips, and the key frames of what is found.
 
+mod barriers;
 mod built_in_holdouts;
 mod clear_types;
 mod key_frames;

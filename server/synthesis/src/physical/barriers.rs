@@ -1,0 +1,276 @@
+//! What a hand keeps clear of in addition to the object: other people's hands, and obstacles.
+//!
+//! [`Barriers`] answers the questions of [`PreparedHand`] for all of them together. Most holdouts have one giver and
+//! nothing else, so that hand comes first, and the others are looked at only where it decides nothing.
+
+use glam::Vec3;
+
+use super::solids::{Bounded, PreparedHand, SPHERES, Spheres, TaperedCapsule, TrackedSolids};
+use crate::{geometry::solid_box::SolidBox, model::obstacle::Obstacle};
+
+/// How much closer than to another hand a hand may come to an obstacle, in metres: 0.1 mm remain, against rounding. A
+/// hand that takes something thin from a table all but touches it; with half of this, no pen on a table can be taken.
+const CLOSER_TO_OBSTACLES: f32 = 0.0009;
+
+/// An obstacle prepared for comparison with many hands. All its distances are longer by [`CLOSER_TO_OBSTACLES`] than they
+/// are, so that one threshold serves hands and obstacles.
+#[derive(Clone, Copy, Debug)]
+pub enum PreparedObstacle {
+    /// A capsule.
+    Capsule(Bounded),
+    /// A box.
+    Box(SolidBox),
+}
+
+/// Hands and obstacles to keep clear of, all in the object's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Barriers<'a> {
+    /// The first hand: the giver's, if there is one.
+    pub giver: Option<&'a PreparedHand>,
+    /// Further hands.
+    pub other_hands: &'a [PreparedHand],
+    /// The obstacles.
+    pub obstacles: &'a [PreparedObstacle],
+}
+
+/// Distances of a hand from its barriers, in metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BarrierClearances {
+    /// From the nearest of the other hands; none without any.
+    pub hands: Option<f32>,
+    /// From the nearest obstacle; none without any.
+    pub obstacles: Option<f32>,
+}
+
+impl PreparedObstacle {
+    /// Prepares an obstacle.
+    pub fn new(obstacle: &Obstacle) -> Self {
+        match obstacle {
+            Obstacle::Capsule(capsule) => Self::Capsule(Bounded::new(*capsule)),
+            Obstacle::Box(solid) => Self::Box(SolidBox::new(solid)),
+        }
+    }
+
+    /// Distance of a point from the surface in metres, negative inside.
+    pub fn point_distance(&self, point: Vec3) -> f32 {
+        match self {
+            Self::Capsule(capsule) => capsule.solid.signed_distance(point) + CLOSER_TO_OBSTACLES,
+            Self::Box(solid) => solid.signed_distance(point) + CLOSER_TO_OBSTACLES,
+        }
+    }
+
+    /// The direction in which the distance from a point grows fastest: a unit vector, or 0 on the axis of a capsule.
+    fn outward(&self, point: Vec3) -> Vec3 {
+        match self {
+            Self::Capsule(capsule) => {
+                let (along, _) = capsule.solid.nearest(point.as_dvec3());
+                (point - capsule.solid.at(along as f32)).normalize_or_zero()
+            }
+            Self::Box(solid) => solid.outward(point),
+        }
+    }
+
+    /// Distance from a solid in metres, negative where they overlap.
+    pub fn distance(&self, solid: &TaperedCapsule) -> f32 {
+        match self {
+            Self::Capsule(capsule) => capsule.solid.distance(solid) + CLOSER_TO_OBSTACLES,
+            Self::Box(obstacle) => obstacle.distance(solid) + CLOSER_TO_OBSTACLES,
+        }
+    }
+
+    /// True if a solid is certainly farther away than `distance` metres.
+    fn is_beyond(&self, solid: &Bounded, distance: f32) -> bool {
+        match self {
+            Self::Capsule(capsule) => solid.is_beyond(capsule, distance),
+            Self::Box(obstacle) => obstacle.signed_distance(solid.centre) - solid.radius > distance,
+        }
+    }
+}
+
+impl<'a> Barriers<'a> {
+    /// Nothing to keep clear of.
+    pub const NONE: Barriers<'static> = Barriers {
+        giver: None,
+        other_hands: &[],
+        obstacles: &[],
+    };
+
+    /// One giver's hand and nothing else.
+    pub const fn of_giver(giver: &'a PreparedHand) -> Self {
+        Self {
+            giver: Some(giver),
+            ..Barriers::NONE
+        }
+    }
+
+    /// True if there is nothing to keep clear of.
+    pub fn is_empty(&self) -> bool {
+        self.giver.is_none() && !self.has_more()
+    }
+
+    /// True if there is more than the first hand.
+    #[inline]
+    fn has_more(&self) -> bool {
+        !self.other_hands.is_empty() || !self.obstacles.is_empty()
+    }
+
+    /// The number of comparisons between two clock checks, of which `with_giver` are due with a single hand.
+    pub fn comparisons_per_check(&self, with_giver: usize) -> usize {
+        (with_giver / (1 + self.other_hands.len() + self.obstacles.len())).max(1)
+    }
+
+    /// All hands, the giver's first.
+    fn hands(&self) -> impl Iterator<Item = &'a PreparedHand> {
+        self.giver.into_iter().chain(self.other_hands)
+    }
+
+    /// True only if a point is closer to a hand than `from_hands` metres, or to an obstacle than `from_obstacles`; near
+    /// those distances it may be false regardless.
+    #[inline]
+    pub fn certainly_cover(&self, point: Vec3, from_hands: f32, from_obstacles: f32) -> bool {
+        self.hands()
+            .any(|hand| hand.certainly_within(point, 0.0, from_hands))
+            || self
+                .obstacles
+                .iter()
+                .any(|obstacle| obstacle.point_distance(point) < from_obstacles)
+    }
+
+    /// As [`PreparedHand::any_certainly_within`].
+    #[inline]
+    pub fn any_certainly_within(&self, spheres: &Spheres, distance: f32) -> bool {
+        self.giver
+            .is_some_and(|giver| giver.any_certainly_within(spheres, distance))
+            || self.has_more() && self.any_certainly_within_others(spheres, distance)
+    }
+
+    #[inline(never)]
+    fn any_certainly_within_others(&self, spheres: &Spheres, distance: f32) -> bool {
+        self.other_hands
+            .iter()
+            .any(|hand| hand.any_certainly_within(spheres, distance))
+            || self.obstacles.iter().any(|obstacle| {
+                spheres
+                    .iter()
+                    .any(|(centre, radius)| obstacle.point_distance(centre) < radius + distance)
+            })
+    }
+
+    /// How far some spheres have to move together, in metres, to be `distance` away from every obstacle that they are too
+    /// close to now: out of one after the other, each time by the sphere that is deepest.
+    pub fn way_out_of_obstacles(&self, spheres: &[Spheres], distance: f32) -> Vec3 {
+        self.obstacles.iter().fold(Vec3::ZERO, |way, obstacle| {
+            let depth = |(centre, radius): (Vec3, f32)| {
+                let centre = centre + way;
+                (radius + distance - obstacle.point_distance(centre), centre)
+            };
+            let deepest = spheres
+                .iter()
+                .flat_map(Spheres::iter)
+                .map(depth)
+                .max_by(|(a, _), (b, _)| a.total_cmp(b));
+            match deepest {
+                Some((depth, centre)) if depth > 0.0 => way + obstacle.outward(centre) * depth,
+                _ => way,
+            }
+        })
+    }
+
+    /// As [`PreparedHand::distance_upper_bounds`].
+    #[inline]
+    pub fn distance_upper_bounds(&self, spheres: &Spheres) -> [f32; SPHERES] {
+        let mut least = self.giver.map_or([f32::INFINITY; SPHERES], |giver| {
+            giver.distance_upper_bounds(spheres)
+        });
+        if self.has_more() {
+            self.lower_by_others(spheres, &mut least);
+        }
+        least
+    }
+
+    #[inline(never)]
+    fn lower_by_others(&self, spheres: &Spheres, least: &mut [f32; SPHERES]) {
+        for hand in self.other_hands {
+            for (least, distance) in least.iter_mut().zip(hand.distance_upper_bounds(spheres)) {
+                *least = least.min(distance);
+            }
+        }
+        for obstacle in self.obstacles {
+            for (least, (centre, radius)) in least.iter_mut().zip(spheres.iter()) {
+                *least = least.min(obstacle.point_distance(centre) - radius);
+            }
+        }
+    }
+
+    /// As [`PreparedHand::point_distance_upper_bound`], for the nearest hand; none without hands.
+    #[inline]
+    pub fn hand_distance_upper_bound(&self, point: Vec3) -> Option<f32> {
+        self.hands()
+            .map(|hand| hand.point_distance_upper_bound(point))
+            .reduce(f32::min)
+    }
+
+    /// As [`PreparedHand::comes_within`].
+    pub fn comes_within<'b>(
+        &self,
+        solids: impl Iterator<Item = &'b TaperedCapsule> + Clone,
+        distance: f32,
+    ) -> bool {
+        self.hands()
+            .any(|hand| hand.comes_within(solids.clone(), distance))
+            || self.least_from_obstacles(solids, distance, distance).is_none()
+    }
+
+    /// As [`PreparedHand::least_distance`].
+    pub fn least_distance<'b>(
+        &self,
+        solids: impl Iterator<Item = &'b TaperedCapsule> + Clone,
+        enough: f32,
+        required: f32,
+    ) -> Option<f32> {
+        let least = self.hands().try_fold(enough, |least, hand| {
+            hand.least_distance(solids.clone(), least, required)
+        })?;
+        self.least_from_obstacles(solids, least, required)
+    }
+
+    /// As [`PreparedHand::least_distance`], for the obstacles alone.
+    fn least_from_obstacles<'b>(
+        &self,
+        solids: impl Iterator<Item = &'b TaperedCapsule>,
+        enough: f32,
+        required: f32,
+    ) -> Option<f32> {
+        let mut least = enough;
+        if self.obstacles.is_empty() {
+            return Some(least);
+        }
+        for solid in solids {
+            let our = Bounded::new(*solid);
+            for obstacle in self.obstacles {
+                if !obstacle.is_beyond(&our, least) {
+                    least = least.min(obstacle.distance(solid));
+                    if least < required {
+                        return None;
+                    }
+                }
+            }
+        }
+        Some(least)
+    }
+
+    /// The distances of a hand, if those from hands are at least `required` metres and those from obstacles at least
+    /// [`CLOSER_TO_OBSTACLES`] less.
+    pub fn clearances(&self, hand: &TrackedSolids, required: f32) -> Option<BarrierClearances> {
+        let mut clearances = BarrierClearances::default();
+        for other in self.hands() {
+            let clearance = other.clearance(hand, required)?;
+            clearances.hands = Some(clearances.hands.map_or(clearance, |least| least.min(clearance)));
+        }
+        if !self.obstacles.is_empty() {
+            let least = self.least_from_obstacles(hand.iter(), f32::INFINITY, required)?;
+            clearances.obstacles = Some(least - CLOSER_TO_OBSTACLES);
+        }
+        Some(clearances)
+    }
+}
