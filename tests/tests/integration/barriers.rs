@@ -1,7 +1,7 @@
 //! Further hands and obstacles over real gRPC: no answer runs into them, as measured here with code of the test's own on
 //! nothing but the joints and radii of requests and answers.
 
-use std::time::Duration;
+use std::{fmt::Write as _, time::Duration};
 
 use glam::{Quat, Vec3};
 use grasp_assets::hands::hand;
@@ -25,7 +25,7 @@ const SEEDS: u64 = 40;
 /// Steps along a capsule's axis at which this test measures.
 const STEPS: u16 = 40;
 
-/// The joints of each digit from its metacarpal to its tip, in the order of OpenXR.
+/// The joints of each digit from its metacarpal to its tip, in the order of `OpenXR`.
 const DIGITS: [std::ops::RangeInclusive<usize>; 5] = [2..=5, 6..=10, 11..=15, 16..=20, 21..=25];
 
 /// A box by its name, half its edge lengths in metres, and its mass in kilograms.
@@ -51,7 +51,7 @@ fn box_obj(half: Vec3) -> Vec<u8> {
     for corner in 0..8 {
         let side = |axis: u8| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
         let Vec3 { x, y, z } = half * Vec3::new(side(0), side(1), side(2));
-        text += &format!("v {x} {y} {z}\n");
+        let _ = writeln!(text, "v {x} {y} {z}");
     }
     text += "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
     text.into_bytes()

@@ -7,14 +7,14 @@ use crate::fixtures::{assert_blamed, floating_remote, held_remote};
 
 type Mutation = fn(&mut v1::FindGraspRequest);
 
-fn vector(x: f32, y: f32, z: f32) -> Option<v1::Vector3> {
-    Some(v1::Vector3 { x, y, z })
+fn vector(x: f32, y: f32, z: f32) -> v1::Vector3 {
+    v1::Vector3 { x, y, z }
 }
 
 fn capsule() -> v1::CapsuleShape {
     v1::CapsuleShape {
-        client_start: vector(0.0, -1.0, 0.0),
-        client_end: vector(0.0, -1.0, 0.5),
+        client_start: Some(vector(0.0, -1.0, 0.0)),
+        client_end: Some(vector(0.0, -1.0, 0.5)),
         radius: 0.1,
         end_radius: Some(0.2),
     }
@@ -23,7 +23,7 @@ fn capsule() -> v1::CapsuleShape {
 fn solid_box() -> v1::BoxShape {
     v1::BoxShape {
         client_from_box: None,
-        half_extents: vector(5.0, 0.01, 5.0),
+        half_extents: Some(vector(5.0, 0.01, 5.0)),
     }
 }
 
@@ -40,7 +40,7 @@ fn request() -> v1::FindGraspRequest {
             obstacle(Shape::Capsule(capsule())),
             obstacle(Shape::Box(v1::BoxShape {
                 client_from_box: Some(v1::Pose {
-                    position: vector(0.0, -2.0, 0.0),
+                    position: Some(vector(0.0, -2.0, 0.0)),
                     orientation: None,
                 }),
                 ..solid_box()
@@ -58,12 +58,18 @@ fn angles(request: &mut v1::FindGraspRequest) -> &mut v1::HandAngles {
     }
 }
 
-fn set_capsule(request: &mut v1::FindGraspRequest, changed: v1::CapsuleShape) {
-    request.obstacles[0] = obstacle(Shape::Capsule(changed));
+fn capsule_of(request: &mut v1::FindGraspRequest) -> &mut v1::CapsuleShape {
+    match &mut request.obstacles[0].shape {
+        Some(Shape::Capsule(capsule)) => capsule,
+        other => panic!("{other:?}"),
+    }
 }
 
-fn set_box(request: &mut v1::FindGraspRequest, changed: v1::BoxShape) {
-    request.obstacles[1] = obstacle(Shape::Box(changed));
+fn box_of(request: &mut v1::FindGraspRequest) -> &mut v1::BoxShape {
+    match &mut request.obstacles[1].shape {
+        Some(Shape::Box(shape)) => shape,
+        other => panic!("{other:?}"),
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -84,121 +90,37 @@ async fn every_field_of_further_hands_and_obstacles_is_validated() {
         ),
         (|r| r.obstacles[1].shape = None, "obstacles[1]"),
         (
-            |r| {
-                let client_start = None;
-                set_capsule(
-                    r,
-                    v1::CapsuleShape {
-                        client_start,
-                        ..capsule()
-                    },
-                );
-            },
+            |r| capsule_of(r).client_start = None,
             "obstacles[0].capsule.client_start",
         ),
         (
-            |r| {
-                let client_end = vector(0.0, f32::INFINITY, 0.0);
-                set_capsule(
-                    r,
-                    v1::CapsuleShape {
-                        client_end,
-                        ..capsule()
-                    },
-                );
-            },
+            |r| capsule_of(r).client_end = Some(vector(0.0, f32::INFINITY, 0.0)),
             "obstacles[0].capsule.client_end",
         ),
+        (|r| capsule_of(r).radius = 0.0, "obstacles[0].capsule.radius"),
         (
-            |r| {
-                set_capsule(
-                    r,
-                    v1::CapsuleShape {
-                        radius: 0.0,
-                        ..capsule()
-                    },
-                )
-            },
-            "obstacles[0].capsule.radius",
-        ),
-        (
-            |r| {
-                let end_radius = Some(-0.1);
-                set_capsule(
-                    r,
-                    v1::CapsuleShape {
-                        end_radius,
-                        ..capsule()
-                    },
-                );
-            },
+            |r| capsule_of(r).end_radius = Some(-0.1),
             "obstacles[0].capsule.end_radius",
         ),
+        (|r| box_of(r).half_extents = None, "obstacles[1].box.half_extents"),
         (
-            |r| {
-                let half_extents = None;
-                set_box(
-                    r,
-                    v1::BoxShape {
-                        half_extents,
-                        ..solid_box()
-                    },
-                );
-            },
+            |r| box_of(r).half_extents = Some(vector(1.0, 0.0, 1.0)),
+            "obstacles[1].box.half_extents",
+        ),
+        (
+            |r| box_of(r).half_extents = Some(vector(1.0, f32::NAN, -1.0)),
+            "obstacles[1].box.half_extents",
+        ),
+        (
+            |r| box_of(r).half_extents = Some(vector(1.0, 1.0, 1001.0)),
             "obstacles[1].box.half_extents",
         ),
         (
             |r| {
-                let half_extents = vector(1.0, 0.0, 1.0);
-                set_box(
-                    r,
-                    v1::BoxShape {
-                        half_extents,
-                        ..solid_box()
-                    },
-                );
-            },
-            "obstacles[1].box.half_extents",
-        ),
-        (
-            |r| {
-                let half_extents = vector(1.0, f32::NAN, -1.0);
-                set_box(
-                    r,
-                    v1::BoxShape {
-                        half_extents,
-                        ..solid_box()
-                    },
-                );
-            },
-            "obstacles[1].box.half_extents",
-        ),
-        (
-            |r| {
-                let half_extents = vector(1.0, 1.0, 1001.0);
-                set_box(
-                    r,
-                    v1::BoxShape {
-                        half_extents,
-                        ..solid_box()
-                    },
-                );
-            },
-            "obstacles[1].box.half_extents",
-        ),
-        (
-            |r| {
-                let client_from_box = Some(v1::Pose {
-                    position: vector(0.0, 1e6, 0.0),
+                box_of(r).client_from_box = Some(v1::Pose {
+                    position: Some(vector(0.0, 1e6, 0.0)),
                     orientation: None,
                 });
-                set_box(
-                    r,
-                    v1::BoxShape {
-                        client_from_box,
-                        ..solid_box()
-                    },
-                );
             },
             "obstacles[1].box.client_from_box.position",
         ),
@@ -226,16 +148,13 @@ async fn wrong_hands_and_obstacles_are_reported_together() {
     let server = TestServer::start().await;
     let mut wrong = request();
     angles(&mut wrong).handedness = 0;
-    set_capsule(
-        &mut wrong,
-        v1::CapsuleShape {
-            client_start: None,
-            client_end: None,
-            radius: f32::NAN,
-            end_radius: Some(2000.0),
-        },
-    );
-    set_box(&mut wrong, v1::BoxShape::default());
+    *capsule_of(&mut wrong) = v1::CapsuleShape {
+        client_start: None,
+        client_end: None,
+        radius: f32::NAN,
+        end_radius: Some(2000.0),
+    };
+    *box_of(&mut wrong) = v1::BoxShape::default();
     let fields = [
         "other_hands[1].angles.handedness",
         "obstacles[0].capsule.client_start",
