@@ -60,7 +60,7 @@ pub use retry::RetryPolicy;
 pub use score::{Score, ScoreTerm};
 pub use search::{
     AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-    NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy,
+    Hands, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy,
     Validity,
 };
 

@@ -21,7 +21,7 @@ use crate::{
     score::{Score, ScoreTerm},
     search::{
         AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-        NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
+        Hands, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
         Strategy, Validity,
     },
 };
@@ -73,6 +73,12 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         }
         .into(),
         plan_key_frames: request.plan_key_frames,
+        hands: match request.hands {
+            None => v1::Hands::Unspecified,
+            Some(Hands::One) => v1::Hands::One,
+            Some(Hands::Both) => v1::Hands::Both,
+        }
+        .into(),
     }
 }
 
@@ -170,6 +176,14 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
         .map(grasp_from_wire)
         .transpose()
         .map_err(|malformed| malformed.within("grasp"))?;
+    let other_grasp = answer
+        .other_grasp
+        .map(grasp_from_wire)
+        .transpose()
+        .map_err(|malformed| malformed.within("other_grasp"))?;
+    if grasp.is_none() && other_grasp.is_some() {
+        return Err(Malformed::new("other_grasp", "is present without grasp"));
+    }
     let (outcome, grasp) = match (v1::Outcome::try_from(answer.outcome), grasp) {
         (Ok(v1::Outcome::Found), Some(grasp)) => (Outcome::Found, Some(grasp)),
         (Ok(v1::Outcome::Found), None) => return Err(Malformed::missing("grasp")),
@@ -189,6 +203,7 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
     Ok(FindAnswer {
         outcome,
         grasp,
+        other_grasp,
         report,
     })
 }

@@ -245,6 +245,9 @@ fn rejects_grasp_that_contradicts_outcome() {
     assert_eq!(path_of(with_grasp.clone()), "grasp");
     with_grasp.outcome = 42;
     assert_eq!(path_of(with_grasp), "outcome");
+    let mut with_other_grasp = wire_answer();
+    with_other_grasp.other_grasp = with_other_grasp.grasp.take();
+    assert_eq!(path_of(with_other_grasp), "other_grasp");
 }
 
 #[test]
@@ -282,6 +285,7 @@ fn default_request_leaves_everything_to_the_server() {
     assert_eq!(wire.validity(), v1::Validity::Unspecified);
     assert_eq!(wire.choice(), v1::Choice::Unspecified);
     assert_eq!(wire.atlas(), v1::AtlasUse::Unspecified);
+    assert_eq!(wire.hands(), v1::Hands::Unspecified);
     assert_eq!(wire.constraints, None);
     assert!(!wire.plan_key_frames);
     assert_eq!(wire.convention(), v1::Convention::Openxr);
@@ -310,6 +314,7 @@ fn converts_every_field_of_a_request() {
         choice: Some(Choice::BestWithinBudget),
         atlas: Some(AtlasUse::None),
         plan_key_frames: true,
+        hands: Some(Hands::Both),
         ..FindRequest::new("objects/remote")
     };
     let wire = find_request_to_wire(&request);
@@ -329,5 +334,6 @@ fn converts_every_field_of_a_request() {
     assert_eq!(wire.choice(), v1::Choice::BestWithinBudget);
     assert_eq!(wire.atlas(), v1::AtlasUse::None);
     assert!(wire.plan_key_frames);
+    assert_eq!(wire.hands(), v1::Hands::Both);
     assert_eq!(wire.constraints.unwrap().max_comfort_e, Some(0.25));
 }

@@ -85,7 +85,7 @@ fn picture_of(asked: &Asked) -> Result<Picture, Failure> {
     let object = &asked.request.object;
     let model = Model::built_in(object)
         .ok_or_else(|| Failure::Usage(format!("{object} is not built in, so it cannot be drawn")))?;
-    Ok(Picture::new(model, asked.request.clone())?.with_grasp(asked.answer.grasp.clone()))
+    Ok(Picture::new(model, asked.request.clone())?.with_hands(&asked.answer))
 }
 
 fn caption(asked: &Asked) -> String {

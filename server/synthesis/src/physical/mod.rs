@@ -2,8 +2,10 @@
 //!
 //! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
 //! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
-//! ([`immobility`]). A [`grip`] is a hand closed on an object.
+//! ([`immobility`]). A [`grip`] is a hand closed on an object;
+//! [`both_hands`] hold what is too large for one.
 
+pub mod both_hands;
 mod closer;
 pub mod closing;
 pub mod contacts;
@@ -14,3 +16,4 @@ pub mod obstacle;
 pub mod scene;
 pub mod shape;
 pub mod solids;
+pub mod stance;

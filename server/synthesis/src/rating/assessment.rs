@@ -50,27 +50,16 @@ impl GraspContext<'_> {
         gripper: &mut Gripper,
         stopwatch: &mut impl Stopwatch,
     ) -> Result<Box<Grasp>, NoGrip> {
-        let Self {
-            object,
-            presented,
-            rig,
-            constraints,
-        } = self;
-        let contacts = &gripper.contacts;
-        let classification = classify(rig, &grip.pose, contacts);
-        if !constraints.admits_contacts(contacts) || !constraints.admits_type(classification.grasp_type) {
-            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
-        }
+        let Self { object, presented, .. } = self;
+        let classification = self.classified(grip, &gripper.contacts)?;
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
         let load = object.load(&gripper.soft_contacts, presented.up);
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        let tracked = TrackedSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
-        let giver_clearance = clear_of_giver(&tracked, presented.giver.as_ref());
-        let giver_clearance = giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
-        let mut grasp = unscored_grasp(
+        let giver_clearance = self.giver_clearance(grip, solids)?;
+        let grasp = unscored_grasp(
             grip,
             &gripper.contacts,
             classification,
@@ -79,13 +68,49 @@ impl GraspContext<'_> {
             presented,
             giver_clearance,
         );
+        let relative_closure = gripper.relative_closure(object, grip.epsilon);
+        self.rated(grasp, relative_closure, solids).map(Box::new)
+    }
+
+    /// The grip's type, if the constraints admit it and the contacts.
+    pub(super) fn classified(&self, grip: &Grip, contacts: &[Contact]) -> Result<Classification, NoGrip> {
+        let classification = classify(self.rig, &grip.pose, contacts);
+        if !self.constraints.admits_contacts(contacts)
+            || !self.constraints.admits_type(classification.grasp_type)
+        {
+            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+        }
+        Ok(classification)
+    }
+
+    /// The hand's distance from the giver's, in metres, if it keeps clear of it; none without a giver.
+    pub(super) fn giver_clearance(&self, grip: &Grip, solids: &HandSolids) -> Result<Option<f32>, NoGrip> {
+        let tracked = TrackedSolids::of_rig(self.rig, grip.pose.frame_from_wrist, solids);
+        let giver_clearance = clear_of_giver(&tracked, self.presented.giver.as_ref());
+        giver_clearance.ok_or(NoGrip::Rejected(Rejection::FingerCollision))
+    }
+
+    /// The grasp with its score, if the constraints admit it. `relative_closure` is the epsilon of the contacts as a
+    /// multiple of the required one.
+    pub(super) fn rated(
+        &self,
+        mut grasp: Grasp,
+        relative_closure: f32,
+        solids: &HandSolids,
+    ) -> Result<Grasp, NoGrip> {
+        let Self {
+            object,
+            presented,
+            rig,
+            constraints,
+        } = self;
         let grip_values = grip_values(
             object,
             rig,
-            &grip.pose,
+            &grasp.pose,
             &grasp.contacts,
-            classification,
-            gripper.relative_closure(object, grip.epsilon),
+            grasp.classification,
+            relative_closure,
             solids,
         );
         grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
@@ -93,7 +118,7 @@ impl GraspContext<'_> {
         if !constraints.admits(&grasp) {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
-        Ok(Box::new(grasp))
+        Ok(grasp)
     }
 }
 
@@ -126,6 +151,7 @@ pub fn unscored_grasp(
         classification,
         score: None,
         key_frames: None,
+        other_hand: None,
     }
 }
 
@@ -143,5 +169,6 @@ pub fn thesis_grasp(rig: &Rig, held: HeldObject) -> Grasp {
         margins: None,
         score: None,
         key_frames: None,
+        other_hand: None,
     }
 }

@@ -1,5 +1,6 @@
 //! Whole searches: the race, how it stops, look-ups of known grips, and the key frames of what is found.
 
+mod both_hands;
 mod built_in_holdouts;
 mod key_frames;
 mod look_up;
