@@ -59,8 +59,8 @@ pub use pose::Pose;
 pub use retry::RetryPolicy;
 pub use score::{Score, ScoreTerm};
 pub use search::{
-    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-    Hands, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy,
+    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource, Hands,
+    NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime, Strategy,
     Validity,
 };
 

@@ -114,7 +114,12 @@ impl<'a> HandoverScene<'a> {
         let hands = [
             ("giver", &self.giver, Complexion::FAIR, GIVER_SLEEVE),
             ("receiver", &self.receiver, Complexion::BROWN, RECEIVER_SLEEVE),
-            ("other_receiver", &self.other_receiver, Complexion::BROWN, RECEIVER_SLEEVE),
+            (
+                "other_receiver",
+                &self.other_receiver,
+                Complexion::BROWN,
+                RECEIVER_SLEEVE,
+            ),
         ];
         for (who, hand, complexion, sleeve_colour) in hands {
             if let Some(PosedHand { skin, joints }) = hand {

@@ -21,8 +21,8 @@ use crate::{
     score::{Score, ScoreTerm},
     search::{
         AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-        Hands, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
-        Strategy, Validity,
+        Hands, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step,
+        StepTime, Strategy, Validity,
     },
 };
 

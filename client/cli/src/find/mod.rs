@@ -23,8 +23,8 @@ use crate::{
     picture::{Model, Picture, write_file},
     server_options::ServerOptions,
     values::{
-        BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize, parse_duration,
-        parse_view_size,
+        BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
+        parse_duration, parse_view_size,
     },
 };
 

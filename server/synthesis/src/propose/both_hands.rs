@@ -13,7 +13,7 @@ use super::{
 use crate::{
     base::{pose::Pose, random::AttemptStream},
     model::object::GraspObject,
-    physical::shape::Proposal,
+    physical::shape::{HandShape, Proposal},
 };
 
 /// Locations drawn per proposal, of which the best is used. More find holds of plain objects sooner, but less varied ones.
@@ -140,18 +140,26 @@ impl ProposalContext<'_> {
     ) -> Option<Proposal> {
         let palm_share = 1.0 - (1.0 - LEAST_PALM_SHARE) * self.surface.spanned_share();
         let in_palm = stream.unit() < palm_share;
-        (0..MAX_LOCATIONS)
-            .take_while(|_| !interrupted())
-            .find_map(|_| {
-                if in_palm {
-                    let shape = palm_shape(stream);
-                    let point = best_of(|| self.free_point(stream), |point| aim.merit_of_point(point))?;
-                    self.palm_on(point, shape, &admits, stream)
-                } else {
-                    let pair = best_of(|| self.free_pair(stream), |pair| aim.merit_of_pair(pair))?;
-                    Some(self.candidate_on(pair, &admits, stream)?.proposal())
-                }
-            })
+        (0..MAX_LOCATIONS).take_while(|_| !interrupted()).find_map(|_| {
+            if in_palm {
+                let shape = flat_palm_shape(stream);
+                let point = best_of(|| self.free_point(stream), |point| aim.merit_of_point(point))?;
+                self.palm_on(point, shape, &admits, stream)
+            } else {
+                let pair = best_of(|| self.free_pair(stream), |pair| aim.merit_of_pair(pair))?;
+                Some(self.candidate_on(pair, &admits, stream)?.proposal())
+            }
+        })
+    }
+}
+
+/// Draws the shape of a hand with the palm on what is too wide for one hand: nearly flat under it, so that a thumb far out
+/// of the palm's plane would start inside.
+fn flat_palm_shape(stream: &mut AttemptStream) -> HandShape {
+    let shape = palm_shape(stream);
+    HandShape {
+        thumb_yaw: shape.thumb_yaw * stream.unit(),
+        ..shape
     }
 }
 

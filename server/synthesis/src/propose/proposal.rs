@@ -38,6 +38,9 @@ pub(super) const MAX_LOCATIONS: usize = 12;
 /// Largest number of rotations of the hand tried at a location.
 const MAX_ROTATIONS: usize = 10;
 
+/// Largest number of rotations drawn until [`MAX_ROTATIONS`] are admitted. An admission is cheap compared with a fit.
+const MAX_DRAWN_ROTATIONS: usize = 48;
+
 /// Candidates sampled per proposal and ordered by the success prior. With half or twice as many, searches take longer.
 const COMPARED: usize = 64;
 
@@ -187,9 +190,11 @@ impl<'a> ProposalContext<'a> {
         stream: &mut AttemptStream,
     ) -> Option<Candidate<'a>> {
         let opposition = self.opposition_for(&pair, stream)?;
-        (0..MAX_ROTATIONS)
+        (0..MAX_DRAWN_ROTATIONS)
             .map(|_| Candidate::draw(opposition, pair, stream))
-            .find(|candidate| admits(candidate.object_from_wrist) && self.fits(candidate))
+            .filter(|candidate| admits(candidate.object_from_wrist))
+            .take(MAX_ROTATIONS)
+            .find(|candidate| self.fits(candidate))
     }
 
     /// Chooses a cached placement that is clear of the giver, preferring likely ones.
@@ -355,16 +360,22 @@ impl<'a> ProposalContext<'a> {
         let across = stream.between(PALM_OFFSETS[0][0], PALM_OFFSETS[0][1]);
         let along = stream.between(PALM_OFFSETS[1][0], PALM_OFFSETS[1][1]);
         let contact = self.rig.palm + Vec3::new(across, along, 0.0);
-        (0..MAX_ROTATIONS).find_map(|_| {
+        let rotated = |_| {
             let turn = stream.between(0.0, TAU);
             let y = a * turn.cos() + b * turn.sin();
             let orientation = Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z)).normalize();
-            let touching = Pose::new(point.position - orientation * contact, orientation);
-            (admits(touching) && self.palm_fits(touching)).then_some(Proposal {
-                object_from_wrist: Pose::new(touching.position - z * PALM_START_HEIGHT, orientation),
-                shape,
-                advance: 2.0 * PALM_START_HEIGHT,
-            })
+            Pose::new(point.position - orientation * contact, orientation)
+        };
+        let touching = (0..MAX_DRAWN_ROTATIONS)
+            .map(rotated)
+            .filter(|touching| admits(*touching))
+            .take(MAX_ROTATIONS)
+            .find(|touching| self.palm_fits(*touching))?;
+        let position = touching.position - z * PALM_START_HEIGHT;
+        Some(Proposal {
+            object_from_wrist: Pose::new(position, touching.orientation),
+            shape,
+            advance: 2.0 * PALM_START_HEIGHT,
         })
     }
 

@@ -50,7 +50,9 @@ impl GraspContext<'_> {
         gripper: &mut Gripper,
         stopwatch: &mut impl Stopwatch,
     ) -> Result<Box<Grasp>, NoGrip> {
-        let Self { object, presented, .. } = self;
+        let Self {
+            object, presented, ..
+        } = self;
         let classification = self.classified(grip, &gripper.contacts)?;
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.

@@ -26,7 +26,9 @@ pub fn assess_both(
     let classifications = [classified(0)?, classified(1)?];
     let clearance = |hand: usize| around[hand].giver_clearance(&halves[hand].grip, &halves[hand].solids);
     let clearances = [clearance(0)?, clearance(1)?];
-    let GraspContext { object, presented, .. } = around[0];
+    let GraspContext {
+        object, presented, ..
+    } = around[0];
     let held = hold_together(object, presented.up, halves, buffers, stopwatch).map_err(NoGrip::Rejected)?;
     let SharedHold {
         epsilon,

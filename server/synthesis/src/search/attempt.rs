@@ -251,7 +251,10 @@ impl Attempt {
         stopwatch: &mut impl Stopwatch,
         interrupted: &impl Fn() -> bool,
     ) -> AttemptEnd {
-        let around_other = GraspContext { rig: other, ..*around };
+        let around_other = GraspContext {
+            rig: other,
+            ..*around
+        };
         let hands = &mut self.both_hands;
         let contexts = [around, &around_other];
         let held = hands.hold(scene, contexts, other, stream, stopwatch, interrupted);

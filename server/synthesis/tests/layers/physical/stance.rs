@@ -12,9 +12,16 @@ fn wrist(position: Vec3, fingers: Vec3, palm: Vec3) -> Pose {
 }
 
 fn suits(right: Pose, left: Pose) -> bool {
-    let hands = [(&**adult(Handedness::Right), right), (&**adult(Handedness::Left), left)];
+    let hands = [
+        (&**adult(Handedness::Right), right),
+        (&**adult(Handedness::Left), left),
+    ];
     let [a, b] = hands;
-    assert_eq!(suits_one_body([a, b], UP), suits_one_body([b, a], UP), "the order matters");
+    assert_eq!(
+        suits_one_body([a, b], UP),
+        suits_one_body([b, a], UP),
+        "the order matters"
+    );
     suits_one_body(hands, UP)
 }
 
