@@ -61,8 +61,8 @@ pub use pose::Pose;
 pub use retry::RetryPolicy;
 pub use score::{Score, ScoreTerm};
 pub use search::{
-    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource, Limit,
-    LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step,
+    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource, Hands,
+    Limit, LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step,
     StepTime, Strategy, Validity,
 };
 

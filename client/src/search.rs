@@ -85,7 +85,7 @@ pub enum BendRatios {
 pub enum Choice {
     /// The first one found.
     FirstValid,
-    /// The one with the highest score among all found within the budget. Without a budget in the request, that is 5 ms; if
+    /// The one with the highest score (of both hands: the highest mean) among all found within the budget. Without a budget in the request, that is 5 ms; if
     /// nothing is found by then, the first one found within the server's default budget is returned.
     BestWithinBudget,
 }
@@ -98,6 +98,18 @@ pub enum AtlasUse {
     Allowed,
     /// Known grasps are not used: the answer depends on the request alone.
     None,
+}
+
+/// How many of the receiver's hands take the object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Hands {
+    /// The receiving hand alone.
+    One,
+    /// Left and right hand together, for what one hand cannot hold. Requires [`Validity::Physical`] and
+    /// [`Strategy::Guided`]; cannot be combined with [`FindRequest::plan_key_frames`]. Constraints apply to each hand.
+    /// Known grasps are neither used nor collected.
+    Both,
 }
 
 /// A holdout (an object, its pose, the giver's hand and what else is near), and how to search for a grasp.
@@ -174,6 +186,9 @@ pub struct FindRequest {
     /// Up to 64 obstacles to keep clear of. Only under [`Validity::Physical`].
     #[serde(default)]
     pub obstacles: Vec<Obstacle>,
+    /// How many hands take the object; none: one.
+    #[serde(default)]
+    pub hands: Option<Hands>,
 }
 
 impl FindRequest {
@@ -202,6 +217,7 @@ impl FindRequest {
             plan_key_frames: false,
             other_hands: Vec::new(),
             obstacles: Vec::new(),
+            hands: None,
         }
     }
 
@@ -334,7 +350,7 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
-    /// The wrist, the contacts or the grasp violate the request's constraints.
+    /// The wrist, the contacts or the grasp violate the request's constraints, or two hands do not suit one body.
     UnmetConstraint,
     /// A kind unknown to this version of the library.
     Unrecognised,
@@ -499,6 +515,10 @@ pub struct FindAnswer {
     pub outcome: Outcome,
     /// The grasp; present exactly if the outcome is [`Outcome::Found`].
     pub grasp: Option<Grasp>,
+    /// With [`Hands::Both`], the receiver's other hand of the same rig, if a grasp was found. The forces of both hands
+    /// together balance the weight; residual, epsilon and wrench angle of either are those of both together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_grasp: Option<Grasp>,
     /// Report of the search.
     pub report: SearchReport,
 }

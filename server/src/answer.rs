@@ -63,10 +63,16 @@ pub(crate) fn find_response(
         SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted => v1::Outcome::BudgetExhausted,
         SearchEnd::Stopped => return Err(ServiceError::Cancelled),
     };
+    let other_grasp = || {
+        let grasp = outcome.grasp.as_ref()?.other_hand.as_ref()?;
+        let rig = settings.query.other_hand.as_ref()?;
+        Some(wire_grasp(grasp, rig, frame))
+    };
     Ok(v1::FindGraspResponse {
         outcome: wire_outcome.into(),
         grasp: outcome.grasp.as_ref().map(|grasp| wire_grasp(grasp, rig, frame)),
         report: Some(report(&outcome.report, frame, settings, circumstances)),
+        other_grasp: other_grasp(),
     })
 }
 

@@ -4,7 +4,7 @@ use std::{sync::LazyLock, time::Duration};
 
 use clap::{ValueEnum, builder::PossibleValue};
 use glam::Vec3;
-use grasp_client::{BendRatios, Choice, Digit, GraspType, Handedness, Strategy, Validity};
+use grasp_client::{BendRatios, Choice, Digit, GraspType, Handedness, Hands, Strategy, Validity};
 
 use crate::format::name_of;
 
@@ -167,6 +167,24 @@ impl From<ChoiceName> for Choice {
         match name {
             ChoiceName::First => Self::FirstValid,
             ChoiceName::Best => Self::BestWithinBudget,
+        }
+    }
+}
+
+/// How many of the receiver's hands take the object.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum HandsName {
+    /// The receiving hand alone.
+    One,
+    /// Left and right hand together, for what one hand cannot hold.
+    Both,
+}
+
+impl From<HandsName> for Hands {
+    fn from(name: HandsName) -> Self {
+        match name {
+            HandsName::One => Self::One,
+            HandsName::Both => Self::Both,
         }
     }
 }

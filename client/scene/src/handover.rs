@@ -85,7 +85,9 @@ pub struct HandoverScene<'a> {
     pub giver: Option<PosedHand<'a>>,
     /// The receiving hand.
     pub receiver: Option<PosedHand<'a>>,
-    /// Contacts of the receiving hand.
+    /// The receiver's other hand.
+    pub other_receiver: Option<PosedHand<'a>>,
+    /// Contacts of the receiver's hands.
     pub contacts: Vec<ContactMark>,
 }
 
@@ -100,17 +102,24 @@ impl<'a> HandoverScene<'a> {
             object_finish: Finish::Satin,
             giver: None,
             receiver: None,
+            other_receiver: None,
             contacts: Vec::new(),
         }
     }
 
-    /// The scene: parts `object`, `giver_hand`, `giver_nails`, `giver_sleeve`, the same for `receiver`, and for each
+    /// The scene: parts `object`, `giver_hand`, `giver_nails`, `giver_sleeve`, the same for `receiver` and `other_receiver`, and for each
     /// contact `contact_thumb_third` and `force_thumb_third` or the like, with the force in newtons as extras.
     pub fn to_scene(&self) -> Scene {
         let mut parts = vec![self.object_part()];
         let hands = [
             ("giver", &self.giver, Complexion::FAIR, GIVER_SLEEVE),
             ("receiver", &self.receiver, Complexion::BROWN, RECEIVER_SLEEVE),
+            (
+                "other_receiver",
+                &self.other_receiver,
+                Complexion::BROWN,
+                RECEIVER_SLEEVE,
+            ),
         ];
         for (who, hand, complexion, sleeve_colour) in hands {
             if let Some(PosedHand { skin, joints }) = hand {
@@ -250,7 +259,7 @@ impl ContactMark {
 fn importance(part: &Part, contacts: usize) -> f32 {
     match part.name.as_str() {
         "object" => 2.0,
-        "receiver_hand" => 1.0,
+        "receiver_hand" | "other_receiver_hand" => 1.0,
         "giver_hand" => 0.6,
         name if name.starts_with("contact_") => 2.0 / contacts.max(1) as f32,
         _ => 0.0,

@@ -22,8 +22,8 @@ use crate::{
     score::{Score, ScoreTerm},
     search::{
         AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-        Limit, LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport,
-        Step, StepTime, Strategy, Validity,
+        Hands, Limit, LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount,
+        SearchReport, Step, StepTime, Strategy, Validity,
     },
 };
 
@@ -76,6 +76,12 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         plan_key_frames: request.plan_key_frames,
         other_hands: request.other_hands.iter().map(presenting_hand_to_wire).collect(),
         obstacles: request.obstacles.iter().map(obstacle_to_wire).collect(),
+        hands: match request.hands {
+            None => v1::Hands::Unspecified,
+            Some(Hands::One) => v1::Hands::One,
+            Some(Hands::Both) => v1::Hands::Both,
+        }
+        .into(),
     }
 }
 
@@ -173,6 +179,14 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
         .map(grasp_from_wire)
         .transpose()
         .map_err(|malformed| malformed.within("grasp"))?;
+    let other_grasp = answer
+        .other_grasp
+        .map(grasp_from_wire)
+        .transpose()
+        .map_err(|malformed| malformed.within("other_grasp"))?;
+    if grasp.is_none() && other_grasp.is_some() {
+        return Err(Malformed::new("other_grasp", "is present without grasp"));
+    }
     let (outcome, grasp) = match (v1::Outcome::try_from(answer.outcome), grasp) {
         (Ok(v1::Outcome::Found), Some(grasp)) => (Outcome::Found, Some(grasp)),
         (Ok(v1::Outcome::Found), None) => return Err(Malformed::missing("grasp")),
@@ -192,6 +206,7 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
     Ok(FindAnswer {
         outcome,
         grasp,
+        other_grasp,
         report,
     })
 }

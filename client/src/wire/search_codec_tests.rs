@@ -19,6 +19,7 @@ fn wire_answer() -> v1::FindGraspResponse {
     v1::FindGraspResponse {
         outcome: v1::Outcome::Found.into(),
         grasp: Some(wire_grasp()),
+        other_grasp: None,
         report: Some(wire_report()),
     }
 }
@@ -288,6 +289,9 @@ fn rejects_grasp_that_contradicts_outcome() {
     assert_eq!(path_of(with_grasp.clone()), "grasp");
     with_grasp.outcome = 42;
     assert_eq!(path_of(with_grasp), "outcome");
+    let mut with_other_grasp = wire_answer();
+    with_other_grasp.other_grasp = with_other_grasp.grasp.take();
+    assert_eq!(path_of(with_other_grasp), "other_grasp");
 }
 
 #[test]
@@ -325,6 +329,7 @@ fn default_request_leaves_everything_to_the_server() {
     assert_eq!(wire.validity(), v1::Validity::Unspecified);
     assert_eq!(wire.choice(), v1::Choice::Unspecified);
     assert_eq!(wire.atlas(), v1::AtlasUse::Unspecified);
+    assert_eq!(wire.hands(), v1::Hands::Unspecified);
     assert_eq!(wire.constraints, None);
     assert!(!wire.plan_key_frames);
     assert!(wire.other_hands.is_empty() && wire.obstacles.is_empty());
@@ -376,6 +381,7 @@ fn converts_every_field_of_a_request() {
         plan_key_frames: true,
         other_hands: vec![hand(Handedness::Left), hand(Handedness::Right)],
         obstacles: vec![Obstacle::capsule(Vec3::X, Vec3::Y, 0.1)],
+        hands: Some(Hands::Both),
         ..FindRequest::new("objects/remote")
     };
     let wire = find_request_to_wire(&request);
@@ -405,5 +411,6 @@ fn converts_every_field_of_a_request() {
     );
     assert_ne!(wire.other_hands[0], wire.other_hands[1]);
     assert_eq!(wire.obstacles, [obstacle_to_wire(&request.obstacles[0])]);
+    assert_eq!(wire.hands(), v1::Hands::Both);
     assert_eq!(wire.constraints.unwrap().max_comfort_e, Some(0.25));
 }

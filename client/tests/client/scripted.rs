@@ -93,6 +93,7 @@ impl GraspService for Scripted {
                     .or(Some(prost_types::Duration::default())),
                 ..v1::SearchReport::default()
             }),
+            other_grasp: None,
         }))
     }
 }

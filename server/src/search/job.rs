@@ -130,7 +130,7 @@ impl FindJob {
             .filter(|atlas| !query.reproducible || atlas.is_complete());
         let seeds = match &atlas {
             Some(atlas) => SeedSource::Atlas(Arc::clone(atlas)),
-            None if query.strategy.uses_known_grips(query.validity) => {
+            None if query.uses_seeds() => {
                 let transferred = self.stored.transferred_grips(query.receiving_hand);
                 transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)
             }
@@ -144,6 +144,7 @@ impl FindJob {
                 friction: query.friction,
                 constraints: query.constraints.transformed(object_from_client),
                 choice: query.choice,
+                other_hand: query.other_hand.map(|hand| hand.rig.clone()),
             },
             known: Known {
                 // A replay runs one attempt and tries no known grips.

@@ -55,6 +55,8 @@ pub(crate) struct FindQuery {
     pub obstacles: Vec<Obstacle>,
     /// The hand to pose.
     pub receiving_hand: &'static Hand,
+    /// The receiver's other hand, if both take the object.
+    pub other_hand: Option<&'static Hand>,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
     /// Requested budget.
@@ -95,7 +97,12 @@ pub(crate) struct FindQuery {
 impl FindQuery {
     /// True if the search uses known grips.
     pub(crate) fn uses_atlas(&self) -> bool {
-        self.allows_atlas && self.strategy.uses_known_grips(self.validity)
+        self.allows_atlas && self.uses_seeds()
+    }
+
+    /// True if its attempts use what is known about the object or similar ones.
+    pub(crate) fn uses_seeds(&self) -> bool {
+        self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }
 }
 
@@ -171,6 +178,12 @@ pub(crate) fn find_query(
             "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer depends on the speed of the machine; use one of them",
         );
     }
+    let takes_both_hands = takes_both_hands(
+        known(Field::root("hands"), request.hands, v),
+        (strategy, validity),
+        request.plan_key_frames,
+        v,
+    );
     if let (false, Some(id)) = (violations.is_empty(), &object_id)
         && !object_exists(id)
     {
@@ -188,6 +201,9 @@ pub(crate) fn find_query(
         other_hands,
         obstacles,
         receiving_hand,
+        other_hand: takes_both_hands
+            .then(|| hand::other_hand(receiving_hand))
+            .flatten(),
         up,
         budget,
         is_patient,
@@ -206,6 +222,32 @@ pub(crate) fn find_query(
         is_replay: request.only_attempt.is_some(),
         plan_key_frames: request.plan_key_frames,
     })
+}
+
+/// True if both hands take the object.
+fn takes_both_hands(
+    hands: v1::Hands,
+    searched: (Strategy, Validity),
+    plan_key_frames: bool,
+    violations: &mut Violations,
+) -> bool {
+    match hands {
+        v1::Hands::Unspecified | v1::Hands::One => return false,
+        v1::Hands::Both => {}
+    }
+    if searched != (Strategy::Guided, Validity::Physical) {
+        violations.add(
+            Field::root("hands"),
+            "is HANDS_BOTH, which requires VALIDITY_PHYSICAL and STRATEGY_GUIDED; use these or HANDS_ONE",
+        );
+    }
+    if plan_key_frames {
+        violations.add(
+            Field::root("plan_key_frames"),
+            "is true with HANDS_BOTH, for which no motion is planned; leave it out or use HANDS_ONE",
+        );
+    }
+    true
 }
 
 /// Index of the first attempt, and the number of attempts.

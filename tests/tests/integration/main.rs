@@ -2,6 +2,7 @@
 
 mod atlases;
 mod barriers;
+mod both_hands;
 mod budget;
 mod constraints;
 mod conventions;

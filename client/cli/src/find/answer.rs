@@ -22,13 +22,13 @@ pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_se
             },
         ),
     ];
-    if let Some(grasp) = &answer.grasp {
+    for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
         lines.extend(describe_grasp(grasp));
     }
     lines.extend(describe_search(report));
     lines.push(("round trip", human_time(round_trip_seconds)));
     let mut text = pairs(&lines);
-    if let Some(grasp) = &answer.grasp {
+    for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
         let _ = write!(text, "\n\n{}", contact_table(grasp));
     }
     text

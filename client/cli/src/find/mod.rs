@@ -23,8 +23,8 @@ use crate::{
     picture::{Model, Picture, write_file},
     server_options::ServerOptions,
     values::{
-        BendRatiosName, ChoiceName, HandName, StrategyName, ValidityName, ViewSize, parse_duration,
-        parse_view_size,
+        BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
+        parse_duration, parse_view_size,
     },
 };
 
@@ -45,7 +45,7 @@ API's FindGraspRequest; only "object" is required:
     "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
     "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
     "record_step_times": false, "convention": "openxr", "friction": null,
-    "choice": "first_valid", "atlas": "allowed", "plan_key_frames": false,
+    "choice": "first_valid", "atlas": "allowed", "plan_key_frames": false, "hands": "one",
     "other_hands": [{"angles": {…}}, …up to three],
     "obstacles": [
       {"box": {"client_from_box": {"position": [0, 0.7, 0]}, "half_extents": [0.6, 0.02, 0.4]}},
@@ -64,7 +64,7 @@ headset does not report is 0. Metres, radians, quaternions x y z w. Options on t
 sending it, as a template.
 
 With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
-"round_trip_seconds": …} with the fields of the API's FindGraspResponse; durations are numbers of seconds, the seed is
+"round_trip_seconds": …}, and "other_grasp" for both hands, with the fields of the API's FindGraspResponse; durations are numbers of seconds, the seed is
 a string of digits."#;
 
 /// Ask for a grasp on an object that is held out.
@@ -118,6 +118,9 @@ pub(crate) struct Arguments {
     /// The rig of the hand to pose. Default: the server's.
     #[arg(long, value_name = "RIG")]
     receiving_rig: Option<String>,
+    /// How many hands take the object. Default: one.
+    #[arg(long, value_name = "HOW_MANY", conflicts_with = "key_frames")]
+    hands: Option<HandsName>,
     /// Coefficient of static friction. Default: the object's.
     #[arg(long, value_name = "MU")]
     friction: Option<f32>,
@@ -175,9 +178,9 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         round_trip_seconds: start.elapsed().as_secs_f64(),
     };
     if let Some(picture) = picture
-        && let Some(grasp) = &timed.answer.grasp
+        && timed.answer.grasp.is_some()
     {
-        let picture = picture.with_grasp(Some(grasp.clone()));
+        let picture = picture.with_hands(&timed.answer);
         draw(picture, arguments.view_size, arguments.png, arguments.glb).await?;
     }
     output.write(&timed, |timed| {
@@ -238,6 +241,7 @@ impl Arguments {
         }
         request.record_step_times |= self.step_times;
         request.plan_key_frames |= self.key_frames;
+        request.hands = self.hands.map(Into::into).or(request.hands);
         request.friction = self.friction.or(request.friction);
         self.constraints.override_in(&mut request.constraints);
         let receiver = &mut request.receiving_hand;

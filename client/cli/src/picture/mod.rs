@@ -7,7 +7,7 @@ mod model;
 use std::path::Path;
 
 use glam::Vec3;
-use grasp_client::{Contact, Convention, Digit, FindRequest, Grasp, Phalanx};
+use grasp_client::{Contact, Convention, Digit, FindAnswer, FindRequest, Grasp, Phalanx};
 use grasp_scene::{ContactMark, HandoverScene, Image, PosedHand, RenderOptions, to_glb};
 use grasp_synthesis::model::hand;
 
@@ -20,6 +20,7 @@ pub(crate) struct Picture {
     model: Model,
     request: FindRequest,
     grasp: Option<Grasp>,
+    other_grasp: Option<Grasp>,
 }
 
 impl Picture {
@@ -34,12 +35,17 @@ impl Picture {
             model,
             request,
             grasp: None,
+            other_grasp: None,
         })
     }
 
-    /// Adds the grasp, if there is one.
-    pub(crate) fn with_grasp(self, grasp: Option<Grasp>) -> Self {
-        Self { grasp, ..self }
+    /// Adds the hand or hands of an answer.
+    pub(crate) fn with_hands(self, answer: &FindAnswer) -> Self {
+        Self {
+            grasp: answer.grasp.clone(),
+            other_grasp: answer.other_grasp.clone(),
+            ..self
+        }
     }
 
     /// Two views side by side, each of this size.
@@ -73,14 +79,16 @@ impl Picture {
             .as_ref()
             .map(hands::giver)
             .transpose()?;
-        let receiver = self.grasp.as_ref().map(hands::receiver).transpose()?;
-        let contacts = self.grasp.iter().flat_map(|grasp| &grasp.contacts);
+        let receiver = |grasp: &Option<Grasp>| grasp.as_ref().map(hands::receiver).transpose();
+        let hands = self.grasp.iter().chain(&self.other_grasp);
+        let contacts = hands.flat_map(|grasp| &grasp.contacts);
         Ok(HandoverScene {
             forbidden: self.model.forbidden(),
             object_colour: self.model.colour(),
             object_finish: self.model.finish(),
             giver,
-            receiver,
+            receiver: receiver(&self.grasp)?,
+            other_receiver: receiver(&self.other_grasp)?,
             contacts: contacts.map(mark).collect(),
             ..HandoverScene::new(
                 self.model.mesh(),

@@ -192,6 +192,40 @@ async fn prints_what_the_server_repaired() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn both_hands_are_listed_and_drawn() {
+    let url = real_server().await;
+    let folder = empty_folder("both_hands");
+    let (request, glb) = (folder.join("request.json"), folder.join("grasp.glb"));
+    std::fs::write(&request, r#"{"object": "objects/remote", "seed": "1"}"#).unwrap();
+    let output = run(&[
+        "find",
+        "--request",
+        request.to_str().unwrap(),
+        "--hands",
+        "both",
+        "--budget",
+        "10s",
+        "--json",
+        "--glb",
+        glb.to_str().unwrap(),
+        "--server",
+        &url,
+    ]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let answer = json(&output.stdout);
+    assert_eq!(answer["grasp"]["handedness"], "right");
+    assert_eq!(answer["other_grasp"]["handedness"], "left");
+    let scene = std::fs::read(glb).unwrap();
+    for part in ["receiver_hand", "other_receiver_hand", "other_receiver_sleeve"] {
+        let name = format!("\"{part}\"");
+        assert!(
+            scene.windows(name.len()).any(|bytes| bytes == name.as_bytes()),
+            "{part}"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn rejects_picture_without_mesh_before_the_search() {
     let folder = empty_folder("a_picture_without_a_mesh");
     let request = folder.join("request.json");

@@ -135,7 +135,7 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
         pose(2.0),
         proptest::option::of(vector(1.0)),
         (0..8_i32, 0..8_i32, 0..6_i32),
-        any::<(Option<u64>, Option<u64>, bool)>(),
+        any::<(Option<u64>, Option<u64>, bool, bool)>(),
         proptest::option::of(number(0.05..2.0)),
     )
         .prop_map(
@@ -144,7 +144,7 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
                 client_from_object,
                 up,
                 enums,
-                (seed, only_attempt, reproducible),
+                (seed, only_attempt, reproducible, both_hands),
                 friction,
             )| {
                 v1::FindGraspRequest {
@@ -160,7 +160,13 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
                     only_attempt,
                     reproducible,
                     friction,
-                    plan_key_frames: true,
+                    plan_key_frames: !both_hands,
+                    hands: if both_hands {
+                        v1::Hands::Both
+                    } else {
+                        v1::Hands::One
+                    }
+                    .into(),
                     other_hands: other_hand.into_iter().collect(),
                     obstacles,
                     ..Default::default()
@@ -203,6 +209,7 @@ fn answers_every_request_that_passes_validation() {
         let mut counts = searched.get();
         counts[kind] += 1;
         searched.set(counts);
+        let takes_both = query.other_hand.is_some();
         let budgets = config::Config::default().budgets;
         let job = FindJob {
             budget: effective_budget(query.budget, budgets, budgets.minimum_reserve, arrived, None),
@@ -228,6 +235,7 @@ fn answers_every_request_that_passes_validation() {
                     answer.grasp.is_some(),
                     answer.outcome == i32::from(v1::Outcome::Found)
                 );
+                prop_assert_eq!(answer.other_grasp.is_some(), answer.grasp.is_some() && takes_both);
                 for joint in answer.grasp.iter().flat_map(|grasp| &grasp.joints) {
                     let pose = joint.client_from_joint.expect("every joint has a pose");
                     let position = pose.position.expect("every pose has a position");

@@ -75,6 +75,11 @@ pub(super) fn receiving_hand(
     built_in(field.child("rig"), rig, handedness, violations)
 }
 
+/// The same person's other hand.
+pub(super) fn other_hand(hand: &Hand) -> Option<&'static Hand> {
+    hands::hand(&hand.rig.name, hand.rig.handedness.other())
+}
+
 fn built_in(
     field: Field<'_>,
     rig: &str,

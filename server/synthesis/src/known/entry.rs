@@ -102,8 +102,11 @@ impl Entry {
 
     /// A grasp as a known grip for other holdouts of its object, under the friction that it was found with.
     /// Its scores by gravity and its finger subsets are unknown. None if the grasp is not valid under
-    /// `PHYSICAL`.
+    /// `PHYSICAL`, or takes two hands.
     pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
+        if grasp.other_hand.is_some() {
+            return None;
+        }
         let margins = grasp.margins?;
         let Score { mut values } = grasp.score?;
         for (term, value) in Term::ALL.into_iter().zip(&mut values) {

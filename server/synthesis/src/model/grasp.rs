@@ -50,6 +50,9 @@ pub struct Grasp {
     /// path
     /// exists.
     pub key_frames: Option<[KeyFrame; 3]>,
+    /// The hand that holds the object together with this one, if it takes two. The forces of both balance the weight, and
+    /// residual, epsilon and wrench angle of both grasps are those of all contacts together.
+    pub other_hand: Option<Box<Grasp>>,
 }
 
 /// The margins by which a grasp passes the checks of `PHYSICAL` validity.

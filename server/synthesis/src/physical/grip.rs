@@ -75,6 +75,17 @@ impl Grip {
     }
 }
 
+/// Whether a hand has to hold the object alone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Holding {
+    /// Its contacts need closure.
+    #[default]
+    Alone,
+    /// Another hand's contacts complete its own: closure is left to [`super::both_hands`], and its grips have an epsilon
+    /// of 0.
+    Shared,
+}
+
 /// Closes hands. Keeps its buffers from one call to the next.
 #[derive(Clone, Debug, Default)]
 pub struct Gripper {
@@ -82,6 +93,7 @@ pub struct Gripper {
     pub posed: Vec<DigitAngles>,
     /// Contacts of the hand.
     pub contacts: Vec<Contact>,
+    holding: Holding,
     obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
@@ -91,6 +103,14 @@ pub struct Gripper {
 }
 
 impl Gripper {
+    /// Closes hands that hold together with another.
+    pub fn sharing() -> Self {
+        Self {
+            holding: Holding::Shared,
+            ..Self::default()
+        }
+    }
+
     /// Closes a proposed hand; its contacts are in `contacts` afterwards. With `presented`, hands that come too close
     /// to its barriers are rejected on the way.
     ///
@@ -184,7 +204,10 @@ impl Gripper {
         stopwatch.lap(Step::ContactValidation);
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
-        let epsilon = are_opposed(&self.contacts).then(|| self.closure(scene)).flatten();
+        let epsilon = match self.holding {
+            Holding::Alone => are_opposed(&self.contacts).then(|| self.closure(scene)).flatten(),
+            Holding::Shared => Some(0.0),
+        };
         stopwatch.lap(Step::ImmobilityValidation);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         if interrupted() {

@@ -2,9 +2,11 @@
 //!
 //! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
 //! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
-//! ([`immobility`]). A [`grip`] is a hand closed on an object, clear of [`barriers`].
+//! ([`immobility`]). A [`grip`] is a hand closed on an object, clear of [`barriers`]; [`both_hands`] hold what is too large
+//! for one.
 
 pub mod barriers;
+pub mod both_hands;
 mod closer;
 pub mod closing;
 pub mod contacts;
@@ -15,3 +17,4 @@ pub mod obstacle;
 pub mod scene;
 pub mod shape;
 pub mod solids;
+pub mod stance;

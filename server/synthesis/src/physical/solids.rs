@@ -15,6 +15,7 @@ mod tracked_solids;
 
 pub use crate::physical::solids::flesh::{PALM_SOLIDS, THENAR_SOLIDS};
 pub use crate::physical::solids::hand_clearance::{Bounded, SOFT_CONTACT, self_clearance};
+pub(super) use crate::physical::solids::hand_solids::FOREARM_LENGTH;
 pub use crate::physical::solids::hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
 pub use crate::physical::solids::mesh_clearance::{Touch, clearance, closest, comes_within};
 pub use crate::physical::solids::prepared_hand::PreparedHand;

@@ -5,7 +5,9 @@
 //! matches the two and prefers hands that are likely to hold ([`success_prior`]). Whether a hand fits at the object does
 //! not depend on the giver, so the first attempts choose from placements sampled once ([`placement_cache`]). Proposals
 //! pass no check here; a hand that nearly passes them is perturbed a few times (`PhysicalAttempt::hold_or_refine`).
+//! What takes two hands is held on both sides of its centre of mass ([`both_hands`]).
 
+pub mod both_hands;
 pub mod holdable;
 pub mod opposition;
 pub mod placement_cache;

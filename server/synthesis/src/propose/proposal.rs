@@ -34,10 +34,13 @@ const THICKNESS_TOLERANCE: [f32; 2] = [0.006, 0.012];
 const MAX_PALM_TILT: f32 = 0.35;
 
 /// Largest number of locations (surface pairs or points) tried per proposal until the hand fits at one.
-const MAX_LOCATIONS: usize = 12;
+pub(super) const MAX_LOCATIONS: usize = 12;
 
 /// Largest number of rotations of the hand tried at a location.
 const MAX_ROTATIONS: usize = 10;
+
+/// Largest number of rotations drawn until [`MAX_ROTATIONS`] are admitted. An admission is cheap compared with a fit.
+const MAX_DRAWN_ROTATIONS: usize = 48;
 
 /// Candidates sampled per proposal and ordered by the success prior. With half or twice as many, searches take longer.
 const COMPARED: usize = 64;
@@ -124,6 +127,14 @@ impl<'a> Candidate<'a> {
     }
 }
 
+/// Draws the shape of a hand that holds in the palm: all digits close.
+pub(super) fn palm_shape(stream: &mut AttemptStream) -> HandShape {
+    HandShape {
+        closing: [true; 5],
+        ..draw_shape(f32::INFINITY, stream)
+    }
+}
+
 /// Draws a proposal, preferring hands that are likely to hold. Returns `None` if no sampled hand fits, or if interrupted.
 pub fn propose(
     context: &ProposalContext<'_>,
@@ -173,9 +184,23 @@ impl<'a> ProposalContext<'a> {
     /// fits. Returns `None` if no rotation does.
     pub fn fitting_candidate(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
         let pair = self.free_pair(stream)?;
+        self.candidate_on(pair, |_| true, stream)
+    }
+
+    /// Places a hand on a pair as [`Self::fitting_candidate`] does, at a wrist pose that `admits` accepts.
+    pub(super) fn candidate_on(
+        &self,
+        pair: SurfacePair,
+        admits: impl Fn(Pose) -> bool,
+        stream: &mut AttemptStream,
+    ) -> Option<Candidate<'a>> {
         let opposition = self.opposition_for(&pair, stream)?;
-        (0..MAX_ROTATIONS)
-            .map(|_| self.settled(Candidate::draw(opposition, pair, stream), stream))
+        (0..MAX_DRAWN_ROTATIONS)
+            .filter_map(|_| {
+                let candidate = Candidate::draw(opposition, pair, stream);
+                admits(candidate.object_from_wrist).then(|| self.settled(candidate, stream))
+            })
+            .take(MAX_ROTATIONS)
             .find(|candidate| self.fits(candidate))
     }
 
@@ -293,14 +318,14 @@ impl<'a> ProposalContext<'a> {
     }
 
     /// A pair clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
-    fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
+    pub(super) fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
         (0..MAX_DRAWS)
             .map_while(|_| self.surface.pair(stream))
             .find(|pair| pair.is_free_of(self.barriers))
     }
 
     /// A point clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
-    fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
+    pub(super) fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
         (0..MAX_DRAWS)
             .map_while(|_| self.surface.point(stream))
             .find(|point| point.is_free_of(self.barriers))
@@ -336,13 +361,22 @@ impl<'a> ProposalContext<'a> {
             .find_map(|_| self.palm_on_point(stream))
     }
 
-    /// Places the palm over a point of the surface, facing it, and rotates it until palm and forearm fit.
+    /// Places the palm over a free point of the surface.
     fn palm_on_point(&self, stream: &mut AttemptStream) -> Option<Proposal> {
-        let shape = HandShape {
-            closing: [true; 5],
-            ..draw_shape(f32::INFINITY, stream)
-        };
+        let shape = palm_shape(stream);
         let point = self.free_point(stream)?;
+        self.palm_on(point, shape, |_| true, stream)
+    }
+
+    /// Places the palm over a point of the surface, facing it, and rotates it until palm and forearm fit and `admits`
+    /// accepts the wrist pose at which it touches.
+    pub(super) fn palm_on(
+        &self,
+        point: SurfacePoint,
+        shape: HandShape,
+        admits: impl Fn(Pose) -> bool,
+        stream: &mut AttemptStream,
+    ) -> Option<Proposal> {
         let (a, b) = point.normal.any_orthonormal_pair();
         let tilted = point.normal
             + a * stream.between(-MAX_PALM_TILT, MAX_PALM_TILT)
@@ -354,16 +388,22 @@ impl<'a> ProposalContext<'a> {
         let across = stream.between(PALM_OFFSETS[0][0], PALM_OFFSETS[0][1]);
         let along = stream.between(PALM_OFFSETS[1][0], PALM_OFFSETS[1][1]);
         let contact = self.rig.palm + Vec3::new(across, along, 0.0);
-        (0..MAX_ROTATIONS).find_map(|_| {
+        let rotated = |_| {
             let turn = stream.between(0.0, TAU);
             let y = a * turn.cos() + b * turn.sin();
             let orientation = Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z)).normalize();
-            let touching = Pose::new(point.position - orientation * contact, orientation);
-            self.palm_fits(touching).then_some(Proposal {
-                object_from_wrist: Pose::new(touching.position - z * PALM_START_HEIGHT, orientation),
-                shape,
-                advance: 2.0 * PALM_START_HEIGHT,
-            })
+            Pose::new(point.position - orientation * contact, orientation)
+        };
+        let touching = (0..MAX_DRAWN_ROTATIONS)
+            .map(rotated)
+            .filter(|touching| admits(*touching))
+            .take(MAX_ROTATIONS)
+            .find(|touching| self.palm_fits(*touching))?;
+        let position = touching.position - z * PALM_START_HEIGHT;
+        Some(Proposal {
+            object_from_wrist: Pose::new(position, touching.orientation),
+            shape,
+            advance: 2.0 * PALM_START_HEIGHT,
         })
     }
 

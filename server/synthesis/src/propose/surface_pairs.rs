@@ -164,6 +164,11 @@ impl SurfacePairs {
         &self.points
     }
 
+    /// Share of the surface that lies opposite a part within a hand's span, from 0 to 1.
+    pub fn spanned_share(&self) -> f32 {
+        self.pairs.len() as f32 / self.points.len().max(1) as f32
+    }
+
     /// Size of pairs and points, in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(self.pairs.as_slice()) + size_of_val(self.points.as_slice())

@@ -52,26 +52,17 @@ impl GraspContext<'_> {
         stopwatch: &mut impl Stopwatch,
     ) -> Result<Box<Grasp>, NoGrip> {
         let Self {
-            object,
-            presented,
-            rig,
-            constraints,
+            object, presented, ..
         } = self;
-        let contacts = &gripper.contacts;
-        let classification = classify(rig, &grip.pose, contacts);
-        if !constraints.admits_contacts(contacts) || !constraints.admits_type(classification.grasp_type) {
-            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
-        }
+        let classification = self.classified(grip, &gripper.contacts)?;
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
         let load = object.load(&gripper.soft_contacts, presented.up);
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        let tracked = TrackedSolids::of_rig(rig, grip.pose.frame_from_wrist, solids);
-        let clearances = clear_of_barriers(&tracked, presented.barriers());
-        let clearances = clearances.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
-        let mut grasp = unscored_grasp(
+        let clearances = self.clearances(grip, solids)?;
+        let grasp = unscored_grasp(
             grip,
             &gripper.contacts,
             classification,
@@ -80,13 +71,49 @@ impl GraspContext<'_> {
             presented,
             clearances,
         );
+        let relative_closure = gripper.relative_closure(object, grip.epsilon);
+        self.rated(grasp, relative_closure, solids).map(Box::new)
+    }
+
+    /// The grip's type, if the constraints admit it and the contacts.
+    pub(super) fn classified(&self, grip: &Grip, contacts: &[Contact]) -> Result<Classification, NoGrip> {
+        let classification = classify(self.rig, &grip.pose, contacts);
+        if !self.constraints.admits_contacts(contacts)
+            || !self.constraints.admits_type(classification.grasp_type)
+        {
+            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+        }
+        Ok(classification)
+    }
+
+    /// The hand's distances from what it keeps clear of.
+    pub(super) fn clearances(&self, grip: &Grip, solids: &HandSolids) -> Result<BarrierClearances, NoGrip> {
+        let tracked = TrackedSolids::of_rig(self.rig, grip.pose.frame_from_wrist, solids);
+        let clearances = clear_of_barriers(&tracked, self.presented.barriers());
+        clearances.ok_or(NoGrip::Rejected(Rejection::FingerCollision))
+    }
+
+    /// The grasp with its score, if the constraints admit it. `relative_closure` is the epsilon of the contacts as a
+    /// multiple of the required one.
+    pub(super) fn rated(
+        &self,
+        mut grasp: Grasp,
+        relative_closure: f32,
+        solids: &HandSolids,
+    ) -> Result<Grasp, NoGrip> {
+        let Self {
+            object,
+            presented,
+            rig,
+            constraints,
+        } = self;
         let grip_values = grip_values(
             object,
             rig,
-            &grip.pose,
+            &grasp.pose,
             &grasp.contacts,
-            classification,
-            gripper.relative_closure(object, grip.epsilon),
+            grasp.classification,
+            relative_closure,
             solids,
         );
         grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
@@ -94,7 +121,7 @@ impl GraspContext<'_> {
         if !constraints.admits(&grasp) {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
-        Ok(Box::new(grasp))
+        Ok(grasp)
     }
 }
 
@@ -128,6 +155,7 @@ pub fn unscored_grasp(
         classification,
         score: None,
         key_frames: None,
+        other_hand: None,
     }
 }
 
@@ -145,5 +173,6 @@ pub fn thesis_grasp(rig: &Rig, held: HeldObject) -> Grasp {
         margins: None,
         score: None,
         key_frames: None,
+        other_hand: None,
     }
 }

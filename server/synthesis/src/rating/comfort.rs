@@ -6,12 +6,14 @@ use crate::model::{forces::COMFORTABLE_SHARES, grasp::Contact};
 
 /// E of Eq. 4.6: squared distance of the digits' force shares from the comfortable ones; 0 is most comfortable.
 ///
-/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact, and at least one is
-/// positive. D' are the comfortable shares of the touching digits, normalized to sum 1. The thesis leaves the scale of f
+/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact. If all are, because the
+/// palm of one of two hands bears alone, E is 0. D' are the comfortable shares of the touching digits, normalized to sum 1. The thesis leaves the scale of f
 /// open; f is normalized likewise here, so that E does not depend on the object's weight.
 pub fn comfort(digit_totals: [f32; 5]) -> f32 {
     let total: f32 = digit_totals.iter().sum();
-    debug_assert!(total > 0.0, "no digit applies a force: {digit_totals:?}");
+    if total <= 0.0 {
+        return 0.0;
+    }
     let touching = digit_totals.map(|force| if force > 0.0 { 1.0 } else { 0.0 });
     let z: f32 = COMFORTABLE_SHARES.iter().zip(touching).map(|(d, b)| b * d).sum();
     (0..5)

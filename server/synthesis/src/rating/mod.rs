@@ -3,5 +3,6 @@
 pub mod assessment;
 pub mod comfort;
 pub mod scoring;
+pub mod shared_assessment;
 pub mod stiffness;
 pub mod taxonomy;

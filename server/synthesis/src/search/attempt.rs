@@ -1,7 +1,7 @@
 //! One attempt: places, closes and checks a hand according to strategy and validity. If that fails and seeds
 //! are known, hands perturbed from those follow.
 
-use super::{physical_attempt::PhysicalAttempt, scene::Scene};
+use super::{both_hands::BothHands, physical_attempt::PhysicalAttempt, scene::Scene};
 use crate::{
     base::{
         mechanisms::Mechanism,
@@ -19,6 +19,7 @@ use crate::{
         grip::NoGrip,
         shape::{HandShape, Proposal},
     },
+    propose::prepared::PreparedRig,
     rating::assessment::{GraspContext, thesis_grasp},
     thesis::{
         algorithm_1::{Failure, ThesisAttempt},
@@ -80,6 +81,7 @@ pub struct Attempt {
     posed: Vec<DigitAngles>,
     thesis: ThesisAttempt,
     physical: PhysicalAttempt,
+    both_hands: BothHands,
 }
 
 impl Default for Attempt {
@@ -90,6 +92,7 @@ impl Default for Attempt {
             posed: Vec::with_capacity(5),
             thesis: ThesisAttempt::default(),
             physical: PhysicalAttempt::default(),
+            both_hands: BothHands::default(),
         }
     }
 }
@@ -128,7 +131,8 @@ impl Attempt {
         }
     }
 
-    /// Tries a freshly placed hand, and, if that fails and seeds are known, some hands perturbed from those.
+    /// Tries a freshly placed hand, and, if that fails and seeds are known, some hands perturbed from those; or two hands
+    /// together if the search asks for both.
     /// Calls `interrupted` at least every 50 µs or so of work.
     pub fn run(
         &mut self,
@@ -143,6 +147,9 @@ impl Attempt {
         let Some(around) = scene.surroundings() else {
             return self.try_by_thesis(scene, stream, stopwatch, interrupted);
         };
+        if let Some(other) = scene.other_hand() {
+            return self.try_both_hands(scene, &around, other, stream, stopwatch, interrupted);
+        }
         let end = self.try_physically(scene, &around, stream, stopwatch, interrupted);
         if scene.has_no_seeds() || !matches!(end, AttemptEnd::Rejected { .. }) {
             return end;
@@ -231,6 +238,30 @@ impl Attempt {
             physical.hold(around, &proposal, stopwatch, interrupted)
         };
         self.posed.extend_from_slice(&physical.gripper.posed);
+        held.map_or_else(AttemptEnd::from, AttemptEnd::Valid)
+    }
+
+    /// Two hands that hold the object together.
+    fn try_both_hands(
+        &mut self,
+        scene: &Scene<'_>,
+        around: &GraspContext<'_>,
+        other: &PreparedRig,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> AttemptEnd {
+        let around_other = GraspContext {
+            rig: other,
+            ..*around
+        };
+        let hands = &mut self.both_hands;
+        let contexts = [around, &around_other];
+        let held = hands.hold(scene, contexts, other, stream, stopwatch, interrupted);
+        if let Some(placed) = hands.placed {
+            self.wrist = WristFrame::new(placed);
+        }
+        self.posed.extend_from_slice(&hands.first.posed);
         held.map_or_else(AttemptEnd::from, AttemptEnd::Valid)
     }
 

@@ -271,8 +271,10 @@ impl<'a> KnownGrips<'a> {
     }
 }
 
-/// The quality of a grasp: its score, or its comfort if it has none.
+/// The quality of a grasp: its score, or its comfort if it has none; for two hands, their mean.
 pub(super) fn grasp_value(grasp: &Grasp) -> f32 {
     let score = grasp.score.as_ref();
-    score.map_or_else(|| comfort_value(grasp.comfort), Score::total)
+    let value = score.map_or_else(|| comfort_value(grasp.comfort), Score::total);
+    let other = grasp.other_hand.as_deref();
+    other.map_or(value, |other| 0.5 * (value + grasp_value(other)))
 }

@@ -2,6 +2,7 @@
 //! stopped.
 
 pub mod attempt;
+mod both_hands;
 pub mod key_frames;
 mod known_grips;
 pub mod limits;

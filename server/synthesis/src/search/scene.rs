@@ -59,6 +59,8 @@ pub struct Scene<'a> {
     /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     seeds: SeedSets,
     mechanisms: Mechanisms,
+    /// The receiver's other hand, if both are to hold the object together.
+    other_hand: Option<PreparedRig>,
 }
 
 impl<'a> Scene<'a> {
@@ -91,6 +93,7 @@ impl<'a> Scene<'a> {
             constraints: query.constraints,
             seeds: SeedSets::new(seeds),
             mechanisms,
+            other_hand: query.other_hand.clone(),
             physical: match query.validity {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
@@ -144,9 +147,19 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// Where `GUIDED` search may place a hand.
+    /// The receiver's other hand, if both are to hold the object together.
+    pub(super) fn other_hand(&self) -> Option<&PreparedRig> {
+        self.other_hand.as_ref()
+    }
+
+    /// Where `GUIDED` search may place the receiving hand.
     pub(super) fn place(&self) -> ProposalContext<'_> {
-        let Task { object, rig, .. } = self.task;
+        self.place_of(self.task.rig)
+    }
+
+    /// Where it may place either hand.
+    pub(super) fn place_of<'b>(&'b self, rig: &'b PreparedRig) -> ProposalContext<'b> {
+        let Task { object, .. } = self.task;
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
         ProposalContext {
             object: object.object(),

@@ -11,6 +11,7 @@ use crate::{
         object::GraspObject,
         strategy::{Choice, Strategy, Validity},
     },
+    propose::prepared::PreparedRig,
 };
 
 /// The settings of a search.
@@ -39,6 +40,8 @@ pub struct Query {
     pub constraints: Constraints,
     /// Which valid grasp is wanted.
     pub choice: Choice,
+    /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
+    pub other_hand: Option<PreparedRig>,
 }
 
 impl Default for Query {
@@ -50,14 +53,15 @@ impl Default for Query {
             friction: None,
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
+            other_hand: None,
         }
     }
 }
 
 impl Query {
-    /// True if known grips may answer it.
+    /// True if known grips, which are of one hand, may answer it.
     pub fn uses_known_grips(&self) -> bool {
-        self.strategy.uses_known_grips(self.validity)
+        self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }
 
     /// The coefficient of friction for grasps on an object.

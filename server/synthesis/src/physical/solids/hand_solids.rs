@@ -20,7 +20,7 @@ use crate::{
 pub const FOREARM_SOLIDS: usize = 2;
 
 /// Modelled length of the forearm behind the wrist, in metres: up to the elbow of an adult.
-const FOREARM_LENGTH: f32 = 0.25;
+pub(in crate::physical) const FOREARM_LENGTH: f32 = 0.25;
 
 /// Half the thickness of the forearm at wrist and far end, as multiples of the wrist's tracked radius (half its
 /// thickness at the crease). The far end has a circumference of 0.30 m for 0.17 m at the wrist, the means of ANSUR

@@ -6,3 +6,4 @@ mod closing;
 mod closure;
 mod hand_solids;
 mod prepared_hand;
+mod stance;

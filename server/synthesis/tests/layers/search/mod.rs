@@ -1,6 +1,7 @@
 //! Whole searches: the race, how it stops, look-ups of known grips, and the key frames of what is found.
 
 mod barriers;
+mod both_hands;
 mod built_in_holdouts;
 mod clear_types;
 mod key_frames;

@@ -1,0 +1,171 @@
+//! Proposals for two hands that hold an object together: each a part of it that one hand can hold or press, on both sides
+//! of its centre of mass.
+//!
+//! Most objects that take two hands are symmetric about an upright plane, and people hold them symmetrically. The mirror
+//! image of a hand is the same person's other hand, so one that fits on one side has a fitting partner on the other.
+
+use glam::{Mat3, Quat, Vec3};
+
+use super::{
+    proposal::{MAX_LOCATIONS, ProposalContext, palm_shape},
+    surface_pairs::{SurfacePair, SurfacePoint},
+};
+use crate::{
+    base::{pose::Pose, random::AttemptStream},
+    model::object::GraspObject,
+    physical::shape::{HandShape, Proposal},
+};
+
+/// Locations drawn per proposal, of which the best is used. More find holds of plain objects sooner, but less varied ones.
+const COMPARED: usize = 4;
+
+/// Share of proposals with the palm on the object where all of it is within a hand's span. Elsewhere, only palms can
+/// hold it.
+const LEAST_PALM_SHARE: f32 = 0.3;
+
+/// Largest rise of an upright plane's normal, as its sine: objects are not held exactly level.
+const MAX_NORMAL_RISE: f32 = 0.5;
+
+/// Smallest distance of a hand from a plane in whose mirror image the other hand holds, in metres: half a hand's breadth.
+const MIN_DISTANCE: f32 = 0.05;
+
+/// Where one of two hands should be.
+#[derive(Clone, Copy, Debug)]
+pub enum Aim {
+    /// Far from the line along `up`, a unit vector, through `centre`, with palms facing it.
+    Outside {
+        /// The object's centre of mass, in metres.
+        centre: Vec3,
+        /// Against gravity.
+        up: Vec3,
+    },
+    /// Near a point, in metres.
+    Near(Vec3),
+}
+
+impl Aim {
+    /// The better, the higher, for opposed pads.
+    fn merit_of_pair(&self, pair: &SurfacePair) -> f32 {
+        let middle = (pair.start + pair.end) * 0.5;
+        match *self {
+            Self::Outside { centre, up } => (middle - centre).reject_from_normalized(up).length(),
+            Self::Near(target) => -middle.distance(target),
+        }
+    }
+
+    /// The better, the higher, for a palm.
+    fn merit_of_point(&self, point: &SurfacePoint) -> f32 {
+        match *self {
+            Self::Outside { centre, up } => {
+                let outward = (point.position - centre).reject_from_normalized(up);
+                outward.normalize_or_zero().dot(point.normal)
+            }
+            Self::Near(target) => -point.position.distance(target),
+        }
+    }
+}
+
+/// A plane in which a hand has its mirror image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mirror {
+    /// A point of the plane, in metres.
+    point: Vec3,
+    /// Its unit normal.
+    normal: Vec3,
+}
+
+impl Mirror {
+    /// The upright planes through the centre of mass, along the axes of the object's bounding box. `up` is a unit
+    /// vector.
+    pub fn of_object(object: &GraspObject, up: Vec3) -> impl Iterator<Item = Self> {
+        let axes = object.bounding_box.object_from_box;
+        Vec3::AXES
+            .map(|axis| axes.transform_vector(axis))
+            .into_iter()
+            .filter(move |axis| axis.dot(up).abs() <= MAX_NORMAL_RISE)
+            .map(|normal| Self {
+                point: object.centre_of_mass,
+                normal,
+            })
+    }
+
+    /// The upright plane through the centre of mass that faces `place`; none if that is above or below it.
+    pub fn facing(object: &GraspObject, up: Vec3, place: Vec3) -> Option<Self> {
+        let outward = (place - object.centre_of_mass).reject_from_normalized(up);
+        outward.try_normalize().map(|normal| Self {
+            point: object.centre_of_mass,
+            normal,
+        })
+    }
+
+    /// True if the other hand has room next to one at `place`.
+    pub fn has_room(&self, place: Vec3) -> bool {
+        (place - self.point).dot(self.normal).abs() >= MIN_DISTANCE
+    }
+
+    /// The mirror image of a point.
+    pub fn point(&self, point: Vec3) -> Vec3 {
+        point - self.normal * (2.0 * (point - self.point).dot(self.normal))
+    }
+
+    /// The wrist pose of the other hand in the mirror image of a hand.
+    pub fn wrist(&self, wrist: Pose) -> Pose {
+        let reflected = |axis: Vec3| {
+            let axis = wrist.transform_vector(axis);
+            axis - self.normal * (2.0 * axis.dot(self.normal))
+        };
+        // The other hand's own x axis is reversed, so that its frame is right-handed too.
+        let axes = Mat3::from_cols(-reflected(Vec3::X), reflected(Vec3::Y), reflected(Vec3::Z));
+        Pose::new(self.point(wrist.position), Quat::from_mat3(&axes).normalize())
+    }
+
+    /// The mirror image of a proposal, for the other hand.
+    pub fn proposal(&self, proposal: &Proposal) -> Proposal {
+        Proposal {
+            object_from_wrist: self.wrist(proposal.object_from_wrist),
+            ..*proposal
+        }
+    }
+}
+
+impl ProposalContext<'_> {
+    /// Proposes one of two hands, with pads or palm on the best of some locations and a wrist pose that `admits` accepts.
+    /// Returns `None` if no sampled hand fits, or if interrupted.
+    pub fn propose_half(
+        &self,
+        aim: Aim,
+        admits: impl Fn(Pose) -> bool,
+        stream: &mut AttemptStream,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<Proposal> {
+        let palm_share = 1.0 - (1.0 - LEAST_PALM_SHARE) * self.surface.spanned_share();
+        let in_palm = stream.unit() < palm_share;
+        (0..MAX_LOCATIONS).take_while(|_| !interrupted()).find_map(|_| {
+            if in_palm {
+                let shape = flat_palm_shape(stream);
+                let point = best_of(|| self.free_point(stream), |point| aim.merit_of_point(point))?;
+                self.palm_on(point, shape, &admits, stream)
+            } else {
+                let pair = best_of(|| self.free_pair(stream), |pair| aim.merit_of_pair(pair))?;
+                Some(self.candidate_on(pair, &admits, stream)?.proposal())
+            }
+        })
+    }
+}
+
+/// Draws the shape of a hand with the palm on what is too wide for one hand: nearly flat under it, so that a thumb far out
+/// of the palm's plane would start inside.
+fn flat_palm_shape(stream: &mut AttemptStream) -> HandShape {
+    let shape = palm_shape(stream);
+    HandShape {
+        thumb_yaw: shape.thumb_yaw * stream.unit(),
+        ..shape
+    }
+}
+
+/// The one with the highest merit of [`COMPARED`] draws.
+fn best_of<T>(mut draw: impl FnMut() -> Option<T>, merit: impl Fn(&T) -> f32) -> Option<T> {
+    (0..COMPARED)
+        .map_while(|_| draw())
+        .max_by(|a, b| merit(a).total_cmp(&merit(b)))
+}

@@ -1,0 +1,229 @@
+//! One attempt at holding an object with both hands: a hand that holds one side of it, and tries for the other hand on
+//! the other side.
+
+use glam::Vec3;
+
+use super::scene::Scene;
+use crate::{
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        rejection::Rejection,
+        stopwatch::{Step, Stopwatch},
+    },
+    model::grasp::Grasp,
+    physical::{
+        both_hands::{HalfGrip, are_clear},
+        grip::{Gripper, NoGrip},
+        immobility::Buffers,
+        shape::Proposal,
+        solids::PreparedHand,
+        stance::suits_one_body,
+    },
+    propose::{
+        both_hands::{Aim, Mirror},
+        prepared::PreparedRig,
+    },
+    rating::{assessment::GraspContext, shared_assessment::assess_both},
+};
+
+/// Hands tried opposite a hand that holds its side. More find holds of lopsided objects sooner, those of others later.
+const OTHER_HANDS: usize = 8;
+
+/// Share of attempts whose first hand must have a mirror image that suits the same body. The others find holds without
+/// symmetry.
+const SYMMETRIC_SHARE: f32 = 0.75;
+
+/// The first hand of an attempt, as far as it got, and the buffers of both.
+#[derive(Clone, Debug)]
+pub(super) struct BothHands {
+    /// Closes the first hand.
+    pub first: Gripper,
+    /// Where the first hand's wrist was placed; none if no placement fits.
+    pub placed: Option<Pose>,
+    other: Gripper,
+    buffers: Buffers,
+}
+
+impl Default for BothHands {
+    fn default() -> Self {
+        Self {
+            first: Gripper::sharing(),
+            placed: None,
+            other: Gripper::sharing(),
+            buffers: Buffers::default(),
+        }
+    }
+}
+
+/// A first hand that holds its side, and what the other hand needs to know of it.
+struct First<'a> {
+    around: &'a GraspContext<'a>,
+    proposal: Proposal,
+    half: HalfGrip,
+    /// Its solids as an obstacle.
+    obstacle: PreparedHand,
+    /// The middle of its contacts.
+    place: Vec3,
+}
+
+impl BothHands {
+    /// Draws and closes a hand, then up to [`OTHER_HANDS`] other hands until one holds together with it.
+    ///
+    /// # Errors
+    /// The first failed check of the first hand, or of the last other hand; or the stop signal.
+    pub(super) fn hold(
+        &mut self,
+        scene: &Scene<'_>,
+        [around, around_other]: [&GraspContext<'_>; 2],
+        other_rig: &PreparedRig,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<Box<Grasp>, NoGrip> {
+        self.placed = None;
+        self.first.posed.clear();
+        let first = self.hold_first(scene, around, around_other, stream, stopwatch, interrupted)?;
+        let object = around.object.object;
+        let up = around.presented.up;
+        let mirrors: Vec<Mirror> = Mirror::facing(object, up, first.place)
+            .into_iter()
+            .chain(Mirror::of_object(object, up))
+            .filter(|mirror| mirror.has_room(first.place))
+            .collect();
+        let admits = |wrist: Pose| {
+            around.constraints.admits_wrist(wrist)
+                && suits_one_body(
+                    [
+                        (around.rig, first.half.grip.pose.frame_from_wrist),
+                        (around_other.rig, wrist),
+                    ],
+                    up,
+                )
+        };
+        let place = scene.place_of(other_rig);
+        let mut rejection = Rejection::NoContacts;
+        for attempt in 0..OTHER_HANDS {
+            let proposal = if let Some(mirror) = mirrors.get(attempt) {
+                Some(mirror.proposal(&first.proposal))
+            } else {
+                let across = match mirrors.len() {
+                    0 => 2.0 * object.centre_of_mass - first.place,
+                    count => mirrors[stream.below(count)].point(first.place),
+                };
+                place.propose_half(Aim::Near(across), admits, stream, interrupted)
+            };
+            stopwatch.lap(Step::WristPlacement);
+            if interrupted() {
+                return Err(NoGrip::Interrupted);
+            }
+            let Some(proposal) = proposal else { continue };
+            match self.complete(&first, around_other, &proposal, admits, stopwatch, interrupted) {
+                Err(NoGrip::Rejected(rejected)) => rejection = rejected,
+                end => return end,
+            }
+        }
+        Err(NoGrip::Rejected(rejection))
+    }
+
+    /// Draws and closes the first hand.
+    fn hold_first<'a>(
+        &mut self,
+        scene: &Scene<'_>,
+        around: &'a GraspContext<'_>,
+        around_other: &GraspContext<'_>,
+        stream: &mut AttemptStream,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<First<'a>, NoGrip> {
+        let object = around.object.object;
+        let up = around.presented.up;
+        let is_symmetric = stream.unit() < SYMMETRIC_SHARE;
+        let admits = |wrist: Pose| {
+            let palm = wrist.transform_point(around.rig.palm);
+            let suits = |mirror: Mirror| {
+                mirror.has_room(palm)
+                    && suits_one_body([(around.rig, wrist), (around_other.rig, mirror.wrist(wrist))], up)
+            };
+            around.constraints.admits_wrist(wrist)
+                && (!is_symmetric
+                    || Mirror::facing(object, up, palm)
+                        .into_iter()
+                        .chain(Mirror::of_object(object, up))
+                        .any(suits))
+        };
+        let aim = Aim::Outside {
+            centre: object.centre_of_mass,
+            up,
+        };
+        let proposal = scene.place().propose_half(aim, admits, stream, interrupted);
+        stopwatch.lap(Step::WristPlacement);
+        let Some(proposal) = proposal else {
+            return Err(if interrupted() {
+                NoGrip::Interrupted
+            } else {
+                NoGrip::Rejected(Rejection::NoContacts)
+            });
+        };
+        self.placed = Some(proposal.object_from_wrist);
+        let half = close_half(&mut self.first, around, &proposal, stopwatch, interrupted)?;
+        let positions = half.contacts.iter().map(|contact| contact.position);
+        Ok(First {
+            around,
+            proposal,
+            obstacle: PreparedHand::new(&half.tracked(around.rig)),
+            place: positions.sum::<Vec3>() / half.contacts.len().max(1) as f32,
+            half,
+        })
+    }
+
+    /// Closes the other hand and checks that both hold together.
+    fn complete(
+        &mut self,
+        first: &First<'_>,
+        around: &GraspContext<'_>,
+        proposal: &Proposal,
+        admits: impl Fn(Pose) -> bool,
+        stopwatch: &mut impl Stopwatch,
+        interrupted: &impl Fn() -> bool,
+    ) -> Result<Box<Grasp>, NoGrip> {
+        let half = close_half(&mut self.other, around, proposal, stopwatch, interrupted)?;
+        // Closing may have moved either wrist since its placement.
+        if !admits(half.grip.pose.frame_from_wrist) {
+            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+        }
+        let is_clear = are_clear(&first.obstacle, &half.tracked(around.rig));
+        stopwatch.lap(Step::CollisionValidation);
+        if !is_clear {
+            return Err(NoGrip::Rejected(Rejection::FingerCollision));
+        }
+        assess_both(
+            [first.around, around],
+            [&first.half, &half],
+            &mut self.buffers,
+            stopwatch,
+        )
+    }
+}
+
+/// Closes one hand.
+fn close_half(
+    gripper: &mut Gripper,
+    around: &GraspContext<'_>,
+    proposal: &Proposal,
+    stopwatch: &mut impl Stopwatch,
+    interrupted: &impl Fn() -> bool,
+) -> Result<HalfGrip, NoGrip> {
+    let GraspContext {
+        object,
+        presented,
+        rig,
+        ..
+    } = around;
+    let (grip, solids) = gripper.grip(object, rig, proposal, Some(presented), stopwatch, interrupted)?;
+    Ok(HalfGrip {
+        grip,
+        solids,
+        contacts: gripper.contacts.clone(),
+    })
+}
