@@ -85,8 +85,9 @@ pub enum BendRatios {
 pub enum Choice {
     /// The first one found.
     FirstValid,
-    /// The one with the highest score (of both hands: the highest mean) among all found within the budget. Without a budget in the request, that is 5 ms; if
-    /// nothing is found by then, the first one found within the server's default budget is returned.
+    /// The one with the highest score (of both hands: the highest mean) among all found within the budget. Without a budget
+    /// in the request, that is 5 ms; if nothing is found by then, the first one found within the server's default budget is
+    /// returned.
     BestWithinBudget,
 }
 

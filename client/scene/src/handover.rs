@@ -107,8 +107,8 @@ impl<'a> HandoverScene<'a> {
         }
     }
 
-    /// The scene: parts `object`, `giver_hand`, `giver_nails`, `giver_sleeve`, the same for `receiver` and `other_receiver`, and for each
-    /// contact `contact_thumb_third` and `force_thumb_third` or the like, with the force in newtons as extras.
+    /// The scene: parts `object`; `_hand`, `_nails` and `_sleeve` of `giver`, `receiver` and `other_receiver`; for each
+    /// contact, `contact_thumb_third` and `force_thumb_third` or the like, with the force in newtons as extras.
     pub fn to_scene(&self) -> Scene {
         let mut parts = vec![self.object_part()];
         let hands = [

@@ -64,8 +64,8 @@ headset does not report is 0. Metres, radians, quaternions x y z w. Options on t
 sending it, as a template.
 
 With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
-"round_trip_seconds": …}, and "other_grasp" for both hands, with the fields of the API's FindGraspResponse; durations are numbers of seconds, the seed is
-a string of digits."#;
+"round_trip_seconds": …} with the fields of the API's FindGraspResponse, and "other_grasp" for both hands; durations are
+numbers of seconds, the seed is a string of digits."#;
 
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]

@@ -22,8 +22,8 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
-    /// The wrist, the contacts, the grasp type or the comfort violates a constraint of the request, or two hands do not suit
-    /// one body.
+    /// The wrist, the contacts, the grasp type or the comfort violates a constraint of the request, or two hands do not
+    /// suit one body.
     UnmetConstraint,
 }
 

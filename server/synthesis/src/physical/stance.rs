@@ -14,8 +14,8 @@ use crate::{
 /// Largest angle between the forearms, as its cosine: 110°. Wider ones would embrace the object.
 const MIN_FOREARM_COS: f32 = -0.342;
 
-/// Largest rise and fall of a forearm from the elbow to the wrist, as sines: 65° up and 58° down. Steeper ones need a body
-/// below or above the object.
+/// Range of a forearm's rise from the elbow to the wrist, as sines: from 58° down to 64° up. Steeper ones need a body above
+/// or below the object.
 const FOREARM_RISE: [f32; 2] = [-0.85, 0.9];
 
 /// Smallest height of the thumb's side of the hand over the other side, as the sine of its slope: forearms twist from
@@ -32,12 +32,12 @@ const MIN_FACING: f32 = 0.3;
 /// How far a hand may point back at its body: the cosine of 96°.
 const MIN_FORWARD_COS: f32 = -0.1;
 
-/// How far the right hand may be to the left of the left hand, in metres: hands one above the other are a finger's breadth
-/// out of line.
+/// How far the right hand may be to the left of the left one, in metres: a finger's breadth, for hands one above the
+/// other.
 const MAX_CROSSING: f32 = 0.02;
 
-/// Distances of the elbows across the body, in metres: close together in front of it, and as far apart as shoulders 0.36 m
-/// apart and upper arms of 0.3 m allow.
+/// Range of the elbows' distance, in metres: from close together in front of the body, measured across it, to as far apart
+/// as shoulders of 0.36 m and upper arms of 0.3 m allow.
 const ELBOW_DISTANCES: [f32; 2] = [0.1, 0.9];
 
 /// True if the hands of two rigs with these wrist poses suit one upright body: forearms from the same side, twisted no
@@ -73,7 +73,7 @@ pub fn suits_one_body(hands: [(&Rig, Pose); 2], up: Vec3) -> bool {
         && right.elbow.distance(left.elbow) <= farthest
 }
 
-/// A hand and forearm as far as they tell where the body is.
+/// A hand and forearm as far as they show where the body is.
 struct Arm {
     /// The palm's centre.
     palm: Vec3,

@@ -6,9 +6,9 @@ use crate::model::{forces::COMFORTABLE_SHARES, grasp::Contact};
 
 /// E of Eq. 4.6: squared distance of the digits' force shares from the comfortable ones; 0 is most comfortable.
 ///
-/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact. If all are, because the
-/// palm of one of two hands bears alone, E is 0. D' are the comfortable shares of the touching digits, normalized to sum 1. The thesis leaves the scale of f
-/// open; f is normalized likewise here, so that E does not depend on the object's weight.
+/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact. E is 0 if all are: of two
+/// hands, one may hold by its palm alone. D' are the comfortable shares of the touching digits, normalized to sum 1. The
+/// thesis leaves the scale of f open; f is normalized likewise here, so that E does not depend on the object's weight.
 pub fn comfort(digit_totals: [f32; 5]) -> f32 {
     let total: f32 = digit_totals.iter().sum();
     if total <= 0.0 {
