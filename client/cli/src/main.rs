@@ -114,7 +114,7 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
 async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
     match command {
         Command::Demo(arguments) => demo::run(arguments, output).await,
-        Command::Find(arguments) => find::run(*arguments, output).await,
+        Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Objects(command) => objects::run(command, output).await,
         Command::Experiment(arguments) => experiment::run(arguments, output).await,
         Command::Health(arguments) => health::run(arguments, output).await,

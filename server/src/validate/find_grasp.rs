@@ -106,6 +106,16 @@ impl FindQuery {
     }
 }
 
+/// A search for the best grasp cannot be reproducible.
+fn check_reproducible(is_reproducible: bool, choice: Choice, violations: &mut Violations) {
+    if is_reproducible && choice == Choice::BestWithinBudget {
+        violations.add(
+            Field::root("reproducible"),
+            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer depends on the speed of the machine; use one of them",
+        );
+    }
+}
+
 /// Checks a request. An id for which `object_exists` is false is a violation if there are others; without others, it is
 /// left to the look-up, which knows about evicted objects.
 ///
@@ -172,12 +182,7 @@ pub(crate) fn find_query(
         .map(|value| friction(Field::root("friction"), value, v));
     let constraints = constraints(Field::root("constraints"), request.constraints, convention, v);
     let atlas_use: v1::AtlasUse = known(Field::root("atlas"), request.atlas, v);
-    if request.reproducible && choice == Choice::BestWithinBudget {
-        v.add(
-            Field::root("reproducible"),
-            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer depends on the speed of the machine; use one of them",
-        );
-    }
+    check_reproducible(request.reproducible, choice, v);
     let takes_both_hands = takes_both_hands(
         known(Field::root("hands"), request.hands, v),
         (strategy, validity),

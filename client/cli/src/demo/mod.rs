@@ -139,7 +139,7 @@ fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
     Ok(Drawing {
         caption: caption(&name, asked.answer.outcome),
         name,
-        picture: Picture::new(model, asked.request.clone())?.with_grasp(asked.answer.grasp.clone()),
+        picture: Picture::new(model, asked.request.clone())?.with_hands(&asked.answer),
     })
 }
 

@@ -117,6 +117,6 @@ fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
     Ok(Drawing {
         name: asked.object.name.to_owned(),
         caption: caption(asked.object.name, asked.answer.outcome),
-        picture: Picture::new(model, asked.request.clone())?.with_grasp(asked.answer.grasp.clone()),
+        picture: Picture::new(model, asked.request.clone())?.with_hands(&asked.answer),
     })
 }

@@ -28,7 +28,7 @@ fn mirror_image_of_a_hand_is_the_other_hand() {
     };
     // The plane's normal is horizontal and points from the centre of mass at the wrist.
     let offset = pose.frame_from_wrist.position - object.centre_of_mass;
-    let normal = Vec3::new(offset.x, 0.0, offset.z).normalize();
+    let normal = Vec3::new(offset.x, 0.0, offset.z).normalize_or_zero();
     let reflected = |p: Vec3| p - 2.0 * (p - object.centre_of_mass).dot(normal) * normal;
     let original = HandSolids::of_pose(right, &pose);
     let mirrored = HandSolids::of_pose(left, &image);
