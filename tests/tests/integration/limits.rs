@@ -87,7 +87,8 @@ async fn an_untouchable_box_is_limited_by_its_forbidden_surfaces() {
 async fn too_little_time_is_no_limit() {
     let server = TestServer::start().await;
     let short = v1::FindGraspRequest {
-        atlas: v1::AtlasUse::None.into(),
+        // It places hands at random and uses no known grips.
+        strategy: v1::Strategy::E.into(),
         max_attempts: Some(1),
         ..floating_remote()
     };
