@@ -56,6 +56,7 @@ fn wire_answer() -> v1::FindGraspResponse {
             wrench_angle: 11.0,
             r#type: v1::GraspType::Quadpod.into(),
             type_confidence: 0.75,
+            hangs: true,
             score: Some(v1::Score {
                 total: 0.21,
                 terms: vec![v1::ScoreTerm {
@@ -156,6 +157,7 @@ fn converts_every_number_of_an_answer() {
         (Some(GraspType::Quadpod), 0.75)
     );
     assert_eq!(grasp.margins.map(|margins| margins.epsilon), Some(0.03));
+    assert!(grasp.hangs);
     let score = grasp.score.unwrap();
     let term = &score.terms[0];
     assert_eq!(

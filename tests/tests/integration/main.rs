@@ -6,6 +6,7 @@ mod constraints;
 mod conventions;
 mod fixtures;
 mod health;
+mod hooks;
 mod invalid;
 mod key_frames;
 mod load;

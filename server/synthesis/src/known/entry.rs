@@ -101,10 +101,10 @@ impl Entry {
     }
 
     /// A grasp as a known grip for other holdouts of its object, under the friction that it was found with.
-    /// Its scores by gravity and its finger subsets are unknown. None if the grasp is not valid under
-    /// `PHYSICAL`.
+    /// Its scores by gravity and its finger subsets are unknown. None if the grasp is not valid under `PHYSICAL`, or
+    /// if the load hangs in it: what hangs falls when the object is held out differently.
     pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
-        let margins = grasp.margins?;
+        let margins = grasp.margins.filter(|_| !grasp.hangs)?;
         let Score { mut values } = grasp.score?;
         for (term, value) in Term::ALL.into_iter().zip(&mut values) {
             if !term.is_grip_term() {
@@ -116,6 +116,7 @@ impl Entry {
             bend_ratios: grasp.bend_ratios,
             penetration: margins.penetration,
             epsilon: margins.epsilon,
+            hang: None,
         };
         Some(Self {
             finger_subsets: FingerSubsets::whole(grip.holding_digits()),

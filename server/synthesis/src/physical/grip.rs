@@ -11,6 +11,7 @@ use super::{
     closer::Closer,
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
+    hanging::Hang,
     immobility::{Buffers, SoftContact, TorqueScale, epsilon},
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
@@ -67,6 +68,8 @@ pub struct Grip {
     pub penetration: f32,
     /// Ferrari-Canny epsilon of its contacts.
     pub epsilon: f32,
+    /// How the object hangs in the hand; `None` for a hand whose contacts have closure.
+    pub hang: Option<Hang>,
 }
 
 impl Grip {
@@ -185,9 +188,16 @@ impl Gripper {
         stopwatch.lap(Step::ContactValidation);
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
-        let epsilon = are_opposed(&self.contacts).then(|| self.closure(scene)).flatten();
+        let hold = if shape.is_hook() {
+            presented.and_then(|presented| self.hang(scene, &closed, presented.up))
+        } else {
+            are_opposed(&self.contacts)
+                .then(|| self.closure(scene))
+                .flatten()
+                .map(|epsilon| (epsilon, None))
+        };
         stopwatch.lap(Step::ImmobilityValidation);
-        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
+        let (epsilon, hang) = hold.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         if interrupted() {
             return Err(NoGrip::Interrupted);
         }
@@ -195,7 +205,8 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
-        self.validate(&closer, &digits, epsilon, stopwatch)
+        let (grip, solids) = self.validate(&closer, &digits, epsilon, stopwatch)?;
+        Ok((Grip { hang, ..grip }, solids))
     }
 
     /// Every check but closure, for a hand whose digits are all posed and whose contacts have this epsilon.
@@ -239,8 +250,22 @@ impl Gripper {
             bend_ratios,
             penetration,
             epsilon,
+            hang: None,
         };
         Ok((grip, solids))
+    }
+
+    /// How the object hangs in closed digits, and the epsilon of their contacts. `None` if it does not hang.
+    fn hang(
+        &mut self,
+        scene: &ObjectScene<'_>,
+        closed: &[ClosedDigit; 5],
+        up: Vec3,
+    ) -> Option<(f32, Option<Hang>)> {
+        let hang = Hang::of(&self.contacts, closed, scene.object.centre_of_mass, up)?;
+        let load = scene.load(&self.soft_contacts, up);
+        let epsilon = epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers);
+        Some((epsilon, Some(hang)))
     }
 
     /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.

@@ -9,6 +9,7 @@ pub mod closing;
 pub mod contacts;
 pub mod flexing;
 pub mod grip;
+pub mod hanging;
 pub mod immobility;
 pub mod obstacle;
 pub mod scene;

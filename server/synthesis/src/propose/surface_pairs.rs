@@ -61,6 +61,11 @@ pub struct SurfacePair {
 }
 
 impl SurfacePair {
+    /// The point midway between the ends, in metres.
+    pub fn middle(&self) -> Vec3 {
+        (self.start + self.end) * 0.5
+    }
+
     /// True unless an end is certainly too close to the giver's hand for a finger.
     pub fn is_free_of(&self, giver: &PreparedHand) -> bool {
         [self.start, self.end]
@@ -143,6 +148,11 @@ impl SurfacePairs {
                 .copied()
                 .collect(),
         }
+    }
+
+    /// The pairs, in the order of the surface's triangles.
+    pub fn pairs(&self) -> &[SurfacePair] {
+        &self.pairs
     }
 
     /// Size of pairs and points, in bytes.

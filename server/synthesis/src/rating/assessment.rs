@@ -64,6 +64,7 @@ impl GraspContext<'_> {
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
         let load = object.load(&gripper.soft_contacts, presented.up);
+        let load = grip.hang.map_or(load, |hang| hang.load_at_rest(load));
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
@@ -85,7 +86,10 @@ impl GraspContext<'_> {
             &grip.pose,
             &grasp.contacts,
             classification,
-            gripper.relative_closure(object, grip.epsilon),
+            grip.hang.map_or_else(
+                || gripper.relative_closure(object, grip.epsilon),
+                |hang| hang.relative_lip(),
+            ),
             solids,
         );
         grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
@@ -124,6 +128,7 @@ pub fn unscored_grasp(
             giver_clearance,
         }),
         classification,
+        hangs: grip.hang.is_some(),
         score: None,
         key_frames: None,
     }
@@ -141,6 +146,7 @@ pub fn thesis_grasp(rig: &Rig, held: HeldObject) -> Grasp {
         forces: held.forces,
         torsions: Vec::new(),
         margins: None,
+        hangs: false,
         score: None,
         key_frames: None,
     }

@@ -4,4 +4,5 @@ mod balance;
 mod closing;
 mod closure;
 mod hand_solids;
+mod hanging;
 mod prepared_hand;

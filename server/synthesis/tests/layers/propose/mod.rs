@@ -1,5 +1,6 @@
 //! Where hands are placed.
 
+mod hooks;
 mod oppositions;
 mod placement_cache;
 mod success_prior;
