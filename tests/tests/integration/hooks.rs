@@ -52,7 +52,13 @@ async fn find(server: &TestServer, up: Vec3, constraints: v1::Constraints) -> v1
         constraints: Some(constraints),
         ..Default::default()
     };
-    server.grasps().await.find_grasp(request).await.unwrap().into_inner()
+    server
+        .grasps()
+        .await
+        .find_grasp(request)
+        .await
+        .unwrap()
+        .into_inner()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -79,8 +85,18 @@ async fn a_case_hangs_by_its_handle() {
         let grasp = answer.grasp.unwrap();
         assert!(grasp.hangs);
         assert_eq!(grasp.r#type(), v1::GraspType::FixedHook);
-        assert!(grasp.contacts.iter().all(|contact| contact.digit() != v1::Digit::Thumb));
-        let lift: f32 = grasp.contacts.iter().filter_map(|contact| contact.client_force).map(|force| force.y).sum();
+        assert!(
+            grasp
+                .contacts
+                .iter()
+                .all(|contact| contact.digit() != v1::Digit::Thumb)
+        );
+        let lift: f32 = grasp
+            .contacts
+            .iter()
+            .filter_map(|contact| contact.client_force)
+            .map(|force| force.y)
+            .sum();
         assert!((lift - 2.0 * 9.81).abs() < 0.05 * 2.0 * 9.81, "{lift}");
     }
     // With the thumb, it is held by closure.

@@ -54,6 +54,7 @@ impl Closer<'_> {
             plane: DigitPlane::new(flexing.digit, self.object_from_wrist, flexing.base_yaw),
             preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
             obstacles,
+            curls_last: self.shape.is_hook() && digit != Digit::Thumb,
         }
     }
 

@@ -14,11 +14,7 @@
 
 use glam::{Mat3, Vec3};
 
-use super::{
-    closing::ClosedDigit,
-    immobility::Load,
-    solids::TaperedCapsule,
-};
+use super::{closing::ClosedDigit, immobility::Load, solids::TaperedCapsule};
 use crate::model::{
     grasp::Contact,
     hand::{Digit, HandPart, Phalanx},
@@ -26,7 +22,7 @@ use crate::model::{
 
 /// Push to the side that what hangs must bear, as a share of the weight: a load that is carried at a walk swings as
 /// much. A larger share asks for fingers that are bent further.
-pub const SIDEWAYS_SHARE: f32 = 0.3;
+pub const SIDEWAYS_SHARE: f32 = 0.2;
 
 /// Smallest height of the way out of a finger under [`SIDEWAYS_SHARE`], in metres: flesh yields by less. A larger one
 /// asks for more of the fingertip on the far side.
@@ -61,13 +57,20 @@ pub struct Hang {
 impl Hang {
     /// How a load with this centre of mass hangs in closed digits with these contacts; `None` if it does not. `up` is the
     /// unit vector against gravity. Everything is in the object's frame, in metres.
-    pub fn of(contacts: &[Contact], digits: &[ClosedDigit; 5], centre_of_mass: Vec3, up: Vec3) -> Option<Self> {
+    pub fn of(
+        contacts: &[Contact],
+        digits: &[ClosedDigit; 5],
+        centre_of_mass: Vec3,
+        up: Vec3,
+    ) -> Option<Self> {
         let fingers = &Digit::ALL[1..];
         let lips = fingers
             .iter()
             .filter_map(|&finger| lip(finger, contacts, &digits[finger.index()].links, up))
             .filter(|&lip| lip >= MIN_LIP);
-        let (count, lip) = lips.fold((0, f32::INFINITY), |(count, least), lip| (count + 1, least.min(lip)));
+        let (count, lip) = lips.fold((0, f32::INFINITY), |(count, least), lip| {
+            (count + 1, least.min(lip))
+        });
         let pivot = pivot(contacts);
         let lever = pivot - centre_of_mass;
         let hangs = lever.dot(up) >= MIN_DEPTH && lever.angle_between(up) <= MAX_SWING;
@@ -105,8 +108,12 @@ fn lip(finger: Digit, contacts: &[Contact], links: &[TaperedCapsule; 3], up: Vec
         let run = (offset - up * rise).length();
         (rise + radius - SIDEWAYS_SHARE * run) / SIDEWAYS_SHARE.hypot(1.0)
     };
-    let to_knuckle = links[..=link].iter().map(|link| way_out(link.start, link.start_radius));
-    let to_tip = links[link..].iter().map(|link| way_out(link.end, link.end_radius));
+    let to_knuckle = links[..=link]
+        .iter()
+        .map(|link| way_out(link.start, link.start_radius));
+    let to_tip = links[link..]
+        .iter()
+        .map(|link| way_out(link.end, link.end_radius));
     let highest_to_knuckle = to_knuckle.fold(f32::NEG_INFINITY, f32::max);
     Some(to_tip.fold(f32::NEG_INFINITY, f32::max).min(highest_to_knuckle))
 }

@@ -26,14 +26,15 @@ use crate::{
 /// Largest thickness in metres of a part that fingers hook around: their tips do not reach past a thicker one.
 const MAX_THICKNESS: f32 = 0.045;
 
-/// Largest number of thin parts that are probed. Each takes up to 50 µs.
-const MAX_PROBED: usize = 96;
+/// Largest number of thin parts that are probed, those of the least swing. Each takes up to 50 µs.
+const MAX_PROBED: usize = 64;
 
 /// Radius of a finger as it is probed for, in metres. A larger one misses narrow handles.
 const FINGER_RADIUS: f32 = 0.007;
 
-/// Step in metres in which the room below a part is probed.
+/// Step in metres in which the room below a part is probed, and how often it is halved there: to a fifth of a millimetre.
 const STEP: f32 = 0.003;
+const HALVINGS: usize = 4;
 
 /// Directions probed around the vertical, over half a turn.
 const DIRECTIONS: usize = 12;
@@ -60,13 +61,11 @@ const MAX_HANDS: usize = 12;
 const KNUCKLE_FLEXION: [f32; 2] = [0.1, 0.6];
 
 /// Range of the second joint's flexion in radians.
-const MIDDLE_FLEXION: [f32; 2] = [1.05, 1.7];
+const MIDDLE_FLEXION: [f32; 2] = [0.95, 1.6];
 
-/// Share of the flexion from which fingers close: straighter ones would meet what is below.
-const PRESHAPE: f32 = 0.8;
-
-/// Range of the gap in metres that a drawn hook leaves between the first links and what the second ones lift.
-const ROOM_IN_HOOK: [f32; 2] = [0.0, 0.01];
+/// Largest share, of the way from the second joint to the third, at which a hook lifts. With more, the last link is below what
+/// it should hold back.
+const MAX_SHARE_ALONG: f32 = 0.6;
 
 /// Largest tilt of the hook about the bar, in radians.
 const MAX_TILT: f32 = 0.35;
@@ -76,9 +75,9 @@ const GAP: [f32; 2] = [0.0, 0.003];
 
 /// Shares of hands that hook with four, three and two fingers.
 const FINGER_SETS: [([bool; 5], f32); 3] = [
-    ([false, true, true, true, true], 0.7),
-    ([false, true, true, true, false], 0.2),
-    ([false, true, true, false, false], 0.1),
+    ([false, true, true, true, true], 0.8),
+    ([false, true, true, true, false], 0.15),
+    ([false, true, true, false, false], 0.05),
 ];
 
 /// A place by which an object may hang, in its frame.
@@ -105,7 +104,8 @@ pub struct HangingPlaces {
 /// Fingers bent to a hook, in the wrist's frame.
 struct Hook {
     shape: HandShape,
-    /// The middle of where the second links lift, in metres.
+    /// The middle of where the second links lift, at the height of the one that reaches deepest, in metres: the other fingers
+    /// close less.
     middle: Vec3,
     /// From the outermost lifting finger to the innermost, and the direction in which they lift: orthogonal unit vectors.
     along: Vec3,
@@ -116,16 +116,18 @@ impl HangingPlaces {
     /// Probes the thin parts above the centre of mass; takes up to some milliseconds, and microseconds where there are none.
     pub fn of(object: &GraspObject, pairs: &SurfacePairs, up: Vec3) -> Self {
         let swing = |point: Vec3| (point - object.centre_of_mass).angle_between(up);
-        let thin: Vec<&SurfacePair> = pairs
+        let mut thin: Vec<(f32, &SurfacePair)> = pairs
             .pairs()
             .iter()
-            .filter(|pair| pair.thickness <= MAX_THICKNESS && swing(pair.middle()) <= MAX_SWING)
+            .filter(|pair| pair.thickness <= MAX_THICKNESS)
+            .map(|pair| (swing(pair.middle()), pair))
+            .filter(|(swing, _)| *swing <= MAX_SWING)
             .collect();
-        let step = thin.len().div_ceil(MAX_PROBED).max(1);
+        thin.sort_by(|a, b| a.0.total_cmp(&b.0));
         let places = thin
             .into_iter()
-            .step_by(step)
-            .filter_map(|pair| {
+            .take(MAX_PROBED)
+            .filter_map(|(_, pair)| {
                 let (underside, along) = probe(&object.surface, pair, up)?;
                 Some(HangingPlace {
                     underside,
@@ -173,14 +175,21 @@ impl HangingPlaces {
 
     /// The wrist's pose with the hook below a place, the palm on either side of it.
     fn hooked_in(&self, place: &HangingPlace, hook: &Hook, stream: &mut AttemptStream) -> Pose {
-        let along = if stream.unit() < 0.5 { place.along } else { -place.along };
+        let along = if stream.unit() < 0.5 {
+            place.along
+        } else {
+            -place.along
+        };
         let tilt = Quat::from_axis_angle(along, stream.between(-MAX_TILT, MAX_TILT));
         let lift = tilt * self.up.reject_from_normalized(along).normalize_or(self.up);
         let axes = |along: Vec3, lift: Vec3| Mat3::from_cols(along, lift, along.cross(lift));
         let rotation = axes(along, lift) * axes(hook.along, hook.lift).transpose();
         let orientation = Quat::from_mat3(&rotation).normalize();
         let gap = stream.between(GAP[0], GAP[1]);
-        Pose::new(place.underside - lift * gap - orientation * hook.middle, orientation)
+        Pose::new(
+            place.underside - lift * gap - orientation * hook.middle,
+            orientation,
+        )
     }
 }
 
@@ -196,51 +205,58 @@ impl Hook {
             })
             .map_or(FINGER_SETS[0].0, |(set, _)| *set);
         let knuckle = stream.between(KNUCKLE_FLEXION[0], KNUCKLE_FLEXION[1]);
-        let middle = stream.between(MIDDLE_FLEXION[0], MIDDLE_FLEXION[1]);
+        let second = stream.between(MIDDLE_FLEXION[0], MIDDLE_FLEXION[1]);
         let mut shape = HandShape {
             thumb_yaw: stream.between(0.1, 0.5),
             spread: 0.3 * stream.unit(),
-            bend_ratios: [1.0, middle / knuckle],
+            bend_ratios: [1.0, second / knuckle],
             closing,
             preshape: [0.0; 2],
             tucks: false,
         };
-        shape.preshape[1] = shape.flexing(rig, Digit::Middle).closure_at(PRESHAPE * knuckle);
-        let room = 0.5 * thickness + stream.between(ROOM_IN_HOOK[0], ROOM_IN_HOOK[1]);
-        let hooked = |&finger: &Digit| lifting_point(rig, finger, &shape, [knuckle, middle], room);
+        shape.preshape[1] = shape.flexing(rig, Digit::Middle).closure_at(knuckle);
+        let share = MAX_SHARE_ALONG * stream.unit();
+        let hooked =
+            |&finger: &Digit| lifting_point(rig, finger, &shape, [knuckle, second], thickness, share);
         let fingers = &Digit::ALL[1..];
         let points: Vec<(Vec3, Vec3)> = fingers
             .iter()
             .filter(|finger| closing[finger.index()])
             .map(hooked)
             .collect();
-        let count = points.len() as f32;
+        let middle = points.iter().map(|(point, _)| *point).sum::<Vec3>() / points.len() as f32;
         let along = (points[0].0 - points[points.len() - 1].0).normalize_or(Vec3::X);
         let lifts: Vec3 = points.iter().map(|(_, lift)| *lift).sum();
+        let lift = lifts.reject_from_normalized(along).normalize_or(Vec3::Z);
+        let heights = points.iter().map(|(point, _)| (point - middle).dot(lift));
         Self {
             shape,
-            middle: points.iter().map(|(point, _)| *point).sum::<Vec3>() / count,
+            middle: middle + lift * heights.fold(f32::INFINITY, f32::min),
             along,
-            lift: lifts.reject_from_normalized(along).normalize_or(Vec3::Z),
+            lift,
         }
     }
 }
 
-/// The point on the skin of a finger's second link that is `room` metres from the first link, and the direction its pad
-/// faces, in the wrist's frame.
+/// A point on the skin of a finger's second link, and the direction its pad faces, in the wrist's frame. It is at a share of
+/// the way from where a round part of this thickness, in metres, fits between the first two links, to the link's end.
 fn lifting_point(
     rig: &Rig,
     finger: Digit,
     shape: &HandShape,
-    [knuckle, middle]: [f32; 2],
-    room: f32,
+    [knuckle, second]: [f32; 2],
+    thickness: f32,
+    share: f32,
 ) -> (Vec3, Vec3) {
     let digit = rig.digit(finger);
-    let angles = DigitAngles::coupled(shape.flexing(rig, finger).base_yaw, knuckle, middle);
+    let angles = DigitAngles::coupled(shape.flexing(rig, finger).base_yaw, knuckle, second);
     let link = digit_frames(digit, Pose::IDENTITY, angles).links[1];
     let radii = link_radii(rig, finger);
-    let along = (radii[1] + room).min(digit.lengths[1]);
-    let radius = radii[1] + (radii[2] - radii[1]) * along / digit.lengths[1];
+    let length = digit.lengths[1];
+    // Tangent to both links' skin: the axes meet at the joint, turned by its flexion.
+    let closest = ((0.5 * thickness + radii[1]) * (0.5 * second).tan()).min(length);
+    let along = closest + (length - closest) * share;
+    let radius = radii[1] + (radii[2] - radii[1]) * along / length;
     (
         link.transform_point(Vec3::new(0.0, along, radius)),
         link.transform_vector(Vec3::Z),
@@ -266,22 +282,31 @@ fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<(Vec3, Vec3)
     let turn = PI * across / DIRECTIONS as f32 + FRAC_PI_2;
     let level = a * turn.cos() + b * turn.sin();
     // The part goes on to both sides: below it, a finger finds its underside at a similar height.
+    let depth = 2.0 * (MAX_RISE + FINGER_RADIUS) + pair.thickness;
     let [ahead, behind] = [HALF_LENGTH, -HALF_LENGTH].map(|offset| {
         let above = finger + level * offset + up * (MAX_RISE + FINGER_RADIUS);
-        let below = finger_below(surface, above, 2.0 * MAX_RISE + FINGER_RADIUS, up)?;
-        // Free room above the finger as well means that there is no part.
-        (below.distance_squared(above) > 0.0).then_some(below)
+        finger_below(surface, above, depth, up)
     });
     let along = (ahead? - behind?).normalize_or(level);
     Some((finger + up * FINGER_RADIUS, along))
 }
 
-/// The highest point below `start`, within `depth` metres, at which a finger is free.
+/// The highest point at which a finger is free below what is below `start`, within `depth` metres.
 fn finger_below(surface: &MeshBvh, start: Vec3, depth: f32, up: Vec3) -> Option<Vec3> {
-    let steps = (depth / STEP) as usize;
-    (0..=steps)
-        .map(|step| start - up * (STEP * step as f32))
-        .find(|&centre| is_free(surface, centre))
+    let at = |depth: f32| start - up * depth;
+    let mut steps = (0..=(depth / STEP) as usize).map(|step| STEP * step as f32);
+    let first = steps.find(|&depth| !is_free(surface, at(depth)))?;
+    let mut free = steps.find(|&depth| is_free(surface, at(depth)))?;
+    let mut blocked = (free - STEP).max(first);
+    for _ in 0..HALVINGS {
+        let between = 0.5 * (blocked + free);
+        if is_free(surface, at(between)) {
+            free = between;
+        } else {
+            blocked = between;
+        }
+    }
+    Some(at(free))
 }
 
 /// True if a sphere of [`FINGER_RADIUS`] is clear of surface and volume.

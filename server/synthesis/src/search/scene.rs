@@ -222,7 +222,12 @@ impl<'a> Scene<'a> {
             .hanging_places
             .get_or_init(|| HangingPlaces::of(object.object(), object.surface_pairs(), presented.up));
         let place = self.place();
-        places.propose(rig, place.giver, |wrist| place.palm_fits(wrist), &mut stream.clone())
+        places.propose(
+            rig,
+            place.giver,
+            |wrist| place.palm_fits(wrist),
+            &mut stream.clone(),
+        )
     }
 
     /// Adapts the proposal to the mechanisms that are on.

@@ -77,6 +77,7 @@ fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Cl
         plane: DigitPlane::new(digit, Pose::IDENTITY, 0.0),
         preshape: 0.0,
         obstacles: &[],
+        curls_last: false,
     }
 }
 
@@ -278,6 +279,27 @@ fn a_digit_stops_at_other_parts_of_the_hand() {
         }
     }
     assert!(stopped > 50, "{stopped}");
+}
+
+#[test]
+fn a_hooking_finger_supports_a_bar_before_its_tip_curls() {
+    let digit = finger();
+    // A bar that the tip reaches from below first if all joints bend together.
+    let bar = cuboid(Vec3::new(-0.05, 0.022, 0.013), Vec3::new(0.05, 0.034, 0.025));
+    let together = Closing {
+        preshape: 0.8,
+        ..closing(&bar, &digit, 4.0)
+    };
+    let hooking = Closing {
+        curls_last: true,
+        ..together
+    };
+    let closed = hooking.close().expect("it starts clear of the bar");
+    assert!(closed.touches[1], "{closed:?}");
+    // Once the second link is stopped, the last one bends by itself.
+    let coupled = DigitAngles::THIRD_PITCH_SHARE * closed.angles.second_pitch;
+    assert!((closed.angles.third_pitch - coupled).abs() > 0.01, "{closed:?}");
+    assert_eq!(together.close().map(|closed| closed.touches[1]), Some(false));
 }
 
 #[test]

@@ -35,7 +35,9 @@ fn finger(x: f32, run: f32, rise: f32) -> ClosedDigit {
         Vec3::new(x, level + rise, run),
     ];
     ClosedDigit {
-        links: std::array::from_fn(|link| TaperedCapsule::new(points[link], points[link + 1], RADIUS, RADIUS)),
+        links: std::array::from_fn(|link| {
+            TaperedCapsule::new(points[link], points[link + 1], RADIUS, RADIUS)
+        }),
         touches: [false, true, false],
         ..ClosedDigit::default()
     }
@@ -80,7 +82,11 @@ fn the_lip_is_the_height_of_the_tip_under_tilted_gravity() {
     for tip in [[0.0, 0.02], [0.01, 0.015], [0.02, 0.02], [0.015, 0.03]] {
         let hang = hook([tip, [0.0, 0.05]], Vec3::Y).expect("it hangs");
         let expected = lip_in_tilted_frame(tip);
-        assert!((hang.lip - expected).abs() < 1e-6, "{tip:?}: {} {expected}", hang.lip);
+        assert!(
+            (hang.lip - expected).abs() < 1e-6,
+            "{tip:?}: {} {expected}",
+            hang.lip
+        );
     }
 }
 

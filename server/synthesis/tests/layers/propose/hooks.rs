@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use grasp_synthesis::{model::object::GraspObject, propose::hooks::HangingPlaces};
 
-use crate::fixtures::objects::{bar, lunch_box, object_of, plate, prepared};
 use crate::fixtures::meshes::{sphere, torus};
+use crate::fixtures::objects::{bar, lunch_box, object_of, plate, prepared};
 
 fn places(object: GraspObject, up: Vec3) -> HangingPlaces {
     let object = prepared(&Arc::new(object));
@@ -15,13 +15,20 @@ fn places(object: GraspObject, up: Vec3) -> HangingPlaces {
 
 #[test]
 fn a_box_hangs_by_its_handle() {
-    for up in [Vec3::Y, Quat::from_rotation_x(0.35) * Vec3::Y, Quat::from_rotation_z(-0.35) * Vec3::Y] {
+    for up in [
+        Vec3::Y,
+        Quat::from_rotation_x(0.35) * Vec3::Y,
+        Quat::from_rotation_z(-0.35) * Vec3::Y,
+    ] {
         let found = places(lunch_box(0.04), up);
         assert!(found.places().len() > 5, "{up}: {found:?}");
         for place in found.places() {
             // The bar's underside is 40 mm above the lid; a tilted finger touches it near an edge.
             let height = place.underside.y - 0.13;
-            assert!(height.abs() < 0.006 && place.underside.x.abs() < 0.065, "{up}: {place:?}");
+            assert!(
+                height.abs() < 0.006 && place.underside.x.abs() < 0.065,
+                "{up}: {place:?}"
+            );
             assert!(place.along.x.abs() > 0.95, "{up}: {place:?}");
         }
     }

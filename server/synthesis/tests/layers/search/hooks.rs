@@ -51,7 +51,10 @@ fn assert_holds(grasp: &Grasp, up: Vec3) {
         let pressing = -force.dot(contact.normal);
         let rubbing = (force + contact.normal * pressing).length();
         assert!(pressing >= 0.0 && force.length() <= 27.001, "{force}");
-        assert!(rubbing <= 0.6 * pressing * 1.001 + 1e-5, "{rubbing} N at {pressing} N");
+        assert!(
+            rubbing <= 0.6 * pressing * 1.001 + 1e-5,
+            "{rubbing} N at {pressing} N"
+        );
         torque += contact.position.cross(*force) - contact.normal * *torsion;
     }
     // The force acts along a vertical line that the centre of mass swings to.
