@@ -1,5 +1,5 @@
-//! A grip: a hand closed on an object, independent of the giver's pose and of gravity. Steps 2 to 4 of Algorithm 1
-//! with the hand as solids, and closure.
+//! A grip: a hand closed on an object, independent of the giver's pose and, unless the object hangs in it, of gravity.
+//! Steps 2 to 4 of Algorithm 1 with the hand as solids, and closure.
 //!
 //! Checks run in order of cost: palm and forearm before any digit closes, and those that reject most hands first.
 //! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
@@ -189,7 +189,13 @@ impl Gripper {
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
         let hold = if shape.is_hook() {
-            presented.and_then(|presented| self.hang(scene, &closed, presented.up))
+            // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
+            let closing = (1..5).filter(|&finger| shape.closing[finger]);
+            let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
+            let enough_touch = touching.count() >= closing.count().min(3);
+            presented
+                .filter(|_| enough_touch)
+                .and_then(|presented| self.hang(scene, &closed, presented.up))
         } else {
             are_opposed(&self.contacts)
                 .then(|| self.closure(scene))

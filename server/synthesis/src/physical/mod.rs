@@ -2,7 +2,7 @@
 //!
 //! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
 //! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
-//! ([`immobility`]). A [`grip`] is a hand closed on an object.
+//! ([`immobility`]). A [`grip`] is a hand closed on an object, or fingers in which it hangs ([`hanging`]).
 
 mod closer;
 pub mod closing;

@@ -48,8 +48,11 @@ const SIDE_HEIGHTS: [f32; 2] = [0.0, 0.015];
 /// Distance in metres from a place at which its part has to go on to both sides: half the breadth of two fingers.
 const HALF_LENGTH: f32 = 0.014;
 
-/// Largest rise of a part over [`HALF_LENGTH`], in metres: a bar sloping by more than 45° slips.
+/// Largest rise of a part over [`HALF_LENGTH`] that is probed, in metres, …
 const MAX_RISE: f32 = HALF_LENGTH;
+
+/// … and the largest slope along it, as a sine: 35°. The load slips along a steeper one.
+const MAX_SLOPE: f32 = 0.57;
 
 /// Places drawn per hand; the hand hooks in at the one with the least swing, near the middle of a handle.
 const COMPARED: usize = 4;
@@ -75,9 +78,9 @@ const GAP: [f32; 2] = [0.0, 0.003];
 
 /// Shares of hands that hook with four, three and two fingers.
 const FINGER_SETS: [([bool; 5], f32); 3] = [
-    ([false, true, true, true, true], 0.8),
-    ([false, true, true, true, false], 0.15),
-    ([false, true, true, false, false], 0.05),
+    ([false, true, true, true, true], 0.6),
+    ([false, true, true, true, false], 0.25),
+    ([false, true, true, false, false], 0.15),
 ];
 
 /// A place by which an object may hang, in its frame.
@@ -136,6 +139,7 @@ impl HangingPlaces {
                     swing: swing(underside),
                 })
             })
+            .filter(|place| place.swing <= MAX_SWING)
             .collect();
         Self { places, up }
     }
@@ -288,7 +292,7 @@ fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<(Vec3, Vec3)
         finger_below(surface, above, depth, up)
     });
     let along = (ahead? - behind?).normalize_or(level);
-    Some((finger + up * FINGER_RADIUS, along))
+    (along.dot(up).abs() <= MAX_SLOPE).then_some((finger + up * FINGER_RADIUS, along))
 }
 
 /// The highest point at which a finger is free below what is below `start`, within `depth` metres.
