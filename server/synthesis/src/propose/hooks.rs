@@ -54,8 +54,9 @@ const MAX_RISE: f32 = HALF_LENGTH;
 /// … and the largest slope along it, as a sine: 35°. The load slips along a steeper one.
 const MAX_SLOPE: f32 = 0.57;
 
-/// Places drawn per hand; the hand hooks in at the one with the least swing, near the middle of a handle.
-const COMPARED: usize = 4;
+/// Places drawn per hand; the hand hooks in at the one with the least swing, near the middle of a handle. With more, a tilted
+/// handle is mostly tried at its end.
+const COMPARED: usize = 2;
 
 /// Largest number of hands tried until palm and forearm fit.
 const MAX_HANDS: usize = 12;
