@@ -329,6 +329,10 @@ pub struct Grasp {
     /// if no straight approach is free of collisions and within the constraints.
     #[serde(default)]
     pub key_frames: Vec<KeyFrame>,
+    /// True if the object hangs in hooked fingers by its weight. Closure was not required, and the forces are those of the
+    /// object at rest, after it has swung until its centre of mass is below the fingers.
+    #[serde(default)]
+    pub hangs: bool,
 }
 
 /// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.

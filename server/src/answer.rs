@@ -183,6 +183,7 @@ fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
             .flatten()
             .map(|key_frame| wire_key_frame(key_frame, rig, frame))
             .collect(),
+        hangs: grasp.hangs,
     }
 }
 

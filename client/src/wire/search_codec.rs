@@ -233,6 +233,7 @@ fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
         type_confidence: grasp.type_confidence,
         score: grasp.score.map(score_from_wire),
         key_frames: each("key_frames", grasp.key_frames, key_frame_from_wire)?,
+        hangs: grasp.hangs,
     })
 }
 

@@ -66,6 +66,7 @@ fn wire_grasp() -> v1::Grasp {
         wrench_angle: 11.0,
         r#type: v1::GraspType::Quadpod.into(),
         type_confidence: 0.75,
+        hangs: true,
         score: Some(v1::Score {
             total: 0.21,
             terms: vec![v1::ScoreTerm {

@@ -8,6 +8,7 @@ mod constraints;
 mod conventions;
 mod fixtures;
 mod health;
+mod hooks;
 mod invalid;
 mod invalid_barriers;
 mod key_frames;

@@ -53,6 +53,9 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
         ("comfort E", format!("{:.4}", grasp.comfort)),
         ("wrench angle", format!("{:.2}°", grasp.wrench_angle.to_degrees())),
     ];
+    if grasp.hangs {
+        lines.push(("holds", "it hangs in hooked fingers".to_owned()));
+    }
     if let Some(margins) = &grasp.margins {
         let giver = margins.giver_clearance.map_or_else(String::new, |clearance| {
             format!(", {:.1} mm clear of other hands", 1e3 * clearance)

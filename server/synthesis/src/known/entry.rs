@@ -101,10 +101,10 @@ impl Entry {
     }
 
     /// A grasp as a known grip for other holdouts of its object, under the friction that it was found with.
-    /// Its scores by gravity and its finger subsets are unknown. None if the grasp is not valid under
-    /// `PHYSICAL`, or takes two hands.
+    /// Its scores by gravity and its finger subsets are unknown. None if the grasp is not valid under `PHYSICAL`, takes two
+    /// hands, or if the load hangs in it: what hangs falls when the object is held out differently.
     pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
-        if grasp.other_hand.is_some() {
+        if grasp.other_hand.is_some() || grasp.hangs {
             return None;
         }
         let margins = grasp.margins?;
@@ -119,6 +119,7 @@ impl Entry {
             bend_ratios: grasp.bend_ratios,
             penetration: margins.penetration,
             epsilon: margins.epsilon,
+            hang: None,
         };
         Some(Self {
             finger_subsets: FingerSubsets::whole(grip.holding_digits()),

@@ -33,6 +33,17 @@ pub struct Constraints {
     pub worst_comfort: Option<f32>,
 }
 
+/// What constraints say about hooks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hooks {
+    /// Nothing else is likely to meet them.
+    Demanded,
+    /// They meet them, as others do.
+    Allowed,
+    /// They do not meet them.
+    RuledOut,
+}
+
 /// The sphere around the shoulder in which the wrist must lie, modelling an arm that bends freely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
@@ -99,6 +110,19 @@ impl Constraints {
         let digits = contacts.iter().filter_map(|contact| contact.part.digit());
         let touching: DigitSet = digits.collect();
         touching.contains_all(self.must_touch) && !touching.intersects(self.must_not_touch)
+    }
+
+    /// Whether grasps in which a load hangs from hooked fingers, without the thumb, are demanded, allowed or ruled out.
+    pub fn hooks(&self) -> Hooks {
+        let only_hook = TypeSet::from_iter([GraspType::FixedHook]);
+        let without_thumb = DigitSet::from_iter([Digit::Thumb]);
+        if self.must_touch.intersects(without_thumb) || !self.admits_type(Some(GraspType::FixedHook)) {
+            Hooks::RuledOut
+        } else if self.must_not_touch.intersects(without_thumb) || self.allowed_types == Some(only_hook) {
+            Hooks::Demanded
+        } else {
+            Hooks::Allowed
+        }
     }
 
     /// True if the grasp type is allowed; pass none for a grasp without a type.

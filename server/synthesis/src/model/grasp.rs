@@ -44,6 +44,9 @@ pub struct Grasp {
     pub margins: Option<PhysicalMargins>,
     /// The grasp type in the taxonomy.
     pub classification: Classification,
+    /// True if the load hangs in hooked fingers. Closure was then not required, and the forces are those of the load at
+    /// rest, with its centre of mass below the fingers.
+    pub hangs: bool,
     /// The score; none under `THESIS` validity.
     pub score: Option<Score>,
     /// The motion to the grasp, once planned ([`crate::search::key_frames`]); none before that, or if no straight

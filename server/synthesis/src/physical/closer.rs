@@ -1,5 +1,5 @@
 //! Step 2 under `PHYSICAL` validity for all digits of one hand: thumb first, then fingers, then idle fingers come to
-//! rest.
+//! rest. The thumb of a hook rests first.
 
 use super::{
     barriers::Barriers,
@@ -18,6 +18,9 @@ use crate::{
 /// Flexions in radians, in order of preference, that take an idle finger clear of the barriers: tucked into the palm, or
 /// nearly straight.
 const EVASIVE_FLEXIONS: [f32; 2] = [TUCKED_FLEXION, 0.6];
+
+/// Total flexion of a relaxed thumb, in radians: a thumb that lies next to the index finger is nearly straight.
+const RESTING_THUMB_FLEXION: f32 = 0.35;
 
 /// Closes the digits of a hand whose wrist is fixed.
 #[derive(Debug)]
@@ -52,6 +55,7 @@ impl Closer<'_> {
             plane: DigitPlane::new(flexing.digit, self.object_from_wrist, flexing.base_yaw),
             preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
             obstacles,
+            curls_last: self.shape.is_hook() && digit != Digit::Thumb,
         }
     }
 
@@ -70,11 +74,14 @@ impl Closer<'_> {
         !self.barriers.comes_within(digit.links.iter(), GIVER_CLEARANCE)
     }
 
-    /// Closes the thumb.
+    /// Closes the thumb, or rests it if the fingers hook.
     ///
     /// # Errors
-    /// The thumb is blocked, does not touch the object, or comes too close to a forbidden surface.
+    /// A closing thumb is blocked, does not touch the object, or comes too close to a forbidden surface.
     pub(super) fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, NoGrip> {
+        if self.shape.is_hook() {
+            return Ok(self.rest(Digit::Thumb, obstacles, RESTING_THUMB_FLEXION));
+        }
         let thumb = self.close(Digit::Thumb, obstacles);
         let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
         if !thumb.touches_object() {
@@ -127,10 +134,10 @@ impl Closer<'_> {
         rested
     }
 
-    /// A relaxed pose for a finger that holds nothing; where that is too close to a barrier, tucked away or nearly
+    /// A relaxed pose for a digit that holds nothing; where that is too close to a barrier, tucked away or nearly
     /// straight.
-    fn rest(&self, finger: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
-        let closing = self.closing(finger, obstacles);
+    fn rest(&self, digit: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
+        let closing = self.closing(digit, obstacles);
         let relaxed = closing.relax(flexion);
         if self.is_clear(&relaxed) {
             return relaxed;

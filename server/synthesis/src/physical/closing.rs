@@ -4,7 +4,8 @@
 //! are tapered capsules that close by conservative advancement (after B. Mirtich, "Timewarp Rigid Body Simulation",
 //! 2000, for rotations): a clearance divided by the highest speed of any point on the links is an angle that is
 //! certainly free. A link that touches stops, and with it the joints that carry it; the outer joints continue, as the
-//! deep flexor bends the last joint of a finger whose other joints are held.
+//! deep flexor bends the last joint of a finger whose other joints are held. A hooking finger bends the last joint only
+//! then.
 
 use std::f32::consts::PI;
 
@@ -40,6 +41,9 @@ const RELAXED_CLEARANCE: f32 = 0.001;
 
 /// Fractions of full closure tried as starts for relaxing a digit that cannot be opened.
 const CURLED: [f32; 3] = [0.35, 0.7, 1.0];
+
+/// Shares of the preshape tried as starts for hooking: straighter fingers meet what is below the handle.
+const HOOKED: &[f32] = &[1.0, 0.92, 0.84, 0.76, 0.65];
 
 /// Above this gap, in metres, a lower bound replaces the exact gap. Smaller values take more steps of a few
 /// nanoseconds each, larger ones more mesh queries.
@@ -91,15 +95,15 @@ pub struct Closing<'a> {
     pub preshape: f32,
     /// Other parts of the hand that stop the digit.
     pub obstacles: &'a [Obstacle],
+    /// Whether the last joint stays straight until the others are stopped. A fingertip that curls early meets what hangs in
+    /// the finger before the finger supports it.
+    pub curls_last: bool,
 }
 
 impl Closing<'_> {
     /// Closes until every joint is stopped or at its limit. `None` if a link starts inside a surface.
     pub fn close(&self) -> Option<ClosedDigit> {
-        let mut angles = [self.preshape, 0.5 * self.preshape, 0.0]
-            .map(|share| self.flexing.closed_by(share))
-            .into_iter()
-            .find(|angles| self.is_free(angles))?;
+        let mut angles = self.starts().find(|angles| self.is_free(angles))?;
         let mut touches = [false; 3];
         // The first joint that still moves.
         let mut free = 0;
@@ -107,7 +111,7 @@ impl Closing<'_> {
             let sweep = Sweep {
                 start: angles,
                 rates: std::array::from_fn(|joint| {
-                    if joint < free {
+                    if joint < free || (self.curls_last && joint == 2 && free < 2) {
                         0.0
                     } else {
                         self.flexing.rate(joint)
@@ -121,7 +125,13 @@ impl Closing<'_> {
                 let touches = self.link_touches(&links[link]);
                 (touches || self.is_obstructed(link, &links[link])).then_some((link, touches))
             });
-            let Some((link, is_touch)) = held else { break };
+            let Some((link, is_touch)) = held else {
+                if self.curls_last && free < 2 {
+                    free = 2;
+                    continue;
+                }
+                break;
+            };
             touches[link] = is_touch;
             free = link + 1;
         }
@@ -134,6 +144,27 @@ impl Closing<'_> {
             angles,
             links,
             touches,
+        })
+    }
+
+    /// The poses to close from, preferred ones first.
+    fn starts(&self) -> impl Iterator<Item = DigitAngles> {
+        let straight = self.flexing.opened().third_pitch;
+        let shares = if self.curls_last {
+            HOOKED
+        } else {
+            [1.0, 0.5, 0.0].as_slice()
+        };
+        shares.iter().map(move |share| {
+            let closed = self.flexing.closed_by(share * self.preshape);
+            DigitAngles {
+                third_pitch: if self.curls_last {
+                    straight
+                } else {
+                    closed.third_pitch
+                },
+                ..closed
+            }
         })
     }
 

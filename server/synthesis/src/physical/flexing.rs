@@ -44,6 +44,12 @@ impl Flexing<'_> {
         self.angles_at(&sweep, closure * self.full_sweep(&sweep))
     }
 
+    /// The fraction of full closure at which the first joint is at `base_pitch` radians, if its limits allow that.
+    pub fn closure_at(&self, base_pitch: f32) -> f32 {
+        let sweep = self.sweep();
+        (base_pitch - sweep.start.base_pitch) / self.full_sweep(&sweep).max(f32::MIN_POSITIVE)
+    }
+
     /// A sweep of all joints from the opened pose.
     pub(super) fn sweep(&self) -> Sweep {
         Sweep {

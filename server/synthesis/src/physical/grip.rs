@@ -1,5 +1,5 @@
-//! A grip: a hand closed on an object, independent of the giver's pose and of gravity. Steps 2 to 4 of Algorithm 1
-//! with the hand as solids, and closure.
+//! A grip: a hand closed on an object, independent of the giver's pose and, unless the object hangs in it, of gravity.
+//! Steps 2 to 4 of Algorithm 1 with the hand as solids, and closure.
 //!
 //! Checks run in order of cost: palm and forearm before any digit closes, and those that reject most hands first.
 //! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
@@ -12,6 +12,7 @@ use super::{
     closer::Closer,
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
+    hanging::Hang,
     immobility::{Buffers, SoftContact, TorqueScale, epsilon},
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
@@ -66,6 +67,8 @@ pub struct Grip {
     pub penetration: f32,
     /// Ferrari-Canny epsilon of its contacts.
     pub epsilon: f32,
+    /// How the object hangs in the hand; `None` for a hand whose contacts have closure.
+    pub hang: Option<Hang>,
 }
 
 impl Grip {
@@ -204,12 +207,24 @@ impl Gripper {
         stopwatch.lap(Step::ContactValidation);
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
-        let epsilon = match self.holding {
-            Holding::Alone => are_opposed(&self.contacts).then(|| self.closure(scene)).flatten(),
-            Holding::Shared => Some(0.0),
+        let hold = if self.holding == Holding::Shared {
+            Some((0.0, None))
+        } else if shape.is_hook() {
+            // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
+            let closing = (1..5).filter(|&finger| shape.closing[finger]);
+            let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
+            let enough_touch = touching.count() >= closing.count().min(3);
+            presented
+                .filter(|_| enough_touch)
+                .and_then(|presented| self.hang(scene, &closed, presented.up))
+        } else {
+            are_opposed(&self.contacts)
+                .then(|| self.closure(scene))
+                .flatten()
+                .map(|epsilon| (epsilon, None))
         };
         stopwatch.lap(Step::ImmobilityValidation);
-        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
+        let (epsilon, hang) = hold.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         if interrupted() {
             return Err(NoGrip::Interrupted);
         }
@@ -217,7 +232,8 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
-        self.validate(&closer, &digits, epsilon, stopwatch)
+        let (grip, solids) = self.validate(&closer, &digits, epsilon, stopwatch)?;
+        Ok((Grip { hang, ..grip }, solids))
     }
 
     /// Every check but closure, for a hand whose digits are all posed and whose contacts have this epsilon.
@@ -261,8 +277,22 @@ impl Gripper {
             bend_ratios,
             penetration,
             epsilon,
+            hang: None,
         };
         Ok((grip, solids))
+    }
+
+    /// How the object hangs in closed digits, and the epsilon of their contacts. `None` if it does not hang.
+    fn hang(
+        &mut self,
+        scene: &ObjectScene<'_>,
+        closed: &[ClosedDigit; 5],
+        up: Vec3,
+    ) -> Option<(f32, Option<Hang>)> {
+        let hang = Hang::of(&self.contacts, closed, scene.object.centre_of_mass, up)?;
+        let load = scene.load(&self.soft_contacts, up);
+        let epsilon = epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers);
+        Some((epsilon, Some(hang)))
     }
 
     /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.

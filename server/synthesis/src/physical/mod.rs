@@ -2,8 +2,8 @@
 //!
 //! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
 //! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
-//! ([`immobility`]). A [`grip`] is a hand closed on an object, clear of [`barriers`]; [`both_hands`] hold what is too large
-//! for one.
+//! ([`immobility`]). A [`grip`] is a hand closed on an object, or fingers in which it hangs ([`hanging`]), clear of
+//! [`barriers`]; [`both_hands`] hold what is too large for one.
 
 pub mod barriers;
 pub mod both_hands;
@@ -12,6 +12,7 @@ pub mod closing;
 pub mod contacts;
 pub mod flexing;
 pub mod grip;
+pub mod hanging;
 pub mod immobility;
 pub mod obstacle;
 pub mod scene;

@@ -36,7 +36,8 @@ pub struct HandShape {
     pub spread: f32,
     /// Degrees of the second joint per degree of the first: for the thumb, and for the fingers.
     pub bend_ratios: [f32; 2],
-    /// Which digits close, thumb first; the others rest.
+    /// Which digits close, thumb first; the others rest. Fingers that close without the thumb are a hook, in which the
+    /// load has to hang.
     pub closing: [bool; 5],
     /// Fraction of full closure, from 0 to 1, that thumb and fingers start from. A preshaped hand avoids obstacles that only
     /// an opened one would meet.
@@ -117,6 +118,11 @@ impl HandShape {
         } else {
             (sum / count).clamp(MIN_RESTING_FLEXION, MAX_RESTING_FLEXION)
         }
+    }
+
+    /// True if the load has to hang in the fingers.
+    pub fn is_hook(&self) -> bool {
+        !self.closing[Digit::Thumb.index()]
     }
 
     /// How a digit of this shape bends.

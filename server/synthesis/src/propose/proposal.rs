@@ -409,7 +409,7 @@ impl<'a> ProposalContext<'a> {
 
     /// True if inner spheres of palm and forearm are clear of object and barriers. This is a hundred times cheaper than the
     /// whole hand's clearance, which is checked later.
-    fn palm_fits(&self, object_from_wrist: Pose) -> bool {
+    pub fn palm_fits(&self, object_from_wrist: Pose) -> bool {
         let spheres = self.rig.oppositions().inner_spheres();
         self.spheres_fit(object_from_wrist, spheres, MAX_PENETRATION)
     }

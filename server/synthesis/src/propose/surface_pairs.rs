@@ -70,6 +70,11 @@ impl SurfacePair {
         self.thickness <= START_DEPTH
     }
 
+    /// The point midway between the ends, in metres.
+    pub fn middle(&self) -> Vec3 {
+        (self.start + self.end) * 0.5
+    }
+
     /// True unless an end is certainly too close to a barrier for a finger.
     pub fn is_free_of(&self, barriers: Barriers<'_>) -> bool {
         [self.start, self.end]
@@ -154,7 +159,7 @@ impl SurfacePairs {
         }
     }
 
-    /// The pairs.
+    /// The pairs, in the order of the surface's triangles.
     pub fn pairs(&self) -> &[SurfacePair] {
         &self.pairs
     }

@@ -58,6 +58,7 @@ impl GraspContext<'_> {
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
         let load = object.load(&gripper.soft_contacts, presented.up);
+        let load = grip.hang.map_or(load, |hang| hang.load_at_rest(load));
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
@@ -71,7 +72,10 @@ impl GraspContext<'_> {
             presented,
             clearances,
         );
-        let relative_closure = gripper.relative_closure(object, grip.epsilon);
+        let relative_closure = grip.hang.map_or_else(
+            || gripper.relative_closure(object, grip.epsilon),
+            |hang| hang.relative_lip(),
+        );
         self.rated(grasp, relative_closure, solids).map(Box::new)
     }
 
@@ -153,6 +157,7 @@ pub fn unscored_grasp(
             obstacle_clearance: clearances.obstacles,
         }),
         classification,
+        hangs: grip.hang.is_some(),
         score: None,
         key_frames: None,
         other_hand: None,
@@ -171,6 +176,7 @@ pub fn thesis_grasp(rig: &Rig, held: HeldObject) -> Grasp {
         forces: held.forces,
         torsions: Vec::new(),
         margins: None,
+        hangs: false,
         score: None,
         key_frames: None,
         other_hand: None,

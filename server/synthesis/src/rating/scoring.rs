@@ -92,7 +92,8 @@ pub fn posture_values(
 }
 
 /// Values of the terms that depend only on hand and object, not on how it is presented; the others are 0.
-/// `relative_closure` is the epsilon of the contacts as a multiple of the required one.
+/// `relative_closure` is the epsilon of the contacts as a multiple of the required one; for a hook, the height of the way
+/// out.
 pub fn grip_values(
     scene: &ObjectScene<'_>,
     rig: &Rig,

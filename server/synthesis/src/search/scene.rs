@@ -13,7 +13,7 @@ use crate::{
     },
     model::{
         bend_ratios::BendRatioChoice,
-        constraints::Constraints,
+        constraints::{Constraints, Hooks},
         hand::rig::Rig,
         holdout::Holdout,
         strategy::{Strategy, Validity},
@@ -25,6 +25,7 @@ use crate::{
         shape::Proposal,
     },
     propose::{
+        hooks::HangingPlaces,
         placement_cache::{PlacementCache, ROWS},
         prepared::{PreparedObject, PreparedRig},
         proposal::{ProposalContext, propose, propose_evenly},
@@ -32,6 +33,10 @@ use crate::{
     rating::assessment::GraspContext,
     thesis,
 };
+
+/// One in this many attempts hooks the fingers where the object may hang in them, or does not where that is demanded. With
+/// more hooks, objects that hang are found sooner by them and later by other grips.
+const ATTEMPTS_PER_HOOK: u64 = 8;
 
 /// What to grasp, and with which hand.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +60,8 @@ pub struct Scene<'a> {
     physical: Option<(ObjectScene<'a>, Presented)>,
     /// Cached placements of the receiving hand, computed on first use.
     placements: OnceLock<Arc<PlacementCache>>,
+    /// Where the object may hang in hooked fingers, computed on first use.
+    hanging_places: OnceLock<HangingPlaces>,
     constraints: Constraints,
     /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     seeds: SeedSets,
@@ -90,6 +97,7 @@ impl<'a> Scene<'a> {
                 friction,
             ),
             placements: OnceLock::new(),
+            hanging_places: OnceLock::new(),
             constraints: query.constraints,
             seeds: SeedSets::new(seeds),
             mechanisms,
@@ -192,7 +200,10 @@ impl<'a> Scene<'a> {
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
-        if self.physical.is_some() {
+        if let Some((_, presented)) = &self.physical {
+            if let Some(hook) = self.hook(presented, stream) {
+                return Some(hook);
+            }
             // The proposal has checked palm and forearm already.
             let proposal = propose(&self.cached_place(stream.attempt()), stream, interrupted)?;
             return Some(self.shaped(proposal));
@@ -205,6 +216,31 @@ impl<'a> Scene<'a> {
             advance: 0.0,
             ..proposal
         })
+    }
+
+    /// Hooked fingers, if it is their turn and the object may hang in them. Leaves the numbers that other proposals draw from
+    /// the stream as they are.
+    fn hook(&self, presented: &Presented, stream: &AttemptStream) -> Option<Proposal> {
+        let is_last = stream.attempt() % ATTEMPTS_PER_HOOK == ATTEMPTS_PER_HOOK - 1;
+        let takes_turn = match self.constraints.hooks() {
+            Hooks::Demanded => !is_last,
+            Hooks::Allowed => is_last,
+            Hooks::RuledOut => false,
+        };
+        if !takes_turn {
+            return None;
+        }
+        let Task { object, rig, .. } = self.task;
+        let places = self
+            .hanging_places
+            .get_or_init(|| HangingPlaces::of(object.object(), object.surface_pairs(), presented.up));
+        let place = self.place();
+        places.propose(
+            rig,
+            place.barriers,
+            |wrist| place.palm_fits(wrist),
+            &mut stream.clone(),
+        )
     }
 
     /// Adapts the proposal to the mechanisms that are on.

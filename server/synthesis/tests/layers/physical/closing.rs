@@ -77,6 +77,7 @@ fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Cl
         plane: DigitPlane::new(digit, Pose::IDENTITY, 0.0),
         preshape: 0.0,
         obstacles: &[],
+        curls_last: false,
     }
 }
 
@@ -278,6 +279,24 @@ fn a_digit_stops_at_other_parts_of_the_hand() {
         }
     }
     assert!(stopped > 50, "{stopped}");
+}
+
+#[test]
+fn a_hooking_finger_supports_a_bar_before_its_tip_curls_around_it() {
+    let digit = finger();
+    let bar = cuboid(Vec3::new(-0.05, 0.020, 0.022), Vec3::new(0.05, 0.0335, 0.036));
+    let hooking = closing(&bar, &digit, 4.0);
+    let hooking = Closing {
+        preshape: hooking.flexing.closure_at(0.3),
+        curls_last: true,
+        ..hooking
+    };
+    let closed = hooking.close().expect("it starts clear of the bar");
+    assert!(closed.touches[1], "{closed:?}");
+    // Then the last link bends by itself, until it touches or is at its limit.
+    let is_at_limit = closed.angles.third_pitch > digit.limits.third_pitch.max - 1e-4;
+    assert!(closed.touches[2] || is_at_limit, "{closed:?}");
+    assert!(closed.angles.third_pitch > 0.3, "{closed:?}");
 }
 
 #[test]

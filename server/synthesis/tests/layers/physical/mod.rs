@@ -5,5 +5,6 @@ mod barriers;
 mod closing;
 mod closure;
 mod hand_solids;
+mod hanging;
 mod prepared_hand;
 mod stance;

@@ -1,5 +1,6 @@
 //! Where hands are placed.
 
+mod hooks;
 mod mirror;
 mod oppositions;
 mod placement_cache;

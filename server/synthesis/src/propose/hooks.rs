@@ -1,0 +1,338 @@
+//! Where an object may hang in hooked fingers, and hands placed to hook in there.
+//!
+//! A place to hang by is a thin part above the centre of mass, with room below for a finger and free ways up on both
+//! sides of it, while the part itself goes on to the other two. Spheres of about a finger's thickness probe for that, so
+//! bars, wires, straps and sheets are all found alike.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use glam::{Mat3, Quat, Vec3};
+
+use super::surface_pairs::{SurfacePair, SurfacePairs};
+use crate::{
+    base::{pose::Pose, random::AttemptStream},
+    geometry::mesh_bvh::MeshBvh,
+    model::{
+        hand::{Digit, DigitAngles, kinematics::digit_frames, rig::Rig},
+        object::GraspObject,
+    },
+    physical::{
+        barriers::Barriers,
+        hanging::MAX_SWING,
+        shape::{HandShape, Proposal},
+        solids::link_radii,
+    },
+};
+
+/// Largest thickness in metres of a part that fingers hook around: their tips do not reach past a thicker one.
+const MAX_THICKNESS: f32 = 0.045;
+
+/// Largest number of thin parts that are probed, those of the least swing. Each takes up to 50 µs.
+const MAX_PROBED: usize = 64;
+
+/// Radius of a finger as it is probed for, in metres. A larger one misses narrow handles.
+const FINGER_RADIUS: f32 = 0.007;
+
+/// Step in metres in which the room below a part is probed, and how often it is halved there: to a fifth of a millimetre.
+const STEP: f32 = 0.003;
+const HALVINGS: usize = 4;
+
+/// Directions probed around the vertical, over half a turn.
+const DIRECTIONS: usize = 12;
+
+/// Distance to the side at which the ways up are probed, in metres beyond [`FINGER_RADIUS`] and half the part's thickness.
+const SIDE_GAP: f32 = 0.006;
+
+/// Heights above the probed finger at which the ways up have to be free, in metres.
+const SIDE_HEIGHTS: [f32; 2] = [0.0, 0.015];
+
+/// Distance in metres from a place at which its part has to go on to both sides: half the breadth of two fingers.
+const HALF_LENGTH: f32 = 0.014;
+
+/// Largest rise of a part over [`HALF_LENGTH`] that is probed, in metres, …
+const MAX_RISE: f32 = HALF_LENGTH;
+
+/// … and the largest slope along it, as a sine: 35°. The load slips along a steeper one.
+const MAX_SLOPE: f32 = 0.57;
+
+/// Places drawn per hand; the hand hooks in at the one with the least swing, near the middle of a handle. With more, a tilted
+/// handle is mostly tried at its end.
+const COMPARED: usize = 2;
+
+/// Largest number of hands tried until palm and forearm fit.
+const MAX_HANDS: usize = 12;
+
+/// Range of the first joint's flexion in radians: a hook is bent at the outer joints.
+const KNUCKLE_FLEXION: [f32; 2] = [0.1, 0.6];
+
+/// Range of the second joint's flexion in radians.
+const MIDDLE_FLEXION: [f32; 2] = [0.95, 1.6];
+
+/// Largest share, of the way from the second joint to the third, at which a hook lifts. With more, the last link is below what
+/// it should hold back.
+const MAX_SHARE_ALONG: f32 = 0.6;
+
+/// Largest tilt of the hook about the bar, in radians.
+const MAX_TILT: f32 = 0.35;
+
+/// Range of the gap in metres between the lifting links and what they lift before they close.
+const GAP: [f32; 2] = [0.0, 0.003];
+
+/// Shares of hands that hook with four, three and two fingers.
+const FINGER_SETS: [([bool; 5], f32); 3] = [
+    ([false, true, true, true, true], 0.6),
+    ([false, true, true, true, false], 0.25),
+    ([false, true, true, false, false], 0.15),
+];
+
+/// A place by which an object may hang, in its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HangingPlace {
+    /// The highest point that a finger below the part touches, in metres.
+    pub underside: Vec3,
+    /// Unit vector along the part.
+    pub along: Vec3,
+    /// Thickness of the part, in metres.
+    pub thickness: f32,
+    /// By how much the load swings until its centre of mass is below, in radians.
+    pub swing: f32,
+}
+
+/// The places by which an object hangs under one direction of gravity.
+#[derive(Clone, Debug, Default)]
+pub struct HangingPlaces {
+    places: Vec<HangingPlace>,
+    /// Unit vector against gravity, in the object's frame.
+    up: Vec3,
+}
+
+/// Fingers bent to a hook, in the wrist's frame.
+struct Hook {
+    shape: HandShape,
+    /// The middle of where the second links lift, at the height of the one that reaches deepest, in metres: the other fingers
+    /// close less.
+    middle: Vec3,
+    /// From the outermost lifting finger to the innermost, and the direction in which they lift: orthogonal unit vectors.
+    along: Vec3,
+    lift: Vec3,
+}
+
+impl HangingPlaces {
+    /// Probes the thin parts above the centre of mass; takes up to some milliseconds, and microseconds where there are none.
+    pub fn of(object: &GraspObject, pairs: &SurfacePairs, up: Vec3) -> Self {
+        let swing = |point: Vec3| (point - object.centre_of_mass).angle_between(up);
+        let mut thin: Vec<(f32, &SurfacePair)> = pairs
+            .pairs()
+            .iter()
+            .filter(|pair| pair.thickness <= MAX_THICKNESS)
+            .map(|pair| (swing(pair.middle()), pair))
+            .filter(|(swing, _)| *swing <= MAX_SWING)
+            .collect();
+        thin.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let places = thin
+            .into_iter()
+            .take(MAX_PROBED)
+            .filter_map(|(_, pair)| {
+                let (underside, along) = probe(&object.surface, pair, up)?;
+                Some(HangingPlace {
+                    underside,
+                    along,
+                    thickness: pair.thickness,
+                    swing: swing(underside),
+                })
+            })
+            .filter(|place| place.swing <= MAX_SWING)
+            .collect();
+        Self { places, up }
+    }
+
+    /// The places, in no particular order.
+    pub fn places(&self) -> &[HangingPlace] {
+        &self.places
+    }
+
+    /// Places a hooked hand whose palm and forearm satisfy `fits`. Returns `None` if there is nothing to hang by, or no drawn
+    /// hand fits.
+    pub fn propose(
+        &self,
+        rig: &Rig,
+        barriers: Barriers<'_>,
+        fits: impl Fn(Pose) -> bool,
+        stream: &mut AttemptStream,
+    ) -> Option<Proposal> {
+        if self.places.is_empty() {
+            return None;
+        }
+        (0..MAX_HANDS).find_map(|_| {
+            let drawn = (0..COMPARED).map(|_| &self.places[stream.below(self.places.len())]);
+            let place = drawn.min_by(|a, b| a.swing.total_cmp(&b.swing))?;
+            if barriers.certainly_cover(place.underside, FINGER_RADIUS, 0.0) {
+                return None;
+            }
+            let hook = Hook::draw(rig, place.thickness, stream);
+            let object_from_wrist = self.hooked_in(place, &hook, stream);
+            fits(object_from_wrist).then_some(Proposal {
+                object_from_wrist,
+                shape: hook.shape,
+                advance: 0.0,
+            })
+        })
+    }
+
+    /// The wrist's pose with the hook below a place, the palm on either side of it.
+    fn hooked_in(&self, place: &HangingPlace, hook: &Hook, stream: &mut AttemptStream) -> Pose {
+        let along = if stream.unit() < 0.5 {
+            place.along
+        } else {
+            -place.along
+        };
+        let tilt = Quat::from_axis_angle(along, stream.between(-MAX_TILT, MAX_TILT));
+        let lift = tilt * self.up.reject_from_normalized(along).normalize_or(self.up);
+        let axes = |along: Vec3, lift: Vec3| Mat3::from_cols(along, lift, along.cross(lift));
+        let rotation = axes(along, lift) * axes(hook.along, hook.lift).transpose();
+        let orientation = Quat::from_mat3(&rotation).normalize();
+        let gap = stream.between(GAP[0], GAP[1]);
+        Pose::new(
+            place.underside - lift * gap - orientation * hook.middle,
+            orientation,
+        )
+    }
+}
+
+impl Hook {
+    /// A hook for a part of this thickness, in metres.
+    fn draw(rig: &Rig, thickness: f32, stream: &mut AttemptStream) -> Self {
+        let mut height = stream.unit();
+        let closing = FINGER_SETS
+            .iter()
+            .find(|(_, share)| {
+                height -= share;
+                height < 0.0
+            })
+            .map_or(FINGER_SETS[0].0, |(set, _)| *set);
+        let knuckle = stream.between(KNUCKLE_FLEXION[0], KNUCKLE_FLEXION[1]);
+        let second = stream.between(MIDDLE_FLEXION[0], MIDDLE_FLEXION[1]);
+        let mut shape = HandShape {
+            thumb_yaw: stream.between(0.1, 0.5),
+            spread: 0.3 * stream.unit(),
+            bend_ratios: [1.0, second / knuckle],
+            closing,
+            preshape: [0.0; 2],
+            tucks: false,
+        };
+        shape.preshape[1] = shape.flexing(rig, Digit::Middle).closure_at(knuckle);
+        let share = MAX_SHARE_ALONG * stream.unit();
+        let hooked =
+            |&finger: &Digit| lifting_point(rig, finger, &shape, [knuckle, second], thickness, share);
+        let fingers = &Digit::ALL[1..];
+        let points: Vec<(Vec3, Vec3)> = fingers
+            .iter()
+            .filter(|finger| closing[finger.index()])
+            .map(hooked)
+            .collect();
+        let middle = points.iter().map(|(point, _)| *point).sum::<Vec3>() / points.len() as f32;
+        let along = (points[0].0 - points[points.len() - 1].0).normalize_or(Vec3::X);
+        let lifts: Vec3 = points.iter().map(|(_, lift)| *lift).sum();
+        let lift = lifts.reject_from_normalized(along).normalize_or(Vec3::Z);
+        let heights = points.iter().map(|(point, _)| (point - middle).dot(lift));
+        Self {
+            shape,
+            middle: middle + lift * heights.fold(f32::INFINITY, f32::min),
+            along,
+            lift,
+        }
+    }
+}
+
+/// A point on the skin of a finger's second link, and the direction its pad faces, in the wrist's frame. It is at a share of
+/// the way from where a round part of this thickness, in metres, fits between the first two links, to the link's end.
+fn lifting_point(
+    rig: &Rig,
+    finger: Digit,
+    shape: &HandShape,
+    [knuckle, second]: [f32; 2],
+    thickness: f32,
+    share: f32,
+) -> (Vec3, Vec3) {
+    let digit = rig.digit(finger);
+    let angles = DigitAngles::coupled(shape.flexing(rig, finger).base_yaw, knuckle, second);
+    let link = digit_frames(digit, Pose::IDENTITY, angles).links[1];
+    let radii = link_radii(rig, finger);
+    let length = digit.lengths[1];
+    // Tangent to both links' skin: the axes meet at the joint, turned by its flexion.
+    let closest = ((0.5 * thickness + radii[1]) * (0.5 * second).tan()).min(length);
+    let along = closest + (length - closest) * share;
+    let radius = radii[1] + (radii[2] - radii[1]) * along / length;
+    (
+        link.transform_point(Vec3::new(0.0, along, radius)),
+        link.transform_vector(Vec3::Z),
+    )
+}
+
+/// The underside of a thin part and the direction along it, if an object may hang by it.
+fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<(Vec3, Vec3)> {
+    let finger = finger_below(surface, pair.middle(), MAX_THICKNESS + FINGER_RADIUS, up)?;
+    let (a, b) = up.any_orthonormal_pair();
+    let reach = FINGER_RADIUS.mul_add(2.0, 0.5 * pair.thickness) + SIDE_GAP;
+    let is_open = |turn: usize| {
+        let (sin, cos) = (PI * turn as f32 / DIRECTIONS as f32).sin_cos();
+        let side = a * cos + b * sin;
+        [reach, -reach].iter().all(|&reach| {
+            SIDE_HEIGHTS
+                .iter()
+                .all(|&height| is_free(surface, finger + side * reach + up * height))
+        })
+    };
+    let open: [bool; DIRECTIONS] = std::array::from_fn(is_open);
+    let across = middle_of_longest_run(&open)?;
+    let turn = PI * across / DIRECTIONS as f32 + FRAC_PI_2;
+    let level = a * turn.cos() + b * turn.sin();
+    // The part goes on to both sides: below it, a finger finds its underside at a similar height.
+    let depth = 2.0 * (MAX_RISE + FINGER_RADIUS) + pair.thickness;
+    let [ahead, behind] = [HALF_LENGTH, -HALF_LENGTH].map(|offset| {
+        let above = finger + level * offset + up * (MAX_RISE + FINGER_RADIUS);
+        finger_below(surface, above, depth, up)
+    });
+    let along = (ahead? - behind?).normalize_or(level);
+    (along.dot(up).abs() <= MAX_SLOPE).then_some((finger + up * FINGER_RADIUS, along))
+}
+
+/// The highest point at which a finger is free below what is below `start`, within `depth` metres.
+fn finger_below(surface: &MeshBvh, start: Vec3, depth: f32, up: Vec3) -> Option<Vec3> {
+    let at = |depth: f32| start - up * depth;
+    let mut steps = (0..=(depth / STEP) as usize).map(|step| STEP * step as f32);
+    let first = steps.find(|&depth| !is_free(surface, at(depth)))?;
+    let mut free = steps.find(|&depth| is_free(surface, at(depth)))?;
+    let mut blocked = (free - STEP).max(first);
+    for _ in 0..HALVINGS {
+        let between = 0.5 * (blocked + free);
+        if is_free(surface, at(between)) {
+            free = between;
+        } else {
+            blocked = between;
+        }
+    }
+    Some(at(free))
+}
+
+/// True if a sphere of [`FINGER_RADIUS`] is clear of surface and volume.
+fn is_free(surface: &MeshBvh, centre: Vec3) -> bool {
+    surface.closest_point_within(centre, FINGER_RADIUS).is_none() && !surface.contains(centre)
+}
+
+/// The middle of the longest run of open directions, in steps around half a turn; `None` if all or none are open.
+fn middle_of_longest_run(open: &[bool; DIRECTIONS]) -> Option<f32> {
+    let closed = open.iter().position(|open| !open)?;
+    let (mut best, mut length) = ((0, 0.0), 0);
+    for step in 1..=DIRECTIONS {
+        if open[(closed + step) % DIRECTIONS] {
+            length += 1;
+            if length > best.0 {
+                best = (length, (closed + step) as f32 - 0.5 * (length - 1) as f32);
+            }
+        } else {
+            length = 0;
+        }
+    }
+    (best.0 > 0).then_some(best.1)
+}

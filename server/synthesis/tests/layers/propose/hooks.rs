@@ -1,0 +1,61 @@
+//! Places by which an object may hang.
+
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{model::object::GraspObject, propose::hooks::HangingPlaces};
+
+use crate::fixtures::meshes::{sphere, torus};
+use crate::fixtures::objects::{bar, lunch_box, object_of, plate, prepared};
+
+fn places(object: GraspObject, up: Vec3) -> HangingPlaces {
+    let object = prepared(&Arc::new(object));
+    HangingPlaces::of(object.object(), object.surface_pairs(), up)
+}
+
+#[test]
+fn a_box_hangs_by_its_handle() {
+    for up in [
+        Vec3::Y,
+        Quat::from_rotation_x(0.35) * Vec3::Y,
+        Quat::from_rotation_z(-0.35) * Vec3::Y,
+    ] {
+        let found = places(lunch_box(0.04), up);
+        assert!(found.places().len() > 5, "{up}: {found:?}");
+        for place in found.places() {
+            // The bar's underside is 40 mm above the lid; a tilted finger touches it near an edge.
+            let height = place.underside.y - 0.13;
+            assert!(
+                height.abs() < 0.006 && place.underside.x.abs() < 0.065,
+                "{up}: {place:?}"
+            );
+            // Next to a post, a finger finds the handle's underside farther down.
+            let nears_post = place.underside.x.abs() > 0.03;
+            assert!(nears_post || place.along.x.abs() > 0.95, "{up}: {place:?}");
+        }
+    }
+}
+
+#[test]
+fn there_is_nothing_to_hang_by_without_room_or_below_the_weight() {
+    assert!(places(lunch_box(0.008), Vec3::Y).places().is_empty());
+    assert!(places(lunch_box(0.04), Vec3::NEG_Y).places().is_empty());
+    for (name, object) in [
+        ("bar", bar()),
+        ("plate", plate()),
+        ("sphere", object_of(sphere(0.02, 16), &[])),
+    ] {
+        for up in [Vec3::X, Vec3::Y, Vec3::Z] {
+            assert!(places(object.clone(), up).places().is_empty(), "{name} {up}");
+        }
+    }
+}
+
+#[test]
+fn an_upright_ring_hangs_by_its_top() {
+    let found = places(object_of(torus(0.05, 0.006, 24), &[]), Vec3::Y);
+    assert!(!found.places().is_empty());
+    for place in found.places() {
+        assert!(place.underside.y > 0.03 && place.along.z.abs() < 0.3, "{place:?}");
+    }
+}
