@@ -41,6 +41,7 @@ mod key_frame;
 mod object;
 mod obstacle;
 mod pose;
+mod query;
 mod retry;
 mod score;
 mod search;
@@ -58,12 +59,12 @@ pub use key_frame::{KeyFrame, KeyFrameKind};
 pub use object::{AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage};
 pub use obstacle::{Capsule, Obstacle, SolidBox};
 pub use pose::Pose;
+pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};
 pub use retry::RetryPolicy;
 pub use score::{Score, ScoreTerm};
 pub use search::{
-    AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource, Hands,
-    Limit, LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount, SearchReport, Step,
-    StepTime, Strategy, Validity,
+    Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
+    PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
 };
 
 /// The README's Rust example compiles.

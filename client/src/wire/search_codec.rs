@@ -19,11 +19,11 @@ use super::{
 use crate::{
     grasp_type::GraspType,
     key_frame::{KeyFrame, KeyFrameKind},
+    query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity},
     score::{Score, ScoreTerm},
     search::{
-        AtlasUse, BendRatios, Choice, Contact, Convention, FindAnswer, FindRequest, Grasp, GraspSource,
-        Hands, Limit, LimitKind, NearestMiss, Outcome, PhysicalMargins, Rejection, RejectionCount,
-        SearchReport, Step, StepTime, Strategy, Validity,
+        Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
+        PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
     },
 };
 

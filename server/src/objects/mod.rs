@@ -30,7 +30,7 @@ use crate::{
     atlas_slots::AtlasSlots,
 };
 
-/// Bytes per triangle in the search structures, besides its three indices: the hierarchy's nodes, the prepared triangle
+/// Bytes per triangle in the search structures, in addition to its three indices: the hierarchy's nodes, the prepared triangle
 /// and the forbidden flag. A generous estimate, because it bounds the cache.
 const SEARCH_BYTES_PER_TRIANGLE: usize = 192;
 

@@ -11,7 +11,7 @@ use grasp_synthesis::{
 use super::{FARTHEST, Field, Violations, finite, hand, hand::GiverHand, point, pose};
 use crate::convention::Convention;
 
-/// Largest number of hands besides the presenting one: the giver's other hand, and both of another person.
+/// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
 const MAXIMUM_OTHER_HANDS: usize = 3;
 
 /// Largest number of obstacles. Each is compared with every hand that a search tries, at up to a microsecond each.

@@ -1,4 +1,4 @@
-//! `NAME.toml`: the fields of a `CreateObject` request besides the mesh, under the same names.
+//! `NAME.toml`: the fields of a `CreateObject` request other than the mesh, under the same names.
 
 use grasp_proto::v1;
 use toml::{Table, Value};

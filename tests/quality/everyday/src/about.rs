@@ -1,4 +1,4 @@
-//! What is known about an object besides its shape, and the files made of it.
+//! What is known about an object apart from its shape, and the files made of it.
 
 use std::fmt::Write as _;
 
