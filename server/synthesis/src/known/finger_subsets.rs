@@ -13,7 +13,7 @@ pub struct FingerSubsets(u16);
 impl FingerSubsets {
     /// All fingers that hold, and those of their subsets that have enough closure by themselves according to
     /// `closes`, which takes digits, thumb first. Subsets of a set that does not close are not tested:
-    /// removing a contact never adds closure.
+    /// removing a contact hardly ever adds closure.
     pub fn of(holding: [bool; 5], mut closes: impl FnMut([bool; 5]) -> bool) -> Self {
         let whole = number(holding);
         let mut sets = Self::whole(holding);

@@ -5,8 +5,12 @@ use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh};
 
 use crate::fixtures::{data, meshes, oracle, random::Random};
 
-/// Compares containment with the winding number; returns how many points were inside.
-fn compare(name: &str, mesh: &TriangleMesh, count: usize) -> usize {
+/// Largest fraction of a winding number that [`compare`] takes for that of a point far from sheets and holes.
+const WHOLE: f64 = 0.05;
+
+/// Compares containment with the winding number; returns how many points were inside. Where `has_sheets`, points with
+/// fractional winding numbers are left out: sheets, which enclose nothing, have a share in them.
+fn compare(name: &str, mesh: &TriangleMesh, count: usize, has_sheets: bool) -> usize {
     let bvhs = [MeshBvh::build(mesh.clone()), MeshBvh::build_quick(mesh.clone())];
     let mut random = Random::new(4);
     let mut inside = 0;
@@ -21,7 +25,8 @@ fn compare(name: &str, mesh: &TriangleMesh, count: usize) -> usize {
             continue;
         }
         let winding = oracle::winding_number(mesh, point);
-        if (winding.abs() - 0.5).abs() < 1e-4 {
+        let is_fraction = (winding - winding.round()).abs() > WHOLE;
+        if (winding.abs() - 0.5).abs() < 1e-4 || has_sheets && is_fraction {
             continue;
         }
         let expected = winding.abs() > 0.5 && mesh.aabb().contains(point);
@@ -41,7 +46,7 @@ fn compare(name: &str, mesh: &TriangleMesh, count: usize) -> usize {
 fn containment_matches_the_winding_number() {
     // Each triangle of the soup is a sheet.
     for (name, mesh) in meshes::all().into_iter().filter(|(name, _)| *name != "soup") {
-        let inside = compare(name, &mesh, 5_000);
+        let inside = compare(name, &mesh, 5_000, false);
         assert!(inside > 50, "{name}: only {inside} points are inside");
     }
 }
@@ -49,7 +54,7 @@ fn containment_matches_the_winding_number() {
 #[test]
 fn containment_in_real_objects_matches_the_winding_number() {
     for (name, mesh) in data::real_objects() {
-        let inside = compare(&name, &mesh, 400);
+        let inside = compare(&name, &mesh, 400, true);
         assert!(inside > 10, "{name}: only {inside} points are inside");
     }
 }

@@ -99,5 +99,6 @@ fn without_reproducible_a_clear_type_is_nearly_always_found() {
         let grasp = racing.run_on(&pool).grasp.expect("it is found");
         grasp.classification.is_clear()
     });
-    assert!(clear.count() as u64 >= 4 * SEEDS - 2);
+    let clear = clear.count() as u64;
+    assert!(8 * clear > 7 * 4 * SEEDS, "{clear} of {}", 4 * SEEDS);
 }

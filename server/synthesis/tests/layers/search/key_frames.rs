@@ -208,12 +208,12 @@ fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
         };
         widened.push(aperture(&pre_grasp.pose) - aperture(&close.pose));
     }
-    // As with people, thumb and index finger are some centimetres farther apart than in the grasp, except where the
-    // thumb lies across a finger.
+    // As with people, thumb and index finger are some centimetres farther apart than in the grasp, except in the one of
+    // eight in which the thumb lies across a finger.
     let mean = widened.iter().sum::<f32>() / widened.len() as f32;
     assert!((0.02..0.06).contains(&mean), "{mean} m");
     let wider = widened.iter().filter(|&&by| by > 0.01).count();
-    assert!(10 * wider > 9 * widened.len(), "{wider} of {}", widened.len());
+    assert!(8 * wider > 7 * widened.len(), "{wider} of {}", widened.len());
 }
 
 #[test]
