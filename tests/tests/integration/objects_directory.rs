@@ -56,8 +56,10 @@ async fn a_built_in_object_from_the_folder_gets_the_same_grasp() {
         let request = v1::FindGraspRequest {
             object,
             reproducible: true,
-            // The folder's manifest sets it, while the built-in object has no friction of its own.
+            // The folder's manifest sets it, while the built-in object has no friction of its own, which decides which
+            // grips of primitives a default search starts near.
             friction: Some(0.5),
+            validity: v1::Validity::Thesis.into(),
             ..held_remote()
         };
         let answer = server.grasps().await.find_grasp(request).await.unwrap();

