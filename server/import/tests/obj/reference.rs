@@ -1,14 +1,16 @@
-//! A second, simple reader for well-formed text whose polygons are all convex, to compare with.
+//! A second, simple reader for well-formed text, which splits all polygons into fans, to compare with.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Triangles by position in file order, and the triangles of each name.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Reference {
     pub(crate) triangles: Vec<[Vec3; 3]>,
     pub(crate) groups: BTreeMap<String, Vec<u32>>,
+    /// Is some polygon not the fan of its first corner?
+    has_concave: bool,
 }
 
 /// Reads text that the real reader accepted; leaves out triangles with two equal corners, without area, and those
@@ -54,6 +56,7 @@ pub(crate) fn read(text: &str, unit_metres: f32) -> Reference {
                         vertices[if index < 0 { before + index } else { index - 1 } as usize]
                     })
                     .collect();
+                reference.has_concave |= is_concave(&corners);
                 for k in 2..corners.len() {
                     let triangle = [corners[0], corners[k - 1], corners[k]];
                     let [a, b, c] = triangle;
@@ -93,6 +96,28 @@ pub(crate) fn compare(text: &str, unit_metres: f32) {
             if turned { [a, c, b] } else { [a, b, c] }
         })
         .collect();
+    if reference.has_concave {
+        // Whatever the triangles of a polygon, their area vectors have the same sum.
+        let [ours, theirs] =
+            [&triangles, &reference.triangles].map(|all| all.iter().map(area_vector).sum::<DVec3>());
+        let size: f64 = triangles
+            .iter()
+            .map(|triangle| area_vector(triangle).length())
+            .sum();
+        assert!((ours - theirs).length() <= 1e-4 * size, "{ours}, {theirs}");
+        return;
+    }
     assert_eq!(triangles, reference.triangles);
     assert_eq!(real.groups, reference.groups.into_iter().collect::<Vec<_>>());
+}
+
+fn area_vector([a, b, c]: &[Vec3; 3]) -> DVec3 {
+    (b.as_dvec3() - a.as_dvec3()).cross(c.as_dvec3() - a.as_dvec3())
+}
+
+/// True unless all triangles of the fan face the same side as the whole polygon.
+fn is_concave(corners: &[Vec3]) -> bool {
+    let fan = || (2..corners.len()).map(|k| area_vector(&[corners[0], corners[k - 1], corners[k]]));
+    let whole: DVec3 = fan().sum();
+    fan().any(|triangle| triangle.dot(whole) <= 0.0)
 }
