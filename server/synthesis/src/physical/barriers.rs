@@ -12,7 +12,7 @@ use crate::{geometry::solid_box::SolidBox, model::obstacle::Obstacle};
 /// hand that takes something thin from a table all but touches it; with half of this, no pen on a table can be taken.
 const CLOSER_TO_OBSTACLES: f32 = 0.0009;
 
-/// An obstacle prepared for comparison with many hands. All its distances are longer by [`CLOSER_TO_OBSTACLES`] than they
+/// An obstacle prepared for comparison with many hands. All its distances are longer by `CLOSER_TO_OBSTACLES` than they
 /// are, so that one threshold serves hands and obstacles.
 #[derive(Clone, Copy, Debug)]
 pub enum PreparedObstacle {
@@ -260,7 +260,7 @@ impl<'a> Barriers<'a> {
     }
 
     /// The distances of a hand, if those from hands are at least `required` metres and those from obstacles at least
-    /// [`CLOSER_TO_OBSTACLES`] less.
+    /// `CLOSER_TO_OBSTACLES` less.
     pub fn clearances(&self, hand: &TrackedSolids, required: f32) -> Option<BarrierClearances> {
         let mut clearances = BarrierClearances::default();
         for other in self.hands() {
