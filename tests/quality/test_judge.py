@@ -373,11 +373,10 @@ class TestFaults:
 
     def test_epsilon_of_two_pads_is_their_torsion(self):
         # Two pads are weakest about the line between them: friction times two thirds of the patch's radius over half
-        # their distance.
+        # their distance, or over the shortest length that torques are divided by.
         scene, grasp, _ = good()
         thumb, finger = (np.array(contact["client_position"]) for contact in grasp["contacts"])
-        length = np.linalg.norm(thumb - finger) / 2
-        assert 0.02 < length < 0.06
+        length = np.clip(np.linalg.norm(thumb - finger) / 2, *measures.HAND_LENGTHS)
         assert judged(scene, grasp)["epsilon"] == pytest.approx(FRICTION * measures.TORSION_RADIUS / length, rel=0.02)
         grasp["contacts"].pop()
         assert judged(scene, grasp)["epsilon"] == 0.0
@@ -387,11 +386,12 @@ class TestFaults:
         # six axes make an octahedron, whose faces are 1 / sqrt 3 away.
         scene, _, _ = good()
         scene.friction = 1e-9
+        length = measures.HAND_LENGTHS[1]
         contacts = []
         for axis in np.concatenate([np.eye(3), -np.eye(3)]):
             for around in np.concatenate([np.eye(3), -np.eye(3)]):
                 if abs(axis @ around) < 0.5:
-                    contacts.append({"normal": axis, "position": axis + 9 * around})
+                    contacts.append({"normal": axis, "position": length * (axis + 9 * around)})
         assert measures.epsilon(scene, contacts)["epsilon"] == pytest.approx(3**-0.5, rel=0.02)
 
     def test_counts_stretched_idle_fingers(self):
