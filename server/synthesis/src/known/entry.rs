@@ -119,7 +119,6 @@ impl Entry {
             bend_ratios: grasp.bend_ratios,
             penetration: margins.penetration,
             epsilon: margins.epsilon,
-            hang: None,
         };
         Some(Self {
             finger_subsets: FingerSubsets::whole(grip.holding_digits()),

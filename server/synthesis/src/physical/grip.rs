@@ -67,8 +67,6 @@ pub struct Grip {
     pub penetration: f32,
     /// Ferrari-Canny epsilon of its contacts.
     pub epsilon: f32,
-    /// How the object hangs in the hand; `None` for a hand whose contacts have closure.
-    pub hang: Option<Hang>,
 }
 
 impl Grip {
@@ -100,6 +98,8 @@ pub struct Gripper {
     obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
+    /// How the object hangs in the last hand; `None` if its contacts have closure.
+    pub(crate) hang: Option<Hang>,
     /// Closure of the last hand as a share of the required one: an upper bound if below 1, 0 if no hand came that
     /// far.
     closure_share: f32,
@@ -130,6 +130,7 @@ impl Gripper {
     ) -> Result<(Grip, HandSolids), NoGrip> {
         self.posed.clear();
         self.closure_share = 0.0;
+        self.hang = None;
         let barriers = presented.map_or(Barriers::NONE, Presented::barriers);
 
         // Steps 3 and 4 for palm and forearm, which do not move with the digits, and for the ball of the thumb in its
@@ -207,8 +208,8 @@ impl Gripper {
         stopwatch.lap(Step::ContactValidation);
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
-        let hold = if self.holding == Holding::Shared {
-            Some((0.0, None))
+        let epsilon = if self.holding == Holding::Shared {
+            Some(0.0)
         } else if shape.is_hook() {
             // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
             let closing = (1..5).filter(|&finger| shape.closing[finger]);
@@ -218,13 +219,10 @@ impl Gripper {
                 .filter(|_| enough_touch)
                 .and_then(|presented| self.hang(scene, &closed, presented.up))
         } else {
-            are_opposed(&self.contacts)
-                .then(|| self.closure(scene))
-                .flatten()
-                .map(|epsilon| (epsilon, None))
+            are_opposed(&self.contacts).then(|| self.closure(scene)).flatten()
         };
         stopwatch.lap(Step::ImmobilityValidation);
-        let (epsilon, hang) = hold.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
+        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         if interrupted() {
             return Err(NoGrip::Interrupted);
         }
@@ -232,8 +230,7 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
-        let (grip, solids) = self.validate(&closer, &digits, epsilon, stopwatch)?;
-        Ok((Grip { hang, ..grip }, solids))
+        self.validate(&closer, &digits, epsilon, stopwatch)
     }
 
     /// Every check but closure, for a hand whose digits are all posed and whose contacts have this epsilon.
@@ -277,22 +274,16 @@ impl Gripper {
             bend_ratios,
             penetration,
             epsilon,
-            hang: None,
         };
         Ok((grip, solids))
     }
 
-    /// How the object hangs in closed digits, and the epsilon of their contacts. `None` if it does not hang.
-    fn hang(
-        &mut self,
-        scene: &ObjectScene<'_>,
-        closed: &[ClosedDigit; 5],
-        up: Vec3,
-    ) -> Option<(f32, Option<Hang>)> {
-        let hang = Hang::of(&self.contacts, closed, scene.object.centre_of_mass, up)?;
+    /// The epsilon of the contacts if the object hangs in closed digits.
+    fn hang(&mut self, scene: &ObjectScene<'_>, closed: &[ClosedDigit; 5], up: Vec3) -> Option<f32> {
+        self.hang = Hang::of(&self.contacts, closed, scene.object.centre_of_mass, up);
+        self.hang?;
         let load = scene.load(&self.soft_contacts, up);
-        let epsilon = epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers);
-        Some((epsilon, Some(hang)))
+        Some(epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers))
     }
 
     /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.

@@ -27,7 +27,7 @@ use crate::{
 /// Largest thickness in metres of a part that fingers hook around: their tips do not reach past a thicker one.
 const MAX_THICKNESS: f32 = 0.045;
 
-/// Largest number of thin parts that are probed, those of the least swing. Each takes up to 50 µs.
+/// Largest number of thin parts that are probed, the highest first, as handles are. Each takes up to 50 µs.
 const MAX_PROBED: usize = 64;
 
 /// Radius of a finger as it is probed for, in metres. A larger one misses narrow handles.
@@ -119,31 +119,39 @@ struct Hook {
 
 impl HangingPlaces {
     /// Probes the thin parts above the centre of mass; takes up to some milliseconds, and microseconds where there are none.
-    pub fn of(object: &GraspObject, pairs: &SurfacePairs, up: Vec3) -> Self {
+    /// `None` if interrupted.
+    pub fn of(
+        object: &GraspObject,
+        pairs: &SurfacePairs,
+        up: Vec3,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<Self> {
         let swing = |point: Vec3| (point - object.centre_of_mass).angle_between(up);
-        let mut thin: Vec<(f32, &SurfacePair)> = pairs
+        let mut thin: Vec<&SurfacePair> = pairs
             .pairs()
             .iter()
-            .filter(|pair| pair.thickness <= MAX_THICKNESS)
-            .map(|pair| (swing(pair.middle()), pair))
-            .filter(|(swing, _)| *swing <= MAX_SWING)
+            .filter(|pair| pair.thickness <= MAX_THICKNESS && swing(pair.middle()) <= MAX_SWING)
             .collect();
-        thin.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let places = thin
-            .into_iter()
-            .take(MAX_PROBED)
-            .filter_map(|(_, pair)| {
-                let (underside, along) = probe(&object.surface, pair, up)?;
-                Some(HangingPlace {
+        thin.sort_by(|a, b| b.middle().dot(up).total_cmp(&a.middle().dot(up)));
+        let mut places = Vec::new();
+        for pair in thin.into_iter().take(MAX_PROBED) {
+            if interrupted() {
+                return None;
+            }
+            let Some((underside, along)) = probe(&object.surface, pair, up) else {
+                continue;
+            };
+            let swing = swing(underside);
+            if swing <= MAX_SWING {
+                places.push(HangingPlace {
                     underside,
                     along,
                     thickness: pair.thickness,
-                    swing: swing(underside),
-                })
-            })
-            .filter(|place| place.swing <= MAX_SWING)
-            .collect();
-        Self { places, up }
+                    swing,
+                });
+            }
+        }
+        Some(Self { places, up })
     }
 
     /// The places, in no particular order.

@@ -58,12 +58,12 @@ impl GraspContext<'_> {
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
         let load = object.load(&gripper.soft_contacts, presented.up);
-        let load = grip.hang.map_or(load, |hang| hang.load_at_rest(load));
+        let load = gripper.hang.map_or(load, |hang| hang.load_at_rest(load));
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
         let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         let clearances = self.clearances(grip, solids)?;
-        let grasp = unscored_grasp(
+        let mut grasp = unscored_grasp(
             grip,
             &gripper.contacts,
             classification,
@@ -72,7 +72,8 @@ impl GraspContext<'_> {
             presented,
             clearances,
         );
-        let relative_closure = grip.hang.map_or_else(
+        grasp.hangs = gripper.hang.is_some();
+        let relative_closure = gripper.hang.map_or_else(
             || gripper.relative_closure(object, grip.epsilon),
             |hang| hang.relative_lip(),
         );
@@ -129,7 +130,8 @@ impl GraspContext<'_> {
     }
 }
 
-/// The grasp of a grip that holds the presented object with the forces of `balance`. Its score is left empty.
+/// The grasp of a grip that holds the presented object with the forces of `balance`. Its score is left empty, and it
+/// does not hang.
 pub fn unscored_grasp(
     grip: &Grip,
     contacts: &[Contact],
@@ -157,7 +159,7 @@ pub fn unscored_grasp(
             obstacle_clearance: clearances.obstacles,
         }),
         classification,
-        hangs: grip.hang.is_some(),
+        hangs: false,
         score: None,
         key_frames: None,
         other_hand: None,

@@ -201,7 +201,7 @@ impl<'a> Scene<'a> {
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
         if let Some((_, presented)) = &self.physical {
-            if let Some(hook) = self.hook(presented, stream) {
+            if let Some(hook) = self.hook(presented, stream, interrupted) {
                 return Some(hook);
             }
             // The proposal has checked palm and forearm already.
@@ -220,7 +220,12 @@ impl<'a> Scene<'a> {
 
     /// Hooked fingers, if it is their turn and the object may hang in them. Leaves the numbers that other proposals draw from
     /// the stream as they are.
-    fn hook(&self, presented: &Presented, stream: &AttemptStream) -> Option<Proposal> {
+    fn hook(
+        &self,
+        presented: &Presented,
+        stream: &AttemptStream,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<Proposal> {
         let is_last = stream.attempt() % ATTEMPTS_PER_HOOK == ATTEMPTS_PER_HOOK - 1;
         let takes_turn = match self.constraints.hooks() {
             Hooks::Demanded => !is_last,
@@ -231,9 +236,13 @@ impl<'a> Scene<'a> {
             return None;
         }
         let Task { object, rig, .. } = self.task;
-        let places = self
-            .hanging_places
-            .get_or_init(|| HangingPlaces::of(object.object(), object.surface_pairs(), presented.up));
+        let places = if let Some(places) = self.hanging_places.get() {
+            places
+        } else {
+            let pairs = object.surface_pairs();
+            let probed = HangingPlaces::of(object.object(), pairs, presented.up, interrupted)?;
+            self.hanging_places.get_or_init(|| probed)
+        };
         let place = self.place();
         places.propose(
             rig,

@@ -62,8 +62,6 @@ pub(super) fn write_entry(
         bend_ratios,
         penetration,
         epsilon,
-        // Atlases serve every direction of gravity; a hook serves only one.
-        hang: _,
     } = &entry.grip;
     let Pose {
         position,
@@ -122,7 +120,6 @@ pub(super) fn read_entry(
         bend_ratios,
         penetration,
         epsilon,
-        hang: None,
     };
     let finger_subsets = FingerSubsets::from_bits(sets, grip.holding_digits())
         .ok_or(AtlasError::Malformed("invalid finger subsets"))?;

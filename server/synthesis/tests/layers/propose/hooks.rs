@@ -10,7 +10,7 @@ use crate::fixtures::objects::{bar, lunch_box, object_of, plate, prepared};
 
 fn places(object: GraspObject, up: Vec3) -> HangingPlaces {
     let object = prepared(&Arc::new(object));
-    HangingPlaces::of(object.object(), object.surface_pairs(), up)
+    HangingPlaces::of(object.object(), object.surface_pairs(), up, &|| false).expect("nobody interrupts")
 }
 
 #[test]
@@ -58,4 +58,11 @@ fn an_upright_ring_hangs_by_its_top() {
     for place in found.places() {
         assert!(place.underside.y > 0.03 && place.along.z.abs() < 0.3, "{place:?}");
     }
+}
+
+#[test]
+fn probing_stops_when_interrupted() {
+    let object = prepared(&Arc::new(lunch_box(0.047)));
+    let probed = HangingPlaces::of(object.object(), object.surface_pairs(), Vec3::Y, &|| true);
+    assert!(probed.is_none());
 }
