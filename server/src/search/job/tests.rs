@@ -47,7 +47,8 @@ fn quaternion() -> impl Strategy<Value = v1::Quaternion> {
     prop_oneof![500 => turned, 1 => any]
 }
 
-fn pose(ordinary: f32) -> impl Strategy<Value = Option<v1::Pose>> {
+/// Boxed, like all strategies that others repeat: without optimisation, nested value trees outgrow a test's stack of 2 MiB.
+fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
     let pose = (
         proptest::option::of(vector(ordinary)),
         proptest::option::of(quaternion()),
@@ -59,10 +60,11 @@ fn pose(ordinary: f32) -> impl Strategy<Value = Option<v1::Pose>> {
             orientation,
         }),
     )
+    .boxed()
 }
 
 /// A hand in any pose, seldom with a joint that is anywhere.
-fn tracked_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
+fn tracked_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
     let moved = (vector(1.0), quaternion()).prop_map(|(v, q)| Pose {
         position: Vec3::new(v.x, v.y, v.z),
         orientation: Quat::from_xyzw(q.x, q.y, q.z, q.w),
@@ -97,13 +99,14 @@ fn tracked_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
             }
             v1::presenting_hand::Form::Joints(hand)
         })
+        .boxed()
 }
 
 /// Angles given as shares of their ranges.
-fn angled_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
+fn angled_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
     let shares = proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5);
-    (shares, pose(0.2), 1..=2_i32, 0..RIG_NAMES.len()).prop_map(
-        |(shares, client_from_wrist, handedness, rig)| {
+    (shares, pose(0.2), 1..=2_i32, 0..RIG_NAMES.len())
+        .prop_map(|(shares, client_from_wrist, handedness, rig)| {
             let rig = RIG_NAMES[rig];
             let hand = hands::hand(rig, Handedness::Right).expect("the rig is built in");
             let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
@@ -121,8 +124,8 @@ fn angled_hand() -> impl Strategy<Value = v1::presenting_hand::Form> {
                     })
                     .collect(),
             })
-        },
-    )
+        })
+        .boxed()
 }
 
 fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
