@@ -87,6 +87,7 @@ impl Knowledge {
             | Mechanism::RoomScreen
             | Mechanism::PalmPlacement
             | Mechanism::Preshape
+            | Mechanism::Handles
             | Mechanism::TuckedFingers => true,
         };
         Mechanism::ALL.into_iter().filter(runs)

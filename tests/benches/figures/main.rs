@@ -13,6 +13,7 @@ mod cold;
 mod core;
 mod echo;
 mod ellipsoid;
+mod everyday;
 mod graspit;
 mod registration;
 mod requests;
@@ -49,6 +50,8 @@ enum Row {
     Best,
     /// Without an atlas.
     Cold,
+    /// Everyday objects that nobody holds out, without an atlas.
+    Everyday,
     /// From a mesh to a complete atlas.
     Registration,
     /// Comparison with `GraspIt!`.
@@ -64,6 +67,7 @@ impl Row {
             Self::Wire => "wire",
             Self::Best => "best",
             Self::Cold => "cold",
+            Self::Everyday => "everyday",
             Self::Registration => "registration",
             Self::Graspit => "graspit",
             Self::Ablation => "ablation",
@@ -181,6 +185,9 @@ fn measure(setting: &Setting, minutes: Option<u32>, is_selected: impl Fn(Row) ->
     }
     if is_selected(Row::Cold) {
         lines.extend(cold::measure(setting, &test_objects));
+    }
+    if is_selected(Row::Everyday) {
+        lines.extend(everyday::measure(setting));
     }
     if is_selected(Row::Registration) {
         lines.extend(registration::measure(setting, &test_objects));

@@ -47,6 +47,8 @@ pub enum Mechanism {
     RoomScreen,
     /// Places some hands with the palm on the surface.
     PalmPlacement,
+    /// Wraps handles with the whole hand, in most attempts at heavy objects.
+    Handles,
     /// Preshapes the hand to the object's width before closing it.
     Preshape,
     /// Tucks fingers that do not take part into the palm, for some hands.
@@ -55,7 +57,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All mechanisms, in the order in which a search uses them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::AtlasLookUp,
         Self::Shortlists,
         Self::GravityOrder,
@@ -75,6 +77,7 @@ impl Mechanism {
         Self::PlacementCache,
         Self::RoomScreen,
         Self::PalmPlacement,
+        Self::Handles,
         Self::Preshape,
         Self::TuckedFingers,
     ];
@@ -101,6 +104,7 @@ impl Mechanism {
             Self::PlacementCache => "placement-cache",
             Self::RoomScreen => "room-screen",
             Self::PalmPlacement => "palm-placement",
+            Self::Handles => "handles",
             Self::Preshape => "preshape",
             Self::TuckedFingers => "tucked-fingers",
         }

@@ -11,7 +11,7 @@ pub mod mesh;
 pub mod mesh_bvh;
 pub mod opposed;
 pub mod oriented_box;
-mod principal_axes;
+pub(crate) mod principal_axes;
 pub mod solid_box;
 mod stack_entry;
 pub mod surface_samples;

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 
 /// The principal axes of points, right-handed: eigenvectors of their covariance by Jacobi rotations (G. H. Golub, C.
 /// F. Van Loan: Matrix Computations, 8.5).
-pub(super) fn principal_axes(points: &[DVec3]) -> DMat3 {
+pub(crate) fn principal_axes(points: &[DVec3]) -> DMat3 {
     let mean = points.iter().sum::<DVec3>() / points.len() as f64;
     let mut covariance = DMat3::ZERO;
     for &point in points {

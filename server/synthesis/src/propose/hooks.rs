@@ -55,6 +55,10 @@ const MAX_RISE: f32 = HALF_LENGTH;
 /// … and the largest slope along it, as a sine: 35°. The load slips along a steeper one.
 const MAX_SLOPE: f32 = 0.57;
 
+/// By how much the ends of a part for four fingers may be off the line along it, in metres: fingers of one hand reach about as
+/// deep.
+const MAX_SAG: f32 = 0.01;
+
 /// Places drawn per hand; the hand hooks in at the one with the least swing, near the middle of a handle. With more, a tilted
 /// handle is mostly tried at its end.
 const COMPARED: usize = 2;
@@ -62,23 +66,23 @@ const COMPARED: usize = 2;
 /// Largest number of hands tried until palm and forearm fit.
 const MAX_HANDS: usize = 12;
 
-/// Range of the first joint's flexion in radians: a hook is bent at the outer joints.
-const KNUCKLE_FLEXION: [f32; 2] = [0.1, 0.6];
-
-/// Range of the second joint's flexion in radians.
-const MIDDLE_FLEXION: [f32; 2] = [0.95, 1.6];
+/// Ranges of the first and the second joint's flexion before the fingers close, in radians. Knuckles that are straighter leave
+/// the fingertips below the bar.
+const KNUCKLE_FLEXION: [f32; 2] = [0.35, 1.0];
+const MIDDLE_FLEXION: [f32; 2] = [0.7, 1.25];
 
 /// Largest share, of the way from the second joint to the third, at which a hook lifts. With more, the last link is below what
 /// it should hold back.
-const MAX_SHARE_ALONG: f32 = 0.6;
+const MAX_SHARE_ALONG: f32 = 0.45;
 
-/// Largest tilt of the hook about the bar, in radians.
-const MAX_TILT: f32 = 0.35;
+/// Range of the angle in radians by which the hook turns about the bar, fingertips up. With less, the lip is on the knuckles'
+/// side only.
+const TILT: [f32; 2] = [0.0, 0.45];
 
 /// Range of the gap in metres between the lifting links and what they lift before they close.
 const GAP: [f32; 2] = [0.0, 0.003];
 
-/// Shares of hands that hook with four, three and two fingers.
+/// The fingers that hook, with the shares of hands where a part offers room for all; elsewhere, only two do.
 const FINGER_SETS: [([bool; 5], f32); 3] = [
     ([false, true, true, true, true], 0.6),
     ([false, true, true, true, false], 0.25),
@@ -94,6 +98,8 @@ pub struct HangingPlace {
     pub along: Vec3,
     /// Thickness of the part, in metres.
     pub thickness: f32,
+    /// Whether it goes on for the breadth of four fingers.
+    pub is_broad: bool,
     /// By how much the load swings until its centre of mass is below, in radians.
     pub swing: f32,
 }
@@ -138,7 +144,12 @@ impl HangingPlaces {
             if interrupted() {
                 return None;
             }
-            let Some((underside, along)) = probe(&object.surface, pair, up) else {
+            let Some(Underside {
+                highest: underside,
+                along,
+                is_broad,
+            }) = probe(&object.surface, pair, up)
+            else {
                 continue;
             };
             let swing = swing(underside);
@@ -147,6 +158,7 @@ impl HangingPlaces {
                     underside,
                     along,
                     thickness: pair.thickness,
+                    is_broad,
                     swing,
                 });
             }
@@ -177,7 +189,7 @@ impl HangingPlaces {
             if barriers.certainly_cover(place.underside, FINGER_RADIUS, 0.0) {
                 return None;
             }
-            let hook = Hook::draw(rig, place.thickness, stream);
+            let hook = Hook::draw(rig, place, stream);
             let object_from_wrist = self.hooked_in(place, &hook, stream);
             fits(object_from_wrist).then_some(Proposal {
                 object_from_wrist,
@@ -194,7 +206,7 @@ impl HangingPlaces {
         } else {
             -place.along
         };
-        let tilt = Quat::from_axis_angle(along, stream.between(-MAX_TILT, MAX_TILT));
+        let tilt = Quat::from_axis_angle(along, stream.between(TILT[0], TILT[1]));
         let lift = tilt * self.up.reject_from_normalized(along).normalize_or(self.up);
         let axes = |along: Vec3, lift: Vec3| Mat3::from_cols(along, lift, along.cross(lift));
         let rotation = axes(along, lift) * axes(hook.along, hook.lift).transpose();
@@ -208,16 +220,16 @@ impl HangingPlaces {
 }
 
 impl Hook {
-    /// A hook for a part of this thickness, in metres.
-    fn draw(rig: &Rig, thickness: f32, stream: &mut AttemptStream) -> Self {
-        let mut height = stream.unit();
+    /// A hook for a place.
+    fn draw(rig: &Rig, place: &HangingPlace, stream: &mut AttemptStream) -> Self {
+        let mut height = if place.is_broad { stream.unit() } else { 1.0 };
         let closing = FINGER_SETS
             .iter()
             .find(|(_, share)| {
                 height -= share;
                 height < 0.0
             })
-            .map_or(FINGER_SETS[0].0, |(set, _)| *set);
+            .map_or(FINGER_SETS[2].0, |(set, _)| *set);
         let knuckle = stream.between(KNUCKLE_FLEXION[0], KNUCKLE_FLEXION[1]);
         let second = stream.between(MIDDLE_FLEXION[0], MIDDLE_FLEXION[1]);
         let mut shape = HandShape {
@@ -231,7 +243,7 @@ impl Hook {
         shape.preshape[1] = shape.flexing(rig, Digit::Middle).closure_at(knuckle);
         let share = MAX_SHARE_ALONG * stream.unit();
         let hooked =
-            |&finger: &Digit| lifting_point(rig, finger, &shape, [knuckle, second], thickness, share);
+            |&finger: &Digit| lifting_point(rig, finger, &shape, [knuckle, second], place.thickness, share);
         let fingers = &Digit::ALL[1..];
         let points: Vec<(Vec3, Vec3)> = fingers
             .iter()
@@ -277,8 +289,18 @@ fn lifting_point(
     )
 }
 
-/// The underside of a thin part and the direction along it, if an object may hang by it.
-fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<(Vec3, Vec3)> {
+/// The underside of a thin part by which an object may hang.
+struct Underside {
+    /// The highest point that a finger below it touches, in metres.
+    highest: Vec3,
+    /// Unit vector along the part.
+    along: Vec3,
+    /// Whether it goes on for the breadth of four fingers.
+    is_broad: bool,
+}
+
+/// The underside of a thin part, if an object may hang by it.
+fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<Underside> {
     let finger = finger_below(surface, pair.middle(), MAX_THICKNESS + FINGER_RADIUS, up)?;
     let (a, b) = up.any_orthonormal_pair();
     let reach = FINGER_RADIUS.mul_add(2.0, 0.5 * pair.thickness) + SIDE_GAP;
@@ -297,12 +319,19 @@ fn probe(surface: &MeshBvh, pair: &SurfacePair, up: Vec3) -> Option<(Vec3, Vec3)
     let level = a * turn.cos() + b * turn.sin();
     // The part goes on to both sides: below it, a finger finds its underside at a similar height.
     let depth = 2.0 * (MAX_RISE + FINGER_RADIUS) + pair.thickness;
-    let [ahead, behind] = [HALF_LENGTH, -HALF_LENGTH].map(|offset| {
+    let below = |offset: f32| {
         let above = finger + level * offset + up * (MAX_RISE + FINGER_RADIUS);
         finger_below(surface, above, depth, up)
-    });
-    let along = (ahead? - behind?).normalize_or(level);
-    (along.dot(up).abs() <= MAX_SLOPE).then_some((finger + up * FINGER_RADIUS, along))
+    };
+    let along = (below(HALF_LENGTH)? - below(-HALF_LENGTH)?).normalize_or(level);
+    let goes_on = |offset: f32| {
+        below(offset).is_some_and(|end| (end - finger).reject_from_normalized(along).length() <= MAX_SAG)
+    };
+    (along.dot(up).abs() <= MAX_SLOPE).then(|| Underside {
+        highest: finger + up * FINGER_RADIUS,
+        along,
+        is_broad: goes_on(2.0 * HALF_LENGTH) && goes_on(-2.0 * HALF_LENGTH),
+    })
 }
 
 /// The highest point at which a finger is free below what is below `start`, within `depth` metres.

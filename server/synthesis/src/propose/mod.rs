@@ -9,6 +9,7 @@
 //! What takes two hands is held on both sides of its centre of mass ([`both_hands`]).
 
 pub mod both_hands;
+pub mod handles;
 pub mod holdable;
 pub mod hooks;
 pub mod opposition;

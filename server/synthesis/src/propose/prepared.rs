@@ -6,6 +6,7 @@ use std::{
 };
 
 use super::{
+    handles::Handles,
     holdable::HoldableSurface,
     opposition::Oppositions,
     placement_cache::{PlacementCache, PlacementCaches},
@@ -66,18 +67,21 @@ pub struct PreparedObject {
     surface_pairs: SurfacePairs,
     holdable: HoldableSurface,
     placements: PlacementCaches,
+    handles: Handles,
 }
 
 impl PreparedObject {
-    /// Samples the object's surface for opposed points, which takes some milliseconds.
+    /// Samples the object's surface for opposed points and handles, which takes some milliseconds.
     pub fn new(object: Arc<GraspObject>) -> Self {
         let surface_pairs = SurfacePairs::of(&object.surface, |triangle| object.is_forbidden(triangle));
         let holdable = HoldableSurface::of(&object, &surface_pairs);
+        let handles = Handles::of(&object, &surface_pairs);
         Self {
             object,
             surface_pairs,
             holdable,
             placements: PlacementCaches::default(),
+            handles,
         }
     }
 
@@ -94,6 +98,11 @@ impl PreparedObject {
     /// Bounds on where it may be held.
     pub fn holdable(&self) -> &HoldableSurface {
         &self.holdable
+    }
+
+    /// Where it can be wrapped.
+    pub fn handles(&self) -> &Handles {
+        &self.handles
     }
 
     /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five

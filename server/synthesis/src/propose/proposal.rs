@@ -70,7 +70,7 @@ const THIN: f32 = 0.015;
 const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.02, 0.02], [-0.02, 0.03]];
 
 /// Height above the surface from which the palm approaches, in metres.
-const PALM_START_HEIGHT: f32 = 0.03;
+pub(super) const PALM_START_HEIGHT: f32 = 0.03;
 
 /// The object, hands and settings for which proposals are drawn.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,11 @@
 //! One attempt: places, closes and checks a hand according to strategy and validity. If that fails and seeds
 //! are known, hands perturbed from those follow.
 
-use super::{both_hands::BothHands, physical_attempt::PhysicalAttempt, scene::Scene};
+use super::{
+    both_hands::BothHands,
+    physical_attempt::PhysicalAttempt,
+    scene::{Guided, Scene},
+};
 use crate::{
     base::{
         mechanisms::Mechanism,
@@ -82,6 +86,8 @@ pub struct Attempt {
     thesis: ThesisAttempt,
     physical: PhysicalAttempt,
     both_hands: BothHands,
+    /// Whether the hand was placed on a handle or to hook in.
+    is_special: bool,
 }
 
 impl Default for Attempt {
@@ -93,6 +99,7 @@ impl Default for Attempt {
             thesis: ThesisAttempt::default(),
             physical: PhysicalAttempt::default(),
             both_hands: BothHands::default(),
+            is_special: false,
         }
     }
 }
@@ -144,6 +151,7 @@ impl Attempt {
         stopwatch.start();
         self.pruned_placements = 0;
         self.posed.clear();
+        self.is_special = false;
         let Some(around) = scene.surroundings() else {
             return self.try_by_thesis(scene, stream, stopwatch, interrupted);
         };
@@ -151,7 +159,7 @@ impl Attempt {
             return self.try_both_hands(scene, &around, other, stream, stopwatch, interrupted);
         }
         let end = self.try_physically(scene, &around, stream, stopwatch, interrupted);
-        if scene.has_no_seeds() || !matches!(end, AttemptEnd::Rejected { .. }) {
+        if self.is_special || scene.has_no_seeds() || !matches!(end, AttemptEnd::Rejected { .. }) {
             return end;
         }
         match self.try_seeds(scene, &around, stream, stopwatch, interrupted) {
@@ -178,7 +186,11 @@ impl Attempt {
         } = self;
         let place_wrist = |stream: &mut AttemptStream| {
             *wrist = if scene.strategy() == Strategy::Guided {
-                WristFrame::new(guided_proposal(scene, stream, interrupted)?.object_from_wrist)
+                WristFrame::new(
+                    guided_proposal(scene, stream, interrupted)?
+                        .proposal
+                        .object_from_wrist,
+                )
             } else {
                 place_by_ladder(scene, stream, pruned_placements, interrupted)?
             };
@@ -211,8 +223,11 @@ impl Attempt {
     ) -> AttemptEnd {
         let is_guided = scene.strategy() == Strategy::Guided;
         let placed = if is_guided && scene.mechanisms().has(Mechanism::Oppositions) {
-            guided_proposal(scene, stream, interrupted)
-                .map(|proposal| (WristFrame::new(proposal.object_from_wrist), Some(proposal)))
+            guided_proposal(scene, stream, interrupted).map(|guided| {
+                self.is_special = guided.is_special;
+                let Guided { proposal, .. } = guided;
+                (WristFrame::new(proposal.object_from_wrist), Some(proposal))
+            })
         } else {
             place_by_ladder(scene, stream, &mut self.pruned_placements, interrupted)
                 .map(|wrist| (wrist, None))
@@ -312,7 +327,7 @@ fn guided_proposal(
     scene: &Scene<'_>,
     stream: &mut AttemptStream,
     interrupted: &impl Fn() -> bool,
-) -> Result<Proposal, Failure> {
+) -> Result<Guided, Failure> {
     scene.guided_proposal(stream, interrupted).ok_or_else(|| {
         if interrupted() {
             Failure::Interrupted

@@ -12,6 +12,7 @@ mod report;
 pub mod scene;
 pub mod settings;
 mod tally;
+mod turns;
 
 use std::{sync::atomic::AtomicBool, time::Duration};
 

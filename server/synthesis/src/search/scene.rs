@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::settings::SearchSettings;
+use super::{settings::SearchSettings, turns::Turn};
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     base::random::AttemptStream,
@@ -13,7 +13,7 @@ use crate::{
     },
     model::{
         bend_ratios::BendRatioChoice,
-        constraints::{Constraints, Hooks},
+        constraints::Constraints,
         hand::rig::Rig,
         holdout::Holdout,
         strategy::{Strategy, Validity},
@@ -34,10 +34,6 @@ use crate::{
     thesis,
 };
 
-/// One in this many attempts hooks the fingers where the object may hang in them, or does not where that is demanded. With
-/// more hooks, objects that hang are found sooner by them and later by other grips.
-const ATTEMPTS_PER_HOOK: u64 = 8;
-
 /// What to grasp, and with which hand.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<'a> {
@@ -48,6 +44,16 @@ pub struct Task<'a> {
     pub object: &'a PreparedObject,
     /// The receiving hand.
     pub rig: &'a PreparedRig,
+}
+
+/// A hand as `GUIDED` search proposes it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guided {
+    /// The hand.
+    pub(super) proposal: Proposal,
+    /// Whether it wraps a handle or hooks in: such hands succeed so often, and fail so soon, that others from seeds need not
+    /// follow.
+    pub(super) is_special: bool,
 }
 
 /// A holdout and the way attempts run, with data about the holdout that is computed once.
@@ -199,42 +205,64 @@ impl<'a> Scene<'a> {
         &self,
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
-    ) -> Option<Proposal> {
+    ) -> Option<Guided> {
         if let Some((_, presented)) = &self.physical {
-            if let Some(hook) = self.hook(presented, stream, interrupted) {
-                return Some(hook);
+            let object = self.task.object;
+            let wraps = self.mechanisms.has(Mechanism::Handles);
+            let has_handles = wraps && !object.handles().places().is_empty();
+            let turn = Turn::of(
+                stream.attempt(),
+                object.mass,
+                has_handles,
+                self.constraints.hooks(),
+            );
+            let special = match turn {
+                Turn::Anywhere => None,
+                Turn::Handle => self.wrap(stream),
+                Turn::Hook => self.hook(presented, stream, interrupted),
+            };
+            if let Some(proposal) = special {
+                return Some(Guided {
+                    proposal,
+                    is_special: true,
+                });
             }
             // The proposal has checked palm and forearm already.
             let proposal = propose(&self.cached_place(stream.attempt()), stream, interrupted)?;
-            return Some(self.shaped(proposal));
+            return Some(Guided {
+                proposal: self.shaped(proposal),
+                is_special: false,
+            });
         }
         // The success prior was learned under `PHYSICAL` validity.
         let proposal = propose_evenly(&self.place(), stream, interrupted)?;
         let scene = ObjectScene::new(&self.task.holdout.object, self.thesis.load.friction);
-        Some(Proposal {
+        let proposal = Proposal {
             object_from_wrist: wrist_after_advance(&scene, self.task.rig, &proposal)?,
             advance: 0.0,
             ..proposal
+        };
+        Some(Guided {
+            proposal,
+            is_special: false,
         })
     }
 
-    /// Hooked fingers, if it is their turn and the object may hang in them. Leaves the numbers that other proposals draw from
-    /// the stream as they are.
+    /// A wrapped handle, if the object has one with room for the hand.
+    fn wrap(&self, stream: &AttemptStream) -> Option<Proposal> {
+        let handles = self.task.object.handles();
+        // Leaves the numbers that other proposals draw from the stream as they are.
+        let wrapped = handles.propose(&self.place(), &mut stream.clone())?;
+        Some(self.shaped(wrapped))
+    }
+
+    /// Hooked fingers, if the object may hang in them. Leaves the stream as [`Self::wrap`] does.
     fn hook(
         &self,
         presented: &Presented,
         stream: &AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
-        let is_last = stream.attempt() % ATTEMPTS_PER_HOOK == ATTEMPTS_PER_HOOK - 1;
-        let takes_turn = match self.constraints.hooks() {
-            Hooks::Demanded => !is_last,
-            Hooks::Allowed => is_last,
-            Hooks::RuledOut => false,
-        };
-        if !takes_turn {
-            return None;
-        }
         let Task { object, rig, .. } = self.task;
         let places = if let Some(places) = self.hanging_places.get() {
             places

@@ -1,5 +1,6 @@
 //! Where hands are placed.
 
+mod handles;
 mod hooks;
 mod mirror;
 mod oppositions;

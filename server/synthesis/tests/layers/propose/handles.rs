@@ -1,0 +1,161 @@
+//! Handles, and hands that wrap them.
+
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
+    geometry::mesh::TriangleMesh,
+    model::{
+        hand::Handedness,
+        object::{GraspObject, THESIS_FRICTION},
+    },
+    physical::{grip::Gripper, scene::ObjectScene, shape::Proposal},
+    propose::{
+        handles::Handle,
+        proposal::{ProposalContext, propose_evenly},
+    },
+};
+
+use crate::fixtures::{
+    hands::adult,
+    meshes::{cuboid, cylinder_mesh, moved, sphere, torus},
+    objects::{lunch_box, object_of, plate, prepared},
+    proposals::place,
+    random::Random,
+};
+
+fn handles(mesh: TriangleMesh) -> Vec<Handle> {
+    places(object_of(mesh, &[]))
+}
+
+fn places(object: GraspObject) -> Vec<Handle> {
+    prepared(&Arc::new(object)).handles().places().to_vec()
+}
+
+/// How many of 300 hands hold an object.
+fn holding(
+    object: &Arc<GraspObject>,
+    hand: Handedness,
+    propose: impl Fn(&ProposalContext<'_>, &mut AttemptStream) -> Option<Proposal>,
+) -> usize {
+    let context = place(object, adult(hand));
+    let scene = ObjectScene::new(object, THESIS_FRICTION);
+    let mut gripper = Gripper::default();
+    (0..300)
+        .filter(|&index| {
+            let proposal = propose(&context, &mut AttemptStream::new(4, index));
+            proposal.is_some_and(|proposal| {
+                gripper
+                    .grip(&scene, context.rig, &proposal, None, &mut NoStopwatch, &|| false)
+                    .is_ok()
+            })
+        })
+        .count()
+}
+
+#[test]
+fn rods_are_handles_however_they_lie() {
+    let mut random = Random::new(31);
+    for _ in 0..12 {
+        let radius = random.between(0.005, 0.025);
+        let half = random.between(0.08, 0.5);
+        let (turn, offset) = (random.rotation(), 0.2 * random.in_cube());
+        let found = handles(moved(&cylinder_mesh(radius, half, 24, 12), turn, offset));
+        assert!(
+            found.len() > 20,
+            "radius {radius}, half length {half}: {}",
+            found.len()
+        );
+        let axis = turn * Vec3::Y;
+        for handle in found {
+            let from_axis = (handle.middle - offset).reject_from_normalized(axis).length();
+            assert!(handle.axis.dot(axis).abs() > 0.98, "{radius} {half}: {handle:?}");
+            assert!(from_axis < 0.5 * radius, "{radius} {half}: {handle:?}");
+            // The part goes on for three fingers' breadth.
+            assert!(
+                (handle.middle - offset).dot(axis).abs() < half - 0.015,
+                "{half}: {handle:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_ring_is_a_handle_all_around() {
+    let found = handles(torus(0.09, 0.012, 32));
+    assert!(found.len() > 40, "{}", found.len());
+    for handle in &found {
+        let outward = Vec3::new(handle.middle.x, handle.middle.y, 0.0).normalize();
+        assert!(handle.axis.dot(outward).abs() < 0.35, "{handle:?}");
+    }
+}
+
+#[test]
+fn what_fingers_cannot_wrap_is_no_handle() {
+    for (name, mesh) in [
+        ("ball", sphere(0.025, 24)),
+        ("wire", cylinder_mesh(0.002, 0.2, 12, 4)),
+        ("post", cylinder_mesh(0.05, 0.3, 32, 8)),
+        ("die", cuboid(Vec3::splat(0.012), 4)),
+        ("crate", cuboid(Vec3::splat(0.2), 4)),
+    ] {
+        assert!(handles(mesh).is_empty(), "{name}");
+    }
+    assert!(places(plate()).is_empty());
+}
+
+#[test]
+fn a_handle_needs_room_for_the_fingers() {
+    assert!(!places(lunch_box(0.04)).is_empty());
+    for handle in places(lunch_box(0.008)) {
+        assert!(handle.middle.y < 0.09, "the bar lies on the lid: {handle:?}");
+    }
+}
+
+#[test]
+fn hands_on_handles_hold_more_often_than_hands_anywhere() {
+    let lying = moved(
+        &cylinder_mesh(0.014, 0.09, 24, 12),
+        Quat::from_rotation_z(1.2),
+        Vec3::ZERO,
+    );
+    for (name, object) in [
+        ("rod", Arc::new(object_of(lying, &[]))),
+        ("ring", Arc::new(object_of(torus(0.09, 0.012, 32), &[]))),
+    ] {
+        let handles = prepared(&object).handles();
+        let on_handles = |hand| holding(&object, hand, |context, stream| handles.propose(context, stream));
+        let [left, right] = [Handedness::Left, Handedness::Right].map(on_handles);
+        let anywhere = holding(&object, Handedness::Right, |context, stream| {
+            propose_evenly(context, stream, &|| false)
+        });
+        assert!(
+            right > 2 * anywhere && right > 45,
+            "{name}: {right} and {anywhere} of 300"
+        );
+        assert!(left.abs_diff(right) < 45, "{name}: {left} left and {right} right");
+    }
+}
+
+#[test]
+fn the_palm_is_on_the_side_with_room() {
+    // The bar of the lunch box runs along x above the lid, with room for fingers below.
+    let object = Arc::new(lunch_box(0.03));
+    let handles = prepared(&object).handles();
+    let context = place(&object, adult(Handedness::Right));
+    let mut proposed = 0;
+    for index in 0..200 {
+        let Some(proposal) = handles.propose(&context, &mut AttemptStream::new(5, index)) else {
+            continue;
+        };
+        let Pose { orientation, .. } = proposal.object_from_wrist;
+        let palm_faces = orientation * Vec3::Z;
+        proposed += 1;
+        assert!(
+            palm_faces.y < 0.9,
+            "the palm lies between handle and lid: {proposal:?}"
+        );
+    }
+    assert!(proposed > 100, "{proposed}");
+}
