@@ -76,7 +76,7 @@ def chosen_objects(wanted):
         return names, {}
     things = everyday.things()
     if wanted == "everyday":
-        names = [name for name, thing in things.items() if not thing.beyond]
+        names = list(things)
     for name in names:
         if name not in known["all"] and name not in things:
             choices = ", ".join([*known["all"], *things])
@@ -155,7 +155,7 @@ def ask(service, request, options, **picture):
 
 def everyday_givers(names, things, options):
     """Givers of the everyday objects by name, from a server of their own: that which is judged must not know them."""
-    chosen = [things[name] for name in names if name in things]
+    chosen = [things[name] for name in names if name in things and not things[name].beyond]
     if not chosen:
         return {}
     with Service(options.workers, "--builder-threads", "0") as service:
@@ -177,13 +177,13 @@ def collect(names, things, options):
         for name in pool.Progress("objects requested").over(names):
             mesh_file = None if name in holdouts.BUILT_IN else holdouts.mesh_file(name)
             thing = things.get(name)
-            givers = everyday_hands[name] if thing else recorded
+            givers = everyday_hands.get(name, []) if thing else recorded
             for label, request, scene in cases(name, service, options, givers, thing):
                 picture = pictures / f"{name}-{drawn[name]:02}.png"
                 wanted = {"picture": picture, "mesh": mesh_file} if drawn[name] < share else {}
                 answer, in_time = ask(service, request, options, **wanted)
                 row = {"object": name, "holdout": label, "seed": request["seed"], "found": answer["grasp"] is not None}
-                row["everyday"] = thing is not None
+                row["everyday"], row["both"] = thing is not None, request.get("hands") == "both"
                 row["search_ms"] = 1000 * answer["report"]["search_time_seconds"]
                 row["round_trip_ms"] = 1000 * answer["round_trip_seconds"]
                 row["in_time"] = in_time and row["search_ms"] <= 1000 * BUDGET_SECONDS
@@ -193,7 +193,7 @@ def collect(names, things, options):
                 if answer["grasp"]:
                     drawing = picture.with_name(f"{picture.stem}-alone.png") if wanted else None
                     replies[len(rows)] = pool.Case(
-                        name, dataclasses.replace(scene, mesh=None), answer["grasp"], drawing
+                        name, dataclasses.replace(scene, mesh=None), answer["grasp"], answer.get("other_grasp"), drawing
                     )
                     file.write(json.dumps({"request": request, "answer": answer}) + "\n")
                     if wanted:

@@ -88,16 +88,19 @@ class Object:
     friction: float
 
 
-def simulate(obj, hand, contacts, up, axes=np.eye(3), pushes=DIRECTIONS):
+def simulate(obj, hand, contacts, up, axes=np.eye(3), pushes=DIRECTIONS, other=None):
     """Outcomes by name: "gravity" and, if the object survives that, each push.
 
     `hand` (None for no hand), `contacts` and `up` are in the object's frame; pushes go along the rows of `axes`, in
-    either direction.
+    either direction. `other` is a second hand with its contacts.
     """
-    model = mujoco.MjModel.from_xml_string(world(obj, hand, contacts, -GRAVITY * np.asarray(up)))
+    grips = [(hand, contacts)] if hand else []
+    grips += [other] if other else []
+    model = mujoco.MjModel.from_xml_string(world(obj, [hand for hand, _ in grips], -GRAVITY * np.asarray(up)))
     data = mujoco.MjData(model)
-    for joint, torque in torques(hand, contacts).items() if hand else ():
-        data.qfrc_applied[model.joint(joint).dofadr[0]] = torque
+    for number, grip in enumerate(grips):
+        for joint, torque in torques(*grip, number).items():
+            data.qfrc_applied[model.joint(joint).dofadr[0]] = torque
     hand_over(model, data)
     outcomes = {"gravity": run(model, data, obj, SETTLING)}
     settled = data.qpos.copy(), data.qvel.copy(), data.qacc_warmstart.copy()
@@ -141,8 +144,8 @@ def run(model, data, obj, seconds):
     return Outcome(fate, float(farthest), float(widest))
 
 
-def torques(hand, contacts):
-    """The constant torque of each hinge in newton metres, by the hinge's name.
+def torques(hand, contacts, number=0):
+    """The constant torque of each hinge of the hand with this number in newton metres, by the hinge's name.
 
     It is the transposed Jacobian of the contacts beyond the hinge times the forces with which they press on the object.
     """
@@ -157,7 +160,7 @@ def torques(hand, contacts):
                 arm = contact["position"] - hand.positions[chain[phalanx]]
                 moment = np.cross(arm, contact["force"]) - (contact["torsion"] or 0.0) * contact["normal"]
                 total += float(axes[phalanx] @ moment)
-            result[f"{DIGITS[digit]} {PHALANGES[phalanx]}"] = total
+            result[f"{number} {DIGITS[digit]} {PHALANGES[phalanx]}"] = total
     return result
 
 
@@ -166,7 +169,7 @@ def hinge_axes(hand, chain):
     return [(hand.rotations[joint] * HALF_TURN).apply([1.0, 0.0, 0.0]) for joint in chain[:3]]
 
 
-def world(obj, hand, contacts, gravity):
+def world(obj, hands, gravity):
     """The scene in MuJoCo's format. No body is rotated against the world, so offsets are differences of positions."""
     friction = f"{obj.friction:.6g} {obj.friction * TORSION_RADIUS:.6g} 0.0001"
     low, high = IMPEDANCES
@@ -175,7 +178,7 @@ def world(obj, hand, contacts, gravity):
     )
     inertia = obj.mass * convex.unit_inertia(obj.pieces)
     entries = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    bodies, servos = hand_bodies(hand) if hand else ("", "")
+    bodies, servos = ("".join(parts) for parts in zip(("", ""), *map(hand_bodies, hands, range(len(hands)))))
     return f"""<mujoco>
 <compiler angle="radian" balanceinertia="true"/>
 <option timestep="{STEP}" gravity="{numbers(gravity)}" integrator="implicitfast" cone="elliptic"
@@ -200,15 +203,15 @@ def world(obj, hand, contacts, gravity):
 </mujoco>"""
 
 
-def hand_bodies(hand):
-    """The fixed palm and the digits' chains of phalanges, and the springs that hold their posture."""
+def hand_bodies(hand, number):
+    """A numbered hand: the fixed palm and the digits' chains of phalanges, and the springs that hold their posture."""
     capsules, tags = hand.solids()
     palm = "".join(slices(capsules, row, np.zeros(3)) for row in np.flatnonzero(tags[:, 0] < 0))
-    text, servos = [f'<body name="palm">{palm}</body>'], []
+    text, servos = [f'<body name="{number} palm">{palm}</body>'], []
     for digit, chain in enumerate(CHAINS):
         places, axes = hand.positions[chain], hinge_axes(hand, chain)
         for phalanx in range(3):
-            name = f"{DIGITS[digit]} {PHALANGES[phalanx]}"
+            name = f"{number} {DIGITS[digit]} {PHALANGES[phalanx]}"
             offset = places[phalanx] - (places[phalanx - 1] if phalanx else 0.0)
             row = int(np.flatnonzero((tags == (digit, phalanx)).all(axis=1))[0])
             # The length beyond the hinge; each of the three joints gives way by a third.

@@ -8,11 +8,13 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 
 import matplotlib.image
+import numpy as np
 
 import convex
 import draw
 import holdouts
 import measures
+import pairs
 import physics
 
 
@@ -23,6 +25,8 @@ class Case:
     object: str
     scene: measures.Scene
     grasp: dict
+    # The receiver's other hand, if both hold the object.
+    other: dict | None = None
     # Where to save a picture of hand and object alone.
     drawing: pathlib.Path | None = None
 
@@ -40,21 +44,22 @@ def mesh_of(name):
 def judged(case, simulated):
     """All measures of a case by name."""
     case.scene.mesh = mesh_of(case.object)
-    row = measures.judge(case.scene, case.grasp)
+    grasps = [case.grasp] + ([case.other] if case.other else [])
+    row = pairs.judge(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
     if simulated and case.scene.mesh.closed():
-        row.update(survival(case.scene, case.grasp))
+        row.update(survival(case.scene, grasps))
     if case.drawing:
         matplotlib.image.imsave(case.drawing, draw.picture(case.scene, case.grasp))
     return row
 
 
-def survival(scene, grasp):
-    """How the runs in the physics engine end; pushes are along the axes of the client's frame."""
-    hand, contacts = measures.in_object_frame(scene, grasp)
+def survival(scene, grasps):
+    """How the runs in the physics engine end, of one hand or two; pushes are along the axes of the client's frame."""
+    grips = [measures.in_object_frame(scene, grasp) for grasp in grasps]
     obj = physics.Object(convex.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction)
     to_object = scene.rotation.inv()
     outcomes = physics.simulate(
-        obj, hand, contacts, to_object.apply(scene.up), to_object.apply([[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        obj, *grips[0], to_object.apply(scene.up), to_object.apply(np.eye(3)), other=grips[1] if grips[1:] else None
     )
     result = {
         "survives_gravity": outcomes["gravity"].held,

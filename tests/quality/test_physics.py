@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 import convex
 import hand as hands
@@ -44,7 +45,7 @@ class TestPads:
 
     def test_presses_with_the_forces_of_the_reply(self):
         obj, hand, contacts, up, _ = held_block(5.0)
-        model = mujoco.MjModel.from_xml_string(physics.world(obj, hand, contacts, -measures.GRAVITY * up))
+        model = mujoco.MjModel.from_xml_string(physics.world(obj, [hand], -measures.GRAVITY * up))
         data = mujoco.MjData(model)
         for name, torque in physics.torques(hand, contacts).items():
             data.qfrc_applied[model.joint(name).dofadr[0]] = torque
@@ -63,7 +64,7 @@ class TestPads:
         obj.pieces[0] = obj.pieces[0] + depth * (obj.pieces[0] - obj.centre_of_mass) @ np.outer(axes[0], axes[0]) / (
             np.abs((obj.pieces[0] - obj.centre_of_mass) @ axes[0]).max()
         )
-        model = mujoco.MjModel.from_xml_string(physics.world(obj, hand, contacts, -measures.GRAVITY * up))
+        model = mujoco.MjModel.from_xml_string(physics.world(obj, [hand], -measures.GRAVITY * up))
         data = mujoco.MjData(model)
         for name, torque in physics.torques(hand, contacts).items():
             data.qfrc_applied[model.joint(name).dofadr[0]] = torque
@@ -90,18 +91,36 @@ class TestPads:
     def test_verdicts_do_not_depend_on_the_frame(self):
         obj, hand, contacts, up, axes = held_block(0.7 * WEIGHT / FRICTION)
         before = physics.simulate(obj, hand, contacts, up, axes, ["-z"])
-        turn, shift = hands.Rotation.from_quat([0.5, -0.2, 0.4, 0.7]), np.array([0.3, -0.1, 0.2])
-        moved = [
-            {**c, "position": turn.apply(c["position"]) + shift, **{k: turn.apply(c[k]) for k in ("normal", "force")}}
-            for c in contacts
-        ]
+        turn, shift = Rotation.from_quat([0.5, -0.2, 0.4, 0.7]), np.array([0.3, -0.1, 0.2])
         other = physics.Object(
             [turn.apply(obj.pieces[0]) + shift], MASS, turn.apply(obj.centre_of_mass) + shift, FRICTION
         )
-        after = physics.simulate(other, hand.moved(turn, shift), moved, turn.apply(up), turn.apply(axes), ["-z"])
+        after = physics.simulate(
+            other, *moved(hand, contacts, turn, shift), turn.apply(up), turn.apply(axes), ["-z"]
+        )
         # How it falls once it slips depends on rounding; whether it slips does not.
         assert [(name, o.held) for name, o in before.items()] == [(name, o.held) for name, o in after.items()]
         assert after["gravity"].distance == pytest.approx(before["gravity"].distance, abs=5e-4)
+
+
+def moved(hand, contacts, turn, shift):
+    """A hand and its contacts after a rigid motion."""
+    result = [
+        {**c, "position": turn.apply(c["position"]) + shift, **{k: turn.apply(c[k]) for k in ("normal", "force")}}
+        for c in contacts
+    ]
+    return hand.moved(turn, shift), result
+
+
+def test_two_hands_hold_what_is_too_heavy_for_one():
+    obj, hand, contacts, up, axes = held_block(0.7 * WEIGHT / FRICTION)
+    obj.mass *= 2
+    alone = physics.simulate(obj, hand, contacts, up, axes, [])
+    assert not alone["gravity"].held
+    turn = Rotation.from_rotvec(np.pi * up)
+    other = moved(hand, contacts, turn, obj.centre_of_mass - turn.apply(obj.centre_of_mass))
+    both = physics.simulate(obj, hand, contacts, up, axes, [], other)
+    assert both["gravity"].held, both
 
 
 def ball(centre, radius):
@@ -182,9 +201,9 @@ class TestTorques:
                     after = pinching_hand(bent)
                     way = after.positions[joint] + after.rotations[joint].apply(local) - contact["position"]
                     expected = force @ way / 1e-6
-                    name = f"{hands.DIGITS[digit]} {hands.PHALANGES[turned]}"
+                    name = f"0 {hands.DIGITS[digit]} {hands.PHALANGES[turned]}"
                     assert found[name] == pytest.approx(expected, abs=1e-5)
-                others = [v for name, v in found.items() if not name.startswith(hands.DIGITS[digit])]
+                others = [v for name, v in found.items() if not name.startswith(f"0 {hands.DIGITS[digit]}")]
                 assert not any(others)
 
     def test_contacts_of_the_palm_exert_no_torque(self):

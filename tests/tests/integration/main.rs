@@ -20,6 +20,7 @@ mod physical;
 mod real_input;
 mod reflection;
 mod reported;
+mod reported_grasps;
 mod reproducible;
 mod shutdown;
 mod tracked_hands;

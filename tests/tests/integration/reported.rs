@@ -12,7 +12,7 @@ use tonic::{Code, Status};
 use crate::fixtures::{blamed_fields, seconds};
 
 /// The folder of one report, if the test data have it.
-fn report(test: &str, name: &str) -> Option<PathBuf> {
+pub(crate) fn report(test: &str, name: &str) -> Option<PathBuf> {
     let folder = data_folder_or_skip(test)?.join("reports").join(name);
     if !folder.is_dir() {
         eprintln!("SKIPPED {test}: the test data have no {}", folder.display());
@@ -21,7 +21,7 @@ fn report(test: &str, name: &str) -> Option<PathBuf> {
     Some(folder)
 }
 
-fn json(file: &Path) -> Value {
+pub(crate) fn json(file: &Path) -> Value {
     let text = std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     serde_json::from_str(&text).expect("a request is JSON")
 }
@@ -31,7 +31,7 @@ fn number(value: &Value, key: &str) -> f32 {
     value[key].as_f64().unwrap_or_default() as f32
 }
 
-fn text(value: &Value, key: &str) -> String {
+pub(crate) fn text(value: &Value, key: &str) -> String {
     value[key].as_str().unwrap_or_default().to_owned()
 }
 
@@ -55,19 +55,28 @@ fn bytes(base64: &str) -> Vec<u8> {
         .collect()
 }
 
-async fn create(server: &TestServer, file: &Path) -> Result<v1::Object, Status> {
+pub(crate) async fn create(server: &TestServer, file: &Path) -> Result<v1::Object, Status> {
     let value = json(file);
+    let forbidden = value["forbidden"]["triangles"].as_array();
     let request = v1::CreateObjectRequest {
         object_id: text(&value, "objectId"),
         obj: bytes(&text(&value, "obj")),
         mass_kg: number(&value, "massKg"),
+        centre_of_mass: value.get("centreOfMass").map(vector),
+        forbidden: forbidden.map(|triangles| v1::ForbiddenSurfaces {
+            triangles: triangles
+                .iter()
+                .map(|triangle| triangle.as_u64().expect("an index") as u32)
+                .collect(),
+            ..Default::default()
+        }),
         ..Default::default()
     };
     let answer = server.objects().await.create_object(request).await?;
     Ok(answer.into_inner().object.expect("an answer has the object"))
 }
 
-fn vector(value: &Value) -> v1::Vector3 {
+pub(crate) fn vector(value: &Value) -> v1::Vector3 {
     let [x, y, z] = ["x", "y", "z"].map(|key| number(value, key));
     v1::Vector3 { x, y, z }
 }
@@ -81,28 +90,33 @@ fn pose(value: &Value) -> v1::Pose {
     }
 }
 
-/// A request with 26 joints of a left hand.
-fn find_request(file: &Path) -> v1::FindGraspRequest {
-    let value = json(file);
-    let hand = &value["presentingHand"]["joints"];
-    assert_eq!(hand["handedness"], "HANDEDNESS_LEFT");
+/// 26 joints of a hand.
+pub(crate) fn joints(hand: &Value) -> v1::HandJoints {
     assert_eq!(hand["jointSet"], "JOINT_SET_OPENXR_26");
     let joints = hand["joints"].as_array().expect("a hand has joints");
+    let handedness = v1::Handedness::from_str_name(&text(hand, "handedness"));
+    v1::HandJoints {
+        handedness: handedness.expect("left or right").into(),
+        joint_set: v1::JointSet::Openxr26.into(),
+        joints: joints
+            .iter()
+            .map(|joint| v1::JointPose {
+                client_from_joint: Some(pose(&joint["clientFromJoint"])),
+                radius: number(joint, "radius"),
+            })
+            .collect(),
+    }
+}
+
+/// A request with a giver's hand.
+pub(crate) fn find_request(file: &Path) -> v1::FindGraspRequest {
+    let value = json(file);
     v1::FindGraspRequest {
         object: text(&value, "object"),
-        client_from_object: Some(pose(&value["clientFromObject"])),
+        client_from_object: value.get("clientFromObject").map(pose),
+        up: value.get("up").map(vector),
         presenting_hand: Some(v1::PresentingHand {
-            form: Some(Form::Joints(v1::HandJoints {
-                handedness: v1::Handedness::Left.into(),
-                joint_set: v1::JointSet::Openxr26.into(),
-                joints: joints
-                    .iter()
-                    .map(|joint| v1::JointPose {
-                        client_from_joint: Some(pose(&joint["clientFromJoint"])),
-                        radius: number(joint, "radius"),
-                    })
-                    .collect(),
-            })),
+            form: Some(Form::Joints(joints(&value["presentingHand"]["joints"]))),
         }),
         budget: Some(seconds(2)),
         seed: Some(1),
