@@ -36,6 +36,8 @@ STRONGEST = 27.0
 # A contact's largest torsion over friction times force, in metres: two thirds of the radius, some 6 mm, of a pad's
 # evenly pressed patch under a few newtons. Slip and torsion share the friction (an ellipse).
 TORSION_RADIUS = 0.004
+# Largest swing of what hangs in hooked fingers until it is at rest, in degrees.
+SWING = 32.0
 # Range of the length that epsilon divides torques by, in metres.
 HAND_LENGTHS = (0.02, 0.06)
 # Comfortable shares of the force, thumb first (thesis 4.6).
@@ -96,9 +98,10 @@ def judge(scene, grasp):
     giver = scene.giver and scene.giver.moved(inverse, -inverse.apply(scene.translation))
     return {
         **penetration(scene.mesh, local),
-        **forces(scene, contacts, inverse.apply(scene.up)),
+        **forces(scene, contacts, inverse.apply(scene.up), grasp.get("hangs")),
         **epsilon(scene, contacts),
         **fingers(local, contacts),
+        "hangs": bool(grasp.get("hangs")),
         **contact_places(scene.mesh, local, contacts),
         **giver_clearance(scene.mesh, local, giver),
         **self_clearance(local),
@@ -155,17 +158,34 @@ def surface_near(mesh, hand, margin=0.03):
     return points[((points > low) & (points < high)).all(axis=1)]
 
 
-def forces(scene, contacts, up):
+def at_rest(centre_of_mass, contacts, up):
+    """The centre of mass of what hangs in contacts with forces, after it has swung until it is below the forces.
+
+    It swings about the middle of the contacts, and by SWING at most.
+    """
+    pivot = np.mean([contact["position"] for contact in contacts], axis=0)
+    lift = np.array([contact["force"] for contact in contacts])
+    torque = np.cross([contact["position"] - pivot for contact in contacts], lift).sum(axis=0)
+    # Where the forces' sum acts, horizontally.
+    offset = np.cross(up, torque) / max(lift.sum(axis=0) @ up, 1e-9)
+    length = np.linalg.norm(centre_of_mass - pivot)
+    below = pivot + offset - up * np.sqrt(max(length**2 - offset @ offset, 0.0))
+    cosine = (below - pivot) @ (centre_of_mass - pivot) / length**2
+    return below if cosine >= np.cos(np.radians(SWING)) else centre_of_mass
+
+
+def forces(scene, contacts, up, hangs=False):
     """Whether the forces are inside their cones, and the share of the weight that they leave unbalanced.
 
-    The imbalance combines force, and torque over the object's reach.
+    The imbalance combines force, and torque over the object's reach. What hangs is at rest.
     """
     weight = scene.mass * GRAVITY
     if not contacts:
         return {"force_outside_cone": True, "imbalance": 1.0, "largest_force": 0.0}
     force = np.array([contact["force"] for contact in contacts])
     normal = np.array([contact["normal"] for contact in contacts])
-    arm = np.array([contact["position"] for contact in contacts]) - scene.centre_of_mass
+    centre_of_mass = at_rest(scene.centre_of_mass, contacts, up) if hangs else scene.centre_of_mass
+    arm = np.array([contact["position"] for contact in contacts]) - centre_of_mass
     pressed = -np.einsum("ci,ci->c", force, normal)
     sideways = np.linalg.norm(force + pressed[:, None] * normal, axis=1)
     size = np.linalg.norm(force, axis=1)
@@ -287,11 +307,25 @@ def is_normal(mesh, point, normal):
     away = np.array([Mesh(mesh.triangles[t], [[0, 1, 2]]).closest([point])[0][0] for t in near])
     if (np.abs(mesh.normals[near[away < NORMAL_REACH]] @ normal) > np.cos(np.radians(NORMAL_ANGLE))).any():
         return True
+    if presses_on_rim(mesh, point, normal):
+        return True
     # A direction between normals is a sum of them with non-negative weights.
     at_edge = mesh.normals[near[away < EDGE_REACH]]
     return len(at_edge) > 1 and any(
         nnls(sign * at_edge.T, normal)[1] < np.sin(np.radians(NORMAL_ANGLE)) for sign in (1, -1)
     )
+
+
+def presses_on_rim(mesh, point, normal):
+    """Whether the point is on the rim of an open surface, and the normal at right angles to it."""
+    rims = mesh.rims()[0]
+    if len(rims) == 0:
+        return False
+    start, along = rims[:, 0], rims[:, 1] - rims[:, 0]
+    squared = np.maximum((along**2).sum(axis=1), 1e-300)
+    share = np.clip(((point - start) * along).sum(axis=1) / squared, 0.0, 1.0)
+    near = np.linalg.norm(point - start - share[:, None] * along, axis=1) < NORMAL_REACH
+    return bool((np.abs(along[near] @ normal) < np.sqrt(squared[near]) * np.sin(np.radians(NORMAL_ANGLE))).any())
 
 
 def giver_clearance(mesh, hand, giver):

@@ -129,14 +129,28 @@ class Mesh:
                     groups.append(group)
         return cls(vertices, faces, groups)
 
-    def closed(self):
-        """Whether the surface encloses a volume: along every edge run as many triangles one way as the other."""
-        _, merged = np.unique(np.round(self.vertices, 7), axis=0, return_inverse=True)
+    def rims(self):
+        """The ends of the edges along which not as many triangles run one way as the other, and how many more."""
+        places, merged = np.unique(np.round(self.vertices, 7), axis=0, return_inverse=True)
         corners = merged.ravel()[self.faces]
         edges = np.concatenate([corners[:, [i, (i + 1) % 3]] for i in range(3)])
         turns = np.where(edges[:, 0] < edges[:, 1], 1, -1)
-        _, of_edge = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-        return not np.bincount(of_edge.ravel(), weights=turns).any()
+        edges, of_edge = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+        excess = np.abs(np.bincount(of_edge.ravel(), weights=turns))
+        return places[edges[excess > 0]], excess[excess > 0]
+
+    def closed(self):
+        """Whether the surface encloses a volume."""
+        return len(self.rims()[0]) == 0
+
+    def is_sheet(self):
+        """Whether the surface is open and so flat that it encloses nothing.
+
+        Its area is no more than a fifth above what its rim encloses in a plane (isoperimetric inequality).
+        """
+        rims, excess = self.rims()
+        length = (np.linalg.norm(rims[:, 1] - rims[:, 0], axis=1) * excess).sum()
+        return 0 < self.areas.sum() <= 1.2 * length**2 / (4 * math.pi)
 
     def winding(self, points):
         """How often the surface winds round each point: 1 inside a closed surface, 0 outside."""
@@ -149,10 +163,10 @@ class Mesh:
         )
 
     def depth(self, points):
-        """The largest depth of a point inside the volume in metres; 0 if none is inside."""
+        """The largest depth of a point inside the volume in metres; 0 if none is inside, as in a sheet."""
         points = np.asarray(points, float).reshape(-1, 3)
         boxed = points[((points > self.low) & (points < self.high)).all(axis=1)]
-        if len(boxed) == 0:
+        if len(boxed) == 0 or self.is_sheet():
             return 0.0
         inside = boxed[np.abs(self.winding(boxed)) > 0.5]
         return float(self.closest(inside)[0].max()) if len(inside) else 0.0

@@ -34,6 +34,8 @@ STRIDE = 5
 PUSH = 10.0
 # The object is lost when it has moved or turned farther than this, in metres and degrees.
 LOST_DISTANCE, LOST_ANGLE = 0.05, 15.0
+# What hangs in hooked fingers may swing: it is lost when the place by which it hangs has moved as far, or it turns over.
+LOST_SWING = 60.0
 # Stiffness of the posture's spring at a fingertip in newtons per metre, shared evenly by the three joints: that of
 # pressing index fingers (200 to 800 N/m, Hajian and Howe 1997, from memory). Twice or four times as much hardly changes
 # a verdict.
@@ -86,6 +88,8 @@ class Object:
     mass: float
     centre_of_mass: np.ndarray
     friction: float
+    # The place by which the object hangs in hooked fingers, if it does.
+    hangs_by: np.ndarray | None = None
 
 
 def simulate(obj, hand, contacts, up, axes=np.eye(3), pushes=DIRECTIONS, other=None):
@@ -127,17 +131,19 @@ def run(model, data, obj, seconds):
     """Steps until the time is over or the object is lost."""
     farthest = widest = 0.0
     held = True
+    hangs = obj.hangs_by is not None
+    watched, lost_angle = (obj.hangs_by, LOST_SWING) if hangs else (obj.centre_of_mass, LOST_ANGLE)
     for _ in range(round(seconds / (STEP * STRIDE))):
         mujoco.mj_step(model, data, STRIDE)
         # The body's frame started as the world's, so its pose is the motion.
         place, turn = data.qpos[:3], data.qpos[3:7]
         angle = np.degrees(2 * np.arctan2(np.linalg.norm(turn[1:]), abs(turn[0])))
         moved = np.empty(3)
-        mujoco.mju_rotVecQuat(moved, obj.centre_of_mass, turn)
-        distance = np.linalg.norm(place + moved - obj.centre_of_mass)
+        mujoco.mju_rotVecQuat(moved, watched, turn)
+        distance = np.linalg.norm(place + moved - watched)
         farthest, widest = max(farthest, distance), max(widest, angle)
         # A diverged simulation counts as lost.
-        held = farthest <= LOST_DISTANCE and widest <= LOST_ANGLE and np.isfinite(distance + angle)
+        held = farthest <= LOST_DISTANCE and widest <= lost_angle and np.isfinite(distance + angle)
         if not held:
             break
     fate = Fate.HELD if held else Fate.TURNED if farthest <= LOST_DISTANCE else Fate.SLIPPED

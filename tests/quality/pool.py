@@ -56,7 +56,9 @@ def judged(case, simulated):
 def survival(scene, grasps):
     """How the runs in the physics engine end, of one hand or two; pushes are along the axes of the client's frame."""
     grips = [measures.in_object_frame(scene, grasp) for grasp in grasps]
-    obj = physics.Object(convex.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction)
+    contacts = grips[0][1]
+    hangs_by = np.mean([contact["position"] for contact in contacts], axis=0) if grasps[0].get("hangs") else None
+    obj = physics.Object(convex.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction, hangs_by)
     to_object = scene.rotation.inv()
     outcomes = physics.simulate(
         obj, *grips[0], to_object.apply(scene.up), to_object.apply(np.eye(3)), other=grips[1] if grips[1:] else None

@@ -136,13 +136,17 @@ def held(found):
     if not found:
         return []
     lines = []
+    # A hook bears the weight; nobody asks it to resist a push from below.
+    closed = [row for row in found if not row.get("hangs")]
     for name, measure, least in [
         ("survives_gravity", "survives gravity in simulation", 95),
         ("survives_all", "survives all six pushes, too", 75),
     ]:
-        count = sum(row[name] for row in found)
-        share = 100 * count / len(found)
-        lines.append(Target(measure, f"≥ {least} %", f"{share:.0f} % ({count} of {len(found)})", share >= least))
+        asked = found if name == "survives_gravity" else closed
+        if asked:
+            count = sum(row[name] for row in asked)
+            share = 100 * count / len(asked)
+            lines.append(Target(measure, f"≥ {least} %", f"{share:.0f} % ({count} of {len(asked)})", share >= least))
     return lines
 
 

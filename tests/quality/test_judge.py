@@ -423,3 +423,50 @@ def test_targets_count_the_grasps_with_a_fault():
     assert not lines["penetration, worst"].met and not lines["giver's hand touched"].met
     assert lines["giver's hand touched"].figure.startswith("1 of 2")
     assert lines["wrong chirality"].met
+
+
+class TestSheets:
+    # A square of 20 cm in the plane z = 0.
+    square = Mesh([[0, 0, 0], [0.2, 0, 0], [0.2, 0.2, 0], [0, 0.2, 0]], [[0, 1, 2], [0, 2, 3]])
+
+    def test_a_rim_is_pressed_from_the_side_and_a_face_is_not(self):
+        assert measures.is_normal(self.square, np.array([0.2, 0.07, 0.0]), np.array([1.0, 0.0, 0.0]))
+        assert not measures.is_normal(self.square, np.array([0.2, 0.07, 0.0]), np.array([0.0, 1.0, 0.0]))
+        assert not measures.is_normal(self.square, np.array([0.1, 0.07, 0.0]), np.array([1.0, 0.0, 0.0]))
+
+    def test_a_bent_sheet_encloses_nothing_and_a_bowl_does(self):
+        across = np.linspace(-1, 1, 21)
+        x, y = (grid.ravel() for grid in np.meshgrid(across, across))
+        faces = []
+        for i in range(20):
+            for j in range(20):
+                a = 21 * i + j
+                faces += [[a, a + 1, a + 22], [a, a + 22, a + 21]]
+        bent = Mesh(np.column_stack([0.1 * x, 0.1 * y, 0.02 * x**2]), faces)
+        inside = np.array([[0.0, 0.0, 0.004]])
+        assert np.abs(bent.winding(inside)) > 0.4
+        assert bent.is_sheet() and bent.depth(inside) == 0.0
+        # The square as a disc, bulged to half a ball.
+        radius, angle = np.maximum(np.abs(x), np.abs(y)), np.arctan2(y, x)
+        polar = radius * np.pi / 2
+        bowl = np.column_stack([np.sin(polar) * np.cos(angle), np.sin(polar) * np.sin(angle), -np.cos(polar)])
+        assert not Mesh(0.1 * bowl, faces).is_sheet()
+        assert Mesh(0.1 * bowl, faces).depth([[0.0, 0.0, -0.06]]) > 0.03
+
+
+def test_what_hangs_is_balanced_below_its_forces():
+    scene, grasp, _ = good()
+    up = np.array([0.0, 1.0, 0.0])
+    weight = scene.mass * measures.GRAVITY
+    place = scene.centre_of_mass + [0.02, 0.06, 0.0]
+    lifting = [
+        {"position": place + offset, "normal": -up, "force": weight / 2 * up, "digit": "index", "phalanx": "second",
+         "torsion": None}
+        for offset in ([0.0, 0.0, 0.01], [0.0, 0.0, -0.01])
+    ]  # fmt: skip
+    assert measures.forces(scene, lifting, up)["imbalance"] > 0.1
+    assert measures.forces(scene, lifting, up, hangs=True)["imbalance"] < 1e-6
+    # Too far to the side to swing there.
+    for contact in lifting:
+        contact["position"] = contact["position"] + [0.1, 0.0, 0.0]
+    assert measures.forces(scene, lifting, up, hangs=True)["imbalance"] > 0.1

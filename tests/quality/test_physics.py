@@ -103,6 +103,16 @@ class TestPads:
         assert after["gravity"].distance == pytest.approx(before["gravity"].distance, abs=5e-4)
 
 
+def test_what_hangs_may_swing_until_its_centre_of_mass_is_below():
+    obj, hand, contacts, up, axes = held_block(1.3 * WEIGHT / FRICTION)
+    pinched = obj.centre_of_mass
+    obj.centre_of_mass = pinched - 0.02 * up + 0.016 * axes[1]
+    assert physics.simulate(obj, hand, contacts, up, axes, [])["gravity"].fate is physics.Fate.TURNED
+    obj.hangs_by = pinched
+    swung = physics.simulate(obj, hand, contacts, up, axes, [])["gravity"]
+    assert swung.held and swung.angle > physics.LOST_ANGLE, swung
+
+
 def moved(hand, contacts, turn, shift):
     """A hand and its contacts after a rigid motion."""
     result = [
