@@ -152,7 +152,8 @@ def held(found):
 
 def classified(found):
     """How many grasps have a type of the taxonomy, and how many types there are; nothing if no reply has a type."""
-    typed = [row for row in found if "type" in row]
+    # Types of the taxonomy are those of one hand.
+    typed = [row for row in found if "type" in row and not row.get("both")]
     if not typed:
         return []
     named = [row["type"] for row in typed if row["type"] and row["type_confidence"] >= CONFIDENT]
