@@ -336,8 +336,8 @@ pub enum LimitKind {
     /// The weight's torque about the nearest place that may be held, in newton metres, against the largest that all
     /// contacts of a hand resist there.
     Torque,
-    /// The distance in metres between the closest two places that can be pressed against each other, against the hand's
-    /// span.
+    /// The distance in metres between the closest two places that can be pressed against each other, against what the hand
+    /// closes around.
     Width,
     /// The share of the surface's area that is forbidden, from 0 to 1: the rest has no two places that one hand can press
     /// against each other.

@@ -185,6 +185,11 @@ impl Oppositions {
         (first < end).then(|| &self.by_width[first + stream.below(end - first)])
     }
 
+    /// The largest distance between opposed pads, in metres; 0 if the rig has no oppositions.
+    pub fn widest(&self) -> f32 {
+        self.widths.last().copied().unwrap_or_default()
+    }
+
     /// The opposition with an index.
     pub fn get(&self, index: u16) -> &Opposition {
         &self.by_width[usize::from(index)]

@@ -1,7 +1,8 @@
 //! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot.
 //!
-//! Each is necessary under `PHYSICAL` validity, so that nothing possible is called impossible. They are not sufficient: a
-//! search that finds nothing although no limit applies may have had too little time.
+//! Each is necessary under `PHYSICAL` validity, so that nothing possible is called impossible; only the width is what this
+//! search can open a hand to. They are not sufficient: a search that finds nothing although no limit applies may have had too
+//! little time.
 
 use std::fmt;
 
@@ -31,6 +32,7 @@ use crate::{
     },
     propose::{
         holdable::HoldableSurface,
+        prepared::PreparedRig,
         surface_pairs::{SurfacePair, SurfacePairs},
     },
 };
@@ -51,6 +53,10 @@ const MAX_FRICTION_OF_WIDTH: f32 = 0.6;
 /// widest range, and then some.
 const ANGLES: usize = 5;
 const BETWEEN_ANGLES: f32 = 1.03;
+
+/// How far apart palm and fingers may be that press against each other, over the widest opening of thumb and fingers: hands
+/// that hold in the palm reach a little farther.
+const PALM_OVER_PADS: f32 = 1.25;
 
 /// Height above a touched point, over the finger's radius, of a point that is at least as far from the giver: it is inside
 /// the finger, up to a millimetre less deep than high, even if the bone is 45° off the normal.
@@ -75,7 +81,8 @@ pub enum LimitKind {
     /// The weight's torque about the nearest place that may be held, and the largest torque of all contacts of a hand
     /// there, in newton metres.
     Torque,
-    /// The distance between the closest places that can be pressed against each other, and the hand's span, in metres.
+    /// The distance between the closest places that can be pressed against each other, and how far apart a hand can press, in
+    /// metres.
     Width,
     /// The share of the surface's area that is forbidden: no two of the remaining places can be pressed against each
     /// other by one hand.
@@ -110,7 +117,7 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     [
         mass_limit(&holdout.object),
         torque,
-        width_limit(holdable, friction, span),
+        width_limit(holdable, friction, opening(rig).min(span)),
         giver,
         reach,
     ]
@@ -144,8 +151,17 @@ fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f3
     })
 }
 
-/// Contacts that hold have normals more than a right angle apart, at most a hand's span from each other.
-fn width_limit(holdable: &HoldableSurface, friction: f32, span: f32) -> Option<Limit> {
+/// How far apart places may be that a hand presses against each other, in metres; unbounded before its oppositions are known.
+fn opening(rig: &PreparedRig) -> f32 {
+    if rig.is_derived() {
+        PALM_OVER_PADS * rig.oppositions().widest()
+    } else {
+        f32::INFINITY
+    }
+}
+
+/// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
+fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Option<Limit> {
     let forbidden = Limit {
         kind: LimitKind::Forbidden,
         value: holdable.forbidden_share,
@@ -155,12 +171,12 @@ fn width_limit(holdable: &HoldableSurface, friction: f32, span: f32) -> Option<L
         return Some(forbidden);
     }
     let is_wide =
-        |width: Option<f32>| width.filter(|&width| width > span && friction <= MAX_FRICTION_OF_WIDTH);
+        |width: Option<f32>| width.filter(|&width| width > opening && friction <= MAX_FRICTION_OF_WIDTH);
     is_wide(holdable.width)?;
     Some(is_wide(holdable.width_of_all).map_or(forbidden, |width| Limit {
         kind: LimitKind::Width,
         value: width,
-        bound: Some(span),
+        bound: Some(opening),
     }))
 }
 
@@ -300,7 +316,7 @@ impl fmt::Display for Limit {
             ),
             LimitKind::Width => write!(
                 f,
-                "width: {value:.2} m between the closest opposed places, a hand spans {bound:.2} m"
+                "width: {value:.2} m between the closest opposed places, a hand closes around up to {bound:.2} m"
             ),
             LimitKind::Forbidden => write!(
                 f,

@@ -125,6 +125,27 @@ fn boxes_and_balls_beyond_a_hands_span_are_limited_by_width() {
 }
 
 #[test]
+fn balls_are_found_or_limited_by_width_but_not_both() {
+    let mut kinds = [0; 2];
+    for millimetres in (150..=250).step_by(10) {
+        let ball = of_mass(sphere(0.5e-3 * millimetres as f32, 24), 0.3, &[]);
+        let holdout = floating(ball);
+        let search = Search {
+            friction: 0.52,
+            max_attempts: 400,
+            ..Search::guided(&holdout, right())
+        };
+        let found = search.run().grasp.is_some();
+        let limits = search.limits();
+        assert!(!found || limits.is_empty(), "{millimetres} mm: {limits:?}");
+        kinds[usize::from(!limits.is_empty())] += 1;
+        // A basketball is 244 mm across.
+        assert!(millimetres < 240 || only(&limits).kind == LimitKind::Width);
+    }
+    assert!(kinds[0] > 2, "{kinds:?}");
+}
+
+#[test]
 fn width_is_not_judged_where_it_proves_nothing() {
     let cube = floating(object_of(cuboid(Vec3::splat(0.2), 2), &[]));
     let sticky = Search {
@@ -243,7 +264,7 @@ fn limits_name_their_figures() {
             LimitKind::Width,
             0.38,
             Some(0.22),
-            "width: 0.38 m between the closest opposed places, a hand spans 0.22 m",
+            "width: 0.38 m between the closest opposed places, a hand closes around up to 0.22 m",
         ),
     ];
     for (kind, value, bound, text) in texts {
@@ -272,9 +293,10 @@ fn no_pose_exceeds_the_span() {
     let cube = floating(object_of(cuboid(Vec3::splat(0.22), 2), &[]));
     let mut random = Random::new(21);
     for hand in all_hands() {
-        let rig: &PreparedRig = &hand.rig;
-        let span = only(&Search::guided(&cube, rig).limits()).bound.unwrap();
-        let farthest = farthest_fingertips(rig, &mut random);
+        // Before its oppositions are known, a hand is only known to close around less than its span.
+        let rig = PreparedRig::new(Rig::clone(&hand.rig));
+        let span = only(&Search::guided(&cube, &rig).limits()).bound.unwrap();
+        let farthest = farthest_fingertips(&rig, &mut random);
         // The span includes the palm's heel and the skin around the fingertips.
         assert!(
             farthest < span && span < 1.6 * farthest,
