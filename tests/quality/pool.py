@@ -46,7 +46,7 @@ def judged(case, simulated):
     case.scene.mesh = mesh_of(case.object)
     grasps = [case.grasp] + ([case.other] if case.other else [])
     row = pairs.judge(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
-    if simulated and case.scene.mesh.closed():
+    if simulated and not case.scene.mesh.is_sheet():
         row.update(survival(case.scene, grasps))
     if case.drawing:
         matplotlib.image.imsave(case.drawing, draw.picture(case.scene, case.grasp))
@@ -77,7 +77,7 @@ def survival(scene, grasps):
 
 def decomposed(name):
     """Makes the convex pieces of an object and caches them. Sheets of no thickness have none and are not simulated."""
-    if mesh_of(name).closed():
+    if not mesh_of(name).is_sheet():
         convex.pieces(mesh_of(name))
 
 
