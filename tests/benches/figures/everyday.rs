@@ -63,12 +63,12 @@ pub(crate) fn measure(setting: &Setting) -> Vec<Line> {
         missed.collect::<Vec<_>>().join(", ")
     };
     vec![
-        line("first calls", &first, missing(&|answers| vec![answers[0]])),
-        line("later calls", &later, missing(&|answers| answers[1..].to_vec())),
+        line("first calls", &first, &missing(&|answers| vec![answers[0]])),
+        line("later calls", &later, &missing(&|answers| answers[1..].to_vec())),
     ]
 }
 
-fn line(what: &str, answers: &[Answer], missing: String) -> Line {
+fn line(what: &str, answers: &[Answer], missing: &str) -> Line {
     let in_time = share(answers, Answer::is_in_time);
     Line::new(Row::Everyday, what, Unit::Seconds, search_times(answers))
         .target(Target::at_least("in 50 ms", Unit::Share, in_time, IN_TIME))

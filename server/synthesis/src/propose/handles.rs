@@ -256,7 +256,7 @@ fn axis_of_part(surface: &MeshBvh, inside: Vec3) -> Option<Vec3> {
     });
     squares.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     let [(along, axis), (across, _), _] = squares;
-    (along <= MAX_ALONG && across >= MIN_ACROSS).then(|| axis.as_vec3().normalize())
+    (along <= MAX_ALONG && across >= MIN_ACROSS).then(|| axis.as_vec3().normalize_or(Vec3::Y))
 }
 
 /// A unit vector at right angles to an axis, after so many of the [`DIRECTIONS`].
