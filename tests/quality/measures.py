@@ -318,7 +318,7 @@ def is_normal(mesh, point, normal):
 
 def presses_on_rim(mesh, point, normal):
     """Whether the point is on the rim of an open surface, and the normal at right angles to it."""
-    rims = mesh.rims()[0]
+    rims = mesh.rims[0]
     if len(rims) == 0:
         return False
     start, along = rims[:, 0], rims[:, 1] - rims[:, 0]

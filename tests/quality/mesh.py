@@ -5,6 +5,7 @@ solid angles that the triangles subtend at a point (van Oosterom and Strackee 19
 answers for open surfaces and overlapping parts as well.
 """
 
+import functools
 import math
 
 import numpy as np
@@ -129,6 +130,7 @@ class Mesh:
                     groups.append(group)
         return cls(vertices, faces, groups)
 
+    @functools.cached_property
     def rims(self):
         """The ends of the edges along which not as many triangles run one way as the other, and how many more."""
         places, merged = np.unique(np.round(self.vertices, 7), axis=0, return_inverse=True)
@@ -141,14 +143,14 @@ class Mesh:
 
     def closed(self):
         """Whether the surface encloses a volume."""
-        return len(self.rims()[0]) == 0
+        return len(self.rims[0]) == 0
 
     def is_sheet(self):
         """Whether the surface is open and so flat that it encloses nothing.
 
         Its area is no more than a fifth above what its rim encloses in a plane (isoperimetric inequality).
         """
-        rims, excess = self.rims()
+        rims, excess = self.rims
         length = (np.linalg.norm(rims[:, 1] - rims[:, 0], axis=1) * excess).sum()
         return 0 < self.areas.sum() <= 1.2 * length**2 / (4 * math.pi)
 

@@ -132,7 +132,7 @@ async fn first_answers_on_a_new_object_mostly_have_a_clear_type() {
         unclear += usize::from(grasp.type_confidence < 0.5);
     }
     // Eight of these 15 were reported.
-    assert!(unclear <= 4, "{unclear} of 15 answers have no clear type");
+    assert!(unclear <= 1, "{unclear} of 15 answers have no clear type");
     server.stop().await;
 }
 
@@ -179,6 +179,6 @@ async fn answers_keep_clear_of_both_hands_of_a_giver() {
             assert!(gap > -0.002, "seed {seed}: joints overlap by {} m", -gap);
         }
     }
-    assert!(answered >= 30, "{answered} of 40");
+    assert!(answered >= 38, "{answered} of 40");
     server.stop().await;
 }

@@ -96,7 +96,7 @@ pub enum LimitKind {
 }
 
 /// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes a fraction
-/// of a millisecond, whatever the object.
+/// of a millisecond, whatever the object, once the rig's oppositions are known.
 pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     if query.validity != Validity::Physical {
         return Vec::new();
@@ -151,13 +151,9 @@ fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f3
     })
 }
 
-/// How far apart places may be that a hand presses against each other, in metres; unbounded before its oppositions are known.
+/// How far apart places may be that a hand presses against each other, in metres.
 fn opening(rig: &PreparedRig) -> f32 {
-    if rig.is_derived() {
-        PALM_OVER_PADS * rig.oppositions().widest()
-    } else {
-        f32::INFINITY
-    }
+    PALM_OVER_PADS * rig.oppositions().widest()
 }
 
 /// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
@@ -249,7 +245,7 @@ fn horizontal_distance(region: &OrientedBox, point: Vec3, up: Vec3) -> f32 {
 }
 
 /// An upper bound on the distance of two contacts of a hand, in metres: from fingertip to fingertip or palm, over all poses.
-fn hand_span(rig: &Rig) -> f32 {
+pub fn hand_span(rig: &Rig) -> f32 {
     let stretched = HandPose {
         frame_from_wrist: Pose::IDENTITY,
         digits: rig.stretched(),

@@ -61,6 +61,20 @@ fn an_upright_ring_hangs_by_its_top() {
 }
 
 #[test]
+fn only_a_wide_bow_has_room_for_four_fingers() {
+    for (radius, is_broad) in [(0.09, true), (0.03, false)] {
+        let found = places(object_of(torus(radius, 0.005, 32), &[]), Vec3::Y);
+        let broad = found.places().iter().filter(|place| place.is_broad).count();
+        assert!(!found.places().is_empty());
+        assert_eq!(
+            broad > found.places().len() / 2,
+            is_broad,
+            "{radius} m: {broad} of {found:?}"
+        );
+    }
+}
+
+#[test]
 fn probing_stops_when_interrupted() {
     let object = prepared(&Arc::new(lunch_box(0.047)));
     let probed = HangingPlaces::of(object.object(), object.surface_pairs(), Vec3::Y, &|| true);

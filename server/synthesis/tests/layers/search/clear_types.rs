@@ -100,5 +100,5 @@ fn without_reproducible_a_clear_type_is_nearly_always_found() {
         grasp.classification.is_clear()
     });
     let clear = clear.count() as u64;
-    assert!(8 * clear > 7 * 4 * SEEDS, "{clear} of {}", 4 * SEEDS);
+    assert!(clear >= 4 * SEEDS - 4, "{clear} of {}", 4 * SEEDS);
 }
