@@ -29,6 +29,7 @@ use grasp_synthesis::{
         bend_ratios::BendRatioChoice,
         hand::{DigitAngles, HandPose, Handedness, joints::HandJoints},
         holdout::{Holdout, PresentingHand, PresentingHandError},
+        receiver::Stance,
         strategy::Strategy,
     },
     propose::prepared::PreparedObject,
@@ -137,6 +138,7 @@ impl BuiltInHoldout {
             )?),
             other_hands: Vec::new(),
             obstacles: Vec::new(),
+            stance: Stance::default(),
             up: object_from_world.transform_vector(Vec3::Y),
         })
     }

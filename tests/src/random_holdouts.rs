@@ -20,6 +20,7 @@ use grasp_synthesis::{
         },
         holdout::{Holdout, PresentingHand},
         object::GraspObject,
+        receiver::Stance,
     },
 };
 use rand::{RngExt as _, SeedableRng as _};
@@ -219,6 +220,7 @@ impl ClientHoldout {
             )),
             other_hands: Vec::new(),
             obstacles: Vec::new(),
+            stance: Stance::default(),
             up: object_from_client.transform_vector(Vec3::Y),
         }
     }

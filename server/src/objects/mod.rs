@@ -119,7 +119,7 @@ impl StoredObject {
             + self.object.surface.distance_field_bytes()
             + self.object.local_thickness.bytes()
             + self.object.surface_pairs().bytes()
-            + self.object.handles().bytes()
+            + self.object.parts().bytes()
             + PlacementCaches::MAX_BYTES
             + self.transferred_grips.len() * TransferredGrips::MAX_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()

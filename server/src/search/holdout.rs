@@ -5,6 +5,7 @@ use std::sync::Arc;
 use grasp_synthesis::model::{
     holdout::{Holdout, PresentingHand},
     object::GraspObject,
+    receiver::Stance,
     strategy::Validity,
 };
 
@@ -37,6 +38,7 @@ pub(super) fn holdout(query: &FindQuery, object: &Arc<GraspObject>) -> Result<Ho
         obstacles: obstacles
             .map(|obstacle| obstacle.transformed(object_from_client))
             .collect(),
+        stance: Stance::default(),
         up: object_from_client.transform_vector(query.up),
     })
 }

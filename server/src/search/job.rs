@@ -19,7 +19,7 @@ use grasp_synthesis::{
         key_frames::plan_key_frames,
         limits::limits,
         scene::Task,
-        settings::{Known, Query, Run, SearchSettings},
+        settings::{IMPROVEMENT, Known, Query, Run, SearchSettings},
     },
 };
 use rayon::ThreadPool;
@@ -144,6 +144,7 @@ impl FindJob {
                 friction: query.friction,
                 constraints: query.constraints.transformed(object_from_client),
                 choice: query.choice,
+                improvement: IMPROVEMENT,
                 other_hand: query.other_hand.map(|hand| hand.rig.clone()),
             },
             known: Known {

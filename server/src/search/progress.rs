@@ -1,10 +1,13 @@
 //! What a search has found so far.
 
-use std::sync::{Mutex, PoisonError};
+use std::{
+    sync::{Mutex, PoisonError},
+    time::Duration,
+};
 
 use grasp_synthesis::{
     model::grasp::Grasp,
-    search::{SearchEnd, SearchOutcome, SearchReport, settings::Run},
+    search::{Replaceable, SearchEnd, SearchOutcome, SearchReport, settings::Run},
 };
 
 /// The sum of a search's finished slices. The searching thread adds to it; others may read it at any time.
@@ -16,8 +19,8 @@ struct Sum {
     report: SearchReport,
     /// The best grasp with its quality.
     best: Option<(Grasp, f32)>,
-    /// The last attempt that replaces a best grasp without a clear type if its grasp has one.
-    replaceable_until: Option<u64>,
+    /// Until when a best grasp that a person would not choose may be replaced.
+    replaceable_until: Option<Replaceable>,
     /// The first attempt that has not run.
     next: u64,
     /// Must the answer not depend on the time that was left?
@@ -29,20 +32,25 @@ struct Sum {
 pub(super) enum Found {
     /// No.
     Nothing,
-    /// One without a clear type, which one of the next attempts may replace.
+    /// One that one of the next attempts may replace.
     Replaceable {
         /// How many of them.
         attempts: u64,
+        /// By when.
+        by: Option<Duration>,
     },
     /// One that no later attempt replaces, unless the best is wanted.
     Settled,
 }
 
 impl Sum {
-    /// Number of attempts left that may replace the best grasp for its unclear type.
+    /// Number of attempts left that may replace the best grasp.
     fn replacing_attempts(&self) -> u64 {
-        self.replaceable_until
-            .map_or(0, |last| last.saturating_add(1).saturating_sub(self.next))
+        match self.replaceable_until {
+            None => 0,
+            Some(Replaceable::UntilAttempt(last)) => last.saturating_add(1).saturating_sub(self.next),
+            Some(Replaceable::UntilTime(_)) => u64::MAX,
+        }
     }
 }
 
@@ -57,13 +65,21 @@ impl Progress {
             && (replaces || sum.best.as_ref().is_none_or(|(_, value)| slice.value > *value));
         sum.report.merge(slice.report, is_better);
         if is_better {
+            let is_first = sum.best.is_none();
             sum.best = slice.grasp.map(|grasp| (grasp, slice.value));
-            sum.replaceable_until = slice.replaceable_until;
+            // The first one decides for how long.
+            if replaces || is_first {
+                sum.replaceable_until = slice.replaceable_until;
+            }
         }
+        let by = match sum.replaceable_until {
+            Some(Replaceable::UntilTime(by)) => Some(by),
+            _ => None,
+        };
         match (&sum.best, sum.replacing_attempts()) {
             (None, _) => Found::Nothing,
             (Some(_), 0) => Found::Settled,
-            (Some(_), attempts) => Found::Replaceable { attempts },
+            (Some(_), attempts) => Found::Replaceable { attempts, by },
         }
     }
 

@@ -55,8 +55,9 @@ pub(super) fn search_in_slices(
         left -= slice.run.max_attempts;
         let end = outcome.end;
         let found = progress.add(outcome, &slice.run);
-        if let Found::Replaceable { attempts } = found {
+        if let Found::Replaceable { attempts, by } = found {
             left = left.min(attempts);
+            slice.run.deadline = [slice.run.deadline, by].into_iter().flatten().min();
         }
         // The first valid grasp ends the search unless the best is wanted.
         let is_enough = found == Found::Settled && slice.query.choice == Choice::FirstValid;

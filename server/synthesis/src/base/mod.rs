@@ -4,6 +4,7 @@
 pub mod clock;
 pub mod mechanisms;
 pub mod pose;
+pub mod ramp;
 pub mod random;
 pub mod rejection;
 pub mod stopwatch;

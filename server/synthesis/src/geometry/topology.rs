@@ -129,7 +129,7 @@ fn enclosure(mesh: &TriangleMesh, triangle: usize, winding: impl Fn(Vec3) -> f64
 }
 
 /// The triangles' edges, with vertices at equal positions as one, in the order of their ends.
-fn sorted_edges(mesh: &TriangleMesh) -> Vec<EdgeUse> {
+pub(super) fn sorted_edges(mesh: &TriangleMesh) -> Vec<EdgeUse> {
     let vertices = weld(mesh.positions());
     let welded = mesh
         .triangles()
@@ -153,10 +153,10 @@ fn connected_parts(mesh: &TriangleMesh, edges: &[EdgeUse]) -> DisjointSets {
 
 /// One triangle's use of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct EdgeUse {
+pub(super) struct EdgeUse {
     /// The vertices, the lower index first.
-    ends: [u32; 2],
-    triangle: u32,
+    pub(super) ends: [u32; 2],
+    pub(super) triangle: u32,
     /// True if the triangle traverses the edge from the higher index to the lower.
     reversed: bool,
 }
@@ -270,18 +270,18 @@ fn weld(positions: &[Vec3]) -> Vec<u32> {
 }
 
 /// Disjoint sets (union-find with path halving).
-struct DisjointSets {
+pub(super) struct DisjointSets {
     parents: Vec<u32>,
 }
 
 impl DisjointSets {
-    fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self {
             parents: (0..count as u32).collect(),
         }
     }
 
-    fn root(&mut self, mut item: u32) -> u32 {
+    pub(super) fn root(&mut self, mut item: u32) -> u32 {
         while self.parents[item as usize] != item {
             let grandparent = self.parents[self.parents[item as usize] as usize];
             self.parents[item as usize] = grandparent;
@@ -290,7 +290,7 @@ impl DisjointSets {
         item
     }
 
-    fn join(&mut self, a: u32, b: u32) {
+    pub(super) fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         let (low, high) = (a.min(b), a.max(b));
         self.parents[high as usize] = low;

@@ -1,5 +1,7 @@
 //! A known grip of an atlas.
 
+use glam::Vec3;
+
 use super::{
     finger_subsets::FingerSubsets,
     friction_uses::FrictionUses,
@@ -22,7 +24,8 @@ use crate::{
         solids::{HandSolids, TrackedSolids},
     },
     rating::{
-        scoring::{force_values, grip_values},
+        choice::upright_values,
+        scoring::{force_values, grip_values, sum},
         taxonomy::classify,
     },
 };
@@ -80,7 +83,10 @@ impl Entry {
                     .map_or(FrictionUse::Full, |balance| balance.friction_use),
             );
             held.map_or(SLIPS, |balance| {
-                let values = force_values(scene, &contacts, &balance.forces);
+                let values = sum(
+                    force_values(scene, &contacts, &balance.forces),
+                    upright_values(scene.object, grip.pose.frame_from_wrist, direction(index)),
+                );
                 quantized(of_grip + Score { values }.total())
             })
         });
@@ -164,6 +170,11 @@ impl Entry {
     /// The solids of the hand as they are compared with a giver's, in the object's frame.
     pub fn tracked_solids(&self, rig: &Rig) -> TrackedSolids {
         TrackedSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids(rig))
+    }
+
+    /// Direction of the forearm, straight behind the wrist, from wrist to elbow: a unit vector in the object's frame.
+    pub fn forearm(&self) -> Vec3 {
+        self.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Y)
     }
 
     /// True if wrist, contacts and grasp type satisfy the constraints.

@@ -1,5 +1,7 @@
 //! Known grips with the data that screens them against barriers.
 
+use glam::Vec3;
+
 use super::{
     entry::Entry,
     finger_subsets::FingerSubsets,
@@ -23,6 +25,8 @@ pub struct Grips {
     inner_spheres: Vec<Spheres>,
     /// The finger subsets that hold, for each grip.
     finger_subsets: Vec<FingerSubsets>,
+    /// Direction of each forearm from wrist to elbow, a unit vector.
+    forearms: Vec<Vec3>,
 }
 
 impl Grips {
@@ -32,6 +36,7 @@ impl Grips {
         Self {
             inner_spheres: entries.iter().map(spheres).collect(),
             finger_subsets: entries.iter().map(|entry| entry.finger_subsets).collect(),
+            forearms: entries.iter().map(Entry::forearm).collect(),
             entries,
         }
     }
@@ -41,10 +46,16 @@ impl Grips {
         &self.entries
     }
 
+    /// Direction of the forearm of each grip from wrist to elbow, a unit vector.
+    pub fn forearms(&self) -> &[Vec3] {
+        &self.forearms
+    }
+
     /// Appends a grip.
     pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
         self.inner_spheres.push(first_spheres(&entry.solids(rig)));
         self.finger_subsets.push(entry.finger_subsets);
+        self.forearms.push(entry.forearm());
         self.entries.push(entry);
     }
 
@@ -52,6 +63,7 @@ impl Grips {
     pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
         self.inner_spheres[index] = first_spheres(&entry.solids(rig));
         self.finger_subsets[index] = entry.finger_subsets;
+        self.forearms[index] = entry.forearm();
         self.entries[index] = entry;
     }
 
@@ -110,5 +122,6 @@ impl Grips {
         self.entries.iter().map(Entry::bytes).sum::<usize>()
             + size_of_val(self.inner_spheres.as_slice())
             + size_of_val(self.finger_subsets.as_slice())
+            + size_of_val(self.forearms.as_slice())
     }
 }

@@ -30,6 +30,7 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{Gripper, clear_of_barriers},
+        receiver::Receiver,
         scene::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
         solids::{PreparedHand, TrackedSolids},
@@ -274,6 +275,7 @@ impl<'a> Growth<'a> {
                 other_hands: Vec::new(),
                 obstacles: Vec::new(),
                 giver_palm: None,
+                receiver: Receiver::ANYWHERE,
                 up: Vec3::Y,
             },
             seeds,

@@ -74,6 +74,12 @@ impl<'a> GripChecker<'a> {
         } else {
             entry.grip.epsilon
         };
+        let must_reach = presented.receiver.must_reach();
+        let arm = must_reach.then(|| presented.arm_of(scene.object, rig, entry.grip.pose.frame_from_wrist));
+        let arm = match arm {
+            Some(None) => return None,
+            reached => reached.flatten(),
+        };
         let mut grasp = unscored_grasp(
             &entry.grip,
             &entry.contacts,
@@ -83,6 +89,7 @@ impl<'a> GripChecker<'a> {
             presented,
             clearances,
         );
+        grasp.arm = arm;
         grasp.score = Some(score(entry.grip_values, &grasp, scene, rig, presented));
         Some(grasp)
     }

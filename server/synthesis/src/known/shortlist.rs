@@ -3,8 +3,8 @@
 //! The best grips by score lie next to each other on the object, and a giver that obstructs the first
 //! obstructs hundreds. So a look-up starts with grips that complement one another: for each direction of
 //! gravity, those that together serve a sample of givers best. A giver is served by the best listed grip that
-//! is clear of it, provided that its score is within [`SCORE_MARGIN`] of the best clear grip of all. They are
-//! tried by falling score, then all others are.
+//! is clear of it, provided that its value is within [`VALUE_MARGIN`] of the best clear grip of all. A grip's value is its score
+//! and how well its forearm suits a receiver who faces the giver. They are tried by falling value, then all others are.
 //!
 //! The objective is a sum of maxima (facility location), which is monotone and submodular. Greedy selection
 //! then reaches at least 1 − 1/e of the optimum (G. L. Nemhauser, L. A. Wolsey and M. L. Fisher, "An analysis
@@ -20,15 +20,16 @@ use glam::Vec3;
 
 use super::{
     entry::{Entry, SLIPS},
-    gravity::{DIRECTIONS, nearest_direction},
+    gravity::{DIRECTIONS, direction, nearest_direction},
     inner_spheres::{first_spheres, second_spheres},
     occupancy::Occupancy,
 };
 use crate::{
-    model::hand::rig::Rig,
+    model::{hand::rig::Rig, score::Term},
     physical::{
         barriers::Barriers,
         grip::GIVER_CLEARANCE,
+        receiver::Receiver,
         solids::{Spheres, TrackedSolids},
     },
 };
@@ -41,15 +42,28 @@ const LIST_LENGTH: usize = 96;
 /// cost time in proportion: a tenth of a second when an atlas is loaded.
 const SAMPLED_GIVERS: usize = 512;
 
-/// How far a grip's score may be below that of the best clear grip to serve a giver, in steps of 1/254. More
-/// finds a listed grip for more givers, at lower scores.
-const SCORE_MARGIN: u8 = 40;
+/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254. More
+/// finds a listed grip for more givers, at lower values.
+const VALUE_MARGIN: u8 = 40;
 
 /// Givers whose gains are added at once: a register of bytes.
 const LANES: usize = 32;
 
-/// For each giver, all bits set if it is clear of a grip, else 0.
-type ClearOf = [u8; SAMPLED_GIVERS];
+/// Directions that the givers' forearms are quantized to, about 36° apart: where the receiver stands need not be known more
+/// exactly, and each direction costs two milliseconds.
+const FOREARMS: usize = 16;
+
+/// Places for givers: those with forearms in the same direction share chunks of [`LANES`] places, of which some stay empty.
+const PLACES: usize = SAMPLED_GIVERS + FOREARMS * LANES;
+
+/// For each place, all bits set if a giver there is clear of a grip, else 0.
+type ClearOf = [u8; PLACES];
+
+/// The value of a grip for givers by the direction of their forearms; 0 if it lets the object slip.
+type Row = [u8; FOREARMS];
+
+/// The direction of the forearms of the givers of each chunk.
+type Chunks = [usize; PLACES / LANES];
 
 /// A grip on a list. There are a few hundred in all, and nearly every look-up starts with them, so their
 /// solids are kept.
@@ -67,9 +81,24 @@ pub(super) struct Shortlists {
     grips: Vec<Listed>,
     /// The first inner spheres of each listed grip, contiguous.
     inner_spheres: Vec<Spheres>,
+    /// The direction of each listed grip's forearm, from wrist to elbow.
+    forearms: Vec<Vec3>,
     /// For each direction, the grips on its list.
-    by_direction: Vec<Vec<u16>>,
+    by_direction: Vec<Vec<ListedPlace>>,
 }
+
+/// A listed grip under one direction of gravity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct ListedPlace {
+    /// Its place among the listed grips of all directions.
+    grip: u16,
+    /// Its score under this gravity.
+    score: u8,
+}
+
+/// Steps of a score from 0 to 1, as entries store it, and those by which values are compared.
+const QUANTA: f32 = 254.0;
+const VALUE_STEPS: f32 = 1e6;
 
 /// The list for one direction of gravity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -77,15 +106,31 @@ pub struct Shortlist<'a> {
     /// The grips of all lists, and their first inner spheres.
     grips: &'a [Listed],
     inner_spheres: &'a [Spheres],
-    /// The indices of the grips on this list.
-    places: &'a [u16],
+    forearms: &'a [Vec3],
+    /// The grips on this list.
+    places: &'a [ListedPlace],
 }
 
 impl<'a> Shortlist<'a> {
     /// The grips on the list, by falling score.
     pub fn iter(self) -> impl Iterator<Item = &'a Listed> {
         let grips = self.grips;
-        self.places.iter().map(|&place| &grips[usize::from(place)])
+        self.places.iter().map(|place| &grips[usize::from(place.grip)])
+    }
+
+    /// The places of the list by falling value, with `stance` the value of a forearm's direction for where the receiver
+    /// stands, 0 to 1. In order of the list where values are equal.
+    pub fn by_value(&self, stance: impl Fn(Vec3) -> f32) -> Vec<u16> {
+        let mut order: Vec<(u32, u16)> = (0..)
+            .zip(self.places)
+            .map(|(index, place)| {
+                let stance = stance(self.forearms[usize::from(place.grip)]);
+                let value = f32::from(place.score) / QUANTA + Term::Stance.share() * stance;
+                (u32::MAX - (value * VALUE_STEPS) as u32, index)
+            })
+            .collect();
+        order.sort_unstable();
+        order.into_iter().map(|(_, index)| index).collect()
     }
 
     /// The length of the list.
@@ -100,7 +145,7 @@ impl<'a> Shortlist<'a> {
 
     /// The grip at a place of the list, with its solids.
     pub fn at(&self, place: usize) -> (u16, &'a TrackedSolids) {
-        let grip = &self.grips[usize::from(self.places[place])];
+        let grip = &self.grips[usize::from(self.places[place].grip)];
         (grip.entry, &grip.solids)
     }
 
@@ -108,7 +153,7 @@ impl<'a> Shortlist<'a> {
     /// a barrier. Conservative: a grip that passes may still collide.
     #[inline]
     pub fn screen(&self, place: usize, barriers: Barriers<'_>) -> Option<(u16, &'a TrackedSolids)> {
-        let place = usize::from(self.places[place]);
+        let place = usize::from(self.places[place].grip);
         let collides = |spheres: &Spheres| barriers.any_certainly_within(spheres, GIVER_CLEARANCE);
         if collides(&self.inner_spheres[place]) {
             return None;
@@ -121,23 +166,31 @@ impl<'a> Shortlist<'a> {
 impl Shortlists {
     /// Builds the lists of a rig's grips, whose hands fill the cells of `occupancy`.
     pub(super) fn of(rig: &Rig, entries: &[Entry], occupancy: &Occupancy) -> Self {
-        let clear_of = clear_of_sampled_givers(entries.len(), occupancy);
-        let list = |direction: usize| shortlist(|entry| entries[entry].scores[direction], &clear_of);
-        let mut by_direction: Vec<Vec<u16>> = (0..DIRECTIONS).map(list).collect();
-        let mut listed: Vec<u16> = by_direction.concat();
+        let (clear_of, chunks) = clear_of_sampled_givers(entries, occupancy);
+        let list = |up: usize| shortlist(&values(entries, up), &chunks, &clear_of);
+        let lists: Vec<Vec<u16>> = (0..DIRECTIONS).map(list).collect();
+        let mut listed: Vec<u16> = lists.concat();
         listed.sort_unstable();
         listed.dedup();
-        for entry in by_direction.iter_mut().flatten() {
-            let place = listed.partition_point(|listed| listed < entry);
-            *entry = place as u16;
-        }
+        let by_direction = (0..).zip(&lists).map(|(up, list): (usize, &Vec<u16>)| {
+            let mut list: Vec<ListedPlace> = list
+                .iter()
+                .map(|entry| ListedPlace {
+                    grip: listed.partition_point(|listed| listed < entry) as u16,
+                    score: entries[usize::from(*entry)].scores[up],
+                })
+                .collect();
+            list.sort_by_key(|place| Reverse(place.score));
+            list
+        });
         let mut shortlists = Self {
-            by_direction,
+            by_direction: by_direction.collect(),
             ..Self::default()
         };
         for entry in listed {
             let solids = entries[usize::from(entry)].tracked_solids(rig);
             shortlists.inner_spheres.push(first_spheres(&solids.hand));
+            shortlists.forearms.push(entries[usize::from(entry)].forearm());
             shortlists.grips.push(Listed {
                 entry,
                 second_spheres: second_spheres(&solids.hand),
@@ -152,6 +205,7 @@ impl Shortlists {
         Shortlist {
             grips: &self.grips,
             inner_spheres: &self.inner_spheres,
+            forearms: &self.forearms,
             places: self
                 .by_direction
                 .get(nearest_direction(up))
@@ -168,56 +222,99 @@ impl Shortlists {
     pub(super) fn bytes(&self) -> usize {
         let lists = self.by_direction.iter();
         let lists = lists.map(|list| size_of_val(list.as_slice()));
-        size_of_val(self.grips.as_slice()) + size_of_val(self.inner_spheres.as_slice()) + lists.sum::<usize>()
+        size_of_val(self.grips.as_slice())
+            + size_of_val(self.inner_spheres.as_slice())
+            + size_of_val(self.forearms.as_slice())
+            + lists.sum::<usize>()
     }
 }
 
-/// For each of `count` grips, which givers are clear of it. Grips of the same atlas serve as givers: hands
+/// For each grip, which givers are clear of it, and the forearms of the givers. Grips of the same atlas serve as givers: hands
 /// that hold an object out hold it like others do.
-fn clear_of_sampled_givers(count: usize, occupancy: &Occupancy) -> Vec<ClearOf> {
+fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<ClearOf>, Chunks) {
+    let count = entries.len();
     let givers = count.min(SAMPLED_GIVERS);
-    let mut clear_of = vec![[0; SAMPLED_GIVERS]; count];
+    let mut by_forearm: [Vec<usize>; FOREARMS] = std::array::from_fn(|_| Vec::new());
     for giver in 0..givers {
         // Spread evenly over the entries, as complete atlases start with the best ones.
-        let colliding = occupancy.colliding_with(giver * count / givers);
-        for (entry, clear_of) in clear_of.iter_mut().enumerate() {
-            if !colliding.contains(entry) {
-                clear_of[giver] = u8::MAX;
+        let giver = giver * count / givers;
+        by_forearm[nearest_forearm(entries[giver].forearm())].push(giver);
+    }
+    let mut clear_of = vec![[0; PLACES]; count];
+    let mut chunks = [0; PLACES / LANES];
+    let mut chunk = 0;
+    for (forearm, givers) in by_forearm.iter().enumerate() {
+        for together in givers.chunks(LANES) {
+            chunks[chunk] = forearm;
+            for (lane, &giver) in together.iter().enumerate() {
+                let colliding = occupancy.colliding_with(giver);
+                for (entry, clear_of) in clear_of.iter_mut().enumerate() {
+                    if !colliding.contains(entry) {
+                        clear_of[LANES * chunk + lane] = u8::MAX;
+                    }
+                }
             }
+            chunk += 1;
         }
     }
-    clear_of
+    (clear_of, chunks)
 }
 
-/// The list for one direction: the grips that serve the givers best, by falling score.
-fn shortlist(score: impl Fn(usize) -> u8, clear_of: &[ClearOf]) -> Vec<u16> {
-    // The score that each giver is served with so far. The initial one is what does not count next to its
+/// One of [`FOREARMS`] evenly spread directions.
+fn forearm(index: usize) -> Vec3 {
+    direction(index * (DIRECTIONS / FOREARMS))
+}
+
+/// The index of the nearest one.
+fn nearest_forearm(along: Vec3) -> usize {
+    let cosine = |&index: &usize| forearm(index).dot(along);
+    (0..FOREARMS)
+        .max_by(|a, b| cosine(a).total_cmp(&cosine(b)))
+        .unwrap_or(0)
+}
+
+/// The values of all grips for one direction against gravity.
+fn values(entries: &[Entry], up: usize) -> Vec<Row> {
+    let receivers: [Receiver; FOREARMS] =
+        std::array::from_fn(|giver| Receiver::facing(forearm(giver), Vec3::ZERO, direction(up)));
+    let of_stance = QUANTA * Term::Stance.share();
+    let row = |entry: &Entry| {
+        let score = entry.scores[up];
+        let along = entry.forearm();
+        receivers.map(|receiver| match score {
+            SLIPS => SLIPS,
+            _ => score.saturating_add((of_stance * receiver.suits_forearm(along)).round() as u8),
+        })
+    };
+    entries.iter().map(row).collect()
+}
+
+/// The list for one direction: the grips that serve the givers best.
+fn shortlist(values: &[Row], chunks: &Chunks, clear_of: &[ClearOf]) -> Vec<u16> {
+    // The value that each giver is served with so far. The initial one is what does not count next to its
     // best clear grip.
-    let mut served = [SLIPS; SAMPLED_GIVERS];
-    for (entry, clear_of) in clear_of.iter().enumerate() {
-        serve(&mut served, score(entry), clear_of);
+    let mut served = [SLIPS; PLACES];
+    for (row, clear_of) in values.iter().zip(clear_of) {
+        serve(&mut served, row, chunks, clear_of);
     }
     for best in &mut served {
-        *best = best.saturating_sub(SCORE_MARGIN);
+        *best = best.saturating_sub(VALUE_MARGIN);
     }
+    let gain_of =
+        |entry: usize, served: &[u8; PLACES]| gain(&values[entry], chunks, &clear_of[entry], served);
     let mut gains: BinaryHeap<(u32, Reverse<u16>)> = (0..clear_of.len())
-        .map(|entry| {
-            (
-                gain(score(entry), &clear_of[entry], &served),
-                Reverse(entry as u16),
-            )
-        })
+        .map(|entry| (gain_of(entry, &served), Reverse(entry as u16)))
         .filter(|&(gain, _)| gain > 0)
         .collect();
     let mut list = Vec::with_capacity(LIST_LENGTH);
     while list.len() < LIST_LENGTH {
         let Some(mut top) = gains.peek_mut() else { break };
         let (bound, Reverse(entry)) = *top;
-        let (score, clear_of) = (score(usize::from(entry)), &clear_of[usize::from(entry)]);
-        let gain = gain(score, clear_of, &served);
+        let index = usize::from(entry);
+        let gain = gain_of(index, &served);
         if gain == bound {
             PeekMut::pop(top);
-            serve(&mut served, score, clear_of);
+            serve(&mut served, &values[index], chunks, &clear_of[index]);
             list.push(entry);
         } else if gain > 0 {
             top.0 = gain;
@@ -225,25 +322,29 @@ fn shortlist(score: impl Fn(usize) -> u8, clear_of: &[ClearOf]) -> Vec<u16> {
             PeekMut::pop(top);
         }
     }
-    list.sort_by_key(|&entry| Reverse(score(usize::from(entry))));
     list
 }
 
 /// Serves the givers that are clear of a grip, if it is better than what they have.
-fn serve(served: &mut [u8; SAMPLED_GIVERS], score: u8, clear_of: &ClearOf) {
-    for (served, clear) in served.iter_mut().zip(clear_of) {
-        *served = (*served).max(score & clear);
+fn serve(served: &mut [u8; PLACES], row: &Row, chunks: &Chunks, clear_of: &ClearOf) {
+    let (served, clear_of) = (served.as_chunks_mut::<LANES>().0, clear_of.as_chunks::<LANES>().0);
+    for ((served, clear_of), &forearm) in served.iter_mut().zip(clear_of).zip(chunks) {
+        let value = row[forearm];
+        for lane in 0..LANES {
+            served[lane] = served[lane].max(value & clear_of[lane]);
+        }
     }
 }
 
 /// The sum of the improvements that a grip brings to the givers that are clear of it.
-fn gain(score: u8, clear_of: &ClearOf, served: &[u8; SAMPLED_GIVERS]) -> u32 {
-    const { assert!(SAMPLED_GIVERS / LANES * u8::MAX as usize <= u16::MAX as usize) };
+fn gain(row: &Row, chunks: &Chunks, clear_of: &ClearOf, served: &[u8; PLACES]) -> u32 {
+    const { assert!(PLACES / LANES * u8::MAX as usize <= u16::MAX as usize) };
     let (clear_of, served) = (clear_of.as_chunks::<LANES>().0, served.as_chunks::<LANES>().0);
     let mut gains = [0_u16; LANES];
-    for (clear_of, served) in clear_of.iter().zip(served) {
+    for ((clear_of, served), &forearm) in clear_of.iter().zip(served).zip(chunks) {
+        let value = row[forearm];
         for lane in 0..LANES {
-            gains[lane] += u16::from(score.saturating_sub(served[lane]) & clear_of[lane]);
+            gains[lane] += u16::from(value.saturating_sub(served[lane]) & clear_of[lane]);
         }
     }
     gains.into_iter().map(u32::from).sum()
@@ -254,53 +355,68 @@ mod tests {
     use super::*;
     use crate::base::random::AttemptStream;
 
-    /// Grips with random scores; each of the first `givers` is clear of a random share of them.
-    fn drawn(stream: &mut AttemptStream, count: usize, givers: usize, share: f32) -> (Vec<u8>, Vec<ClearOf>) {
+    /// Givers whose forearms point in all directions.
+    fn chunks() -> Chunks {
+        std::array::from_fn(|chunk| chunk % FOREARMS)
+    }
+
+    /// Grips with random values; each of the first `givers` is clear of a random share of them.
+    fn drawn(
+        stream: &mut AttemptStream,
+        count: usize,
+        givers: usize,
+        share: f32,
+    ) -> (Vec<Row>, Vec<ClearOf>) {
         let grip = |_| {
-            let mut clear_of = [0; SAMPLED_GIVERS];
+            let mut clear_of = [0; PLACES];
             for clear in &mut clear_of[..givers] {
                 *clear = if stream.unit() < share { u8::MAX } else { 0 };
             }
-            // Some slip, and many have equal or similar scores.
-            (stream.below(6) as u8 * 5 * stream.below(11) as u8, clear_of)
+            // Some slip, and many have equal or similar values.
+            let score = stream.below(6) as u8 * 5 * stream.below(7) as u8;
+            let row = std::array::from_fn(|_| score.saturating_add(10 * stream.below(4) as u8));
+            (if score == SLIPS { [SLIPS; FOREARMS] } else { row }, clear_of)
         };
         (0..count).map(grip).unzip()
     }
 
     /// The objective of a list: by how much the best clear grip of each giver exceeds what does not count.
-    fn total_service(list: &[u16], scores: &[u8], clear_of: &[ClearOf]) -> u32 {
+    fn total_service(list: &[u16], values: &[Row], clear_of: &[ClearOf]) -> u32 {
+        let chunks = chunks();
         let best = |entries: &mut dyn Iterator<Item = usize>, giver: usize| {
             let clear = entries.filter(|&entry| clear_of[entry][giver] != 0);
-            clear.map(|entry| u32::from(scores[entry])).max().unwrap_or(0)
+            clear
+                .map(|entry| u32::from(values[entry][chunks[giver / LANES]]))
+                .max()
+                .unwrap_or(0)
         };
         let served = |giver: usize| {
-            let of_all = best(&mut (0..scores.len()), giver);
+            let of_all = best(&mut (0..values.len()), giver);
             let of_list = best(&mut list.iter().map(|&entry| usize::from(entry)), giver);
-            of_list.saturating_sub(of_all.saturating_sub(u32::from(SCORE_MARGIN)))
+            of_list.saturating_sub(of_all.saturating_sub(u32::from(VALUE_MARGIN)))
         };
-        (0..SAMPLED_GIVERS).map(served).sum()
+        (0..PLACES).map(served).sum()
     }
 
     #[test]
     fn lazy_greedy_matches_plain_greedy() {
         for seed in 0..20 {
             let mut stream = AttemptStream::new(7, seed);
-            let (scores, clear_of) = drawn(&mut stream, 150, 200, 0.05);
+            let (values, clear_of) = drawn(&mut stream, 150, 200, 0.05);
             let mut plain: Vec<u16> = Vec::new();
             while plain.len() < LIST_LENGTH {
                 let with = |entry: u16| {
                     let longer = [plain.as_slice(), &[entry]].concat();
-                    total_service(&longer, &scores, &clear_of)
+                    total_service(&longer, &values, &clear_of)
                 };
                 let top = (0..150).max_by_key(|&entry| (with(entry), Reverse(entry)));
                 let top = top.expect("there are grips");
-                if with(top) == total_service(&plain, &scores, &clear_of) {
+                if with(top) == total_service(&plain, &values, &clear_of) {
                     break;
                 }
                 plain.push(top);
             }
-            plain.sort_by_key(|&entry| Reverse(scores[usize::from(entry)]));
-            assert_eq!(shortlist(|entry| scores[entry], &clear_of), plain, "seed {seed}");
+            assert_eq!(shortlist(&values, &chunks(), &clear_of), plain, "seed {seed}");
         }
     }
 
@@ -308,29 +424,33 @@ mod tests {
     fn list_longer_than_the_atlas_serves_as_well_as_all_grips() {
         for seed in 0..20 {
             let mut stream = AttemptStream::new(8, seed);
-            let (scores, clear_of) = drawn(&mut stream, 12, 40, 0.3);
-            let list = shortlist(|entry| scores[entry], &clear_of);
+            let (values, clear_of) = drawn(&mut stream, 12, 40, 0.3);
+            let list = shortlist(&values, &chunks(), &clear_of);
             let all: Vec<u16> = (0..12).collect();
             assert_eq!(
-                total_service(&list, &scores, &clear_of),
-                total_service(&all, &scores, &clear_of),
+                total_service(&list, &values, &clear_of),
+                total_service(&all, &values, &clear_of),
                 "seed {seed}"
             );
-            assert!(list.iter().all(|&entry| scores[usize::from(entry)] != SLIPS));
+            assert!(
+                list.iter()
+                    .all(|&entry| values[usize::from(entry)] != [SLIPS; FOREARMS])
+            );
         }
     }
 
     #[test]
     fn gain_sums_improvements_over_givers_clear_of_the_grip() {
         let mut stream = AttemptStream::new(9, 0);
-        let served: [u8; SAMPLED_GIVERS] = std::array::from_fn(|_| stream.below(256) as u8);
-        let (scores, clear_of) = drawn(&mut stream, 50, SAMPLED_GIVERS, 0.5);
-        for (&score, clear_of) in scores.iter().zip(&clear_of) {
-            let more = (0..SAMPLED_GIVERS).filter(|&giver| clear_of[giver] != 0 && score > served[giver]);
+        let served: [u8; PLACES] = std::array::from_fn(|_| stream.below(256) as u8);
+        let (values, clear_of) = drawn(&mut stream, 50, PLACES, 0.5);
+        for (row, clear_of) in values.iter().zip(&clear_of) {
+            let value = |giver: usize| row[chunks()[giver / LANES]];
+            let more = (0..PLACES).filter(|&giver| clear_of[giver] != 0 && value(giver) > served[giver]);
             let sum: u32 = more
-                .map(|giver| u32::from(score) - u32::from(served[giver]))
+                .map(|giver| u32::from(value(giver)) - u32::from(served[giver]))
                 .sum();
-            assert_eq!(gain(score, clear_of, &served), sum);
+            assert_eq!(gain(row, &chunks(), clear_of, &served), sum);
         }
     }
 }

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::{
     grasp_type::Classification,
     hand::{HandPart, HandPose},
+    receiver::ArmPose,
     score::Score,
 };
 
@@ -49,6 +50,8 @@ pub struct Grasp {
     pub hangs: bool,
     /// The score; none under `THESIS` validity.
     pub score: Option<Score>,
+    /// The receiver's arm, if where the receiver stands is given or can be assumed, and the arm reaches from there.
+    pub arm: Option<ArmPose>,
     /// The motion to the grasp, once planned ([`crate::search::key_frames`]); none before that, or if no straight
     /// path
     /// exists.

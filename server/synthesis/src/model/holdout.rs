@@ -8,6 +8,7 @@ use super::{
     hand::{joints::HandJoints, skin::Skin},
     object::GraspObject,
     obstacle::Obstacle,
+    receiver::Stance,
 };
 use crate::{
     base::pose::Pose,
@@ -39,6 +40,8 @@ pub struct Holdout {
     pub other_hands: Vec<HandJoints>,
     /// Obstacles to keep clear of. `THESIS` validity knows none.
     pub obstacles: Vec<Obstacle>,
+    /// Where the receiver's arm may come from. `THESIS` validity does not ask.
+    pub stance: Stance,
     /// The direction against gravity, a unit vector.
     pub up: Vec3,
 }
@@ -71,8 +74,8 @@ pub enum HoldoutError {
 }
 
 impl Holdout {
-    /// A holdout with everything in the object's frame, without further hands or obstacles; `up` points against
-    /// gravity.
+    /// A holdout with everything in the object's frame, without further hands or obstacles, to a receiver who faces the giver;
+    /// `up` points against gravity.
     ///
     /// # Errors
     /// `up` is not a unit vector.
@@ -89,6 +92,7 @@ impl Holdout {
             presenting_hand,
             other_hands: Vec::new(),
             obstacles: Vec::new(),
+            stance: Stance::default(),
             up,
         })
     }

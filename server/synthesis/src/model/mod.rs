@@ -11,5 +11,7 @@ pub mod hand;
 pub mod holdout;
 pub mod object;
 pub mod obstacle;
+pub mod parts;
+pub mod receiver;
 pub mod score;
 pub mod strategy;

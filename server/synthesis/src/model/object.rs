@@ -1,11 +1,13 @@
 //! Objects that can be grasped.
 
+use std::sync::OnceLock;
+
 use glam::Vec3;
 
-use super::strategy::Validity;
+use super::{parts::Parts, strategy::Validity};
 use crate::geometry::{
-    local_thickness::LocalThickness, mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox,
-    tapered_capsule::TaperedCapsule,
+    handles::Handles, local_thickness::LocalThickness, mesh::TriangleMesh, mesh_bvh::MeshBvh,
+    oriented_box::OrientedBox, tapered_capsule::TaperedCapsule,
 };
 
 /// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
@@ -39,6 +41,8 @@ pub struct GraspObject {
     /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried
     /// first.
     forbidden_surface: Option<MeshBvh>,
+    /// What its parts are for, found on first use.
+    parts: OnceLock<Parts>,
 }
 
 /// Why an object was rejected.
@@ -132,6 +136,7 @@ impl GraspObject {
                 .map(MeshBvh::build_quick),
             surface,
             forbidden,
+            parts: OnceLock::new(),
         })
     }
 
@@ -146,6 +151,16 @@ impl GraspObject {
     /// True if the triangle must not be touched (Algorithm 7); O(1).
     pub fn is_forbidden(&self, triangle: u32) -> bool {
         self.forbidden[triangle as usize]
+    }
+
+    /// What its parts are for, as the mesh shows. The first call takes some milliseconds.
+    pub fn parts(&self) -> &Parts {
+        self.parts.get_or_init(|| Parts::of(self))
+    }
+
+    /// Where it can be wrapped. The first call takes as long as that of [`Self::parts`].
+    pub fn handles(&self) -> &Handles {
+        &self.parts().handles
     }
 
     /// Number of triangles that must not be touched.

@@ -3,7 +3,7 @@
 //! The weights are the project's choice. [`crate::rating::scoring`] computes the terms.
 
 /// Number of terms.
-pub const TERMS: usize = 12;
+pub const TERMS: usize = 20;
 
 /// One value per term, in the order of [`Term::ALL`].
 pub type Values = [f32; TERMS];
@@ -19,7 +19,8 @@ pub enum Term {
     Ease,
     /// Neighbouring fingers bend by similar angles.
     SharedFlexion,
-    /// As many digits touch as the weight calls for.
+    /// As much of the hand holds as the load calls for: fingers for what is light, all and the palm for what is heavy or held
+    /// far from its centre of mass.
     EnoughDigits,
     /// The digits touch with their pads, not with their sides.
     Pads,
@@ -36,6 +37,22 @@ pub enum Term {
     GiverClearance,
     /// The hand keeps its distance from forbidden surfaces.
     SterileDistance,
+    /// The forearm comes from where the receiver stands.
+    Stance,
+    /// The hand comes from the side or from above, not from beneath.
+    FromSideOrAbove,
+    /// The wrist carries little torque.
+    WristLoad,
+    /// The hand comes across the object's long axis, not from its end.
+    AcrossLongAxis,
+    /// The hand holds the object near its centre of mass, or by its handle.
+    NearCentre,
+    /// Thumb and fingers oppose across a small dimension of the object.
+    SmallSpan,
+    /// The hand holds the object by its handle, if it has one.
+    OnHandle,
+    /// No contact is on a sharp edge or point.
+    OffSharp,
 }
 
 impl Term {
@@ -53,6 +70,14 @@ impl Term {
         Self::AwayFromGiver,
         Self::GiverClearance,
         Self::SterileDistance,
+        Self::Stance,
+        Self::FromSideOrAbove,
+        Self::WristLoad,
+        Self::AcrossLongAxis,
+        Self::NearCentre,
+        Self::SmallSpan,
+        Self::OnHandle,
+        Self::OffSharp,
     ];
 
     /// The name used in answers.
@@ -70,6 +95,14 @@ impl Term {
             Self::AwayFromGiver => "away_from_giver",
             Self::GiverClearance => "giver_clearance",
             Self::SterileDistance => "sterile_distance",
+            Self::Stance => "stance",
+            Self::FromSideOrAbove => "from_side_or_above",
+            Self::WristLoad => "wrist_load",
+            Self::AcrossLongAxis => "across_long_axis",
+            Self::NearCentre => "near_centre",
+            Self::SmallSpan => "small_span",
+            Self::OnHandle => "on_handle",
+            Self::OffSharp => "off_sharp",
         }
     }
 
@@ -77,15 +110,25 @@ impl Term {
     pub const fn weight(self) -> f32 {
         match self {
             Self::Comfort | Self::Ease => 1.0,
-            Self::Pads => 1.5,
-            Self::EnoughDigits | Self::SharedFlexion => 2.0,
+            Self::Pads | Self::SmallSpan => 1.5,
+            Self::SharedFlexion | Self::NearCentre | Self::WristLoad => 2.0,
             // Weighted by how well they predict which grips survive pushes from all sides in an independent
-            // simulation. The terms not weighted here judge appearance.
-            Self::Steadiness => 4.0,
+            // simulation; each is mostly earned at a threshold (see [`crate::rating::scoring`]).
+            Self::Steadiness | Self::EnoughDigits => 4.0,
             Self::Closure | Self::FrictionReserve | Self::NaturalType => 6.0,
             Self::AwayFromGiver => 0.75,
             Self::GiverClearance | Self::SterileDistance => 0.5,
+            // Where a hand comes from and what it holds are what a person notices first.
+            Self::FromSideOrAbove => 3.0,
+            Self::AcrossLongAxis => 5.0,
+            Self::OnHandle | Self::OffSharp => 6.0,
+            Self::Stance => 12.0,
         }
+    }
+
+    /// The weight as a share of the weights of all terms.
+    pub fn share(self) -> f32 {
+        self.weight() / Self::ALL.iter().map(|term| term.weight()).sum::<f32>()
     }
 
     /// True if the term depends on the hand and the object alone, not on gravity or the giver.
@@ -99,6 +142,11 @@ impl Term {
                 | Self::Closure
                 | Self::Steadiness
                 | Self::SterileDistance
+                | Self::AcrossLongAxis
+                | Self::NearCentre
+                | Self::SmallSpan
+                | Self::OnHandle
+                | Self::OffSharp
         )
     }
 }

@@ -5,6 +5,7 @@
 //! ([`immobility`]). A [`grip`] is a hand closed on an object, or fingers in which it hangs ([`hanging`]), clear of
 //! [`barriers`]; [`both_hands`] hold what is too large for one.
 
+mod arm;
 pub mod barriers;
 pub mod both_hands;
 mod closer;
@@ -15,6 +16,7 @@ pub mod grip;
 pub mod hanging;
 pub mod immobility;
 pub mod obstacle;
+pub mod receiver;
 pub mod scene;
 pub mod shape;
 pub mod solids;

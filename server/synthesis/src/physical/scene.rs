@@ -5,11 +5,20 @@ use glam::Vec3;
 use super::{
     barriers::{Barriers, PreparedObstacle},
     immobility::{Load, SoftContact, TorqueScale},
+    receiver::Receiver,
     solids::{PreparedHand, TrackedSolids},
 };
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    model::{hand::joints::HandJoints, holdout::Holdout, object::GraspObject},
+    base::{
+        mechanisms::{Mechanism, Mechanisms},
+        pose::Pose,
+    },
+    model::{
+        hand::{joints::HandJoints, rig::Rig},
+        holdout::Holdout,
+        object::GraspObject,
+        receiver::ArmPose,
+    },
 };
 
 /// Smallest Ferrari-Canny epsilon of a valid grasp, without unit, for objects that fingers reach around. In
@@ -65,6 +74,8 @@ pub struct Presented {
     pub obstacles: Vec<PreparedObstacle>,
     /// Centre of the giver's palm, in metres, in the object's frame.
     pub giver_palm: Option<Vec3>,
+    /// Where the receiver stands.
+    pub receiver: Receiver,
     /// Unit vector against gravity, in the object's frame.
     pub up: Vec3,
 }
@@ -93,8 +104,21 @@ impl Presented {
             other_hands: hands.collect(),
             obstacles: holdout.obstacles.iter().map(PreparedObstacle::new).collect(),
             giver_palm: giver.map(|hand| hand.palm),
+            receiver: Receiver::new(
+                holdout.stance,
+                giver.map(|hand| &hand.joints),
+                holdout.object.centre_of_mass,
+                holdout.up,
+            ),
             up: holdout.up,
         }
+    }
+
+    /// The receiver's arm of a hand at the object with this wrist pose; none if where the receiver stands is unknown, or if the arm
+    /// does not reach the wrist clear of object and barriers.
+    pub fn arm_of(&self, object: &GraspObject, rig: &Rig, object_from_wrist: Pose) -> Option<ArmPose> {
+        self.receiver
+            .arm(rig, object_from_wrist, &object.surface, self.barriers())
     }
 
     /// What a hand keeps clear of.

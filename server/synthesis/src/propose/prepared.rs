@@ -6,7 +6,6 @@ use std::{
 };
 
 use super::{
-    handles::Handles,
     holdable::HoldableSurface,
     opposition::Oppositions,
     placement_cache::{PlacementCache, PlacementCaches},
@@ -67,7 +66,6 @@ pub struct PreparedObject {
     surface_pairs: SurfacePairs,
     holdable: HoldableSurface,
     placements: PlacementCaches,
-    handles: Handles,
 }
 
 impl PreparedObject {
@@ -75,13 +73,13 @@ impl PreparedObject {
     pub fn new(object: Arc<GraspObject>) -> Self {
         let surface_pairs = SurfacePairs::of(&object.surface, |triangle| object.is_forbidden(triangle));
         let holdable = HoldableSurface::of(&object, &surface_pairs);
-        let handles = Handles::of(&object, &surface_pairs);
+        // Found here rather than by the first search.
+        let _ = object.parts();
         Self {
             object,
             surface_pairs,
             holdable,
             placements: PlacementCaches::default(),
-            handles,
         }
     }
 
@@ -98,11 +96,6 @@ impl PreparedObject {
     /// Bounds on where it may be held.
     pub fn holdable(&self) -> &HoldableSurface {
         &self.holdable
-    }
-
-    /// Where it can be wrapped.
-    pub fn handles(&self) -> &Handles {
-        &self.handles
     }
 
     /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five

@@ -122,8 +122,11 @@ impl GraspContext<'_> {
             solids,
         );
         grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
+        if presented.receiver.must_reach() {
+            grasp.arm = presented.arm_of(object.object, rig, grasp.pose.frame_from_wrist);
+        }
         // Closing may have moved the wrist since its placement was admitted.
-        if !constraints.admits(&grasp) {
+        if !constraints.admits(&grasp) || (presented.receiver.must_reach() && grasp.arm.is_none()) {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
         Ok(grasp)
@@ -161,6 +164,7 @@ pub fn unscored_grasp(
         classification,
         hangs: false,
         score: None,
+        arm: None,
         key_frames: None,
         other_hand: None,
     }
@@ -180,6 +184,7 @@ pub fn thesis_grasp(rig: &Rig, held: HeldObject) -> Grasp {
         margins: None,
         hangs: false,
         score: None,
+        arm: None,
         key_frames: None,
         other_hand: None,
     }

@@ -7,10 +7,12 @@
 use glam::Vec3;
 
 use super::{
+    choice::{choice_values, upright_values},
     comfort::{comfort, digit_totals},
     stiffness::compliance,
 };
 use crate::{
+    base::ramp::ramp,
     model::{
         forces::GRAVITY,
         grasp::{Contact, Grasp},
@@ -43,8 +45,22 @@ const WEIGHT_PER_FINGER: f32 = 1.5;
 /// them.
 const MIN_FINGERS: f32 = 2.0;
 
-/// Closure that scores 1, as a multiple of the minimum for validity.
-const SAFE_CLOSURE: f32 = 6.0;
+/// How much further a finger counts for the distance of the hand from the centre of mass, in metres: the weight's lever doubles
+/// what the hand has to hold at this distance.
+const LEVER: f32 = 0.06;
+
+/// Masses in kilograms between which the palm becomes part of what a load calls for: heavier things than half a kilogram are
+/// mostly held in power grasps (Feix, Bullock and Dollar 2014).
+const PALM_MASSES: [f32; 2] = [0.4, 1.0];
+
+/// Closures, as multiples of the minimum for validity, at which a hand is firm enough and at which more changes nothing.
+const CLOSURES: [f32; 2] = [2.5, 6.0];
+
+/// Steadiness, 0 to 1, that is firm enough.
+const STEADY_ENOUGH: f32 = 0.5;
+
+/// Value of closure and steadiness once they are firm enough: what a viewer notices counts for more from there.
+const FIRM: f32 = 0.85;
 
 /// Displacements in metres under a push as large as the object's weight at which steadiness scores 1 and 0; logarithmic
 /// in between.
@@ -88,6 +104,14 @@ pub fn posture_values(
     values[Term::EnoughDigits as usize] = enough_digits(object, contacts);
     values[Term::Pads as usize] = pads(rig, pose, contacts);
     values[Term::NaturalType as usize] = natural_type(classification);
+    sum(values, choice_values(object, pose.frame_from_wrist, contacts))
+}
+
+/// The sum of the values of different terms.
+pub fn sum(mut values: Values, others: Values) -> Values {
+    for (value, other) in values.iter_mut().zip(others) {
+        *value += other;
+    }
     values
 }
 
@@ -104,8 +128,11 @@ pub fn grip_values(
     solids: &HandSolids,
 ) -> Values {
     let mut values = posture_values(scene.object, rig, pose, contacts, classification);
-    values[Term::Closure as usize] = (relative_closure / SAFE_CLOSURE).min(1.0);
-    values[Term::Steadiness as usize] = steadiness(scene.object, rig, pose, contacts);
+    values[Term::Closure as usize] = firm(relative_closure, CLOSURES);
+    values[Term::Steadiness as usize] = firm(
+        steadiness(scene.object, rig, pose, contacts),
+        [STEADY_ENOUGH, 1.0],
+    );
     values[Term::SterileDistance as usize] = sterile_distance(scene.object, solids);
     values
 }
@@ -164,11 +191,12 @@ pub fn score(
     rig: &Rig,
     presented: &Presented,
 ) -> Score {
-    let mut values = grip_values;
-    let force_values = force_values(scene, &grasp.contacts, &grasp.forces);
-    for (value, force_value) in values.iter_mut().zip(force_values) {
-        *value += force_value;
-    }
+    let of_presentation = sum(
+        force_values(scene, &grasp.contacts, &grasp.forces),
+        upright_values(scene.object, grasp.pose.frame_from_wrist, presented.up),
+    );
+    let mut values = sum(grip_values, of_presentation);
+    values[Term::Stance as usize] = presented.receiver.suits(grasp.pose.frame_from_wrist);
     let clearance = grasp.margins.and_then(|margins| margins.giver_clearance);
     values[Term::GiverClearance as usize] =
         clearance.map_or(1.0, |distance| (distance / AMPLE_GIVER_CLEARANCE).min(1.0));
@@ -189,7 +217,12 @@ fn shared_flexion(pose: &HandPose) -> f32 {
     (1.0 - worst / MAX_FLEXION_DIFFERENCE).max(0.0)
 }
 
-/// Share of the fingers that a person would use for this weight.
+/// [`FIRM`] once a measure reaches what is enough, and 1 once more changes nothing.
+fn firm(measure: f32, [enough, ample]: [f32; 2]) -> f32 {
+    FIRM * (measure / enough).min(1.0) + (1.0 - FIRM) * (measure / ample).min(1.0)
+}
+
+/// Share of the hand that a person would use for this load: its weight, and its lever about the contacts.
 fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
     let mut touching = [false; 5];
     let mut palm = false;
@@ -199,11 +232,14 @@ fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
             HandPart::Palm => palm = true,
         }
     }
+    let middle: Vec3 = contacts.iter().map(|contact| contact.position).sum();
+    let lever = (middle / contacts.len().max(1) as f32).distance(object.centre_of_mass);
     // The palm counts as two fingers.
     let fingers =
         touching[1..].iter().filter(|touches| **touches).count() as f32 + if palm { 2.0 } else { 0.0 };
-    let wanted = 1.0 + object.mass * GRAVITY / WEIGHT_PER_FINGER;
-    (fingers / wanted.clamp(MIN_FINGERS, 4.0)).min(1.0)
+    let wanted = 1.0 + object.mass * GRAVITY * (1.0 + lever / LEVER) / WEIGHT_PER_FINGER;
+    let most = 4.0 + 2.0 * ramp(object.mass, PALM_MASSES);
+    (fingers / wanted.clamp(MIN_FINGERS, most)).min(1.0)
 }
 
 /// 1 if the object hardly moves under a push as large as its weight, 0 if it is loose.

@@ -300,7 +300,7 @@ impl Attempt {
             let proposal = seeds
                 .propose(entries, &place, stream)
                 .map(|proposal| scene.shaped(proposal))
-                .filter(|proposal| scene.constraints().admits_wrist(proposal.object_from_wrist));
+                .filter(|proposal| scene.admits_wrist(proposal.object_from_wrist));
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
             let physical = &mut self.physical;
@@ -352,7 +352,7 @@ fn place_by_ladder(
 
 /// The wrist, if it meets the request's constraints.
 fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure> {
-    if scene.constraints().admits_wrist(wrist.object_from_wrist) {
+    if scene.admits_wrist(wrist.object_from_wrist) {
         Ok(*wrist)
     } else {
         Err(Rejection::UnmetConstraint.into())

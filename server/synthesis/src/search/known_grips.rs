@@ -1,12 +1,17 @@
 //! Known grips as candidates of a race: those of the atlas, then recent ones.
+//!
+//! Where a receiver is expected to stand, a search for the first valid grasp takes those whose forearms come from there first:
+//! of the shortlist, then of the whole atlas. Only if none is valid, it takes another.
 
 use std::{
     ops::Deref,
     sync::{
         Arc, LazyLock, OnceLock,
-        atomic::{AtomicUsize, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
     },
 };
+
+use glam::Vec3;
 
 use super::{report::GraspSource, scene::Scene, settings::SearchSettings};
 use crate::{
@@ -17,7 +22,12 @@ use crate::{
         recheck::GripChecker,
     },
     model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
-    physical::{barriers::Barriers, grip::Gripper, solids::TrackedSolids},
+    physical::{
+        barriers::Barriers,
+        grip::Gripper,
+        receiver::{Receiver, SUITABLE},
+        solids::TrackedSolids,
+    },
     rating::scoring::comfort_value,
 };
 
@@ -34,8 +44,15 @@ pub(super) struct KnownGrips<'a> {
     /// The atlas' shortlist for givers. These are screened one by one, because excluding grips of the whole
     /// atlas at once takes as long.
     shortlist: Shortlist<'a>,
+    /// Its places in the order in which they are tried.
+    listed: Vec<u16>,
     /// All grips of the atlas.
     order: &'a [u16],
+    /// Where the receiver stands, if the order follows that. All grips are then passed twice: those whose forearms suit it, then
+    /// the others.
+    receiver: Option<&'a Receiver>,
+    /// True once a grip is valid whose forearm does not suit where the receiver stands.
+    has_fallback: AtomicBool,
     /// Recent grips. Mostly they are worse than those of the atlas, which are a selection.
     recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
@@ -45,7 +62,7 @@ pub(super) struct KnownGrips<'a> {
     mechanisms: Mechanisms,
     /// Grips that certainly collide with the giver, computed on first use.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place to try, counted through shortlist, `order` and `recent`.
+    /// The next place to try, counted through `listed`, `order` once or twice, and `recent`.
     cursor: AtomicUsize,
 }
 
@@ -99,6 +116,8 @@ pub(super) enum TryResult {
         grasp: Box<Grasp>,
         /// Its quality; higher is better.
         value: f32,
+        /// Whether its forearm suits where the receiver stands, if that is asked.
+        suits: bool,
     },
 }
 
@@ -119,11 +138,12 @@ impl<'a> KnownGrips<'a> {
             return None;
         }
         let barriers = presented.barriers();
+        let is_first_valid = settings.query.choice == Choice::FirstValid;
+        let receiver = Some(&presented.receiver).filter(|receiver| is_first_valid && receiver.is_expected());
         // The shortlist serves searches with barriers that any valid grasp ends; it is no better than the rest.
-        let shortlist = match (atlas, settings.query.choice) {
-            (Some(atlas), Choice::FirstValid)
-                if !barriers.is_empty() && mechanisms.has(Mechanism::Shortlists) =>
-            {
+        let is_listed = is_first_valid && (!barriers.is_empty() || receiver.is_some());
+        let shortlist = match atlas {
+            Some(atlas) if is_listed && mechanisms.has(Mechanism::Shortlists) => {
                 atlas.shortlist(presented.up)
             }
             _ => Shortlist::default(),
@@ -138,7 +158,10 @@ impl<'a> KnownGrips<'a> {
         };
         Some(Self {
             atlas,
+            listed: shortlist.by_value(|forearm| presented.receiver.suits_forearm(forearm)),
             shortlist,
+            receiver,
+            has_fallback: AtomicBool::new(false),
             order: atlas.map_or(&[], order),
             recent,
             scene,
@@ -164,7 +187,8 @@ impl<'a> KnownGrips<'a> {
     /// Advances to the next grip that does not certainly collide with a barrier, past at most
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
-        let end = self.shortlist.len() + self.order.len() + self.recent.len();
+        let passes = 1 + usize::from(self.receiver.is_some());
+        let end = self.listed.len() + passes * self.order.len() + self.recent.len();
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
@@ -190,7 +214,8 @@ impl<'a> KnownGrips<'a> {
 
     /// The grip at a place, unless it certainly collides with a barrier.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
-        let Some(place) = place.checked_sub(self.shortlist.len()) else {
+        let Some(place) = place.checked_sub(self.listed.len()) else {
+            let place = usize::from(self.listed[place]);
             let (index, solids) = if self.mechanisms.has(Mechanism::InnerSpheres) {
                 self.shortlist.screen(place, self.barriers)?
             } else {
@@ -198,10 +223,27 @@ impl<'a> KnownGrips<'a> {
             };
             return self.of_atlas(index, Solids::Stored(solids));
         };
-        let Some(&index) = self.order.get(place) else {
-            return Some(self.recent_at(place - self.order.len()));
+        // With a grip to fall back on, only suitable ones are worth trying.
+        let passes_twice = self.receiver.is_some();
+        if place >= self.order.len() && passes_twice && self.has_fallback.load(Ordering::Relaxed) {
+            return None;
+        }
+        let (index, is_second) = match self.order.get(place) {
+            Some(&index) => (index, false),
+            None if passes_twice && place < 2 * self.order.len() => {
+                (self.order[place - self.order.len()], true)
+            }
+            None => {
+                let passed = self.order.len() * (1 + usize::from(passes_twice));
+                return Some(self.recent_at(place - passed));
+            }
         };
         let atlas = self.atlas?;
+        if let Some(receiver) = self.receiver
+            && suits(receiver, atlas.grips().forearms()[usize::from(index)]) == is_second
+        {
+            return None;
+        }
         if let Some(giver) = self.barriers.giver
             && self.mechanisms.has(Mechanism::CellOccupancy)
         {
@@ -252,11 +294,20 @@ impl<'a> KnownGrips<'a> {
             Next::Candidate(candidate) => candidate,
         };
         match self.recheck(entry, &solids, gripper) {
-            Some(grasp) => TryResult::Valid {
-                source,
-                value: grasp_value(&grasp),
-                grasp,
-            },
+            Some(grasp) => {
+                let suits = self
+                    .receiver
+                    .is_none_or(|receiver| suits(receiver, entry.forearm()));
+                if !suits {
+                    self.has_fallback.store(true, Ordering::Relaxed);
+                }
+                TryResult::Valid {
+                    source,
+                    value: grasp_value(&grasp),
+                    grasp,
+                    suits,
+                }
+            }
             None => TryResult::Rejected,
         }
     }
@@ -269,6 +320,11 @@ impl<'a> KnownGrips<'a> {
         let grasp = self.checker.check(entry, solids, gripper)?;
         constraints.admits(&grasp).then(|| Box::new(grasp))
     }
+}
+
+/// True if a forearm suits where the receiver stands.
+fn suits(receiver: &Receiver, forearm: Vec3) -> bool {
+    receiver.suits_forearm(forearm) >= SUITABLE
 }
 
 /// The quality of a grasp: its score, or its comfort if it has none; for two hands, their mean.

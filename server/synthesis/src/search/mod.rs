@@ -7,6 +7,7 @@ pub mod key_frames;
 mod known_grips;
 pub mod limits;
 pub mod physical_attempt;
+mod preference;
 mod race;
 mod report;
 pub mod scene;
@@ -51,13 +52,22 @@ pub struct SearchOutcome {
     pub end: SearchEnd,
     /// The grasp, if one was found.
     pub grasp: Option<Grasp>,
-    /// Its quality, if the best grasp is wanted; higher is better.
+    /// Its quality; higher is better.
     pub value: f32,
-    /// If the grasp has no clear type: the last attempt that replaces it if its grasp has one. It may lie beyond the
-    /// search's attempts.
-    pub replaceable_until: Option<u64>,
+    /// If a person would rather choose another grasp: until when such a one replaces it. That may be after the search's last
+    /// attempt or its deadline.
+    pub replaceable_until: Option<Replaceable>,
     /// What the search did.
     pub report: SearchReport,
+}
+
+/// Until when a valid grasp that a person would not choose may be replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Replaceable {
+    /// By attempts up to this one, if the search is reproducible.
+    UntilAttempt(u64),
+    /// Until this time on the search's clock.
+    UntilTime(Duration),
 }
 
 /// The outcome of a look-up of known grips.

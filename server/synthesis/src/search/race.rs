@@ -10,7 +10,7 @@ use std::{
 };
 
 use super::{
-    SearchEnd, SearchOutcome,
+    Replaceable, SearchEnd, SearchOutcome,
     attempt::{Attempt, AttemptEnd},
     known_grips::{KnownGrips, TryResult, grasp_value},
     report::{GraspSource, SearchReport},
@@ -31,9 +31,9 @@ use crate::{
 /// and nine in ten requests have their answer by then.
 const HEAD_START: Duration = Duration::from_micros(300);
 
-/// Attempts after a valid one without a clear type of which one with a clear type is preferred, in addition to as many as
-/// the valid one took. On a new object, one in ten is such; more delay the answers that stay unclear, by 0.1 ms each.
-const CLEAR_TYPE_ATTEMPTS: u64 = 32;
+/// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose
+/// it. They take a few milliseconds, as long as other searches go on ([`super::settings::Query::improvement`]).
+const IMPROVING_ATTEMPTS: u64 = 16;
 
 /// Marks a worker that is not running an attempt.
 const IDLE: u64 = u64::MAX;
@@ -48,9 +48,11 @@ pub(super) struct Race<'a> {
     end: u64,
     /// The next attempt to start. Indices are taken in order, so all below it are taken.
     next: AtomicU64,
-    /// Attempts above this index need not run: the lowest valid one so far, if the search is reproducible, or the last that
-    /// may replace it.
+    /// If the search is reproducible, attempts above this index need not run: the lowest valid one so far that a person would
+    /// choose, or the last that may replace another one.
     bound: AtomicU64,
+    /// When a search that is not reproducible ends, in nanoseconds of its clock, with a grasp that a person would not choose.
+    settles: AtomicU64,
     /// Set to stop all workers: any grasp will do and one was found, or a worker panicked.
     over: AtomicBool,
     /// The lowest attempt that was started but interrupted.
@@ -72,13 +74,23 @@ struct Winner {
     value: f32,
 }
 
-/// The preferred valid grasps so far.
+/// The valid grasps so far.
 #[derive(Default)]
 struct Winners {
-    /// The preferred one.
-    clear: Option<Winner>,
-    /// The preferred one of those without a clear type, if clear types are preferred.
-    unclear: Option<Winner>,
+    /// The best, the first, or the one with the lowest index that a person would choose.
+    chosen: Option<Winner>,
+    /// Those that a person would not choose.
+    others: Vec<Winner>,
+}
+
+impl Winner {
+    /// The index of the attempt that found it; none for known grips.
+    fn index(&self) -> Option<u64> {
+        match self.source {
+            GraspSource::Attempt(index) => Some(index),
+            GraspSource::Atlas(_) | GraspSource::Recent => None,
+        }
+    }
 }
 
 /// Stops the other workers if its own worker panics.
@@ -111,6 +123,7 @@ impl<'a> Race<'a> {
                 .saturating_add(settings.run.max_attempts),
             next: AtomicU64::new(settings.run.first_attempt),
             bound: AtomicU64::new(u64::MAX),
+            settles: AtomicU64::new(u64::MAX),
             over: AtomicBool::new(false),
             lowest_interrupted: AtomicU64::new(u64::MAX),
             running: (0..settings.run.workers).map(|_| AtomicU64::new(IDLE)).collect(),
@@ -140,8 +153,9 @@ impl<'a> Race<'a> {
                     break;
                 }
                 AttemptEnd::Valid(grasp) => {
-                    let value = self.value_of(&grasp);
-                    self.record_valid(GraspSource::Attempt(index), grasp, value);
+                    let is_chosen = !self.has_preferences() || self.scene.preference().is_met_by(&grasp);
+                    let value = grasp_value(&grasp);
+                    self.record_valid(GraspSource::Attempt(index), grasp, value, is_chosen);
                     None
                 }
                 AttemptEnd::Rejected {
@@ -194,11 +208,14 @@ impl<'a> Race<'a> {
         self.over.load(Ordering::Relaxed)
             || self.bound.load(Ordering::Relaxed) < index
             || self.stop.load(Ordering::Relaxed)
-            || self
-                .settings
-                .run
-                .deadline
-                .is_some_and(|deadline| self.clock.now() >= deadline)
+            || self.end_time().is_some_and(|end| self.clock.now() >= end)
+    }
+
+    /// When the search ends by its clock.
+    fn end_time(&self) -> Option<Duration> {
+        let settled = self.settles.load(Ordering::Relaxed);
+        let settled = (settled != u64::MAX).then(|| Duration::from_nanos(settled));
+        [self.settings.run.deadline, settled].into_iter().flatten().min()
     }
 
     /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is
@@ -225,15 +242,32 @@ impl<'a> Race<'a> {
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) && until.is_none_or(|until| self.clock.now() < until) {
             match known.try_next(&mut gripper) {
-                TryResult::Exhausted => return false,
+                TryResult::Exhausted => break,
                 TryResult::Rejected => {}
-                TryResult::Valid { source, grasp, value } => {
-                    self.record_valid(source, grasp, value);
-                    return true;
+                TryResult::Valid {
+                    source,
+                    grasp,
+                    value,
+                    suits,
+                } => {
+                    self.record_valid(source, grasp, value, suits);
+                    if suits {
+                        return true;
+                    }
                 }
             }
         }
-        false
+        self.falls_back()
+    }
+
+    /// True if a known grip is valid. Searches do not go on for a better one: the atlas has the best that they would find.
+    fn falls_back(&self) -> bool {
+        let winners = self.winners.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_found = winners.others.iter().any(|winner| winner.index().is_none());
+        if is_found {
+            self.over.store(true, Ordering::Relaxed);
+        }
+        is_found
     }
 
     /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the
@@ -246,36 +280,50 @@ impl<'a> Race<'a> {
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) {
             match known.try_next(&mut gripper) {
-                TryResult::Exhausted => return,
+                TryResult::Exhausted => break,
                 TryResult::Rejected => {}
-                TryResult::Valid { source, grasp, value } => {
-                    self.record_valid(source, grasp, value);
-                }
+                TryResult::Valid {
+                    source,
+                    grasp,
+                    value,
+                    suits,
+                } => self.record_valid(source, grasp, value, suits),
             }
         }
+        self.falls_back();
     }
 
-    /// Records a valid grasp. It ends the race, unless the best one, the one with the lowest index or one with a clear type
-    /// is wanted.
-    fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32) {
+    /// Records a valid grasp. It ends the race, unless the best one, the one with the lowest index or one that a person would
+    /// choose is wanted.
+    fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32, is_chosen: bool) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let is_reproducible = self.settings.run.reproducible;
-        let is_clear = !self.prefers_clear_types() || grasp.classification.is_clear();
+        let winner = Winner { source, grasp, value };
         let mut winners = self.winners.lock().unwrap_or_else(PoisonError::into_inner);
-        let Winners { clear, unclear } = &mut *winners;
-        let rival = match (source, is_clear) {
-            (GraspSource::Attempt(_), false) => unclear,
-            _ => clear,
-        };
+        let rival = &mut winners.chosen;
         let is_preferred = match (self.settings.query.choice, source) {
             (Choice::BestWithinBudget, _) => rival.as_ref().is_none_or(|best| value > best.value),
-            (Choice::FirstValid, GraspSource::Attempt(index)) if is_reproducible || !is_clear => {
-                let last = if is_clear { index } else { last_replacing(index) };
-                self.bound.fetch_min(last, Ordering::SeqCst);
+            (Choice::FirstValid, _) if !is_chosen => {
+                match source {
+                    GraspSource::Attempt(index) if is_reproducible => {
+                        self.bound.fetch_min(last_replacing(index), Ordering::SeqCst);
+                    }
+                    GraspSource::Attempt(_) => {
+                        let settles = self.clock.now().saturating_add(self.settings.query.improvement);
+                        let nanos = u64::try_from(settles.as_nanos()).unwrap_or(u64::MAX - 1);
+                        self.settles.fetch_min(nanos, Ordering::SeqCst);
+                    }
+                    GraspSource::Atlas(_) | GraspSource::Recent => {}
+                }
+                winners.others.push(winner);
+                return;
+            }
+            (Choice::FirstValid, GraspSource::Attempt(index)) if is_reproducible => {
+                self.bound.fetch_min(index, Ordering::SeqCst);
                 // A known grip precedes every attempt.
-                rival.as_ref().is_none_or(
-                    |lowest| matches!(lowest.source, GraspSource::Attempt(lowest) if index < lowest),
-                )
+                rival
+                    .as_ref()
+                    .is_none_or(|lowest| lowest.index().is_some_and(|lowest| index < lowest))
             }
             (Choice::FirstValid, _) => {
                 self.over.store(true, Ordering::Relaxed);
@@ -283,22 +331,14 @@ impl<'a> Race<'a> {
             }
         };
         if is_preferred {
-            *rival = Some(Winner { source, grasp, value });
+            *rival = Some(winner);
         }
     }
 
-    /// True if an attempt with a clear type is preferred to one just before it without. Known grips nearly all have one.
-    fn prefers_clear_types(&self) -> bool {
+    /// True if a grasp that a person would choose is preferred to one just before it.
+    fn has_preferences(&self) -> bool {
         let query = &self.settings.query;
         query.choice == Choice::FirstValid && query.uses_known_grips()
-    }
-
-    /// The quality of a fresh grasp; 0 unless the best one is wanted.
-    fn value_of(&self, grasp: &Grasp) -> f32 {
-        if self.settings.query.choice == Choice::FirstValid {
-            return 0.0;
-        }
-        grasp_value(grasp)
     }
 
     /// The highest index such that all attempts up to it have ended and none below it has been beaten by a
@@ -320,22 +360,26 @@ impl<'a> Race<'a> {
     /// The outcome, after all workers have stopped.
     pub(super) fn outcome(self) -> SearchOutcome {
         let interrupted = self.lowest_interrupted.into_inner();
-        let Winners { clear, unclear } = self.winners.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let index_of = |winner: &Winner| match winner.source {
-            GraspSource::Attempt(index) => Some(index),
-            GraspSource::Atlas(_) | GraspSource::Recent => None,
-        };
-        let last = unclear.as_ref().and_then(index_of).map(last_replacing);
-        // Without `reproducible`, attempts beyond the last may have run.
-        let replaces = |clear: &Winner| index_of(clear) <= last || !self.settings.run.reproducible;
-        let (winner, replaceable_until) = match clear {
-            Some(clear) if last.is_none() || replaces(&clear) => (Some(clear), None),
-            _ => (unclear, last),
+        let is_reproducible = self.settings.run.reproducible;
+        let winners = self.winners.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let (winner, replaceable_until) = winners.decided(is_reproducible);
+        let replaceable_until = match replaceable_until {
+            Some(last) if is_reproducible => Some(Replaceable::UntilAttempt(last)),
+            Some(_) => Some(Replaceable::UntilTime(Duration::from_nanos(
+                self.settles.into_inner(),
+            ))),
+            None => None,
         };
         // Reproducible: an interrupted attempt with a lower index, or one that replaces the winner, might have won.
-        let winner = winner.filter(|winner| {
-            let decided = replaceable_until.or(index_of(winner));
-            !self.settings.run.reproducible || decided.is_none_or(|index| index < interrupted)
+        let last_deciding = match replaceable_until {
+            Some(Replaceable::UntilAttempt(last)) => Some(last),
+            _ => winner.as_ref().and_then(Winner::index),
+        };
+        let winner =
+            winner.filter(|_| !is_reproducible || last_deciding.is_none_or(|index| index < interrupted));
+        let winner = winner.map(|mut winner| {
+            self.scene.pose_arm(&mut winner.grasp);
+            winner
         });
         let source = winner.as_ref().map(|winner| winner.source);
         let winning_index = match source {
@@ -355,7 +399,7 @@ impl<'a> Race<'a> {
             attempt: winning_index,
             source,
             // How many others were found by then depends on the number of workers.
-            candidates: if self.settings.run.reproducible {
+            candidates: if is_reproducible {
                 u64::from(source.is_some())
             } else {
                 self.candidates.into_inner()
@@ -363,9 +407,7 @@ impl<'a> Race<'a> {
             known_grips: self.known.map_or(0, KnownGrips::atlas_len),
             ..SearchReport::default()
         };
-        let last_counted = replaceable_until
-            .or(winning_index)
-            .filter(|_| winner.is_some() && self.settings.run.reproducible);
+        let last_counted = last_deciding.filter(|_| winner.is_some() && is_reproducible);
         for tally in self.tallies.into_inner().unwrap_or_else(PoisonError::into_inner) {
             tally.add_to(&mut report, last_counted);
         }
@@ -382,7 +424,27 @@ impl<'a> Race<'a> {
     }
 }
 
-/// The last attempt whose grasp, if it has a clear type, replaces that of a valid attempt without one.
+impl Winners {
+    /// The winner and, if a person would not choose it, the last attempt of a reproducible search that may replace it, or any
+    /// number.
+    fn decided(self, is_reproducible: bool) -> (Option<Winner>, Option<u64>) {
+        let Self { chosen, others } = self;
+        let last = others.iter().filter_map(Winner::index).min().map(last_replacing);
+        // Beyond the last, attempts may have run that need not have.
+        let counts = |winner: &Winner| !is_reproducible || winner.index() <= last;
+        if let Some(chosen) = chosen
+            && (last.is_none() || counts(&chosen))
+        {
+            return (Some(chosen), None);
+        }
+        let better = |a: &Winner, b: &Winner| a.value.total_cmp(&b.value).then(b.index().cmp(&a.index()));
+        let best = others.into_iter().filter(counts).max_by(better);
+        let last = last.filter(|_| best.as_ref().is_some_and(|best| best.index().is_some()));
+        (best, last)
+    }
+}
+
+/// The last attempt whose grasp, if a person would choose it, replaces that of a valid attempt which they would not.
 fn last_replacing(attempt: u64) -> u64 {
-    attempt.saturating_mul(2).saturating_add(CLEAR_TYPE_ATTEMPTS)
+    attempt.saturating_add(IMPROVING_ATTEMPTS)
 }

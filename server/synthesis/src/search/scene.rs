@@ -2,10 +2,13 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{settings::SearchSettings, turns::Turn};
+use super::{preference::Preference, settings::SearchSettings, turns::Turn};
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    base::random::AttemptStream,
+    base::{
+        mechanisms::{Mechanism, Mechanisms},
+        pose::Pose,
+        random::AttemptStream,
+    },
     known::{
         entry::Entry,
         seed_source::{SeedContext, SeedSets, SeedSource},
@@ -14,6 +17,7 @@ use crate::{
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
+        grasp::Grasp,
         hand::rig::Rig,
         holdout::Holdout,
         strategy::{Strategy, Validity},
@@ -25,6 +29,7 @@ use crate::{
         shape::Proposal,
     },
     propose::{
+        handles::wrap_handle,
         hooks::HangingPlaces,
         placement_cache::{PlacementCache, ROWS},
         prepared::{PreparedObject, PreparedRig},
@@ -74,6 +79,8 @@ pub struct Scene<'a> {
     mechanisms: Mechanisms,
     /// The receiver's other hand, if both are to hold the object together.
     other_hand: Option<PreparedRig>,
+    /// What a person would choose, computed on first use.
+    preference: OnceLock<Preference>,
 }
 
 impl<'a> Scene<'a> {
@@ -108,6 +115,7 @@ impl<'a> Scene<'a> {
             seeds: SeedSets::new(seeds),
             mechanisms,
             other_hand: query.other_hand.clone(),
+            preference: OnceLock::new(),
             physical: match query.validity {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
@@ -145,6 +153,13 @@ impl<'a> Scene<'a> {
         &self.constraints
     }
 
+    /// True if the constraints admit a wrist pose, and the receiver's arm reaches it if it must.
+    pub(super) fn admits_wrist(&self, object_from_wrist: Pose) -> bool {
+        let presented = self.physical.as_ref().map(|(_, presented)| presented);
+        self.constraints.admits_wrist(object_from_wrist)
+            && presented.is_none_or(|presented| presented.receiver.reaches(self.task.rig, object_from_wrist))
+    }
+
     /// The input of Algorithm 1.
     pub(super) fn thesis(&self) -> &thesis::thesis_scene::ThesisScene<'a> {
         &self.thesis
@@ -164,6 +179,24 @@ impl<'a> Scene<'a> {
     /// The receiver's other hand, if both are to hold the object together.
     pub(super) fn other_hand(&self) -> Option<&PreparedRig> {
         self.other_hand.as_ref()
+    }
+
+    /// Poses the receiver's arm of a grasp, if where the receiver stands can be assumed.
+    pub(super) fn pose_arm(&self, grasp: &mut Grasp) {
+        if let Some((object, presented)) = &self.physical
+            && grasp.arm.is_none()
+        {
+            grasp.arm = presented.arm_of(object.object, self.task.rig, grasp.pose.frame_from_wrist);
+        }
+    }
+
+    /// What a person would choose.
+    pub(super) fn preference(&self) -> &Preference {
+        self.preference.get_or_init(|| {
+            let presented = self.physical.as_ref().map(|(_, presented)| presented);
+            let barriers = presented.map_or(Barriers::NONE, Presented::barriers);
+            Preference::of(self.task.object.object(), barriers)
+        })
     }
 
     /// Where `GUIDED` search may place the receiving hand.
@@ -250,9 +283,8 @@ impl<'a> Scene<'a> {
 
     /// A wrapped handle, if the object has one with room for the hand.
     fn wrap(&self, stream: &AttemptStream) -> Option<Proposal> {
-        let handles = self.task.object.handles();
         // Leaves the numbers that other proposals draw from the stream as they are.
-        let wrapped = handles.propose(&self.place(), &mut stream.clone())?;
+        let wrapped = wrap_handle(&self.place(), &mut stream.clone())?;
         Some(self.shaped(wrapped))
     }
 

@@ -14,6 +14,9 @@ use crate::{
     propose::prepared::PreparedRig,
 };
 
+/// Default of [`Query::improvement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
+pub const IMPROVEMENT: Duration = Duration::from_millis(5);
+
 /// The settings of a search.
 #[derive(Clone, Debug, Default)]
 pub struct SearchSettings {
@@ -40,6 +43,9 @@ pub struct Query {
     pub constraints: Constraints,
     /// Which valid grasp is wanted.
     pub choice: Choice,
+    /// How much longer a search for the first valid grasp looks for one that a person would rather choose, if the first is not
+    /// such (it then has the highest score of those found). Known grips are not searched further.
+    pub improvement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,
 }
@@ -53,6 +59,7 @@ impl Default for Query {
             friction: None,
             constraints: Constraints::default(),
             choice: Choice::FirstValid,
+            improvement: IMPROVEMENT,
             other_hand: None,
         }
     }

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
     base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
-    geometry::mesh::TriangleMesh,
+    geometry::{handles::Handle, mesh::TriangleMesh},
     model::{
         hand::Handedness,
         object::{GraspObject, THESIS_FRICTION},
     },
     physical::{grip::Gripper, scene::ObjectScene, shape::Proposal},
     propose::{
-        handles::Handle,
+        handles::wrap_handle,
         proposal::{ProposalContext, propose_evenly},
     },
 };
@@ -124,8 +124,7 @@ fn hands_on_handles_hold_more_often_than_hands_anywhere() {
         ("rod", Arc::new(object_of(lying, &[]))),
         ("ring", Arc::new(object_of(torus(0.09, 0.012, 32), &[]))),
     ] {
-        let handles = prepared(&object).handles();
-        let on_handles = |hand| holding(&object, hand, |context, stream| handles.propose(context, stream));
+        let on_handles = |hand| holding(&object, hand, wrap_handle);
         let [left, right] = [Handedness::Left, Handedness::Right].map(on_handles);
         let anywhere = holding(&object, Handedness::Right, |context, stream| {
             propose_evenly(context, stream, &|| false)
@@ -142,11 +141,10 @@ fn hands_on_handles_hold_more_often_than_hands_anywhere() {
 fn the_palm_is_on_the_side_with_room() {
     // The bar of the lunch box runs along x above the lid, with room for fingers below.
     let object = Arc::new(lunch_box(0.03));
-    let handles = prepared(&object).handles();
     let context = place(&object, adult(Handedness::Right));
     let mut proposed = 0;
     for index in 0..200 {
-        let Some(proposal) = handles.propose(&context, &mut AttemptStream::new(5, index)) else {
+        let Some(proposal) = wrap_handle(&context, &mut AttemptStream::new(5, index)) else {
             continue;
         };
         let Pose { orientation, .. } = proposal.object_from_wrist;

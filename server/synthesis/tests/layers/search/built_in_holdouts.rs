@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_assets::holdouts::{Origin, holdouts};
-use grasp_synthesis::model::{hand::Handedness, holdout::Holdout, strategy::Strategy};
+use grasp_synthesis::model::{hand::Handedness, holdout::Holdout, receiver::Stance, strategy::Strategy};
 
 use crate::fixtures::{hands::built_in_hand, objects::object, searches::Search};
 
@@ -34,6 +34,7 @@ fn synthesized_givers_are_found_again_by_seed_and_attempt() {
             presenting_hand: None,
             other_hands: Vec::new(),
             obstacles: Vec::new(),
+            stance: Stance::default(),
             up,
         };
         let search = Search {

@@ -1,0 +1,238 @@
+//! Handles: slender parts with room around them, found from the mesh alone.
+//!
+//! A part is a handle where the surface around a point inside it faces all ways but two: along those it goes on for the
+//! breadth of a hand. Spheres of a finger's and of a palm's thickness find the room around it. So grips, stems, necks and
+//! bows are all found alike, whatever the rest of the object looks like.
+
+use std::f32::consts::TAU;
+
+use glam::{DVec3, Vec3};
+
+use super::{Segment, mesh_bvh::MeshBvh, principal_axes::principal_axes, surface_samples::SurfaceSampler};
+use crate::base::random::AttemptStream;
+
+/// Points of the surface below which a part is sought, and the seed by which they are drawn. Fewer miss short handles of large
+/// objects.
+const SAMPLES: u64 = 1024;
+const SEED: u64 = 0x4841_4e44;
+
+/// Depth below the surface at which a ray starts, in metres, so that it does not hit its own triangle.
+const START_DEPTH: f32 = 1e-5;
+
+/// Minimum cosine between a ray through a part and the normals at its ends: 45°.
+const MIN_COS: f32 = 0.7;
+
+/// Thickness in metres of what fingers can wrap: thinner parts are pinched, thicker ones are not enclosed.
+const THICKNESS: [f32; 2] = [0.008, 0.06];
+
+/// Largest number of points that are probed, evenly spread over the surface. Each takes about 10 µs.
+const MAX_PROBED: usize = 128;
+
+/// Rays from the middle of a part, in all directions, and their length in metres.
+const RAYS: usize = 32;
+pub(crate) const RAY_LENGTH: f32 = 0.045;
+
+/// Largest mean square of the normals' components along a part, and smallest across its narrower side: 0 and 0.5 for a rod, 0
+/// and 0 for a plate.
+const MAX_ALONG: f64 = 0.08;
+const MIN_ACROSS: f64 = 0.12;
+
+/// Distance in metres from the middle at which a part has to go on to both sides: half the breadth of three fingers.
+const HALF_LENGTH: f32 = 0.027;
+
+/// By how much a bent part may be off its axis there, in metres.
+const MAX_BEND: f32 = 0.008;
+
+/// Radii in metres of the spheres that probe the room around a part for fingers and for the palm, and their gap from it.
+const FINGER_RADIUS: f32 = 0.008;
+const PALM_RADIUS: f32 = 0.016;
+const GAP: f32 = 0.002;
+
+/// Directions around a part in which room is probed.
+pub(crate) const DIRECTIONS: usize = 12;
+
+/// Fewest directions side by side with room for a finger: fingers and thumb come round a part from both sides of the palm.
+const MIN_FREE: u32 = 10;
+
+/// Directions around a handle, as bits: turns about its axis by `TAU / DIRECTIONS`, from its first orthonormal vector.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Sides(u16);
+
+/// A place at which a handle can be wrapped, in the object's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Handle {
+    /// The middle of its section, in metres.
+    pub middle: Vec3,
+    /// Unit vector along it.
+    pub axis: Vec3,
+    /// Mean distance of its skin from the middle, in metres.
+    pub radius: f32,
+    /// Where the palm has room.
+    pub(crate) for_palm: Sides,
+}
+
+/// The places at which an object's handles can be wrapped.
+#[derive(Clone, Debug, Default)]
+pub struct Handles(Vec<Handle>);
+
+impl Handles {
+    /// Probes the parts of a surface that are as thick as a handle, without the triangles for which `is_forbidden` returns
+    /// true; takes about a millisecond.
+    pub fn of(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Self {
+        let middles = middles(surface, is_forbidden);
+        let stride = middles.len().div_ceil(MAX_PROBED).max(1);
+        let probed = middles
+            .into_iter()
+            .step_by(stride)
+            .filter_map(|middle| Handle::probe(surface, middle));
+        Self(probed.collect())
+    }
+
+    /// The places, in the order of the surface's triangles.
+    pub fn places(&self) -> &[Handle] {
+        &self.0
+    }
+
+    /// True if a point of the surface is on a handle.
+    pub fn contain(&self, point: Vec3) -> bool {
+        self.0.iter().any(|handle| handle.contains(point))
+    }
+
+    /// Memory use in bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
+}
+
+impl Handle {
+    /// The handle around a point inside an object, if there is one.
+    fn probe(surface: &MeshBvh, inside: Vec3) -> Option<Self> {
+        let axis = axis_of_part(surface, inside)?;
+        let goes_on = |offset: f32| {
+            let point = inside + axis * offset;
+            surface.contains(point) || surface.closest_point_within(point, MAX_BEND).is_some()
+        };
+        if !(goes_on(HALF_LENGTH) && goes_on(-HALF_LENGTH)) {
+            return None;
+        }
+        let skin = |from: Vec3, outward: Vec3| {
+            let hit = surface.first_hit(Segment::new(from, from + outward * RAY_LENGTH));
+            hit.map(|hit| hit.position)
+        };
+        let outward: [Vec3; DIRECTIONS] = std::array::from_fn(|turn| around(axis, turn as f32));
+        let mut middle = Vec3::ZERO;
+        for outward in outward {
+            middle += skin(inside, outward)? / DIRECTIONS as f32;
+        }
+        let (mut for_fingers, mut for_palm) = (Sides::default(), Sides::default());
+        for (turn, outward) in outward.into_iter().enumerate() {
+            let skin = skin(middle, outward)?;
+            let has_room = |radius: f32| {
+                let centre = skin + outward * (radius + GAP);
+                surface.closest_point_within(centre, radius).is_none() && !surface.contains(centre)
+            };
+            if has_room(FINGER_RADIUS) {
+                for_fingers.add(turn);
+            }
+            if has_room(PALM_RADIUS) {
+                for_palm.add(turn);
+            }
+        }
+        let radius = outward.iter().filter_map(|&outward| skin(middle, outward));
+        let radius = radius.map(|skin| skin.distance(middle)).sum::<f32>() / DIRECTIONS as f32;
+        let can_be_wrapped = for_fingers.longest_run() >= MIN_FREE && for_palm != Sides::default();
+        can_be_wrapped.then_some(Self {
+            middle,
+            axis,
+            radius,
+            for_palm,
+        })
+    }
+
+    /// True if a point of the surface belongs to the handle where it was probed.
+    pub fn contains(&self, point: Vec3) -> bool {
+        let offset = point - self.middle;
+        let along = offset.dot(self.axis);
+        along.abs() <= HALF_LENGTH && (offset - self.axis * along).length() <= WITHIN * self.radius + SLACK
+    }
+}
+
+/// How far a point of a handle may be from its axis: so many times its mean radius, since few are round, and by so much more,
+/// in metres.
+const WITHIN: f32 = 1.3;
+const SLACK: f32 = 0.004;
+
+/// Points inside the parts of a surface that are as thick as a handle, in the order of its triangles.
+fn middles(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Vec<Vec3> {
+    let mesh = surface.mesh();
+    let sampler = SurfaceSampler::new(mesh, |triangle| !is_forbidden(triangle));
+    let middle = |sample| {
+        let mut stream = AttemptStream::new(SEED, sample);
+        let (triangle, position) = sampler.sample(sample, SAMPLES, &mut stream)?;
+        let inward = -mesh.normal(triangle);
+        let start = position + inward * START_DEPTH;
+        let exit = surface.first_hit(Segment::new(start, start + inward * THICKNESS[1]))?;
+        let faces_away = mesh.normal(exit.triangle as usize).dot(inward) >= MIN_COS;
+        let is_thick = exit.distance >= THICKNESS[0] && !is_forbidden(exit.triangle) && faces_away;
+        is_thick.then(|| start.midpoint(exit.position))
+    };
+    (0..SAMPLES).filter_map(middle).collect()
+}
+
+impl Sides {
+    fn add(&mut self, turn: usize) {
+        self.0 |= 1 << turn;
+    }
+
+    pub(crate) fn contains(self, turn: usize) -> bool {
+        self.0 >> (turn % DIRECTIONS) & 1 == 1
+    }
+
+    /// The largest number of directions side by side.
+    fn longest_run(self) -> u32 {
+        let run = |start: usize| (start..start + DIRECTIONS).take_while(|&turn| self.contains(turn));
+        let runs = (0..DIRECTIONS).map(|start| run(start).count() as u32);
+        runs.max().unwrap_or(0)
+    }
+}
+
+/// The unit vector along the slender part around a point, as its normals show; `None` if the part is not slender.
+fn axis_of_part(surface: &MeshBvh, inside: Vec3) -> Option<Vec3> {
+    let normal = |ray: usize| {
+        let hit = surface.first_hit(Segment::new(inside, inside + direction(ray) * RAY_LENGTH))?;
+        Some(surface.mesh().normal(hit.triangle as usize).as_dvec3())
+    };
+    // With its opposite, each normal counts about the origin.
+    let normals: Vec<DVec3> = (0..RAYS)
+        .filter_map(normal)
+        .flat_map(|normal| [normal, -normal])
+        .collect();
+    if normals.len() < RAYS / 2 {
+        return None;
+    }
+    let axes = principal_axes(&normals);
+    let mut squares = [0, 1, 2].map(|axis| {
+        let axis = axes.col(axis);
+        let sum: f64 = normals.iter().map(|normal| normal.dot(axis).powi(2)).sum();
+        (sum / normals.len() as f64, axis)
+    });
+    squares.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let [(along, axis), (across, _), _] = squares;
+    (along <= MAX_ALONG && across >= MIN_ACROSS).then(|| axis.as_vec3().normalize_or(Vec3::Y))
+}
+
+/// A unit vector at right angles to an axis, after so many of the [`DIRECTIONS`].
+pub(crate) fn around(axis: Vec3, turn: f32) -> Vec3 {
+    let (a, b) = axis.any_orthonormal_pair();
+    let (sin, cos) = (TAU * turn / DIRECTIONS as f32).sin_cos();
+    a * cos + b * sin
+}
+
+/// One of [`RAYS`] evenly spread directions (spherical Fibonacci lattice; R. Swinbank, R. J. Purser: Fibonacci grids, 2006).
+fn direction(ray: usize) -> Vec3 {
+    const GOLDEN_ANGLE: f32 = 2.399_963_2;
+    let height = 1.0 - (2.0 * ray as f32 + 1.0) / RAYS as f32;
+    let radius = (1.0 - height * height).sqrt();
+    let (sin, cos) = (GOLDEN_ANGLE * ray as f32).sin_cos();
+    Vec3::new(radius * cos, height, radius * sin)
+}

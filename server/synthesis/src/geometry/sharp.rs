@@ -1,0 +1,158 @@
+//! Sharp edges and points of a mesh, which nobody touches if they can help it.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::{IVec3, Vec3};
+
+use super::{
+    mesh::TriangleMesh,
+    topology::{DisjointSets, EdgeUse, sorted_edges},
+};
+
+/// Cosine of the angle between the outward normals of two faces beyond which the edge between them is sharp: the faces enclose
+/// less than 30°.
+const SHARP_COS: f32 = -0.866;
+
+/// Least length in metres of connected sharp edges: shorter ones are flaws of a mesh.
+const LEAST_LENGTH: f32 = 0.01;
+
+/// Largest sum of the angles at a vertex, in radians, that makes it a point: that of a cone with half an angle of 20° at its
+/// tip.
+const POINT_ANGLES: f32 = 2.15;
+
+/// Edges at a point that are at least this long, in metres, show that it is more than a spike of the mesh.
+const POINT_DEPTH: f32 = 0.003;
+
+/// Edge of the cells into which space around sharp features is divided, in metres: a contact in a cell with one, or next to
+/// such a cell, touches it.
+const CELL: f32 = 0.002;
+
+/// Largest number of cells that are kept, against meshes that are all edges.
+const MOST_CELLS: usize = 1 << 16;
+
+/// Where a mesh is sharp.
+#[derive(Clone, Debug, Default)]
+pub struct SharpFeatures {
+    cells: HashSet<IVec3>,
+}
+
+impl SharpFeatures {
+    /// Finds the sharp edges and points of a mesh; O(n log n).
+    pub fn of(mesh: &TriangleMesh) -> Self {
+        let mut sharp = Self::default();
+        let edges = sorted_edges(mesh);
+        let sharp_edges: Vec<[u32; 2]> = edges
+            .chunk_by(|a, b| a.ends == b.ends)
+            .filter(|users| is_sharp(mesh, users))
+            .map(|users| users[0].ends)
+            .collect();
+        let at = |vertex: u32| mesh.positions()[vertex as usize];
+        // Only chains of some length cut.
+        let mut chains = DisjointSets::new(mesh.positions().len());
+        for &[a, b] in &sharp_edges {
+            chains.join(a, b);
+        }
+        let mut lengths: HashMap<u32, f32> = HashMap::new();
+        for &[a, b] in &sharp_edges {
+            *lengths.entry(chains.root(a)).or_default() += at(a).distance(at(b));
+        }
+        for &[a, b] in &sharp_edges {
+            if lengths
+                .get(&chains.root(a))
+                .is_some_and(|&length| length >= LEAST_LENGTH)
+            {
+                sharp.add(at(a), at(b));
+            }
+        }
+        for point in points(mesh, &edges) {
+            sharp.add(point, point);
+        }
+        sharp
+    }
+
+    /// True if nothing is sharp.
+    pub fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
+    /// True if a point is within about two millimetres of a sharp edge or point.
+    pub fn are_near(&self, point: Vec3) -> bool {
+        self.cells.contains(&cell_of(point))
+    }
+
+    /// Memory use in bytes.
+    pub fn bytes(&self) -> usize {
+        self.cells.capacity() * (size_of::<IVec3>() + 1)
+    }
+
+    /// Marks the cells along a line and those next to them.
+    fn add(&mut self, start: Vec3, end: Vec3) {
+        let steps = (start.distance(end) / CELL).ceil().clamp(1.0, MOST_CELLS as f32) as usize;
+        for step in 0..=steps {
+            let cell = cell_of(start.lerp(end, step as f32 / steps as f32));
+            for x in -1..=1 {
+                for y in -1..=1 {
+                    for z in -1..=1 {
+                        if self.cells.len() < MOST_CELLS {
+                            self.cells.insert(cell + IVec3::new(x, y, z));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn cell_of(point: Vec3) -> IVec3 {
+    (point / CELL).floor().as_ivec3()
+}
+
+/// True if two faces meet in an edge that sticks out and encloses a small angle.
+fn is_sharp(mesh: &TriangleMesh, users: &[EdgeUse]) -> bool {
+    let [a, b] = users else { return false };
+    let [first, second] = [a, b].map(|user| mesh.normal(user.triangle as usize));
+    if first.dot(second) > SHARP_COS {
+        return false;
+    }
+    // The far corner of the other face is below an edge that sticks out, and above one that is a groove.
+    let [start, _] = a.ends.map(|vertex| mesh.positions()[vertex as usize]);
+    let far = mesh.corners(b.triangle as usize).into_iter();
+    far.map(|corner| (corner - start).dot(first)).sum::<f32>() <= 0.0
+}
+
+/// The vertices whose faces meet in a narrow cone.
+fn points(mesh: &TriangleMesh, edges: &[EdgeUse]) -> Vec<Vec3> {
+    let mut angles: HashMap<u32, (f32, f32)> = HashMap::new();
+    for users in edges.chunk_by(|a, b| a.ends == b.ends) {
+        let [a, b] = users[0].ends;
+        let [start, end] = [a, b].map(|vertex| mesh.positions()[vertex as usize]);
+        for vertex in [a, b] {
+            let (_, longest) = angles.entry(vertex).or_default();
+            *longest = longest.max(start.distance(end));
+        }
+    }
+    for user in edges {
+        // Each triangle adds its angle to both ends of each of its three edges, so twice.
+        let [a, b, c] = mesh.corners(user.triangle as usize);
+        for vertex in user.ends {
+            let position = mesh.positions()[vertex as usize];
+            let others: Vec<Vec3> = [a, b, c]
+                .into_iter()
+                .filter(|&corner| corner != position)
+                .collect();
+            if let ([first, second], Some(entry)) = (&others[..], angles.get_mut(&vertex)) {
+                entry.0 += 0.5 * (*first - position).angle_between(*second - position);
+            }
+        }
+    }
+    let mut found: Vec<u32> = angles
+        .iter()
+        .filter(|(_, (angle, longest))| *angle > 0.0 && *angle <= POINT_ANGLES && *longest >= POINT_DEPTH)
+        .map(|(&vertex, _)| vertex)
+        .collect();
+    found.sort_unstable();
+    found
+        .into_iter()
+        .map(|vertex| mesh.positions()[vertex as usize])
+        .collect()
+}

@@ -1,0 +1,129 @@
+//! A receiver's arm of two bones: whether it reaches a wrist pose, and where its elbow then is.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use super::solids::TaperedCapsule;
+use crate::{
+    base::pose::Pose,
+    model::{
+        hand::{Handedness, rig::Rig},
+        receiver::{Arm, ArmPose},
+    },
+};
+
+/// Flexion, extension, and deviation toward thumb and little finger of a wrist, in radians (American Academy of Orthopaedic
+/// Surgeons: 80°, 70°, 20° and 30°).
+const FLEXION: f32 = 80.0 / 180.0 * PI;
+const EXTENSION: f32 = 70.0 / 180.0 * PI;
+const TOWARD_THUMB: f32 = 20.0 / 180.0 * PI;
+const TOWARD_LITTLE: f32 = 30.0 / 180.0 * PI;
+
+/// Cosine of the smallest angle between the bones: an elbow flexes by 145°.
+const FLEXED_COS: f32 = 0.819;
+
+/// Swivel angles of the elbow about the line from shoulder to wrist that are tried, and the largest, in radians. 0 is the
+/// hanging elbow, a right angle an elbow as high as the shoulder if that is level with the wrist.
+const SWIVELS: usize = 15;
+const LARGEST_SWIVEL: f32 = 1.75;
+
+/// How far above the shoulder the elbow may be, as the sine of the upper arm's rise: raising it further takes effort that
+/// nobody spends on taking something.
+const MAX_RISE: f32 = 0.4;
+
+/// Weight of a swivel of one radian against a wrist at the end of its range: people let the elbow hang, and turn it out before
+/// the wrist is strained.
+const SWIVEL_WEIGHT: f32 = 0.35;
+
+/// Radii of an arm at wrist, elbow and shoulder, in metres (ANSUR II: circumferences of 0.17, 0.28 and 0.34 m).
+const RADII: [f32; 3] = [0.027, 0.044, 0.052];
+
+/// An elbow's position and how uncomfortable it is, from 0.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Elbow {
+    pub(super) pose: ArmPose,
+    pub(super) strain: f32,
+}
+
+/// The elbows with which an arm reaches a wrist, in no order. `up` is a unit vector; all are in one frame.
+pub(super) fn elbows(
+    arm: Arm,
+    (rig, wrist): (&Rig, Pose),
+    up: Vec3,
+    is_assumed: bool,
+) -> impl Iterator<Item = Elbow> {
+    let Arm {
+        shoulder,
+        upper_arm,
+        forearm,
+    } = arm;
+    let reach = wrist.position - shoulder;
+    let distance = reach.length();
+    let toward = reach / distance.max(f32::MIN_POSITIVE);
+    // The law of cosines, for the elbow's place along the line from the shoulder to the wrist and its distance from it.
+    let along = (upper_arm * upper_arm - forearm * forearm + distance * distance) / (2.0 * distance);
+    let square = upper_arm * upper_arm - along * along;
+    let flexed = upper_arm * upper_arm + forearm * forearm - 2.0 * upper_arm * forearm * FLEXED_COS;
+    let is_in_reach = square >= 0.0 && distance * distance >= flexed;
+    let hanging = (-up).reject_from(toward);
+    let hanging = hanging.normalize_or(toward.any_orthonormal_vector());
+    let out = toward.cross(hanging);
+    let radius = square.max(0.0).sqrt();
+    let count = if is_in_reach { SWIVELS } else { 0 };
+    (0..count).filter_map(move |index| {
+        let swivel = (index as f32 / (SWIVELS - 1) as f32 * 2.0 - 1.0) * LARGEST_SWIVEL;
+        let (sin, cos) = swivel.sin_cos();
+        let elbow = shoulder + toward * along + (hanging * cos + out * sin) * radius;
+        let (flexion, deviation) = wrist_angles(rig.handedness, wrist, elbow);
+        let bent = [
+            flexion / if flexion > 0.0 { FLEXION } else { EXTENSION },
+            deviation
+                / if deviation > 0.0 {
+                    TOWARD_LITTLE
+                } else {
+                    TOWARD_THUMB
+                },
+        ];
+        let is_raised = (elbow - shoulder).dot(up) > MAX_RISE * upper_arm;
+        if is_raised || bent.iter().any(|share| share.abs() > 1.0) {
+            return None;
+        }
+        let strain = bent[0].powi(2) + bent[1].powi(2) + SWIVEL_WEIGHT * swivel * swivel;
+        Some(Elbow {
+            pose: ArmPose {
+                shoulder,
+                elbow,
+                flexion,
+                deviation,
+                is_assumed,
+            },
+            strain,
+        })
+    })
+}
+
+/// Flexion of a wrist toward the palm and its deviation toward the little finger, in radians, with the elbow at a point.
+fn wrist_angles(handedness: Handedness, wrist: Pose, elbow: Vec3) -> (f32, f32) {
+    let back = wrist.inverse().transform_vector(elbow - wrist.position);
+    let little = match handedness {
+        Handedness::Right => -back.x,
+        Handedness::Left => back.x,
+    };
+    let flexion = f32::atan2(back.z, -back.y);
+    let deviation = f32::atan2(little, back.y.hypot(back.z));
+    (flexion, deviation)
+}
+
+/// Forearm and upper arm as solids, in the arm's frame. The forearm starts some way behind the wrist, where the hand's own
+/// solids end.
+pub(super) fn solids_of(arm: &ArmPose, wrist: Vec3) -> [TaperedCapsule; 2] {
+    const START: f32 = 0.15;
+    let [at_wrist, at_elbow, at_shoulder] = RADII;
+    let start = wrist.lerp(arm.elbow, START);
+    let start_radius = at_wrist + START * (at_elbow - at_wrist);
+    [
+        TaperedCapsule::new(start, arm.elbow, start_radius, at_elbow),
+        TaperedCapsule::new(arm.elbow, arm.shoulder, at_elbow, at_shoulder),
+    ]
+}

@@ -1,0 +1,251 @@
+//! Where the receiver stands, and whether a hand suits that.
+//!
+//! Of the receiver's body, a client may give the shoulder; then the arm must reach the wrist. Otherwise people hand things over
+//! face to face: the giver's forearm shows where the giver's body is, and the receiver stands opposite or at an angle, as
+//! far away as both arms reach comfortably. Shoulders of people in a handover are 0.6 to 1.2 m apart (P. Basili et al.,
+//! "Investigating human-human approach and hand-over", 2009; C. Hansen et al., "Human-human handovers: the influence of
+//! object weight and distance", 2017).
+
+use glam::{Quat, Vec3};
+
+use super::{
+    arm::{Elbow, elbows, solids_of},
+    barriers::Barriers,
+};
+use crate::{
+    base::{pose::Pose, ramp::ramp},
+    geometry::mesh_bvh::MeshBvh,
+    model::{
+        hand::{
+            joints::{HandJoints, index, thesis_from_openxr_frame},
+            rig::Rig,
+        },
+        receiver::{Arm, ArmPose, FOREARM_LENGTH, Stance, UPPER_ARM_LENGTH},
+    },
+};
+
+/// Range of the horizontal distance of two shoulders in a handover, in metres.
+const APART: [f32; 2] = [0.6, 1.2];
+
+/// Horizontal distance of the receiver's shoulder from the object at which the elbow is bent by about a right angle, in
+/// metres, and its range, which follows from [`APART`]. Farther away, the arm is stretched.
+const COMFORTABLE: f32 = 0.42;
+const NEAREST: f32 = 0.25;
+const FARTHEST: f32 = 0.55;
+
+/// Angles between the direction opposite the giver and those in which the receiver may stand, in radians: up to 30° to either
+/// side.
+const ANGLES: [f32; 3] = [0.0, 0.524, -0.524];
+
+/// Number of directions if nothing shows where the giver stands.
+const ALL_ROUND: usize = 6;
+
+/// Shortest horizontal part of the giver's forearm, of 1, that shows where the giver stands.
+const LEAST_HORIZONTAL: f32 = 0.25;
+
+/// Lean of the giver's upper arm toward the body's back, as a tangent: an upper arm nearly hangs.
+const UPPER_ARM_LEAN: f32 = 0.35;
+
+/// Range of the shoulder's height above the object, in metres: things are handed over between waist and shoulder.
+const HEIGHTS: [f32; 2] = [0.0, 0.45];
+
+/// Distance of the wrist from what the hand holds, in metres.
+const HAND: f32 = 0.1;
+
+/// Cosines of the angle between a straight forearm and the nearest plausible one at which a hand stops to suit at all and suits
+/// best: 75° and 35°. The wrist bends by less than that without strain.
+const TOWARD: [f32; 2] = [0.26, 0.82];
+
+/// Cosines of the angle between the forearms of receiver and giver, both from the wrist, at which they are well apart and
+/// would stand in each other: 80° and 60°.
+const TOGETHER: [f32; 2] = [0.17, 0.5];
+
+/// Smallest value of [`Receiver::suits`] with which a hand passes for one of a person who stands there.
+pub const SUITABLE: f32 = 0.5;
+
+/// Most directions of plausible forearms.
+const MOST: usize = ALL_ROUND;
+
+/// Where the receiver stands, prepared for many hands. All is in the object's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    stance: Stance,
+    /// Plausible arms, and the directions of their forearms from wrist to elbow, unit vectors.
+    arms: [Arm; MOST],
+    directions: [Vec3; MOST],
+    /// How many of them count.
+    count: usize,
+    /// Direction of the giver's forearm, from wrist to elbow.
+    giver: Option<Vec3>,
+    /// Unit vector against gravity.
+    up: Vec3,
+}
+
+impl Receiver {
+    /// A receiver of whom nothing is known and from whom nothing is expected.
+    pub const ANYWHERE: Self = Self {
+        stance: Stance::Any,
+        arms: [Arm {
+            shoulder: Vec3::ZERO,
+            upper_arm: UPPER_ARM_LENGTH,
+            forearm: FOREARM_LENGTH,
+        }; MOST],
+        directions: [Vec3::ZERO; MOST],
+        count: 0,
+        giver: None,
+        up: Vec3::Y,
+    };
+
+    /// The receiver of an object whose centre of mass is `centre`, from a giver's hand, if there is one. `up` is a unit
+    /// vector.
+    pub fn new(stance: Stance, giver: Option<&HandJoints>, centre: Vec3, up: Vec3) -> Self {
+        let mut receiver = Self {
+            stance,
+            up,
+            ..Self::ANYWHERE
+        };
+        let giver_wrist = giver.map(|hand| thesis_from_openxr_frame(hand.joints[index::WRIST].pose));
+        match (stance, giver_wrist) {
+            (Stance::Any, _) | (Stance::Facing, None) => {}
+            (Stance::At(arm), _) => receiver.add(arm, centre),
+            (Stance::Facing, Some(wrist)) => {
+                receiver.face(wrist.position, wrist.transform_vector(Vec3::NEG_Y), centre);
+            }
+        }
+        receiver
+    }
+
+    /// The receiver of an object whose centre of mass is `centre` from a giver whose hand is there, too, with the forearm in
+    /// this direction from wrist to elbow. Both directions are unit vectors.
+    pub fn facing(giver_forearm: Vec3, centre: Vec3, up: Vec3) -> Self {
+        let mut receiver = Self {
+            stance: Stance::Facing,
+            up,
+            ..Self::ANYWHERE
+        };
+        receiver.face(centre + giver_forearm * HAND, giver_forearm, centre);
+        receiver
+    }
+
+    /// Adds the arms of receivers who face a giver with this wrist and forearm.
+    fn face(&mut self, wrist: Vec3, forearm: Vec3, centre: Vec3) {
+        self.giver = Some(forearm);
+        let up = self.up;
+        let horizontal = forearm.reject_from_normalized(up);
+        let is_clear = horizontal.length() >= LEAST_HORIZONTAL;
+        let behind = horizontal.normalize_or(up.any_orthonormal_vector());
+        let upper_arm = (up + behind * UPPER_ARM_LEAN).normalize_or(up) * UPPER_ARM_LENGTH;
+        let shoulder = wrist + forearm * FOREARM_LENGTH + upper_arm;
+        let from_object = shoulder - centre;
+        let height = from_object.dot(up).clamp(HEIGHTS[0], HEIGHTS[1]);
+        let theirs = from_object.dot(behind);
+        let distance = COMFORTABLE
+            .clamp(APART[0] - theirs, (APART[1] - theirs).max(APART[0] - theirs))
+            .clamp(NEAREST, FARTHEST);
+        let arm_toward = |angle: f32| Arm {
+            shoulder: centre + Quat::from_axis_angle(up, angle) * -behind * distance + up * height,
+            ..Self::ANYWHERE.arms[0]
+        };
+        if is_clear {
+            for angle in ANGLES {
+                self.add(arm_toward(angle), centre);
+            }
+        } else {
+            for turn in 0..ALL_ROUND {
+                self.add(
+                    arm_toward(turn as f32 * std::f32::consts::TAU / ALL_ROUND as f32),
+                    centre,
+                );
+            }
+        }
+    }
+
+    /// Adds an arm, whose elbow hangs while the hand is at `centre`.
+    fn add(&mut self, arm: Arm, centre: Vec3) {
+        let to_shoulder = arm.shoulder - centre;
+        let distance = to_shoulder.length();
+        let toward = to_shoulder / distance.max(f32::MIN_POSITIVE);
+        let wrist = centre + toward * HAND.min(0.5 * distance);
+        let Arm {
+            shoulder,
+            upper_arm,
+            forearm,
+        } = arm;
+        // As far as the bones reach; a receiver who stands farther away leans toward the object.
+        let reach = (distance - HAND).clamp((upper_arm - forearm).abs() + 0.05, upper_arm + forearm - 0.01);
+        let along = (forearm * forearm - upper_arm * upper_arm + reach * reach) / (2.0 * reach);
+        let drop = (forearm * forearm - along * along).max(0.0).sqrt();
+        let hanging = (-self.up).reject_from(toward).normalize_or_zero();
+        let elbow = wrist + toward * along + hanging * drop;
+        self.arms[self.count] = Arm {
+            shoulder,
+            upper_arm,
+            forearm,
+        };
+        self.directions[self.count] = (elbow - wrist).normalize_or(toward);
+        self.count += 1;
+    }
+
+    /// True if hands are expected to come from somewhere.
+    pub fn is_expected(&self) -> bool {
+        self.count > 0
+    }
+
+    /// True if the arm must reach the wrist.
+    pub fn must_reach(&self) -> bool {
+        matches!(self.stance, Stance::At(_))
+    }
+
+    /// Horizontal direction from the object to where the receiver most likely stands, a unit vector, if any is expected.
+    pub fn direction(&self) -> Option<Vec3> {
+        (self.count > 0).then(|| self.directions[0])
+    }
+
+    /// How well a hand suits where the receiver stands, 0 to 1: 1 if its forearm, straight behind the wrist, comes from there
+    /// and not from the giver's side. 1 if nothing is expected. Takes some nanoseconds.
+    #[inline]
+    pub fn suits(&self, object_from_wrist: Pose) -> f32 {
+        self.suits_forearm(object_from_wrist.transform_vector(Vec3::NEG_Y))
+    }
+
+    /// [`Self::suits`] for a forearm's direction from wrist to elbow, a unit vector.
+    #[inline]
+    pub fn suits_forearm(&self, along: Vec3) -> f32 {
+        if self.count == 0 {
+            return 1.0;
+        }
+        let plausible = &self.directions[..self.count];
+        let nearest = plausible
+            .iter()
+            .map(|direction| direction.dot(along))
+            .fold(-1.0, f32::max);
+        let toward = ramp(nearest, TOWARD);
+        let together = self.giver.map_or(0.0, |giver| ramp(giver.dot(along), TOGETHER));
+        toward * (1.0 - together)
+    }
+
+    /// The arm of a hand, the least strained of those that are clear of `barriers` and of the object; none if it does not reach
+    /// the wrist.
+    pub fn arm(&self, rig: &Rig, wrist: Pose, surface: &MeshBvh, barriers: Barriers<'_>) -> Option<ArmPose> {
+        let is_assumed = !self.must_reach();
+        let mut all: Vec<Elbow> = self.arms[..self.count]
+            .iter()
+            .flat_map(|&arm| elbows(arm, (rig, wrist), self.up, is_assumed))
+            .collect();
+        all.sort_by(|a, b| a.strain.total_cmp(&b.strain));
+        let is_clear = |elbow: &&Elbow| {
+            let solids = solids_of(&elbow.pose, wrist.position);
+            !barriers.comes_within(solids.iter(), 0.0)
+                && solids.iter().all(|solid| !surface.comes_within(solid, 0.0))
+        };
+        all.iter().find(is_clear).map(|elbow| elbow.pose)
+    }
+
+    /// True if the arm need not reach the wrist, or does.
+    pub fn reaches(&self, rig: &Rig, wrist: Pose) -> bool {
+        !self.must_reach()
+            || self.arms[..self.count]
+                .iter()
+                .any(|&arm| elbows(arm, (rig, wrist), self.up, false).next().is_some())
+    }
+}
