@@ -120,6 +120,7 @@ fn proposals(criterion: &mut Criterion) {
             object: scene.object,
             surface: object(name).surface_pairs(),
             barriers: Barriers::NONE,
+            chooses: None,
             rig: rig(),
             placements: None,
             mechanisms: Mechanisms::ALL,

@@ -20,6 +20,7 @@ use grasp_synthesis::{
         grasp::Grasp,
         holdout::Holdout,
         object::THESIS_FRICTION,
+        receiver::Stance,
         strategy::{Strategy, Validity},
     },
     propose::prepared::{PreparedObject, PreparedRig},
@@ -80,6 +81,7 @@ fn free(object: &Arc<PreparedObject>, up: Vec3) -> Holdout {
         presenting_hand: None,
         other_hands: Vec::new(),
         obstacles: Vec::new(),
+        stance: Stance::default(),
         up,
     }
 }

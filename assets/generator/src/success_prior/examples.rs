@@ -12,6 +12,7 @@ use grasp_synthesis::{
         strategy::Validity,
     },
     physical::{
+        receiver::Receiver,
         scene::{ObjectScene, Presented},
         solids::{PreparedHand, TrackedSolids},
     },
@@ -71,6 +72,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             object: &object,
             surface: object.surface_pairs(),
             barriers: presented.barriers(),
+            chooses: None,
             rig,
             placements: None,
             mechanisms: Mechanisms::ALL,
@@ -117,6 +119,7 @@ fn present(holding: &[HandPose], rig: &Rig, stream: &mut AttemptStream, by_giver
         other_hands: Vec::new(),
         obstacles: Vec::new(),
         giver_palm: None,
+        receiver: Receiver::ANYWHERE,
         up,
     }
 }

@@ -48,6 +48,16 @@ const FINGER_RADIUS: f32 = 0.008;
 const PALM_RADIUS: f32 = 0.016;
 const GAP: f32 = 0.002;
 
+/// Cosine of the angle between the axes of two places of the same straight part, and by how much more the part may be off its
+/// axis per metre: grips are slightly bent.
+const PARALLEL: f32 = 0.9;
+const BOW: f32 = 0.15;
+
+/// Length of a main handle as a share of the longest one, and the length in metres from which a longer one is no more of a handle:
+/// a hammer's head is a slender part, too, but not what it is held by.
+const MAIN_SHARE: f32 = 0.8;
+const FULL_LENGTH: f32 = 0.12;
+
 /// Directions around a part in which room is probed.
 pub(crate) const DIRECTIONS: usize = 12;
 
@@ -67,6 +77,10 @@ pub struct Handle {
     pub axis: Vec3,
     /// Mean distance of its skin from the middle, in metres.
     pub radius: f32,
+    /// How far the handle goes on in a straight line through this place, in metres.
+    pub length: f32,
+    /// True if it belongs to the longest handles, which are what people hold.
+    pub is_main: bool,
     /// Where the palm has room.
     pub(crate) for_palm: Sides,
 }
@@ -85,7 +99,21 @@ impl Handles {
             .into_iter()
             .step_by(stride)
             .filter_map(|middle| Handle::probe(surface, middle));
-        Self(probed.collect())
+        let mut handles: Vec<Handle> = probed.collect();
+        let length_at = |at: &Handle| {
+            let in_line = handles.iter().filter_map(|other| other.along(at));
+            let (low, high) = in_line.fold((0.0_f32, 0.0_f32), |(low, high), along| {
+                (low.min(along), high.max(along))
+            });
+            high - low + 2.0 * HALF_LENGTH
+        };
+        let lengths: Vec<f32> = handles.iter().map(length_at).collect();
+        let longest = lengths.iter().copied().fold(0.0, f32::max);
+        for (handle, length) in handles.iter_mut().zip(lengths) {
+            handle.length = length;
+            handle.is_main = length >= MAIN_SHARE * longest.min(FULL_LENGTH);
+        }
+        Self(handles)
     }
 
     /// The places, in the order of the surface's triangles.
@@ -93,9 +121,14 @@ impl Handles {
         &self.0
     }
 
-    /// True if a point of the surface is on a handle.
+    /// The places on the longest handles.
+    pub fn main(&self) -> impl Iterator<Item = &Handle> {
+        self.0.iter().filter(|handle| handle.is_main)
+    }
+
+    /// True if a point of the surface is on one of the longest handles.
     pub fn contain(&self, point: Vec3) -> bool {
-        self.0.iter().any(|handle| handle.contains(point))
+        self.main().any(|handle| handle.contains(point))
     }
 
     /// Memory use in bytes.
@@ -145,8 +178,19 @@ impl Handle {
             middle,
             axis,
             radius,
+            length: 2.0 * HALF_LENGTH,
+            is_main: true,
             for_palm,
         })
+    }
+
+    /// How far this place is along the axis of another one, in metres, if both are of the same straight part.
+    fn along(&self, other: &Self) -> Option<f32> {
+        let offset = self.middle - other.middle;
+        let along = offset.dot(other.axis);
+        let is_in_line = self.axis.dot(other.axis).abs() >= PARALLEL
+            && (offset - other.axis * along).length() <= MAX_BEND + BOW * along.abs();
+        is_in_line.then_some(along)
     }
 
     /// True if a point of the surface belongs to the handle where it was probed.

@@ -36,6 +36,7 @@ use crate::{
         solids::{PreparedHand, TrackedSolids},
     },
     propose::{
+        handles::wrap_handle,
         prepared::{PreparedObject, PreparedRig},
         proposal::{ProposalContext, propose_evenly},
         surface_pairs::SurfacePairs,
@@ -63,6 +64,9 @@ const SEED: u64 = 0x4154_4c41;
 /// Share of perturbed proposals once grips are known. They succeed ten times as often as fresh ones, which
 /// discover new regions.
 const PERTURBED_SHARE: f32 = 0.5;
+
+/// Share of fresh proposals that wrap a handle, if the object has one: people hold it there.
+const HANDLE_SHARE: f32 = 0.5;
 
 /// Seed of the givers.
 const GIVERS_SEED: u64 = 0x4749_5645;
@@ -333,6 +337,7 @@ impl<'a> Growth<'a> {
             object: self.scene.object,
             surface: giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface),
             barriers: giver.map_or(Barriers::NONE, |giver| giver.presented.barriers()),
+            chooses: None,
             rig: self.rig,
             placements: None,
             mechanisms: Mechanisms::ALL,
@@ -341,6 +346,9 @@ impl<'a> Growth<'a> {
             Some(Some(seeds)) if is_perturbed => seeds.propose_evenly(self.grips.entries(), &place, stream),
             None if is_perturbed => Some(self.perturbed_known(stream)),
             // Perturbing known grips is wasted on a giver with enough clear ones: most of them collide.
+            _ if self.prepared.parts().is_handled && stream.unit() < HANDLE_SHARE => {
+                wrap_handle(&place, stream)
+            }
             _ => propose_evenly(&place, stream, &|| false),
         }
     }

@@ -12,7 +12,11 @@ use super::{
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     model::{constraints::Constraints, hand::rig::Rig},
-    physical::scene::Presented,
+    physical::{
+        receiver::{Receiver, SUITABLE},
+        scene::Presented,
+    },
+    propose::proposal::ANYWHERE_EVERY,
 };
 
 /// Where seeds come from.
@@ -54,7 +58,9 @@ pub struct SeedContext<'a> {
 #[derive(Clone, Debug, Default)]
 pub struct SeedSets {
     source: SeedSource,
-    /// From the whole atlas: the grips nearest to being clear of the barriers.
+    /// From the whole atlas: the grips nearest to being clear of the barriers, of those whose forearms come from where the
+    /// receiver stands, and of all.
+    suitable: OnceLock<Seeds>,
     nearest: OnceLock<Seeds>,
     /// From the transferred grips that pass the closure screen.
     passing: OnceLock<(Grips, Seeds)>,
@@ -87,7 +93,9 @@ impl SeedSets {
         match &self.source {
             SeedSource::Nothing => None,
             SeedSource::Atlas(atlas) => {
-                let seeds = self.of_atlas(atlas, context, interrupted)?;
+                let is_anywhere = attempt.is_multiple_of(ANYWHERE_EVERY);
+                let receiver = (!is_anywhere).then_some(&context.presented.receiver);
+                let seeds = self.of_atlas(atlas, receiver, context, interrupted)?;
                 Some((seeds, atlas.entries()))
             }
             SeedSource::Transferred(transferred) => {
@@ -100,24 +108,34 @@ impl SeedSets {
     fn of_atlas(
         &self,
         atlas: &Atlas,
+        receiver: Option<&Receiver>,
         context: &SeedContext<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&Seeds> {
         let barriers = context.presented.barriers();
         let mechanisms = context.mechanisms;
-        if let Some(seeds) = self.nearest.get() {
+        let receiver = receiver.filter(|receiver| receiver.is_expected());
+        let set = if receiver.is_some() {
+            &self.suitable
+        } else {
+            &self.nearest
+        };
+        if let Some(seeds) = set.get() {
             return Some(seeds);
         }
+        let forearms = atlas.grips().forearms();
+        let suits = |entry: u16| {
+            receiver.is_none_or(|receiver| receiver.suits_forearm(forearms[usize::from(entry)]) >= SUITABLE)
+        };
         let (holding, unordered) = if mechanisms.has(Mechanism::GravityOrder) {
             (atlas.holding_under(context.presented.up), 0)
         } else {
             (&[][..], atlas.entries().len() as u16)
         };
-        let candidates = holding
-            .iter()
-            .copied()
-            .chain(0..unordered)
-            .filter(|&entry| atlas.entries()[usize::from(entry)].meets(context.constraints));
+        let candidates =
+            holding.iter().copied().chain(0..unordered).filter(|&entry| {
+                suits(entry) && atlas.entries()[usize::from(entry)].meets(context.constraints)
+            });
         let new_seeds = Seeds::of_with(
             mechanisms,
             atlas.grips(),
@@ -127,7 +145,7 @@ impl SeedSets {
             interrupted,
         )?;
         // Another worker may have computed the same set meanwhile.
-        Some(self.nearest.get_or_init(|| new_seeds))
+        Some(set.get_or_init(|| new_seeds))
     }
 
     /// Alternates between grips that pass the closure screen and all that fit. Passing grips hold more often

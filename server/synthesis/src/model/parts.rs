@@ -16,6 +16,9 @@ const SEED: u64 = 0x5041_5254;
 /// whole object, such as a stick.
 const HANDLE_SHARES: [f32; 2] = [0.03, 0.8];
 
+/// Places found on handles from which they are no accident of the samples.
+const LEAST_PLACES: usize = 4;
+
 /// Mass in kilograms below which an object is held by its handle no more than elsewhere: a pen is not a tool's handle.
 const HANDLED_MASS: f32 = 0.03;
 
@@ -59,7 +62,9 @@ impl Parts {
             .object_from_box
             .transform_vector(Vec3::AXES[longest]);
         Self {
-            is_handled: object.mass >= HANDLED_MASS && (least..=most).contains(&share),
+            is_handled: object.mass >= HANDLED_MASS
+                && (least..=most).contains(&share)
+                && handles.main().count() >= LEAST_PLACES,
             sharp: SharpFeatures::of(mesh),
             handles,
             long_axis: axis.normalize_or(Vec3::Y),
@@ -75,7 +80,7 @@ impl Parts {
     }
 }
 
-/// The share of the surface that may be touched which is on handles.
+/// The share of the surface that may be touched which is on main handles.
 fn share_on(handles: &Handles, object: &GraspObject) -> f32 {
     if handles.places().is_empty() {
         return 0.0;

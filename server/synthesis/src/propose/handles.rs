@@ -16,8 +16,11 @@ use crate::{
 /// Handles drawn per hand; the one nearest to the centre of mass is wrapped.
 const COMPARED: usize = 2;
 
+/// Breadth of a finger, in metres: so much of a handle each needs.
+const FINGER_BREADTH: f32 = 0.02;
+
 /// Largest number of hands tried until palm and forearm fit.
-const MAX_HANDS: usize = 24;
+const MAX_HANDS: usize = 64;
 
 /// Range of the angle in radians by which the end of a handle at the thumb's side points toward the fingers: power grips lie
 /// obliquely in the palm.
@@ -47,7 +50,7 @@ pub fn wrap_handle(context: &ProposalContext<'_>, stream: &mut AttemptStream) ->
         let lever = |handle: &&Handle| handle.middle.distance_squared(centre_of_mass);
         let handle = drawn.min_by(|a, b| lever(a).total_cmp(&lever(b)))?;
         let (touching, radius) = in_palm(handle, context, stream)?;
-        if !context.palm_fits(touching) {
+        if !context.is_chosen(touching, stream) || !context.palm_fits(touching) {
             return None;
         }
         let above = touching.transform_vector(Vec3::Z) * PALM_START_HEIGHT;
@@ -56,6 +59,7 @@ pub fn wrap_handle(context: &ProposalContext<'_>, stream: &mut AttemptStream) ->
         Some(Proposal {
             object_from_wrist: Pose::new(touching.position - above, touching.orientation),
             shape: HandShape {
+                closing: closing_on(handle, stream),
                 thumb_yaw: thumb_yaw.clamp(0.0, 1.0),
                 preshape: PRESHAPE.map(|[min, max]| stream.between(min, max)),
                 ..palm_shape(stream)
@@ -63,6 +67,18 @@ pub fn wrap_handle(context: &ProposalContext<'_>, stream: &mut AttemptStream) ->
             advance: 2.0 * PALM_START_HEIGHT,
         })
     })
+}
+
+/// The digits that close on a handle: fewer on one with room for few, as in a cup's ear. There, some hands leave out one finger
+/// more, and the others rest outside.
+fn closing_on(handle: &Handle, stream: &mut AttemptStream) -> [bool; 5] {
+    let room = (handle.length / FINGER_BREADTH) as usize;
+    let fingers = if room >= 4 {
+        4
+    } else {
+        (room + stream.below(2)).clamp(2, 4)
+    };
+    std::array::from_fn(|digit| digit <= fingers)
 }
 
 /// The wrist's pose with the palm on the handle from a direction with room, the fingers across it, and the handle's radius

@@ -65,6 +65,7 @@ impl PlacementCache {
             object,
             surface: object.surface_pairs(),
             barriers: Barriers::NONE,
+            chooses: None,
             rig,
             placements: None,
             mechanisms,

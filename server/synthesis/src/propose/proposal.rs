@@ -18,9 +18,11 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{GIVER_CLEARANCE, MAX_PENETRATION},
+        scene::Presented,
         shape::{HandShape, Proposal},
         solids::Spheres,
     },
+    rating::choice::{across_long_axis, from_side_or_above},
 };
 
 /// Share of proposals that place the palm on the object instead of pads on opposed points.
@@ -72,6 +74,13 @@ const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.02, 0.02], [-0.02, 0.03]];
 /// Height above the surface from which the palm approaches, in metres.
 pub(super) const PALM_START_HEIGHT: f32 = 0.03;
 
+/// Smallest weight of a hand that does not come from where people take the object: some must be tried, too, because only they may
+/// fit.
+const LEAST_CHOICE: f32 = 0.03;
+
+/// Share of attempts that place hands wherever they fit, at multiples of this number, for the same reason.
+pub const ANYWHERE_EVERY: u64 = 8;
+
 /// The object, hands and settings for which proposals are drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct ProposalContext<'a> {
@@ -81,6 +90,8 @@ pub struct ProposalContext<'a> {
     pub surface: &'a SurfacePairs,
     /// What the hand keeps clear of.
     pub barriers: Barriers<'a>,
+    /// How the object is presented, if hands are preferred that people would choose.
+    pub chooses: Option<&'a Presented>,
     /// The receiving hand.
     pub rig: &'a PreparedRig,
     /// Cached placements to choose from, if they are to be used.
@@ -173,6 +184,21 @@ impl<'a> ProposalContext<'a> {
         }
     }
 
+    /// How likely people are to place a hand so, 0 to 1: from where the receiver stands, not from beneath, and not from an end.
+    pub(super) fn choice(&self, object_from_wrist: Pose) -> f32 {
+        let Some(presented) = self.chooses else { return 1.0 };
+        presented.receiver.suits(object_from_wrist)
+            * (0.2 + 0.8 * across_long_axis(self.object.parts(), object_from_wrist))
+            * (0.2 + 0.8 * from_side_or_above(object_from_wrist, presented.up))
+    }
+
+    /// True if a hand is to be tried, by how likely people are to place it so; always in every [`ANYWHERE_EVERY`]th attempt.
+    pub fn is_chosen(&self, object_from_wrist: Pose, stream: &mut AttemptStream) -> bool {
+        self.chooses.is_none()
+            || stream.attempt().is_multiple_of(ANYWHERE_EVERY)
+            || stream.unit() < self.choice(object_from_wrist).max(LEAST_CHOICE)
+    }
+
     /// Places opposed pads at the first of some locations where the hand fits.
     fn propose_pads(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
         (0..MAX_LOCATIONS)
@@ -198,7 +224,9 @@ impl<'a> ProposalContext<'a> {
         (0..MAX_DRAWN_ROTATIONS)
             .filter_map(|_| {
                 let candidate = Candidate::draw(opposition, pair, stream);
-                admits(candidate.object_from_wrist).then(|| self.settled(candidate, stream))
+                let wrist = candidate.object_from_wrist;
+                let is_tried = admits(wrist) && self.is_chosen(wrist, stream);
+                is_tried.then(|| self.settled(candidate, stream))
             })
             .take(MAX_ROTATIONS)
             .find(|candidate| self.fits(candidate))
@@ -285,6 +313,7 @@ impl<'a> ProposalContext<'a> {
         stream: &mut AttemptStream,
     ) -> Vec<Candidate<'a>> {
         let uses_prior = self.mechanisms.has(Mechanism::SuccessPrior);
+        let chooses = !stream.attempt().is_multiple_of(ANYWHERE_EVERY);
         let mut keyed: Vec<(f32, Candidate<'_>)> = candidates
             .into_iter()
             .map(|candidate| {
@@ -299,9 +328,14 @@ impl<'a> ProposalContext<'a> {
                 } else {
                     0.0
                 };
+                let log_choice = if chooses {
+                    self.choice(object_from_wrist).max(LEAST_CHOICE).ln()
+                } else {
+                    0.0
+                };
                 // Gumbel-max trick: sorting by these keys draws without replacement in proportion to the weights.
                 let gumbel = -(-stream.unit().max(f32::MIN_POSITIVE).ln()).ln();
-                (preference * log_probability + gumbel, candidate)
+                (preference * log_probability + log_choice + gumbel, candidate)
             })
             .collect();
         keyed.sort_by(|(a, _), (b, _)| b.total_cmp(a));
@@ -392,11 +426,11 @@ impl<'a> ProposalContext<'a> {
             let turn = stream.between(0.0, TAU);
             let y = a * turn.cos() + b * turn.sin();
             let orientation = Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z)).normalize();
-            Pose::new(point.position - orientation * contact, orientation)
+            let touching = Pose::new(point.position - orientation * contact, orientation);
+            (admits(touching) && self.is_chosen(touching, stream)).then_some(touching)
         };
         let touching = (0..MAX_DRAWN_ROTATIONS)
-            .map(rotated)
-            .filter(|touching| admits(*touching))
+            .filter_map(rotated)
             .take(MAX_ROTATIONS)
             .find(|touching| self.palm_fits(*touching))?;
         let position = touching.position - z * PALM_START_HEIGHT;

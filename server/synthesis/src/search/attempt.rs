@@ -300,7 +300,10 @@ impl Attempt {
             let proposal = seeds
                 .propose(entries, &place, stream)
                 .map(|proposal| scene.shaped(proposal))
-                .filter(|proposal| scene.admits_wrist(proposal.object_from_wrist));
+                .filter(|proposal| {
+                    let wrist = proposal.object_from_wrist;
+                    scene.admits_wrist(wrist) && place.is_chosen(wrist, stream)
+                });
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
             let physical = &mut self.physical;

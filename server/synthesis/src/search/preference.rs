@@ -28,20 +28,20 @@ const FREE_SHARE: f32 = 0.4;
 /// What a person would choose in one scene.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Preference {
-    wants_handle: bool,
+    /// True if the object has a handle that is free: it is then to be held there.
+    pub(super) wants_handle: bool,
 }
 
 impl Preference {
     /// The preference for an object among barriers.
     pub(super) fn of(object: &GraspObject, barriers: Barriers<'_>) -> Self {
         let parts = object.parts();
-        let places = parts.handles.places();
         let is_free = |distance: f32| {
-            let free = places.iter().filter(|handle| {
+            let free = parts.handles.main().filter(|handle| {
                 let around = handle.radius + distance;
                 !barriers.certainly_cover(handle.middle, around, around)
             });
-            free.count() as f32 >= FREE_SHARE * places.len() as f32
+            free.count() as f32 >= FREE_SHARE * parts.handles.main().count() as f32
         };
         Self {
             wants_handle: parts.is_handled && is_free(ROOM),

@@ -2,7 +2,11 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::{preference::Preference, settings::SearchSettings, turns::Turn};
+use super::{
+    preference::Preference,
+    settings::SearchSettings,
+    turns::{HandleUse, Turn},
+};
 use crate::{
     base::{
         mechanisms::{Mechanism, Mechanisms},
@@ -212,6 +216,7 @@ impl<'a> Scene<'a> {
             object: object.object(),
             surface: object.surface_pairs(),
             barriers: presented.map_or(Barriers::NONE, Presented::barriers),
+            chooses: presented,
             rig,
             placements: None,
             mechanisms: self.mechanisms,
@@ -243,12 +248,12 @@ impl<'a> Scene<'a> {
             let object = self.task.object;
             let wraps = self.mechanisms.has(Mechanism::Handles);
             let has_handles = wraps && !object.handles().places().is_empty();
-            let turn = Turn::of(
-                stream.attempt(),
-                object.mass,
-                has_handles,
-                self.constraints.hooks(),
-            );
+            let handles = match (has_handles, self.preference().wants_handle) {
+                (false, _) => HandleUse::Impossible,
+                (true, false) => HandleUse::Possible,
+                (true, true) => HandleUse::Wanted,
+            };
+            let turn = Turn::of(stream.attempt(), object.mass, handles, self.constraints.hooks());
             let special = match turn {
                 Turn::Anywhere => None,
                 Turn::Handle => self.wrap(stream),

@@ -25,6 +25,17 @@ pub(super) enum Turn {
 
 use Turn::{Anywhere, Handle, Hook};
 
+/// Whether hands wrap the handles of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum HandleUse {
+    /// It has none.
+    Impossible,
+    /// They may.
+    Possible,
+    /// They should: a handle is what sets a part of the object apart, and is free.
+    Wanted,
+}
+
 /// The turns of eight attempts in a row. Attempts on handles take a tenth of the time of others, and succeed more often, but
 /// only where there is room; with more of them, objects that giver or obstacles cover are found later.
 const LIGHT: [Turn; 8] = [
@@ -33,6 +44,7 @@ const LIGHT: [Turn; 8] = [
 const MEDIUM: [Turn; 8] = [
     Anywhere, Anywhere, Anywhere, Handle, Anywhere, Anywhere, Anywhere, Hook,
 ];
+const HANDLED: [Turn; 8] = [Handle, Handle, Anywhere, Handle, Handle, Handle, Handle, Hook];
 const WRAPPED: [Turn; 8] = [Handle, Anywhere, Handle, Handle, Anywhere, Handle, Handle, Hook];
 const CARRIED: [Turn; 8] = [Handle, Hook, Handle, Anywhere, Handle, Hook, Handle, Anywhere];
 const CARRIED_BY_STRAPS: [Turn; 8] = [Hook, Anywhere, Hook, Hook, Hook, Anywhere, Hook, Hook];
@@ -41,13 +53,16 @@ const HOOKED: [Turn; 8] = [Hook, Hook, Hook, Hook, Hook, Hook, Hook, Anywhere];
 
 impl Turn {
     /// The turn of an attempt at an object of this mass in kilograms, which may have handles.
-    pub(super) fn of(attempt: u64, mass: f32, has_handles: bool, hooks: Hooks) -> Self {
+    pub(super) fn of(attempt: u64, mass: f32, handles: HandleUse, hooks: Hooks) -> Self {
+        let has_handles = handles != HandleUse::Impossible;
         let turns = if hooks == Hooks::Demanded {
             HOOKED
         } else if mass >= CARRIED_MASS && has_handles {
             CARRIED
         } else if mass >= CARRIED_MASS {
             CARRIED_BY_STRAPS
+        } else if handles == HandleUse::Wanted {
+            HANDLED
         } else if mass >= WRAPPED_MASS {
             WRAPPED
         } else if mass >= PINCHED_MASS {
@@ -68,8 +83,13 @@ mod tests {
     use super::*;
 
     fn turns(mass: f32, has_handles: bool, hooks: Hooks) -> Vec<Turn> {
+        let handles = if has_handles {
+            HandleUse::Possible
+        } else {
+            HandleUse::Impossible
+        };
         (0..8)
-            .map(|attempt| Turn::of(attempt, mass, has_handles, hooks))
+            .map(|attempt| Turn::of(attempt, mass, handles, hooks))
             .collect()
     }
 
@@ -81,6 +101,20 @@ mod tests {
     fn heavier_things_are_wrapped_more_often() {
         let handles = [0.01, 0.1, 0.5].map(|mass| count(&turns(mass, true, Hooks::Allowed), Handle));
         assert!(handles.is_sorted_by(|a, b| a < b), "{handles:?}");
+    }
+
+    #[test]
+    fn free_handles_are_wrapped_first_and_most() {
+        for mass in [0.05, 0.3] {
+            let turns: Vec<Turn> = (0..8)
+                .map(|attempt| Turn::of(attempt, mass, HandleUse::Wanted, Hooks::Allowed))
+                .collect();
+            assert_eq!(turns[0], Handle);
+            assert!(
+                count(&turns, Handle) > 4 && turns.contains(&Anywhere),
+                "{turns:?}"
+            );
+        }
     }
 
     #[test]
