@@ -39,8 +39,8 @@ def box_of(mesh):
 def smallest_box(points):
     """Axes (rows, the longest first) and sides of the smallest box around points.
 
-    One face of a smallest box lies on a face of the convex hull (up to an edge case that makes it hardly smaller). The
-    axes of the frame and the principal axes are tried as well: a sheet has no hull.
+    The box has a face on a face of the convex hull, and may be slightly larger than one that has none. The axes of the
+    frame and the principal axes are tried as well: a sheet has no hull.
     """
     try:
         hull = ConvexHull(points)
@@ -70,7 +70,9 @@ def around(points, normal):
     try:
         outline = flat[ConvexHull(flat).vertices]
     except QhullError:
-        outline = flat[[np.argmin(flat @ np.ptp(flat, axis=0)), np.argmax(flat @ np.ptp(flat, axis=0))]]
+        # A sheet seen from its edge is a line.
+        along = flat @ np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0]
+        outline = flat[[np.argmin(along), np.argmax(along)]]
     edges = np.diff(np.concatenate([outline, outline[:1]]), axis=0)
     angles = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (np.pi / 2), 5))
     across = np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -18,12 +18,17 @@ import stance
 from hand import FOREARM_RADIUS, WRIST
 from solids import Capsules
 
+LEGEND = (
+    "Blue: the giver. Green: the receiver, if a plausible one has this hand; the wrist is bent as needed. Red: the forearm goes"
+    " straight back from the hand, and no plausible receiver has it."
+)
 # Pixels along each side of a view.
 SIZE = 440
 # Distances between the points of a body and of what is small, in metres; a point covers three pixels of about 3 mm.
-BODY_SPACING, HAND_SPACING = 0.007, 0.004
+BODY_SPACING, HAND_SPACING = 0.006, 0.003
 # What a pixel can show.
 NOTHING, OBJECT, GIVER, GIVER_ARM, FITTING, FITTING_ARM, WRONG, WRONG_ARM = range(8)
+BODIES = (GIVER, FITTING, WRONG)
 COLOURS = np.array(
     [
         [1.0, 1.0, 1.0],
@@ -36,9 +41,11 @@ COLOURS = np.array(
         [0.85, 0.15, 0.1],
     ]
 )
+# How far the bodies are moved away from the eye, in metres, so that they never hide arms and object.
+BACKGROUND = 10.0
 # Radii of torso, neck, head and upper arm, and heights of hips, neck and head over the shoulders, in metres.
 TORSO, NECK, HEAD, ARM = 0.11, 0.05, 0.1, 0.045
-HIPS, CROWN = -0.5, 0.25
+HIPS, CROWN = -0.5, 0.23
 
 
 @dataclass
@@ -123,7 +130,8 @@ def picture(scene, grasp):
     beside = np.cross(across, scene.up)
     views = []
     for axes in (np.stack([across, scene.up, beside]), np.stack([across, -beside, scene.up])):
-        seen, nearest = draw.shown(points, kinds, axes, SIZE)
+        backed = points - BACKGROUND * np.isin(kinds, BODIES)[:, None] * axes[2]
+        seen, nearest = draw.shown(backed, kinds, axes, SIZE)
         light = axes.T @ [0.3, 0.5, 0.8]
         shade = 0.5 + 0.5 * np.abs(normals[nearest] @ light) / np.linalg.norm(light)
         shade[seen == NOTHING] = 1.0

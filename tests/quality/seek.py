@@ -60,7 +60,7 @@ def has_fitting(service, request, scene, handedness):
             grasp = service.find({**request, **more})["grasp"]
             if grasp is None:
                 hopeless.append(wish)
-            elif stance.judge(scene, grasp)["stance_fits"]:
+            elif stance.fits(scene, grasp):
                 return True
             if time.monotonic() > until:
                 break
