@@ -169,22 +169,17 @@ def table(found):
     """Markdown table of the distributions, with nobody holding and from a giver, beside chance and people."""
     rows = [row for row in found if "long" in row]
     groups = [[row for row in rows if row["held_out"] == held_out] for held_out in (False, True)]
-    end_on_chance = f"{CHANCE:.0f} %"
-    lines = [
-        ("long things taken end-on, by the approach", end_on, end_on_chance, f"{PEOPLE_END_ON} % (people, 53 objects)"),
-        ("by the palm's normal", lambda here: end_on(here, "palm_to_axis"), end_on_chance, ""),
-        ("by the forearm", lambda here: end_on(here, "forearm_to_axis"), end_on_chance, ""),
-    ]
     text = ["| | nobody holding | from a giver | by chance | people |", "|---|--:|--:|--:|---|"]
-    for name, shares, chance, people in lines:
-        cells = [share(shares(here)) for here in groups]
-        text.append(f"| {name} | {' | '.join(cells)} | {chance} | {people} |")
-    angles = [("approach", "41 / 60 / 76°"), ("palm", "41 / 60 / 76°"), ("forearm", "41 / 60 / 76°")]
-    for name, chance in angles:
+    for name in ("approach", "palm", "forearm"):
+        cells = [share(end_on(here, f"{name}_to_axis")) for here in groups]
+        people = f"{PEOPLE_END_ON} % (people, 53 objects)" if name == "approach" else ""
+        text.append(f"| long things taken end-on, by the {name} | {' | '.join(cells)} | {CHANCE:.0f} % | {people} |")
+    for name in ("approach", "palm", "forearm"):
         cells = [quartiles((row[f"{name}_to_axis"] for row in here if row["long"]), "°") for here in groups]
-        text.append(f"| {name} to the long axis, quartiles | {' | '.join(cells)} | {chance} | |")
-    cells = [quartiles((100 * row["offset_along"] for row in here if row["long"] and "offset_along" in row), " %")
-             for here in groups]
+        # The cosine of the angle between a random direction and an axis is spread evenly.
+        text.append(f"| {name} to the long axis, quartiles | {' | '.join(cells)} | 41 / 60 / 76° | |")
+    offsets = [[100 * row["offset_along"] for row in here if row["long"] and "offset_along" in row] for here in groups]
+    cells = [quartiles(values, " %") for values in offsets]
     text.append(f"| contacts off the centre of mass, of half the length | {' | '.join(cells)} | | |")
     cells = [quartiles((row["approach_to_nearest_axis"] for row in here), "°") for here in groups]
     people = "aligned (Balasubramanian et al. 2012)"

@@ -55,7 +55,8 @@ def judged(case, simulated):
         row.update(survival(case.scene, grasps))
     if case.drawing:
         matplotlib.image.imsave(case.drawing, draw.picture(case.scene, case.grasp))
-        matplotlib.image.imsave(mannequin.file_of(case.drawing), mannequin.picture(case.scene, case.grasp))
+        if not case.other:
+            matplotlib.image.imsave(mannequin.file_of(case.drawing), mannequin.picture(case.scene, case.grasp))
     return row
 
 

@@ -31,13 +31,14 @@ ELBOW_FLEXION, SHOULDER_EXTENSION, SHOULDER_ADDUCTION = 145, 60, 40
 DISTANCES = np.linspace(0.6, 1.2, 7)
 AZIMUTHS = np.linspace(-60, 60, 9)
 HEIGHTS = np.array([-0.15, 0.0, 0.15])
-# Least horizontal distance from the giver's wrist to the receiver's middle: half a trunk, and room for the giver's hand.
-CLOSEST = 0.25
+# Least horizontal distance from the giver's wrist to the receiver's middle: two hands and half a trunk.
+CLOSEST = 0.35
 # A forearm nearer to the vertical tells ever less about where the body is; an upright one tells nothing.
 UPRIGHT = 20.0
 # How far a giver may hold the elbow forward.
 FORWARD = 30.0
-SWIVELS = np.radians(np.arange(0, 360, 15))
+# How far an elbow swings from its lowest place, outward and inward, in radians.
+SWIVELS = np.radians(np.arange(-30, 61, 15))
 # Bounds of the targets: from the nearest plausible forearm, and from the giver's own.
 NEAR_RECEIVER, NEAR_GIVER = 75.0, 60.0
 
@@ -104,12 +105,15 @@ def behind(hand, up):
     spread = 180.0 * max(0.0, 1.0 - steep / UPRIGHT)
     sides = np.concatenate([[0.0], *([a, -a] for a in np.arange(30.0, spread + 1e-6, 30.0))])
     rear = turned(horizontal(back, up), up, sides)
-    least = max(0.0, 180.0 - ELBOW_FLEXION - angle(up, -back))
+    # The upper arm is cos(t) up + sin(t) rear; the angle between it and the forearm must not be too small.
+    sharpest = np.cos(np.radians(180 - ELBOW_FLEXION))
+    reach, offset = np.hypot(back @ up, rear @ back), np.arctan2(-rear @ back, -back @ up)
+    least = np.where(-back @ up > sharpest, offset + np.arccos(np.minimum(sharpest / reach, 1.0)), 0.0)
     # With the elbow farther forward than this, the arm would be bent backward.
-    most = max(least, min(FORWARD, angle(up, back)))
-    shoulders = [elbow + UPPER_ARM * (np.cos(tilt) * up + np.sin(tilt) * rear) for tilt in np.radians([least, most])]
-    forward = np.tile(-rear, (2, 1))
-    return Bodies(np.concatenate(shoulders), forward, outward_of(forward, up, hand.handedness))
+    most = np.maximum(least, np.radians(min(FORWARD, angle(up, back))))
+    tilts, rears = np.concatenate([least, most])[:, None], np.tile(rear, (2, 1))
+    shoulders, forward = elbow + UPPER_ARM * (np.cos(tilts) * up + np.sin(tilts) * rears), -rears
+    return Bodies(shoulders, forward, outward_of(forward, up, hand.handedness))
 
 
 def receivers(giver, up, handedness):
@@ -129,16 +133,21 @@ def receivers(giver, up, handedness):
 
 
 def elbows(wrist, bodies, up):
-    """The elbows with which people reach a wrist, and the row of each one's owner; none if nobody does."""
+    """The elbows with which people reach a wrist, and the row of each one's owner; none if nobody does.
+
+    Elbows hang, so none is higher than its shoulder, and forearms point forward.
+    """
     reach = wrist - bodies.shoulders
     distance = np.linalg.norm(reach, axis=1)
     bent = np.radians(180 - ELBOW_FLEXION)
     least = np.sqrt(UPPER_ARM**2 + FOREARM**2 - 2 * UPPER_ARM * FOREARM * np.cos(bent))
     rows = np.flatnonzero((distance >= least) & (distance <= UPPER_ARM + FOREARM))
     along, distance = unit(reach[rows]), distance[rows]
-    # Swivel 0 is the lowest elbow.
-    down = unit(-up + (along @ up)[:, None] * along)
+    # Swivel 0 is the lowest elbow; of an arm that hangs straight, the rearmost.
+    low = -up - 0.1 * bodies.forward[rows]
+    down = unit(low - np.sum(low * along, axis=1)[:, None] * along)
     side = np.cross(along, down)
+    side *= np.where(np.sum(side * bodies.outward[rows], axis=1) < 0, -1.0, 1.0)[:, None]
     share = (UPPER_ARM**2 - FOREARM**2 + distance**2) / (2 * distance)
     radius = np.sqrt(np.maximum(UPPER_ARM**2 - share**2, 0.0))
     circle = np.cos(SWIVELS)[None, :, None] * down[:, None] + np.sin(SWIVELS)[None, :, None] * side[:, None]
@@ -150,6 +159,7 @@ def elbows(wrist, bodies, up):
     )
     natural = lifted <= 1e-9
     natural &= ahead >= -np.sin(np.radians(SHOULDER_EXTENSION))
+    natural &= np.sum((wrist - bodies.shoulders[owners] - upper) * bodies.forward[owners], axis=1) >= 0
     natural &= out >= -np.sin(np.radians(SHOULDER_ADDUCTION))
     return bodies.shoulders[owners[natural]] + upper[natural], owners[natural]
 
