@@ -3,9 +3,10 @@
 The object's box is the smallest that holds it. A hand approaches halfway between its stretched fingers and its palm's
 normal. Lengths are in metres, angles in degrees.
 
-Sources. Feix, Bullock and Dollar 2014, Analysis of human grasping behavior: object characteristics and grasp type (almost
-10,000 grasps of two housekeepers and two machinists). Balasubramanian et al. 2012, Physical human interactive guidance:
-identifying grasping principles from human-planned grasps (people align the hand with an object's principal axes).
+Sources. Feix, Bullock and Dollar 2014, Analysis of human grasping behavior: object characteristics and grasp type
+(almost 10,000 grasps of two housekeepers and two machinists). Balasubramanian et al. 2012, Physical human interactive
+guidance: identifying grasping principles from human-planned grasps (people align the hand with an object's principal
+axes).
 """
 
 import numpy as np
@@ -182,8 +183,8 @@ def table(found):
     cells = [quartiles(values, " %") for values in offsets]
     text.append(f"| contacts off the centre of mass, of half the length | {' | '.join(cells)} | | |")
     cells = [quartiles((row["approach_to_nearest_axis"] for row in here), "°") for here in groups]
-    people = "aligned (Balasubramanian et al. 2012)"
-    text.append(f"| approach to the box's nearest axis, quartiles | {' | '.join(cells)} | {nearest_by_chance()} | {people} |")
+    cells += [nearest_by_chance(), "aligned (Balasubramanian et al. 2012)"]
+    text.append(f"| approach to the box's nearest axis, quartiles | {' | '.join(cells)} |")
     cells = [share(row["across_smallest"] for row in here if "across_smallest" in row) for here in groups]
     text.append(f"| pressed across the smallest dimension | {' | '.join(cells)} | | 94 % (Feix et al. 2014) |")
     for key, name in [("from_held", "as held"), ("from_standing", "as it stands")]:

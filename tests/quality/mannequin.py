@@ -1,7 +1,7 @@
 """Pictures of who stands where: giver and receiver as mannequins, from the side and from above, with object and hands.
 
-The giver is blue. The receiver stands where a plausible one is whose forearm is nearest to that of the hand, and is green
-if the arm fits and red if it does not: then the forearm goes straight back from the hand, wherever that leads.
+The giver is blue. The receiver stands where a plausible one is whose forearm is nearest to that of the hand, and is
+green if the arm fits and red if it does not: then the forearm goes straight back from the hand, wherever that leads.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from hand import FOREARM_RADIUS, WRIST
 from solids import Capsules
 
 LEGEND = (
-    "Blue: the giver. Green: the receiver, if a plausible one has this hand; the wrist is bent as needed. Red: the forearm goes"
-    " straight back from the hand, and no plausible receiver has it."
+    "Blue: the giver. Green: the receiver, if a plausible one has this hand; the wrist is bent as needed. Red: the"
+    " forearm goes straight back from the hand, and no plausible receiver has it."
 )
 # Pixels along each side of a view.
 SIZE = 440
@@ -104,7 +104,8 @@ def cloud(scene, grasp):
     """Points to draw in the client's frame, their normals and their kinds."""
     giver, receiver, fits = people(scene, grasp)
     surface, owners = measures.surface_samples(scene.mesh)
-    parts = [(scene.rotation.apply(surface) + scene.translation, scene.rotation.apply(scene.mesh.normals[owners]), OBJECT)]
+    turn = scene.rotation
+    parts = [(turn.apply(surface) + scene.translation, turn.apply(scene.mesh.normals[owners]), OBJECT)]
     kinds = (WRONG, WRONG_ARM) if fits is False else (FITTING, FITTING_ARM)
     for person, (plain, strong) in [(giver, (GIVER, GIVER_ARM)), (receiver, kinds)]:
         if person is not None:

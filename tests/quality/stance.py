@@ -2,14 +2,15 @@
 
 A giver's hand tells where the giver stands: the forearm goes straight back from the hand, the upper arm hangs from the
 shoulder, and the body is behind the forearm. A receiver faces the giver. Shoulders that are plausible for the receiver
-are sampled, and for each one the elbows of an arm whose elbow hangs. All is in the client's frame; lengths are in metres,
-angles in degrees.
+are sampled, and for each one the elbows of an arm whose elbow hangs. All is in the client's frame; lengths are in
+metres, angles in degrees.
 
-Sources. Lengths of arms and shoulders: ANSUR (Gordon et al. 1989: acromion to elbow 34 cm in men and 31 cm in women, some
-3 cm of it above the joint's centre; elbow to wrist 27 and 24 cm; biacromial breadth 40 and 36 cm); Winter, Biomechanics and
-Motor Control of Human Movement (0.186 and 0.146 of the stature, 32 and 25 cm at 1.7 m). Distance: people who deal with each
-other stand 0.46 to 1.22 m apart (Hall 1966, personal distance), and where they hand things over depends on the distance
-they keep (Hansen et al. 2017). Direction: handing over from the front is preferred (Koay et al. 2007).
+Sources. Lengths of arms and shoulders: ANSUR (Gordon et al. 1989: acromion to elbow 34 cm in men and 31 cm in women,
+some 3 cm of it above the joint's centre; elbow to wrist 27 and 24 cm; biacromial breadth 40 and 36 cm); Winter,
+Biomechanics and Motor Control of Human Movement (0.186 and 0.146 of the stature, 32 and 25 cm at 1.7 m). Distance:
+people who deal with each other stand 0.46 to 1.22 m apart (Hall 1966, personal distance), and where they hand things
+over depends on the distance they keep (Hansen et al. 2017). Direction: handing over from the front is preferred (Koay
+et al. 2007).
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,8 @@ from solids import Capsules, clearance
 UPPER_ARM, FOREARM, HALF_SHOULDERS = 0.30, 0.26, 0.18
 # Lengths of adults' upper arms and forearms, from small women (5th percentile) to large men (95th) of ANSUR.
 UPPER_ARMS, FOREARMS = (0.25, 0.37), (0.21, 0.30)
-# Largest flexion of an elbow, extension of a shoulder, and adduction of an upper arm across the body (AAOS: 150, 60, 45).
+# Largest flexion of an elbow, extension of a shoulder, and adduction of an upper arm across the body (AAOS: 150, 60 and
+# 45; less is comfortable).
 ELBOW_FLEXION, SHOULDER_EXTENSION, SHOULDER_ADDUCTION = 145, 60, 40
 # Distances between both bodies, azimuths of the receiver from straight opposite, and heights over the giver's shoulder.
 DISTANCES = np.linspace(0.6, 1.2, 7)
@@ -264,9 +266,9 @@ def lines(found):
         asked = [row for row in given if row["stance_fits"] or row.get("stance_possible", not searched)]
         fits = sum(row["stance_fits"] for row in asked)
         share = 100 * fits / max(len(asked), 1)
-        rest = f"; {len(given) - len(asked)} more have none" if searched else "; whether others have any: --search-stance"
+        rest = f"{len(given) - len(asked)} more have none" if searched else "whether others have any: --search-stance"
         name = f"forearm within {NEAR_RECEIVER:.0f}° of a plausible receiver's, elbow reachable, where any has that"
-        figure = f"{share:.0f} % ({fits} of {len(asked)}{rest})"
+        figure = f"{share:.0f} % ({fits} of {len(asked)}; {rest})"
         result.append((name, "≥ 95 %", figure, share >= 95))
         angles = np.array([row["receiver_angle"] for row in given])
         reached = sum(row["elbow_reachable"] for row in given)

@@ -89,7 +89,8 @@ class TestSides:
         turn = Rotation.from_quat([0.3, 0.1, -0.5, 0.8])
         hand = straight_hand("right", [0.0, 0.1, 0.0], DOWN)
         row = choice.judge(bar_scene(), reply(hand))
-        moved = choice.judge(bar_scene(rotation=turn, up=turn.apply([0.0, 1.0, 0.0])), reply(hand.moved(turn, np.zeros(3))))
+        scene = bar_scene(rotation=turn, up=turn.apply([0.0, 1.0, 0.0]))
+        moved = choice.judge(scene, reply(hand.moved(turn, np.zeros(3))))
         assert row == pytest.approx(moved, abs=1e-5)
 
 
