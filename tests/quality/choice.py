@@ -31,14 +31,14 @@ DIRECTIONS = 250
 
 
 def box_of(mesh):
-    """Axes (rows, the longest first) and sides of the smallest box; computed once."""
+    """Axes (rows, the longest first), sides and middle of the smallest box; computed once."""
     if not hasattr(mesh, "smallest_box"):
         mesh.smallest_box = smallest_box(mesh.vertices[np.unique(mesh.faces)])
     return mesh.smallest_box
 
 
 def smallest_box(points):
-    """Axes (rows, the longest first) and sides of the smallest box around points.
+    """Axes (rows, the longest first), sides and middle of the smallest box around points.
 
     The box has a face on a face of the convex hull, and may be slightly larger than one that has none. The axes of the
     frame and the principal axes are tried as well: a sheet has no hull.
@@ -60,7 +60,9 @@ def smallest_box(points):
         if volume < least * (1 - 1e-6):
             best, least = (axes, sides), volume
     order = np.argsort(-best[1])
-    return best[0][order], best[1][order]
+    axes, sides = best[0][order], best[1][order]
+    along = points @ axes.T
+    return axes, sides, (along.max(axis=0) + along.min(axis=0)) / 2 @ axes
 
 
 def around(points, normal):
@@ -103,7 +105,7 @@ def opposition(contacts):
 def judge(scene, grasp):
     """The measures of a grasp by name."""
     hand, contacts = measures.in_object_frame(scene, grasp)
-    axes, sides = box_of(scene.mesh)
+    axes, sides, middle = box_of(scene.mesh)
     wrist = hand.rotations[WRIST]
     approach = wrist.apply([0.0, -(0.5**0.5), -(0.5**0.5)])
     up = scene.rotation.inv().apply(scene.up)
@@ -113,13 +115,14 @@ def judge(scene, grasp):
         "approach_to_axis": folded(approach, axes[0]),
         "palm_to_axis": folded(wrist.apply([0.0, -1.0, 0.0]), axes[0]),
         "forearm_to_axis": folded(stance.forearm_direction(hand), axes[0]),
+        "wrist_to_axis": folded(stance.unit(hand.positions[WRIST] - middle), axes[0]),
         "approach_to_nearest_axis": min(folded(approach, axis) for axis in axes),
         "from_held": from_side(approach, up),
         "from_standing": from_side(approach, [0.0, 1.0, 0.0]),
     }
     if contacts:
-        middle = np.mean([contact["position"] for contact in contacts], axis=0)
-        row["offset_along"] = float(abs((middle - scene.centre_of_mass) @ axes[0]) / (sides[0] / 2))
+        touched = np.mean([contact["position"] for contact in contacts], axis=0)
+        row["offset_along"] = float(abs((touched - scene.centre_of_mass) @ axes[0]) / (sides[0] / 2))
         off = [folded(opposition(contacts), axis) for axis in axes]
         row["across_smallest"] = bool(sides[int(np.argmin(off))] <= SMALLEST * sides[2])
     return row
@@ -148,6 +151,8 @@ def lines(found):
         if taken:
             met = None if held_out else 100 * np.mean(taken) <= PEOPLE_END_ON
             result.append((name, wanted, share(taken), None if met is None else bool(met)))
+            where = share(end_on((row for row in rows if row["held_out"] == held_out), "wrist_to_axis"))
+            result.append((name.replace("taken end-on", "with the wrist toward an end"), "reported", where, None))
     return result
 
 
@@ -175,6 +180,8 @@ def table(found):
         cells = [share(end_on(here, f"{name}_to_axis")) for here in groups]
         people = f"{PEOPLE_END_ON} % (people, 53 objects)" if name == "approach" else ""
         text.append(f"| long things taken end-on, by the {name} | {' | '.join(cells)} | {CHANCE:.0f} % | {people} |")
+    cells = [share(end_on(here, "wrist_to_axis")) for here in groups]
+    text.append(f"| long things with the wrist toward an end, from the middle | {' | '.join(cells)} | | |")
     for name in ("approach", "palm", "forearm"):
         cells = [quartiles((row[f"{name}_to_axis"] for row in here if row["long"]), "°") for here in groups]
         # The cosine of the angle between a random direction and an axis is spread evenly.

@@ -46,8 +46,8 @@ class TestBox:
     @pytest.mark.parametrize("seed", range(4))
     def test_box_of_a_turned_bar_is_the_bar(self, seed):
         turn = Rotation.random(rng=np.random.default_rng(seed))
-        axes, sides = choice.smallest_box(turn.apply(box(BAR)))
-        assert np.allclose(sides, 2 * BAR)
+        axes, sides, middle = choice.smallest_box(turn.apply(box(BAR, centre=(0.3, 0.0, -0.1))))
+        assert np.allclose(sides, 2 * BAR) and np.allclose(middle, turn.apply([0.3, 0.0, -0.1]))
         assert np.allclose(np.abs(axes @ turn.as_matrix()), np.eye(3), atol=1e-4)
 
     def test_sheet_has_a_box(self):
@@ -66,7 +66,7 @@ class TestSides:
         row = judged(bar_scene(), DOWN)
         assert row["long"] and row["from_held"] == row["from_standing"] == "above"
         assert np.isclose(row["approach_to_axis"], 90)
-        assert not choice.end_on([row])[0]
+        assert not choice.end_on([row])[0] and np.isclose(row["wrist_to_axis"], 90)
 
     def test_hand_along_the_axis_is_end_on_and_from_the_side(self):
         row = judged(bar_scene(), ALONG_X)
@@ -114,8 +114,8 @@ class TestContacts:
 class TestTable:
     def test_more_than_people_miss_the_target_only_if_nobody_holds(self):
         rows = [judged(bar_scene(), ALONG_X), {**judged(bar_scene(), ALONG_X), "held_out": True}]
-        assert [met for *_, met in choice.lines(rows)] == [False, None]
-        assert [met for *_, met in choice.lines([judged(bar_scene(), DOWN)])] == [True]
+        assert [met for *_, met in choice.lines(rows)] == [False, None, None, None]
+        assert [met for *_, met in choice.lines([judged(bar_scene(), DOWN)])] == [True, None]
 
     def test_rows_of_two_hands_are_left_out(self):
         assert choice.lines([{"both": True}]) == []
