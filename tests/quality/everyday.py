@@ -133,11 +133,11 @@ def leaves_room(giver, receiver):
     return is_clear(receiver.solids()[0]) and any(map(is_clear, receiver.forearms()))
 
 
-def givers_among(hands):
-    """Up to GIVERS of the hands that leave room for another one that is right."""
+def givers_among(hands, handedness="right"):
+    """Up to GIVERS of the hands that leave room for another one of this handedness, or for any if that is None."""
     chosen = []
     for giver in hands:
-        others = (other for other in hands if other is not giver and other.handedness == "right")
+        others = (other for other in hands if other is not giver and handedness in (None, other.handedness))
         if any(leaves_room(giver, other) for other in others):
             chosen.append(giver)
         if len(chosen) == GIVERS:
@@ -145,11 +145,11 @@ def givers_among(hands):
     return chosen
 
 
-def make_givers(service, chosen, seed):
-    """Givers in the client's frame for each of the things, by name."""
+def make_givers(service, chosen, seed, handedness="right"):
+    """Givers in the client's frame for each of the things, by name, who leave room for a hand of this handedness."""
     result = {}
     for thing in pool.Progress("objects with givers").over(chosen):
-        result[thing.name] = givers_among(hands_on(service, thing, seed))
+        result[thing.name] = givers_among(hands_on(service, thing, seed), handedness)
     return result
 
 

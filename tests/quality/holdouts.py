@@ -211,6 +211,13 @@ def random_request(name, placer, givers, random):
     }
 
 
+def standing_request(name, random):
+    """A request with nobody holding the object: it stands on its -Y side, turned at random about the vertical."""
+    turn = Rotation.from_rotvec([0.0, random.uniform(0.0, 2 * np.pi), 0.0])
+    pose = {"position": [0.0, 1.2, 0.3], "orientation": turn.as_quat().tolist()}
+    return {"object": name, "client_from_object": pose}
+
+
 def giver_of_request(request):
     """The giver's hand of a request in the client's frame, or None."""
     form = request.get("presenting_hand")

@@ -16,11 +16,14 @@ import time
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+import compare
 import everyday
 import holdouts
 import measures
 import pool
 import report
+import seek
+import stance
 from service import Service, built_in_request
 
 # Budget of a request, and of a second one that finds out whether there is any grasp at all.
@@ -43,6 +46,23 @@ def arguments():
     parser.add_argument("--choice", help="choice of the requests, such as best (default: the server's)")
     parser.add_argument("--no-atlas", action="store_true", help="request searches without atlases")
     parser.add_argument("--rig", help="rig of the receiving hand (default: the server's)")
+    parser.add_argument(
+        "--hand",
+        choices=["left", "right", "unspecified"],
+        default="right",
+        help="receiving hand (default: right); unspecified leaves it to the server",
+    )
+    parser.add_argument(
+        "--givers",
+        choices=["all", "none"],
+        default="all",
+        help="none: nobody holds the objects, which stand, turned about the vertical (default: all)",
+    )
+    parser.add_argument(
+        "--search-stance",
+        action="store_true",
+        help="where the hand fits no plausible receiver, find out whether another valid one does (5 s each)",
+    )
     parser.add_argument("--seed", type=int, default=1, help="seed of the random holdouts and searches (default: 1)")
     parser.add_argument("--workers", type=int, help="search threads of the server (default: the server's)")
     parser.add_argument(
@@ -57,6 +77,9 @@ def arguments():
         default=0,
         metavar="PERCENT",
         help="exit with 1 if fewer of the grasps are without fault (default: 0)",
+    )
+    parser.add_argument(
+        "--compare", type=pathlib.Path, metavar="REPORT", help="folder of an earlier report to compare the figures with"
     )
     parser.add_argument("--strict", action="store_true", help="exit with 1 if a target is not met")
     return parser.parse_args()
@@ -87,7 +110,8 @@ def chosen_objects(wanted):
 def cases(name, service, options, givers, thing):
     """Yields the requests on one object, each with a label and the scene that judging needs.
 
-    `givers` are hands to place on the object; or, on an everyday one, `thing`, those that hold it.
+    `givers` are hands to place on the object; or, on an everyday one, `thing`, those that hold it. Without any, nobody
+    holds the object.
     """
     mesh = holdouts.load_mesh(name)
     if name in holdouts.BUILT_IN:
@@ -97,24 +121,29 @@ def cases(name, service, options, givers, thing):
     else:
         description = service.create(name.replace("_", "-").lower(), holdouts.mesh_file(name), holdouts.REAL[name])
     requests = []
-    if name in holdouts.BUILT_IN:
+    if name in holdouts.BUILT_IN and givers:
         for holdout in holdouts.built_in_holdouts(name):
             for turn in range(options.seeds):
                 requests.append((f"{holdout}", built_in_request(holdout), options.seed + turn))
     if thing:
         requests += everyday.requests(thing, givers, options.seed)
     # One random stream per holdout, so that adding an object or a holdout changes no other.
-    placer = None if thing else holdouts.Placer(mesh)
+    placer = holdouts.Placer(mesh) if givers and not thing else None
     for i in range(0 if thing else options.sample):
         random = np.random.default_rng([options.seed, i, *name.encode()])
-        request = holdouts.random_request(description["name"], placer, givers, random)
+        if placer:
+            request = holdouts.random_request(description["name"], placer, givers, random)
+        else:
+            request = holdouts.standing_request(description["name"], random)
         requests.append((f"random {i}", request, int(random.integers(2**31))))
     for label, request, seed in requests:
         request["seed"] = str(seed)
         request["validity"] = options.validity
         request["strategy"] = options.strategy
-        if options.rig:
-            request["receiving_hand"] = {"rig": options.rig, "handedness": "right"}
+        # Who takes something with both hands is not asked with which one.
+        if request.get("hands") != "both":
+            hand = {**(request.get("receiving_hand") or {}), "handedness": asked_handedness(options)}
+            request["receiving_hand"] = {**hand, "rig": options.rig} if options.rig else hand
         pose = request["client_from_object"]
         yield label, request, measures.Scene(
             mesh=mesh,
@@ -127,8 +156,13 @@ def cases(name, service, options, givers, thing):
             translation=np.array(pose["position"]),
             up=np.array(request.get("up") or [0.0, 1.0, 0.0]),
             giver=holdouts.giver_of_request(request),
-            asked_handedness=(request.get("receiving_hand") or {}).get("handedness") or "right",
+            asked_handedness=asked_handedness(options),
         )
+
+
+def asked_handedness(options):
+    """The handedness of the requests, or None if it is left to the server."""
+    return None if options.hand == "unspecified" else options.hand
 
 
 def friction_in_force(request, described, validity):
@@ -156,15 +190,16 @@ def ask(service, request, options, **picture):
 def everyday_givers(names, things, options):
     """Givers of the everyday objects by name, from a server of their own: that which is judged must not know them."""
     chosen = [things[name] for name in names if name in things and not things[name].beyond]
-    if not chosen:
+    if not chosen or options.givers == "none":
         return {}
     with Service(options.workers, "--builder-threads", "0") as service:
-        return everyday.make_givers(service, chosen, options.seed)
+        return everyday.make_givers(service, chosen, options.seed, asked_handedness(options))
 
 
 def collect(names, things, options):
     """Requests all grasps. Returns a row per holdout, and the replies to judge by the index of their row."""
-    recorded, everyday_hands = holdouts.recorded_hands(), everyday_givers(names, things, options)
+    recorded = holdouts.recorded_hands() if options.givers == "all" else []
+    everyday_hands = everyday_givers(names, things, options)
     pictures = options.out / "pictures"
     pictures.mkdir(parents=True, exist_ok=True)
     for old in pictures.glob("*.png"):
@@ -191,6 +226,9 @@ def collect(names, things, options):
                 row["validity"] = answer["report"]["validity"]
                 scene.friction = friction_in_force(request, scene.friction, row["validity"])
                 if answer["grasp"]:
+                    if options.search_stance and not stance.fits(scene, answer["grasp"]):
+                        handedness = answer["grasp"]["handedness"]
+                        row["stance_possible"] = seek.has_fitting(service, request, scene, handedness)
                     drawing = picture.with_name(f"{picture.stem}-alone.png") if wanted else None
                     replies[len(rows)] = pool.Case(
                         name, dataclasses.replace(scene, mesh=None), answer["grasp"], answer.get("other_grasp"), drawing
@@ -215,7 +253,10 @@ def main():
     targets = report.targets(rows)
     print()
     print(report.table(targets))
-    report.write(options.out, rows, targets, vars(options), everyday.table(rows, things))
+    comparison = compare.table(targets, options.compare) if options.compare else ""
+    if comparison:
+        print(f"\n{comparison}")
+    report.write(options.out, rows, targets, vars(options), everyday.table(rows, things), comparison)
     print(f"\n{len(rows)} holdouts in {time.monotonic() - began:.0f} s; the report is {options.out}/README.md")
     if not any(row["found"] for row in rows):
         raise SystemExit("no grasp was found, so there is nothing to judge")

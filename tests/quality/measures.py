@@ -59,7 +59,8 @@ class Scene:
     translation: np.ndarray
     up: np.ndarray
     giver: Hand | None
-    asked_handedness: str = "right"
+    # None if the service may choose.
+    asked_handedness: str | None = "right"
 
     def to_object(self, points):
         """Maps points from the client's frame to the object's."""
@@ -106,7 +107,7 @@ def judge(scene, grasp):
         **giver_clearance(scene.mesh, local, giver),
         **self_clearance(local),
         **forbidden_distance(scene, local),
-        "wrong_chirality": hand.chirality() != hand.handedness or hand.handedness != scene.asked_handedness,
+        "wrong_chirality": hand.chirality() != hand.handedness or scene.asked_handedness not in (None, hand.handedness),
         **comfort(contacts, grasp["comfort"]),
         **reported_margins(grasp),
         **reported_type(grasp),

@@ -10,12 +10,15 @@ from dataclasses import dataclass
 import matplotlib.image
 import numpy as np
 
+import choice
 import convex
 import draw
 import holdouts
+import mannequin
 import measures
 import pairs
 import physics
+import stance
 
 
 @dataclass
@@ -46,10 +49,14 @@ def judged(case, simulated):
     case.scene.mesh = mesh_of(case.object)
     grasps = [case.grasp] + ([case.other] if case.other else [])
     row = pairs.judge(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
+    if not case.other:
+        row.update({**stance.judge(case.scene, case.grasp), **choice.judge(case.scene, case.grasp)})
     if simulated and not case.scene.mesh.is_sheet():
         row.update(survival(case.scene, grasps))
     if case.drawing:
         matplotlib.image.imsave(case.drawing, draw.picture(case.scene, case.grasp))
+        if not case.other:
+            matplotlib.image.imsave(mannequin.file_of(case.drawing), mannequin.picture(case.scene, case.grasp))
     return row
 
 

@@ -9,9 +9,13 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+import choice
+import compare
 import everyday
+import mannequin
 import measures
 import relations
+import stance
 
 # Confidence from which a type counts; targets for the percentage of grasps that have one, and for the number of types.
 CONFIDENT, CLASSIFIED, TYPES = 0.5, 95, 15
@@ -77,6 +81,7 @@ def targets(rows):
     none_of("forbidden surface within 2 mm", column("forbidden_distance") < measures.FORBIDDEN)
     lines += held(found) + classified(found)
     lines += overstated(found)
+    lines += [Target(*line) for line in stance.lines(found) + choice.lines(found)]
     figure = f"median {np.nanmedian(column('comfort')):.4f}, reply off by {np.median(column('comfort_error')):.4f}"
     lines.append(Target("comfort E", "reported", figure, None))
     figure = f"{column('digits_touching').mean():.1f} digits, {column('contacts').mean():.1f} contacts"
@@ -218,18 +223,21 @@ def markdown(lines):
     return "\n".join(rows)
 
 
-def write(folder, rows, lines, options, everyday_table=""):
+def write(folder, rows, lines, options, everyday_table="", comparison=""):
     """Writes the report of a run: CSV, Markdown, plots and contact sheet."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     with open(folder / "grasps.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, columns)
         writer.writeheader()
         writer.writerows(rows)
+    compare.save(folder, lines)
     found = [row for row in rows if row["found"]]
     text = ["# Quality of grasps", ""]
     given = ", ".join(f"{key} {value}" for key, value in options.items() if key not in ("out", "strict") and value)
     text += [f"{len(rows)} holdouts, {len(found)} grasps judged; {given}. Every grasp: [grasps.csv](grasps.csv).", ""]
     text += [markdown(lines), ""]
+    if comparison:
+        text += ["## Compared", "", comparison, ""]
     if everyday_table:
         text += ["## Everyday objects", "", everyday_table, ""]
     if found:
@@ -238,6 +246,7 @@ def write(folder, rows, lines, options, everyday_table=""):
         rated = [row for row in found if "survives_gravity" in row] or found
         if "survives_gravity" in rated[0]:
             text += ["## Survival by epsilon", "", relations.survival_by_epsilon(rated), ""]
+        text += ["## Who takes it how", "", choice.table(found), ""]
         text += ["## Comfort E against the verdict", "", relations.comfort_and_verdict(rated, acceptable, faults), ""]
         relations.scatter(folder / "comfort.svg", rated, acceptable)
         text += ["![E against epsilon, by verdict](comfort.svg)", ""]
@@ -245,6 +254,8 @@ def write(folder, rows, lines, options, everyday_table=""):
             text += ["## Types", "", relations.types(found), ""]
         plots(folder, found)
         text += ["![Distributions](distributions.svg)", ""]
+        if mannequin.sheet(folder, found):
+            text += ["## Who stands where", "", mannequin.LEGEND, "", "![Giver and receiver](stance.png)", ""]
         if sheet(folder, found):
             text += ["## Contact sheet", ""]
             text += ["Green: no fault, gravity survived. Red: the faults. On the right: hand and object alone.", ""]

@@ -149,7 +149,7 @@ def test_a_server_takes_everyday_objects_alone_and_from_givers():
 def test_two_hands_of_a_server_hold_a_box_that_one_cannot(tmp_path):
     things = everyday.things()
     options = argparse.Namespace(
-        choice=None, no_atlas=False, seeds=1, seed=1, sample=0, rig=None, validity=None, strategy=None
+        choice=None, no_atlas=False, seeds=1, seed=1, sample=0, rig=None, hand="right", validity=None, strategy=None
     )
     with Service(None, "--builder-threads", "0") as service:
         asked = list(judge.cases("moving-box", service, options, [], things["moving-box"]))
