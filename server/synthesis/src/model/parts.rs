@@ -19,6 +19,9 @@ const HANDLE_SHARES: [f32; 2] = [0.03, 0.8];
 /// Places found on handles from which they are no accident of the samples.
 const LEAST_PLACES: usize = 4;
 
+/// Mean radius in metres from which a slender part is sized for a hand: stems and wires are thinner.
+const LEAST_RADIUS: f32 = 0.0045;
+
 /// Mass in kilograms below which an object is held by its handle no more than elsewhere: a pen is not a tool's handle.
 const HANDLED_MASS: f32 = 0.03;
 
@@ -38,7 +41,9 @@ pub struct Parts {
     pub long_axis: Vec3,
     /// Degree to which it is long, 0 to 1.
     pub is_long: f32,
-    /// Half its length along that axis, and its whole smallest dimension, in metres.
+    /// The middle of its box, in metres.
+    pub middle: Vec3,
+    /// Half its length along that axis, in metres.
     pub half_length: f32,
     /// Its smallest dimension in metres.
     pub smallest: f32,
@@ -61,14 +66,18 @@ impl Parts {
             .bounding_box
             .object_from_box
             .transform_vector(Vec3::AXES[longest]);
+        let main = handles.main().count();
+        let radii: f32 = handles.main().map(|handle| handle.radius).sum();
         Self {
             is_handled: object.mass >= HANDLED_MASS
                 && (least..=most).contains(&share)
-                && handles.main().count() >= LEAST_PLACES,
+                && main >= LEAST_PLACES
+                && radii >= LEAST_RADIUS * main as f32,
             sharp: SharpFeatures::of(mesh),
             handles,
             long_axis: axis.normalize_or(Vec3::Y),
             is_long: ((ratio - LONG[0]) / (LONG[1] - LONG[0])).clamp(0.0, 1.0),
+            middle: object.bounding_box.object_from_box.position,
             half_length: sides[2],
             smallest: 2.0 * sides[0],
         }

@@ -121,7 +121,8 @@ impl Term {
             // Where a hand comes from and what it holds are what a person notices first.
             Self::FromSideOrAbove => 3.0,
             Self::AcrossLongAxis => 5.0,
-            Self::OnHandle | Self::OffSharp => 6.0,
+            Self::OffSharp => 6.0,
+            Self::OnHandle => 10.0,
             Self::Stance => 12.0,
         }
     }

@@ -26,6 +26,11 @@ use crate::{
 /// Cosines of the angle between approach and long axis at which a hand comes across it, and from its end: 65° and 35°.
 const END_ON: [f32; 2] = [0.42, 0.82];
 
+/// Cosines of the angle at the object's middle between the wrist and the long axis at which the wrist is beside the object, and
+/// beyond its end: 55° and 30°; and how much that counts next to the direction of the hand.
+const BEYOND: [f32; 2] = [0.57, 0.87];
+const BEYOND_WEIGHT: f32 = 0.6;
+
 /// Offset of the contacts' middle from the centre of mass, as a share of half the object's length, up to which a hand is near
 /// and from which it is far; and the offset in metres that is always near.
 const OFFSET: [f32; 2] = [0.15, 0.9];
@@ -74,10 +79,13 @@ pub fn upright_values(object: &GraspObject, object_from_wrist: Pose, up: Vec3) -
     values
 }
 
-/// 1 if a hand comes across the long axis, or if there is none; 0 if from its end.
+/// 1 if a hand comes across the long axis, or if there is none; 0 if it comes along it. A wrist beyond an end loses part of it.
 pub fn across_long_axis(parts: &Parts, object_from_wrist: Pose) -> f32 {
     let along = approach_direction(object_from_wrist).dot(parts.long_axis).abs();
-    1.0 - parts.is_long * ramp(along, END_ON)
+    let from_middle = (object_from_wrist.position - parts.middle).normalize_or_zero();
+    let beyond = from_middle.dot(parts.long_axis).abs();
+    let end_on = ramp(along, END_ON).max(BEYOND_WEIGHT * ramp(beyond, BEYOND));
+    1.0 - parts.is_long * end_on
 }
 
 /// 1 if neither the palm faces up nor the hand moves up; 0 if it reaches beneath the object.

@@ -1,19 +1,24 @@
 //! Known grips as candidates of a race: those of the atlas, then recent ones.
 //!
-//! Where a receiver is expected to stand, a search for the first valid grasp takes those whose forearms come from there first:
-//! of the shortlist, then of the whole atlas. Only if none is valid, it takes another.
+//! A search for the first valid grasp passes them in up to three [`Grade`]s: first those that people would choose, of the
+//! shortlist, then of the whole atlas; then, only if none of them is valid, those of the next grade.
 
 use std::{
     ops::Deref,
     sync::{
         Arc, LazyLock, OnceLock,
-        atomic::{AtomicBool, AtomicUsize, Ordering},
+        atomic::{AtomicU8, AtomicUsize, Ordering},
     },
 };
 
 use glam::Vec3;
 
-use super::{report::GraspSource, scene::Scene, settings::SearchSettings};
+use super::{
+    preference::{HELD_BY_HANDLE, Preference},
+    report::GraspSource,
+    scene::Scene,
+    settings::SearchSettings,
+};
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     known::{
@@ -21,7 +26,12 @@ use crate::{
         entry::Entry,
         recheck::GripChecker,
     },
-    model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
+    model::{
+        grasp::Grasp,
+        hand::rig::Rig,
+        score::{Score, Term},
+        strategy::Choice,
+    },
     physical::{
         barriers::Barriers,
         grip::Gripper,
@@ -48,11 +58,10 @@ pub(super) struct KnownGrips<'a> {
     listed: Vec<u16>,
     /// All grips of the atlas.
     order: &'a [u16],
-    /// Where the receiver stands, if the order follows that. All grips are then passed twice: those whose forearms suit it, then
-    /// the others.
-    receiver: Option<&'a Receiver>,
-    /// True once a grip is valid whose forearm does not suit where the receiver stands.
-    has_fallback: AtomicBool,
+    /// What grips are graded by; none if all are alike.
+    grading: Option<Grading<'a>>,
+    /// The best grade of a valid grip that people would not choose.
+    fallback: AtomicU8,
     /// Recent grips. Mostly they are worse than those of the atlas, which are a selection.
     recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
@@ -62,7 +71,7 @@ pub(super) struct KnownGrips<'a> {
     mechanisms: Mechanisms,
     /// Grips that certainly collide with the giver, computed on first use.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place to try, counted through `listed`, `order` once or twice, and `recent`.
+    /// The next place to try, counted through `listed`, the passes through `order`, and `recent`.
     cursor: AtomicUsize,
 }
 
@@ -116,9 +125,43 @@ pub(super) enum TryResult {
         grasp: Box<Grasp>,
         /// Its quality; higher is better.
         value: f32,
-        /// Whether its forearm suits where the receiver stands, if that is asked.
-        suits: bool,
+        /// Whether people would choose it.
+        is_chosen: bool,
     },
+}
+
+/// How a known grip suits where the receiver stands, and what the object is held by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Grade {
+    /// Its forearm comes from there, and it holds the handle if that is free.
+    Chosen,
+    /// Its forearm comes from there.
+    Suitable,
+    /// It holds.
+    Valid,
+}
+
+/// Number of grades.
+const GRADES: usize = 3;
+
+/// What grips are graded by.
+#[derive(Clone, Copy, Debug)]
+struct Grading<'a> {
+    receiver: &'a Receiver,
+    wants_handle: bool,
+}
+
+impl Grading<'_> {
+    /// The grade of a grip with this forearm. The entry is looked at only if it matters.
+    fn grade(&self, forearm: Vec3, entry: &Entry) -> Grade {
+        if self.receiver.suits_forearm(forearm) < SUITABLE {
+            Grade::Valid
+        } else if self.wants_handle && entry.grip_values[Term::OnHandle as usize] < HELD_BY_HANDLE {
+            Grade::Suitable
+        } else {
+            Grade::Chosen
+        }
+    }
 }
 
 impl<'a> KnownGrips<'a> {
@@ -139,9 +182,11 @@ impl<'a> KnownGrips<'a> {
         }
         let barriers = presented.barriers();
         let is_first_valid = settings.query.choice == Choice::FirstValid;
-        let receiver = Some(&presented.receiver).filter(|receiver| is_first_valid && receiver.is_expected());
+        let &Preference { wants_handle } = scene.preference();
+        let receiver = &presented.receiver;
+        let is_graded = is_first_valid && (receiver.is_expected() || wants_handle);
         // The shortlist serves searches with barriers that any valid grasp ends; it is no better than the rest.
-        let is_listed = is_first_valid && (!barriers.is_empty() || receiver.is_some());
+        let is_listed = is_first_valid && (!barriers.is_empty() || receiver.is_expected());
         let shortlist = match atlas {
             Some(atlas) if is_listed && mechanisms.has(Mechanism::Shortlists) => {
                 atlas.shortlist(presented.up)
@@ -160,8 +205,11 @@ impl<'a> KnownGrips<'a> {
             atlas,
             listed: shortlist.by_value(|forearm| presented.receiver.suits_forearm(forearm)),
             shortlist,
-            receiver,
-            has_fallback: AtomicBool::new(false),
+            grading: is_graded.then_some(Grading {
+                receiver,
+                wants_handle,
+            }),
+            fallback: AtomicU8::new(u8::MAX),
             order: atlas.map_or(&[], order),
             recent,
             scene,
@@ -179,6 +227,11 @@ impl<'a> KnownGrips<'a> {
         self.cursor.load(Ordering::Relaxed)
     }
 
+    /// How often all grips of the atlas are passed.
+    fn passes(&self) -> usize {
+        if self.grading.is_some() { GRADES } else { 1 }
+    }
+
     /// The number of grips in the atlas.
     pub(super) fn atlas_len(&self) -> usize {
         self.order.len()
@@ -187,8 +240,7 @@ impl<'a> KnownGrips<'a> {
     /// Advances to the next grip that does not certainly collide with a barrier, past at most
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
-        let passes = 1 + usize::from(self.receiver.is_some());
-        let end = self.listed.len() + passes * self.order.len() + self.recent.len();
+        let end = self.listed.len() + self.passes() * self.order.len() + self.recent.len();
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
@@ -223,26 +275,19 @@ impl<'a> KnownGrips<'a> {
             };
             return self.of_atlas(index, Solids::Stored(solids));
         };
-        // With a grip to fall back on, only suitable ones are worth trying.
-        let passes_twice = self.receiver.is_some();
-        if place >= self.order.len() && passes_twice && self.has_fallback.load(Ordering::Relaxed) {
-            return None;
+        if place >= self.passes() * self.order.len() {
+            let recent = place - self.passes() * self.order.len();
+            return (self.fallback.load(Ordering::Relaxed) == u8::MAX).then(|| self.recent_at(recent));
         }
-        let (index, is_second) = match self.order.get(place) {
-            Some(&index) => (index, false),
-            None if passes_twice && place < 2 * self.order.len() => {
-                (self.order[place - self.order.len()], true)
-            }
-            None => {
-                let passed = self.order.len() * (1 + usize::from(passes_twice));
-                return Some(self.recent_at(place - passed));
-            }
-        };
+        let (pass, index) = (place / self.order.len(), self.order[place % self.order.len()]);
         let atlas = self.atlas?;
-        if let Some(receiver) = self.receiver
-            && suits(receiver, atlas.grips().forearms()[usize::from(index)]) == is_second
-        {
-            return None;
+        if let Some(grading) = &self.grading {
+            // With a grip to fall back on, only better ones are worth trying.
+            let is_late = pass >= usize::from(self.fallback.load(Ordering::Relaxed));
+            let forearm = atlas.grips().forearms()[usize::from(index)];
+            if is_late || grading.grade(forearm, &atlas.entries()[usize::from(index)]) as usize != pass {
+                return None;
+            }
         }
         if let Some(giver) = self.barriers.giver
             && self.mechanisms.has(Mechanism::CellOccupancy)
@@ -295,17 +340,17 @@ impl<'a> KnownGrips<'a> {
         };
         match self.recheck(entry, &solids, gripper) {
             Some(grasp) => {
-                let suits = self
-                    .receiver
-                    .is_none_or(|receiver| suits(receiver, entry.forearm()));
-                if !suits {
-                    self.has_fallback.store(true, Ordering::Relaxed);
+                let grade = self
+                    .grading
+                    .map_or(Grade::Chosen, |grading| grading.grade(entry.forearm(), entry));
+                if grade != Grade::Chosen {
+                    self.fallback.fetch_min(grade as u8, Ordering::Relaxed);
                 }
                 TryResult::Valid {
                     source,
                     value: grasp_value(&grasp),
                     grasp,
-                    suits,
+                    is_chosen: grade == Grade::Chosen,
                 }
             }
             None => TryResult::Rejected,
@@ -320,11 +365,6 @@ impl<'a> KnownGrips<'a> {
         let grasp = self.checker.check(entry, solids, gripper)?;
         constraints.admits(&grasp).then(|| Box::new(grasp))
     }
-}
-
-/// True if a forearm suits where the receiver stands.
-fn suits(receiver: &Receiver, forearm: Vec3) -> bool {
-    receiver.suits_forearm(forearm) >= SUITABLE
 }
 
 /// The quality of a grasp: its score, or its comfort if it has none; for two hands, their mean.

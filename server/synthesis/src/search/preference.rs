@@ -17,7 +17,7 @@ const LEAST_VALUES: [(Term, f32); 6] = [
 ];
 
 /// Least value of the handle's term, if a handle is free: nearly all contacts are on it.
-const HELD_BY_HANDLE: f32 = 0.8;
+pub(super) const HELD_BY_HANDLE: f32 = 0.8;
 
 /// Distance of a handle's skin from other hands and obstacles, in metres, from which a hand can take it there.
 const ROOM: f32 = 0.012;

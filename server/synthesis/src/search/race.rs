@@ -248,10 +248,10 @@ impl<'a> Race<'a> {
                     source,
                     grasp,
                     value,
-                    suits,
+                    is_chosen,
                 } => {
-                    self.record_valid(source, grasp, value, suits);
-                    if suits {
+                    self.record_valid(source, grasp, value, is_chosen);
+                    if is_chosen {
                         return true;
                     }
                 }
@@ -286,8 +286,8 @@ impl<'a> Race<'a> {
                     source,
                     grasp,
                     value,
-                    suits,
-                } => self.record_valid(source, grasp, value, suits),
+                    is_chosen,
+                } => self.record_valid(source, grasp, value, is_chosen),
             }
         }
         self.falls_back();
