@@ -7,5 +7,6 @@ mod crossing;
 mod local_thickness;
 mod opposed;
 mod oriented_box;
+mod sharp;
 mod solid_box;
 mod triangle_mesh;

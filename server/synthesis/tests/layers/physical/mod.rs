@@ -7,4 +7,5 @@ mod closure;
 mod hand_solids;
 mod hanging;
 mod prepared_hand;
+mod receiver;
 mod stance;

@@ -1,0 +1,91 @@
+//! Sharp edges and points.
+
+use glam::Vec3;
+use grasp_synthesis::geometry::{mesh::TriangleMesh, sharp::SharpFeatures};
+
+use crate::fixtures::meshes::{cuboid, sphere};
+
+/// A wedge along x whose edge, at the origin, encloses an angle in radians.
+fn wedge(angle: f32, half_length: f32) -> TriangleMesh {
+    let depth = 0.04;
+    let half_height = depth * (0.5 * angle).tan();
+    let corner = |x: f32, y: f32, z: f32| Vec3::new(x * half_length, y * half_height, z * depth);
+    let positions = vec![
+        corner(-1.0, 0.0, 0.0),
+        corner(1.0, 0.0, 0.0),
+        corner(-1.0, 1.0, -1.0),
+        corner(1.0, 1.0, -1.0),
+        corner(-1.0, -1.0, -1.0),
+        corner(1.0, -1.0, -1.0),
+    ];
+    let triangles = vec![
+        [0, 1, 3],
+        [0, 3, 2],
+        [1, 0, 4],
+        [1, 4, 5],
+        [2, 3, 5],
+        [2, 5, 4],
+        [0, 2, 4],
+        [1, 5, 3],
+    ];
+    TriangleMesh::new(positions, triangles).expect("a wedge is a mesh")
+}
+
+/// A cone along z with its tip at the origin and half an angle in radians there.
+fn cone(half_angle: f32) -> TriangleMesh {
+    let (sides, length) = (24_u32, 0.05_f32);
+    let radius = length * half_angle.tan();
+    let mut positions = vec![Vec3::ZERO, Vec3::new(0.0, 0.0, -length)];
+    for side in 0..sides {
+        let (sin, cos) = (std::f32::consts::TAU * side as f32 / sides as f32).sin_cos();
+        positions.push(Vec3::new(radius * cos, radius * sin, -length));
+    }
+    let triangles = (0..sides).flat_map(|side| {
+        let (a, b) = (2 + side, 2 + (side + 1) % sides);
+        [[0, a, b], [1, b, a]]
+    });
+    let triangles = triangles.collect();
+    TriangleMesh::new(positions, triangles).expect("a cone is a mesh")
+}
+
+#[test]
+fn a_narrow_wedge_is_sharp_along_its_edge_only() {
+    let sharp = SharpFeatures::of(&wedge(20_f32.to_radians(), 0.05));
+    for x in [-0.045, -0.01, 0.0, 0.02, 0.045] {
+        assert!(sharp.are_near(Vec3::new(x, 0.0, -0.0005)), "{x}");
+        assert!(!sharp.are_near(Vec3::new(x, 0.0, -0.008)), "{x}");
+    }
+}
+
+#[test]
+fn wide_wedges_boxes_and_balls_are_not_sharp() {
+    for mesh in [
+        wedge(35_f32.to_radians(), 0.05),
+        cuboid(Vec3::new(0.04, 0.02, 0.0005), 3),
+        sphere(0.03, 16),
+    ] {
+        assert!(SharpFeatures::of(&mesh).is_empty());
+    }
+}
+
+#[test]
+fn an_edge_shorter_than_a_centimetre_is_a_flaw_of_the_mesh() {
+    assert!(SharpFeatures::of(&wedge(20_f32.to_radians(), 0.004)).is_empty());
+}
+
+#[test]
+fn a_narrow_cone_has_a_point_and_a_wide_one_has_none() {
+    let sharp = SharpFeatures::of(&cone(15_f32.to_radians()));
+    assert!(sharp.are_near(Vec3::new(0.0, 0.0, -0.001)));
+    assert!(!sharp.are_near(Vec3::new(0.0, 0.0, -0.02)));
+    assert!(SharpFeatures::of(&cone(40_f32.to_radians())).is_empty());
+}
+
+#[test]
+fn a_groove_is_no_edge() {
+    // The wedge inside out: a slot that fingers cannot reach into.
+    let wedge = wedge(20_f32.to_radians(), 0.05);
+    let flipped = wedge.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let slot = TriangleMesh::new(wedge.positions().to_vec(), flipped).expect("it is a mesh");
+    assert!(SharpFeatures::of(&slot).is_empty());
+}

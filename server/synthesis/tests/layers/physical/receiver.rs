@@ -1,0 +1,181 @@
+//! Where a receiver stands, and the arm that reaches from there.
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::{
+        hand::{
+            HandPose, Handedness,
+            joints::{HandJoints, index},
+        },
+        receiver::{Arm, ArmPose, Stance},
+    },
+    physical::{barriers::Barriers, receiver::Receiver},
+};
+
+use crate::fixtures::{hands::adult, meshes::sphere, objects::object_of, random::Random};
+
+const UP: Vec3 = Vec3::Y;
+const BONES: [f32; 2] = [0.3, 0.26];
+
+/// A wrist at a point whose straight forearm goes in a direction, with the palm about up or down.
+fn wrist(position: Vec3, forearm: Vec3, roll: f32) -> Pose {
+    let arc = Quat::from_rotation_arc(Vec3::NEG_Y, forearm.normalize_or(Vec3::Z));
+    Pose::new(
+        position,
+        Quat::from_axis_angle(forearm.normalize_or(Vec3::Z), roll) * arc,
+    )
+}
+
+/// A giver's hand with a forearm in a direction, at a point.
+fn giver(position: Vec3, forearm: Vec3) -> HandJoints {
+    let rig = adult(Handedness::Right);
+    HandJoints::of_pose(
+        rig,
+        &HandPose {
+            frame_from_wrist: wrist(position, forearm, 0.3),
+            digits: rig.stretched(),
+        },
+    )
+}
+
+fn arm_at(shoulder: Vec3) -> Arm {
+    let [upper_arm, forearm] = BONES;
+    Arm {
+        shoulder,
+        upper_arm,
+        forearm,
+    }
+}
+
+/// The arm of a hand without anything near.
+fn reached(receiver: &Receiver, handedness: Handedness, wrist: Pose) -> Option<ArmPose> {
+    let far_away = object_of(sphere(0.01, 6), &[]);
+    receiver.arm(adult(handedness), wrist, &far_away.surface, Barriers::NONE)
+}
+
+#[test]
+fn hands_from_opposite_the_giver_suit_and_those_from_the_givers_side_do_not() {
+    let mut random = Random::new(3);
+    for _ in 0..200 {
+        let azimuth = Quat::from_axis_angle(UP, random.between(-3.0, 3.0));
+        let forearm = azimuth * Vec3::new(0.0, random.between(-0.5, 0.5), 1.0).normalize_or(Vec3::Z);
+        let hand = giver(forearm * 0.1, forearm);
+        let receiver = Receiver::new(Stance::Facing, Some(&hand), Vec3::ZERO, UP);
+        let away = -(azimuth * Vec3::Z);
+        assert!(receiver.suits_forearm(away) > 0.8, "{forearm}");
+        assert!(receiver.suits_forearm(forearm) == 0.0, "{forearm}");
+        let aside = azimuth * Vec3::X;
+        assert!(receiver.suits_forearm(aside) < receiver.suits_forearm(away));
+    }
+}
+
+#[test]
+fn suitability_turns_with_the_scene() {
+    let mut random = Random::new(5);
+    for _ in 0..200 {
+        let (forearm, along, turn) = (random.direction(), random.direction(), random.rotation());
+        let suits = |forearm: Vec3, along: Vec3, up: Vec3| {
+            let hand = giver(forearm * 0.1, forearm);
+            Receiver::new(Stance::Facing, Some(&hand), Vec3::ZERO, up).suits_forearm(along)
+        };
+        // Forearms along gravity leave open where the giver stands, and then any direction is as good as another.
+        if forearm.reject_from(UP).length() > 0.3 {
+            let difference = suits(forearm, along, UP) - suits(turn * forearm, turn * along, turn * UP);
+            assert!(difference.abs() < 1e-3, "{forearm} {along}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_expected_without_giver_or_body_or_if_any_stance_will_do() {
+    let hand = giver(Vec3::Z * 0.1, Vec3::Z);
+    for receiver in [
+        Receiver::new(Stance::Facing, None, Vec3::ZERO, UP),
+        Receiver::new(Stance::Any, Some(&hand), Vec3::ZERO, UP),
+    ] {
+        assert!(!receiver.is_expected());
+        assert!((receiver.suits_forearm(Vec3::Z) - 1.0).abs() < f32::EPSILON);
+    }
+}
+
+#[test]
+fn reached_arms_have_their_bones_lengths_and_bend_the_wrist_within_its_range() {
+    let mut random = Random::new(7);
+    let mut count = 0;
+    for _ in 0..600 {
+        let shoulder = Vec3::new(random.between(-0.3, 0.3), random.between(0.0, 0.4), 0.5);
+        let at = Vec3::new(5.0, 0.0, 0.0);
+        let pose = wrist(at, random.direction(), random.between(-3.0, 3.0));
+        let receiver = Receiver::new(Stance::At(arm_at(at + shoulder)), None, at, UP);
+        let handedness = [Handedness::Left, Handedness::Right][random.index(2)];
+        let arm = reached(&receiver, handedness, pose);
+        assert_eq!(arm.is_some(), receiver.reaches(adult(handedness), pose));
+        let Some(arm) = arm else { continue };
+        count += 1;
+        assert!((arm.elbow.distance(arm.shoulder) - BONES[0]).abs() < 1e-4);
+        assert!((arm.elbow.distance(pose.position) - BONES[1]).abs() < 1e-4);
+        // The angles lead from the wrist back to the elbow: flexion about x, deviation to the little finger's side.
+        let little = if handedness == Handedness::Right {
+            -1.0
+        } else {
+            1.0
+        };
+        let (bent, along) = arm.deviation.sin_cos();
+        let back = Vec3::new(
+            little * bent,
+            -along * arm.flexion.cos(),
+            along * arm.flexion.sin(),
+        );
+        let elbow = pose.transform_point(back * BONES[1]);
+        assert!(elbow.distance(arm.elbow) < 1e-4, "{arm:?}");
+        let degrees = [arm.flexion, arm.deviation].map(f32::to_degrees);
+        assert!((-70.1..=80.1).contains(&degrees[0]) && (-20.1..=30.1).contains(&degrees[1]));
+        assert!(!arm.is_assumed);
+    }
+    assert!(count > 60, "{count}");
+}
+
+#[test]
+fn mirrored_arms_mirror() {
+    let mut random = Random::new(9);
+    let flip = Vec3::new(-1.0, 1.0, 1.0);
+    let at = Vec3::new(0.0, 0.0, 5.0);
+    for _ in 0..200 {
+        let shoulder = at + Vec3::new(random.between(-0.3, 0.3), 0.2, 0.45);
+        let pose = wrist(at, random.direction(), random.between(-3.0, 3.0));
+        let mirrored = pose.mirrored_x();
+        let of = |shoulder: Vec3, handedness, pose: Pose| {
+            let receiver = Receiver::new(Stance::At(arm_at(shoulder)), None, at, UP);
+            reached(&receiver, handedness, pose)
+        };
+        let right = of(shoulder, Handedness::Right, pose);
+        let left = of(shoulder * flip, Handedness::Left, mirrored);
+        assert_eq!(right.is_some(), left.is_some());
+        if let (Some(right), Some(left)) = (right, left) {
+            assert!((right.elbow * flip).distance(left.elbow) < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn arms_keep_clear_of_the_object() {
+    // A ball where the elbow would hang.
+    let pose = wrist(Vec3::ZERO, Vec3::new(0.0, -0.2, 1.0), 0.0);
+    let receiver = Receiver::new(
+        Stance::At(arm_at(Vec3::new(0.0, 0.2, 0.45))),
+        None,
+        Vec3::ZERO,
+        UP,
+    );
+    let rig = adult(Handedness::Right);
+    let far = object_of(sphere(0.01, 6), &[]);
+    let free = receiver
+        .arm(rig, pose, &far.surface, Barriers::NONE)
+        .expect("it reaches");
+    let moved = crate::fixtures::meshes::moved(&sphere(0.06, 12), Quat::IDENTITY, free.elbow);
+    let ball = object_of(moved, &[]);
+    if let Some(arm) = receiver.arm(rig, pose, &ball.surface, Barriers::NONE) {
+        assert!(arm.elbow.distance(free.elbow) > 0.06 + 0.04, "{arm:?}");
+    }
+}
