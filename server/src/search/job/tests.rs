@@ -224,7 +224,8 @@ fn answers_every_request_that_passes_validation() {
             seed: 3,
             arrived,
             workers: 1,
-            known: KnownGrips::default(),
+            improvement: Duration::from_micros(100),
+            known: Default::default(),
             mechanisms: Mechanisms::ALL,
         };
         match job
