@@ -217,6 +217,7 @@ mod tests {
         let settings = SearchSettings {
             query: Query {
                 choice,
+                improvement: Duration::ZERO,
                 ..Query::default()
             },
             run: Run {
