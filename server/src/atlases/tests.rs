@@ -278,6 +278,49 @@ fn stops_building_for_an_evicted_object() {
     until("the end of the first", || first.strong_count() == 0);
 }
 
+/// Number of grips of each hand that requests of an object can use, right before left.
+fn entries(object: &StoredObject) -> [usize; 2] {
+    [Handedness::Right, Handedness::Left].map(|side| {
+        let hand = hand("adult", side).unwrap();
+        let grown = object.atlas_slots.get(hand).and_then(|slot| slot.grown);
+        grown.map_or(0, |grown| grown.atlas.entries().len())
+    })
+}
+
+#[test]
+fn both_hands_of_every_new_object_become_useful_before_any_grows_on() {
+    const USEFUL: usize = 100;
+    let store = store(10, 1 << 30);
+    let objects = ["a", "b"].map(|id| store.insert(small(id)).unwrap());
+    let atlases = start(1, &store);
+    for object in &objects {
+        atlases.register(object);
+    }
+    let all = || objects.each_ref().map(|object| entries(object));
+    until("useful atlases", || {
+        all().as_flattened().iter().all(|&count| count >= USEFUL)
+    });
+    // By then an atlas had a turn or two more, each of a quarter of its grips.
+    let most = all().into_iter().flatten().max().unwrap();
+    assert!(most < 4 * USEFUL, "{:?}", all());
+}
+
+#[test]
+fn hands_requested_together_do_not_evict_each_other() {
+    let object = Arc::new(small("a"));
+    let grown = grown(&object);
+    let atlases = start(0, &store(10, grown.bytes() + 10));
+    let left = hand("adult", Handedness::Left).unwrap();
+    atlases.0.request(&object, [Some(adult()), Some(left)]);
+    let publish = |hand| {
+        let update = Update::of(Arc::clone(&grown));
+        atlases.0.loaded.publish(&object, hand, update, Duration::ZERO)
+    };
+    assert!(publish(adult()));
+    assert!(!publish(left), "there is room for one of them");
+    assert!(object.atlas_slots.get(adult()).unwrap().grown.is_some());
+}
+
 #[test]
 fn builders_end_when_stopped_or_dropped() {
     let store = store(10, 1 << 30);

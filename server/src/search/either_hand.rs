@@ -285,3 +285,6 @@ impl EitherHand<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
