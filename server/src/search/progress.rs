@@ -152,8 +152,13 @@ impl Progress {
             replaceable_until,
             missing_hand,
             known_grips,
+            is_reproducible,
             ..
         } = sum;
+        if is_reproducible {
+            // How many others were found by then depends on the slices.
+            report.candidates = u64::from(best.is_some());
+        }
         if best.is_some() {
             // The nearest miss is reported only if there is no grasp.
             report.nearest_miss = None;
