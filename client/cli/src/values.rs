@@ -357,6 +357,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn zero_is_a_duration_only_where_it_switches_off() {
+        assert_eq!(parse_duration_or_none("0"), Ok(Duration::ZERO));
+        assert_eq!(parse_duration_or_none("0ms"), Ok(Duration::ZERO));
+        assert_eq!(parse_duration_or_none("2ms"), Ok(Duration::from_millis(2)));
+        assert!(parse_duration("0ms").is_err());
+        for wrong in ["", "-1ms", "5", "1h"] {
+            assert!(parse_duration_or_none(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn a_turned_place_has_four_numbers() {
+        let expected = Turned {
+            position: Vec3::new(0.0, -1.0, 0.5),
+            degrees: -90.0,
+        };
+        assert_eq!(parse_turned("0,-1,0.5,-90"), Ok(expected));
+        for wrong in ["", "0,0,0", "0,0,0,0,0", "0,0,0,x"] {
+            assert!(parse_turned(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
     fn accepts_grasp_type_names_of_answers() {
         for grasp_type in GraspType::ALL {
             let words = name_of(&grasp_type);
