@@ -9,6 +9,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "grasp/v1/geometry.proto",
         "grasp/v1/hand.proto",
         "grasp/v1/obstacle.proto",
+        "grasp/v1/receiver.proto",
         "grasp/v1/constraints.proto",
         "grasp/v1/object_service.proto",
         "grasp/v1/grasp_type.proto",

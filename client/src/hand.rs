@@ -126,6 +126,7 @@ pub enum PresentingHand {
 pub struct ReceivingHand {
     /// Name of the rig; none: the server's default.
     pub rig: Option<String>,
-    /// Left or right; none: right.
+    /// Left or right; none: the better of both, as [`Grasp::handedness`](crate::Grasp::handedness) says. Then the right one under
+    /// [`Validity::Thesis`](crate::Validity::Thesis).
     pub handedness: Option<Handedness>,
 }

@@ -19,7 +19,8 @@
 //!
 //! - [`GraspClient`] connects and calls, with deadlines and retries; it is cheap to clone.
 //! - [`FindRequest`] describes the holdout and the search, [`FindAnswer`] the result. [`PresentingHand`] is the giver's
-//!   hand; [`Obstacle`]s are kept clear of like it; [`Constraints`] are requirements on the grasp.
+//!   hand; [`Obstacle`]s are kept clear of like it; [`Receiver`] is the body whose arm has to reach; [`Constraints`] are
+//!   requirements on the grasp.
 //! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
 //!
 //! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
@@ -42,6 +43,7 @@ mod object;
 mod obstacle;
 mod pose;
 mod query;
+mod receiver;
 mod retry;
 mod score;
 mod search;
@@ -60,6 +62,7 @@ pub use object::{AtlasState, ForbiddenSurfaces, Health, NewObject, Object, Objec
 pub use obstacle::{Capsule, Obstacle, SolidBox};
 pub use pose::Pose;
 pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};
+pub use receiver::{Arm, Receiver, ReceiverBody, ReceiverStance, StandingBody};
 pub use retry::RetryPolicy;
 pub use score::{Score, ScoreTerm};
 pub use search::{

@@ -69,7 +69,8 @@ pub enum BendRatios {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Choice {
-    /// The first one found.
+    /// The first one found, or a better one found within [`FindRequest::improvement`](crate::FindRequest::improvement) if it is
+    /// one that a person would not choose.
     FirstValid,
     /// The one with the highest score (of both hands: the highest mean) among all found within the budget. Without a budget
     /// in the request, that is 5 ms; if nothing is found by then, the first one found within the server's default budget is

@@ -14,12 +14,14 @@ use crate::{
     obstacle::Obstacle,
     pose::Pose,
     query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity},
+    receiver::{Arm, Receiver, ReceiverStance},
     score::Score,
 };
 
 /// A holdout (an object, its pose, the giver's hand and what else is near), and how to search for a grasp.
 ///
-/// In JSON, fields keep their names, except that `budget` is `budget_seconds`; all but `object` are optional.
+/// In JSON, fields keep their names, except that `budget` is `budget_seconds` and `improvement` is `improvement_seconds`; all
+/// but `object` are optional.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FindRequest {
@@ -40,7 +42,8 @@ pub struct FindRequest {
     /// Time limit of the search; more than 0; none: the server's default.
     #[serde(default, rename = "budget_seconds", with = "json::optional_seconds")]
     pub budget: Option<Duration>,
-    /// Largest number of attempts; more than 0; none: limited by the budget only.
+    /// Largest number of attempts, of both hands together if the search chooses between them; more than 0; none: limited by the
+    /// budget only.
     #[serde(default)]
     pub max_attempts: Option<u64>,
     /// Search strategy; none: the server's default.
@@ -58,8 +61,9 @@ pub struct FindRequest {
     /// Decide by the indices of the valid attempts: the answer does not depend on the number of workers.
     #[serde(default)]
     pub reproducible: bool,
-    /// Replay: run only this attempt of the seed, without trying known grasps first. An attempt that fails continues near
-    /// grasps of the atlas: it repeats exactly with an atlas of the same stamp, or again without one.
+    /// Replay: run only this attempt of the seed, without trying known grasps first. Requires [`ReceivingHand::handedness`] under
+    /// [`Validity::Physical`]. An attempt that fails continues near grasps of the atlas: it repeats exactly with an atlas of the
+    /// same stamp, or again without one.
     #[serde(default)]
     pub only_attempt: Option<u64>,
     /// Report the time spent in each step.
@@ -94,6 +98,17 @@ pub struct FindRequest {
     /// How many hands take the object; none: one.
     #[serde(default)]
     pub hands: Option<Hands>,
+    /// The receiver's body; none: `receiver_stance` says where the receiver is expected. Only under [`Validity::Physical`] and
+    /// [`Hands::One`].
+    #[serde(default)]
+    pub receiver: Option<Receiver>,
+    /// Where a receiver without a body is expected to stand; none: facing the giver.
+    #[serde(default)]
+    pub receiver_stance: Option<ReceiverStance>,
+    /// How much longer [`Choice::FirstValid`] searches after a valid grasp that a person would not choose; 0 switches it off; at
+    /// most 1 s and the budget; none: the server's default.
+    #[serde(default, rename = "improvement_seconds", with = "json::optional_seconds")]
+    pub improvement: Option<Duration>,
 }
 
 impl FindRequest {
@@ -123,6 +138,9 @@ impl FindRequest {
             other_hands: Vec::new(),
             obstacles: Vec::new(),
             hands: None,
+            receiver: None,
+            receiver_stance: None,
+            improvement: None,
         }
     }
 
@@ -237,6 +255,10 @@ pub struct Grasp {
     /// object at rest, after it has swung until its centre of mass is below the fingers.
     #[serde(default)]
     pub hangs: bool,
+    /// The receiver's arm, if [`FindRequest::receiver`] is set, or if a receiver is expected to face the giver and the arm reaches
+    /// from there; none under [`Validity::Thesis`].
+    #[serde(default)]
+    pub arm: Option<Arm>,
 }
 
 /// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.
@@ -259,7 +281,8 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
-    /// The wrist, the contacts or the grasp violate the request's constraints, or two hands do not suit one body.
+    /// The wrist, the contacts or the grasp violate the request's constraints, the receiver's arm does not reach the wrist, or
+    /// two hands do not suit one body.
     UnmetConstraint,
     /// A kind unknown to this version of the library.
     Unrecognised,
@@ -313,6 +336,9 @@ pub struct NearestMiss {
     pub wrench_angle: Option<f32>,
     /// The wrist's joint frame in the client's frame.
     pub client_from_wrist: Pose,
+    /// The hand of the attempt; none from servers that do not say.
+    #[serde(default)]
+    pub handedness: Option<Handedness>,
 }
 
 /// Origin of a grasp.
@@ -402,12 +428,15 @@ pub struct SearchReport {
     /// Origin of the grasp; none without one, or if unknown to this version of the library.
     #[serde(default)]
     pub source: Option<GraspSource>,
-    /// Number of atlas entries available.
+    /// Number of atlas entries available to the hand of the grasp or, without one, of the nearest miss.
     #[serde(default)]
     pub atlas_entries: u32,
-    /// Identifies the state of the atlas used, in hexadecimal; none if none was used.
+    /// Identifies the state of that hand's atlas, in hexadecimal; none if none was used.
     #[serde(default)]
     pub atlas_stamp: Option<String>,
+    /// If the search chose between both hands: the stamp of the other hand's atlas; none if none was used.
+    #[serde(default)]
+    pub other_atlas_stamp: Option<String>,
     /// What the server repaired in the request, such as radii of the giver's joints that were 0.
     #[serde(default)]
     pub warnings: Vec<String>,

@@ -1,6 +1,6 @@
 //! Converts grasps and reports to messages in the client's frame and convention.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use glam::Vec3;
 use grasp_proto::v1;
@@ -15,6 +15,7 @@ use grasp_synthesis::{
             joints::{HandJoints, JOINT_COUNT, openxr_from_thesis_frame},
             rig::Rig,
         },
+        receiver::ArmPose,
         score::{Score, Term},
         strategy::{Strategy, Validity},
     },
@@ -45,6 +46,8 @@ pub(crate) struct Circumstances<'a> {
     pub budget: Duration,
     /// What was repaired in the request.
     pub warnings: &'a [String],
+    /// The atlas of the hand that the search might have chosen instead.
+    pub other_atlas: Option<&'a Arc<Atlas>>,
 }
 
 /// The response to a `FindGrasp` request.
@@ -71,7 +74,7 @@ pub(crate) fn find_response(
     Ok(v1::FindGraspResponse {
         outcome: wire_outcome.into(),
         grasp: outcome.grasp.as_ref().map(|grasp| wire_grasp(grasp, rig, frame)),
-        report: Some(report(&outcome.report, frame, settings, circumstances)),
+        report: Some(report(&outcome.report, rig, frame, settings, circumstances)),
         other_grasp: other_grasp(),
     })
 }
@@ -184,6 +187,21 @@ fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
             .map(|key_frame| wire_key_frame(key_frame, rig, frame))
             .collect(),
         hangs: grasp.hangs,
+        arm: grasp.arm.as_ref().map(|arm| wire_arm(arm, frame)),
+    }
+}
+
+fn wire_arm(arm: &ArmPose, frame: ClientFrame) -> v1::Arm {
+    let point = |p| {
+        let in_client = frame.client_from_object.transform_point(p);
+        Some(vector(frame.convention.point_from_openxr(in_client)))
+    };
+    v1::Arm {
+        client_shoulder: point(arm.shoulder),
+        client_elbow: point(arm.elbow),
+        wrist_flexion: arm.flexion,
+        wrist_deviation: arm.deviation,
+        assumed: arm.is_assumed,
     }
 }
 
@@ -248,6 +266,7 @@ fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, frame: ClientFrame
 
 fn report(
     report: &SearchReport,
+    rig: &Rig,
     frame: ClientFrame,
     settings: &SearchSettings,
     circumstances: Circumstances<'_>,
@@ -270,7 +289,10 @@ fn report(
         search_time: Some(wire_duration(circumstances.search_time)),
         budget: Some(wire_duration(circumstances.budget)),
         workers: u32::try_from(settings.run.workers).unwrap_or(u32::MAX),
-        nearest_miss: report.nearest_miss.as_ref().map(|miss| nearest_miss(miss, frame)),
+        nearest_miss: report
+            .nearest_miss
+            .as_ref()
+            .map(|miss| nearest_miss(miss, rig, frame)),
         strategy: wire_strategy(settings.query.strategy).into(),
         validity: wire_validity(settings.query.validity).into(),
         candidates: report.candidates,
@@ -290,6 +312,10 @@ fn report(
             .unwrap_or_default(),
         warnings: circumstances.warnings.to_vec(),
         limits: report.limits.iter().map(wire_limit).collect(),
+        other_atlas_stamp: circumstances
+            .other_atlas
+            .map(|atlas| atlas_stamp(atlas))
+            .unwrap_or_default(),
     }
 }
 
@@ -326,7 +352,7 @@ fn step_times(times: &StepTimes) -> Vec<v1::StepTime> {
     .collect()
 }
 
-fn nearest_miss(miss: &NearestMiss, frame: ClientFrame) -> v1::NearestMiss {
+fn nearest_miss(miss: &NearestMiss, rig: &Rig, frame: ClientFrame) -> v1::NearestMiss {
     let HandPose { frame_from_wrist, .. } = miss.pose;
     let client_from_wrist = frame.client_from_object * openxr_from_thesis_frame(frame_from_wrist);
     v1::NearestMiss {
@@ -334,6 +360,7 @@ fn nearest_miss(miss: &NearestMiss, frame: ClientFrame) -> v1::NearestMiss {
         attempt: miss.attempt,
         wrench_angle: miss.wrench_angle,
         client_from_wrist: Some(wire_pose(frame.convention.joint_from_openxr(client_from_wrist))),
+        handedness: wire_handedness(rig.handedness).into(),
     }
 }
 

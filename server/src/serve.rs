@@ -192,6 +192,7 @@ impl Server {
                 Instant::now(),
             )),
             budgets: config.budgets,
+            improvement: config.improvement,
             obj_limits,
             default_rig: config.default_rig,
             mechanisms: config.mechanisms,

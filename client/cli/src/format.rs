@@ -127,6 +127,7 @@ mod tests {
             source: None,
             atlas_entries: 0,
             atlas_stamp: None,
+            other_atlas_stamp: None,
             limits: Vec::new(),
             warnings: Vec::new(),
         };

@@ -4,29 +4,40 @@ use std::{sync::LazyLock, time::Duration};
 
 use clap::{ValueEnum, builder::PossibleValue};
 use glam::Vec3;
-use grasp_client::{BendRatios, Choice, Digit, GraspType, Handedness, Hands, Strategy, Validity};
+use grasp_client::{
+    BendRatios, Choice, Digit, GraspType, Handedness, Hands, ReceiverStance, Strategy, Validity,
+};
 
 use crate::format::name_of;
 
 /// Parses a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let expected = || format!("{text:?} is not a duration; write for example 500ms, 2s or 1m, more than 0");
-    let unit_start = text
-        .find(|c: char| !c.is_ascii_digit() && c != '.')
-        .ok_or_else(expected)?;
+    duration(text)
+        .filter(|duration| !duration.is_zero())
+        .ok_or_else(expected)
+}
+
+/// Parses a duration in the same way, or 0 with any unit or none.
+pub(crate) fn parse_duration_or_none(text: &str) -> Result<Duration, String> {
+    if text == "0" {
+        return Ok(Duration::ZERO);
+    }
+    duration(text).ok_or_else(|| format!("{text:?} is not a duration; write for example 2ms, 1s or 0"))
+}
+
+fn duration(text: &str) -> Option<Duration> {
+    let unit_start = text.find(|c: char| !c.is_ascii_digit() && c != '.')?;
     let (number, unit) = text.split_at(unit_start);
     let seconds_per_unit = match unit {
         "us" => 1e-6,
         "ms" => 1e-3,
         "s" => 1.0,
         "m" => 60.0,
-        _ => return Err(expected()),
+        _ => return None,
     };
-    let seconds = number.parse::<f64>().map_err(|_| expected())? * seconds_per_unit;
-    Duration::try_from_secs_f64(seconds)
-        .ok()
-        .filter(|duration| !duration.is_zero())
-        .ok_or_else(expected)
+    let seconds = number.parse::<f64>().ok()? * seconds_per_unit;
+    Duration::try_from_secs_f64(seconds).ok()
 }
 
 /// Parses a vector such as `0,0.01,-0.02`.
@@ -57,6 +68,26 @@ pub(crate) fn parse_cone(text: &str) -> Result<Cone, String> {
     Ok(Cone {
         direction: parse_vector(direction).map_err(|_| expected())?,
         half_angle_degrees: degrees.trim().parse().map_err(|_| expected())?,
+    })
+}
+
+/// A place and a turn about the vertical.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Turned {
+    /// The place.
+    pub(crate) position: Vec3,
+    /// The turn.
+    pub(crate) degrees: f32,
+}
+
+/// Parses a place with a turn such as `0,0,-1,180`: a position and degrees.
+pub(crate) fn parse_turned(text: &str) -> Result<Turned, String> {
+    let expected =
+        || format!("{text:?} is not a place; write a position and degrees, for example 0,0,-1,180");
+    let (position, degrees) = text.rsplit_once(',').ok_or_else(expected)?;
+    Ok(Turned {
+        position: parse_vector(position).map_err(|_| expected())?,
+        degrees: degrees.trim().parse().map_err(|_| expected())?,
     })
 }
 
@@ -237,20 +268,41 @@ impl From<BendRatiosName> for BendRatios {
     }
 }
 
-/// A left or a right hand.
+/// The hand to pose.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum HandName {
     /// The left hand.
     Left,
     /// The right hand.
     Right,
+    /// The better of both.
+    Either,
 }
 
-impl From<HandName> for Handedness {
+impl From<HandName> for Option<Handedness> {
     fn from(name: HandName) -> Self {
         match name {
-            HandName::Left => Self::Left,
-            HandName::Right => Self::Right,
+            HandName::Left => Some(Handedness::Left),
+            HandName::Right => Some(Handedness::Right),
+            HandName::Either => None,
+        }
+    }
+}
+
+/// Where a receiver is expected to stand.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum StanceName {
+    /// Opposite the giver.
+    Facing,
+    /// Anywhere.
+    Any,
+}
+
+impl From<StanceName> for ReceiverStance {
+    fn from(name: StanceName) -> Self {
+        match name {
+            StanceName::Facing => Self::FacingGiver,
+            StanceName::Any => Self::Any,
         }
     }
 }
@@ -303,6 +355,29 @@ impl ValueEnum for GraspTypeName {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn zero_is_a_duration_only_where_it_switches_off() {
+        assert_eq!(parse_duration_or_none("0"), Ok(Duration::ZERO));
+        assert_eq!(parse_duration_or_none("0ms"), Ok(Duration::ZERO));
+        assert_eq!(parse_duration_or_none("2ms"), Ok(Duration::from_millis(2)));
+        assert!(parse_duration("0ms").is_err());
+        for wrong in ["", "-1ms", "5", "1h"] {
+            assert!(parse_duration_or_none(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn a_turned_place_has_four_numbers() {
+        let expected = Turned {
+            position: Vec3::new(0.0, -1.0, 0.5),
+            degrees: -90.0,
+        };
+        assert_eq!(parse_turned("0,-1,0.5,-90"), Ok(expected));
+        for wrong in ["", "0,0,0", "0,0,0,0,0", "0,0,0,x"] {
+            assert!(parse_turned(wrong).is_err(), "{wrong:?}");
+        }
+    }
 
     #[test]
     fn accepts_grasp_type_names_of_answers() {

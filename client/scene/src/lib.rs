@@ -26,7 +26,7 @@ pub mod views;
 
 pub use camera::Camera;
 pub use glb::{GlbWriter, to_glb};
-pub use handover::{ContactMark, HandoverScene, PosedHand};
+pub use handover::{ArmJoints, ContactMark, HandoverScene, PosedHand};
 pub use image::{Image, contact_sheet, side_by_side};
 pub use render::{RenderOptions, render, render_png};
 pub use scene::{Finish, Part, Scene, linear_from_srgb};

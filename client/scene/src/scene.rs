@@ -91,13 +91,6 @@ impl Scene {
     pub fn points(&self) -> impl Iterator<Item = Vec3> + Clone + '_ {
         self.parts.iter().flat_map(|part| part.positions.iter().copied())
     }
-
-    /// The corners of the smallest box around all parts along the axes; none for a scene without vertices.
-    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        self.points()
-            .map(|p| (p, p))
-            .reduce(|(min, max), (p, _)| (min.min(p), max.max(p)))
-    }
 }
 
 /// Linear RGBA of an opaque sRGB colour, 0 to 255 per channel.

@@ -28,14 +28,15 @@ pub const MIN_ANGLE_BETWEEN_VIEWS: f32 = 1.222;
 pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, aspect: f32) -> [Camera; 2] {
     let triangles = flat_triangles_of(scene);
     let importances: Vec<f32> = scene.parts.iter().map(importance).collect();
-    let frame = |direction: Vec3| {
-        let framed = scene.parts.iter().zip(&importances).filter(|(_, i)| **i > 0.0);
-        let points = framed.flat_map(|(part, _)| part.positions.iter().copied());
-        Camera::framing_points(points, direction, up, aspect)
+    let framed = || {
+        let parts = scene.parts.iter().zip(&importances).filter(|(_, i)| **i > 0.0);
+        parts.flat_map(|(part, _)| part.positions.iter().copied())
     };
-    let centre = scene
-        .bounds()
-        .map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5);
+    let frame = |direction: Vec3| Camera::framing_points(framed(), direction, up, aspect);
+    let corners = framed()
+        .map(|p| (p, p))
+        .reduce(|(low, high), (p, _)| (low.min(p), high.max(p)));
+    let centre = corners.map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5);
     let to_up = Quat::from_rotation_arc(Vec3::Y, up.normalize_or(Vec3::Y));
     let mut directions = Vec::new();
     for (elevation, welcome) in ELEVATIONS {

@@ -8,6 +8,7 @@ mod geometry_codec;
 mod hand_codec;
 mod object_codec;
 mod obstacle_codec;
+mod receiver_codec;
 mod search_codec;
 
 pub(crate) use object_codec::{

@@ -14,6 +14,7 @@ use super::{
         presenting_hand_to_wire, receiving_hand_to_wire,
     },
     obstacle_codec::obstacle_to_wire,
+    receiver_codec::{arm_from_wire, receiver_to_wire, stance_to_wire},
     required,
 };
 use crate::{
@@ -82,6 +83,9 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
             Some(Hands::Both) => v1::Hands::Both,
         }
         .into(),
+        receiver: request.receiver.map(receiver_to_wire),
+        receiver_stance: stance_to_wire(request.receiver_stance).into(),
+        improvement: request.improvement.map(duration_to_wire),
     }
 }
 
@@ -234,6 +238,11 @@ fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
         score: grasp.score.map(score_from_wire),
         key_frames: each("key_frames", grasp.key_frames, key_frame_from_wire)?,
         hangs: grasp.hangs,
+        arm: grasp
+            .arm
+            .map(arm_from_wire)
+            .transpose()
+            .map_err(|malformed| malformed.within("arm"))?,
     })
 }
 
@@ -320,6 +329,7 @@ fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed>
             attempt: miss.attempt,
             wrench_angle: miss.wrench_angle,
             client_from_wrist: pose_from_wire(miss.client_from_wrist),
+            handedness: handedness_from_wire("handedness", miss.handedness).ok(),
         }),
         strategy: strategy_from_wire(report.strategy),
         validity: validity_from_wire(report.validity),
@@ -327,6 +337,7 @@ fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed>
         source: source_from_wire(report.source),
         atlas_entries: report.atlas_entries,
         atlas_stamp: Some(report.atlas_stamp).filter(|stamp| !stamp.is_empty()),
+        other_atlas_stamp: Some(report.other_atlas_stamp).filter(|stamp| !stamp.is_empty()),
         limits: report.limits.into_iter().map(limit_from_wire).collect(),
         warnings: report.warnings,
     })

@@ -8,6 +8,7 @@ use crate::{
     hand::{Digit, DigitAngles, HandAngles, Handedness, JOINT_COUNT, Phalanx, PresentingHand},
     obstacle::Obstacle,
     pose::Pose,
+    receiver::{Arm, Receiver, ReceiverStance},
 };
 
 fn wire_vector(x: f32) -> v1::Vector3 {
@@ -67,6 +68,13 @@ fn wire_grasp() -> v1::Grasp {
         r#type: v1::GraspType::Quadpod.into(),
         type_confidence: 0.75,
         hangs: true,
+        arm: Some(v1::Arm {
+            client_shoulder: Some(wire_vector(0.41)),
+            client_elbow: Some(wire_vector(0.42)),
+            wrist_flexion: 0.43,
+            wrist_deviation: -0.44,
+            assumed: true,
+        }),
         score: Some(v1::Score {
             total: 0.21,
             terms: vec![v1::ScoreTerm {
@@ -120,6 +128,7 @@ fn wire_report() -> v1::SearchReport {
         source: v1::GraspSource::Atlas.into(),
         atlas_entries: 25,
         atlas_stamp: "26".to_owned(),
+        other_atlas_stamp: "33".to_owned(),
         limits: vec![
             v1::Limit {
                 kind: v1::LimitKind::Torque.into(),
@@ -189,6 +198,14 @@ fn converts_every_number_of_an_answer() {
         (margins.giver_clearance, margins.obstacle_clearance),
         (Some(0.031), Some(0.032))
     );
+    let arm = Arm {
+        client_shoulder: Vec3::X * 0.41,
+        client_elbow: Vec3::X * 0.42,
+        wrist_flexion: 0.43,
+        wrist_deviation: -0.44,
+        assumed: true,
+    };
+    assert_eq!(grasp.arm, Some(arm));
     let score = grasp.score.unwrap();
     let term = &score.terms[0];
     assert_eq!(
@@ -202,6 +219,7 @@ fn converts_every_number_of_an_answer() {
     assert_eq!((report.candidates, report.atlas_entries), (24, 25));
     assert_eq!(report.source, Some(GraspSource::Atlas));
     assert_eq!(report.atlas_stamp.as_deref(), Some("26"));
+    assert_eq!(report.other_atlas_stamp.as_deref(), Some("33"));
     let limits = [
         (LimitKind::Torque, 28.0, Some(29.0), "30"),
         (LimitKind::Unrecognised, 31.0, None, "32"),
@@ -317,6 +335,10 @@ fn malformed_answer_is_rejected_with_field_path() {
     assert_eq!(path_of(wire), "grasp.key_frames[1].digits");
 
     let mut wire = wire_answer();
+    wire.grasp.as_mut().unwrap().arm.as_mut().unwrap().client_elbow = None;
+    assert_eq!(path_of(wire), "grasp.arm.client_elbow");
+
+    let mut wire = wire_answer();
     wire.report.as_mut().unwrap().step_times[0].time = None;
     assert_eq!(path_of(wire), "report.step_times[0].time");
 }
@@ -332,6 +354,8 @@ fn default_request_leaves_everything_to_the_server() {
     assert_eq!(wire.atlas(), v1::AtlasUse::Unspecified);
     assert_eq!(wire.hands(), v1::Hands::Unspecified);
     assert_eq!(wire.constraints, None);
+    assert_eq!((wire.receiver, wire.improvement), (None, None));
+    assert_eq!(wire.receiver_stance(), v1::ReceiverStance::Unspecified);
     assert!(!wire.plan_key_frames);
     assert!(wire.other_hands.is_empty() && wire.obstacles.is_empty());
     assert_eq!(wire.convention(), v1::Convention::Openxr);
@@ -383,6 +407,9 @@ fn converts_every_field_of_a_request() {
         other_hands: vec![hand(Handedness::Left), hand(Handedness::Right)],
         obstacles: vec![Obstacle::capsule(Vec3::X, Vec3::Y, 0.1)],
         hands: Some(Hands::Both),
+        receiver: Some(Receiver::with_shoulder(Vec3::X)),
+        receiver_stance: Some(ReceiverStance::Any),
+        improvement: Some(Duration::from_millis(2)),
         ..FindRequest::new("objects/remote")
     };
     let wire = find_request_to_wire(&request);
@@ -413,5 +440,9 @@ fn converts_every_field_of_a_request() {
     assert_ne!(wire.other_hands[0], wire.other_hands[1]);
     assert_eq!(wire.obstacles, [obstacle_to_wire(&request.obstacles[0])]);
     assert_eq!(wire.hands(), v1::Hands::Both);
+    let body = v1::receiver::Body::ClientShoulder(wire_vector(1.0));
+    assert_eq!(wire.receiver.unwrap().body, Some(body));
+    assert_eq!(wire.receiver_stance(), v1::ReceiverStance::Any);
+    assert_eq!(wire.improvement.unwrap().nanos, 2_000_000);
     assert_eq!(wire.constraints.unwrap().max_comfort_e, Some(0.25));
 }

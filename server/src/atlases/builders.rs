@@ -114,10 +114,12 @@ impl Builders {
         hand(&self.default_rig, handedness)
     }
 
-    /// Records a use of an atlas, and puts the atlas in the queue if it is absent.
-    pub(super) fn request(&self, object: &Arc<StoredObject>, hand: Option<&'static Hand>) {
+    /// Records a use of the atlases of one or two hands at the same time, so that neither evicts the other, and puts those that
+    /// are absent in the queue.
+    pub(super) fn request(&self, object: &Arc<StoredObject>, hands: [Option<&'static Hand>; 2]) {
         let now = self.requests.fetch_add(1, Ordering::Relaxed) + 1;
-        if let Some(hand) = hand.filter(|hand| object.atlas_slots.request(hand, now)) {
+        let hands = hands.into_iter().flatten();
+        for hand in hands.filter(|hand| object.atlas_slots.request(hand, now)) {
             self.queue.push(BuildJob {
                 object: Arc::downgrade(object),
                 hand,
@@ -191,30 +193,17 @@ fn work(builders: &Builders, job: BuildJob) {
     };
     // A panic costs only this atlas: the state that it could leave inconsistent is local to the turn.
     let turn = catch_unwind(AssertUnwindSafe(|| turn(builders, &object, &job)));
-    let request_left = || {
-        let first = builders.default_hand(Handedness::Right);
-        if first.is_some_and(|first| std::ptr::eq(first, job.hand)) {
-            builders.request(&object, builders.default_hand(Handedness::Left));
-        }
-    };
     match turn {
-        Ok(Turn::Read) => {
-            // Before the job goes back: both hands' atlases are read before either grows.
-            request_left();
-            builders.queue.push(BuildJob {
-                worked: job.worked + READ_WORK,
-                ..job
-            });
-        }
+        Ok(Turn::Read) => builders.queue.push(BuildJob {
+            worked: job.worked + READ_WORK,
+            ..job
+        }),
         Ok(Turn::More(worked)) => builders.queue.push(BuildJob {
             worked: job.worked + worked,
             ..job
         }),
         Ok(Turn::Dropped) => {}
-        Ok(Turn::Finished) => {
-            object.atlas_slots.finish(job.hand);
-            request_left();
-        }
+        Ok(Turn::Finished) => object.atlas_slots.finish(job.hand),
         Err(_) => {
             tracing::error!(object = object.name(), hand = %hand_label(job.hand), "building an atlas panicked");
             object.atlas_slots.finish(job.hand);

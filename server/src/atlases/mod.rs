@@ -1,9 +1,9 @@
 //! Atlases: grips of the server's objects, found in the background.
 //!
-//! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for
-//! the default rig's right hand, then one for its left hand; other hands get theirs once a request names them. The
-//! [`builders`] take atlases from the [`build_queue`] and grow them on low-priority threads, at a tenth of the time
-//! while searches run; [`files`] keeps them on disk if there is a folder for them.
+//! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
+//! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
+//! [`build_queue`] and grow them on low-priority threads, at a tenth of the time while searches run: those of both hands
+//! alternately, so that both are useful at about the same time. [`files`] keeps them on disk if there is a folder for them.
 //!
 //! For the built-in objects, a few hundred grips per hand ship with the server and answer requests from its start. The
 //! full atlas grows meanwhile and replaces them once it is complete: it then has the same grips and more.
@@ -83,26 +83,35 @@ impl Atlases {
         Ok(atlases)
     }
 
-    /// Makes room for a new object and requests its first atlas.
+    /// Makes room for a new object and requests the atlases of the default rig's hands.
     pub(crate) fn register(&self, object: &Arc<StoredObject>) {
         if self.0.are_running() {
             self.0.loaded.make_room_for_objects();
-            self.0.request(object, self.0.default_hand(Handedness::Right));
+            let hands = [Handedness::Right, Handedness::Left].map(|side| self.0.default_hand(side));
+            self.0.request(object, hands);
         }
     }
 
-    /// The known grips of an object and a hand; requests the atlas if there is none.
-    pub(crate) fn get(&self, object: &Arc<StoredObject>, hand: &'static Hand) -> KnownGrips {
+    /// The known grips of an object and one or two hands; requests the atlases that are absent.
+    pub(crate) fn get(
+        &self,
+        object: &Arc<StoredObject>,
+        hands: [Option<&'static Hand>; 2],
+    ) -> [KnownGrips; 2] {
         if !self.0.are_running() {
-            return KnownGrips::default();
+            return Default::default();
         }
-        self.0.request(object, Some(hand));
-        let slot = object.atlas_slots.get(hand).unwrap_or_default();
-        let atlas = slot.grown.filter(|grown| !grown.atlas.entries().is_empty());
-        KnownGrips {
-            atlas: atlas.map(|grown| Arc::clone(&grown.atlas)),
-            recent: slot.recent,
-        }
+        self.0.request(object, hands);
+        hands.map(|hand| {
+            let slot = hand
+                .and_then(|hand| object.atlas_slots.get(hand))
+                .unwrap_or_default();
+            let atlas = slot.grown.filter(|grown| !grown.atlas.entries().is_empty());
+            KnownGrips {
+                atlas: atlas.map(|grown| Arc::clone(&grown.atlas)),
+                recent: slot.recent,
+            }
+        })
     }
 
     /// Remembers a grip that a search found under the object's own friction, for later requests.

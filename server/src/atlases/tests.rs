@@ -61,6 +61,12 @@ fn start(threads: usize, store: &Arc<ObjectStore>) -> Atlases {
     Atlases::start(threads, store, executor, None, "adult".to_owned()).unwrap()
 }
 
+/// The known grips of one hand.
+fn known(atlases: &Atlases, object: &Arc<StoredObject>, hand: &'static Hand) -> KnownGrips {
+    let [known, _] = atlases.get(object, [Some(hand), None]);
+    known
+}
+
 fn until(what: &str, condition: impl Fn() -> bool) {
     let start = Instant::now();
     while !condition() {
@@ -81,9 +87,9 @@ fn evicts_least_recently_used() {
     };
     let is_there = |object: &Arc<StoredObject>| object.atlas_slots.get(adult()).unwrap().grown.is_some();
     for object in [&a, &b, &c] {
-        atlases.0.request(object, Some(adult()));
+        atlases.0.request(object, [Some(adult()), None]);
     }
-    atlases.0.request(&a, Some(adult()));
+    atlases.0.request(&a, [Some(adult()), None]);
     // From the least to the most recently used: b, c, a.
     assert!(publish(&b) && publish(&a));
     assert!(publish(&c), "b is evicted");
@@ -113,7 +119,7 @@ fn remembers_the_latest_grips_up_to_the_capacity() {
             atlases.remember(object, adult(), moved(&grip, k));
         }
     }
-    let kept = |object: &Arc<StoredObject>| atlases.get(object, adult()).recent.entries().len();
+    let kept = |object: &Arc<StoredObject>| known(&atlases, object, adult()).recent.entries().len();
     let forgotten = OBJECTS * EACH - remembered::CAPACITY;
     for (place, object) in objects.iter().enumerate() {
         let left = EACH - forgotten.saturating_sub(place * EACH).min(EACH);
@@ -124,7 +130,7 @@ fn remembers_the_latest_grips_up_to_the_capacity() {
     last.atlas_slots.evict(adult());
     assert_eq!(kept(last), EACH);
     let left = hand("adult", Handedness::Left).unwrap();
-    assert!(atlases.get(last, left).recent.is_empty());
+    assert!(known(&atlases, last, left).recent.is_empty());
     drop(objects);
     let another = Arc::new(small("another"));
     atlases.remember(&another, adult(), grip);
@@ -136,7 +142,7 @@ fn a_grip_found_again_is_remembered_once() {
     let [a, b] = ["a", "b"].map(|id| Arc::new(small(id)));
     let grip = grown(&a).atlas.entries()[0].clone();
     let atlases = start(1, &store(10, 0));
-    let kept = |object: &Arc<StoredObject>| atlases.get(object, adult()).recent.entries().len();
+    let kept = |object: &Arc<StoredObject>| known(&atlases, object, adult()).recent.entries().len();
     atlases.remember(&b, adult(), grip.clone());
     for _ in 0..2 * remembered::CAPACITY {
         atlases.remember(&a, adult(), grip.clone());
@@ -167,8 +173,8 @@ fn rebuilds_an_evicted_atlas_on_request() {
     let object = Arc::new(small("a"));
     let store = store(10, 1 << 30);
     let atlases = start(1, &store);
-    assert!(atlases.get(&object, adult()).atlas.is_none());
-    let is_there = || atlases.get(&object, adult()).atlas.is_some();
+    assert!(known(&atlases, &object, adult()).atlas.is_none());
+    let is_there = || known(&atlases, &object, adult()).atlas.is_some();
     until("the first atlas", is_there);
     object.atlas_slots.finish(adult());
     atlases.0.loaded.shrink_to(0);
@@ -270,6 +276,49 @@ fn stops_building_for_an_evicted_object() {
     let second = store.insert(small("second")).unwrap();
     atlases.register(&second);
     until("the end of the first", || first.strong_count() == 0);
+}
+
+/// Number of grips of each hand that requests of an object can use, right before left.
+fn entries(object: &StoredObject) -> [usize; 2] {
+    [Handedness::Right, Handedness::Left].map(|side| {
+        let hand = hand("adult", side).unwrap();
+        let grown = object.atlas_slots.get(hand).and_then(|slot| slot.grown);
+        grown.map_or(0, |grown| grown.atlas.entries().len())
+    })
+}
+
+#[test]
+fn both_hands_of_every_new_object_become_useful_before_any_grows_on() {
+    const USEFUL: usize = 100;
+    let store = store(10, 1 << 30);
+    let objects = ["a", "b"].map(|id| store.insert(small(id)).unwrap());
+    let atlases = start(1, &store);
+    for object in &objects {
+        atlases.register(object);
+    }
+    let all = || objects.each_ref().map(|object| entries(object));
+    until("useful atlases", || {
+        all().as_flattened().iter().all(|&count| count >= USEFUL)
+    });
+    // By then an atlas had a turn or two more, each of a quarter of its grips.
+    let most = all().into_iter().flatten().max().unwrap();
+    assert!(most < 4 * USEFUL, "{:?}", all());
+}
+
+#[test]
+fn hands_requested_together_do_not_evict_each_other() {
+    let object = Arc::new(small("a"));
+    let grown = grown(&object);
+    let atlases = start(0, &store(10, grown.bytes() + 10));
+    let left = hand("adult", Handedness::Left).unwrap();
+    atlases.0.request(&object, [Some(adult()), Some(left)]);
+    let publish = |hand| {
+        let update = Update::of(Arc::clone(&grown));
+        atlases.0.loaded.publish(&object, hand, update, Duration::ZERO)
+    };
+    assert!(publish(adult()));
+    assert!(!publish(left), "there is room for one of them");
+    assert!(object.atlas_slots.get(adult()).unwrap().grown.is_some());
 }
 
 #[test]

@@ -28,6 +28,12 @@ impl RawConfig {
             workers: check.count("workers", self.workers, 1..=1024, defaults.workers),
             io_threads: check.count("io_threads", self.io_threads, 1..=1024, defaults.io_threads),
             budgets,
+            improvement: check.time(
+                "improvement_ms",
+                self.improvement_ms,
+                0..=1000,
+                defaults.improvement,
+            ),
             maximum_searches: check.count(
                 "maximum_searches",
                 self.maximum_searches,
@@ -245,6 +251,7 @@ mod tests {
         let config = Config {
             log_format: LogFormat::Json,
             drain: Duration::from_millis(77),
+            improvement: Duration::from_millis(9),
             objects_directory: Some("/objects".into()),
             atlas_directory: Some("/atlases".into()),
             builder_threads: 0,
@@ -285,6 +292,7 @@ mod tests {
             default_budget_ms: Some(0),
             maximum_budget_ms: Some(0),
             deadline_reserve_ms: Some(10_000),
+            improvement_ms: Some(1001),
             maximum_searches: Some(0),
             maximum_uploads: Some(0),
             maximum_object_bytes: Some(1),
@@ -303,7 +311,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 20, "{bad:?}");
+        assert_eq!(bad.len(), 21, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

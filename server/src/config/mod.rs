@@ -7,7 +7,7 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration
 
 pub use raw::{RawConfig, read_file, unknown_variables};
 
-use grasp_synthesis::base::mechanisms::Mechanisms;
+use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMENT};
 
 use crate::{budget::BudgetLimits, limits::StoreLimits};
 
@@ -31,6 +31,9 @@ pub struct Config {
     pub io_threads: NonZeroUsize,
     /// Bounds on search times.
     pub budgets: BudgetLimits,
+    /// How much longer a search goes on after a first valid grasp that a person would not choose, if the request does not say;
+    /// at most 1 s. Longer finds more natural grasps, shorter answers sooner.
+    pub improvement: Duration,
     /// Largest number of running and waiting searches; others are rejected.
     pub maximum_searches: NonZeroUsize,
     /// Largest number of objects received or built at a time; others are rejected.
@@ -76,6 +79,7 @@ impl Default for Config {
                 // Timers of the runtime are up to 6 ms late while all cores search.
                 minimum_reserve: Duration::from_millis(5),
             },
+            improvement: IMPROVEMENT,
             maximum_searches: non_zero(64),
             maximum_uploads: non_zero(4),
             maximum_object_bytes: non_zero(8 << 20),

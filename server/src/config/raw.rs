@@ -41,6 +41,12 @@ pub struct RawConfig {
     /// It grows with the delays of recent responses, up to three quarters of the deadline.
     #[arg(long, env = "GRASP_DEADLINE_RESERVE_MS", value_name = "MS")]
     pub deadline_reserve_ms: Option<u64>,
+    /// How much longer a search goes on after a first valid grasp that a person would not choose, in milliseconds, if the
+    /// request does not say [default: 5].
+    ///
+    /// With 0, the first valid grasp is the answer.
+    #[arg(long, env = "GRASP_IMPROVEMENT_MS", value_name = "MS")]
+    pub improvement_ms: Option<u64>,
     /// Most searches running or waiting; others are rejected [default: 64].
     #[arg(long, env = "GRASP_MAXIMUM_SEARCHES", value_name = "COUNT")]
     pub maximum_searches: Option<u64>,
@@ -136,6 +142,7 @@ impl RawConfig {
             default_budget_ms: self.default_budget_ms.or(fallback.default_budget_ms),
             maximum_budget_ms: self.maximum_budget_ms.or(fallback.maximum_budget_ms),
             deadline_reserve_ms: self.deadline_reserve_ms.or(fallback.deadline_reserve_ms),
+            improvement_ms: self.improvement_ms.or(fallback.improvement_ms),
             maximum_searches: self.maximum_searches.or(fallback.maximum_searches),
             maximum_uploads: self.maximum_uploads.or(fallback.maximum_uploads),
             maximum_object_bytes: self.maximum_object_bytes.or(fallback.maximum_object_bytes),
@@ -167,6 +174,7 @@ impl From<&Config> for RawConfig {
             default_budget_ms: time(config.budgets.default),
             maximum_budget_ms: time(config.budgets.maximum),
             deadline_reserve_ms: time(config.budgets.minimum_reserve),
+            improvement_ms: time(config.improvement),
             maximum_searches: count(config.maximum_searches.get()),
             maximum_uploads: count(config.maximum_uploads.get()),
             maximum_object_bytes: count(config.maximum_object_bytes.get()),

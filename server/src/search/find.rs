@@ -94,7 +94,7 @@ mod tests {
     use grasp_synthesis::base::mechanisms::Mechanisms;
 
     use super::*;
-    use crate::{atlases::KnownGrips, objects::tests::tetrahedron, validate::find_query};
+    use crate::{objects::tests::tetrahedron, validate::find_query};
 
     /// A search whose time has passed.
     fn late_job(has_deadline: bool) -> FindJob {
@@ -113,7 +113,8 @@ mod tests {
             patience: Duration::ZERO,
             has_deadline,
             workers: 1,
-            known: KnownGrips::default(),
+            improvement: Duration::ZERO,
+            known: Default::default(),
             mechanisms: Mechanisms::ALL,
         }
     }

@@ -11,11 +11,16 @@ use grasp_synthesis::model::{
 
 use crate::{error::ServiceError, validate::FindQuery};
 
-/// Poses the giver's hand and places everything else around the object.
+/// Poses the giver's hand and places everything else around the object. The receiver's arm is that of one hand, from a
+/// `stance` in the client's frame.
 ///
 /// # Errors
 /// The giver's joints fold its skin.
-pub(super) fn holdout(query: &FindQuery, object: &Arc<GraspObject>) -> Result<Holdout, ServiceError> {
+pub(super) fn holdout(
+    query: &FindQuery,
+    object: &Arc<GraspObject>,
+    stance: Stance,
+) -> Result<Holdout, ServiceError> {
     let object_from_client = query.client_from_object.inverse();
     let presenting_hand = match &query.presenting_hand {
         None => None,
@@ -38,7 +43,7 @@ pub(super) fn holdout(query: &FindQuery, object: &Arc<GraspObject>) -> Result<Ho
         obstacles: obstacles
             .map(|obstacle| obstacle.transformed(object_from_client))
             .collect(),
-        stance: Stance::default(),
+        stance: stance.transformed(object_from_client),
         up: object_from_client.transform_vector(query.up),
     })
 }

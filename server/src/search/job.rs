@@ -5,6 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
@@ -17,14 +18,19 @@ use grasp_synthesis::{
     search::{
         GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
-        limits::limits,
+        limits::{Limit, limits},
         scene::Task,
-        settings::{IMPROVEMENT, Known, Query, Run, SearchSettings},
+        settings::{Known, Query, Run, SearchSettings},
     },
 };
 use rayon::ThreadPool;
 
-use super::{holdout::holdout, progress::Progress, slices::search_in_slices};
+use super::{
+    either_hand::search_either,
+    holdout::holdout,
+    progress::{Ended, HandPlace, Progress},
+    slices::{Site, search_in_slices},
+};
 use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     atlases::KnownGrips,
@@ -54,8 +60,10 @@ pub(crate) struct FindJob {
     pub has_deadline: bool,
     /// Number of workers.
     pub workers: usize,
-    /// Known grips of the object and the hand.
-    pub known: KnownGrips,
+    /// How much longer the search goes on after a first valid grasp that a person would not choose.
+    pub improvement: Duration,
+    /// Known grips of the object for the receiving hand, and for the alternative one.
+    pub known: [KnownGrips; 2],
     /// Mechanisms of the search that are on.
     pub mechanisms: Mechanisms,
 }
@@ -65,27 +73,36 @@ pub(crate) struct FindJob {
 pub(crate) struct Answered {
     /// The response to the call.
     pub response: v1::FindGraspResponse,
-    /// The grip if it was not known before, to be remembered.
-    pub new_grip: Option<Entry>,
+    /// The grip with its hand if it was not known before, to be remembered.
+    pub new_grip: Option<(&'static Hand, Entry)>,
     /// When the search ended, before the response was made.
     pub ended: Instant,
 }
 
-/// A job whose holdout and settings are ready to be searched.
+/// One hand's search, ready to be run.
+#[derive(Debug)]
+struct HandSearch {
+    hand: &'static Hand,
+    /// The holdout, with the arm of this hand.
+    holdout: Holdout,
+    settings: SearchSettings,
+}
+
+/// A job whose holdouts and settings are ready to be searched.
 #[derive(Debug)]
 pub(super) struct PreparedJob {
     query: FindQuery,
     object: Arc<PreparedObject>,
-    holdout: Holdout,
-    settings: SearchSettings,
+    /// The receiving hand's search and, if the request leaves the choice, the other hand's.
+    hands: Vec<HandSearch>,
     clock: SinceArrival,
     start: Instant,
     budget: Duration,
     patience: Duration,
 }
 
-/// How long a look-up of known grips may take on the call's own thread: about as long as decoding and encoding its
-/// messages. A longer look-up answers more calls without switching threads, and delays other calls.
+/// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
+/// and encoding its messages. A longer look-up answers more calls without switching threads, and delays other calls.
 const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
 /// Time since a call's arrival.
@@ -102,7 +119,8 @@ impl FindJob {
     /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames is
     /// not.
     pub(super) fn is_quick_if_known(&self) -> bool {
-        (self.known.atlas.is_some() || !self.known.recent.is_empty())
+        let is_known = |known: &KnownGrips| known.atlas.is_some() || !known.recent.is_empty();
+        self.known.iter().any(is_known)
             && !self.query.is_replay
             && self.query.choice == Choice::FirstValid
             && !self.query.reproducible
@@ -120,23 +138,48 @@ impl FindJob {
     /// The giver's joints fold its skin.
     pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
-        let query = self.query;
+        let first = self.query.receiving_hand;
+        let stance = |hand: &Hand| self.query.stances.of(hand.rig.handedness);
+        let of_first = holdout(&self.query, self.object.object(), stance(first))?;
+        let object_from_client = self.query.client_from_object.inverse();
+        let of_other = |hand: &Hand| Holdout {
+            stance: stance(hand).transformed(object_from_client),
+            ..of_first.clone()
+        };
+        let alternative = self.query.alternative_hand.map(|hand| (hand, of_other(hand)));
+        let hands = [(first, of_first)].into_iter().chain(alternative);
+        let hands = hands.zip(&self.known).map(|((hand, holdout), known)| HandSearch {
+            hand,
+            holdout,
+            settings: self.settings(hand, known),
+        });
+        Ok(PreparedJob {
+            hands: hands.collect(),
+            query: self.query,
+            object: self.object,
+            clock: SinceArrival(self.arrived),
+            start,
+            budget: self.budget,
+            patience: self.patience,
+        })
+    }
+
+    /// The settings of one hand's search.
+    fn settings(&self, hand: &'static Hand, known: &KnownGrips) -> SearchSettings {
+        let query = &self.query;
         let object_from_client = query.client_from_object.inverse();
-        let holdout = holdout(&query, self.object.object())?;
         // Reproducible answers need a complete atlas: a growing one would change them.
-        let atlas = self
-            .known
-            .atlas
-            .filter(|atlas| !query.reproducible || atlas.is_complete());
-        let seeds = match &atlas {
+        let atlas = known.atlas.as_ref();
+        let atlas = atlas.filter(|atlas| !query.reproducible || atlas.is_complete());
+        let seeds = match atlas {
             Some(atlas) => SeedSource::Atlas(Arc::clone(atlas)),
             None if query.uses_seeds() => {
-                let transferred = self.stored.transferred_grips(query.receiving_hand);
+                let transferred = self.stored.transferred_grips(hand);
                 transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)
             }
             None => SeedSource::Nothing,
         };
-        let settings = SearchSettings {
+        SearchSettings {
             query: Query {
                 strategy: query.strategy,
                 validity: query.validity,
@@ -144,17 +187,17 @@ impl FindJob {
                 friction: query.friction,
                 constraints: query.constraints.transformed(object_from_client),
                 choice: query.choice,
-                improvement: IMPROVEMENT,
+                improvement: self.improvement,
                 other_hand: query.other_hand.map(|hand| hand.rig.clone()),
             },
             known: Known {
                 // A replay runs one attempt and tries no known grips.
-                atlas: atlas.filter(|_| !query.is_replay),
+                atlas: atlas.filter(|_| !query.is_replay).cloned(),
                 seeds,
                 recent: if query.is_replay {
                     RecentGrips::default()
                 } else {
-                    self.known.recent
+                    known.recent.clone()
                 },
                 tried: 0,
             },
@@ -168,30 +211,35 @@ impl FindJob {
                 record_step_times: query.record_step_times,
                 mechanisms: self.mechanisms,
             },
-        };
-        Ok(PreparedJob {
-            query,
-            object: self.object,
-            holdout,
-            settings,
-            clock: SinceArrival(self.arrived),
-            start,
-            budget: self.budget,
-            patience: self.patience,
-        })
+        }
     }
 }
 
 impl PreparedJob {
-    /// Answers with a known grip if one is found quickly; otherwise [`PreparedJob::run`] continues where this stopped.
+    /// Answers with the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`] continues where this
+    /// stopped.
     pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
-        match find_known_grasp(self.task(), &self.settings, &self.clock, LOOK_UP_TIME) {
-            LookUp::Found(outcome) => Some(self.answer(*outcome)),
-            LookUp::NotFound { tried } => {
-                self.settings.known.tried = tried;
-                None
+        let until = self.clock.now() + LOOK_UP_TIME;
+        let mut best: Option<Ended> = None;
+        for place in 0..self.hands.len() {
+            let hands_left = (self.hands.len() - place) as u32;
+            let within = until.saturating_sub(self.clock.now()) / hands_left;
+            let HandSearch { settings, .. } = &self.hands[place];
+            match find_known_grasp(self.task(place), settings, &self.clock, within) {
+                LookUp::Found(outcome) => {
+                    let rank = |outcome: &SearchOutcome| (outcome.replaceable_until.is_none(), outcome.value);
+                    let is_better = |best: &Ended| rank(&outcome) > rank(&best.outcome);
+                    if best.as_ref().is_none_or(is_better) {
+                        best = Some(Ended {
+                            hand: place,
+                            outcome: *outcome,
+                        });
+                    }
+                }
+                LookUp::NotFound { tried } => self.hands[place].settings.known.tried = tried,
             }
         }
+        best.map(|best| self.answer(best))
     }
 
     /// Searches.
@@ -204,23 +252,28 @@ impl PreparedJob {
         stop: &AtomicBool,
         progress: &Progress,
     ) -> Result<Answered, ServiceError> {
-        let outcome = search_in_slices(
+        let site = Site {
             pool,
-            self.task(),
-            &self.settings,
-            self.patience,
-            &self.clock,
+            clock: &self.clock,
             stop,
             progress,
-        );
-        self.answer(outcome)
+        };
+        let search = |place: HandPlace| (self.task(place), &self.hands[place].settings);
+        let ended = if self.hands.len() > 1 {
+            search_either(site, [search(0), search(1)], self.patience)
+        } else {
+            let (task, settings) = search(0);
+            search_in_slices(site, task, settings, self.patience)
+        };
+        self.answer(ended)
     }
 
-    fn task(&self) -> Task<'_> {
+    fn task(&self, place: HandPlace) -> Task<'_> {
+        let HandSearch { hand, holdout, .. } = &self.hands[place];
         Task {
-            holdout: &self.holdout,
+            holdout,
             object: &self.object,
-            rig: &self.query.receiving_hand.rig,
+            rig: &hand.rig,
         }
     }
 
@@ -228,21 +281,29 @@ impl PreparedJob {
     ///
     /// # Errors
     /// The search was stopped.
-    pub(super) fn answer(&self, mut outcome: SearchOutcome) -> Result<Answered, ServiceError> {
-        let rig = &self.query.receiving_hand.rig;
+    pub(super) fn answer(&self, ended: Ended) -> Result<Answered, ServiceError> {
+        let Ended {
+            hand: place,
+            mut outcome,
+        } = ended;
+        let HandSearch {
+            hand,
+            holdout,
+            settings,
+        } = &self.hands[place];
         let ended = Instant::now();
         let search_time = ended - self.start;
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
-            let approach = self.settings.query.constraints.approach;
-            let friction = self.settings.query.friction_on(&self.holdout.object);
-            plan_key_frames(&self.holdout, rig, friction, approach, grasp);
+            let approach = settings.query.constraints.approach;
+            let friction = settings.query.friction_on(&holdout.object);
+            plan_key_frames(holdout, &hand.rig, friction, approach, grasp);
         }
         if matches!(
             outcome.end,
             SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted
         ) {
             // A small part of what the budget leaves for the way back.
-            outcome.report.limits = limits(self.task(), &self.settings.query);
+            outcome.report.limits = self.limits();
         }
         let frame = ClientFrame {
             convention: self.query.convention,
@@ -250,27 +311,50 @@ impl PreparedJob {
         };
         let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
         let warnings: Vec<String> = hands.flat_map(|hand| hand.warnings.iter().cloned()).collect();
+        let other = self.hands.iter().find(|other| !std::ptr::eq(other.hand, *hand));
         let circumstances = Circumstances {
             search_time,
             budget: self.budget,
             warnings: &warnings,
+            other_atlas: other.and_then(|other| other.settings.known.seeds.atlas()),
         };
         Ok(Answered {
-            response: find_response(&outcome, rig, frame, &self.settings, circumstances)?,
-            new_grip: self.new_grip(&outcome),
+            response: find_response(&outcome, &hand.rig, frame, settings, circumstances)?,
+            new_grip: self.new_grip(&outcome, place),
             ended,
         })
     }
 
+    /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same.
+    fn limits(&self) -> Vec<Limit> {
+        let mut all: Vec<Limit> = Vec::new();
+        for (place, search) in self.hands.iter().enumerate() {
+            let of_hand = limits(self.task(place), &search.settings.query);
+            if of_hand.is_empty() {
+                return of_hand;
+            }
+            let new = |limit: &Limit| all.iter().all(|known| known.kind != limit.kind);
+            let new: Vec<Limit> = of_hand.into_iter().filter(new).collect();
+            all.extend(new);
+        }
+        all
+    }
+
     /// The grip to remember: one that was found by an attempt under the object's own friction, which the grips of an
     /// atlas are made for.
-    fn new_grip(&self, outcome: &SearchOutcome) -> Option<Entry> {
-        let own_friction = self.holdout.object.friction_under(Validity::Physical);
+    fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(&'static Hand, Entry)> {
+        let HandSearch {
+            hand,
+            holdout,
+            settings,
+        } = &self.hands[place];
+        let own_friction = holdout.object.friction_under(Validity::Physical);
         let is_new = matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
         let grasp = outcome.grasp.as_ref()?;
-        (is_new && self.settings.query.friction_on(&self.holdout.object) == own_friction)
+        let entry = (is_new && settings.query.friction_on(&holdout.object) == own_friction)
             .then(|| Entry::of_grasp(grasp))
-            .flatten()
+            .flatten();
+        entry.map(|entry| (*hand, entry))
     }
 }
 

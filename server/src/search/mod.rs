@@ -1,5 +1,6 @@
 //! Runs grasp searches on the threads of the executor.
 
+mod either_hand;
 mod find;
 mod holdout;
 mod job;

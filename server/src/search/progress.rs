@@ -7,8 +7,23 @@ use std::{
 
 use grasp_synthesis::{
     model::grasp::Grasp,
-    search::{Replaceable, SearchEnd, SearchOutcome, SearchReport, settings::Run},
+    search::{GraspSource, Replaceable, SearchEnd, SearchOutcome, SearchReport, settings::Run},
 };
+
+/// The hand of a part of a search: the place in its list of hands.
+pub(super) type HandPlace = usize;
+
+/// Largest number of hands that a search chooses between.
+const MOST_HANDS: usize = 2;
+
+/// The outcome of a search with one hand, or of the better of both.
+#[derive(Clone, Debug)]
+pub(super) struct Ended {
+    /// The hand of the grasp or, without one, of the nearest miss.
+    pub hand: HandPlace,
+    /// The outcome.
+    pub outcome: SearchOutcome,
+}
 
 /// The sum of a search's finished slices. The searching thread adds to it; others may read it at any time.
 #[derive(Debug, Default)]
@@ -17,14 +32,27 @@ pub(super) struct Progress(Mutex<Sum>);
 #[derive(Clone, Debug, Default)]
 struct Sum {
     report: SearchReport,
-    /// The best grasp with its quality.
-    best: Option<(Grasp, f32)>,
+    best: Option<Best>,
     /// Until when a best grasp that a person would not choose may be replaced.
     replaceable_until: Option<Replaceable>,
+    /// The hand of the nearest miss.
+    missing_hand: HandPlace,
+    /// The known grips that each hand could use.
+    known_grips: [usize; MOST_HANDS],
     /// The first attempt that has not run.
     next: u64,
     /// Must the answer not depend on the time that was left?
     is_reproducible: bool,
+}
+
+/// The best grasp so far.
+#[derive(Clone, Debug)]
+struct Best {
+    grasp: Grasp,
+    /// Its quality.
+    value: f32,
+    hand: HandPlace,
+    source: Option<GraspSource>,
 }
 
 /// Whether a search has found a grasp.
@@ -52,21 +80,49 @@ impl Sum {
             Some(Replaceable::UntilTime(_)) => u64::MAX,
         }
     }
+
+    /// True if a slice's grasp is preferred to the best so far: one that a person would choose to others; then the one with
+    /// the lower attempt, if the search is reproducible and both have one; then the better one.
+    fn prefers(&self, slice: &SearchOutcome) -> bool {
+        let Some(best) = &self.best else { return true };
+        let are_chosen = [&self.replaceable_until, &slice.replaceable_until].map(Option::is_none);
+        match (are_chosen, best.source, slice.report.source) {
+            ([false, true], ..) => true,
+            ([true, false], ..) => false,
+            ([true, true], Some(GraspSource::Attempt(best)), Some(GraspSource::Attempt(new)))
+                if self.is_reproducible =>
+            {
+                new < best
+            }
+            _ => slice.value > best.value,
+        }
+    }
 }
 
 impl Progress {
-    /// Adds a slice, which `run` describes.
-    pub(super) fn add(&self, slice: SearchOutcome, run: &Run) -> Found {
+    /// Adds a slice of one hand, which `run` describes.
+    pub(super) fn add(&self, slice: SearchOutcome, run: &Run, hand: HandPlace) -> Found {
         let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         sum.next = run.first_attempt.saturating_add(run.max_attempts);
         sum.is_reproducible = run.reproducible;
+        let is_better = slice.grasp.is_some() && sum.prefers(&slice);
         let replaces = sum.replaceable_until.is_some() && slice.replaceable_until.is_none();
-        let is_better = slice.grasp.is_some()
-            && (replaces || sum.best.as_ref().is_none_or(|(_, value)| slice.value > *value));
+        let known_grips = &mut sum.known_grips[hand];
+        *known_grips = slice.report.known_grips.max(*known_grips);
+        let source = slice.report.source;
+        let missed = sum.report.nearest_miss.clone();
         sum.report.merge(slice.report, is_better);
+        if sum.report.nearest_miss != missed {
+            sum.missing_hand = hand;
+        }
         if is_better {
             let is_first = sum.best.is_none();
-            sum.best = slice.grasp.map(|grasp| (grasp, slice.value));
+            sum.best = slice.grasp.map(|grasp| Best {
+                grasp,
+                value: slice.value,
+                hand,
+                source,
+            });
             // The first one decides for how long.
             if replaces || is_first {
                 sum.replaceable_until = slice.replaceable_until;
@@ -85,7 +141,7 @@ impl Progress {
 
     /// The outcome if the search ends here. A search that was not stopped and has a grasp has found one, whatever `end`
     /// says; but not a reproducible one that ran out of time before all attempts that may replace it.
-    pub(super) fn outcome(&self, end: SearchEnd) -> SearchOutcome {
+    pub(super) fn outcome(&self, end: SearchEnd) -> Ended {
         let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if sum.is_reproducible && end == SearchEnd::DeadlinePassed && sum.replacing_attempts() > 0 {
             sum.best = None;
@@ -94,8 +150,15 @@ impl Progress {
             mut report,
             best,
             replaceable_until,
+            missing_hand,
+            known_grips,
+            is_reproducible,
             ..
         } = sum;
+        if is_reproducible {
+            // How many others were found by then depends on the slices.
+            report.candidates = u64::from(best.is_some());
+        }
         if best.is_some() {
             // The nearest miss is reported only if there is no grasp.
             report.nearest_miss = None;
@@ -103,16 +166,19 @@ impl Progress {
             report.attempt = None;
             report.source = None;
         }
-        SearchOutcome {
+        let hand = best.as_ref().map_or(missing_hand, |best| best.hand);
+        report.known_grips = known_grips[hand];
+        let outcome = SearchOutcome {
             end: match (&best, end) {
                 (Some(_), SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted) => SearchEnd::Found,
                 (None, SearchEnd::Found) => SearchEnd::DeadlinePassed,
                 (_, end) => end,
             },
-            value: best.as_ref().map_or(0.0, |(_, value)| *value),
+            value: best.as_ref().map_or(0.0, |best| best.value),
             replaceable_until: replaceable_until.filter(|_| best.is_some()),
-            grasp: best.map(|(grasp, _)| grasp),
+            grasp: best.map(|best| best.grasp),
             report,
-        }
+        };
+        Ended { hand, outcome }
     }
 }

@@ -1,4 +1,4 @@
-//! Runs a search in slices, so that concurrent searches share the workers.
+//! Runs searches in slices, so that concurrent searches share the workers.
 //!
 //! A search without a grasp would otherwise hold the workers until its budget ends. Each slice queues behind the slices
 //! of other searches. Slices cover consecutive attempts: slicing does not change which attempt wins a reproducible
@@ -13,11 +13,15 @@ use grasp_synthesis::{
     base::clock::Clock,
     known::recent_grips::RecentGrips,
     model::strategy::Choice,
-    search::{SearchEnd, SearchOutcome, find_grasp_in, prepare, scene::Task, settings::SearchSettings},
+    search::{
+        SearchEnd, SearchOutcome, find_grasp_in, prepare,
+        scene::{Scene, Task},
+        settings::SearchSettings,
+    },
 };
 use rayon::ThreadPool;
 
-use super::progress::{Found, Progress};
+use super::progress::{Ended, Found, HandPlace, Progress};
 
 /// Target duration of a slice: short compared to a budget of a second, so that searches share the workers evenly, and
 /// long compared to the 50 µs that starting and joining the workers costs.
@@ -29,66 +33,157 @@ const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 /// Largest number of attempts per worker in a slice.
 const MOST_ATTEMPTS_PER_WORKER: u64 = 8192;
 
-/// Runs a search to its end. If it finds nothing by its deadline and `patience` ends later, it continues until then and
-/// takes the first valid grasp. Adds each slice to `progress`, which must be empty.
-pub(super) fn search_in_slices(
-    pool: &ThreadPool,
-    task: Task<'_>,
-    settings: &SearchSettings,
-    patience: Duration,
-    clock: &dyn Clock,
-    stop: &AtomicBool,
-    progress: &Progress,
-) -> SearchOutcome {
-    let scene = prepare(task, settings);
-    let workers = settings.run.workers as u64;
-    let mut slice = settings.clone();
-    let mut left = settings.run.max_attempts;
-    let mut per_worker = FIRST_ATTEMPTS_PER_WORKER;
-    loop {
-        slice.run.max_attempts = left.min(per_worker.saturating_mul(workers));
-        let start = clock.now();
-        let outcome = find_grasp_in(pool, &scene, &slice, clock, stop);
-        // The first slice tries all known grips.
-        slice.known.atlas = None;
-        slice.known.recent = RecentGrips::default();
-        left -= slice.run.max_attempts;
-        let end = outcome.end;
-        let found = progress.add(outcome, &slice.run);
-        if let Found::Replaceable { attempts, by } = found {
-            left = left.min(attempts);
-            slice.run.deadline = [slice.run.deadline, by].into_iter().flatten().min();
-        }
-        // The first valid grasp ends the search unless the best is wanted.
-        let is_enough = found == Found::Settled && slice.query.choice == Choice::FirstValid;
-        let is_stopped = end == SearchEnd::Stopped || stop.load(Ordering::Relaxed);
-        let is_late = end == SearchEnd::DeadlinePassed || has_passed(slice.run.deadline, clock);
-        let goes_on = found == Found::Nothing && slice.run.deadline < Some(patience);
-        if is_late && goes_on && !is_stopped && left > 0 {
-            slice.query.choice = Choice::FirstValid;
-            slice.run.deadline = Some(patience);
-            // If the search waited for workers until its deadline, it has not tried known grips yet.
-            slice.known.atlas.clone_from(&settings.known.atlas);
-            slice.known.recent.clone_from(&settings.known.recent);
-        } else if is_enough || is_stopped || is_late || left == 0 {
-            return progress.outcome(if is_late { SearchEnd::DeadlinePassed } else { end });
-        }
-        slice.run.first_attempt += slice.run.max_attempts;
-        per_worker = next_size(per_worker, clock.now().saturating_sub(start));
+/// Where slices run, and what they watch and add to.
+#[derive(Clone, Copy)]
+pub(super) struct Site<'a> {
+    /// The workers.
+    pub pool: &'a ThreadPool,
+    /// The search's clock.
+    pub clock: &'a dyn Clock,
+    /// Set to stop the search.
+    pub stop: &'a AtomicBool,
+    /// The sum of the slices.
+    pub progress: &'a Progress,
+}
+
+impl Site<'_> {
+    /// True once the search was stopped.
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// True at and after a deadline.
+    pub(super) fn has_passed(&self, deadline: Option<Duration>) -> bool {
+        deadline.is_some_and(|deadline| self.clock.now() >= deadline)
     }
 }
 
-/// Attempts per worker in the next slice, after `size` attempts took `elapsed`. Doubles at most, so that one
-/// unusually quick slice does not cause a long one.
-fn next_size(size: u64, elapsed: Duration) -> u64 {
-    let fitting = u128::from(size) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
-    u64::try_from(fitting)
-        .unwrap_or(u64::MAX)
-        .clamp(1, (2 * size).min(MOST_ATTEMPTS_PER_WORKER))
+/// One hand's search, slice by slice.
+#[derive(Debug)]
+pub(super) struct Slices<'a> {
+    hand: HandPlace,
+    scene: Scene<'a>,
+    /// Settings of the next slice. The first slice tries all known grips.
+    pub(super) next: SearchSettings,
+    /// Attempts left.
+    pub(super) left: u64,
 }
 
-fn has_passed(deadline: Option<Duration>, clock: &dyn Clock) -> bool {
-    deadline.is_some_and(|deadline| clock.now() >= deadline)
+impl<'a> Slices<'a> {
+    /// The search for a task, before its first slice.
+    pub(super) fn new(hand: HandPlace, task: Task<'a>, settings: &SearchSettings) -> Self {
+        Self {
+            hand,
+            scene: prepare(task, settings),
+            next: settings.clone(),
+            left: settings.run.max_attempts,
+        }
+    }
+
+    /// Runs a slice of up to `attempts`; 0 tries known grips only.
+    pub(super) fn run(&mut self, site: Site<'_>, attempts: u64) -> SearchOutcome {
+        self.next.run.max_attempts = self.left.min(attempts);
+        let outcome = find_grasp_in(site.pool, &self.scene, &self.next, site.clock, site.stop);
+        self.next.known.atlas = None;
+        self.next.known.recent = RecentGrips::default();
+        self.left -= self.next.run.max_attempts;
+        outcome
+    }
+
+    /// Adds the outcome of the slice that just ran, and moves on to the next attempts.
+    pub(super) fn add(&mut self, site: Site<'_>, outcome: SearchOutcome) -> Found {
+        let found = site.progress.add(outcome, &self.next.run, self.hand);
+        self.advance();
+        found
+    }
+
+    /// Moves on to the attempts after the slice that just ran.
+    pub(super) fn advance(&mut self) {
+        self.next.run.first_attempt += self.next.run.max_attempts;
+    }
+
+    /// Restores the known grips, to be tried again.
+    pub(super) fn restore_known(&mut self, settings: &SearchSettings) {
+        self.next.known.atlas.clone_from(&settings.known.atlas);
+        self.next.known.recent.clone_from(&settings.known.recent);
+    }
+}
+
+/// The number of attempts in each slice, from the time that the one before took.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SliceSize {
+    per_worker: u64,
+    workers: u64,
+}
+
+impl SliceSize {
+    /// The size of a search's first slice.
+    pub(super) fn first(settings: &SearchSettings) -> Self {
+        Self::of(FIRST_ATTEMPTS_PER_WORKER, settings)
+    }
+
+    /// A size in attempts per worker.
+    pub(super) fn of(per_worker: u64, settings: &SearchSettings) -> Self {
+        Self {
+            per_worker,
+            workers: settings.run.workers as u64,
+        }
+    }
+
+    /// The number of attempts of all workers.
+    pub(super) fn attempts(self) -> u64 {
+        self.per_worker.saturating_mul(self.workers)
+    }
+
+    /// The size of the next slice, after one of this size took `elapsed`. Doubles at most, so that one unusually quick slice
+    /// does not cause a long one.
+    pub(super) fn next(self, elapsed: Duration) -> Self {
+        let fitting = u128::from(self.per_worker) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
+        let most = (2 * self.per_worker).min(MOST_ATTEMPTS_PER_WORKER);
+        Self {
+            per_worker: u64::try_from(fitting).unwrap_or(u64::MAX).clamp(1, most),
+            ..self
+        }
+    }
+}
+
+/// Runs the search of a single hand to its end. If it finds nothing by its deadline and `patience` ends later, it continues
+/// until then and takes the first valid grasp. Adds each slice to the site's progress, which must be empty.
+pub(super) fn search_in_slices(
+    site: Site<'_>,
+    task: Task<'_>,
+    settings: &SearchSettings,
+    patience: Duration,
+) -> Ended {
+    let mut slices = Slices::new(0, task, settings);
+    let mut size = SliceSize::first(settings);
+    loop {
+        let start = site.clock.now();
+        let outcome = slices.run(site, size.attempts());
+        let end = outcome.end;
+        let found = slices.add(site, outcome);
+        let next = &mut slices.next;
+        if let Found::Replaceable { attempts, by } = found {
+            slices.left = slices.left.min(attempts);
+            next.run.deadline = [next.run.deadline, by].into_iter().flatten().min();
+        }
+        // The first valid grasp ends the search unless the best is wanted.
+        let is_enough = found == Found::Settled && next.query.choice == Choice::FirstValid;
+        let is_stopped = end == SearchEnd::Stopped || site.is_stopped();
+        let is_late = end == SearchEnd::DeadlinePassed || site.has_passed(next.run.deadline);
+        let goes_on = found == Found::Nothing && next.run.deadline < Some(patience);
+        if is_late && goes_on && !is_stopped && slices.left > 0 {
+            next.query.choice = Choice::FirstValid;
+            next.run.deadline = Some(patience);
+            // If the search waited for workers until its deadline, it has not tried known grips yet.
+            slices.restore_known(settings);
+        } else if is_enough || is_stopped || is_late || slices.left == 0 {
+            return site
+                .progress
+                .outcome(if is_late { SearchEnd::DeadlinePassed } else { end });
+        }
+        size = size.next(site.clock.now().saturating_sub(start));
+    }
 }
 
 #[cfg(test)]
@@ -122,6 +217,7 @@ mod tests {
         let settings = SearchSettings {
             query: Query {
                 choice,
+                improvement: Duration::ZERO,
                 ..Query::default()
             },
             run: Run {
@@ -145,8 +241,15 @@ mod tests {
         let patience = Duration::from_micros(patience);
         let stop = AtomicBool::new(false);
         let progress = Progress::default();
-        let outcome = search_in_slices(&pool, task, &settings, patience, &clock, &stop, &progress);
-        assert_eq!(progress.outcome(outcome.end).report, outcome.report);
+        let site = Site {
+            pool: &pool,
+            clock: &clock,
+            stop: &stop,
+            progress: &progress,
+        };
+        let Ended { hand, outcome } = search_in_slices(site, task, &settings, patience);
+        assert_eq!(hand, 0);
+        assert_eq!(progress.outcome(outcome.end).outcome.report, outcome.report);
         (outcome, clock.0.into_inner())
     }
 
@@ -176,9 +279,13 @@ mod tests {
 
     #[test]
     fn slices_grow_to_their_time_and_shrink_to_one_attempt() {
-        assert_eq!(next_size(64, Duration::from_millis(1)), 128, "at most doubled");
-        assert_eq!(next_size(64, Duration::from_millis(20)), 32);
-        assert_eq!(next_size(64, Duration::from_secs(100)), 1);
-        assert_eq!(next_size(8192, Duration::ZERO), 8192, "the maximum");
+        let next = |per_worker, elapsed| {
+            let size = SliceSize::of(per_worker, &SearchSettings::default());
+            size.next(elapsed).attempts()
+        };
+        assert_eq!(next(64, Duration::from_millis(1)), 128, "at most doubled");
+        assert_eq!(next(64, Duration::from_millis(20)), 32);
+        assert_eq!(next(64, Duration::from_secs(100)), 1);
+        assert_eq!(next(8192, Duration::ZERO), 8192, "the maximum");
     }
 }

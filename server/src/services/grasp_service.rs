@@ -11,7 +11,6 @@ use tonic::{Request, Response, Status};
 
 use super::Shared;
 use crate::{
-    atlases::KnownGrips,
     budget::effective_budget,
     call::{CallContext, SearchSummary},
     error::ServiceError,
@@ -50,7 +49,13 @@ impl GraspHandler {
             return Err(ServiceError::DeadlineExceeded);
         }
         let admission = shared.executor.admit()?;
-        let (hand, uses_atlas) = (query.receiving_hand, query.uses_atlas());
+        let uses_atlas = query.uses_atlas();
+        let known = if uses_atlas {
+            let [first, alternative] = [Some(query.receiving_hand), query.alternative_hand];
+            shared.atlases.get(&stored, [first, alternative])
+        } else {
+            Default::default()
+        };
         let job = FindJob {
             object,
             stored: Arc::clone(&stored),
@@ -65,17 +70,14 @@ impl GraspHandler {
             has_deadline: call.deadline.is_some(),
             workers: shared.executor.workers(),
             mechanisms: shared.mechanisms,
-            known: if uses_atlas {
-                shared.atlases.get(&stored, hand)
-            } else {
-                KnownGrips::default()
-            },
+            improvement: query.improvement.unwrap_or(shared.improvement),
+            known,
             query,
         };
         call.search_is_due(job.due());
         let answered = search::find(job, &shared.executor, admission).await?;
         call.search_ended(answered.ended);
-        if let Some(grip) = answered.new_grip.filter(|_| uses_atlas) {
+        if let Some((hand, grip)) = answered.new_grip.filter(|_| uses_atlas) {
             shared.atlases.remember(&stored, hand, grip);
         }
         call.log_search(summary(&answered.response));

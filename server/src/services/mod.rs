@@ -3,7 +3,7 @@
 mod grasp_service;
 mod object_service;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use grasp_import::MeshLimits;
 use grasp_synthesis::base::mechanisms::Mechanisms;
@@ -27,6 +27,8 @@ pub(crate) struct Shared {
     pub executor: SearchExecutor,
     /// Bounds on search times.
     pub budgets: BudgetLimits,
+    /// How much longer searches go on after a first grasp that a person would not choose.
+    pub improvement: Duration,
     /// The part of deadlines kept for answers.
     pub reserve: Arc<DeadlineReserve>,
     /// Bounds on meshes.

@@ -16,8 +16,10 @@ use grasp_synthesis::{
 };
 
 use super::{
-    Field, GiverHand, Violations, constraints::constraints, friction, hand, known, object_id_of, obstacles,
-    pose,
+    Field, GiverHand, Violations,
+    constraints::constraints,
+    friction, hand, known, object_id_of, obstacles, pose,
+    receiver::{Stances, Surroundings, stances},
 };
 use crate::{convention::Convention, error::ServiceError};
 
@@ -29,6 +31,9 @@ const LAST_ATTEMPT: u64 = (1 << 62) - 1;
 
 /// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
 const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
+
+/// Longest improvement time: longer ones would keep clients waiting that asked for the first grasp.
+const LONGEST_IMPROVEMENT: Duration = Duration::from_secs(1);
 
 /// Budget for `CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
 /// better grasps. If there is no grasp by then, the search continues for the first one.
@@ -55,12 +60,18 @@ pub(crate) struct FindQuery {
     pub obstacles: Vec<Obstacle>,
     /// The hand to pose.
     pub receiving_hand: &'static Hand,
+    /// The hand that may be posed in its place: the request leaves the choice to the search.
+    pub alternative_hand: Option<&'static Hand>,
     /// The receiver's other hand, if both take the object.
     pub other_hand: Option<&'static Hand>,
+    /// Where the receiver's arms may come from, in the client's frame and `OpenXR` axes.
+    pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
     /// Requested budget.
     pub budget: Option<Duration>,
+    /// Requested time for improving a first valid grasp, at most [`LONGEST_IMPROVEMENT`].
+    pub improvement: Option<Duration>,
     /// True if the search continues for a first grasp when the budget ends without one: the request wants the best
     /// grasp and names no budget.
     pub is_patient: bool,
@@ -116,6 +127,16 @@ fn check_reproducible(is_reproducible: bool, choice: Choice, violations: &mut Vi
     }
 }
 
+/// A replay needs a hand: the attempts of left and right differ.
+fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut Violations) {
+    if only_attempt.is_some() && chooses_hand {
+        violations.add(
+            Field::root("receiving_hand").child("handedness"),
+            "is unspecified with only_attempt, which each hand has of its own; name the hand of the grasp to replay",
+        );
+    }
+}
+
 /// Checks a request. An id for which `object_exists` is false is a violation if there are others; without others, it is
 /// left to the look-up, which knows about evicted objects.
 ///
@@ -130,12 +151,14 @@ pub(crate) fn find_query(
     let v = &mut violations;
     let convention = Convention::from_wire(known(Field::root("convention"), request.convention, v));
     let object_id = object_id_of(Field::root("object"), &request.object, v);
-    let client_from_object = pose(
+    let before = v.len();
+    let client_from_object = convention.pose_to_openxr(pose(
         Field::root("client_from_object"),
         request.client_from_object,
         convention.metres_per_unit(),
         v,
-    );
+    ));
+    let object_origin = (v.len() == before).then_some(client_from_object.position);
     let presenting_hand = request
         .presenting_hand
         .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, v));
@@ -158,7 +181,7 @@ pub(crate) fn find_query(
         Validity::Thesis => THESIS_RIG,
         Validity::Physical => default_rig,
     };
-    let receiving_hand = hand::receiving_hand(
+    let (receiving_hand, is_named) = hand::receiving_hand(
         Field::root("receiving_hand"),
         request.receiving_hand,
         default_rig,
@@ -171,6 +194,10 @@ pub(crate) fn find_query(
         Some(budget) => positive_duration(Field::root("budget"), budget, v),
         None => is_patient.then_some(BEST_CHOICE_BUDGET),
     };
+    let improvement = request
+        .improvement
+        .and_then(|sent| duration(Field::root("improvement"), sent, v))
+        .map(|sent| sent.min(LONGEST_IMPROVEMENT));
     let (first_attempt, max_attempts) = attempts(request.max_attempts, request.only_attempt, v);
     let strategy = strategy(known(Field::root("strategy"), request.strategy, v), validity);
     let bend_ratios = bend_ratios(
@@ -189,6 +216,21 @@ pub(crate) fn find_query(
         request.plan_key_frames,
         v,
     );
+    let chooses_hand = !is_named && !takes_both_hands && validity == Validity::Physical;
+    check_replay(request.only_attempt, chooses_hand, v);
+    let stances = stances(
+        Field::root("receiver"),
+        request.receiver,
+        (Field::root("receiver_stance"), request.receiver_stance),
+        &Surroundings {
+            convention,
+            object: object_origin,
+            validity,
+            takes_both_hands,
+            chooses_hand,
+        },
+        v,
+    );
     if let (false, Some(id)) = (violations.is_empty(), &object_id)
         && !object_exists(id)
     {
@@ -201,16 +243,19 @@ pub(crate) fn find_query(
     violations.finish(FindQuery {
         object_id,
         convention,
-        client_from_object: convention.pose_to_openxr(client_from_object),
+        client_from_object,
         presenting_hand,
         other_hands,
         obstacles,
         receiving_hand,
+        alternative_hand: chooses_hand.then(|| hand::other_hand(receiving_hand)).flatten(),
         other_hand: takes_both_hands
             .then(|| hand::other_hand(receiving_hand))
             .flatten(),
+        stances,
         up,
         budget,
+        improvement,
         is_patient,
         first_attempt,
         max_attempts,
@@ -274,11 +319,22 @@ fn attempts(max_attempts: Option<u64>, only_attempt: Option<u64>, violations: &m
     }
 }
 
+/// A duration of more than 0.
 fn positive_duration(
     field: Field<'_>,
     sent: prost_types::Duration,
     violations: &mut Violations,
 ) -> Option<Duration> {
+    let duration = duration(field, sent, violations)?;
+    if duration.is_zero() {
+        violations.add(field, "is 0 s and 0 ns; it must be more than 0");
+        return None;
+    }
+    Some(duration)
+}
+
+/// A duration of at least 0.
+fn duration(field: Field<'_>, sent: prost_types::Duration, violations: &mut Violations) -> Option<Duration> {
     let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
     let in_range =
         sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
@@ -291,9 +347,9 @@ fn positive_duration(
         return None;
     }
     match (u64::try_from(sent.seconds), u32::try_from(sent.nanos)) {
-        (Ok(seconds), Ok(nanos)) if seconds > 0 || nanos > 0 => Some(Duration::new(seconds, nanos)),
+        (Ok(seconds), Ok(nanos)) => Some(Duration::new(seconds, nanos)),
         _ => {
-            violations.add(field, format_args!("is {}; it must be more than 0", text()));
+            violations.add(field, format_args!("is {}; it must not be negative", text()));
             None
         }
     }

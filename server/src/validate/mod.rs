@@ -10,6 +10,7 @@ mod hand;
 mod object;
 mod obstacles;
 mod page;
+mod receiver;
 
 use std::fmt;
 

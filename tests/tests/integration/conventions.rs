@@ -215,6 +215,24 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
             engine.assert_same_pose(expected.client_from_joint.as_ref().unwrap(), pose, turn);
             assert!((expected.radius * engine.units_per_metre - actual.radius).abs() < 1e-4);
         }
+        let [expected, actual] =
+            [&openxr, &grasp].map(|grasp| grasp.arm.expect("the receiver faces the giver"));
+        assert!(expected.assumed && actual.assumed);
+        for (expected, actual) in [
+            (expected.client_shoulder, actual.client_shoulder),
+            (expected.client_elbow, actual.client_elbow),
+        ] {
+            let expected = engine.vector(expected.unwrap(), engine.units_per_metre);
+            let actual = actual.unwrap();
+            let distance = expected.distance(Vec3::new(actual.x, actual.y, actual.z));
+            assert!(
+                distance < 2e-3 * engine.units_per_metre,
+                "{:?}",
+                engine.convention
+            );
+        }
+        assert!((expected.wrist_flexion - actual.wrist_flexion).abs() < 1e-2);
+        assert!((expected.wrist_deviation - actual.wrist_deviation).abs() < 1e-2);
         assert_eq!(openxr.contacts.len(), grasp.contacts.len());
         for (expected, actual) in openxr.contacts.iter().zip(&grasp.contacts) {
             assert_eq!(expected.triangle, actual.triangle);

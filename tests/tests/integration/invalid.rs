@@ -4,7 +4,7 @@ use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{assert_blamed, blamed_fields, floating_remote, held_remote};
+use crate::fixtures::{assert_blamed, blamed_fields, floating_remote, held_remote, receiving};
 
 type Mutation = fn(&mut v1::FindGraspRequest);
 
@@ -118,7 +118,13 @@ async fn every_field_of_a_search_is_validated() {
         (|r| r.budget = Some(duration(i64::MIN, i32::MIN)), "budget"),
         (|r| r.budget = Some(duration(i64::MAX, 0)), "budget"),
         (|r| r.max_attempts = Some(0), "max_attempts"),
-        (|r| r.only_attempt = Some(u64::MAX), "only_attempt"),
+        (
+            |r| {
+                r.only_attempt = Some(u64::MAX);
+                r.receiving_hand = receiving(v1::Handedness::Right);
+            },
+            "only_attempt",
+        ),
         (|r| r.strategy = 99, "strategy"),
         // A choice that is not supported yet.
         (|r| r.choice = 3, "choice"),

@@ -158,12 +158,13 @@ async fn a_physical_grasp_is_replayed_by_seed_and_attempt() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = ask(&client, "scissors-hold1", 3).await;
-    let request = FindRequest {
+    let mut request = FindRequest {
         validity: Some(Validity::Physical),
         seed: Some(first.report.seed),
         only_attempt: first.report.attempt,
         ..request_for(holdout("scissors-hold1").expect("a built-in holdout"))
     };
+    request.receiving_hand.handedness = first.grasp.as_ref().map(|grasp| grasp.handedness);
     let again = client.find_grasp(&request).await.expect("a valid request");
     assert_eq!(again.grasp, first.grasp);
 }

@@ -114,6 +114,7 @@ async fn ask(
     }
     // A replay of the winning attempt gives the same grasp.
     request.only_attempt = answer.report.attempt;
+    request.receiving_hand.handedness = answer.grasp.as_ref().map(|grasp| grasp.handedness);
     (request, answer)
 }
 

@@ -14,7 +14,7 @@ use prost::Message as _;
 
 use crate::{
     atlases::with_complete_atlas,
-    fixtures::{floating_remote, held_remote, impossible, seconds},
+    fixtures::{floating_remote, held_remote, impossible, receiving, seconds},
 };
 
 async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
@@ -116,9 +116,11 @@ async fn the_reported_seed_and_attempt_replay_the_grasp() {
     )
     .await;
     let report = first.report.unwrap();
+    let hand = first.grasp.as_ref().expect("it can be held").handedness();
     let replay = v1::FindGraspRequest {
         seed: Some(report.seed),
         only_attempt: report.attempt,
+        receiving_hand: receiving(hand),
         ..floating_remote()
     };
     let second = ask(&server, replay).await;
@@ -145,6 +147,7 @@ fn reproducible_search(holdout: &ClientHoldout) -> v1::FindGraspRequest {
         max_attempts: Some(400),
         seed: Some(7),
         reproducible: true,
+        receiving_hand: receiving(v1::Handedness::Right),
         ..holdout.request("objects/scissors")
     }
 }

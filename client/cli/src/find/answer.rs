@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use grasp_client::{FindAnswer, FindRequest, Grasp, Outcome, SearchReport};
+use glam::Vec3;
+use grasp_client::{Arm, FindAnswer, FindRequest, Grasp, Handedness, Outcome, SearchReport};
 
 use crate::{
     format::{all_rejections, grasp_type_name, human_time, name_of},
@@ -25,7 +26,10 @@ pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_se
     for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
         lines.extend(describe_grasp(grasp));
     }
-    lines.extend(describe_search(report));
+    lines.extend(describe_search(
+        report,
+        answer.grasp.as_ref().map(|grasp| grasp.handedness),
+    ));
     lines.push(("round trip", human_time(round_trip_seconds)));
     let mut text = pairs(&lines);
     for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
@@ -73,6 +77,9 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
             ),
         ));
     }
+    if let Some(arm) = &grasp.arm {
+        lines.push(("arm", describe_arm(arm)));
+    }
     if let Some(score) = &grasp.score {
         let terms: Vec<_> = score
             .terms
@@ -92,13 +99,33 @@ fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
     lines
 }
 
+/// Where the arm's joints are, and how the wrist is bent.
+fn describe_arm(arm: &Arm) -> String {
+    let point = |p: Vec3| format!("{:.3}, {:.3}, {:.3}", p.x, p.y, p.z);
+    let bent = |radians: f32, [positive, negative]: [&str; 2]| {
+        let toward = if radians < 0.0 { negative } else { positive };
+        format!("{:.0}° {toward}", radians.to_degrees().abs())
+    };
+    format!(
+        "{}shoulder {}, elbow {} m, wrist {} and {}",
+        if arm.assumed { "assumed " } else { "" },
+        point(arm.client_shoulder),
+        point(arm.client_elbow),
+        bent(arm.wrist_flexion, ["flexed", "extended"]),
+        bent(
+            arm.wrist_deviation,
+            ["toward the little finger", "toward the thumb"]
+        ),
+    )
+}
+
 /// The grasp's type and its confidence.
 fn grasp_type(grasp: &Grasp) -> String {
     let name = grasp_type_name(grasp);
     format!("{name}, {:.0} % sure", 100.0 * grasp.type_confidence)
 }
 
-fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
+fn describe_search(report: &SearchReport, hand: Option<Handedness>) -> Vec<(&'static str, String)> {
     let mut lines = vec![
         (
             "attempts",
@@ -115,7 +142,13 @@ fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
         });
         lines.push((
             "nearest miss",
-            format!("attempt {}: {}{angle}", miss.attempt, name_of(&miss.rejection)),
+            format!(
+                "attempt {}{}: {}{angle}",
+                miss.attempt,
+                miss.handedness
+                    .map_or_else(String::new, |hand| format!(" of the {} hand", name_of(&hand))),
+                name_of(&miss.rejection)
+            ),
         ));
     }
     for limit in &report.limits {
@@ -131,7 +164,12 @@ fn describe_search(report: &SearchReport) -> Vec<(&'static str, String)> {
     lines.push((
         "replay",
         match report.attempt {
-            Some(attempt) => format!("--seed {} --only-attempt {attempt}", report.seed),
+            Some(attempt) => {
+                let hand = hand.map_or_else(String::new, |hand| {
+                    format!(" --receiving-hand {}", name_of(&hand))
+                });
+                format!("--seed {} --only-attempt {attempt}{hand}", report.seed)
+            }
             None => format!("--seed {}", report.seed),
         },
     ));

@@ -2,6 +2,7 @@
 
 mod answer;
 mod constraints;
+mod receiver;
 
 use std::{
     io::Read as _,
@@ -14,6 +15,7 @@ use grasp_client::{AtlasUse, FindAnswer, FindRequest, Outcome, built_in::request
 use serde::{Serialize, de::DeserializeOwned};
 
 use constraints::ConstraintOptions;
+use receiver::ReceiverOptions;
 
 use crate::{
     EXIT_CODES, Ending, blocking,
@@ -24,7 +26,7 @@ use crate::{
     server_options::ServerOptions,
     values::{
         BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
-        parse_duration, parse_view_size,
+        parse_duration, parse_duration_or_none, parse_view_size,
     },
 };
 
@@ -45,7 +47,9 @@ API's FindGraspRequest; only "object" is required:
     "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
     "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
     "record_step_times": false, "convention": "openxr", "friction": null,
-    "choice": "first_valid", "atlas": "allowed", "plan_key_frames": false, "hands": "one",
+    "choice": "first_valid", "improvement_seconds": 0.005, "atlas": "allowed", "plan_key_frames": false, "hands": "one",
+    "receiver": {"standing": {"client_from_root": {"position": [0, 0, 1]}, "height": 1.7},
+      "upper_arm_length": null, "forearm_length": null}, "receiver_stance": null,
     "other_hands": [{"angles": {…}}, …up to three],
     "obstacles": [
       {"box": {"client_from_box": {"position": [0, 0.7, 0]}, "half_extents": [0.6, 0.02, 0.4]}},
@@ -59,7 +63,8 @@ API's FindGraspRequest; only "object" is required:
 
 Instead of angles, a hand may be the joints of a headset: {"joints": {"handedness": "left",
 "joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}; a radius that the
-headset does not report is 0. Metres, radians, quaternions x y z w. Options on the command line override the file.
+headset does not report is 0. Without a handedness, the receiving hand is the better of both. Instead of a standing body,
+a receiver may be {"client_shoulder": [0.2, 1.4, 1]}, or "receiver_stance" may be "facing_giver" or "any". Metres, radians, quaternions x y z w. Options on the command line override the file.
 --print-request prints the request instead of
 sending it, as a template.
 
@@ -91,6 +96,9 @@ pub(crate) struct Arguments {
     /// Which valid grasp to return. Default: the first.
     #[arg(long)]
     choice: Option<ChoiceName>,
+    /// How much longer to search after a first grasp that a person would not choose; 0 takes it. Default: the server's.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration_or_none)]
+    improvement: Option<Duration>,
     /// Time limit of the search. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
@@ -100,7 +108,7 @@ pub(crate) struct Arguments {
     /// Seed of all random streams. Default: drawn by the server.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Replay: run only this attempt of the seed, without trying known grasps first.
+    /// Replay: run only this attempt of the seed and --receiving-hand, without trying known grasps first.
     #[arg(long, value_name = "N", requires = "seed")]
     only_attempt: Option<u64>,
     /// Decide by the indices of the valid attempts, whatever the number of workers.
@@ -112,7 +120,7 @@ pub(crate) struct Arguments {
     /// A JSON file with a list of obstacles to keep clear of, as in a request; - for standard input.
     #[arg(long, value_name = "FILE")]
     obstacles: Option<PathBuf>,
-    /// The hand to pose. Default: right.
+    /// The hand to pose. Default: either.
     #[arg(long, value_name = "HAND")]
     receiving_hand: Option<HandName>,
     /// The rig of the hand to pose. Default: the server's.
@@ -150,6 +158,8 @@ pub(crate) struct Arguments {
     mesh_unit_metres: f32,
     #[command(flatten)]
     constraints: ConstraintOptions,
+    #[command(flatten)]
+    receiver: ReceiverOptions,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -231,6 +241,7 @@ impl Arguments {
         request.validity = self.validity.map(Into::into).or(request.validity);
         request.bend_ratios = self.bend_ratios.map(Into::into).or(request.bend_ratios);
         request.choice = self.choice.map(Into::into).or(request.choice);
+        request.improvement = self.improvement.or(request.improvement);
         request.budget = self.budget.or(request.budget);
         request.max_attempts = self.max_attempts.or(request.max_attempts);
         request.seed = self.seed.or(request.seed);
@@ -244,9 +255,10 @@ impl Arguments {
         request.hands = self.hands.map(Into::into).or(request.hands);
         request.friction = self.friction.or(request.friction);
         self.constraints.override_in(&mut request.constraints);
-        let receiver = &mut request.receiving_hand;
-        receiver.handedness = self.receiving_hand.map(Into::into).or(receiver.handedness);
-        receiver.rig = self.receiving_rig.clone().or(receiver.rig.take());
+        self.receiver.override_in(&mut request)?;
+        let hand = &mut request.receiving_hand;
+        hand.handedness = self.receiving_hand.map_or(hand.handedness, Into::into);
+        hand.rig = self.receiving_rig.clone().or(hand.rig.take());
         Ok(request)
     }
 }

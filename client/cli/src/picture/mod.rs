@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::Vec3;
 use grasp_client::{Contact, Convention, Digit, FindAnswer, FindRequest, Grasp, Phalanx};
-use grasp_scene::{ContactMark, HandoverScene, Image, PosedHand, RenderOptions, to_glb};
+use grasp_scene::{ArmJoints, ContactMark, HandoverScene, Image, PosedHand, RenderOptions, to_glb};
 use grasp_synthesis::model::hand;
 
 use crate::{failure::Failure, values::ViewSize};
@@ -89,6 +89,14 @@ impl Picture {
             giver,
             receiver: receiver(&self.grasp)?,
             other_receiver: receiver(&self.other_grasp)?,
+            arm: self
+                .grasp
+                .as_ref()
+                .and_then(|grasp| grasp.arm.as_ref())
+                .map(|arm| ArmJoints {
+                    shoulder: arm.client_shoulder,
+                    elbow: arm.client_elbow,
+                }),
             contacts: contacts.map(mark).collect(),
             ..HandoverScene::new(
                 self.model.mesh(),

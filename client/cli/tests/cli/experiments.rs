@@ -71,6 +71,8 @@ async fn server_reproduces_every_recorded_grasp() {
             &row["seed"],
             "--only-attempt",
             &row["attempt"],
+            "--receiving-hand",
+            "right",
         ]);
         assert_eq!(code(&answer), 0, "{row:?}: {}", text(&answer.stderr));
         let answer = json(&answer.stdout);

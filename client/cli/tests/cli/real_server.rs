@@ -151,6 +151,7 @@ async fn found_grasp_is_drawn_and_replayed() {
     }
     let report = &answer["report"];
     let attempt = report["attempt"].to_string();
+    let hand = answer["grasp"]["handedness"].as_str().unwrap();
     // With an atlas, the attempt could start from other grips.
     let again = find(&[
         "--no-atlas",
@@ -158,6 +159,8 @@ async fn found_grasp_is_drawn_and_replayed() {
         report["seed"].as_str().unwrap(),
         "--only-attempt",
         &attempt,
+        "--receiving-hand",
+        hand,
     ]);
     assert_eq!(again["grasp"], answer["grasp"]);
     assert_eq!(again["report"]["attempts"], 1);
@@ -223,6 +226,51 @@ async fn both_hands_are_listed_and_drawn() {
             "{part}"
         );
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_arm_of_a_body_is_listed_and_drawn() {
+    let url = real_server().await;
+    let glb = empty_folder("an_arm").join("grasp.glb");
+    let file = empty_folder("a_body").join("request.json");
+    std::fs::write(&file, r#"{"object": "objects/remote", "seed": "1"}"#).unwrap();
+    let find = |options: &[&str]| {
+        let common = [
+            "find",
+            "--request",
+            file.to_str().unwrap(),
+            "--budget",
+            "10s",
+            "--receiver-root",
+            "0,-1.15,0.45,0",
+            "--receiver-height",
+            "1.7",
+            "--server",
+            &url,
+        ];
+        let output = run(&[&common[..], options].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        output
+    };
+    let answer = json(&find(&["--json", "--glb", glb.to_str().unwrap()]).stdout);
+    let arm = &answer["grasp"]["arm"];
+    assert_eq!(arm["assumed"], false);
+    assert!(arm["client_elbow"].is_array() && arm["wrist_flexion"].is_f64());
+    let scene = std::fs::read(glb).unwrap();
+    for part in ["receiver_forearm", "receiver_upper_arm"] {
+        let name = format!("\"{part}\"");
+        assert!(
+            scene.windows(name.len()).any(|bytes| bytes == name.as_bytes()),
+            "{part}"
+        );
+    }
+    let output = find(&[]);
+    let table = text(&output.stdout);
+    let line = table.lines().find(|line| line.trim_start().starts_with("arm "));
+    assert!(
+        line.is_some_and(|line| line.contains("shoulder") && line.contains("elbow")),
+        "{table}"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -128,6 +128,28 @@ fn angled_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
         .boxed()
 }
 
+/// A body near the object, seldom one that is anywhere.
+fn receiver() -> BoxedStrategy<v1::Receiver> {
+    use v1::receiver::Body;
+    let bone = || proptest::option::weighted(0.3, number(0.1..0.6));
+    let body = prop_oneof![
+        vector(1.0).prop_map(Body::ClientShoulder),
+        (pose(1.0), number(0.8..2.5)).prop_map(|(client_from_root, height)| {
+            Body::Standing(v1::StandingBody {
+                client_from_root,
+                height,
+            })
+        }),
+    ];
+    (body, bone(), bone())
+        .prop_map(|(body, upper_arm_length, forearm_length)| v1::Receiver {
+            body: Some(body),
+            upper_arm_length,
+            forearm_length,
+        })
+        .boxed()
+}
+
 fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
     let hand = || {
         prop_oneof![tracked_hand(), angled_hand()].prop_map(|form| v1::PresentingHand { form: Some(form) })
@@ -139,7 +161,11 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
         proptest::option::of(vector(1.0)),
         (0..8_i32, 0..8_i32, 0..6_i32),
         any::<(Option<u64>, Option<u64>, bool, bool)>(),
-        proptest::option::of(number(0.05..2.0)),
+        (
+            proptest::option::of(number(0.05..2.0)),
+            0..3_i32,
+            proptest::option::weighted(0.2, receiver()),
+        ),
     )
         .prop_map(
             |(
@@ -148,7 +174,7 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
                 up,
                 enums,
                 (seed, only_attempt, reproducible, both_hands),
-                friction,
+                (friction, handedness, receiver),
             )| {
                 v1::FindGraspRequest {
                     object: "objects/any".to_owned(),
@@ -160,7 +186,14 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
                     bend_ratios: enums.1,
                     convention: enums.2,
                     seed,
-                    only_attempt,
+                    // A replay names its hand.
+                    only_attempt: only_attempt.filter(|_| handedness > 0),
+                    receiving_hand: Some(v1::ReceivingHand {
+                        rig: String::new(),
+                        handedness,
+                    }),
+                    // Both hands have no body.
+                    receiver: receiver.filter(|_| !both_hands),
                     reproducible,
                     friction,
                     plan_key_frames: !both_hands,
@@ -224,7 +257,8 @@ fn answers_every_request_that_passes_validation() {
             seed: 3,
             arrived,
             workers: 1,
-            known: KnownGrips::default(),
+            improvement: Duration::from_micros(100),
+            known: Default::default(),
             mechanisms: Mechanisms::ALL,
         };
         match job
@@ -239,6 +273,10 @@ fn answers_every_request_that_passes_validation() {
                     answer.outcome == i32::from(v1::Outcome::Found)
                 );
                 prop_assert_eq!(answer.other_grasp.is_some(), answer.grasp.is_some() && takes_both);
+                for arm in answer.grasp.iter().filter_map(|grasp| grasp.arm) {
+                    let elbow = arm.client_elbow.expect("every arm has an elbow");
+                    prop_assert!(elbow.x.is_finite() && elbow.y.is_finite() && elbow.z.is_finite());
+                }
                 for joint in answer.grasp.iter().flat_map(|grasp| &grasp.joints) {
                     let pose = joint.client_from_joint.expect("every joint has a pose");
                     let position = pose.position.expect("every pose has a position");

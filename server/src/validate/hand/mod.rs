@@ -55,15 +55,16 @@ pub(super) fn presenting_hand(
     }
 }
 
-/// The receiving hand; by default the right hand of the default rig.
+/// The receiving hand, by default of the default rig, and whether the request names its side; the right hand if not.
 pub(super) fn receiving_hand(
     field: Field<'_>,
     hand: Option<v1::ReceivingHand>,
     default_rig: &str,
     violations: &mut Violations,
-) -> Option<&'static Hand> {
+) -> (Option<&'static Hand>, bool) {
     let hand = hand.unwrap_or_default();
-    let handedness = match known(field.child("handedness"), hand.handedness, violations) {
+    let named = known(field.child("handedness"), hand.handedness, violations);
+    let handedness = match named {
         v1::Handedness::Left => Handedness::Left,
         v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
     };
@@ -72,7 +73,8 @@ pub(super) fn receiving_hand(
     } else {
         &hand.rig
     };
-    built_in(field.child("rig"), rig, handedness, violations)
+    let hand = built_in(field.child("rig"), rig, handedness, violations);
+    (hand, named != v1::Handedness::Unspecified)
 }
 
 /// The same person's other hand.

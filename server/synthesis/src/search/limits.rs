@@ -22,6 +22,7 @@ use crate::{
         },
         holdout::Holdout,
         object::GraspObject,
+        receiver::Stance,
         strategy::Validity,
     },
     physical::{
@@ -106,11 +107,17 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     let friction = query.friction_on(&holdout.object);
     let span = hand_span(rig);
     let of_region = |region: OrientedBox| {
-        let reach = query.constraints.reach;
+        let reaches = query
+            .constraints
+            .reach
+            .into_iter()
+            .chain(arms_reach(holdout.stance));
         [
             torque_limit(holdout, &region, friction, span),
             giver_limit(&Presented::of(holdout), object.surface_pairs(), rig),
-            reach.and_then(|reach| reach_limit(reach, &region, rig)),
+            reaches
+                .into_iter()
+                .find_map(|reach| reach_limit(reach, &region, rig)),
         ]
     };
     let [torque, giver, reach] = holdable.region.map_or([None; 3], of_region);
@@ -201,6 +208,17 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
         value: room,
         bound: Some(needed),
     })
+}
+
+/// The range of a given arm: no wrist is farther from the shoulder than the stretched bones.
+fn arms_reach(stance: Stance) -> Option<Reach> {
+    match stance {
+        Stance::At(arm) => Some(Reach {
+            shoulder: arm.shoulder,
+            distance: arm.upper_arm + arm.forearm,
+        }),
+        Stance::Any | Stance::Facing => None,
+    }
 }
 
 /// The wrist is within reach of the shoulder, and every contact within the hand's length of the wrist.

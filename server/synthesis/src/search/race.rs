@@ -33,7 +33,7 @@ const HEAD_START: Duration = Duration::from_micros(300);
 
 /// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose
 /// it. They take a few milliseconds, as long as other searches go on ([`super::settings::Query::improvement`]).
-const IMPROVING_ATTEMPTS: u64 = 16;
+pub const IMPROVING_ATTEMPTS: u64 = 16;
 
 /// Marks a worker that is not running an attempt.
 const IDLE: u64 = u64::MAX;
@@ -338,7 +338,7 @@ impl<'a> Race<'a> {
     /// True if a grasp that a person would choose is preferred to one just before it.
     fn has_preferences(&self) -> bool {
         let query = &self.settings.query;
-        query.choice == Choice::FirstValid && query.uses_known_grips()
+        query.choice == Choice::FirstValid && query.uses_known_grips() && !query.improvement.is_zero()
     }
 
     /// The highest index such that all attempts up to it have ended and none below it has been beaten by a

@@ -44,7 +44,8 @@ pub struct Query {
     /// Which valid grasp is wanted.
     pub choice: Choice,
     /// How much longer a search for the first valid grasp looks for one that a person would rather choose, if the first is not
-    /// such (it then has the highest score of those found). Known grips are not searched further.
+    /// such (it then has the highest score of those found); reproducible searches count attempts instead
+    /// ([`super::IMPROVING_ATTEMPTS`]). 0: the first is the answer. Known grips are not searched further.
     pub improvement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,

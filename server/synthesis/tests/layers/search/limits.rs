@@ -11,6 +11,7 @@ use grasp_synthesis::{
         hand::{HandPose, Handedness, joints::HandJoints, kinematics::digit_frames, rig::Rig},
         holdout::{Holdout, PresentingHand},
         object::GraspObject,
+        receiver::{Arm, Stance},
         strategy::Validity,
     },
     physical::{
@@ -249,6 +250,25 @@ fn an_object_beyond_the_receivers_arm_is_limited_by_reach() {
     assert_eq!(limit.kind, LimitKind::Reach);
     assert!((limit.value - 1.2).abs() < 1e-4 && limit.bound.unwrap() > 0.7 + right().reach - 1e-6);
     assert_eq!(at_distance(0.8).limits(), []);
+}
+
+#[test]
+fn an_object_beyond_a_given_arm_is_limited_by_the_length_of_its_bones() {
+    let cube = floating(object_of(cuboid(Vec3::splat(0.025), 2), &[]));
+    let at_distance = |metres: f32| {
+        limits_in(&Holdout {
+            stance: Stance::At(Arm {
+                shoulder: Vec3::X * (metres + 0.025),
+                upper_arm: 0.4,
+                forearm: 0.3,
+            }),
+            ..cube.clone()
+        })
+    };
+    let limit = only(&at_distance(1.2));
+    assert_eq!(limit.kind, LimitKind::Reach);
+    assert!((limit.value - 1.2).abs() < 1e-4 && limit.bound.unwrap() > 0.7 + right().reach - 1e-6);
+    assert_eq!(at_distance(0.8), []);
 }
 
 #[test]

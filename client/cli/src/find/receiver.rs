@@ -1,0 +1,85 @@
+//! Options for the receiver's body.
+
+use clap::{ArgGroup, Args};
+use glam::{Quat, Vec3};
+use grasp_client::{Convention, FindRequest, Pose, Receiver};
+
+use crate::{
+    failure::Failure,
+    values::{StanceName, Turned, parse_turned, parse_vector},
+};
+
+/// The receiver's body, whose arm has to reach the wrist.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "The receiver's body")]
+#[command(group(ArgGroup::new("body").args(["receiver_shoulder", "receiver_root"])))]
+pub(super) struct ReceiverOptions {
+    /// Position of the shoulder joint of the receiving hand's side; the arm must reach from there.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    receiver_shoulder: Option<Vec3>,
+    /// Where a body with --receiver-height stands: the ground between its feet, and how far it is turned about +Y in degrees; at 0
+    /// it faces -Z. In the openxr convention only.
+    #[arg(long, value_name = "X,Y,Z,DEGREES", value_parser = parse_turned, allow_hyphen_values = true)]
+    #[arg(requires = "receiver_height")]
+    receiver_root: Option<Turned>,
+    /// Height of the body at --receiver-root.
+    #[arg(long, value_name = "METRES", requires = "receiver_root")]
+    receiver_height: Option<f32>,
+    /// Length from shoulder to elbow. Default: in proportion to the height, or 0.30.
+    #[arg(long, value_name = "METRES")]
+    upper_arm: Option<f32>,
+    /// Length from elbow to wrist. Default: in proportion to the height, or 0.26.
+    #[arg(long, value_name = "METRES")]
+    forearm: Option<f32>,
+    /// Where a receiver without a body is expected to stand. Default: facing the giver.
+    #[arg(long, value_name = "WHERE", conflicts_with = "body")]
+    receiver_stance: Option<StanceName>,
+}
+
+impl ReceiverOptions {
+    /// Overrides the body and stance of a request with the options that are given.
+    ///
+    /// # Errors
+    /// A length without a body, or a root in another convention than `OpenXR`.
+    pub(super) fn override_in(&self, request: &mut FindRequest) -> Result<(), Failure> {
+        if let Some(shoulder) = self.receiver_shoulder {
+            set_body(request, Receiver::with_shoulder(shoulder));
+        }
+        if let (Some(root), Some(height)) = (self.receiver_root, self.receiver_height) {
+            if request.convention != Convention::OpenXr {
+                return Err(Failure::Usage(
+                    "--receiver-root requires a request in the openxr convention; write receiver.standing in the file"
+                        .to_owned(),
+                ));
+            }
+            let turn = Quat::from_rotation_y(root.degrees.to_radians());
+            set_body(
+                request,
+                Receiver::standing(Pose::new(root.position, turn), height),
+            );
+        }
+        if self.upper_arm.is_some() || self.forearm.is_some() {
+            let receiver = request.receiver.as_mut().ok_or_else(|| {
+                Failure::Usage(
+                    "--upper-arm and --forearm require a body: --receiver-shoulder, --receiver-root or the file's"
+                        .to_owned(),
+                )
+            })?;
+            receiver.upper_arm_length = self.upper_arm.or(receiver.upper_arm_length);
+            receiver.forearm_length = self.forearm.or(receiver.forearm_length);
+        }
+        request.receiver_stance = self.receiver_stance.map(Into::into).or(request.receiver_stance);
+        Ok(())
+    }
+}
+
+/// Replaces a request's body, and keeps the lengths of its arm.
+fn set_body(request: &mut FindRequest, new: Receiver) {
+    request.receiver = Some(match request.receiver {
+        None => new,
+        Some(receiver) => Receiver {
+            body: new.body,
+            ..receiver
+        },
+    });
+}

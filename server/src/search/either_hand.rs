@@ -1,0 +1,290 @@
+//! Chooses the receiving hand: searches with left and right hand in turn, within the same budget, for the better grasp.
+//!
+//! Slices alternate between the hands, short ones at first, until a hand has a grasp that a person would choose. After another
+//! grasp, both hands have the time for improving it together. A search for the best grasp gives half its budget to each hand.
+//! A reproducible one runs the same attempts of both, the right hand's first.
+
+use std::time::Duration;
+
+use grasp_synthesis::{
+    model::strategy::Choice,
+    search::{
+        IMPROVING_ATTEMPTS, Replaceable, SearchEnd, SearchOutcome,
+        scene::Task,
+        settings::{Run, SearchSettings},
+    },
+};
+
+use super::{
+    progress::{Ended, Found, HandPlace},
+    slices::{Site, SliceSize, Slices},
+};
+
+/// Attempts per worker in each hand's first slice: about a millisecond. More favour the right hand, whose turn is first.
+const FIRST_ATTEMPTS_PER_WORKER: u64 = 4;
+
+/// The part of the time for improving a grasp in which the hand that found it goes on before the other's turn: a quarter.
+const OWN_PART: u32 = 4;
+
+/// How long the known grips of each hand are tried before the other's, if the call's own thread did not: as long as the core
+/// tries them before fresh attempts.
+const KNOWN_GRIPS_TIME: Duration = Duration::from_micros(300);
+
+/// Searches with two hands, each with its settings, whose query and run must be the same. Right comes first. If nothing is
+/// found by the deadline and `patience` ends later, the search continues until then and takes the first valid grasp. Adds to
+/// the site's progress, which must be empty.
+pub(super) fn search_either<'a>(
+    site: Site<'a>,
+    hands: [(Task<'a>, &'a SearchSettings); 2],
+    patience: Duration,
+) -> Ended {
+    let settings = hands.map(|(_, settings)| settings);
+    let [(right, of_right), (left, of_left)] = hands;
+    let mut search = EitherHand {
+        site,
+        hands: [Slices::new(0, right, of_right), Slices::new(1, left, of_left)],
+        settings,
+        deadline: of_right.run.deadline,
+    };
+    // Both together run no more attempts than one alone.
+    let attempts = of_right.run.max_attempts;
+    search.hands[0].left = attempts.div_ceil(2);
+    search.hands[1].left = attempts / 2;
+    let end = match (of_right.query.choice, of_right.run.reproducible) {
+        (Choice::FirstValid, true) => search.lowest_attempt(),
+        (Choice::FirstValid, false) => search.first_valid(),
+        (Choice::BestWithinBudget, _) => {
+            let end = search.best();
+            let is_found = site.progress.outcome(end).outcome.grasp.is_some();
+            if !is_found && end == SearchEnd::DeadlinePassed && search.deadline < Some(patience) {
+                search.deadline = Some(patience);
+                for (slices, settings) in search.hands.iter_mut().zip(settings) {
+                    slices.next.query.choice = Choice::FirstValid;
+                    // If the search waited for workers until its deadline, it has not tried known grips yet.
+                    slices.restore_known(settings);
+                }
+                search.first_valid()
+            } else {
+                end
+            }
+        }
+    };
+    site.progress.outcome(end)
+}
+
+/// Valid grasps of a reproducible search that the attempts still to run may replace.
+#[derive(Debug, Default)]
+struct Undecided {
+    /// The slices that found them, with their runs and hands.
+    found: Vec<(SearchOutcome, Run, HandPlace)>,
+    /// The last attempt that may replace them.
+    last: Option<u64>,
+}
+
+impl Undecided {
+    /// Adds them to the site's progress, without their grasps if the search was cut short: another one might have won.
+    fn settle(self, site: Site<'_>, end: SearchEnd) -> SearchEnd {
+        let is_cut = matches!(end, SearchEnd::DeadlinePassed | SearchEnd::Stopped);
+        for (mut outcome, run, hand) in self.found {
+            if is_cut {
+                outcome.grasp = None;
+                outcome.replaceable_until = None;
+            }
+            site.progress.add(outcome, &run, hand);
+        }
+        end
+    }
+}
+
+/// A search with two hands.
+struct EitherHand<'a> {
+    site: Site<'a>,
+    hands: [Slices<'a>; 2],
+    /// The settings of each hand, with its known grips.
+    settings: [&'a SearchSettings; 2],
+    /// When it ends.
+    deadline: Option<Duration>,
+}
+
+impl EitherHand<'_> {
+    /// Looks for a first valid grasp in turns, and for one that a person would rather choose a little longer.
+    fn first_valid(&mut self) -> SearchEnd {
+        let site = self.site;
+        if self.has_known_grip() {
+            return SearchEnd::Found;
+        }
+        let improvement = self.hands[0].next.query.improvement;
+        let own = improvement / OWN_PART;
+        for slices in &mut self.hands {
+            slices.next.query.improvement = own;
+        }
+        let first_size = SliceSize::of(FIRST_ATTEMPTS_PER_WORKER, &self.hands[0].next);
+        let mut sizes = [first_size; 2];
+        let mut improves_until: Option<Duration> = None;
+        for turn in 0_usize.. {
+            let place = turn % 2;
+            let slices = &mut self.hands[place];
+            if slices.left == 0 {
+                if self.hands.iter().all(|slices| slices.left == 0) {
+                    return SearchEnd::AttemptsExhausted;
+                }
+                continue;
+            }
+            let start = site.clock.now();
+            slices.next.run.deadline = [self.deadline, improves_until].into_iter().flatten().min();
+            let size = if improves_until.is_some() {
+                first_size
+            } else {
+                sizes[place]
+            };
+            let outcome = slices.run(site, size.attempts());
+            let end = outcome.end;
+            let found = slices.add(site, outcome);
+            if end == SearchEnd::Stopped || site.is_stopped() {
+                return SearchEnd::Stopped;
+            }
+            match found {
+                Found::Settled => return SearchEnd::Found,
+                Found::Replaceable { by: Some(by), .. } => {
+                    improves_until.get_or_insert(by.saturating_sub(own).saturating_add(improvement));
+                }
+                Found::Replaceable { by: None, .. } | Found::Nothing => {}
+            }
+            if site.has_passed(self.deadline) || site.has_passed(improves_until) {
+                return SearchEnd::DeadlinePassed;
+            }
+            sizes[place] = size.next(site.clock.now().saturating_sub(start));
+        }
+        SearchEnd::AttemptsExhausted
+    }
+
+    /// Looks for valid known grips of both hands, unless that was done before. True if there is one.
+    fn has_known_grip(&mut self) -> bool {
+        let site = self.site;
+        let mut is_found = false;
+        for (slices, settings) in self.hands.iter_mut().zip(self.settings) {
+            let known = &slices.next.known;
+            if known.tried > 0 || (known.atlas.is_none() && known.recent.is_empty()) {
+                continue;
+            }
+            let until = site.clock.now().saturating_add(KNOWN_GRIPS_TIME);
+            slices.next.run.deadline = [self.deadline, Some(until)].into_iter().flatten().min();
+            let outcome = slices.run(site, 0);
+            is_found |= slices.add(site, outcome) != Found::Nothing;
+            slices.restore_known(settings);
+        }
+        is_found
+    }
+
+    /// Looks for the best grasp, for half the time with each hand.
+    fn best(&mut self) -> SearchEnd {
+        let site = self.site;
+        let start = site.clock.now();
+        let half = |deadline: Duration| start.saturating_add(deadline.saturating_sub(start) / 2);
+        let mut end = SearchEnd::AttemptsExhausted;
+        for (slices, deadline) in self
+            .hands
+            .iter_mut()
+            .zip([self.deadline.map(half), self.deadline])
+        {
+            slices.next.run.deadline = deadline;
+            let mut size = SliceSize::first(&slices.next);
+            end = SearchEnd::AttemptsExhausted;
+            while slices.left > 0 {
+                let start = site.clock.now();
+                let outcome = slices.run(site, size.attempts());
+                end = outcome.end;
+                slices.add(site, outcome);
+                if end == SearchEnd::Stopped || site.is_stopped() {
+                    return SearchEnd::Stopped;
+                }
+                if end == SearchEnd::DeadlinePassed || site.has_passed(deadline) {
+                    end = SearchEnd::DeadlinePassed;
+                    break;
+                }
+                size = size.next(site.clock.now().saturating_sub(start));
+            }
+        }
+        end
+    }
+
+    /// Looks for the valid attempt with the lowest index, or one of those soon after it that a person would rather choose: the
+    /// same attempts of both hands decide, whatever the number of workers and the time.
+    fn lowest_attempt(&mut self) -> SearchEnd {
+        let site = self.site;
+        for slices in &mut self.hands {
+            slices.next.run.deadline = self.deadline;
+        }
+        let mut undecided = Undecided::default();
+        // Known grips precede all attempts.
+        if let Some(end) = self.round(0, &mut undecided) {
+            return undecided.settle(site, end);
+        }
+        // Longer rounds would run attempts beyond those that may replace the first valid one.
+        let prefers = self.hands[0].next.query.uses_known_grips();
+        let mut size = SliceSize::first(&self.hands[0].next);
+        loop {
+            let start = site.clock.now();
+            let first = self.hands[0].next.run.first_attempt;
+            let attempts = match undecided.last {
+                Some(last) => last.saturating_add(1).saturating_sub(first),
+                None if prefers => IMPROVING_ATTEMPTS,
+                None => size.attempts(),
+            };
+            if let Some(end) = self.round(attempts, &mut undecided) {
+                return undecided.settle(site, end);
+            }
+            size = size.next(site.clock.now().saturating_sub(start));
+        }
+    }
+
+    /// Runs the next attempts of both hands, 0 for the known grips. The end, if they decide the search or end it.
+    fn round(&mut self, attempts: u64, undecided: &mut Undecided) -> Option<SearchEnd> {
+        let site = self.site;
+        let was_last = undecided.last.is_some();
+        let mut is_chosen = false;
+        let mut attempts_of_left = attempts;
+        for place in [0, 1] {
+            let slices = &mut self.hands[place];
+            let attempts = if place == 0 { attempts } else { attempts_of_left };
+            let first = slices.next.run.first_attempt;
+            let outcome = slices.run(site, attempts);
+            match outcome.end {
+                SearchEnd::Stopped => return Some(SearchEnd::Stopped),
+                SearchEnd::DeadlinePassed => {
+                    slices.add(site, outcome);
+                    return Some(SearchEnd::DeadlinePassed);
+                }
+                SearchEnd::AttemptsExhausted => {
+                    slices.add(site, outcome);
+                }
+                SearchEnd::Found => {
+                    match (outcome.replaceable_until, outcome.report.attempt) {
+                        (Some(Replaceable::UntilAttempt(last)), _) => {
+                            let earlier = undecided.last.map_or(last, |known| known.min(last));
+                            undecided.last = Some(earlier);
+                        }
+                        (_, attempt) => {
+                            is_chosen = true;
+                            // Only an earlier one of the left hand is preferred to one of the right.
+                            if let Some(attempt) = attempt {
+                                attempts_of_left = attempts_of_left.min(attempt - first);
+                            }
+                        }
+                    }
+                    undecided.found.push((outcome, slices.next.run.clone(), place));
+                    slices.advance();
+                }
+            }
+        }
+        let is_exhausted = attempts > 0 && self.hands.iter().all(|slices| slices.left == 0);
+        if is_chosen || was_last {
+            Some(SearchEnd::Found)
+        } else {
+            is_exhausted.then_some(SearchEnd::AttemptsExhausted)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,306 @@
+//! Either hand on a held remote, whose attempts are the same for any number of workers.
+
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
+
+use grasp_assets::{
+    hands::hand,
+    holdouts::{BuiltInHoldout, holdouts},
+    objects::object,
+};
+use grasp_synthesis::{
+    base::clock::Clock,
+    known::growth::Growth,
+    model::{hand::Handedness, holdout::Holdout, strategy::Strategy},
+    physical::grip::Gripper,
+    search::{
+        GraspSource, find_grasp,
+        settings::{Known, Query},
+    },
+};
+
+use super::*;
+use crate::search::progress::Progress;
+
+/// Longest search; reached only if something hangs.
+const ENDS_BY: Duration = Duration::from_mins(2);
+
+/// The machine's clock.
+struct Since(Instant);
+
+impl Clock for Since {
+    fn now(&self) -> Duration {
+        self.0.elapsed()
+    }
+}
+
+fn pool(workers: usize) -> rayon::ThreadPool {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(workers);
+    pool.build().expect("threads start")
+}
+
+/// A reproducible search without known grips.
+fn reproducible(seed: u64, max_attempts: u64, workers: usize) -> SearchSettings {
+    SearchSettings {
+        run: Run {
+            seed,
+            reproducible: true,
+            max_attempts,
+            workers,
+            deadline: Some(ENDS_BY),
+            ..Run::default()
+        },
+        ..SearchSettings::default()
+    }
+}
+
+fn of_choice(choice: Choice, deadline: Duration) -> SearchSettings {
+    let settings = reproducible(1, u64::MAX >> 1, 2);
+    SearchSettings {
+        query: Query {
+            choice,
+            ..Query::default()
+        },
+        run: Run {
+            reproducible: false,
+            deadline: Some(deadline),
+            ..settings.run
+        },
+        ..settings
+    }
+}
+
+fn task<'a>(built_in: &BuiltInHoldout, holdout: &'a Holdout, side: Handedness) -> Task<'a> {
+    Task {
+        holdout,
+        object: &object(&built_in.object).expect("it is built in").prepared,
+        rig: &hand("adult", side).expect("it is built in").rig,
+    }
+}
+
+fn either(built_in: &BuiltInHoldout, settings: &SearchSettings, patience: Duration) -> Ended {
+    either_of(built_in, [settings; 2], patience)
+}
+
+fn either_of(built_in: &BuiltInHoldout, settings: [&SearchSettings; 2], patience: Duration) -> Ended {
+    let holdout = built_in.to_holdout().expect("built-in holdouts are sound");
+    let [right, left] = [Handedness::Right, Handedness::Left].map(|side| task(built_in, &holdout, side));
+    let (pool, stop, progress) = (
+        pool(settings[0].run.workers),
+        AtomicBool::new(false),
+        Progress::default(),
+    );
+    let site = Site {
+        pool: &pool,
+        clock: &Since(Instant::now()),
+        stop: &stop,
+        progress: &progress,
+    };
+    search_either(site, [(right, settings[0]), (left, settings[1])], patience)
+}
+
+fn alone(built_in: &BuiltInHoldout, settings: &SearchSettings, side: Handedness) -> SearchOutcome {
+    let holdout = built_in.to_holdout().expect("built-in holdouts are sound");
+    let clock = Since(Instant::now());
+    let task = task(built_in, &holdout, side);
+    find_grasp(
+        &pool(settings.run.workers),
+        task,
+        settings,
+        &clock,
+        &AtomicBool::new(false),
+    )
+}
+
+/// Some holdouts, whose givers leave different sides.
+fn some() -> impl Iterator<Item = &'static BuiltInHoldout> {
+    holdouts().iter().step_by(4)
+}
+
+#[test]
+fn the_lowest_attempt_of_either_hand_wins_whatever_the_number_of_workers() {
+    let mut winners = [0; 2];
+    for built_in in some() {
+        for seed in 0..2 {
+            // The first that is valid: a search that prefers nothing.
+            let mut settings = reproducible(seed, 2000, 1);
+            settings.query.improvement = Duration::ZERO;
+            let of_hands = [Handedness::Right, Handedness::Left].map(|side| {
+                let settings = reproducible(seed, 1000, 1);
+                let query = Query {
+                    improvement: Duration::ZERO,
+                    ..Query::default()
+                };
+                let settings = SearchSettings { query, ..settings };
+                alone(built_in, &settings, side).report.attempt
+            });
+            let expected = match of_hands {
+                [Some(right), Some(left)] if left < right => Some((1, left)),
+                [Some(right), _] => Some((0, right)),
+                [None, left] => left.map(|left| (1, left)),
+            };
+            let of = |ended: &Ended| ended.outcome.report.attempt.map(|attempt| (ended.hand, attempt));
+            let with_one = either(built_in, &settings, ENDS_BY);
+            assert_eq!(of(&with_one), expected, "{} {seed}", built_in.name);
+            settings.run.workers = 3;
+            let with_three = either(built_in, &settings, ENDS_BY);
+            assert_eq!(with_three.hand, with_one.hand);
+            assert_eq!(with_three.outcome.grasp, with_one.outcome.grasp);
+            assert_eq!(with_three.outcome.report, with_one.outcome.report);
+            winners[with_one.hand] += usize::from(expected.is_some());
+        }
+    }
+    assert!(winners.iter().all(|&count| count > 0), "{winners:?}");
+}
+
+#[test]
+fn a_reproducible_search_improves_its_grasp_the_same_with_any_number_of_workers() {
+    let mut improved = 0;
+    for built_in in some() {
+        let one = either(built_in, &reproducible(5, 2000, 1), ENDS_BY);
+        let three = either(built_in, &reproducible(5, 2000, 3), ENDS_BY);
+        assert_eq!(three.hand, one.hand, "{}", built_in.name);
+        assert_eq!(three.outcome.grasp, one.outcome.grasp);
+        assert_eq!(three.outcome.report, one.outcome.report);
+        let mut first = reproducible(5, 2000, 1);
+        first.query.improvement = Duration::ZERO;
+        let first = either(built_in, &first, ENDS_BY);
+        let attempts = [&first, &one].map(|ended| ended.outcome.report.attempt);
+        let [Some(first), Some(chosen)] = attempts else {
+            panic!("{} has a grasp: {attempts:?}", built_in.name);
+        };
+        assert!(
+            (first..=first + IMPROVING_ATTEMPTS).contains(&chosen),
+            "{first} {chosen}"
+        );
+        improved += usize::from(chosen > first);
+    }
+    assert!(improved > 0, "no first grasp was improved");
+}
+
+/// The first grips of a hand on an object.
+fn first_grips(object_name: &str, side: Handedness) -> Known {
+    let prepared = &object(object_name).expect("it is built in").prepared;
+    let rig = &hand("adult", side).expect("it is built in").rig;
+    let mut growth = Growth::new(prepared, rig);
+    let mut gripper = Gripper::default();
+    while growth.len() < 60 {
+        growth.round(&mut gripper);
+    }
+    Known {
+        atlas: Some(Arc::new(growth.atlas())),
+        ..Known::default()
+    }
+}
+
+#[test]
+fn the_better_known_grip_of_both_hands_is_as_good_as_that_of_each_alone() {
+    let sides = [Handedness::Right, Handedness::Left];
+    let known = sides.map(|side| first_grips("remote", side));
+    let with = |known: &Known, is_reproducible: bool| {
+        let mut settings = reproducible(1, 1000, 2);
+        settings.known = known.clone();
+        settings.run.reproducible = is_reproducible;
+        settings
+    };
+    let mut chosen = [0; 2];
+    for built_in in holdouts().iter().filter(|built_in| built_in.object == "remote") {
+        for is_reproducible in [true, false] {
+            let settings = known.each_ref().map(|known| with(known, is_reproducible));
+            let alone = [0, 1].map(|place| alone(built_in, &settings[place], sides[place]));
+            let is_known =
+                |outcome: &SearchOutcome| matches!(outcome.report.source, Some(GraspSource::Atlas(_)));
+            let best = alone
+                .iter()
+                .filter(|outcome| is_known(outcome))
+                .map(|outcome| outcome.value)
+                .fold(f32::NEG_INFINITY, f32::max);
+            let ended = either_of(built_in, settings.each_ref(), ENDS_BY);
+            if best.is_finite() {
+                assert!(is_known(&ended.outcome), "{}", built_in.name);
+                assert!(ended.outcome.value >= best, "{}", built_in.name);
+                assert_eq!(
+                    ended.outcome.report.known_grips,
+                    known[ended.hand]
+                        .atlas
+                        .as_ref()
+                        .map_or(0, |atlas| atlas.entries().len())
+                );
+                chosen[ended.hand] += 1;
+            }
+        }
+    }
+    assert!(chosen.iter().sum::<i32>() > 0, "no known grip was valid");
+}
+
+#[test]
+fn a_hand_without_an_atlas_leaves_the_answer_to_the_other() {
+    let built_in = holdouts()
+        .iter()
+        .find(|built_in| built_in.object == "remote")
+        .expect("it is built in");
+    let bare = of_choice(Choice::FirstValid, ENDS_BY);
+    for side in [Handedness::Right, Handedness::Left] {
+        let mut with_atlas = bare.clone();
+        with_atlas.known = first_grips("remote", side);
+        let (settings, place) = match side {
+            Handedness::Right => ([&with_atlas, &bare], 0),
+            Handedness::Left => ([&bare, &with_atlas], 1),
+        };
+        let ended = either_of(built_in, settings, ENDS_BY);
+        let source = ended.outcome.report.source.expect("the remote can be taken");
+        assert!(
+            ended.hand == place || matches!(source, GraspSource::Attempt(_)),
+            "{source:?}"
+        );
+    }
+}
+
+#[test]
+fn attempts_of_both_hands_together_stay_within_the_maximum() {
+    let built_in = &holdouts()[0];
+    for (max_attempts, expected) in [(1, 1), (2, 2), (7, 7)] {
+        // Attempts that find nothing in so few.
+        let mut settings = reproducible(3, max_attempts, 2);
+        settings.query.strategy = Strategy::A;
+        settings.query.bend_ratios = Strategy::A.default_bend_ratios();
+        let ended = either(built_in, &settings, ENDS_BY).outcome;
+        assert_eq!(ended.report.attempts, expected);
+        assert_eq!(ended.end, SearchEnd::AttemptsExhausted);
+        settings.run.reproducible = false;
+        assert_eq!(
+            either(built_in, &settings, ENDS_BY).outcome.report.attempts,
+            expected
+        );
+    }
+}
+
+#[test]
+fn the_first_valid_grasp_of_either_hand_ends_the_search() {
+    for built_in in some() {
+        let settings = of_choice(Choice::FirstValid, ENDS_BY);
+        let ended = either(built_in, &settings, ENDS_BY);
+        assert_eq!(ended.outcome.end, SearchEnd::Found, "{}", built_in.name);
+        assert!(ended.outcome.grasp.is_some() && ended.outcome.report.attempt.is_some());
+    }
+}
+
+#[test]
+fn the_best_of_both_hands_is_ranked_within_the_budget_and_patience_follows() {
+    let built_in = &holdouts()[0];
+    let settings = of_choice(Choice::BestWithinBudget, Duration::from_millis(1500));
+    let start = Instant::now();
+    let best = either(built_in, &settings, Duration::from_millis(1500)).outcome;
+    assert!(
+        start.elapsed() >= Duration::from_millis(1400),
+        "the whole budget is used"
+    );
+    assert!(best.grasp.is_some() && best.report.candidates > 1);
+    // Without a grasp by the deadline, the first one after it.
+    let settings = of_choice(Choice::BestWithinBudget, Duration::from_nanos(1));
+    let late = either(built_in, &settings, ENDS_BY).outcome;
+    assert_eq!(late.end, SearchEnd::Found);
+    assert!(late.value <= best.value);
+}
