@@ -4,10 +4,7 @@ use glam::{Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        hand::{
-            HandPose, Handedness,
-            joints::{HandJoints, index},
-        },
+        hand::{HandPose, Handedness, joints::HandJoints},
         receiver::{Arm, ArmPose, Stance},
     },
     physical::{barriers::Barriers, receiver::Receiver},
