@@ -6,6 +6,7 @@ mod closest;
 mod containment;
 mod crossing;
 mod distance_field;
+pub mod local_shape;
 pub mod local_thickness;
 pub mod mesh;
 pub mod mesh_bvh;
