@@ -88,13 +88,16 @@ fn find(criterion: &mut Criterion) {
 fn classification(criterion: &mut Criterion) {
     let bench = Bench::new(1);
     let grasps: Vec<_> = (0..bench.holdouts.len())
-        .filter_map(|holdout| bench.search(holdout, Strategy::F, SEED, 0, u64::MAX).grasp)
+        .filter_map(|holdout| {
+            let grasp = bench.search(holdout, Strategy::F, SEED, 0, u64::MAX).grasp?;
+            Some((grasp, &bench.holdouts[holdout].1.object.local_shape))
+        })
         .collect();
     let mut next = grasps.iter().cycle();
     criterion.bench_function("classification", |bencher| {
         bencher.iter(|| {
             next.next()
-                .map(|grasp| classify(bench.rig, &grasp.pose, &grasp.contacts))
+                .map(|(grasp, shape)| classify(bench.rig, &grasp.pose, &grasp.contacts, shape))
         });
     });
 }

@@ -118,6 +118,7 @@ impl StoredObject {
                 .map_or(0, |surface| of_mesh(surface.mesh()))
             + self.object.surface.distance_field_bytes()
             + self.object.local_thickness.bytes()
+            + self.object.local_shape.bytes()
             + self.object.surface_pairs().bytes()
             + self.object.parts().bytes()
             + PlacementCaches::MAX_BYTES

@@ -2,15 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{mesh::TriangleMesh, principal_axes::principal_axes, surface_samples::SurfaceSampler};
-use crate::base::random::AttemptStream;
-
-/// Points sampled on the surface. Fewer miss thin parts next to large ones; the time to compare them all grows with the
-/// square, to 3 ms.
-const SAMPLES: u64 = 1024;
-
-/// Seed of the samples: arbitrary, but fixed so that a mesh always has the same thickness.
-const SEED: u64 = 0x5448_4943;
+use super::{principal_axes::principal_axes, surface_samples::SurfaceSample};
 
 /// Radius of the part of the surface around a sample that counts as near, in metres: the reach of a hand's contacts.
 const REACH: f32 = 0.06;
@@ -25,16 +17,9 @@ pub struct LocalThickness {
 }
 
 impl LocalThickness {
-    /// Measures a mesh; takes some milliseconds.
-    pub fn of(mesh: &TriangleMesh) -> Self {
-        let sampler = SurfaceSampler::new(mesh, |_| true);
-        let points: Vec<Vec3> = (0..SAMPLES)
-            .filter_map(|sample| {
-                let mut stream = AttemptStream::new(SEED, sample);
-                sampler.sample(sample, SAMPLES, &mut stream)
-            })
-            .map(|(_, position)| position)
-            .collect();
+    /// Measures a mesh from points spread evenly over it; takes some milliseconds.
+    pub fn of(samples: &[SurfaceSample]) -> Self {
+        let points: Vec<Vec3> = samples.iter().map(|sample| sample.position).collect();
         let mut by_distance = Vec::with_capacity(points.len());
         let samples = points
             .iter()

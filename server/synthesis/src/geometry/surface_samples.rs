@@ -49,3 +49,34 @@ impl<'a> SurfaceSampler<'a> {
         Some((triangle, a + (b - a) * u + (c - a) * v))
     }
 }
+
+/// Points drawn from a mesh to learn the shape of its parts. Fewer miss thin parts next to large ones; the time to compare
+/// them all grows with the square, to 3 ms.
+const SAMPLES: u64 = 1024;
+
+/// Seed of the samples: arbitrary, but fixed so that a mesh always has the same shape.
+const SEED: u64 = 0x5448_4943;
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceSample {
+    /// The point, in metres.
+    pub position: Vec3,
+    /// The outward unit normal of its triangle.
+    pub normal: Vec3,
+}
+
+/// Draws points evenly from a whole mesh, always the same.
+pub fn even_samples(mesh: &TriangleMesh) -> Vec<SurfaceSample> {
+    let sampler = SurfaceSampler::new(mesh, |_| true);
+    (0..SAMPLES)
+        .filter_map(|sample| {
+            let mut stream = AttemptStream::new(SEED, sample);
+            sampler.sample(sample, SAMPLES, &mut stream)
+        })
+        .map(|(triangle, position)| SurfaceSample {
+            position,
+            normal: mesh.normal(triangle),
+        })
+        .collect()
+}

@@ -62,7 +62,7 @@ impl Entry {
         gripper: &mut Gripper,
     ) -> Self {
         let contacts = gripper.contacts.clone();
-        let classification = classify(rig, &grip.pose, &contacts);
+        let classification = classify(rig, &grip.pose, &contacts, &scene.object.local_shape);
         let grip_values = grip_values(
             scene,
             rig,

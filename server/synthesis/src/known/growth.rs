@@ -313,7 +313,7 @@ impl<'a> Growth<'a> {
         // Evaluating the entry takes longest: drop it first if its cell is full.
         let needs_grips = giver.is_some_and(Giver::needs_grips);
         let contacts = &gripper.contacts;
-        let classification = classify(self.rig, &grip.pose, contacts);
+        let classification = classify(self.rig, &grip.pose, contacts, &self.scene.object.local_shape);
         let values = grip_values(
             &self.scene,
             self.rig,

@@ -397,8 +397,9 @@ pub const CLEAR_CONFIDENCE: f32 = 0.5;
 pub struct Classification {
     /// The type; none if the grasp resembles none, and a person would not call it natural.
     pub grasp_type: Option<GraspType>,
-    /// The confidence, 0 to 1: the fit of the best type minus half the fit of the second best. Below
-    /// [`MIN_CONFIDENCE`] if there is no type.
+    /// The confidence, 0 to 1: the share of experts expected to name this type or one close to it, say the next size of wrap.
+    /// It is the fit of the best type less half the fit of the best contradicting one, or a tenth of that of the best type
+    /// close to it. Below [`MIN_CONFIDENCE`] if there is no type.
     pub confidence: f32,
 }
 

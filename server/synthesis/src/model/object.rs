@@ -6,8 +6,9 @@ use glam::Vec3;
 
 use super::{parts::Parts, strategy::Validity};
 use crate::geometry::{
-    handles::Handles, local_thickness::LocalThickness, mesh::TriangleMesh, mesh_bvh::MeshBvh,
-    oriented_box::OrientedBox, tapered_capsule::TaperedCapsule,
+    handles::Handles, local_shape::LocalShape, local_thickness::LocalThickness, mesh::TriangleMesh,
+    mesh_bvh::MeshBvh, oriented_box::OrientedBox, surface_samples::even_samples,
+    tapered_capsule::TaperedCapsule,
 };
 
 /// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
@@ -30,6 +31,8 @@ pub struct GraspObject {
     pub bounding_box: OrientedBox,
     /// How thick it is where a hand may hold it.
     pub local_thickness: LocalThickness,
+    /// How flat, long or round it is there.
+    pub local_shape: LocalShape,
     /// Mass, in kilograms.
     pub mass: f32,
     /// Centre of mass in the object's frame, in metres.
@@ -123,10 +126,15 @@ impl GraspObject {
             return Err(errors);
         }
         let (shape, surface) = shape_and_surface(mesh);
-        let (bounding_box, local_thickness) = shape;
+        let Shape {
+            bounding_box,
+            local_thickness,
+            local_shape,
+        } = shape;
         Ok(Self {
             bounding_box,
             local_thickness,
+            local_shape,
             mass,
             centre_of_mass,
             friction,
@@ -181,15 +189,32 @@ impl GraspObject {
     }
 }
 
-/// Builds the bounding box of a mesh and its local thickness, and its search structure in parallel, or in sequence if no
-/// thread can be spawned. The former take a fifth of the work.
-fn shape_and_surface(mesh: TriangleMesh) -> ((OrientedBox, LocalThickness), MeshBvh) {
+/// The shape of an object, apart from its search structure.
+struct Shape {
+    bounding_box: OrientedBox,
+    local_thickness: LocalThickness,
+    local_shape: LocalShape,
+}
+
+impl Shape {
+    fn of(mesh: &TriangleMesh) -> Self {
+        let samples = even_samples(mesh);
+        Self {
+            bounding_box: OrientedBox::around(mesh),
+            local_thickness: LocalThickness::of(&samples),
+            local_shape: LocalShape::of(&samples),
+        }
+    }
+}
+
+/// Builds the shape of a mesh and its search structure in parallel, or in sequence if no thread can be spawned. The former
+/// takes a fifth of the work.
+fn shape_and_surface(mesh: TriangleMesh) -> (Shape, MeshBvh) {
     let copy = mesh.clone();
-    let shape = || (OrientedBox::around(&copy), LocalThickness::of(&copy));
     std::thread::scope(|scope| {
-        let parallel = std::thread::Builder::new().spawn_scoped(scope, shape);
+        let parallel = std::thread::Builder::new().spawn_scoped(scope, || Shape::of(&copy));
         let surface = MeshBvh::build(mesh);
         let of_copy = parallel.ok().and_then(|thread| thread.join().ok());
-        (of_copy.unwrap_or_else(shape), surface)
+        (of_copy.unwrap_or_else(|| Shape::of(&copy)), surface)
     })
 }

@@ -15,6 +15,7 @@ use crate::{
         grasp::{Contact, Grasp, PhysicalMargins},
         grasp_type::Classification,
         hand::rig::Rig,
+        object::GraspObject,
     },
     physical::{
         barriers::BarrierClearances,
@@ -82,7 +83,7 @@ impl GraspContext<'_> {
 
     /// The grip's type, if the constraints admit it and the contacts.
     pub(super) fn classified(&self, grip: &Grip, contacts: &[Contact]) -> Result<Classification, NoGrip> {
-        let classification = classify(self.rig, &grip.pose, contacts);
+        let classification = classify(self.rig, &grip.pose, contacts, &self.object.object.local_shape);
         if !self.constraints.admits_contacts(contacts)
             || !self.constraints.admits_type(classification.grasp_type)
         {
@@ -170,13 +171,13 @@ pub fn unscored_grasp(
     }
 }
 
-/// The grasp of a hand that holds an object under `THESIS` validity: typed, but without margins or score.
-pub fn thesis_grasp(rig: &Rig, held: HeldObject) -> Grasp {
+/// The grasp of a hand that holds the object under `THESIS` validity: typed, but without margins or score.
+pub fn thesis_grasp(object: &GraspObject, rig: &Rig, held: HeldObject) -> Grasp {
     Grasp {
         bend_ratios: held.bend_ratios,
         wrench_angle: held.wrench_angle,
         comfort: comfort(held.digit_totals),
-        classification: classify(rig, &held.pose, &held.contacts),
+        classification: classify(rig, &held.pose, &held.contacts, &object.local_shape),
         pose: held.pose,
         contacts: held.contacts,
         forces: held.forces,

@@ -201,7 +201,7 @@ impl Attempt {
             .extend(thesis.posed_digits().iter().map(|digit| digit.angles));
         match held {
             Ok(held) => {
-                let grasp = thesis_grasp(scene.rig(), held);
+                let grasp = thesis_grasp(&scene.thesis().holdout.object, scene.rig(), held);
                 if scene.constraints().admits(&grasp) {
                     AttemptEnd::Valid(Box::new(grasp))
                 } else {

@@ -123,7 +123,7 @@ pub(super) fn read_entry(
     };
     let finger_subsets = FingerSubsets::from_bits(sets, grip.holding_digits())
         .ok_or(AtlasError::Malformed("invalid finger subsets"))?;
-    let classification = classify(rig, &pose, &contacts);
+    let classification = classify(rig, &pose, &contacts, &object.local_shape);
     let mut grip_values = posture_values(object, rig, &pose, &contacts, classification);
     for (term, value) in WRITTEN_TERMS.into_iter().zip(written) {
         grip_values[term as usize] = value;

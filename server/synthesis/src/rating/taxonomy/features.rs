@@ -3,9 +3,13 @@
 
 use glam::Vec3;
 
-use super::membership::{falling, rising};
+use super::{
+    held_part::HeldPart,
+    membership::{falling, rising},
+};
 use crate::{
     base::pose::Pose,
+    geometry::local_shape::LocalShape,
     model::{
         grasp::Contact,
         hand::{
@@ -20,9 +24,9 @@ use crate::{
 /// is 0.2 mm on an adult's hand.
 const MIN_LENGTH: f32 = 1e-3;
 
-/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 35° to 55°. Smaller values count
+/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 30° to 60°. Smaller values count
 /// more pad contacts as side contacts.
-const SIDE: [f32; 2] = [0.57, 0.82];
+const SIDE: [f32; 2] = [0.5, 0.87];
 
 /// Component of [`Touch::local`] along the link over which a contact turns from pad to tip: pushes about 30° to 50° off the
 /// pad's normal. Smaller values count more pad contacts as tip contacts.
@@ -32,9 +36,17 @@ const TIP: [f32; 2] = [0.26, 0.43];
 /// three digits. Larger values require more exactly opposite presses.
 const OPPOSED: [f32; 2] = [0.0, 0.5];
 
-/// Minimum negative cosine between two pushes for their distance to count as a thickness: 75° apart. A larger one leaves more
-/// grasps without a thickness.
-const THICKNESS_OPPOSITION: f32 = -0.25;
+/// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart. A larger one leaves
+/// more grasps without a thickness.
+const THICKNESS_OPPOSITION: f32 = 0.25;
+
+/// Power with which such pairs count more, the more opposed they are. A larger one follows the most opposed pair, which a
+/// slight change of the hand may replace by another.
+const THICKNESS_POWER: i32 = 2;
+
+/// Weight of the diameter of the held part itself, which decides where no contacts are opposed: a fifth of that of an
+/// exactly opposed pair.
+const PART_WEIGHT: f32 = 0.1;
 
 /// [`Finger::inner`] if the second link touches but the third does not. A larger one classifies more grasps as power
 /// grasps.
@@ -115,18 +127,20 @@ pub(super) struct Features {
     pub(super) palm_touches: bool,
     /// Degree to which the palm or the roots of the fingers support the object, 0 to 1.
     pub(super) palm_support: f32,
-    /// Distance between the two most opposed contacts, along their pushes, in hand lengths; 0 if none are opposed.
+    /// Distance between opposed contacts, along their pushes, in hand lengths; the held part's diameter if none are opposed.
     pub(super) thickness: f32,
     /// Convergence of the pushes of the outermost touching fingers: 0 on a prism, chord over radius on a sphere, negative
     /// if they diverge.
     pub(super) convergence: f32,
     /// How much the digits push toward the palm, -1 to 1: 0 around the rim of a disk that the palm faces.
     pub(super) pull: f32,
+    /// The shape of what is held.
+    pub(super) part: HeldPart,
 }
 
 impl Features {
-    /// Measures a posed hand. Contacts and pose are in the same frame, in metres.
-    pub(super) fn of(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> Self {
+    /// Measures a posed hand. Contacts, pose and the object's shape are in the same frame, in metres.
+    pub(super) fn of(rig: &Rig, pose: &HandPose, contacts: &[Contact], shape: &LocalShape) -> Self {
         let hand = Frame::new(rig, pose);
         let mut touches = [[None; 3]; 5];
         let mut palm: Option<Touch> = None;
@@ -147,6 +161,7 @@ impl Features {
         let thumb = thumb(thumb_touches, &hand, &frames[0]);
         let fingers = std::array::from_fn(|i| finger(&finger_touches[i], &pose.digits[i + 1]));
         let palm = palm.or(thumb_touches[0]);
+        let part = HeldPart::of(rig, pose, contacts, shape);
         let touching = (0..4).filter(|&i| fingers[i].touches).map(|i| 1 << i).sum();
         Self {
             thumb,
@@ -154,9 +169,10 @@ impl Features {
             touching,
             palm_touches: palm.is_some(),
             palm_support: palm_support(palm.is_some(), finger_touches),
-            thickness: thickness(palm, &touches),
+            thickness: thickness(palm, &touches, &part),
             convergence: convergence(&fingers),
             pull: pull(palm, hand.position(rig.palm), &touches),
+            part,
         }
     }
 
@@ -171,11 +187,11 @@ impl Features {
         self.touching_fingers().map(feature).sum::<f32>() / count
     }
 
-    /// Mean direction of the touching fingers' presses, weighted by their pads; a unit vector or zero.
-    pub(super) fn pads_press(&self) -> Vec3 {
+    /// Mean direction of the touching fingers' presses, each weighted; a unit vector or zero.
+    pub(super) fn mean_press(&self, weight: impl Fn(&Finger) -> f32) -> Vec3 {
         let sum: Vec3 = self
             .touching_fingers()
-            .map(|finger| finger.press * finger.pad)
+            .map(|finger| finger.press * weight(finger))
             .sum();
         direction(sum)
     }
@@ -312,23 +328,28 @@ fn palm_support(palm_touches: bool, fingers: &[[Option<Touch>; 3]]) -> f32 {
     }
 }
 
-fn thickness(palm: Option<Touch>, touches: &[[Option<Touch>; 3]; 5]) -> f32 {
+/// Mean over all pairs of contacts, weighted by how far they are opposed, and the held part's own diameter.
+fn thickness(palm: Option<Touch>, touches: &[[Option<Touch>; 3]; 5], part: &HeldPart) -> f32 {
     let all = || touches.as_flattened().iter().flatten().chain(palm.as_ref());
-    let mut best = THICKNESS_OPPOSITION;
-    let mut thickness = 0.0;
+    let (mut sum, mut weights) = (PART_WEIGHT * part.diameter(), PART_WEIGHT);
     for (i, a) in all().enumerate() {
         for b in all().skip(i + 1) {
-            let against = -a.push.dot(b.push);
-            if against > best {
-                best = against;
+            let against = -a.push.dot(b.push) - THICKNESS_OPPOSITION;
+            if against > 0.0 {
+                let weight = against.powi(THICKNESS_POWER);
                 // On a sphere or cylinder, two contacts differ by the radius times the difference of their pushes; on a
                 // plate, by its thickness.
                 let apart = b.push - a.push;
-                thickness = 2.0 * (a.position - b.position).dot(apart) / apart.length_squared();
+                let width = 2.0 * (a.position - b.position).dot(apart) / apart.length_squared();
+                // Contacts that push away from each other hold nothing between them.
+                if width > 0.0 {
+                    sum += weight * width;
+                    weights += weight;
+                }
             }
         }
     }
-    thickness.max(0.0)
+    sum / weights
 }
 
 /// How much the digits push against the palm's push or, if it does not touch, against the direction from the palm to the

@@ -2,39 +2,52 @@
 //! (5.2, 6.1); this computes the type of every grasp.
 //!
 //! - [`GraspType`]: the types and the cells they belong to.
-//! - [`classify`]: from a posed hand and its contacts to a type. `features` measures, `scores` rates each type.
+//! - [`classify`]: from a posed hand, its contacts and what it holds to a type. `features` and `held_part` measure, `scores`
+//!   rates each type, `kinship` says which types an expert may take for each other.
 
 mod features;
+mod held_part;
+mod kinship;
 mod membership;
 mod scores;
+mod shape_fits;
 
-use crate::model::{
-    grasp::Contact,
-    grasp_type::{Classification, GraspType, MIN_CONFIDENCE},
-    hand::{HandPose, rig::Rig},
+use kinship::are_kin;
+
+use crate::{
+    geometry::local_shape::LocalShape,
+    model::{
+        grasp::Contact,
+        grasp_type::{Classification, GraspType, MIN_CONFIDENCE},
+        hand::{HandPose, rig::Rig},
+    },
 };
 
-/// Share of the second-best score subtracted from the best to give the confidence, which a tie therefore halves. A larger
-/// one requires a clearer lead.
+/// Share of the best rival's fit that is subtracted from the winner's if the two are not kin: a tie halves the confidence. A
+/// larger one requires a clearer lead.
 const DOUBT: f32 = 0.5;
 
-/// Classifies a grasp from the receiving hand and its contacts, both in the same (arbitrary) frame, in metres. Independent
-/// of handedness and hand size.
-pub fn classify(rig: &Rig, pose: &HandPose, contacts: &[Contact]) -> Classification {
-    let scores = scores::scores(&features::Features::of(rig, pose, contacts));
-    let (mut best, mut second, mut best_type) = (0.0, 0.0, None);
-    for (grasp_type, score) in GraspType::ALL.into_iter().zip(scores) {
-        if score > best {
-            second = best;
-            best = score;
-            best_type = Some(grasp_type);
-        } else if score > second {
-            second = score;
+/// The same share for kin. An expert who prefers the rival still accepts the winner.
+const DOUBT_OF_KIN: f32 = 0.1;
+
+/// Classifies a grasp from the receiving hand, its contacts and the shape of the held object, all in the same frame, in metres.
+/// Independent of handedness and hand size.
+pub fn classify(rig: &Rig, pose: &HandPose, contacts: &[Contact], shape: &LocalShape) -> Classification {
+    let scores = scores::scores(&features::Features::of(rig, pose, contacts, shape));
+    let mut best = 0;
+    for (index, score) in scores.iter().enumerate() {
+        if *score > scores[best] {
+            best = index;
         }
     }
-    let confidence = best - DOUBT * second;
+    let mut doubt = 0.0_f32;
+    for (index, score) in scores.iter().enumerate().filter(|(index, _)| *index != best) {
+        let share = if are_kin(best, index) { DOUBT_OF_KIN } else { DOUBT };
+        doubt = doubt.max(share * score);
+    }
+    let confidence = scores[best] - doubt;
     Classification {
-        grasp_type: best_type.filter(|_| confidence >= MIN_CONFIDENCE),
+        grasp_type: (confidence >= MIN_CONFIDENCE).then_some(GraspType::ALL[best]),
         confidence,
     }
 }

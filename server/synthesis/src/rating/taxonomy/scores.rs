@@ -1,31 +1,20 @@
 //! How well a grasp fits each type: the fit to the type's cell (opposition, fingers, thumb position) times the fit to the
-//! type within the cell (size, shape, flexion). All fits are from 0 to 1.
+//! type within the cell (size and shape of what is held, flexion). All fits are from 0 to 1.
 //!
 //! The taxonomy's paper defines types by pictures and cells by words; the thesis classifies by eye. The criteria and
-//! thresholds within a cell are this project's reading of those pictures.
+//! thresholds within a cell are this project's reading of those pictures. Types between which only a size decides both fit
+//! near the boundary.
 
 use super::{
     features::{Features, Finger, bent, opposed, straight},
     membership::{falling, rising},
+    shape_fits::ShapeFits,
 };
 use crate::model::grasp_type::{Cell, GraspClass, GraspType, Opposition, ThumbPosition, VirtualFinger};
 
 /// Height of the thumb's tip above the palm's plane, in hand lengths, over which the thumb goes from adducted to abducted:
 /// 2 to 5 cm on an adult's hand. Larger values classify more thumbs as adducted.
 const THUMB_HEIGHT: [f32; 2] = [0.12, 0.26];
-
-/// Thickness in hand lengths over which small becomes medium: 20 to 32 mm on an adult's hand.
-const SMALL_TO_MEDIUM: [f32; 2] = [0.105, 0.17];
-
-/// Thickness in hand lengths over which medium becomes large: 53 to 72 mm on an adult's hand.
-const MEDIUM_TO_LARGE: [f32; 2] = [0.28, 0.38];
-
-/// Convergence of the outer fingers' pushes over which a prism becomes round. On a sphere, three fingertips are about a
-/// radius apart, which gives 1.
-const ROUND: [f32; 2] = [0.25, 0.7];
-
-/// Pull of the digits toward the palm over which a disk becomes a sphere: fingers reach past the widest part of a sphere.
-const SPHERE: [f32; 2] = [0.05, 0.3];
 
 /// Mean flexion of the two outer joints together, in degrees, over which extended fingers become curled.
 const CURLED: [f32; 2] = [40.0, 80.0];
@@ -35,6 +24,12 @@ const AROUND: [f32; 2] = [15.0, 45.0];
 
 /// Mean of [`Finger::inner`] over which precision becomes power.
 const POWER: [f32; 2] = [0.3, 0.7];
+
+/// Fit of fingertips if more than the tips holds something that is no ball: the taxonomy shows none with these fingers.
+const MORE_THAN_TIPS: f32 = 0.6;
+
+/// How far a finger's side counts as its pad on what cannot be held against a side: a ball, or something wide.
+const SIDE_AS_PAD: f32 = 0.7;
 
 /// Discount on side opposition if a pad of the same finger touches too.
 const PAD_DISCOUNT: f32 = 0.8;
@@ -59,6 +54,8 @@ pub(super) fn scores(features: &Features) -> [f32; 33] {
 /// The degrees of membership that cells and types combine, 0 to 1.
 struct View<'a> {
     features: &'a Features,
+    /// What is held.
+    shape: ShapeFits,
     /// Finger pads against the palm.
     palm: f32,
     /// Finger pads against the thumb, away from the palm.
@@ -73,10 +70,16 @@ struct View<'a> {
     abducted: f32,
     /// The fingers hold with more than their last links.
     inner: f32,
-    round: f32,
+    /// The touching fingers are curled.
     curled: f32,
-    small: f32,
-    large: f32,
+    /// They are bent enough to wrap around something.
+    around: f32,
+    /// The index finger is extended.
+    index_extended: f32,
+    /// Thumb and index finger touch with their tips.
+    tips: f32,
+    /// A pad of another finger than the index supports the object.
+    supported: f32,
 }
 
 impl<'a> View<'a> {
@@ -86,8 +89,11 @@ impl<'a> View<'a> {
             fingers: [index, middle, ..],
             ..
         } = features;
+        let shape = ShapeFits::of(features);
+        let side_as_pad = SIDE_AS_PAD * (1.0 - shape.between_sides);
+        let pad = |finger: &Finger| finger.pad + side_as_pad * (1.0 - finger.pad);
         let thumb_against_pads = if thumb.touches {
-            opposed(thumb.press, features.pads_press())
+            opposed(thumb.press, features.mean_press(pad))
         } else {
             0.0
         };
@@ -98,21 +104,27 @@ impl<'a> View<'a> {
                 0.0
             }
         };
+        let pads = features.mean(pad);
+        let away_from_palm = 1.0 - PALM_DISCOUNT * features.palm_support;
+        let curl = features.mean(|finger| finger.curl);
         Self {
             features,
-            palm: features.palm_support * features.mean(|finger| finger.pad),
-            pad: thumb_against_pads
-                * features.mean(|finger| finger.pad)
-                * (1.0 - PALM_DISCOUNT * features.palm_support),
+            palm: features.palm_support * pads,
+            pad: thumb_against_pads * pads * away_from_palm,
             side_of_index: against_side(index),
-            side_of_middle: against_side(middle) * index.pad * (1.0 - PALM_DISCOUNT * features.palm_support),
+            side_of_middle: against_side(middle) * index.pad * away_from_palm,
             between_fingers: index.ulnar.min(middle.radial) * opposed(index.press, middle.press),
             abducted: rising(thumb.height, THUMB_HEIGHT),
             inner: features.mean(|finger| finger.inner),
-            round: rising(features.convergence, ROUND),
-            curled: bent(features.mean(|finger| finger.curl), CURLED),
-            small: falling(features.thickness, SMALL_TO_MEDIUM),
-            large: rising(features.thickness, MEDIUM_TO_LARGE),
+            curled: bent(curl, CURLED),
+            around: bent(curl, AROUND),
+            index_extended: straight(index.knuckle + index.curl, [30.0, 70.0]),
+            tips: thumb.tip.max(0.3) * index.tip,
+            supported: features.fingers[1..]
+                .iter()
+                .map(|finger| finger.pad)
+                .fold(0.0, f32::max),
+            shape,
         }
     }
 
@@ -132,7 +144,13 @@ impl<'a> View<'a> {
             // A thumb that opposes pads needs no test of its position. Parallel Extension, adducted in the table, itself
             // requires the thumb along the fingers.
             (GraspClass::Power, Opposition::Pad, _) => self.pad * rising(self.inner, POWER) * fingers,
-            (_, Opposition::Pad, _) => self.pad * falling(self.inner, POWER) * fingers,
+            (_, Opposition::Pad, VirtualFinger::Two | VirtualFinger::TwoToFive) => {
+                self.pad * falling(self.inner, POWER) * fingers
+            }
+            (_, Opposition::Pad, _) => {
+                let precise = falling(self.inner, POWER).max(MORE_THAN_TIPS * (1.0 - self.shape.ball));
+                self.pad * precise * fingers
+            }
             (_, Opposition::Side, VirtualFinger::Two) if cell.thumb == ThumbPosition::Abducted => {
                 self.between_fingers
             }
@@ -148,103 +166,75 @@ impl<'a> View<'a> {
             thumb,
             fingers,
             palm_touches,
-            pull,
             ..
-        } = *self.features;
-        let index = fingers[0];
-        let prismatic = 1.0 - self.round;
+        } = self.features;
+        let index = &fingers[0];
+        let shape = &self.shape;
         let straight_fingers = 1.0 - self.curled;
-        let around = prismatic * bent(self.features.mean(|finger| finger.curl), AROUND);
-        let sphere = rising(pull, SPHERE);
-        let parallel = straight_fingers * rising(self.along_fingers(), [0.6, 0.85]);
-        let supported = self.supported();
+        let wrapped = shape.bar * self.curled * (1.0 - self.index_extended);
         match grasp_type {
-            GraspType::LargeDiameter => around * self.large,
-            GraspType::SmallDiameter => around * self.small,
-            GraspType::MediumWrap => around * (1.0 - self.small) * (1.0 - self.large),
-            GraspType::PowerDisk => self.round * (1.0 - sphere),
-            GraspType::PowerSphere => self.round * sphere,
+            GraspType::LargeDiameter => shape.bar * self.around * shape.large,
+            GraspType::SmallDiameter => shape.bar * self.around * shape.small,
+            GraspType::MediumWrap => shape.bar * self.around * shape.medium,
+            GraspType::PowerDisk => shape.disk,
+            GraspType::PowerSphere => shape.ball,
 
-            GraspType::AdductedThumb if thumb.touches => {
-                self.wrapped()
-                    * if thumb.is_inner {
-                        1.0
-                    } else {
-                        0.6 * (1.0 - self.small)
-                    }
-            }
-            GraspType::LightTool if thumb.touches => {
-                self.wrapped() * if thumb.is_inner { 0.4 * self.small } else { 1.0 }
-            }
+            GraspType::AdductedThumb if thumb.is_inner => wrapped,
+            GraspType::AdductedThumb if thumb.touches => 0.5 * wrapped * (1.0 - shape.small),
+            GraspType::LightTool if thumb.is_inner => 0.4 * wrapped * shape.small,
+            GraspType::LightTool if thumb.touches => wrapped * shape.light,
             GraspType::AdductedThumb | GraspType::LightTool => 0.0,
-            GraspType::Palmar => straight_fingers * self.palm,
+            GraspType::Palmar => shape.flat * straight_fingers * self.palm,
             GraspType::FixedHook if thumb.touches => 0.0,
             GraspType::FixedHook => {
-                self.curled * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
+                shape.bar * self.curled * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
             }
 
             // An index finger without contact points past the object.
             GraspType::IndexFingerExtension if !index.touches => 0.0,
             GraspType::IndexFingerExtension => {
                 let others = fingers[1..].iter().map(|finger| finger.curl).sum::<f32>() / 3.0;
-                self.index_extended() * bent(others, CURLED)
+                shape.bar * self.index_extended * bent(others, CURLED)
             }
 
-            GraspType::Ring => bent(index.knuckle + index.curl, [60.0, 100.0]),
-            GraspType::Sphere3Finger => 0.5 + 0.5 * self.round,
-            GraspType::ExtensionType => straight_fingers * prismatic,
-            GraspType::Sphere4Finger => self.curled.max(self.round),
-            GraspType::DistalType => 1.0,
+            GraspType::Ring => shape.ring * bent(index.knuckle + index.curl, [60.0, 100.0]),
+            GraspType::Sphere3Finger | GraspType::Sphere4Finger => shape.ball,
+            GraspType::ExtensionType => shape.flat * straight_fingers,
+            GraspType::DistalType => shape.loops,
 
-            GraspType::PalmarPinch => (1.0 - self.tips()) * bent(index.curl, [15.0, 35.0]),
-            GraspType::TipPinch => self.tips(),
-            GraspType::InferiorPincer => (1.0 - self.tips()) * straight(index.curl, [15.0, 35.0]),
-            GraspType::Prismatic2Finger | GraspType::Prismatic3Finger => prismatic,
-            GraspType::Tripod | GraspType::Quadpod => self.round,
-            GraspType::Prismatic4Finger => prismatic * (1.0 - parallel),
-            GraspType::PrecisionDisk => self.round * (1.0 - sphere),
-            GraspType::PrecisionSphere => self.round * sphere,
-            GraspType::ParallelExtension => prismatic * parallel,
+            GraspType::PalmarPinch => shape.pinchable * (1.0 - self.tips) * bent(index.curl, [15.0, 35.0]),
+            GraspType::TipPinch => shape.pinchable * self.tips,
+            GraspType::InferiorPincer => {
+                shape.pinchable * (1.0 - self.tips) * straight(index.curl, [15.0, 35.0])
+            }
+            GraspType::Prismatic2Finger | GraspType::Prismatic3Finger => shape.prismatic,
+            GraspType::Tripod | GraspType::Quadpod => shape.compact,
+            GraspType::Prismatic4Finger => shape.prismatic * (1.0 - shape.plate * self.parallel()),
+            GraspType::PrecisionDisk => shape.disk,
+            GraspType::PrecisionSphere => shape.ball,
+            GraspType::ParallelExtension => shape.flat * self.parallel(),
 
-            GraspType::Lateral => (1.0 - supported) * if palm_touches { 0.0 } else { 1.0 },
-            GraspType::Stick => supported * if palm_touches { 0.0 } else { 1.0 },
-            GraspType::Ventral => f32::from(u8::from(palm_touches)),
+            GraspType::Lateral if *palm_touches => 0.0,
+            GraspType::Lateral => shape.between_sides * (1.0 - self.supported * shape.stick),
+            GraspType::Stick if *palm_touches => 0.0,
+            GraspType::Stick => shape.between_sides * shape.stick * self.supported,
+            GraspType::Ventral if *palm_touches => shape.between_sides * shape.bar,
+            GraspType::Ventral => 0.0,
             // A touching thumb is no part of a grip between two fingers.
             GraspType::AdductionGrip if thumb.touches => 0.4,
             GraspType::AdductionGrip => 1.0,
-            GraspType::LateralTripod | GraspType::WritingTripod | GraspType::TripodVariation => 1.0,
+            GraspType::LateralTripod | GraspType::WritingTripod | GraspType::TripodVariation => shape.pen,
         }
     }
 
-    /// Degree to which the index finger is extended.
-    fn index_extended(&self) -> f32 {
-        let index = self.features.fingers[0];
-        straight(index.knuckle + index.curl, [30.0, 70.0])
-    }
-
-    /// Degree to which all fingers are curled, including the index finger.
-    fn wrapped(&self) -> f32 {
-        self.curled * (1.0 - self.index_extended())
-    }
-
-    /// Degree to which thumb and index finger touch with their tips.
-    fn tips(&self) -> f32 {
-        self.features.thumb.tip.max(0.3) * self.features.fingers[0].tip
-    }
-
-    /// Degree to which a pad of another finger than the index supports the object.
-    fn supported(&self) -> f32 {
-        let others = &self.features.fingers[1..];
-        others.iter().map(|finger| finger.pad).fold(0.0, f32::max)
+    /// Degree to which thumb and fingers are extended side by side.
+    fn parallel(&self) -> f32 {
+        (1.0 - self.curled) * rising(self.along_fingers(), [0.6, 0.85])
     }
 
     /// Cosine of the angle between the thumb's last link and the direction of extended fingers.
     fn along_fingers(&self) -> f32 {
-        let mut knuckles = 0.0;
-        for finger in self.features.touching_fingers() {
-            knuckles += finger.knuckle;
-        }
-        let bend = knuckles / self.features.touching.count_ones().max(1) as f32;
+        let bend = self.features.mean(|finger| finger.knuckle);
         let along = glam::Vec3::new(0.0, bend.cos(), bend.sin());
         self.features.thumb.along.dot(along)
     }

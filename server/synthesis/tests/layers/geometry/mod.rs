@@ -4,6 +4,7 @@ mod capsule;
 mod closest_point;
 mod containment;
 mod crossing;
+mod local_shape;
 mod local_thickness;
 mod opposed;
 mod oriented_box;

@@ -27,7 +27,7 @@ fn seconds(fingers: usize) -> Vec<Touching> {
 }
 
 /// The last link of the thumb and the two outer links of the first few fingers.
-fn outer_links(fingers: usize) -> Vec<Touching> {
+pub(crate) fn outer_links(fingers: usize) -> Vec<Touching> {
     [pads(fingers), seconds(fingers)].concat()
 }
 
@@ -43,7 +43,7 @@ pub(crate) fn alike(thumb: [f32; 4], finger: [f32; 4]) -> [[f32; 4]; 5] {
 }
 
 /// A thumb, and fingers that bend alike and fan out.
-fn spread(thumb: [f32; 4], [first, second, third]: [f32; 3]) -> [[f32; 4]; 5] {
+pub(crate) fn spread(thumb: [f32; 4], [first, second, third]: [f32; 3]) -> [[f32; 4]; 5] {
     let finger = |yaw| [yaw, first, second, third];
     [thumb, finger(-15.0), finger(-3.0), finger(8.0), finger(18.0)]
 }
@@ -51,7 +51,7 @@ fn spread(thumb: [f32; 4], [first, second, third]: [f32; 3]) -> [[f32; 4]; 5] {
 /// From the little finger's knuckle to the index finger's.
 const ACROSS_FINGERS: Vec3 = Vec3::new(0.97, 0.24, 0.0);
 /// A surface against the palm.
-const PALM_BELOW: Shape = Shape::Plate(Vec3::new(0.0, 80.0, 30.0), Vec3::Z, 16.0);
+pub(crate) const PALM_BELOW: Shape = Shape::Plate(Vec3::new(0.0, 80.0, 30.0), Vec3::Z, 16.0);
 
 /// A point in millimetres or a direction.
 pub(crate) fn v(x: f32, y: f32, z: f32) -> Vec3 {
@@ -65,11 +65,11 @@ pub(crate) fn rod(y: f32, z: f32, radius: f32) -> Shape {
 
 const PEN: Shape = Shape::Rod(Vec3::new(20.0, 105.0, 60.0), Vec3::new(0.3, 0.6, 0.75), 4.0);
 pub(crate) const THUMB_BELOW_TIPS: [f32; 4] = [30.0, 8.0, 50.0, -15.0];
-const THUMB_UNDER_BALL: [f32; 4] = [50.0, 15.0, 40.0, -15.0];
+pub(crate) const THUMB_UNDER_BALL: [f32; 4] = [50.0, 15.0, 40.0, -15.0];
 const THUMB_ON_SIDE: [f32; 4] = [10.0, 10.0, 10.0, 10.0];
 const NEXT_TO_INDEX: Shape = Shape::Plate(Vec3::new(36.0, 110.0, 35.0), Vec3::X, 1.0);
-const THUMB_OVER_FINGERS: [f32; 4] = [40.0, 15.0, 50.0, -15.0];
-const THUMB_FAR: [f32; 4] = [60.0, 10.0, 30.0, 30.0];
+pub(crate) const THUMB_OVER_FINGERS: [f32; 4] = [40.0, 15.0, 50.0, -15.0];
+pub(crate) const THUMB_FAR: [f32; 4] = [60.0, 10.0, 30.0, 30.0];
 const THUMB_ADDUCTED: [f32; 4] = [0.0, 10.0, 20.0, 20.0];
 const THUMB_TO_INDEX: [f32; 4] = [30.0, 15.0, 10.0, -15.0];
 const THUMB_TO_MIDDLE: [f32; 4] = [45.0, 15.0, 40.0, -15.0];
@@ -183,7 +183,7 @@ pub(crate) fn cases() -> Vec<(GraspType, Held)> {
             T::PowerDisk,
             held(
                 spread([30.0, -10.0, 0.0, 0.0], [10.0, 60.0, 30.0]),
-                Shape::Rod(v(0.0, 90.0, 25.0), Vec3::Z, 40.0),
+                Shape::Disk(v(0.0, 90.0, 25.0), Vec3::Z, 40.0),
                 &pads(4),
                 Some(PALM_BELOW),
             ),
@@ -201,7 +201,7 @@ pub(crate) fn cases() -> Vec<(GraspType, Held)> {
             T::PrecisionDisk,
             held(
                 spread(THUMB_FAR, [50.0, 40.0, 20.0]),
-                Shape::Rod(v(0.0, 90.0, 60.0), v(0.0, 0.2, 1.0), 25.0),
+                Shape::Disk(v(0.0, 90.0, 60.0), v(0.0, 0.2, 1.0), 25.0),
                 &pads(4),
                 None,
             ),

@@ -1,8 +1,9 @@
 //! Hands of the `adult` rig around simple shapes, posed by hand.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
+    geometry::{local_shape::LocalShape, mesh::TriangleMesh, surface_samples::even_samples},
     model::{
         grasp::Contact,
         grasp_type::Classification,
@@ -11,7 +12,10 @@ use grasp_synthesis::{
     rating::taxonomy::classify,
 };
 
-use crate::fixtures::hands::right;
+use crate::fixtures::{
+    hands::right,
+    meshes::{Parts, cuboid, cylinder_mesh, moved},
+};
 
 /// A held shape in millimetres, in the wrist frame of a right hand: +x to the thumb, +y along the fingers, +z out of
 /// the palm.
@@ -19,9 +23,11 @@ use crate::fixtures::hands::right;
 pub(crate) enum Shape {
     /// Centre and radius.
     Ball(Vec3, f32),
-    /// A point of the axis, the axis' direction, and the radius.
+    /// A point of the axis, the axis' direction, and the radius: 24 cm long.
     Rod(Vec3, Vec3, f32),
-    /// The middle, the thin direction, and half the thickness.
+    /// The middle, the axis' direction, and the radius: 2 cm thick.
+    Disk(Vec3, Vec3, f32),
+    /// The middle, the thin direction, and half the thickness: 8 cm wide.
     Plate(Vec3, Vec3, f32),
 }
 
@@ -30,7 +36,9 @@ impl Shape {
     fn foot(self, point: Vec3) -> (Vec3, f32) {
         match self {
             Self::Ball(centre, radius) => (centre, radius),
-            Self::Rod(start, axis, radius) => (start + (point - start).project_onto(axis), radius),
+            Self::Rod(start, axis, radius) | Self::Disk(start, axis, radius) => {
+                (start + (point - start).project_onto(axis), radius)
+            }
             Self::Plate(middle, thin, half) => (point - (point - middle).project_onto(thin), half),
         }
     }
@@ -51,7 +59,30 @@ impl Shape {
         match self {
             Self::Ball(centre, radius) => Self::Ball(centre, radius.min(most)),
             Self::Rod(start, axis, radius) => Self::Rod(start, axis, radius.min(most)),
+            Self::Disk(middle, axis, radius) => Self::Disk(middle, axis, radius.min(most)),
             Self::Plate(middle, thin, half) => Self::Plate(middle, thin, half.min(most)),
+        }
+    }
+
+    /// Its surface, in metres.
+    fn mesh(self) -> TriangleMesh {
+        let placed = |mesh: &TriangleMesh, axis: Vec3, middle: Vec3| {
+            let turn = Quat::from_rotation_arc(Vec3::Y, axis.normalize_or(Vec3::Y));
+            moved(mesh, turn, middle * 1e-3)
+        };
+        match self {
+            Self::Ball(centre, radius) => Parts::default()
+                .sphere(centre * 1e-3, radius * 1e-3, 12, true)
+                .mesh(),
+            Self::Rod(middle, axis, radius) => {
+                placed(&cylinder_mesh(radius * 1e-3, 0.12, 24, 12), axis, middle)
+            }
+            Self::Disk(middle, axis, radius) => {
+                placed(&cylinder_mesh(radius * 1e-3, 0.01, 24, 2), axis, middle)
+            }
+            Self::Plate(middle, thin, half) => {
+                placed(&cuboid(Vec3::new(0.04, half * 1e-3, 0.04), 2), thin, middle)
+            }
         }
     }
 }
@@ -73,6 +104,8 @@ pub(crate) struct Held {
     pub(crate) rig: Rig,
     pub(crate) pose: HandPose,
     pub(crate) contacts: Vec<Contact>,
+    /// The surface of what is held.
+    object: TriangleMesh,
 }
 
 /// A hand with angles in degrees (yaw and three pitches, thumb first) that holds a shape with the touching links, and
@@ -88,12 +121,13 @@ pub(crate) fn held(degrees: [[f32; 4]; 5], shape: Shape, touching: &[Touching], 
             third_pitch: third.to_radians(),
         }),
     };
-    let bare = Held {
+    let mut held = Held {
         rig,
         pose,
         contacts: Vec::new(),
+        object: shape.mesh(),
     };
-    let mut held = bare.also(shape, touching);
+    held.object = held.touch(shape, touching).mesh();
     held.contacts
         .extend(palm.map(|shape| contact(shape, held.rig.palm * 1e3, HandPart::Palm)));
     held
@@ -101,7 +135,8 @@ pub(crate) fn held(degrees: [[f32; 4]; 5], shape: Shape, touching: &[Touching], 
 
 impl Held {
     pub(crate) fn classify(&self) -> Classification {
-        classify(&self.rig, &self.pose, &self.contacts)
+        let shape = LocalShape::of(&even_samples(&self.object));
+        classify(&self.rig, &self.pose, &self.contacts, &shape)
     }
 
     /// The mirror image, by the other hand.
@@ -115,6 +150,7 @@ impl Held {
                 ..self.pose
             },
             contacts: self.with_contacts(|position| position * mirror, |normal| normal * mirror),
+            object: self.with_object(|position| position * mirror, |[a, b, c]| [a, c, b]),
         }
     }
 
@@ -133,6 +169,7 @@ impl Held {
             rig,
             pose,
             contacts: self.with_contacts(|position| position * factor, |normal| normal),
+            object: self.with_object(|position| position * factor, |corners| corners),
         }
     }
 
@@ -148,6 +185,7 @@ impl Held {
                 |position| a_from_b.transform_point(position),
                 |normal| a_from_b.transform_vector(normal),
             ),
+            object: self.with_object(|position| a_from_b.transform_point(position), |corners| corners),
         }
     }
 
@@ -160,8 +198,35 @@ impl Held {
         self.contacts.iter().map(change).collect()
     }
 
-    /// Adds another shape at some links.
+    fn with_object(
+        &self,
+        position: impl Fn(Vec3) -> Vec3,
+        corners: impl Fn([u32; 3]) -> [u32; 3],
+    ) -> TriangleMesh {
+        let positions = self.object.positions().iter().copied().map(position);
+        let triangles = self.object.triangles().iter().copied().map(corners);
+        TriangleMesh::new(positions.collect(), triangles.collect()).expect("the mesh stays sound")
+    }
+
+    /// With the same contacts on an object that is stretched along an axis of its frame, which leaves its middle in place.
+    pub(crate) fn on_stretched(&self, axis: Vec3, factor: f32) -> Self {
+        let positions = self.object.positions();
+        let middle = positions.iter().sum::<Vec3>() / positions.len() as f32;
+        let stretched = |point: Vec3| point + (point - middle).project_onto(axis) * (factor - 1.0);
+        Self {
+            object: self.with_object(stretched, |corners| corners),
+            ..self.clone()
+        }
+    }
+
+    /// Touches another shape with some links.
     pub(crate) fn also(mut self, shape: Shape, touching: &[Touching]) -> Self {
+        self.touch(shape, touching);
+        self
+    }
+
+    /// Adds the contacts of a shape, thinned to fit between the links.
+    fn touch(&mut self, shape: Shape, touching: &[Touching]) -> Shape {
         let frames = hand_frames(&self.rig, &self.pose);
         let bones: Vec<_> = touching
             .iter()
@@ -175,7 +240,7 @@ impl Held {
             self.contacts
                 .push(contact(fitted, bone, HandPart::Phalanx(digit, phalanx)));
         }
-        self
+        fitted
     }
 }
 

@@ -62,10 +62,11 @@ fn contacts(holdout: &BuiltInHoldout) -> (HandPose, Vec<Contact>) {
 
 /// Holdouts classified as captioned; the thresholds were set with these in view. Of the others, the thumb's place turns
 /// a Small Diameter into a Light Tool (scalpel-genhold2) and an Adducted Thumb into a Small Diameter (scissors-hold2):
-/// their thumbs are within 8 mm of the same height. The remote's rounded edges look like a ball (remote-genhold1,
-/// Precision Sphere), a middle finger touches with its pad instead of its side (scissors-genhold3, Prismatic 2 Finger),
-/// and pads that press on a rod at right angles oppose nothing (scalpel-hold1, no type).
-const AGREED: [(&str, &str); 10] = [
+/// their thumbs are within 8 mm of the same height. A middle finger touches with its pad instead of its side
+/// (scissors-genhold3, Prismatic 2 Finger), and pads that press on a rod at right angles oppose nothing (scalpel-hold1, no
+/// type).
+const AGREED: [(&str, &str); 11] = [
+    ("remote-genhold1", "Prismatic 4 Finger"),
     ("remote-genhold2", "Medium Wrap"),
     ("remote-genhold3", "Ring"),
     ("remote-hold1", "Light Tool"),
@@ -79,12 +80,15 @@ const AGREED: [(&str, &str); 10] = [
 ];
 
 #[test]
-fn two_thirds_of_the_thesis_examples_match_their_captions() {
+fn most_thesis_examples_match_their_captions() {
     let agreed: Vec<_> = holdouts()
         .iter()
         .filter_map(|holdout| {
             let (pose, contacts) = contacts(holdout);
-            let name = classify(giver_rig(holdout), &pose, &contacts).grasp_type?.name();
+            let shape = &object(&holdout.object).local_shape;
+            let name = classify(giver_rig(holdout), &pose, &contacts, shape)
+                .grasp_type?
+                .name();
             (name == holdout.grasp_type).then_some((&holdout.name[..], name))
         })
         .collect();
