@@ -17,6 +17,7 @@ impl RawConfig {
         let mut bad = Vec::new();
         let check = &mut Check(&mut bad);
         let budgets = self.budgets(check, defaults.budgets);
+        let store = self.store(check, defaults.store);
         let config = Config {
             listen: check.parsed(
                 "listen",
@@ -58,20 +59,7 @@ impl RawConfig {
                 4..=10_000_000,
                 defaults.maximum_object_triangles,
             ),
-            store: StoreLimits {
-                objects: check.within(
-                    "cache_objects",
-                    self.cache_objects,
-                    1..=100_000,
-                    defaults.store.objects,
-                ),
-                bytes: check.within(
-                    "cache_bytes",
-                    self.cache_bytes,
-                    1 << 20..=1 << 40,
-                    defaults.store.bytes,
-                ),
-            },
+            store,
             objects_directory: check.folder("objects_directory", self.objects_directory),
             builder_threads: check.within(
                 "builder_threads",
@@ -148,6 +136,13 @@ impl RawConfig {
             );
         }
         budgets
+    }
+
+    fn store(&self, check: &mut Check<'_>, defaults: StoreLimits) -> StoreLimits {
+        StoreLimits {
+            objects: check.within("cache_objects", self.cache_objects, 1..=100_000, defaults.objects),
+            bytes: check.within("cache_bytes", self.cache_bytes, 1 << 20..=1 << 40, defaults.bytes),
+        }
     }
 }
 

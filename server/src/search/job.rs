@@ -204,8 +204,8 @@ impl FindJob {
             run: Run {
                 seed: self.seed,
                 reproducible: query.reproducible,
-                first_attempt: query.first_attempt,
-                max_attempts: query.max_attempts,
+                first_attempt: query.limits.first_attempt,
+                max_attempts: query.limits.max_attempts,
                 deadline: Some(self.budget),
                 workers: self.workers,
                 record_step_times: query.record_step_times,

@@ -44,7 +44,7 @@ impl GraspHandler {
         call.log_reserve(reserve);
         let effective =
             |requested| effective_budget(requested, shared.budgets, reserve, call.arrived, call.deadline);
-        let budget = effective(query.budget);
+        let budget = effective(query.limits.budget);
         if budget.is_zero() {
             return Err(ServiceError::DeadlineExceeded);
         }
@@ -62,7 +62,7 @@ impl GraspHandler {
             seed: query.seed.unwrap_or_else(drawn_seed),
             arrived: call.arrived,
             budget,
-            patience: if query.is_patient {
+            patience: if query.limits.is_patient {
                 effective(None).max(budget)
             } else {
                 budget
@@ -70,7 +70,7 @@ impl GraspHandler {
             has_deadline: call.deadline.is_some(),
             workers: shared.executor.workers(),
             mechanisms: shared.mechanisms,
-            improvement: query.improvement.unwrap_or(shared.improvement),
+            improvement: query.limits.improvement.unwrap_or(shared.improvement),
             known,
             query,
         };

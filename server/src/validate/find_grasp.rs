@@ -1,7 +1,5 @@
 //! Checks `FindGraspRequest`.
 
-use std::time::Duration;
-
 use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
@@ -20,24 +18,9 @@ use super::{
     constraints::constraints,
     friction, hand, known, object_id_of, obstacles, pose,
     receiver::{Stances, Surroundings, stances},
+    search_limits::{SearchLimits, search_limits},
 };
 use crate::{convention::Convention, error::ServiceError};
-
-/// The receiving hand's rig under THESIS validity: that of chapter 5.
-const THESIS_RIG: &str = "thesis";
-
-/// Largest index of an attempt: 146,000 years at a million attempts per second.
-const LAST_ATTEMPT: u64 = (1 << 62) - 1;
-
-/// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
-const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
-
-/// Longest improvement time: longer ones would keep clients waiting that asked for the first grasp.
-const LONGEST_IMPROVEMENT: Duration = Duration::from_secs(1);
-
-/// Budget for `CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
-/// better grasps. If there is no grasp by then, the search continues for the first one.
-const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
 /// A valid request.
 #[derive(Debug)]
@@ -68,17 +51,8 @@ pub(crate) struct FindQuery {
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
-    /// Requested budget.
-    pub budget: Option<Duration>,
-    /// Requested time for improving a first valid grasp, at most [`LONGEST_IMPROVEMENT`].
-    pub improvement: Option<Duration>,
-    /// True if the search continues for a first grasp when the budget ends without one: the request wants the best
-    /// grasp and names no budget.
-    pub is_patient: bool,
-    /// Index of the first attempt.
-    pub first_attempt: u64,
-    /// Largest number of attempts.
-    pub max_attempts: u64,
+    /// Limits of time and attempts.
+    pub limits: SearchLimits,
     /// Search strategy.
     pub strategy: Strategy,
     /// Notion of a valid grasp.
@@ -127,6 +101,29 @@ fn check_reproducible(is_reproducible: bool, choice: Choice, violations: &mut Vi
     }
 }
 
+/// The object's pose in `OpenXR` axes, and its origin unless the pose is wrong.
+fn object_pose(
+    sent: Option<v1::Pose>,
+    convention: Convention,
+    violations: &mut Violations,
+) -> (Pose, Option<Vec3>) {
+    let before = violations.len();
+    let field = Field::root("client_from_object");
+    let sent = pose(field, sent, convention.metres_per_unit(), violations);
+    let client_from_object = convention.pose_to_openxr(sent);
+    let origin = (violations.len() == before).then_some(client_from_object.position);
+    (client_from_object, origin)
+}
+
+/// Adds to other violations that the object does not exist.
+fn check_exists(id: Option<&str>, object_exists: impl Fn(&str) -> bool, violations: &mut Violations) {
+    if let (false, Some(id)) = (violations.is_empty(), id)
+        && !object_exists(id)
+    {
+        violations.add(Field::root("object"), format_args!("objects/{id} does not exist"));
+    }
+}
+
 /// A replay needs a hand: the attempts of left and right differ.
 fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut Violations) {
     if only_attempt.is_some() && chooses_hand {
@@ -151,14 +148,7 @@ pub(crate) fn find_query(
     let v = &mut violations;
     let convention = Convention::from_wire(known(Field::root("convention"), request.convention, v));
     let object_id = object_id_of(Field::root("object"), &request.object, v);
-    let before = v.len();
-    let client_from_object = convention.pose_to_openxr(pose(
-        Field::root("client_from_object"),
-        request.client_from_object,
-        convention.metres_per_unit(),
-        v,
-    ));
-    let object_origin = (v.len() == before).then_some(client_from_object.position);
+    let (client_from_object, object_origin) = object_pose(request.client_from_object, convention, v);
     let presenting_hand = request
         .presenting_hand
         .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, v));
@@ -177,28 +167,21 @@ pub(crate) fn find_query(
         convention,
         v,
     );
-    let default_rig = match validity {
-        Validity::Thesis => THESIS_RIG,
-        Validity::Physical => default_rig,
-    };
     let (receiving_hand, is_named) = hand::receiving_hand(
         Field::root("receiving_hand"),
         request.receiving_hand,
-        default_rig,
+        (validity, default_rig),
         v,
     );
     let up = hand::up(Field::root("up"), request.up, convention, v);
     let choice = choice(known(Field::root("choice"), request.choice, v));
-    let is_patient = choice == Choice::BestWithinBudget && request.budget.is_none();
-    let budget = match request.budget {
-        Some(budget) => positive_duration(Field::root("budget"), budget, v),
-        None => is_patient.then_some(BEST_CHOICE_BUDGET),
-    };
-    let improvement = request
-        .improvement
-        .and_then(|sent| duration(Field::root("improvement"), sent, v))
-        .map(|sent| sent.min(LONGEST_IMPROVEMENT));
-    let (first_attempt, max_attempts) = attempts(request.max_attempts, request.only_attempt, v);
+    let limits = search_limits(
+        request.budget,
+        request.improvement,
+        (request.max_attempts, request.only_attempt),
+        choice,
+        v,
+    );
     let strategy = strategy(known(Field::root("strategy"), request.strategy, v), validity);
     let bend_ratios = bend_ratios(
         known(Field::root("bend_ratios"), request.bend_ratios, v),
@@ -218,28 +201,20 @@ pub(crate) fn find_query(
     );
     let chooses_hand = !is_named && !takes_both_hands && validity == Validity::Physical;
     check_replay(request.only_attempt, chooses_hand, v);
-    let stances = stances(
-        Field::root("receiver"),
-        request.receiver,
-        (Field::root("receiver_stance"), request.receiver_stance),
-        &Surroundings {
-            convention,
-            object: object_origin,
-            validity,
-            takes_both_hands,
-            chooses_hand,
-        },
-        v,
-    );
-    if let (false, Some(id)) = (violations.is_empty(), &object_id)
-        && !object_exists(id)
-    {
-        violations.add(Field::root("object"), format_args!("objects/{id} does not exist"));
-    }
+    let surroundings = Surroundings {
+        convention,
+        object: object_origin,
+        validity,
+        takes_both_hands,
+        chooses_hand,
+    };
+    let stances = stances(request.receiver, request.receiver_stance, &surroundings, v);
+    check_exists(object_id.as_deref(), object_exists, v);
     let (Some(object_id), Some(receiving_hand)) = (object_id, receiving_hand) else {
         // The function that returned none has added a violation.
         return Err(violations.into_error());
     };
+    let other_hand = |is_posed: bool| is_posed.then(|| hand::other_hand(receiving_hand)).flatten();
     violations.finish(FindQuery {
         object_id,
         convention,
@@ -248,17 +223,11 @@ pub(crate) fn find_query(
         other_hands,
         obstacles,
         receiving_hand,
-        alternative_hand: chooses_hand.then(|| hand::other_hand(receiving_hand)).flatten(),
-        other_hand: takes_both_hands
-            .then(|| hand::other_hand(receiving_hand))
-            .flatten(),
+        alternative_hand: other_hand(chooses_hand),
+        other_hand: other_hand(takes_both_hands),
         stances,
         up,
-        budget,
-        improvement,
-        is_patient,
-        first_attempt,
-        max_attempts,
+        limits,
         strategy,
         validity,
         bend_ratios,
@@ -298,61 +267,6 @@ fn takes_both_hands(
         );
     }
     true
-}
-
-/// Index of the first attempt, and the number of attempts.
-fn attempts(max_attempts: Option<u64>, only_attempt: Option<u64>, violations: &mut Violations) -> (u64, u64) {
-    if max_attempts == Some(0) {
-        violations.add(Field::root("max_attempts"), "is 0; it must be at least 1");
-    }
-    match only_attempt {
-        Some(only) => {
-            if only > LAST_ATTEMPT {
-                violations.add(
-                    Field::root("only_attempt"),
-                    format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
-                );
-            }
-            (only, 1)
-        }
-        None => (0, max_attempts.unwrap_or(LAST_ATTEMPT).min(LAST_ATTEMPT)),
-    }
-}
-
-/// A duration of more than 0.
-fn positive_duration(
-    field: Field<'_>,
-    sent: prost_types::Duration,
-    violations: &mut Violations,
-) -> Option<Duration> {
-    let duration = duration(field, sent, violations)?;
-    if duration.is_zero() {
-        violations.add(field, "is 0 s and 0 ns; it must be more than 0");
-        return None;
-    }
-    Some(duration)
-}
-
-/// A duration of at least 0.
-fn duration(field: Field<'_>, sent: prost_types::Duration, violations: &mut Violations) -> Option<Duration> {
-    let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
-    let in_range =
-        sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
-    let one_sign = i64::from(sent.nanos.signum()) * sent.seconds.signum() >= 0;
-    if !in_range || !one_sign {
-        violations.add(
-            field,
-            format_args!("is {}, which is not a valid google.protobuf.Duration", text()),
-        );
-        return None;
-    }
-    match (u64::try_from(sent.seconds), u32::try_from(sent.nanos)) {
-        (Ok(seconds), Ok(nanos)) => Some(Duration::new(seconds, nanos)),
-        _ => {
-            violations.add(field, format_args!("is {}; it must not be negative", text()));
-            None
-        }
-    }
 }
 
 /// The default is PHYSICAL.

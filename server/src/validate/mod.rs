@@ -11,6 +11,7 @@ mod object;
 mod obstacles;
 mod page;
 mod receiver;
+mod search_limits;
 
 use std::fmt;
 

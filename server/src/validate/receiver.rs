@@ -72,13 +72,12 @@ pub(super) struct Surroundings {
 
 /// The stances of a receiver's body or, without one, of what is expected. A wrong body is a receiver who faces the giver.
 pub(super) fn stances(
-    field: Field<'_>,
     sent: Option<v1::Receiver>,
-    stance: (Field<'_>, i32),
+    stance: i32,
     surroundings: &Surroundings,
     violations: &mut Violations,
 ) -> Stances {
-    let (stance_field, stance) = stance;
+    let (field, stance_field) = (Field::root("receiver"), Field::root("receiver_stance"));
     let expected: v1::ReceiverStance = known(stance_field, stance, violations);
     let Some(sent) = sent else {
         return Stances::both(match expected {

@@ -119,7 +119,7 @@ async fn a_replay_needs_a_hand_unless_the_validity_has_one() {
     assert_blamed(&server, replay.clone(), &["receiving_hand.handedness"]).await;
     for request in [
         v1::FindGraspRequest {
-            receiving_hand: receiving(v1::Handedness::Left),
+            receiving_hand: Some(receiving(v1::Handedness::Left)),
             ..replay.clone()
         },
         v1::FindGraspRequest {

@@ -113,11 +113,11 @@ pub(crate) fn held_remote() -> v1::FindGraspRequest {
 }
 
 /// A receiving hand of the default rig.
-pub(crate) fn receiving(handedness: v1::Handedness) -> Option<v1::ReceivingHand> {
-    Some(v1::ReceivingHand {
+pub(crate) fn receiving(handedness: v1::Handedness) -> v1::ReceivingHand {
+    v1::ReceivingHand {
         rig: String::new(),
         handedness: handedness.into(),
-    })
+    }
 }
 
 pub(crate) fn seconds(seconds: i64) -> prost_types::Duration {

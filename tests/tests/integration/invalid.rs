@@ -121,7 +121,7 @@ async fn every_field_of_a_search_is_validated() {
         (
             |r| {
                 r.only_attempt = Some(u64::MAX);
-                r.receiving_hand = receiving(v1::Handedness::Right);
+                r.receiving_hand = Some(receiving(v1::Handedness::Right));
             },
             "only_attempt",
         ),

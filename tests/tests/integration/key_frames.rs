@@ -68,6 +68,14 @@ async fn a_score_is_the_weighted_mean_of_its_terms() {
             "away_from_giver",
             "giver_clearance",
             "sterile_distance",
+            "stance",
+            "from_side_or_above",
+            "wrist_load",
+            "across_long_axis",
+            "near_centre",
+            "small_span",
+            "on_handle",
+            "off_sharp",
         ];
         assert_eq!(names, expected);
         let (mut sum, mut weights) = (0.0, 0.0);

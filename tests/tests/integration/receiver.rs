@@ -85,12 +85,13 @@ async fn a_standing_body_is_the_same_in_every_convention() {
     let unity = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
     let unreal = |v: Vec3| 100.0 * Vec3::new(-v.z, v.x, v.y);
     let same = |v: Vec3| v;
-    let engines: [(Convention, &dyn Fn(Vec3) -> Vec3, Quat, f32); 3] = [
-        (Convention::Unity, &unity, Quat::from_rotation_y(-0.1), 1.0),
-        (Convention::Unreal, &unreal, Quat::from_rotation_z(-0.1), 100.0),
-        (Convention::Godot, &same, root.orientation, 1.0),
+    let converted: [&dyn Fn(Vec3) -> Vec3; 3] = [&unity, &unreal, &same];
+    let engines = [
+        (Convention::Unity, Quat::from_rotation_y(-0.1), 1.0),
+        (Convention::Unreal, Quat::from_rotation_z(-0.1), 100.0),
+        (Convention::Godot, root.orientation, 1.0),
     ];
-    for (convention, convert, orientation, unit) in engines {
+    for ((convention, orientation, unit), convert) in engines.into_iter().zip(converted) {
         let body = Receiver::standing(Pose::new(convert(root.position), orientation), 1.7 * unit);
         let request = FindRequest {
             convention,
@@ -200,7 +201,7 @@ async fn every_field_of_a_receiver_is_validated() {
     };
     let with = |receiver: v1::Receiver| v1::FindGraspRequest {
         receiver: Some(receiver),
-        receiving_hand: receiving(v1::Handedness::Right),
+        receiving_hand: Some(receiving(v1::Handedness::Right)),
         ..floating_remote()
     };
     let bones = v1::Receiver {
@@ -292,7 +293,7 @@ async fn improvement_of_none_takes_the_first_valid_attempt() {
             improvement,
             reproducible: true,
             seed: Some(seed),
-            receiving_hand: receiving(v1::Handedness::Right),
+            receiving_hand: Some(receiving(v1::Handedness::Right)),
             ..held_remote()
         };
         let answer = server

@@ -120,7 +120,7 @@ async fn the_reported_seed_and_attempt_replay_the_grasp() {
     let replay = v1::FindGraspRequest {
         seed: Some(report.seed),
         only_attempt: report.attempt,
-        receiving_hand: receiving(hand),
+        receiving_hand: Some(receiving(hand)),
         ..floating_remote()
     };
     let second = ask(&server, replay).await;
@@ -147,7 +147,7 @@ fn reproducible_search(holdout: &ClientHoldout) -> v1::FindGraspRequest {
         max_attempts: Some(400),
         seed: Some(7),
         reproducible: true,
-        receiving_hand: receiving(v1::Handedness::Right),
+        receiving_hand: Some(receiving(v1::Handedness::Right)),
         ..holdout.request("objects/scissors")
     }
 }

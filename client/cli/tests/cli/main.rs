@@ -3,5 +3,6 @@
 mod commands;
 mod experiments;
 mod real_server;
+mod receiver_options;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;

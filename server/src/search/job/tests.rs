@@ -248,7 +248,13 @@ fn answers_every_request_that_passes_validation() {
         let takes_both = query.other_hand.is_some();
         let budgets = config::Config::default().budgets;
         let job = FindJob {
-            budget: effective_budget(query.budget, budgets, budgets.minimum_reserve, arrived, None),
+            budget: effective_budget(
+                query.limits.budget,
+                budgets,
+                budgets.minimum_reserve,
+                arrived,
+                None,
+            ),
             patience: Duration::ZERO,
             has_deadline: false,
             query,

@@ -14,12 +14,18 @@ mod tracked;
 use glam::Vec3;
 use grasp_assets::hands::{self, Hand, RIG_NAMES};
 use grasp_proto::v1;
-use grasp_synthesis::model::hand::{Handedness, joints::HandJoints, skin::Skin};
+use grasp_synthesis::model::{
+    hand::{Handedness, joints::HandJoints, skin::Skin},
+    strategy::Validity,
+};
 
 use super::{Field, Violations, direction, known, quoted};
 use crate::convention::Convention;
 use angles::angled_hand;
 use tracked::tracked_hand;
+
+/// The receiving hand's rig under THESIS validity: that of chapter 5.
+const THESIS_RIG: &str = "thesis";
 
 /// The giver's hand, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
@@ -55,26 +61,26 @@ pub(super) fn presenting_hand(
     }
 }
 
-/// The receiving hand, by default of the default rig, and whether the request names its side; the right hand if not.
+/// The receiving hand, by default of the default rig or, under THESIS validity, of chapter 5's, and whether the request names its side; the right hand if not.
 pub(super) fn receiving_hand(
     field: Field<'_>,
     hand: Option<v1::ReceivingHand>,
-    default_rig: &str,
+    (validity, default_rig): (Validity, &str),
     violations: &mut Violations,
 ) -> (Option<&'static Hand>, bool) {
     let hand = hand.unwrap_or_default();
-    let named = known(field.child("handedness"), hand.handedness, violations);
-    let handedness = match named {
+    let is_named = hand.handedness != i32::from(v1::Handedness::Unspecified);
+    let handedness = match known(field.child("handedness"), hand.handedness, violations) {
         v1::Handedness::Left => Handedness::Left,
         v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
     };
-    let rig = if hand.rig.is_empty() {
-        default_rig
-    } else {
-        &hand.rig
+    let rig = match (hand.rig.as_str(), validity) {
+        ("", Validity::Thesis) => THESIS_RIG,
+        ("", Validity::Physical) => default_rig,
+        (named, _) => named,
     };
     let hand = built_in(field.child("rig"), rig, handedness, violations);
-    (hand, named != v1::Handedness::Unspecified)
+    (hand, is_named)
 }
 
 /// The same person's other hand.

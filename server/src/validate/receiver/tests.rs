@@ -5,9 +5,6 @@ use crate::answer::{vector, wire_pose};
 use grasp_synthesis::base::pose::Pose;
 use v1::receiver::Body;
 
-const FIELD: Field<'static> = Field::root("receiver");
-const STANCE_FIELD: Field<'static> = Field::root("receiver_stance");
-
 const CONVENTIONS: [Convention; 4] = [
     Convention::OpenXr,
     Convention::Unity,
@@ -31,13 +28,7 @@ fn checked(
     surroundings: &Surroundings,
 ) -> (Stances, Violations) {
     let mut violations = Violations::default();
-    let stances = stances(
-        FIELD,
-        sent,
-        (STANCE_FIELD, stance.into()),
-        surroundings,
-        &mut violations,
-    );
+    let stances = stances(sent, stance.into(), surroundings, &mut violations);
     (stances, violations)
 }
 

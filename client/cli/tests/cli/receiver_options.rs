@@ -1,0 +1,93 @@
+//! Options for the receiver's body, the receiving hand and the improvement.
+
+use std::process::Output;
+
+use serde_json::Value;
+
+use crate::commands::{code, json, run_with_input, text};
+
+/// The request that options make of a file.
+fn printed(options: &[&str], file: &str) -> Output {
+    let common = ["find", "--request", "-", "--print-request"];
+    run_with_input(&[&common[..], options].concat(), file)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn options_describe_the_receivers_body_and_the_improvement() {
+    let file = r#"{"object": "objects/remote", "receiving_hand": {"handedness": "left"}, "improvement_seconds": 0.01,
+        "receiver": {"client_shoulder": [0, 1, 0], "forearm_length": 0.25}}"#;
+    let kept = json(&printed(&[], file).stdout);
+    assert_eq!(kept["receiver"]["client_shoulder"][1], 1.0);
+    assert_eq!(kept["improvement_seconds"], 0.01);
+    let options = [
+        "--receiver-root",
+        "-1,0,0.5,90",
+        "--receiver-height",
+        "1.75",
+        "--upper-arm",
+        "0.5",
+        "--receiving-hand",
+        "either",
+        "--improvement",
+        "0",
+    ];
+    let output = printed(&options, file);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let request = json(&output.stdout);
+    let receiver = &request["receiver"];
+    assert_eq!(receiver["client_shoulder"], Value::Null);
+    let standing = &receiver["standing"];
+    assert_eq!(standing["height"], 1.75);
+    assert_eq!(
+        standing["client_from_root"]["position"],
+        serde_json::json!([-1.0, 0.0, 0.5])
+    );
+    let turn = standing["client_from_root"]["orientation"][1].as_f64().unwrap();
+    assert!((turn - std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-6);
+    assert_eq!(
+        (&receiver["upper_arm_length"], &receiver["forearm_length"]),
+        (&0.5.into(), &0.25.into())
+    );
+    assert_eq!(request["receiving_hand"]["handedness"], Value::Null);
+    assert_eq!(request["improvement_seconds"], 0.0);
+    let shoulder = printed(
+        &["--receiver-shoulder", "-0.5,1.5,0"],
+        r#"{"object": "objects/remote"}"#,
+    );
+    let shoulder = json(&shoulder.stdout);
+    assert_eq!(
+        shoulder["receiver"]["client_shoulder"],
+        serde_json::json!([-0.5, 1.5, 0.0])
+    );
+    let any = printed(&["--receiver-stance", "any"], r#"{"object": "objects/remote"}"#);
+    assert_eq!(json(&any.stdout)["receiver_stance"], "any");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn rejects_options_that_make_no_body() {
+    let bare = r#"{"object": "objects/remote"}"#;
+    let unreal = r#"{"object": "objects/remote", "convention": "unreal"}"#;
+    let root = ["--receiver-root", "0,0,1,0", "--receiver-height", "1.7"];
+    let cases: [(&[&str], &str, &str); 6] = [
+        (&["--upper-arm", "0.3"], bare, "require a body"),
+        (&["--receiver-height", "1.7"], bare, "--receiver-root"),
+        (
+            &["--receiver-root", "0,0,1", "--receiver-height", "1.7"],
+            bare,
+            "0,0,-1,180",
+        ),
+        (&root, unreal, "openxr"),
+        (
+            &["--receiver-shoulder", "0,1,0", "--receiver-stance", "any"],
+            bare,
+            "cannot be used with",
+        ),
+        (&["--improvement=-1s"], bare, "2ms, 1s or 0"),
+    ];
+    for (options, file, expected) in cases {
+        let output = printed(options, file);
+        assert_eq!(code(&output), 2, "{options:?}");
+        let message = text(&output.stderr);
+        assert!(message.contains(expected), "{options:?}: {message}");
+    }
+}

@@ -1,0 +1,152 @@
+//! Checks how long a search may take, and how many attempts it may run.
+
+use std::time::Duration;
+
+use grasp_synthesis::model::strategy::Choice;
+
+use super::{Field, Violations};
+
+/// Largest index of an attempt: 146,000 years at a million attempts per second.
+const LAST_ATTEMPT: u64 = (1 << 62) - 1;
+
+/// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
+const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
+
+/// Longest improvement time: longer ones would keep clients waiting that asked for the first grasp.
+const LONGEST_IMPROVEMENT: Duration = Duration::from_secs(1);
+
+/// Budget for `CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
+/// better grasps. If there is no grasp by then, the search continues for the first one.
+const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
+
+/// Limits of a search.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SearchLimits {
+    /// Requested budget.
+    pub budget: Option<Duration>,
+    /// Requested time for improving a first valid grasp, at most [`LONGEST_IMPROVEMENT`].
+    pub improvement: Option<Duration>,
+    /// True if the search continues for a first grasp when the budget ends without one: the request wants the best
+    /// grasp and names no budget.
+    pub is_patient: bool,
+    /// Index of the first attempt.
+    pub first_attempt: u64,
+    /// Largest number of attempts.
+    pub max_attempts: u64,
+}
+
+/// The limits of a request. `attempts` are its largest number of attempts and the only one to run.
+pub(super) fn search_limits(
+    budget: Option<prost_types::Duration>,
+    improvement: Option<prost_types::Duration>,
+    (max_attempts, only_attempt): (Option<u64>, Option<u64>),
+    choice: Choice,
+    violations: &mut Violations,
+) -> SearchLimits {
+    let is_patient = choice == Choice::BestWithinBudget && budget.is_none();
+    let budget = match budget {
+        Some(budget) => positive_duration(Field::root("budget"), budget, violations),
+        None => is_patient.then_some(BEST_CHOICE_BUDGET),
+    };
+    let improvement = improvement
+        .and_then(|sent| duration(Field::root("improvement"), sent, violations))
+        .map(|sent| sent.min(LONGEST_IMPROVEMENT));
+    let (first_attempt, max_attempts) = attempts(max_attempts, only_attempt, violations);
+    SearchLimits {
+        budget,
+        improvement,
+        is_patient,
+        first_attempt,
+        max_attempts,
+    }
+}
+
+/// Index of the first attempt, and the number of attempts.
+fn attempts(max_attempts: Option<u64>, only_attempt: Option<u64>, violations: &mut Violations) -> (u64, u64) {
+    if max_attempts == Some(0) {
+        violations.add(Field::root("max_attempts"), "is 0; it must be at least 1");
+    }
+    match only_attempt {
+        Some(only) => {
+            if only > LAST_ATTEMPT {
+                violations.add(
+                    Field::root("only_attempt"),
+                    format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
+                );
+            }
+            (only, 1)
+        }
+        None => (0, max_attempts.unwrap_or(LAST_ATTEMPT).min(LAST_ATTEMPT)),
+    }
+}
+
+/// A duration of more than 0.
+fn positive_duration(
+    field: Field<'_>,
+    sent: prost_types::Duration,
+    violations: &mut Violations,
+) -> Option<Duration> {
+    let duration = duration(field, sent, violations)?;
+    if duration.is_zero() {
+        violations.add(field, "is 0 s and 0 ns; it must be more than 0");
+        return None;
+    }
+    Some(duration)
+}
+
+/// A duration of at least 0.
+fn duration(field: Field<'_>, sent: prost_types::Duration, violations: &mut Violations) -> Option<Duration> {
+    let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
+    let in_range =
+        sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
+    let one_sign = i64::from(sent.nanos.signum()) * sent.seconds.signum() >= 0;
+    if !in_range || !one_sign {
+        violations.add(
+            field,
+            format_args!("is {}, which is not a valid google.protobuf.Duration", text()),
+        );
+        return None;
+    }
+    if let (Ok(seconds), Ok(nanos)) = (u64::try_from(sent.seconds), u32::try_from(sent.nanos)) {
+        return Some(Duration::new(seconds, nanos));
+    }
+    violations.add(field, format_args!("is {}; it must not be negative", text()));
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn limits(improvement: prost_types::Duration) -> (SearchLimits, Violations) {
+        let mut violations = Violations::default();
+        let limits = search_limits(
+            None,
+            Some(improvement),
+            (None, None),
+            Choice::FirstValid,
+            &mut violations,
+        );
+        (limits, violations)
+    }
+
+    #[test]
+    fn improvement_may_be_none_and_is_at_most_a_second() {
+        let of = |seconds, nanos| prost_types::Duration { seconds, nanos };
+        for (sent, expected) in [
+            (of(0, 0), Duration::ZERO),
+            (of(0, 3_000_000), Duration::from_millis(3)),
+            (of(60, 0), LONGEST_IMPROVEMENT),
+        ] {
+            let (limits, violations) = limits(sent);
+            assert!(violations.is_empty());
+            assert_eq!(limits.improvement, Some(expected));
+        }
+        let (_, violations) = limits(of(-1, 0));
+        assert_eq!(violations.listed[0].field, "improvement");
+        assert_eq!(
+            violations.listed[0].description,
+            "is -1 s and 0 ns; it must not be negative"
+        );
+    }
+}
