@@ -40,6 +40,8 @@ class Grip:
     touch: np.ndarray
     phalanges: np.ndarray
     palm: float
+    # Whether it surely touches, and does not only seem to.
+    palm_sure: bool
     # Distance from the palm's skin to the surface.
     palm_gap: float
     # Of each digit: where it touches (NaN where it does not), and the direction from the bone to there in the frame of
@@ -114,7 +116,7 @@ def read(mesh, hand, contacts):
             phalanges[digit, phalanx] = falls(gap, TOUCH, APART)
             sure[digit] |= gap < 0
             perhaps[digit] |= gap < UNSEEN
-            if gap < TOUCH:
+            if phalanges[digit, phalanx] > 0.5:
                 touched.append((row, fine[np.argmin(gaps[:, row])], 1.0))
         for contact in contacts:
             if contact["digit"] == DIGITS[digit]:
@@ -143,14 +145,15 @@ def read(mesh, hand, contacts):
     of_palm = tags[:, 0] < 0
     palm_gap = float(gaps[:, of_palm].min())
     palm = falls(palm_gap, PALM_TOUCH, PALM_APART)
-    if any(contact["digit"] not in DIGITS for contact in contacts):
-        palm = 1.0
+    palm_sure = palm_gap < 0 or any(contact["digit"] not in DIGITS for contact in contacts)
+    palm = 1.0 if palm_sure else palm
     beneath = under(hand, capsules, tags, phalanges, palm, points[near])
     axes = palm_axes(hand)
     return Grip(
         touch=phalanges.max(axis=1),
         phalanges=phalanges,
         palm=palm,
+        palm_sure=palm_sure,
         palm_gap=palm_gap,
         places=places,
         sides=sides,

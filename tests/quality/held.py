@@ -57,9 +57,7 @@ def shape_of(mesh, grip, contacts):
     spots = grip.places[np.isfinite(grip.places).all(axis=1)]
     if len(spots) == 0:
         spots = grip.palm_middle[None]
-    near = np.unique(np.concatenate([tree.query_ball_point(spot, CURVE_REACH) for spot in spots]).astype(int))
-    if len(near) < 4:
-        near = tree.query(spots, k=8)[1].ravel()
+    near = np.unique(np.concatenate([patch(points, normals, tree, spot) for spot in spots]))
     along = long_direction(points, normals, tree, near, spots)
     slices = [slice_at(points, normals, along, spot) for spot in spots]
     width, depth, roundness = np.median([s[:3] for s in slices], axis=0)
@@ -67,13 +65,32 @@ def shape_of(mesh, grip, contacts):
     length, beyond = extent(points, along, centre, width)
     opening = opening_of(grip, contacts)
     shape = Shape(length, width, depth, along, roundness, opening)
-    ball = balls(points[near], normals[near], grip)
+    ball, _ = fitted(points[near], normals[near], 10, 16)
+    # A handle on a round body makes the slice oblong, but not what the hand feels.
+    across = np.linalg.svd(along[None])[2][1:]
+    facing = normals[near] @ across.T
+    sideways = np.linalg.norm(facing, axis=1) > 0.5
+    is_round, radius = fitted(points[near[sideways]] @ across.T, facing[sideways], 6, 11)
+    if is_round > shape.roundness:
+        shape.roundness, shape.width, shape.depth = is_round, 2 * radius, 2 * radius
+    ball = max(ball, bulge(points, along, centre, shape.width) * rises(shape.roundness, 0.5, 0.75))
     # An end that the fingers reach over from beyond it: a cap, a lid, the neck of a bottle from above.
     toward = 1 if along @ grip.axes[2] < 0 else -1
     level = np.median((spots - centre) @ along) * toward
     end_on = rises(abs(along @ grip.axes[2]), 0.6, 0.8) * falls(beyond[toward] - level, 0.015, 0.03)
     shape.classes = memberships(shape, ball, end_on)
     return shape
+
+
+def patch(points, normals, tree, spot):
+    """Indices of the surface near a contact that hangs together with it."""
+    near = np.array(tree.query_ball_point(spot, CURVE_REACH), int)
+    if len(near) < 4:
+        return tree.query(spot, k=min(8, len(points)))[1]
+    # The far side of a wall is none of the fingers' business.
+    nearest = near[np.argmin(np.linalg.norm(points[near] - spot, axis=1))]
+    near = near[normals[near] @ normals[nearest] > 0.3]
+    return near[connected(points[near], spot)]
 
 
 def long_direction(points, normals, tree, near, spots):
@@ -112,12 +129,12 @@ def slice_at(points, normals, along, spot):
     return max(sides), min(sides), roundness, spot + middle @ frame
 
 
-def connected(flat, seed):
-    """Indices of the points of a plane that hang together with the one nearest to the seed."""
-    pairs = cKDTree(flat).query_pairs(LINK, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(flat), len(flat)))
+def connected(points, seed):
+    """Indices of the points that hang together with the one nearest to the seed."""
+    pairs = cKDTree(points).query_pairs(LINK, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
     _, labels = connected_components(graph, directed=False)
-    return np.flatnonzero(labels == labels[np.argmin(np.linalg.norm(flat - seed, axis=1))])
+    return np.flatnonzero(labels == labels[np.argmin(np.linalg.norm(points - seed, axis=1))])
 
 
 def extent(points, along, centre, width):
@@ -137,6 +154,18 @@ def extent(points, along, centre, width):
     return far[1] + far[-1], far
 
 
+def bulge(points, along, centre, width):
+    """How surely a round part narrows to both sides, half its width from the middle of the contacts: a bowl or an egg."""
+    offset = points - centre
+    level = offset @ along
+    away = np.linalg.norm(offset - level[:, None] * along, axis=1)
+    widest = 0.0
+    for side in (-0.5, 0.5):
+        here = (np.abs(level - side * width) < SLICE) & (away < 0.6 * width + 0.004)
+        widest = max(widest, 2 * np.quantile(away[here], 0.95) if here.any() else 0.0)
+    return falls(widest / max(width, 1e-4), 0.86, 0.96) * falls(width, 0.12, 0.15)
+
+
 def opening_of(grip, contacts):
     """Distance between what opposes: the thumb, or else the palm, and the fingers."""
     fingers = grip.middle_of([1, 2, 3, 4])
@@ -151,16 +180,22 @@ def opening_of(grip, contacts):
     return float(abs((first - fingers) @ axis))
 
 
-def balls(points, normals, grip):
-    """How well the surface near the contacts fits a ball, of 7.5 cm in radius at most."""
+def fitted(points, normals, good, bad):
+    """How well points with normals fit a ball or circle of at most 7.5 cm, and its radius.
+
+    On a perfect one every normal is along the radius; the mean angle between them may be `good` degrees, but not `bad`.
+    """
+    if len(points) <= points.shape[1] + 1:
+        return 0.0, 0.0
     system = np.column_stack([2 * points, np.ones(len(points))])
     solution = np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0]
-    centre = solution[:3]
-    radius = np.sqrt(max(solution[3] + centre @ centre, 1e-12))
+    centre = solution[:-1]
+    radius = np.sqrt(max(solution[-1] + centre @ centre, 1e-12))
     radial = points - centre
-    facing = np.abs(np.einsum("pi,pi->p", radial, normals)) / np.maximum(np.linalg.norm(radial, axis=1), 1e-9)
-    error = np.sqrt(np.mean((np.linalg.norm(radial, axis=1) - radius) ** 2)) / radius
-    return rises(np.mean(facing > ROUND), 0.6, 0.85) * falls(error, 0.12, 0.25) * falls(radius, 0.06, 0.075)
+    cosine = np.abs(np.einsum("pi,pi->p", radial, normals))
+    cosine /= np.maximum(np.linalg.norm(radial, axis=1) * np.linalg.norm(normals, axis=1), 1e-9)
+    angle = np.degrees(np.arccos(np.minimum(cosine, 1))).mean()
+    return falls(angle, good, bad) * falls(radius, 0.06, 0.075), float(radius)
 
 
 def memberships(shape, ball, end_on):

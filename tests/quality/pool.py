@@ -15,7 +15,9 @@ import draw
 import holdouts
 import measures
 import pairs
+import parts
 import physics
+import taxonomy
 
 
 @dataclass
@@ -46,6 +48,9 @@ def judged(case, simulated):
     case.scene.mesh = mesh_of(case.object)
     grasps = [case.grasp] + ([case.other] if case.other else [])
     row = pairs.judge(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
+    if not case.other:
+        # The taxonomy is of grasps by one hand.
+        row.update(taxonomy.judge(case.scene, case.grasp), **parts.judge(case.object, case.scene, case.grasp))
     if simulated and not case.scene.mesh.is_sheet():
         row.update(survival(case.scene, grasps))
     if case.drawing:

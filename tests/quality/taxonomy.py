@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import grip as grips
+import measures
 from grip import falls, rises
 from held import Shape, shape_of
 
@@ -50,6 +51,8 @@ NAMES = {
     32: "ventral",
     33: "inferior_pincer",
 }
+POWER = {1, 2, 3, 4, 5, 10, 11, 15, 17, 18, 19, 26, 28, 30, 31}
+INTERMEDIATE = {16, 21, 23, 25, 29, 32}
 # Of each class of shape, the types that the taxonomy shows for it. A held "edge" is the wall of a vessel or a sheet, so it
 # takes what a plate takes.
 ON_ANYTHING = {9, 15, 23, 24, 33}
@@ -97,6 +100,28 @@ def allowed_for_shape(name, shape):
     return any(name in {NAMES[number] for number in BY_SHAPE[kind]} for kind in classes)
 
 
+def kind_of(name):
+    """Whether a type is for power, for precision, or intermediate; empty for none."""
+    number = next((number for number, other in NAMES.items() if other == name), None)
+    if number is None:
+        return ""
+    return "power" if number in POWER else "intermediate" if number in INTERMEDIATE else "precision"
+
+
+def judge(scene, grasp):
+    """The measures of a reply's type: whether the judge would say so too, and what the judge says."""
+    hand, contacts = measures.in_object_frame(scene, grasp)
+    reading = classify(scene.mesh, hand, contacts, bool(grasp.get("hangs")))
+    reply = measures.reported_type(grasp).get("type", "")
+    return {
+        "type_agreed": reply in reading.acceptable,
+        "own_type": reading.own_type,
+        "acceptable_types": " ".join(sorted(reading.acceptable)),
+        "type_fits_shape": bool(reply) and allowed_for_shape(reply, reading.shape),
+        "held_shape": reading.shape.name,
+    }
+
+
 def classify(mesh, hand, contacts, hangs=False):
     """The judge's reading of a grasp, given in the object's frame."""
     grip = grips.read(mesh, hand, contacts)
@@ -118,16 +143,17 @@ class Pose:
         roots = float(np.mean(grip.phalanges[touching, 0])) if touching else 0.0
         close = falls(grip.palm_gap, 0.008, 0.022)
         self.palm = max(grip.palm, 0.8 * rises(roots, 0.4, 0.8) * close) * rises(self.fingers, 0.5, 1.5)
+        self.pressing_palm = self.palm if grip.palm_sure else 0.6 * self.palm
         self.middles = float(np.mean(grip.phalanges[touching, 1])) if touching else 0.0
         # Fingers hardly bent beyond their knuckles.
         self.extended = falls(np.mean(grip.bends[touching, 1]), 40, 75) if touching else 0.0
         # What the thumb presses against: the radial side of the index finger, not its pad.
-        self.side = self.on_side(1)
+        self.side = self.on_side(1) * falls(shape.opening, 0.025, 0.045)
         self.middle_side = self.on_side(2)
         self.tips = float(np.mean([rises(grip.sides[digit, 2], 0.45, 0.75) for digit in [0, *touching]]))
         # The thumb lies along the part instead of around it.
         self.adducted = rises(abs(grip.pointing[0] @ shape.along), 0.6, 0.85)
-        self.in_row = 0.4 + 0.6 * in_row(grip.places[touching], shape.along)
+        self.in_row = 0.5 + 0.5 * in_row(grip.places[touching], shape.along)
         self.opening, self.thickness = shape.opening, (shape.width + shape.depth) / 2
 
     def on_side(self, digit):
@@ -170,8 +196,8 @@ def power_palm(p):
     others = rises(index.touch[2:].sum(), 1.0, 2.0)
     return {
         1: around * rises(p.thickness, 0.05, 0.065),
-        2: around * falls(p.thickness, 0.024, 0.036),
-        3: around * rises(p.thickness, 0.022, 0.030) * falls(p.thickness, 0.055, 0.07),
+        2: around * falls(p.thickness, 0.022, 0.036),
+        3: around * rises(p.thickness, 0.012, 0.026) * falls(p.thickness, 0.055, 0.07),
         4: along * max(0.5, rises(p.thickness, 0.010, 0.020)) * falls(p.thickness, 0.05, 0.07),
         5: along * falls(p.thickness, 0.024, 0.036),
         10: opposed * shape.of("disk") * rises(p.fingers, 2.0, 3.0),
@@ -192,18 +218,18 @@ def power_pad(p):
         18: flat * several * max(p.middles, p.palm),
         26: ball * p.count(3),
         28: ball * p.count(2),
-        31: p.thumb * p.count(1) * surrounds * shape.of("rod", "disk") * rises(p.opening, 0.010, 0.02) * (1 - 0.5 * p.side),
+        31: p.thumb * p.count(1) * surrounds * shape.of("rod", "disk") * rises(p.opening, 0.008, 0.016) * (1 - 0.5 * p.side),
     }
 
 
 def side(p):
     """Types whose thumb presses against the side of the index finger, and the pen's."""
     shape = p.shape
-    pressed = p.thumb * p.side * falls(p.opening, 0.025, 0.045)
+    pressed = p.thumb * p.side
     thin = shape.of("rod", "strip") * falls(p.thickness, 0.014, 0.022)
     pen = p.thumb * p.grip.touch[1] * (1 - 0.5 * p.side) * thin * falls(p.opening, 0.015, 0.025)
     return {
-        16: pressed * max(p.count(1), 0.6 * (1 - p.palm)),
+        16: pressed * max(p.count(1), 0.6),
         20: pen * max(p.middle_side, 0.5) * p.count(2),
         21: p.thumb * thin * max(p.side, p.middle_side) * p.count(3),
         25: pressed * p.count(2),
@@ -214,7 +240,7 @@ def side(p):
 
 def precision(p):
     """Types whose pads oppose the thumb's."""
-    shape, pads = p.shape, p.thumb * (1 - p.side) * (1 - p.palm)
+    shape, pads = p.shape, p.thumb * (1 - 0.8 * p.side) * (1 - p.pressing_palm)
     long = shape.of("rod", "strip", "plate", "edge", "block") * p.in_row
     # Around a compact part, or from around a long one. People call either by either name unless it is clear.
     gathered = max(shape.of("ball", "bead", "disk"), 1.4 - p.in_row)
