@@ -205,7 +205,8 @@ def memberships(shape, ball, end_on):
     elongation, flatness = length / width, depth / width
     is_round = rises(shape.roundness, 0.5, 0.75)
     rod = rises(elongation, 1.1 - 0.3 * is_round, 1.8 - 0.5 * is_round) * rises(flatness, 0.2, 0.4)
-    rod *= falls(width, 0.1, 0.13)
+    # A ball goes on in no direction.
+    rod *= falls(width, 0.1, 0.13) * (1 - 0.8 * ball)
     strip = rises(elongation, 1.5, 2.2) * falls(flatness, 0.35, 0.5) * falls(width, 0.04, 0.055)
     plate = falls(smallest / max(middle, 1e-4), 0.3, 0.5) * falls(smallest, 0.035, 0.05)
     disk = is_round * rises(flatness, 0.6, 0.8) * falls(width, 0.12, 0.15)

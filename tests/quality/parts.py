@@ -87,7 +87,7 @@ BENEATH = 0.0025
 SHARP_ANGLE, SHARP_LENGTH = 30.0, 0.010
 # A worn or coarsely scanned edge cuts, too: at most so thick at the end, and thicker behind it, as if its sides met at an
 # angle from the first to the second of these (a card's do not meet), over REACH.
-BLUNT, WEDGE, EDGE_REACH = 0.0012, (4.0, 30.0), 0.005
+BLUNT, WEDGE, EDGE_REACH = 0.0012, (5.0, 30.0), 0.005
 # A point pierces if the surface within REACH of it lies within a cone of this half-angle, but for SLACK.
 TIP_ANGLE, TIP_REACH, TIP_SLACK = 20.0, 0.005, 0.0003
 # A contact this near to a sharp feature is on it; surface this far from it is safe, and so long a safe piece is enough.
@@ -193,7 +193,7 @@ def worn_edges(mesh):
     near_fine, found = cKDTree(fine), []
     for point, near in zip(points, tree.query_ball_point(points, EDGE_REACH)):
         # At the end of a plate all surface is to one side.
-        if np.linalg.norm(points[near].mean(axis=0) - point) < 0.25 * EDGE_REACH:
+        if np.linalg.norm(points[near].mean(axis=0) - point) < 0.15 * EDGE_REACH:
             continue
         offset = fine[near_fine.query_ball_point(point, EDGE_REACH)] - point
         inward = offset.mean(axis=0) / max(np.linalg.norm(offset.mean(axis=0)), 1e-9)
@@ -201,11 +201,11 @@ def worn_edges(mesh):
         # Across the plate: of the two directions at right angles to `inward`, that in which it is thin.
         across = np.linalg.eigh(flat.T @ flat + np.outer(inward, inward))[1][:, 0]
         depth = offset @ inward - (offset @ inward).min()
-        first, last = depth < 0.2 * EDGE_REACH, (depth > 0.6 * EDGE_REACH) & (depth < 0.9 * EDGE_REACH)
+        first, last = depth < 0.3 * EDGE_REACH, (depth > 0.6 * EDGE_REACH) & (depth < 0.9 * EDGE_REACH)
         if not last.any() or -(offset @ inward).min() > 0.2 * EDGE_REACH:
             continue
         thin, thick = np.ptp(offset[first] @ across), np.ptp(offset[last] @ across)
-        angle = np.degrees(2 * np.arctan2((thick - thin) / 2, 0.65 * EDGE_REACH))
+        angle = np.degrees(2 * np.arctan2((thick - thin) / 2, 0.6 * EDGE_REACH))
         if thin < BLUNT and WEDGE[0] < angle < WEDGE[1]:
             found.append(point)
     found = np.array(found).reshape(-1, 3)

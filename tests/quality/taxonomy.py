@@ -189,7 +189,7 @@ def power_palm(p):
     shape, opposed = p.shape, p.palm * rises(p.fingers, 1.5, 3.0)
     # A thumb that only hovers still shows where it belongs.
     opposed *= max(p.thumb, 0.6)
-    wrap = opposed * shape.of("rod", "strip", "block") * (1 - 0.7 * p.side * falls(p.thickness, 0.015, 0.03))
+    wrap = opposed * shape.of("rod", "strip", "block") * (1 - 0.7 * p.side * falls(p.thickness, 0.008, 0.016))
     around, along = wrap * (1 - p.adducted), wrap * p.adducted
     index = p.grip
     pointing = rises(abs(index.pointing[1] @ shape.along), 0.5, 0.75) * falls(index.bends[1, 1], 35, 60)
@@ -234,7 +234,7 @@ def side(p):
         21: p.thumb * thin * max(p.side, p.middle_side) * p.count(3),
         25: pressed * p.count(2),
         29: pressed * thin * shape.of("rod", "strip") * max(0.8, p.palm),
-        32: pressed * p.palm * shape.of("rod", "strip", "plate") * rises(p.fingers, 1.5, 2.5),
+        32: pressed * p.palm * (0.3 + 0.7 * p.adducted) * shape.of("rod", "strip", "plate") * rises(p.fingers, 1.5, 2.5),
     }
 
 
