@@ -7,6 +7,8 @@ frame. Lengths are in metres, angles in degrees. Memberships run from 0 to 1.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hand import CHAINS, DIGITS, PALM, PHALANGES, WRIST
@@ -18,8 +20,6 @@ TOUCH, APART, UNSEEN = 0.0005, 0.004, 0.002
 PALM_TOUCH, PALM_APART = 0.002, 0.010
 # Distance between the samples of the surface that stand for it here.
 SPACING = 0.0025
-# Surface is beneath the hand within this distance of the skin.
-BENEATH = 0.008
 
 
 def rises(value, low, high):
@@ -56,9 +56,6 @@ class Grip:
     palm_middle: np.ndarray
     # Of each digit: whether its phalanges pass through a loop of the object.
     looped: np.ndarray
-    # Surface beneath the touching parts, with its normals; and all samples of the surface.
-    beneath: np.ndarray
-    beneath_normals: np.ndarray
 
     # The fewest and the most fingers that a person may see touch.
     fingers_between: tuple
@@ -88,6 +85,13 @@ def coarse_samples(mesh):
     return mesh.coarse
 
 
+def linked(points, link):
+    """A label for each point; points that hang together over gaps of at most `link` have the same."""
+    pairs = cKDTree(points).query_pairs(link, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
+    return connected_components(graph, directed=False)[1]
+
+
 def palm_axes(hand):
     """Palmar, radial and distal directions of the palm as rows."""
     palmar, distal = hand.rotations[PALM].apply([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
@@ -97,7 +101,7 @@ def palm_axes(hand):
 
 def read(mesh, hand, contacts):
     """The features of a grasp."""
-    points, normals, _ = coarse_samples(mesh)
+    points = coarse_samples(mesh)[0]
     low, high = hand.positions.min(axis=0) - 0.03, hand.positions.max(axis=0) + 0.03
     near = np.flatnonzero(((points > low) & (points < high)).all(axis=1))
     capsules, tags = hand.solids()
@@ -147,7 +151,6 @@ def read(mesh, hand, contacts):
     palm = falls(palm_gap, PALM_TOUCH, PALM_APART)
     palm_sure = palm_gap < 0 or any(contact["digit"] not in DIGITS for contact in contacts)
     palm = 1.0 if palm_sure else palm
-    beneath = under(hand, capsules, tags, phalanges, palm, points[near])
     axes = palm_axes(hand)
     return Grip(
         touch=phalanges.max(axis=1),
@@ -163,28 +166,7 @@ def read(mesh, hand, contacts):
         palm_middle=hand.positions[[11, 12, 16, 17]].mean(axis=0),
         looped=loops(hand, points[near]),
         fingers_between=(int(sure[1:].sum()), int(perhaps[1:].sum())),
-        beneath=points[near][beneath],
-        beneath_normals=normals[near][beneath],
     )
-
-
-def under(hand, capsules, tags, phalanges, palm, points):
-    """Which points lie beneath the touching parts of the hand: near their skin, and not behind them."""
-    chosen = [row for row, (digit, phalanx) in enumerate(tags) if (palm if digit < 0 else phalanges[digit, phalanx]) > 0.5]
-    result = np.zeros(len(points), bool)
-    if len(points) == 0:
-        return result
-    distances = capsules.distances(points)
-    for row in chosen:
-        digit, phalanx = tags[row]
-        rotation = hand.rotations[PALM if digit < 0 else CHAINS[digit][phalanx]]
-        close = np.flatnonzero(distances[:, row] < BENEATH)
-        offset = points[close] - capsules.starts[row]
-        along = np.clip(offset @ capsules.directions[row], 0, capsules.lengths[row])
-        away = offset - along[:, None] * capsules.directions[row]
-        away /= np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
-        result[close[away @ rotation.apply([0.0, -1.0, 0.0]) > -0.3]] = True
-    return result
 
 
 def loops(hand, points, reach=0.03, sectors=8):

@@ -7,9 +7,6 @@ touching digit, give its width and depth; how far the slices go on gives its len
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 import grip as grips
 from grip import falls, rises
@@ -40,6 +37,11 @@ class Shape:
     opening: float
     # Membership of each class: bead, ball, rod, strip, plate, disk, block, edge.
     classes: dict = field(default_factory=dict)
+
+    @property
+    def thickness(self):
+        """The mean of width and depth: the diameter of a round part."""
+        return (self.width + self.depth) / 2
 
     @property
     def name(self):
@@ -73,7 +75,7 @@ def shape_of(mesh, grip, contacts):
     is_round, radius = fitted(points[near[sideways]] @ across.T, facing[sideways], 6, 11)
     if is_round > shape.roundness:
         shape.roundness, shape.width, shape.depth = is_round, 2 * radius, 2 * radius
-    ball = max(ball, bulge(points, along, centre, shape.width) * rises(shape.roundness, 0.5, 0.75))
+    ball = max(ball, bulge(normals[near] @ along, shape.width) * rises(shape.roundness, 0.5, 0.75))
     # An end that the fingers reach over from beyond it: a cap, a lid, the neck of a bottle from above.
     toward = 1 if along @ grip.axes[2] < 0 else -1
     level = np.median((spots - centre) @ along) * toward
@@ -94,7 +96,7 @@ def patch(points, normals, tree, spot):
 
 
 def long_direction(points, normals, tree, near, spots):
-    """The direction along which the surface near the contacts does not curve; on flat parts, along which they are long."""
+    """The direction along which the surface near the contacts does not curve; on flat parts, that of their length."""
     spread, axes = np.linalg.eigh(normals[near].T @ normals[near] / len(near))
     if spread[1] - spread[0] > 0.02 or spread[1] > 0.06:
         return axes[:, 0]
@@ -131,9 +133,7 @@ def slice_at(points, normals, along, spot):
 
 def connected(points, seed):
     """Indices of the points that hang together with the one nearest to the seed."""
-    pairs = cKDTree(points).query_pairs(LINK, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    _, labels = connected_components(graph, directed=False)
+    labels = grips.linked(points, LINK)
     return np.flatnonzero(labels == labels[np.argmin(np.linalg.norm(points - seed, axis=1))])
 
 
@@ -154,16 +154,17 @@ def extent(points, along, centre, width):
     return far[1] + far[-1], far
 
 
-def bulge(points, along, centre, width):
-    """How surely a round part narrows to both sides, half its width from the middle of the contacts: a bowl or an egg."""
-    offset = points - centre
-    level = offset @ along
-    away = np.linalg.norm(offset - level[:, None] * along, axis=1)
-    widest = 0.0
-    for side in (-0.5, 0.5):
-        here = (np.abs(level - side * width) < SLICE) & (away < 0.6 * width + 0.004)
-        widest = max(widest, 2 * np.quantile(away[here], 0.95) if here.any() else 0.0)
-    return falls(widest / max(width, 1e-4), 0.86, 0.96) * falls(width, 0.12, 0.15)
+def bulge(slopes, width):
+    """How surely a round part also curves along itself under the contacts, as the bowl of a wine glass does.
+
+    `slopes` are the sines of the angles between the normals and the slice.
+    """
+    # Steeper surface is the end of the part.
+    slopes = slopes[np.abs(slopes) < 0.7]
+    if len(slopes) == 0:
+        return 0.0
+    spread = np.ptp(np.quantile(slopes, [0.05, 0.95]))
+    return rises(spread, 0.3, 0.5) * rises(width, 0.03, 0.04) * falls(width, 0.12, 0.15)
 
 
 def opening_of(grip, contacts):

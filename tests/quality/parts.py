@@ -72,8 +72,6 @@ BY_FORMULA = {
     "osim_toothbrush": lambda p: p[:, 0] > -0.045,
     # The loops are above the pivot.
     "osim_scissors": lambda p: p[:, 1] > 0.005,
-    # The stem, between foot and bowl.
-    "osim_wineglass": lambda p: (np.abs(p[:, 2] + 0.047) < 0.030) & (np.hypot(p[:, 0], p[:, 1]) < 0.010),
     # The thin end with the knob, the bar between the weights, and the ends beside the roll.
     "baseball-bat": lambda p: p[:, 1] < -0.15,
     "dumbbell": lambda p: (np.hypot(p[:, 1], p[:, 2]) < 0.02) & (np.abs(p[:, 0]) < 0.07),
@@ -85,10 +83,10 @@ FINGER = 0.012
 BENEATH = 0.0025
 # An edge cuts if its sides meet at less than this angle, over this length.
 SHARP_ANGLE, SHARP_LENGTH = 30.0, 0.010
-# A worn or coarsely scanned edge cuts, too: at most so thick at the end, and thicker behind it, as if its sides met at an
-# angle from the first to the second of these (a card's do not meet), over REACH.
-BLUNT, WEDGE, EDGE_REACH = 0.0012, (5.0, 30.0), 0.005
-# A point pierces if the surface within REACH of it lies within a cone of this half-angle, but for SLACK.
+# A worn or coarsely scanned edge cuts, too: at most BLUNT thick at the end and thicker behind it, within EDGE_REACH, as if
+# its sides met at an angle from the first to the second in WEDGE. A card's sides do not meet.
+BLUNT, WEDGE, EDGE_REACH = 0.0015, (5.0, 30.0), 0.005
+# A point pierces if the surface within TIP_REACH of it lies within a cone of this half-angle, but for TIP_SLACK.
 TIP_ANGLE, TIP_REACH, TIP_SLACK = 20.0, 0.005, 0.0003
 # A contact this near to a sharp feature is on it; surface this far from it is safe, and so long a safe piece is enough.
 ON_SHARP, SAFE, ENOUGH = 0.002, 0.005, 0.06
@@ -277,11 +275,8 @@ def pieces(points, link):
     """The points in sets that hang together over gaps of at most `link`."""
     if len(points) == 0:
         return []
-    pairs = cKDTree(points).query_pairs(link, output_type="ndarray")
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    count, labels = connected_components(graph, directed=False)
-    order = np.argsort(labels, kind="stable")
-    return np.split(points[order], np.cumsum(np.bincount(labels, minlength=count))[:-1])
+    labels = grips.linked(points, link)
+    return np.split(points[np.argsort(labels, kind="stable")], np.cumsum(np.bincount(labels))[:-1])
 
 
 def length_of(points):

@@ -51,10 +51,11 @@ NAMES = {
     32: "ventral",
     33: "inferior_pincer",
 }
+NUMBERS = {name: number for number, name in NAMES.items()}
 POWER = {1, 2, 3, 4, 5, 10, 11, 15, 17, 18, 19, 26, 28, 30, 31}
 INTERMEDIATE = {16, 21, 23, 25, 29, 32}
-# Of each class of shape, the types that the taxonomy shows for it. A held "edge" is the wall of a vessel or a sheet, so it
-# takes what a plate takes.
+# Of each class of shape, the types that the taxonomy shows for it. A held "edge" is the wall of a vessel or a sheet, so
+# it takes what a plate takes.
 ON_ANYTHING = {9, 15, 23, 24, 33}
 ON_LONG = {1, 2, 3, 4, 5, 6, 7, 8, 14, 16, 17, 19, 20, 21, 22, 25, 27, 29, 31, 32}
 ON_FLAT = {6, 7, 8, 14, 16, 18, 22, 25, 27, 30, 32}
@@ -68,10 +69,13 @@ BY_SHAPE = {
     "ball": ON_ANYTHING | {11, 12, 13, 14, 16, 25, 26, 27, 28},
     "bead": ON_ANYTHING | {8, 12, 13, 14, 16, 20, 25, 27},
 }
+# Types that are shown for long parts of some thickness only, in metres: the least and the most.
+THICKNESS = {1: (0.04, np.inf), 2: (0, 0.045), 3: (0.012, 0.09), 5: (0, 0.04)}
+THICKNESS |= {20: (0, 0.025), 21: (0, 0.025), 29: (0, 0.03)}
 # A part counts as of a class from this membership on.
 IS_SHAPE = 0.3
 # A type is acceptable from this share of the heaviest weight on; with less than this weight none is.
-ACCEPTABLE, LEAST = 0.5, 0.1
+ACCEPTABLE, LEAST = 0.45, 0.1
 
 
 @dataclass
@@ -96,15 +100,19 @@ class Reading:
 
 def allowed_for_shape(name, shape):
     """Whether the taxonomy shows a type for parts of such a shape. All classes that fit fairly well count."""
+    number = NUMBERS.get(name)
+    least, most = THICKNESS.get(number, (0, np.inf))
+    if not least <= shape.thickness <= most:
+        return False
     classes = [kind for kind, fit in shape.classes.items() if fit >= IS_SHAPE] or [shape.name]
-    return any(name in {NAMES[number] for number in BY_SHAPE[kind]} for kind in classes)
+    return any(number in BY_SHAPE[kind] for kind in classes)
 
 
 def kind_of(name):
     """Whether a type is for power, for precision, or intermediate; empty for none."""
-    number = next((number for number, other in NAMES.items() if other == name), None)
-    if number is None:
+    if name not in NUMBERS:
         return ""
+    number = NUMBERS[name]
     return "power" if number in POWER else "intermediate" if number in INTERMEDIATE else "precision"
 
 
@@ -154,7 +162,7 @@ class Pose:
         # The thumb lies along the part instead of around it.
         self.adducted = rises(abs(grip.pointing[0] @ shape.along), 0.6, 0.85)
         self.in_row = 0.5 + 0.5 * in_row(grip.places[touching], shape.along)
-        self.opening, self.thickness = shape.opening, (shape.width + shape.depth) / 2
+        self.opening, self.thickness = shape.opening, shape.thickness
 
     def on_side(self, digit):
         """How surely a finger touches with the side toward the thumb."""
@@ -213,12 +221,13 @@ def power_pad(p):
     ball = shape.of("ball") * p.thumb * rises(p.opening, 0.025, 0.045) * (0.7 + 0.3 * p.middles)
     surrounds = rises(p.grip.phalanges[1, :2].sum() + p.grip.phalanges[0, 1], 0.5, 1.5)
     flat = shape.of("plate", "strip", "edge", "disk") * p.thumb * p.extended * (1 - p.side)
+    ring = p.thumb * shape.of("rod", "disk") * (1 - 0.5 * p.side)
     several = max(p.count(3), p.count(4), 0.5 * p.count(2))
     return {
         18: flat * several * max(p.middles, p.palm),
         26: ball * p.count(3),
         28: ball * p.count(2),
-        31: p.thumb * p.count(1) * surrounds * shape.of("rod", "disk") * rises(p.opening, 0.008, 0.016) * (1 - 0.5 * p.side),
+        31: ring * p.count(1) * surrounds * rises(p.opening, 0.008, 0.016),
     }
 
 
@@ -226,6 +235,7 @@ def side(p):
     """Types whose thumb presses against the side of the index finger, and the pen's."""
     shape = p.shape
     pressed = p.thumb * p.side
+    long = shape.of("rod", "strip", "plate")
     thin = shape.of("rod", "strip") * falls(p.thickness, 0.014, 0.022)
     pen = p.thumb * p.grip.touch[1] * (1 - 0.5 * p.side) * thin * falls(p.opening, 0.015, 0.025)
     return {
@@ -233,8 +243,8 @@ def side(p):
         20: pen * max(p.middle_side, 0.5) * p.count(2),
         21: p.thumb * thin * max(p.side, p.middle_side) * p.count(3),
         25: pressed * p.count(2),
-        29: pressed * thin * shape.of("rod", "strip") * max(0.8, p.palm),
-        32: pressed * p.palm * (0.3 + 0.7 * p.adducted) * shape.of("rod", "strip", "plate") * rises(p.fingers, 1.5, 2.5),
+        29: pressed * thin * max(0.8, p.palm),
+        32: pressed * p.palm * (0.5 + 0.5 * p.adducted) * long * rises(p.fingers, 1.5, 2.5),
     }
 
 
@@ -243,7 +253,7 @@ def precision(p):
     shape, pads = p.shape, p.thumb * (1 - 0.8 * p.side) * (1 - p.pressing_palm)
     long = shape.of("rod", "strip", "plate", "edge", "block") * p.in_row
     # Around a compact part, or from around a long one. People call either by either name unless it is clear.
-    gathered = max(shape.of("ball", "bead", "disk"), 1.4 - p.in_row)
+    gathered = max(shape.of("ball", "bead", "disk"), 1.3 - p.in_row)
     flat = shape.of("plate", "strip", "block", "edge")
     return {
         6: pads * p.count(4) * long,

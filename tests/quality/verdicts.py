@@ -7,8 +7,8 @@ import taxonomy
 # Confidence from which a type counts, and the classes of confidence of the calibration table.
 CONFIDENT = 0.5
 CONFIDENCES = [0.0, 0.5, 0.6, 0.7, 0.8, 1.0]
-# Targets in percent: types agreed, from what the server knows and on first calls; contacts on handles that the giver leaves;
-# contacts on blades and points; heavy things held with the palm or four digits.
+# Targets in percent: types agreed, with an atlas and on first calls; contacts on handles that the giver leaves; contacts
+# on blades and points; heavy things held with the palm or four digits.
 AGREED, AGREED_COLD, ON_HANDLE, ON_SHARP, POWER = 85, 75, 80, 2, 90
 # Targets in percent for heavy things with handles: kept against gravity, and in all six pushes.
 KEPT, KEPT_IN_PUSHES = 95, 75
@@ -114,14 +114,16 @@ def by_type(rows):
 
 def by_object(found):
     """Table by object: types agreed, handles taken where half of them is free, and contacts on blades and points."""
-    lines = ["| object | types agreed | on the handle, where free | contacts on blades and points |", "|---|--:|--:|--:|"]
+    lines = ["| object | types agreed | on the handle, where free | contacts on blades and points |"]
+    lines.append("|---|--:|--:|--:|")
     for name in dict.fromkeys(row["object"] for row in found):
         here = [row for row in found if row["object"] == name and "palm_or_four" in row]
         rows, free = judged(here), free_handles(here)
         cells = [f"{sum(map(is_agreed, rows))} of {len(rows)}"]
         cells.append(f"{sum(map(takes_handle, free))} of {len(free)}" if free else "")
         blades = [row for row in here if row["has_sharp"]]
-        cells.append(f"{sum(r['sharp_contacts'] for r in blades)} of {sum(r['contacts'] for r in blades)}" if blades else "")
+        sharp, contacts = (sum(row[key] for row in blades) for key in ("sharp_contacts", "contacts"))
+        cells.append(f"{sharp} of {contacts}" if blades else "")
         if rows:
             lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -141,8 +143,8 @@ def mass_and_power(rows):
             lines.append(f"| {named} | {len(here)} | {' | '.join(cells)} |")
     lines += [
         "",
-        "For comparison, people at work (two housekeepers, two machinists): 92 % of the objects they grasp have at most 0.5"
-        " kg (Feix, Bullock and Dollar 2014, IEEE Transactions on Haptics 7(3), 311-323). They take large and heavy ones"
-        " with power grasps, but of those below 2 cm and 20 g only 61 % with precision grasps (the same, part two).",
+        "For comparison, two housekeepers and two machinists at work: 92 % of the objects they grasp have at most 0.5 kg"
+        " (Feix, Bullock and Dollar 2014, IEEE Transactions on Haptics 7, 311-323). They take large and heavy ones with"
+        " power grasps, but those below 2 cm and 20 g with precision grasps in only 61 % (the same, part two).",
     ]
     return "\n".join(lines)
