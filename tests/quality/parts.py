@@ -83,8 +83,8 @@ FINGER = 0.012
 BENEATH = 0.0025
 # An edge cuts if its sides meet at less than this angle, over this length.
 SHARP_ANGLE, SHARP_LENGTH = 30.0, 0.010
-# A worn or coarsely scanned edge cuts, too: at most BLUNT thick at the end and thicker behind it, within EDGE_REACH, as if
-# its sides met at an angle from the first to the second in WEDGE. A card's sides do not meet.
+# A worn or coarsely scanned edge cuts, too: at most BLUNT thick at the end and thicker behind it, within EDGE_REACH, as
+# if its sides met at an angle from the first to the second in WEDGE. A card's sides do not meet.
 BLUNT, WEDGE, EDGE_REACH = 0.0015, (5.0, 30.0), 0.005
 # A point pierces if the surface within TIP_REACH of it lies within a cone of this half-angle, but for TIP_SLACK.
 TIP_ANGLE, TIP_REACH, TIP_SLACK = 20.0, 0.005, 0.0003

@@ -7,8 +7,8 @@ import taxonomy
 # Confidence from which a type counts, and the classes of confidence of the calibration table.
 CONFIDENT = 0.5
 CONFIDENCES = [0.0, 0.5, 0.6, 0.7, 0.8, 1.0]
-# Targets in percent: types agreed, with an atlas and on first calls; contacts on handles that the giver leaves; contacts
-# on blades and points; heavy things held with the palm or four digits.
+# Targets in percent: types agreed, with an atlas and on first calls; contacts on handles that the giver leaves;
+# contacts on blades and points; heavy things held with the palm or four digits.
 AGREED, AGREED_COLD, ON_HANDLE, ON_SHARP, POWER = 85, 75, 80, 2, 90
 # Targets in percent for heavy things with handles: kept against gravity, and in all six pushes.
 KEPT, KEPT_IN_PUSHES = 95, 75
