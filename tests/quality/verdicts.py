@@ -143,8 +143,8 @@ def mass_and_power(rows):
             lines.append(f"| {named} | {len(here)} | {' | '.join(cells)} |")
     lines += [
         "",
-        "For comparison, two housekeepers and two machinists at work: 92 % of the objects they grasp have at most 0.5 kg"
-        " (Feix, Bullock and Dollar 2014, IEEE Transactions on Haptics 7, 311-323). They take large and heavy ones with"
-        " power grasps, but those below 2 cm and 20 g with precision grasps in only 61 % (the same, part two).",
+        "For comparison, two housekeepers and two machinists at work: 92 % of the objects they grasp have at most 0.5"
+        " kg (Feix, Bullock and Dollar 2014, IEEE Transactions on Haptics 7, 311-323). They take large and heavy ones"
+        " with power grasps, but those below 2 cm and 20 g with precision grasps in only 61 % (the same, part two).",
     ]
     return "\n".join(lines)
