@@ -219,6 +219,8 @@ def collect(names, things, options):
                 answer, in_time = ask(service, request, options, **wanted)
                 row = {"object": name, "holdout": label, "seed": request["seed"], "found": answer["grasp"] is not None}
                 row["everyday"], row["both"] = thing is not None, request.get("hands") == "both"
+                # An atlas is not yet grown when an object is requested as soon as it is created.
+                row["cold"] = options.no_atlas or (thing is not None and label == "alone")
                 row["search_ms"] = 1000 * answer["report"]["search_time_seconds"]
                 row["round_trip_ms"] = 1000 * answer["round_trip_seconds"]
                 row["in_time"] = in_time and row["search_ms"] <= 1000 * BUDGET_SECONDS

@@ -17,8 +17,10 @@ import holdouts
 import mannequin
 import measures
 import pairs
+import parts
 import physics
 import stance
+import taxonomy
 
 
 @dataclass
@@ -51,6 +53,8 @@ def judged(case, simulated):
     row = pairs.judge(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
     if not case.other:
         row.update({**stance.judge(case.scene, case.grasp), **choice.judge(case.scene, case.grasp)})
+        # The taxonomy is of grasps by one hand.
+        row.update(taxonomy.judge(case.scene, case.grasp), **parts.judge(case.object, case.scene, case.grasp))
     if simulated and not case.scene.mesh.is_sheet():
         row.update(survival(case.scene, grasps))
     if case.drawing:

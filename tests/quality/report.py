@@ -16,6 +16,7 @@ import mannequin
 import measures
 import relations
 import stance
+import verdicts
 
 # Confidence from which a type counts; targets for the percentage of grasps that have one, and for the number of types.
 CONFIDENT, CLASSIFIED, TYPES = 0.5, 95, 15
@@ -80,6 +81,7 @@ def targets(rows):
     none_of("fingers through fingers or palm", column("self_collision") > 0)
     none_of("forbidden surface within 2 mm", column("forbidden_distance") < measures.FORBIDDEN)
     lines += held(found) + classified(found)
+    lines += [Target(*line) for line in verdicts.targets(found)]
     lines += overstated(found)
     lines += [Target(*line) for line in stance.lines(found) + choice.lines(found)]
     figure = f"median {np.nanmedian(column('comfort')):.4f}, reply off by {np.median(column('comfort_error')):.4f}"
@@ -252,6 +254,8 @@ def write(folder, rows, lines, options, everyday_table="", comparison=""):
         text += ["![E against epsilon, by verdict](comfort.svg)", ""]
         if any("type" in row for row in found):
             text += ["## Types", "", relations.types(found), ""]
+        if judged := verdicts.tables(found):
+            text += [judged, ""]
         plots(folder, found)
         text += ["![Distributions](distributions.svg)", ""]
         if mannequin.sheet(folder, found):
