@@ -3,12 +3,13 @@
 mod barriers;
 mod both_hands;
 mod built_in_holdouts;
-mod clear_types;
+
 mod hooks;
 mod key_frames;
 mod limits;
 mod look_up;
 mod mechanisms;
+mod preferences;
 mod race;
 mod refinement;
 mod stopping;
