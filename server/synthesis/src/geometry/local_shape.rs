@@ -87,8 +87,13 @@ impl LocalShape {
             return None;
         }
         let centre = Vec3A::from(centre);
-        let squared = self.patches.iter().map(|patch| patch.position.distance_squared(centre));
-        let radius = radius.max(squared.fold(f32::INFINITY, f32::min).sqrt()).max(f32::MIN_POSITIVE);
+        let squared = self
+            .patches
+            .iter()
+            .map(|patch| patch.position.distance_squared(centre));
+        let radius = radius
+            .max(squared.fold(f32::INFINITY, f32::min).sqrt())
+            .max(f32::MIN_POSITIVE);
         let (per_radius, per_turn) = (1.0 / ((FADED - 1.0) * radius), 1.0 / (TURNED * radius));
         let out_of_reach = (FADED * radius).powi(2);
         let mut sum = Sum::default();

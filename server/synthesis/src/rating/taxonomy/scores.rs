@@ -187,9 +187,7 @@ impl<'a> View<'a> {
             GraspType::Palmar => shape.flat * straight_fingers * self.palm,
             GraspType::FixedHook if thumb.touches => 0.0,
             GraspType::FixedHook => {
-                shape.bar
-                    * self.curled
-                    * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
+                shape.bar * self.curled * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
             }
 
             // An index finger without contact points past the object.

@@ -12,7 +12,9 @@ use grasp_synthesis::{
 };
 
 use super::{
-    cases::{PALM_BELOW, THUMB_FAR, THUMB_OVER_FINGERS, THUMB_UNDER_BALL, alike, outer_links, pads, rod, spread, v},
+    cases::{
+        PALM_BELOW, THUMB_FAR, THUMB_OVER_FINGERS, THUMB_UNDER_BALL, alike, outer_links, pads, rod, spread, v,
+    },
     made_grasps::{Shape, held},
 };
 use crate::fixtures::{
@@ -167,7 +169,10 @@ fn a_ball_that_is_stretched_ceases_to_be_one_gradually() {
         let found = ball.on_stretched(Vec3::X, factor).classify();
         let is_ball = found.grasp_type.is_some_and(|found| BALLS.contains(&found));
         if factor < 1.3 {
-            assert!(is_ball && found.confidence > CLEAR_CONFIDENCE, "{factor}: {found:?}");
+            assert!(
+                is_ball && found.confidence > CLEAR_CONFIDENCE,
+                "{factor}: {found:?}"
+            );
         } else if factor > 2.5 {
             assert!(!is_ball, "{factor}: {found:?}");
         }

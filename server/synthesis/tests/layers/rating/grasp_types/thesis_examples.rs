@@ -86,7 +86,9 @@ fn most_thesis_examples_match_their_captions() {
         .filter_map(|holdout| {
             let (pose, contacts) = contacts(holdout);
             let shape = &object(&holdout.object).local_shape;
-            let name = classify(giver_rig(holdout), &pose, &contacts, shape).grasp_type?.name();
+            let name = classify(giver_rig(holdout), &pose, &contacts, shape)
+                .grasp_type?
+                .name();
             (name == holdout.grasp_type).then_some((&holdout.name[..], name))
         })
         .collect();
