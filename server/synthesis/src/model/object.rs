@@ -125,12 +125,12 @@ impl GraspObject {
         if !errors.is_empty() {
             return Err(errors);
         }
-        let (shape, surface) = shape_and_surface(mesh);
-        let Shape {
+        let (measures, surface) = measures_and_surface(mesh);
+        let Measures {
             bounding_box,
             local_thickness,
             local_shape,
-        } = shape;
+        } = measures;
         Ok(Self {
             bounding_box,
             local_thickness,
@@ -189,14 +189,14 @@ impl GraspObject {
     }
 }
 
-/// The shape of an object, apart from its search structure.
-struct Shape {
+/// What is measured of an object's mesh, apart from its search structure.
+struct Measures {
     bounding_box: OrientedBox,
     local_thickness: LocalThickness,
     local_shape: LocalShape,
 }
 
-impl Shape {
+impl Measures {
     fn of(mesh: &TriangleMesh) -> Self {
         let samples = even_samples(mesh);
         Self {
@@ -207,14 +207,14 @@ impl Shape {
     }
 }
 
-/// Builds the shape of a mesh and its search structure in parallel, or in sequence if no thread can be spawned. The former
+/// Measures a mesh and builds its search structure in parallel, or in sequence if no thread can be spawned. The former
 /// takes a fifth of the work.
-fn shape_and_surface(mesh: TriangleMesh) -> (Shape, MeshBvh) {
+fn measures_and_surface(mesh: TriangleMesh) -> (Measures, MeshBvh) {
     let copy = mesh.clone();
     std::thread::scope(|scope| {
-        let parallel = std::thread::Builder::new().spawn_scoped(scope, || Shape::of(&copy));
+        let parallel = std::thread::Builder::new().spawn_scoped(scope, || Measures::of(&copy));
         let surface = MeshBvh::build(mesh);
         let of_copy = parallel.ok().and_then(|thread| thread.join().ok());
-        (of_copy.unwrap_or_else(|| Shape::of(&copy)), surface)
+        (of_copy.unwrap_or_else(|| Measures::of(&copy)), surface)
     })
 }
