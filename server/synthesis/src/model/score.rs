@@ -115,13 +115,12 @@ impl Term {
             // Weighted by how well they predict which grips survive pushes from all sides in an independent
             // simulation; each is mostly earned at a threshold (see [`crate::rating::scoring`]).
             Self::Steadiness | Self::EnoughDigits => 4.0,
-            Self::Closure | Self::FrictionReserve | Self::NaturalType => 6.0,
+            Self::Closure | Self::FrictionReserve | Self::NaturalType | Self::OffSharp => 6.0,
             Self::AwayFromGiver => 0.75,
             Self::GiverClearance | Self::SterileDistance => 0.5,
             // Where a hand comes from and what it holds are what a person notices first.
             Self::FromSideOrAbove => 3.0,
             Self::AcrossLongAxis => 5.0,
-            Self::OffSharp => 6.0,
             Self::OnHandle => 10.0,
             Self::Stance => 12.0,
         }

@@ -182,7 +182,7 @@ impl<'a> KnownGrips<'a> {
         }
         let barriers = presented.barriers();
         let is_first_valid = settings.query.choice == Choice::FirstValid;
-        let &Preference { wants_handle } = scene.preference();
+        let Preference { wants_handle } = scene.preference();
         let receiver = &presented.receiver;
         let is_graded = is_first_valid && (receiver.is_expected() || wants_handle);
         // The shortlist serves searches with barriers that any valid grasp ends; it is no better than the rest.

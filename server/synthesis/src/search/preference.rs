@@ -49,7 +49,7 @@ impl Preference {
     }
 
     /// True if a person would choose such a grasp. Hooks are not asked for closed hands.
-    pub(super) fn is_met_by(&self, grasp: &Grasp) -> bool {
+    pub(super) fn is_met_by(self, grasp: &Grasp) -> bool {
         let Some(score) = &grasp.score else { return true };
         let reaches = |&(term, least): &(Term, f32)| {
             score.values[term as usize] >= least || (grasp.hangs && term == Term::EnoughDigits)

@@ -195,8 +195,8 @@ impl<'a> Scene<'a> {
     }
 
     /// What a person would choose.
-    pub(super) fn preference(&self) -> &Preference {
-        self.preference.get_or_init(|| {
+    pub(super) fn preference(&self) -> Preference {
+        *self.preference.get_or_init(|| {
             let presented = self.physical.as_ref().map(|(_, presented)| presented);
             let barriers = presented.map_or(Barriers::NONE, Presented::barriers);
             Preference::of(self.task.object.object(), barriers)
