@@ -10,7 +10,7 @@ use super::surface_samples::SurfaceSample;
 const PATCH_SAMPLES: usize = 16;
 
 /// Distance in metres that counts as much as a unit of difference between normals when samples are grouped: the two sides
-/// of a wall are then 4 cm apart and never share a patch.
+/// of a wall are then 4 cm apart and rarely share a patch.
 const NORMAL_LENGTH: f32 = 0.02;
 
 /// Distance from the centre, as a multiple of the radius, at which a patch no longer counts. Closer to 1, shapes change

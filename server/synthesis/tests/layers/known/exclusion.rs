@@ -128,6 +128,6 @@ fn a_shipped_atlas_excludes_only_meeting_grips_and_lists_the_best_first() {
             .map(|entry| entry.scores.iter().map(|&score| u32::from(score)).sum())
             .collect();
         assert!(sums.is_sorted_by(|a, b| a >= b), "{name}");
-        assert!(atlas.bytes() < 10_000_000, "{name}: {} bytes", atlas.bytes());
+        assert!(atlas.bytes() < 11_500_000, "{name}: {} bytes", atlas.bytes());
     }
 }

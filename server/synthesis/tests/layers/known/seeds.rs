@@ -119,7 +119,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
     const PROPOSALS: u64 = 150;
     let known = complete_atlas("scissors");
     let rig = right();
-    let givers = tight_givers(&known, 30);
+    let givers = tight_givers(&known, 60);
     assert!(givers.len() >= 3, "only {} givers are tight", givers.len());
     let (mut perturbed, mut perturbed_open, mut fresh) = (0, 0, 0);
     for grip in givers.into_iter().take(10) {

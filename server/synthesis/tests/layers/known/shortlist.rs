@@ -12,6 +12,7 @@ use grasp_synthesis::{
     model::{hand::joints::HandJoints, holdout::Holdout, strategy::Choice},
     physical::{
         grip::{GIVER_CLEARANCE, Gripper},
+        receiver::SUITABLE,
         scene::Presented,
         solids::{PreparedHand, TrackedSolids},
     },
@@ -113,8 +114,8 @@ fn of_known_grips(holdout: &Holdout, known: &Arc<Atlas>, choice: Choice) -> Sear
     search.run()
 }
 
-/// For each known grip, whether it holds.
-fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<bool> {
+/// The score of each known grip that holds.
+fn scores_held(holdout: &Holdout, known: &Atlas) -> Vec<Option<f32>> {
     let rig = right();
     let scene = object_scene(&holdout.object);
     let presented = Presented::of(holdout);
@@ -123,23 +124,41 @@ fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<bool> {
     let entries = known.entries().iter();
     entries
         .map(|entry| {
-            let grasp = checker.check(entry, &entry.tracked_solids(rig), &mut gripper);
-            grasp.is_some()
+            let grasp = checker.check(entry, &entry.tracked_solids(rig), &mut gripper)?;
+            grasp.score.map(|score| score.total())
         })
         .collect()
 }
 
 #[test]
-fn the_first_answer_is_the_first_holding_grip_of_the_shortlist() {
+fn the_first_answer_suits_the_receiver_and_is_the_first_such_of_the_shortlist() {
     let known = complete_atlas("scissors");
     let by_score = known.by_score(UP);
-    let listed: Vec<u16> = known.shortlist(UP).iter().map(|listed| listed.entry).collect();
-    let (mut on_list, mut beyond) = (0, 0);
+    let shortlist = known.shortlist(UP);
+    let (mut on_list, mut beyond, mut unsuitable) = (0, 0, 0);
     for giver in (0..known.entries().len()).step_by(120) {
         let holdout = scissors_held_by(&known, giver);
-        let holds = which_hold(&holdout, &known);
-        let holds = |entry: &&u16| holds[usize::from(**entry)];
-        let first = listed.iter().chain(by_score).find(holds).copied();
+        let receiver = Presented::of(&holdout).receiver;
+        let suits = |entry: &u16| {
+            let forearm = known.entries()[usize::from(*entry)].forearm();
+            receiver.suits_forearm(forearm) >= SUITABLE
+        };
+        let listed: Vec<u16> = shortlist
+            .by_value(|forearm| receiver.suits_forearm(forearm))
+            .into_iter()
+            .map(|place| shortlist.at(usize::from(place)).0)
+            .collect();
+        let scores = scores_held(&holdout, &known);
+        let score = |entry: &u16| scores[usize::from(*entry)];
+        let holds = |entry: &&u16| score(entry).is_some();
+        let by_value = |a: &&u16, b: &&u16| score(a).partial_cmp(&score(b)).expect("scores are numbers");
+        let all = || listed.iter().chain(by_score);
+        let first = all().find(|entry| holds(entry) && suits(entry));
+        let best_listed = || listed.iter().filter(holds).max_by(by_value);
+        let first = first
+            .or_else(best_listed)
+            .or_else(|| by_score.iter().find(holds))
+            .copied();
         let found = of_known_grips(&holdout, &known, Choice::FirstValid);
         assert_eq!(
             found.report.source,
@@ -152,27 +171,28 @@ fn the_first_answer_is_the_first_holding_grip_of_the_shortlist() {
             on_list += 1;
         }
         beyond += usize::from(!listed.contains(&first));
+        unsuitable += usize::from(!suits(&first));
     }
     assert!(on_list >= 3, "{on_list} differ from the first by score");
-    assert!(beyond >= 1, "none needs more than the list");
+    assert!(beyond + unsuitable >= 1, "the first of the list always suits");
 }
 
 #[test]
 fn without_a_giver_grips_are_tried_by_score_and_the_best_counts_each_once() {
     let known = complete_atlas("scissors");
     let afloat = floating(Arc::clone(object("scissors")));
-    let holds = which_hold(&afloat, &known);
+    let scores = scores_held(&afloat, &known);
     let first = known
         .by_score(UP)
         .iter()
-        .find(|&&entry| holds[usize::from(entry)]);
+        .find(|&&entry| scores[usize::from(entry)].is_some());
     let found = of_known_grips(&afloat, &known, Choice::FirstValid);
     assert_eq!(found.report.source, first.copied().map(GraspSource::Atlas));
 
     let holdout = scissors_held_by(&known, 450);
-    let holds = which_hold(&holdout, &known);
+    let scores = scores_held(&holdout, &known);
     let best = of_known_grips(&holdout, &known, Choice::BestWithinBudget);
-    let holding = holds.iter().filter(|holds| **holds).count();
+    let holding = scores.iter().flatten().count();
     assert!(holding > 0, "the giver leaves none");
     assert_eq!(
         best.report.candidates, holding as u64,
