@@ -132,7 +132,7 @@ impl Collection {
                         encode(&grown, object, rig),
                     )?;
                 }
-                let bytes = encode(&grown.listed(object, rig), object, rig);
+                let bytes = encode(&grown.listed(object, rig).most_listed(object, rig), object, rig);
                 Ok((self.path(name), bytes))
             })
             .collect()

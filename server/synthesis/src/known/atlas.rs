@@ -77,6 +77,11 @@ impl Atlas {
         self.shortlists.all().iter().map(|listed| listed.entry)
     }
 
+    /// The same grips, each with the number of shortlists that it is on.
+    pub fn times_listed(&self) -> Vec<(u16, usize)> {
+        self.listed().zip(self.shortlists.times_listed()).collect()
+    }
+
     /// The part of [`Atlas::by_score`] that holds the object.
     pub fn holding_under(&self, up: Vec3) -> &[u16] {
         self.order.holding_under(up)

@@ -78,6 +78,9 @@ const MIN_GRIPS_FOR_GIVERS: usize = 256;
 /// grips are admitted even to full cells.
 const ENOUGH_CLEAR_GRIPS: usize = 60;
 
+/// Grips that are shipped with an object or a primitive, at about 400 bytes each.
+const SHIPPED: usize = 180;
+
 /// Largest number of redraws of a grip from a crowded cell.
 const MAX_REDRAWS: usize = 8;
 
@@ -111,6 +114,22 @@ impl Grown {
     #[must_use]
     pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
         let places: Vec<usize> = self.atlas.listed().map(usize::from).collect();
+        self.only(object, rig, &places)
+    }
+
+    /// The [`SHIPPED`] grips that are on most shortlists, likewise: few are on many lists.
+    #[must_use]
+    pub fn most_listed(&self, object: &GraspObject, rig: &Rig) -> Self {
+        let mut by_count = self.atlas.times_listed();
+        by_count.sort_by_key(|&(entry, times)| (Reverse(times), entry));
+        let most = by_count.into_iter().take(SHIPPED);
+        let mut places: Vec<usize> = most.map(|(entry, _)| usize::from(entry)).collect();
+        places.sort_unstable();
+        self.only(object, rig, &places)
+    }
+
+    /// Some of the grips as an incomplete atlas.
+    fn only(&self, object: &GraspObject, rig: &Rig, places: &[usize]) -> Self {
         let entries = places.iter().map(|&place| self.atlas.entries()[place].clone());
         let grips = Grips::new(rig, entries.collect());
         Self {

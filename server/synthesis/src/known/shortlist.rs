@@ -218,6 +218,15 @@ impl Shortlists {
         &self.grips
     }
 
+    /// The number of lists that each of them is on.
+    pub(super) fn times_listed(&self) -> Vec<usize> {
+        let mut times = vec![0; self.grips.len()];
+        for place in self.by_direction.iter().flatten() {
+            times[usize::from(place.grip)] += 1;
+        }
+        times
+    }
+
     /// Memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let lists = self.by_direction.iter();
