@@ -31,7 +31,7 @@ const HOLDOUTS: [usize; 4] = [0, 5, 9, 13];
 async fn a_request_without_a_hand_is_answered_with_either_and_names_it() {
     let server = TestServer::start().await;
     let mut hands = Vec::new();
-    for number in HOLDOUTS {
+    for number in (0..15).step_by(2) {
         let either = ask(&server, &request(number, None)).await;
         assert_eq!(either.outcome, Outcome::Found);
         let grasp = either.grasp.expect("a grasp was found");

@@ -27,9 +27,10 @@ use grasp_synthesis::{
         growth::Growth,
         recheck::GripChecker,
     },
-    model::{hand::Handedness, strategy::Validity},
+    model::{grasp::Grasp, hand::Handedness, strategy::Validity},
     physical::{
         grip::Gripper,
+        receiver::SUITABLE,
         scene::{ObjectScene, Presented},
     },
     propose::prepared::PreparedRig,
@@ -108,10 +109,23 @@ fn an_atlas_answers_with_its_first_holding_grip() {
             checker.check(entry, &entry.tracked_solids(adult()), &mut Gripper::default())
         };
         let (atlas, up) = (&SMALL_ATLAS.0, presented.up);
-        let listed = atlas.shortlist(up).iter().map(|listed| listed.entry);
-        let (entry, grasp) = (listed.chain(atlas.by_score(up).iter().copied()))
-            .find_map(|entry| Some((entry, held(entry)?)))
-            .expect("a grip of the atlas holds");
+        let (shortlist, receiver) = (atlas.shortlist(up), presented.receiver);
+        let listed = shortlist.by_value(|forearm| receiver.suits_forearm(forearm));
+        let listed = listed.into_iter().map(|place| shortlist.at(usize::from(place)).0);
+        let held_of = |entry: u16| Some((entry, held(entry)?));
+        let listed: Vec<_> = listed.filter_map(held_of).collect();
+        let by_score: Vec<_> = atlas.by_score(up).iter().copied().filter_map(held_of).collect();
+        let suits = |(entry, _): &&(u16, Grasp)| {
+            receiver.suits_forearm(atlas.entries()[usize::from(*entry)].forearm()) >= SUITABLE
+        };
+        let total = |(_, grasp): &&(u16, Grasp)| grasp.score.map_or(0.0, |score| score.total());
+        let first = listed.iter().chain(&by_score).find(suits);
+        let best = || listed.iter().max_by(|a, b| total(a).total_cmp(&total(b)));
+        let (entry, grasp) = first
+            .or_else(best)
+            .or(by_score.first())
+            .expect("a grip of the atlas holds")
+            .clone();
         assert_eq!(record.source, Source::AtlasEntry(entry));
         let search = record.search.expect("a search");
         assert_eq!(search.attempts, 0);
@@ -150,7 +164,8 @@ fn sets_without_an_atlas_are_valid_by_their_own_notion_and_hand() {
                 continue;
             }
             let search = record.search.expect("a search");
-            assert_eq!(search.attempts, attempt + 1);
+            // Attempts after it might have found a grasp that people would rather choose.
+            assert!(search.attempts == attempt + 1 || (is_physical && search.attempts > attempt));
             assert_eq!(search.atlas, None);
             let figures = record.grasp().expect("figures of a grasp");
             assert_eq!(figures.sufficient_distributions.is_none(), is_physical);
