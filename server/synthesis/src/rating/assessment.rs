@@ -13,7 +13,7 @@ use crate::{
     model::{
         constraints::Constraints,
         grasp::{Contact, Grasp, PhysicalMargins},
-        grasp_type::Classification,
+        grasp_type::{Classification, GraspType},
         hand::rig::Rig,
         object::GraspObject,
     },
@@ -25,6 +25,12 @@ use crate::{
         solids::{HandSolids, TrackedSolids},
     },
     thesis::algorithm_1::HeldObject,
+};
+
+/// The type of a grip in which the load hangs.
+const HOOK: Classification = Classification {
+    grasp_type: Some(GraspType::FixedHook),
+    confidence: 1.0,
 };
 
 /// The object, presentation, hand and constraints that a grip is assessed against.
@@ -55,7 +61,7 @@ impl GraspContext<'_> {
         let Self {
             object, presented, ..
         } = self;
-        let classification = self.classified(grip, &gripper.contacts)?;
+        let classification = self.classified(grip, &gripper.contacts, gripper.hang.is_some())?;
 
         // Step 5 of Algorithm 1, Immobility Validation, for the object as it is presented.
         let load = object.load(&gripper.soft_contacts, presented.up);
@@ -81,9 +87,18 @@ impl GraspContext<'_> {
         self.rated(grasp, relative_closure, solids).map(Box::new)
     }
 
-    /// The grip's type, if the constraints admit it and the contacts.
-    pub(super) fn classified(&self, grip: &Grip, contacts: &[Contact]) -> Result<Classification, NoGrip> {
-        let classification = classify(self.rig, &grip.pose, contacts, &self.object.object.local_shape);
+    /// The grip's type, if the constraints admit it and the contacts. What hangs is in a hook, whatever the fingers look like.
+    pub(super) fn classified(
+        &self,
+        grip: &Grip,
+        contacts: &[Contact],
+        hangs: bool,
+    ) -> Result<Classification, NoGrip> {
+        let classification = if hangs {
+            HOOK
+        } else {
+            classify(self.rig, &grip.pose, contacts, &self.object.object.local_shape)
+        };
         if !self.constraints.admits_contacts(contacts)
             || !self.constraints.admits_type(classification.grasp_type)
         {

@@ -22,7 +22,7 @@ pub fn assess_both(
     buffers: &mut Buffers,
     stopwatch: &mut impl Stopwatch,
 ) -> Result<Box<Grasp>, NoGrip> {
-    let classified = |hand: usize| around[hand].classified(&halves[hand].grip, &halves[hand].contacts);
+    let classified = |hand: usize| around[hand].classified(&halves[hand].grip, &halves[hand].contacts, false);
     let classifications = [classified(0)?, classified(1)?];
     let clearance = |hand: usize| around[hand].clearances(&halves[hand].grip, &halves[hand].solids);
     let clearances = [clearance(0)?, clearance(1)?];

@@ -37,9 +37,6 @@ const PAD_DISCOUNT: f32 = 0.8;
 /// Discount on pad and middle-finger side opposition if the palm supports the object.
 const PALM_DISCOUNT: f32 = 0.85;
 
-/// Least fit of a bar to what hangs in curled fingers without the thumb: it is a handle, even if a body close to it hides that.
-const HOOKED_HANDLE: f32 = 0.8;
-
 /// The score of each type, in the order of [`GraspType::ALL`].
 pub(super) fn scores(features: &Features) -> [f32; 33] {
     let view = View::new(features);
@@ -190,8 +187,7 @@ impl<'a> View<'a> {
             GraspType::Palmar => shape.flat * straight_fingers * self.palm,
             GraspType::FixedHook if thumb.touches => 0.0,
             GraspType::FixedHook => {
-                let handle = shape.bar.max(HOOKED_HANDLE);
-                handle * self.curled * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
+                shape.bar * self.curled * straight(self.features.mean(|finger| finger.knuckle), [35.0, 65.0])
             }
 
             // An index finger without contact points past the object.
