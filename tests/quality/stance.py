@@ -240,7 +240,7 @@ def arm_of_reply(scene, hand, grasp):
     if not grasp.get("arm"):
         return {}
     wrist = hand.positions[WRIST]
-    shoulder, elbow = (np.array(grasp["arm"][name], float) for name in ("shoulder", "elbow"))
+    shoulder, elbow = (np.array(grasp["arm"][name], float) for name in ("client_shoulder", "client_elbow"))
     upper, fore = np.linalg.norm(shoulder - elbow), np.linalg.norm(wrist - elbow)
     bend = 180.0 - angle(unit(shoulder - elbow), unit(wrist - elbow))
     capsule = Capsules([wrist], [elbow], [hand.radii[WRIST]], [FOREARM_RADIUS])

@@ -205,7 +205,7 @@ class TestArmOfReply:
     shoulder = np.array([0.0, 1.2 + stance.UPPER_ARM, -0.24 - stance.FOREARM])
 
     def judged(self, shoulder, elbow, giver=GIVER):
-        arm = {"shoulder": list(shoulder), "elbow": list(elbow)}
+        arm = {"client_shoulder": list(shoulder), "client_elbow": list(elbow)}
         return stance.judge(scene_of(giver), reply(self.hand, arm=arm))
 
     def test_good_arm(self):

@@ -117,7 +117,7 @@ impl Grown {
         self.only(object, rig, &places)
     }
 
-    /// The [`SHIPPED`] grips that are on most shortlists, likewise: few are on many lists.
+    /// The grips that are on most shortlists, likewise: as many as are shipped.
     #[must_use]
     pub fn most_listed(&self, object: &GraspObject, rig: &Rig) -> Self {
         let mut by_count = self.atlas.times_listed();
