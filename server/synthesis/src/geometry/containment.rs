@@ -115,7 +115,7 @@ impl Containment {
     }
 
     /// True if the triangle belongs to a sheet.
-    fn is_sheet(&self, triangle: usize) -> bool {
+    pub(super) fn is_sheet(&self, triangle: usize) -> bool {
         self.is_sheet.get(triangle).is_some_and(|&is_sheet| is_sheet)
     }
 }

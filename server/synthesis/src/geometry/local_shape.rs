@@ -10,7 +10,7 @@ use super::surface_samples::SurfaceSample;
 const PATCH_SAMPLES: usize = 16;
 
 /// Distance in metres that counts as much as a unit of difference between normals when samples are grouped: the two sides
-/// of a wall are then 4 cm apart and rarely share a patch.
+/// of a wall are then 4 cm apart and never share a patch.
 const NORMAL_LENGTH: f32 = 0.02;
 
 /// Distance from the centre, as a multiple of the radius, at which a patch no longer counts. Closer to 1, shapes change
@@ -154,7 +154,7 @@ impl Sum {
     }
 }
 
-/// Halves the samples along the axis of position or normal in which they differ most, until each group is a patch.
+/// Parts the samples along the axis of position or normal in which they differ most, until each group is a patch.
 fn group(samples: &mut [SurfaceSample], patches: &mut Vec<Patch>) {
     if samples.len() <= PATCH_SAMPLES {
         patches.extend(Patch::of(samples));
@@ -174,8 +174,17 @@ fn group(samples: &mut [SurfaceSample], patches: &mut Vec<Patch>) {
     let range = if by_position { position_range } else { normal_range };
     let axis = range.max_position();
     let key = |sample: &SurfaceSample| if by_position { sample.position } else { sample.normal }[axis];
-    let middle = samples.len() / 2;
-    samples.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
+    let middle = if by_position {
+        let middle = samples.len() / 2;
+        samples.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b)));
+        middle
+    } else {
+        // Halfway between the normals, so that the two sides of a wall part, however many samples each has.
+        samples.sort_unstable_by(|a, b| key(a).total_cmp(&key(b)));
+        let halfway = 0.5 * (key(&samples[0]) + key(&samples[samples.len() - 1]));
+        let middle = samples.partition_point(|sample| key(sample) <= halfway);
+        middle.clamp(1, samples.len() - 1)
+    };
     let (low, high) = samples.split_at_mut(middle);
     group(low, patches);
     group(high, patches);

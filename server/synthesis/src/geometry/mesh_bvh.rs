@@ -163,6 +163,11 @@ impl MeshBvh {
         self.aabb.contains(point) && self.containment.contains(&self.bvh, &self.mesh, point)
     }
 
+    /// True if a triangle belongs to a sheet, which has no inside and may be pressed from both sides.
+    pub fn is_sheet(&self, triangle: u32) -> bool {
+        self.containment.is_sheet(triangle as usize)
+    }
+
     /// True if any part of the segment lies on the surface or in the volume (Algorithm 6).
     pub fn touches(&self, segment: Segment) -> bool {
         // A segment that crosses nothing is entirely inside or entirely outside.

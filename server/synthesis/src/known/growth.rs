@@ -44,7 +44,7 @@ use crate::{
     rating::{scoring::grip_values, taxonomy::classify},
 };
 
-/// Grips of a complete atlas. More offer more choice, and cost time and about 1.2 kilobytes each.
+/// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
 pub const ENTRIES: usize = 8192;
 
 /// Proposals per round.
@@ -78,8 +78,8 @@ const MIN_GRIPS_FOR_GIVERS: usize = 256;
 /// grips are admitted even to full cells.
 const ENOUGH_CLEAR_GRIPS: usize = 60;
 
-/// Grips that are shipped with an object or a primitive, at about 400 bytes each.
-const SHIPPED: usize = 180;
+/// Grips that are shipped with an object or a primitive, at about 230 bytes each.
+const SHIPPED: usize = 320;
 
 /// Largest number of redraws of a grip from a crowded cell.
 const MAX_REDRAWS: usize = 8;

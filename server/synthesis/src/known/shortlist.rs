@@ -143,6 +143,11 @@ impl<'a> Shortlist<'a> {
         self.places.is_empty()
     }
 
+    /// The index of the grip at a place of the list among the entries.
+    pub fn entry(&self, place: usize) -> u16 {
+        self.grips[usize::from(self.places[place].grip)].entry
+    }
+
     /// The grip at a place of the list, with its solids.
     pub fn at(&self, place: usize) -> (u16, &'a TrackedSolids) {
         let grip = &self.grips[usize::from(self.places[place].grip)];

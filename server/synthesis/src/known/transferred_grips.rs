@@ -244,7 +244,7 @@ impl SortedBox {
 }
 
 /// The larger of the distances of the thumb and of the nearest finger from the object's surface; none if it
-/// exceeds [`MAX_CONTACT_OFFSET`].
+/// exceeds [`MAX_CONTACT_OFFSET`]. A contact counts only where it presses on the surface from outside.
 fn contact_offset(contacts: &[Contact], object: &GraspObject, object_from_primitive: Pose) -> Option<f32> {
     let nearest = |is_thumb: bool| {
         let of_part = contacts
@@ -252,10 +252,11 @@ fn contact_offset(contacts: &[Contact], object: &GraspObject, object_from_primit
             .filter(|contact| contact.part.is_thumb() == Some(is_thumb));
         let distances = of_part.filter_map(|contact| {
             let position = object_from_primitive.transform_point(contact.position);
-            let closest = object
-                .surface
-                .closest_point_within(position, MAX_CONTACT_OFFSET)?;
-            Some(closest.distance)
+            let surface = &object.surface;
+            let closest = surface.closest_point_within(position, MAX_CONTACT_OFFSET)?;
+            let facing = object_from_primitive.transform_vector(contact.normal);
+            let is_outside = surface.mesh().normal(closest.triangle as usize).dot(facing) > 0.0;
+            (is_outside || surface.is_sheet(closest.triangle)).then_some(closest.distance)
         });
         distances.min_by(f32::total_cmp)
     };

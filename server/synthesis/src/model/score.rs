@@ -114,8 +114,9 @@ impl Term {
             Self::SharedFlexion | Self::NearCentre | Self::WristLoad => 2.0,
             // Weighted by how well they predict which grips survive pushes from all sides in an independent
             // simulation; each is mostly earned at a threshold (see [`crate::rating::scoring`]).
-            Self::Steadiness | Self::EnoughDigits => 4.0,
-            Self::Closure | Self::FrictionReserve | Self::NaturalType | Self::OffSharp => 6.0,
+            Self::EnoughDigits => 4.0,
+            Self::Closure | Self::Steadiness | Self::NaturalType | Self::OffSharp => 6.0,
+            Self::FrictionReserve => 8.0,
             Self::AwayFromGiver => 0.75,
             Self::GiverClearance | Self::SterileDistance => 0.5,
             // Where a hand comes from and what it holds are what a person notices first.

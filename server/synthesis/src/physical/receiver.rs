@@ -2,9 +2,9 @@
 //!
 //! Of the receiver's body, a client may give the shoulder; then the arm must reach the wrist. Otherwise people hand things over
 //! face to face: the giver's forearm shows where the giver's body is, and the receiver stands opposite or at an angle, as
-//! far away as both arms reach comfortably. Shoulders of people in a handover are 0.6 to 1.2 m apart (P. Basili et al.,
-//! "Investigating human-human approach and hand-over", 2009; C. Hansen et al., "Human-human handovers: the influence of
-//! object weight and distance", 2017).
+//! far away as both arms reach comfortably. Their shoulders are 0.6 to 1.2 m apart, which is personal distance (E. T. Hall,
+//! "The Hidden Dimension", 1966: 0.46 to 1.22 m). People keep to a distance of their own when they hand things over (C. Hansen
+//! et al., "Human-human handover tasks and how distance and object mass matter", 2017).
 
 use glam::{Quat, Vec3};
 
@@ -53,8 +53,8 @@ const HEIGHTS: [f32; 2] = [0.0, 0.45];
 const HAND: f32 = 0.1;
 
 /// Cosines of the angle between a straight forearm and the nearest plausible one at which a hand stops to suit at all and suits
-/// best: 75° and 35°. The wrist bends by less than that without strain.
-const TOWARD: [f32; 2] = [0.26, 0.82];
+/// best: 75° and 45°. The wrist bends by less than that without strain.
+const TOWARD: [f32; 2] = [0.26, 0.71];
 
 /// Cosines of the angle between the forearms of receiver and giver, both from the wrist, at which they are well apart and
 /// would stand in each other: 80° and 60°.
@@ -139,9 +139,8 @@ impl Receiver {
         let from_object = shoulder - centre;
         let height = from_object.dot(up).clamp(HEIGHTS[0], HEIGHTS[1]);
         let theirs = from_object.dot(behind);
-        let distance = COMFORTABLE
-            .clamp(APART[0] - theirs, (APART[1] - theirs).max(APART[0] - theirs))
-            .clamp(NEAREST, FARTHEST);
+        let distance = COMFORTABLE.max(APART[0] - theirs).min(APART[1] - theirs);
+        let distance = distance.max(NEAREST).min(FARTHEST);
         let arm_toward = |angle: f32| Arm {
             shoulder: centre + Quat::from_axis_angle(up, angle) * -behind * distance + up * height,
             ..Self::ANYWHERE.arms[0]
@@ -172,7 +171,8 @@ impl Receiver {
             forearm,
         } = arm;
         // As far as the bones reach; a receiver who stands farther away leans toward the object.
-        let reach = (distance - HAND).clamp((upper_arm - forearm).abs() + 0.05, upper_arm + forearm - 0.01);
+        let [bent, stretched] = [1.2 * (upper_arm - forearm).abs(), 0.98 * (upper_arm + forearm)];
+        let reach = (distance - HAND).max(bent).min(stretched).max(f32::MIN_POSITIVE);
         let along = (forearm * forearm - upper_arm * upper_arm + reach * reach) / (2.0 * reach);
         let drop = (forearm * forearm - along * along).max(0.0).sqrt();
         let hanging = (-self.up).reject_from(toward).normalize_or_zero();
@@ -194,11 +194,6 @@ impl Receiver {
     /// True if the arm must reach the wrist.
     pub fn must_reach(&self) -> bool {
         matches!(self.stance, Stance::At(_))
-    }
-
-    /// Horizontal direction from the object to where the receiver most likely stands, a unit vector, if any is expected.
-    pub fn direction(&self) -> Option<Vec3> {
-        (self.count > 0).then(|| self.directions[0])
     }
 
     /// How well a hand suits where the receiver stands, 0 to 1: 1 if its forearm, straight behind the wrist, comes from there

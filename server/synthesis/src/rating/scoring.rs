@@ -54,13 +54,13 @@ const LEVER: f32 = 0.06;
 const PALM_MASSES: [f32; 2] = [0.4, 1.0];
 
 /// Closures, as multiples of the minimum for validity, at which a hand is firm enough and at which more changes nothing.
-const CLOSURES: [f32; 2] = [2.5, 6.0];
+const CLOSURES: [f32; 2] = [4.0, 6.0];
 
 /// Steadiness, 0 to 1, that is firm enough.
-const STEADY_ENOUGH: f32 = 0.5;
+const STEADY_ENOUGH: f32 = 0.65;
 
 /// Value of closure and steadiness once they are firm enough: what a viewer notices counts for more from there.
-const FIRM: f32 = 0.85;
+const FIRM: f32 = 0.8;
 
 /// Displacements in metres under a push as large as the object's weight at which steadiness scores 1 and 0; logarithmic
 /// in between.

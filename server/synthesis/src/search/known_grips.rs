@@ -1,13 +1,13 @@
 //! Known grips as candidates of a race: those of the atlas, then recent ones.
 //!
-//! A search for the first valid grasp passes them in up to three [`Grade`]s: first those that people would choose, of the
-//! shortlist, then of the whole atlas; then, only if none of them is valid, those of the next grade.
+//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, of the shortlist, then of
+//! the whole atlas; then, only if none of them is valid, those of the next grade.
 
 use std::{
     ops::Deref,
     sync::{
         Arc, LazyLock, OnceLock,
-        atomic::{AtomicU8, AtomicUsize, Ordering},
+        atomic::{AtomicUsize, Ordering},
     },
 };
 
@@ -60,8 +60,6 @@ pub(super) struct KnownGrips<'a> {
     order: &'a [u16],
     /// What grips are graded by; none if all are alike.
     grading: Option<Grading<'a>>,
-    /// The best grade of a valid grip that people would not choose.
-    fallback: AtomicU8,
     /// Recent grips. Mostly they are worse than those of the atlas, which are a selection.
     recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
@@ -125,24 +123,21 @@ pub(super) enum TryResult {
         grasp: Box<Grasp>,
         /// Its quality; higher is better.
         value: f32,
-        /// Whether people would choose it.
-        is_chosen: bool,
     },
 }
 
 /// How a known grip suits where the receiver stands, and what the object is held by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Grade {
     /// Its forearm comes from there, and it holds the handle if that is free.
     Chosen,
     /// Its forearm comes from there.
     Suitable,
+    /// Its forearm comes roughly from there.
+    Possible,
     /// It holds.
     Valid,
 }
-
-/// Number of grades.
-const GRADES: usize = 3;
 
 /// What grips are graded by.
 #[derive(Clone, Copy, Debug)]
@@ -154,12 +149,24 @@ struct Grading<'a> {
 impl Grading<'_> {
     /// The grade of a grip with this forearm. The entry is looked at only if it matters.
     fn grade(&self, forearm: Vec3, entry: &Entry) -> Grade {
-        if self.receiver.suits_forearm(forearm) < SUITABLE {
+        let suits = self.receiver.suits_forearm(forearm);
+        if suits <= 0.0 {
             Grade::Valid
+        } else if suits < SUITABLE {
+            Grade::Possible
         } else if self.wants_handle && entry.grip_values[Term::OnHandle as usize] < HELD_BY_HANDLE {
             Grade::Suitable
         } else {
             Grade::Chosen
+        }
+    }
+
+    /// The grades that there are, best first: all grips are passed once for each.
+    fn grades(&self) -> &'static [Grade] {
+        match (self.receiver.is_expected(), self.wants_handle) {
+            (true, true) => &[Grade::Chosen, Grade::Suitable, Grade::Possible, Grade::Valid],
+            (true, false) => &[Grade::Chosen, Grade::Possible, Grade::Valid],
+            (false, _) => &[Grade::Chosen, Grade::Suitable],
         }
     }
 }
@@ -209,7 +216,6 @@ impl<'a> KnownGrips<'a> {
                 receiver,
                 wants_handle,
             }),
-            fallback: AtomicU8::new(u8::MAX),
             order: atlas.map_or(&[], order),
             recent,
             scene,
@@ -229,7 +235,17 @@ impl<'a> KnownGrips<'a> {
 
     /// How often all grips of the atlas are passed.
     fn passes(&self) -> usize {
-        if self.grading.is_some() { GRADES } else { 1 }
+        self.grading.as_ref().map_or(1, |grading| grading.grades().len())
+    }
+
+    /// True if a grip of the atlas is tried in a pass.
+    fn has_grade(&self, index: u16, pass: usize) -> bool {
+        let (Some(grading), Some(atlas)) = (&self.grading, self.atlas) else {
+            return true;
+        };
+        let index = usize::from(index);
+        let grade = grading.grade(atlas.grips().forearms()[index], &atlas.entries()[index]);
+        grade == grading.grades()[pass]
     }
 
     /// The number of grips in the atlas.
@@ -268,6 +284,9 @@ impl<'a> KnownGrips<'a> {
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(place) = place.checked_sub(self.listed.len()) else {
             let place = usize::from(self.listed[place]);
+            if !self.has_grade(self.shortlist.entry(place), 0) {
+                return None;
+            }
             let (index, solids) = if self.mechanisms.has(Mechanism::InnerSpheres) {
                 self.shortlist.screen(place, self.barriers)?
             } else {
@@ -276,18 +295,12 @@ impl<'a> KnownGrips<'a> {
             return self.of_atlas(index, Solids::Stored(solids));
         };
         if place >= self.passes() * self.order.len() {
-            let recent = place - self.passes() * self.order.len();
-            return (self.fallback.load(Ordering::Relaxed) == u8::MAX).then(|| self.recent_at(recent));
+            return Some(self.recent_at(place - self.passes() * self.order.len()));
         }
         let (pass, index) = (place / self.order.len(), self.order[place % self.order.len()]);
         let atlas = self.atlas?;
-        if let Some(grading) = &self.grading {
-            // With a grip to fall back on, only better ones are worth trying.
-            let is_late = pass >= usize::from(self.fallback.load(Ordering::Relaxed));
-            let forearm = atlas.grips().forearms()[usize::from(index)];
-            if is_late || grading.grade(forearm, &atlas.entries()[usize::from(index)]) as usize != pass {
-                return None;
-            }
+        if !self.has_grade(index, pass) {
+            return None;
         }
         if let Some(giver) = self.barriers.giver
             && self.mechanisms.has(Mechanism::CellOccupancy)
@@ -339,20 +352,11 @@ impl<'a> KnownGrips<'a> {
             Next::Candidate(candidate) => candidate,
         };
         match self.recheck(entry, &solids, gripper) {
-            Some(grasp) => {
-                let grade = self
-                    .grading
-                    .map_or(Grade::Chosen, |grading| grading.grade(entry.forearm(), entry));
-                if grade != Grade::Chosen {
-                    self.fallback.fetch_min(grade as u8, Ordering::Relaxed);
-                }
-                TryResult::Valid {
-                    source,
-                    value: grasp_value(&grasp),
-                    grasp,
-                    is_chosen: grade == Grade::Chosen,
-                }
-            }
+            Some(grasp) => TryResult::Valid {
+                source,
+                value: grasp_value(&grasp),
+                grasp,
+            },
             None => TryResult::Rejected,
         }
     }

@@ -242,32 +242,15 @@ impl<'a> Race<'a> {
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) && until.is_none_or(|until| self.clock.now() < until) {
             match known.try_next(&mut gripper) {
-                TryResult::Exhausted => break,
+                TryResult::Exhausted => return false,
                 TryResult::Rejected => {}
-                TryResult::Valid {
-                    source,
-                    grasp,
-                    value,
-                    is_chosen,
-                } => {
-                    self.record_valid(source, grasp, value, is_chosen);
-                    if is_chosen {
-                        return true;
-                    }
+                TryResult::Valid { source, grasp, value } => {
+                    self.record_valid(source, grasp, value, true);
+                    return true;
                 }
             }
         }
-        self.falls_back()
-    }
-
-    /// True if a known grip is valid. Searches do not go on for a better one: the atlas has the best that they would find.
-    fn falls_back(&self) -> bool {
-        let winners = self.winners.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_found = winners.others.iter().any(|winner| winner.index().is_none());
-        if is_found {
-            self.over.store(true, Ordering::Relaxed);
-        }
-        is_found
+        false
     }
 
     /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the
@@ -280,17 +263,11 @@ impl<'a> Race<'a> {
         let mut gripper = Gripper::default();
         while !self.is_over_for(0) {
             match known.try_next(&mut gripper) {
-                TryResult::Exhausted => break,
+                TryResult::Exhausted => return,
                 TryResult::Rejected => {}
-                TryResult::Valid {
-                    source,
-                    grasp,
-                    value,
-                    is_chosen,
-                } => self.record_valid(source, grasp, value, is_chosen),
+                TryResult::Valid { source, grasp, value } => self.record_valid(source, grasp, value, true),
             }
         }
-        self.falls_back();
     }
 
     /// Records a valid grasp. It ends the race, unless the best one, the one with the lowest index or one that a person would
@@ -313,6 +290,7 @@ impl<'a> Race<'a> {
                         let nanos = u64::try_from(settles.as_nanos()).unwrap_or(u64::MAX - 1);
                         self.settles.fetch_min(nanos, Ordering::SeqCst);
                     }
+                    // Known grips are tried from the best grade on, so they are not replaced.
                     GraspSource::Atlas(_) | GraspSource::Recent => {}
                 }
                 winners.others.push(winner);
@@ -438,9 +416,7 @@ impl Winners {
             return (Some(chosen), None);
         }
         let better = |a: &Winner, b: &Winner| a.value.total_cmp(&b.value).then(b.index().cmp(&a.index()));
-        let best = others.into_iter().filter(counts).max_by(better);
-        let last = last.filter(|_| best.as_ref().is_some_and(|best| best.index().is_some()));
-        (best, last)
+        (others.into_iter().filter(counts).max_by(better), last)
     }
 }
 

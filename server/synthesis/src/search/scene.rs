@@ -216,7 +216,8 @@ impl<'a> Scene<'a> {
             object: object.object(),
             surface: object.surface_pairs(),
             barriers: presented.map_or(Barriers::NONE, Presented::barriers),
-            chooses: presented,
+            // Two hands carry from below and at the ends.
+            chooses: presented.filter(|_| self.other_hand.is_none()),
             rig,
             placements: None,
             mechanisms: self.mechanisms,

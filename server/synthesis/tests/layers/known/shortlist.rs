@@ -114,8 +114,8 @@ fn of_known_grips(holdout: &Holdout, known: &Arc<Atlas>, choice: Choice) -> Sear
     search.run()
 }
 
-/// The score of each known grip that holds.
-fn scores_held(holdout: &Holdout, known: &Atlas) -> Vec<Option<f32>> {
+/// For each known grip, whether it holds.
+fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<bool> {
     let rig = right();
     let scene = object_scene(&holdout.object);
     let presented = Presented::of(holdout);
@@ -124,8 +124,8 @@ fn scores_held(holdout: &Holdout, known: &Atlas) -> Vec<Option<f32>> {
     let entries = known.entries().iter();
     entries
         .map(|entry| {
-            let grasp = checker.check(entry, &entry.tracked_solids(rig), &mut gripper)?;
-            grasp.score.map(|score| score.total())
+            let grasp = checker.check(entry, &entry.tracked_solids(rig), &mut gripper);
+            grasp.is_some()
         })
         .collect()
 }
@@ -139,24 +139,24 @@ fn the_first_answer_suits_the_receiver_and_is_the_first_such_of_the_shortlist() 
     for giver in (0..known.entries().len()).step_by(120) {
         let holdout = scissors_held_by(&known, giver);
         let receiver = Presented::of(&holdout).receiver;
-        let suits = |entry: &u16| {
+        let suits = |entry: &u16, least: f32| {
             let forearm = known.entries()[usize::from(*entry)].forearm();
-            receiver.suits_forearm(forearm) >= SUITABLE
+            receiver.suits_forearm(forearm) >= least
         };
         let listed: Vec<u16> = shortlist
             .by_value(|forearm| receiver.suits_forearm(forearm))
             .into_iter()
             .map(|place| shortlist.at(usize::from(place)).0)
             .collect();
-        let scores = scores_held(&holdout, &known);
-        let score = |entry: &u16| scores[usize::from(*entry)];
-        let holds = |entry: &&u16| score(entry).is_some();
-        let by_value = |a: &&u16, b: &&u16| score(a).partial_cmp(&score(b)).expect("scores are numbers");
-        let all = || listed.iter().chain(by_score);
-        let first = all().find(|entry| holds(entry) && suits(entry));
-        let best_listed = || listed.iter().filter(holds).max_by(by_value);
+        let holds = which_hold(&holdout, &known);
+        let holds = |entry: &&u16| holds[usize::from(**entry)];
+        let first = listed
+            .iter()
+            .chain(by_score)
+            .find(|entry| holds(entry) && suits(entry, SUITABLE));
+        let roughly = || by_score.iter().find(|entry| holds(entry) && suits(entry, 1e-9));
         let first = first
-            .or_else(best_listed)
+            .or_else(roughly)
             .or_else(|| by_score.iter().find(holds))
             .copied();
         let found = of_known_grips(&holdout, &known, Choice::FirstValid);
@@ -171,28 +171,29 @@ fn the_first_answer_suits_the_receiver_and_is_the_first_such_of_the_shortlist() 
             on_list += 1;
         }
         beyond += usize::from(!listed.contains(&first));
-        unsuitable += usize::from(!suits(&first));
+        unsuitable += usize::from(!suits(&first, SUITABLE));
     }
     assert!(on_list >= 3, "{on_list} differ from the first by score");
-    assert!(beyond + unsuitable >= 1, "the first of the list always suits");
+    assert!(beyond >= 1, "none needs more than the list");
+    assert!(unsuitable >= 1, "every giver leaves one that suits");
 }
 
 #[test]
 fn without_a_giver_grips_are_tried_by_score_and_the_best_counts_each_once() {
     let known = complete_atlas("scissors");
     let afloat = floating(Arc::clone(object("scissors")));
-    let scores = scores_held(&afloat, &known);
+    let holds = which_hold(&afloat, &known);
     let first = known
         .by_score(UP)
         .iter()
-        .find(|&&entry| scores[usize::from(entry)].is_some());
+        .find(|&&entry| holds[usize::from(entry)]);
     let found = of_known_grips(&afloat, &known, Choice::FirstValid);
     assert_eq!(found.report.source, first.copied().map(GraspSource::Atlas));
 
     let holdout = scissors_held_by(&known, 450);
-    let scores = scores_held(&holdout, &known);
+    let holds = which_hold(&holdout, &known);
     let best = of_known_grips(&holdout, &known, Choice::BestWithinBudget);
-    let holding = scores.iter().flatten().count();
+    let holding = holds.iter().filter(|holds| **holds).count();
     assert!(holding > 0, "the giver leaves none");
     assert_eq!(
         best.report.candidates, holding as u64,

@@ -204,11 +204,10 @@ fn all_grips_are_kept_where_none_passes_the_screen() {
 }
 
 #[test]
-fn an_object_like_no_primitive_gets_hardly_any_grips() {
+fn an_object_like_no_primitive_gets_no_grips() {
     let transferred = transferred_to(&bar(Vec3::splat(2.0), Pose::IDENTITY));
-    // But for a few whose thumb and finger lie on one face.
-    assert!(transferred.len() < 10, "{}", transferred.len());
-    assert_eq!(passing(&transferred), unconstrained(&transferred));
+    assert!(transferred.is_empty(), "{}", transferred.len());
+    assert!(unconstrained(&transferred).is_empty());
     let nothing: Arc<[HeldPrimitive]> = [].into();
     assert!(TransferredGrips::of(object("remote"), &nothing).is_empty());
 }

@@ -115,14 +115,12 @@ fn an_atlas_answers_with_its_first_holding_grip() {
         let held_of = |entry: u16| Some((entry, held(entry)?));
         let listed: Vec<_> = listed.filter_map(held_of).collect();
         let by_score: Vec<_> = atlas.by_score(up).iter().copied().filter_map(held_of).collect();
-        let suits = |(entry, _): &&(u16, Grasp)| {
-            receiver.suits_forearm(atlas.entries()[usize::from(*entry)].forearm()) >= SUITABLE
+        let suits = |(entry, _): &(u16, Grasp), least: f32| {
+            receiver.suits_forearm(atlas.entries()[usize::from(*entry)].forearm()) >= least
         };
-        let total = |(_, grasp): &&(u16, Grasp)| grasp.score.map_or(0.0, |score| score.total());
-        let first = listed.iter().chain(&by_score).find(suits);
-        let best = || listed.iter().max_by(|a, b| total(a).total_cmp(&total(b)));
+        let first = listed.iter().chain(&by_score).find(|held| suits(held, SUITABLE));
         let (entry, grasp) = first
-            .or_else(best)
+            .or_else(|| by_score.iter().find(|held| suits(held, 1e-9)))
             .or(by_score.first())
             .expect("a grip of the atlas holds")
             .clone();
