@@ -140,7 +140,7 @@ impl Receiver {
         let height = from_object.dot(up).clamp(HEIGHTS[0], HEIGHTS[1]);
         let theirs = from_object.dot(behind);
         let distance = COMFORTABLE.max(APART[0] - theirs).min(APART[1] - theirs);
-        let distance = distance.max(NEAREST).min(FARTHEST);
+        let distance = distance.clamp(NEAREST, FARTHEST);
         let arm_toward = |angle: f32| Arm {
             shoulder: centre + Quat::from_axis_angle(up, angle) * -behind * distance + up * height,
             ..Self::ANYWHERE.arms[0]
