@@ -23,13 +23,16 @@ const TOWARD_LITTLE: f32 = 30.0 / 180.0 * PI;
 /// Cosine of the smallest angle between the bones: an elbow flexes by 145°.
 const FLEXED_COS: f32 = 0.819;
 
-/// Swivel angles of the elbow about the line from shoulder to wrist that are tried, and the largest, in radians. 0 is the
-/// hanging elbow, a right angle an elbow as high as the shoulder if that is level with the wrist.
+/// Number of swivel angles of the elbow about the line from shoulder to wrist that are tried.
 const SWIVELS: usize = 15;
-const LARGEST_SWIVEL: f32 = 1.75;
+
+/// Range of the swivel, from inward to outward, in radians. 0 is the hanging elbow, a right angle an elbow as high as the
+/// shoulder if that is level with the wrist. Of a receiver of whom nothing is known, the elbow hangs.
+const SWIVEL_RANGE: [f32; 2] = [-1.75, 1.75];
+const HANGING_RANGE: [f32; 2] = [-0.55, 1.05];
 
 /// How far above the shoulder the elbow may be, as the sine of the upper arm's rise: raising it further takes effort that
-/// nobody spends on taking something.
+/// nobody spends on taking something. The elbow of an assumed receiver is no higher than the shoulder.
 const MAX_RISE: f32 = 0.4;
 
 /// Weight of a swivel of one radian against a wrist at the end of its range: people let the elbow hang, and turn it out before
@@ -71,11 +74,26 @@ pub(super) fn elbows(
     let out = toward.cross(hanging);
     let radius = square.max(0.0).sqrt();
     let count = if is_in_reach { SWIVELS } else { 0 };
+    let outward = match rig.handedness {
+        Handedness::Right => -1.0,
+        Handedness::Left => 1.0,
+    };
+    let ([innermost, outermost], max_rise) = if is_assumed {
+        (HANGING_RANGE, 0.0)
+    } else {
+        (SWIVEL_RANGE, MAX_RISE)
+    };
     (0..count).filter_map(move |index| {
-        let swivel = (index as f32 / (SWIVELS - 1) as f32 * 2.0 - 1.0) * LARGEST_SWIVEL;
-        let (sin, cos) = swivel.sin_cos();
+        let share = index as f32 / (SWIVELS - 1) as f32;
+        let swivel = innermost + share * (outermost - innermost);
+        let (sin, cos) = (outward * swivel).sin_cos();
         let elbow = shoulder + toward * along + (hanging * cos + out * sin) * radius;
-        let (flexion, deviation) = wrist_angles(rig.handedness, wrist, elbow);
+        let back = wrist.inverse().transform_vector(elbow - wrist.position);
+        let is_raised = (elbow - shoulder).dot(up) > max_rise * upper_arm;
+        if is_raised || !wrist_allows(rig.handedness, back) {
+            return None;
+        }
+        let (flexion, deviation) = wrist_angles(rig.handedness, back);
         let bent = [
             flexion / if flexion > 0.0 { FLEXION } else { EXTENSION },
             deviation
@@ -85,10 +103,6 @@ pub(super) fn elbows(
                     TOWARD_THUMB
                 },
         ];
-        let is_raised = (elbow - shoulder).dot(up) > MAX_RISE * upper_arm;
-        if is_raised || bent.iter().any(|share| share.abs() > 1.0) {
-            return None;
-        }
         let strain = bent[0].powi(2) + bent[1].powi(2) + SWIVEL_WEIGHT * swivel * swivel;
         Some(Elbow {
             pose: ArmPose {
@@ -103,16 +117,32 @@ pub(super) fn elbows(
     })
 }
 
-/// Flexion of a wrist toward the palm and its deviation toward the little finger, in radians, with the elbow at a point.
-fn wrist_angles(handedness: Handedness, wrist: Pose, elbow: Vec3) -> (f32, f32) {
-    let back = wrist.inverse().transform_vector(elbow - wrist.position);
-    let little = match handedness {
-        Handedness::Right => -back.x,
-        Handedness::Left => back.x,
-    };
+/// Flexion of a wrist toward the palm and its deviation toward the little finger, in radians, by the direction to the elbow in
+/// the wrist's frame.
+fn wrist_angles(handedness: Handedness, back: Vec3) -> (f32, f32) {
     let flexion = f32::atan2(back.z, -back.y);
-    let deviation = f32::atan2(little, back.y.hypot(back.z));
+    let deviation = f32::atan2(little(handedness, back), back.y.hypot(back.z));
     (flexion, deviation)
+}
+
+/// The part of a direction in the wrist's frame that points to the side of the little finger.
+fn little(handedness: Handedness, direction: Vec3) -> f32 {
+    match handedness {
+        Handedness::Right => -direction.x,
+        Handedness::Left => direction.x,
+    }
+}
+
+/// True if a wrist bends so far that its forearm goes in a direction in the wrist's frame.
+///
+/// Each of flexion and deviation is measured as the other axis shows it, straight from behind, so that both are in range
+/// whichever of them comes first.
+fn wrist_allows(handedness: Handedness, back: Vec3) -> bool {
+    let is_between =
+        |part: f32, [least, most]: [f32; 2]| part >= least.tan() * -back.y && part <= most.tan() * -back.y;
+    back.y < 0.0
+        && is_between(back.z, [-EXTENSION, FLEXION])
+        && is_between(little(handedness, back), [-TOWARD_THUMB, TOWARD_LITTLE])
 }
 
 /// Forearm and upper arm as solids, in the arm's frame. The forearm starts some way behind the wrist, where the hand's own

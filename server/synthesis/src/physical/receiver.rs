@@ -2,7 +2,7 @@
 //!
 //! Of the receiver's body, a client may give the shoulder; then the arm must reach the wrist. Otherwise people hand things over
 //! face to face: the giver's forearm shows where the giver's body is, and the receiver stands opposite or at an angle, as
-//! far away as both arms reach comfortably. Their shoulders are 0.6 to 1.2 m apart, which is personal distance (E. T. Hall,
+//! far away as both arms reach comfortably. Their shoulders are 0.65 to 1.2 m apart, which is personal distance (E. T. Hall,
 //! "The Hidden Dimension", 1966: 0.46 to 1.22 m). People keep to a distance of their own when they hand things over (C. Hansen
 //! et al., "Human-human handover tasks and how distance and object mass matter", 2017).
 
@@ -25,13 +25,16 @@ use crate::{
 };
 
 /// Range of the horizontal distance of two shoulders in a handover, in metres.
-const APART: [f32; 2] = [0.6, 1.2];
+const APART: [f32; 2] = [0.65, 1.2];
 
 /// Horizontal distance of the receiver's shoulder from the object at which the elbow is bent by about a right angle, in
 /// metres, and its range, which follows from [`APART`]. Farther away, the arm is stretched.
 const COMFORTABLE: f32 = 0.42;
 const NEAREST: f32 = 0.25;
 const FARTHEST: f32 = 0.55;
+
+/// How much nearer than comfortable, in metres, a receiver may stand for that to make a difference.
+const MUCH_NEARER: f32 = 0.05;
 
 /// Angles between the direction opposite the giver and those in which the receiver may stand, in radians: up to 30° to either
 /// side.
@@ -46,15 +49,22 @@ const LEAST_HORIZONTAL: f32 = 0.25;
 /// Lean of the giver's upper arm toward the body's back, as a tangent: an upper arm nearly hangs.
 const UPPER_ARM_LEAN: f32 = 0.35;
 
-/// Range of the shoulder's height above the object, in metres: things are handed over between waist and shoulder.
-const HEIGHTS: [f32; 2] = [0.0, 0.45];
+/// Range of the shoulder's height above the object, in metres: things are handed over between a hanging hand and the shoulder.
+const HEIGHTS: [f32; 2] = [0.0, 0.6];
+
+/// Distance of the shoulder from the object up to which the arm reaches it without being stretched, in metres: who takes what is
+/// held low comes near.
+const REACH: f32 = 0.6;
 
 /// Distance of the wrist from what the hand holds, in metres.
 const HAND: f32 = 0.1;
 
 /// Cosines of the angle between a straight forearm and the nearest plausible one at which a hand stops to suit at all and suits
-/// best: 75° and 45°. The wrist bends by less than that without strain.
-const TOWARD: [f32; 2] = [0.26, 0.71];
+/// best: 75° and 35°. The wrist bends by less than that without strain.
+const TOWARD: [f32; 2] = [0.26, 0.82];
+
+/// What [`Receiver::suits`] keeps of its value if no arm reaches the wrist: less than [`SUITABLE`].
+const OUT_OF_REACH: f32 = 0.45;
 
 /// Cosines of the angle between the forearms of receiver and giver, both from the wrist, at which they are well apart and
 /// would stand in each other: 80° and 60°.
@@ -64,7 +74,8 @@ const TOGETHER: [f32; 2] = [0.17, 0.5];
 pub const SUITABLE: f32 = 0.5;
 
 /// Most directions of plausible forearms.
-const MOST: usize = ALL_ROUND;
+const MOST: usize = 2 * ANGLES.len();
+const _: () = assert!(ALL_ROUND <= MOST);
 
 /// Where the receiver stands, prepared for many hands. All is in the object's frame.
 #[derive(Clone, Copy, Debug)]
@@ -139,22 +150,27 @@ impl Receiver {
         let from_object = shoulder - centre;
         let height = from_object.dot(up).clamp(HEIGHTS[0], HEIGHTS[1]);
         let theirs = from_object.dot(behind);
-        let distance = COMFORTABLE.max(APART[0] - theirs).min(APART[1] - theirs);
-        let distance = distance.clamp(NEAREST, FARTHEST);
-        let arm_toward = |angle: f32| Arm {
+        let reached = (REACH * REACH - height * height).max(0.0).sqrt();
+        let at = |distance: f32| {
+            let apart = distance.max(APART[0] - theirs).min(APART[1] - theirs);
+            apart.min(reached).clamp(NEAREST, FARTHEST)
+        };
+        let [comfortable, near] = [COMFORTABLE, NEAREST].map(at);
+        let arm_toward = |angle: f32, distance: f32| Arm {
             shoulder: centre + Quat::from_axis_angle(up, angle) * -behind * distance + up * height,
             ..Self::ANYWHERE.arms[0]
         };
         if is_clear {
             for angle in ANGLES {
-                self.add(arm_toward(angle), centre);
+                self.add(arm_toward(angle, comfortable), centre);
+                if comfortable - near > MUCH_NEARER {
+                    self.add(arm_toward(angle, near), centre);
+                }
             }
         } else {
             for turn in 0..ALL_ROUND {
-                self.add(
-                    arm_toward(turn as f32 * std::f32::consts::TAU / ALL_ROUND as f32),
-                    centre,
-                );
+                let angle = turn as f32 * std::f32::consts::TAU / ALL_ROUND as f32;
+                self.add(arm_toward(angle, near), centre);
             }
         }
     }
@@ -197,13 +213,19 @@ impl Receiver {
     }
 
     /// How well a hand suits where the receiver stands, 0 to 1: 1 if its forearm, straight behind the wrist, comes from there
-    /// and not from the giver's side. 1 if nothing is expected. Takes some nanoseconds.
-    #[inline]
-    pub fn suits(&self, object_from_wrist: Pose) -> f32 {
-        self.suits_forearm(object_from_wrist.transform_vector(Vec3::NEG_Y))
+    /// and not from the giver's side; less than [`SUITABLE`] if no plausible arm reaches the wrist. 1 if nothing is expected.
+    /// Takes about a microsecond.
+    pub fn suits(&self, rig: &Rig, object_from_wrist: Pose) -> f32 {
+        let suits = self.suits_forearm(object_from_wrist.transform_vector(Vec3::NEG_Y));
+        if suits < SUITABLE || self.has_elbow(rig, object_from_wrist) {
+            suits
+        } else {
+            suits * OUT_OF_REACH
+        }
     }
 
-    /// [`Self::suits`] for a forearm's direction from wrist to elbow, a unit vector.
+    /// How well a forearm's direction from wrist to elbow, a unit vector, suits where the receiver stands: [`Self::suits`] of
+    /// a wrist that an arm reaches. Takes some nanoseconds.
     #[inline]
     pub fn suits_forearm(&self, along: Vec3) -> f32 {
         if self.count == 0 {
@@ -238,9 +260,16 @@ impl Receiver {
 
     /// True if the arm need not reach the wrist, or does.
     pub fn reaches(&self, rig: &Rig, wrist: Pose) -> bool {
-        !self.must_reach()
-            || self.arms[..self.count]
-                .iter()
-                .any(|&arm| elbows(arm, (rig, wrist), self.up, false).next().is_some())
+        !self.must_reach() || self.has_elbow(rig, wrist)
+    }
+
+    /// True if one of the arms reaches the wrist, or if none is expected.
+    fn has_elbow(&self, rig: &Rig, wrist: Pose) -> bool {
+        let has_elbow = |&arm: &Arm| {
+            elbows(arm, (rig, wrist), self.up, !self.must_reach())
+                .next()
+                .is_some()
+        };
+        self.count == 0 || self.arms[..self.count].iter().any(has_elbow)
     }
 }

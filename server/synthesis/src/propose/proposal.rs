@@ -187,7 +187,7 @@ impl<'a> ProposalContext<'a> {
     /// How likely people are to place a hand so, 0 to 1: from where the receiver stands, not from beneath, and not from an end.
     pub(super) fn choice(&self, object_from_wrist: Pose) -> f32 {
         let Some(presented) = self.chooses else { return 1.0 };
-        presented.receiver.suits(object_from_wrist)
+        presented.receiver.suits(self.rig, object_from_wrist)
             * (0.2 + 0.8 * across_long_axis(self.object.parts(), object_from_wrist))
             * (0.2 + 0.8 * from_side_or_above(object_from_wrist, presented.up))
     }

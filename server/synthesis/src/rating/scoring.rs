@@ -196,7 +196,7 @@ pub fn score(
         upright_values(scene.object, grasp.pose.frame_from_wrist, presented.up),
     );
     let mut values = sum(grip_values, of_presentation);
-    values[Term::Stance as usize] = presented.receiver.suits(grasp.pose.frame_from_wrist);
+    values[Term::Stance as usize] = presented.receiver.suits(rig, grasp.pose.frame_from_wrist);
     let clearance = grasp.margins.and_then(|margins| margins.giver_clearance);
     values[Term::GiverClearance as usize] =
         clearance.map_or(1.0, |distance| (distance / AMPLE_GIVER_CLEARANCE).min(1.0));

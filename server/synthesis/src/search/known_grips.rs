@@ -13,12 +13,7 @@ use std::{
 
 use glam::Vec3;
 
-use super::{
-    preference::{HELD_BY_HANDLE, Preference},
-    report::GraspSource,
-    scene::Scene,
-    settings::SearchSettings,
-};
+use super::{preference::Preference, report::GraspSource, scene::Scene, settings::SearchSettings};
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     known::{
@@ -26,12 +21,7 @@ use crate::{
         entry::Entry,
         recheck::GripChecker,
     },
-    model::{
-        grasp::Grasp,
-        hand::rig::Rig,
-        score::{Score, Term},
-        strategy::Choice,
-    },
+    model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
     physical::{
         barriers::Barriers,
         grip::Gripper,
@@ -126,10 +116,10 @@ pub(super) enum TryResult {
     },
 }
 
-/// How a known grip suits where the receiver stands, and what the object is held by.
+/// How a known grip suits where the receiver stands and what people choose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Grade {
-    /// Its forearm comes from there, and it holds the handle if that is free.
+    /// Its forearm comes from there, and people would take the object so.
     Chosen,
     /// Its forearm comes from there.
     Suitable,
@@ -143,30 +133,37 @@ enum Grade {
 #[derive(Clone, Copy, Debug)]
 struct Grading<'a> {
     receiver: &'a Receiver,
-    wants_handle: bool,
+    rig: &'a Rig,
+    preference: Preference,
 }
 
 impl Grading<'_> {
     /// The grade of a grip with this forearm. The entry is looked at only if it matters.
     fn grade(&self, forearm: Vec3, entry: &Entry) -> Grade {
-        let suits = self.receiver.suits_forearm(forearm);
+        let mut suits = self.receiver.suits_forearm(forearm);
+        if suits >= SUITABLE {
+            suits = self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist);
+        }
         if suits <= 0.0 {
             Grade::Valid
         } else if suits < SUITABLE {
             Grade::Possible
-        } else if self.wants_handle && entry.grip_values[Term::OnHandle as usize] < HELD_BY_HANDLE {
-            Grade::Suitable
-        } else {
+        } else if self
+            .preference
+            .is_met_by_grip(&entry.grip_values, entry.classification, false)
+        {
             Grade::Chosen
+        } else {
+            Grade::Suitable
         }
     }
 
     /// The grades that there are, best first: all grips are passed once for each.
     fn grades(&self) -> &'static [Grade] {
-        match (self.receiver.is_expected(), self.wants_handle) {
-            (true, true) => &[Grade::Chosen, Grade::Suitable, Grade::Possible, Grade::Valid],
-            (true, false) => &[Grade::Chosen, Grade::Possible, Grade::Valid],
-            (false, _) => &[Grade::Chosen, Grade::Suitable],
+        if self.receiver.is_expected() {
+            &[Grade::Chosen, Grade::Suitable, Grade::Possible, Grade::Valid]
+        } else {
+            &[Grade::Chosen, Grade::Suitable]
         }
     }
 }
@@ -189,9 +186,7 @@ impl<'a> KnownGrips<'a> {
         }
         let barriers = presented.barriers();
         let is_first_valid = settings.query.choice == Choice::FirstValid;
-        let Preference { wants_handle } = scene.preference();
         let receiver = &presented.receiver;
-        let is_graded = is_first_valid && (receiver.is_expected() || wants_handle);
         // The shortlist serves searches with barriers that any valid grasp ends; it is no better than the rest.
         let is_listed = is_first_valid && (!barriers.is_empty() || receiver.is_expected());
         let shortlist = match atlas {
@@ -212,9 +207,10 @@ impl<'a> KnownGrips<'a> {
             atlas,
             listed: shortlist.by_value(|forearm| presented.receiver.suits_forearm(forearm)),
             shortlist,
-            grading: is_graded.then_some(Grading {
+            grading: is_first_valid.then_some(Grading {
                 receiver,
-                wants_handle,
+                rig: scene.rig(),
+                preference: scene.preference(),
             }),
             order: atlas.map_or(&[], order),
             recent,
