@@ -1,16 +1,27 @@
 //! Where a receiver stands, and the arm that reaches from there.
 
+use std::sync::LazyLock;
+
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
         hand::{HandPose, Handedness, joints::HandJoints},
+        object::GraspObject,
         receiver::{Arm, ArmPose, Stance},
     },
-    physical::{barriers::Barriers, receiver::Receiver},
+    physical::{
+        barriers::Barriers,
+        receiver::{Receiver, SUITABLE},
+    },
 };
 
-use crate::fixtures::{hands::adult, meshes::sphere, objects::object_of, random::Random};
+use crate::fixtures::{
+    hands::adult,
+    meshes::{moved, sphere},
+    objects::object_of,
+    random::Random,
+};
 
 const UP: Vec3 = Vec3::Y;
 const BONES: [f32; 2] = [0.3, 0.26];
@@ -47,8 +58,8 @@ fn arm_at(shoulder: Vec3) -> Arm {
 
 /// The arm of a hand without anything near.
 fn reached(receiver: &Receiver, handedness: Handedness, wrist: Pose) -> Option<ArmPose> {
-    let far_away = object_of(sphere(0.01, 6), &[]);
-    receiver.arm(adult(handedness), wrist, &far_away.surface, Barriers::NONE)
+    static FAR_AWAY: LazyLock<GraspObject> = LazyLock::new(|| object_of(sphere(0.01, 6), &[]));
+    receiver.arm(adult(handedness), wrist, &FAR_AWAY.surface, Barriers::NONE)
 }
 
 #[test]
@@ -134,6 +145,65 @@ fn reached_arms_have_their_bones_lengths_and_bend_the_wrist_within_its_range() {
 }
 
 #[test]
+fn a_wrist_out_of_reach_does_not_suit_and_one_within_suits_as_its_forearm_does() {
+    let mut random = Random::new(13);
+    let rig = adult(Handedness::Right);
+    let (mut within, mut beyond) = (0, 0);
+    for _ in 0..600 {
+        let at = Vec3::new(0.0, 0.0, 5.0);
+        let hand = giver(at + Vec3::Z * 0.1, Vec3::Z);
+        let receiver = Receiver::new(Stance::Facing, Some(&hand), at, UP);
+        let forearm = random.direction();
+        // Some wrists are beyond the giver's body.
+        let pose = wrist(
+            at + Vec3::Z * random.between(-0.2, 1.0),
+            forearm,
+            random.between(-3.0, 3.0),
+        );
+        let is_reached = reached(&receiver, Handedness::Right, pose).is_some();
+        let (suits, of_forearm) = (receiver.suits(rig, pose), receiver.suits_forearm(forearm));
+        if is_reached || of_forearm < SUITABLE {
+            assert!((suits - of_forearm).abs() < 1e-6);
+            within += usize::from(suits >= SUITABLE);
+        } else {
+            assert!(suits < SUITABLE);
+            beyond += 1;
+        }
+    }
+    assert!(within > 20 && beyond > 20, "{within} within, {beyond} beyond");
+}
+
+#[test]
+fn assumed_elbows_hang_below_the_shoulder_and_rather_outward() {
+    let mut random = Random::new(15);
+    let mut count = 0;
+    for handedness in [Handedness::Left, Handedness::Right] {
+        for _ in 0..600 {
+            let at = Vec3::new(0.0, 0.0, 5.0);
+            // The receiver looks along +Z, so that the right arm is on the side of -X.
+            let hand = giver(at + Vec3::Z * 0.1, Vec3::Z);
+            let receiver = Receiver::new(Stance::Facing, Some(&hand), at, UP);
+            let pose = wrist(at - Vec3::Z * 0.1, random.direction(), random.between(-3.0, 3.0));
+            let Some(arm) = reached(&receiver, handedness, pose) else {
+                continue;
+            };
+            count += 1;
+            assert!(arm.is_assumed && arm.elbow.y <= arm.shoulder.y + 1e-4);
+            let toward = (pose.position - arm.shoulder).normalize_or_zero();
+            let right = toward.cross(UP).normalize_or_zero();
+            let out = (arm.elbow - arm.shoulder).dot(right);
+            let out = if handedness == Handedness::Right {
+                out
+            } else {
+                -out
+            };
+            assert!(out > -0.16, "{arm:?}");
+        }
+    }
+    assert!(count > 60, "{count}");
+}
+
+#[test]
 fn mirrored_arms_mirror() {
     let mut random = Random::new(9);
     let flip = Vec3::new(-1.0, 1.0, 1.0);
@@ -158,21 +228,18 @@ fn mirrored_arms_mirror() {
 #[test]
 fn arms_keep_clear_of_the_object() {
     // A ball where the elbow would hang.
-    let pose = wrist(Vec3::ZERO, Vec3::new(0.0, -0.2, 1.0), 0.0);
-    let receiver = Receiver::new(
-        Stance::At(arm_at(Vec3::new(0.0, 0.2, 0.45))),
-        None,
-        Vec3::ZERO,
-        UP,
-    );
+    let at = Vec3::new(0.0, 0.0, 5.0);
+    let pose = wrist(at, Vec3::new(0.0, -0.2, 1.0), 0.0);
+    let arm = arm_at(at + Vec3::new(0.0, 0.2, 0.45));
+    let receiver = Receiver::new(Stance::At(arm), None, at, UP);
     let rig = adult(Handedness::Right);
     let far = object_of(sphere(0.01, 6), &[]);
     let free = receiver
         .arm(rig, pose, &far.surface, Barriers::NONE)
         .expect("it reaches");
-    let moved = crate::fixtures::meshes::moved(&sphere(0.06, 12), Quat::IDENTITY, free.elbow);
-    let ball = object_of(moved, &[]);
+    let ball = object_of(moved(&sphere(0.06, 48), Quat::IDENTITY, free.elbow), &[]);
+    let centre = ball.bounding_box.object_from_box.position;
     if let Some(arm) = receiver.arm(rig, pose, &ball.surface, Barriers::NONE) {
-        assert!(arm.elbow.distance(free.elbow) > 0.06 + 0.04, "{arm:?}");
+        assert!(arm.elbow.distance(centre) > 0.99 * (0.06 + 0.044), "{arm:?}");
     }
 }
