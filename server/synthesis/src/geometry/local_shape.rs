@@ -2,7 +2,7 @@
 
 use std::ops::{Add, AddAssign, Mul};
 
-use glam::{Vec3, Vec3A, Vec3Swizzles};
+use glam::{Vec3, Vec3A, Vec3Swizzles, Vec4};
 
 use super::surface_samples::SurfaceSample;
 
@@ -24,6 +24,19 @@ const TURNED: f32 = 0.02;
 /// Smallest variance of unit normals for a full [`Part::sphericity`]: that of a cap of 16°. Less shows no curvature.
 const MIN_NORMAL_VARIANCE: f32 = 0.02;
 
+/// Distance in metres from a touched point at which a quarter of a patch's weight is left: the width of a fingertip.
+const TOUCHED: f32 = 0.015;
+
+/// Cosine between the normals of a touched point and of a patch up to which the patch is on another side of the object, such
+/// as the far side of a wall.
+const OTHER_SIDE: f32 = 0.3;
+
+/// Squared length of a patch's mean normal over which it is no longer taken for one across an edge, such as the rim of a can.
+const EDGE: [f32; 2] = [0.8, 0.9];
+
+/// Number of touched points on a patch that counts as none: that of one point about 4 cm away.
+const NEGLIGIBLE: f32 = 0.01;
+
 /// Groups of samples of a mesh that lie and face alike.
 #[derive(Clone, Debug, Default)]
 pub struct LocalShape {
@@ -43,8 +56,8 @@ struct Patch {
     spread: Symmetric,
     /// Second moments of the normals about zero.
     facing: Symmetric,
-    /// Trace of the covariance between positions and normals, in metres.
-    bulge: f32,
+    /// Symmetric part of the covariance between positions and normals, in metres.
+    bulge: Symmetric,
 }
 
 /// The part of a mesh around a point.
@@ -60,6 +73,16 @@ pub struct Part {
     pub spread: Symmetric,
     /// Second moments of the unit normals; their trace is 1.
     pub facing: Symmetric,
+}
+
+/// How a surface curves under some of its points. Its axis is the direction along which it curves least there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Curvature {
+    /// How well a circle fits across the axis, 0 to 1: the squared correlation of positions and normals, 1 for anything round,
+    /// 0.75 for a square rod.
+    pub roundness: f32,
+    /// Curvature along the axis over that across it, 0 to 1: 0 for rods, 1 for balls. Edges do not count.
+    pub along: f32,
 }
 
 /// A symmetric matrix.
@@ -104,10 +127,36 @@ impl LocalShape {
                 let beyond = (squared.sqrt() - radius).max(0.0) * per_radius;
                 let height = offset.dot(patch.normal);
                 let turn = (height * per_turn).clamp(-1.0, 1.0);
-                sum.add(patch, offset, patch.weight * (1.0 - beyond), turn, height);
+                sum.add(patch, offset, patch.weight * (1.0 - beyond), turn);
             }
         }
         Some(sum.part())
+    }
+
+    /// How the surface curves under some of its points, which lie within a distance of a centre, in metres, and whose normals
+    /// point outward; flat if it is sampled nowhere near them.
+    pub fn under(
+        &self,
+        centre: Vec3,
+        radius: f32,
+        points: impl IntoIterator<Item = SurfaceSample>,
+    ) -> Curvature {
+        let centre = Vec3A::from(centre);
+        let points = TouchedPoints::new(points);
+        let out_of_reach = (FADED * radius).powi(2);
+        let (mut sum, mut within) = (Sum::default(), Within::default());
+        for patch in &self.patches {
+            let offset = patch.position - centre;
+            if offset.length_squared() < out_of_reach {
+                let smooth = (patch.normal.length_squared() - EDGE[0]) / (EDGE[1] - EDGE[0]);
+                let weight = points.nearness(patch) * smooth.clamp(0.0, 1.0);
+                if weight > 0.0 {
+                    sum.add(patch, offset, patch.weight * weight, 1.0);
+                    within.add(patch, patch.weight * weight);
+                }
+            }
+        }
+        sum.curvature(&within)
     }
 
     /// Memory use in bytes.
@@ -124,17 +173,18 @@ struct Sum {
     normal: Vec3A,
     spread: Symmetric,
     facing: Symmetric,
-    bulge: f32,
+    bulge: Symmetric,
 }
 
 impl Sum {
-    fn add(&mut self, patch: &Patch, offset: Vec3A, weight: f32, turn: f32, height: f32) {
+    /// Adds a patch; `turn` of -1 turns it over.
+    fn add(&mut self, patch: &Patch, offset: Vec3A, weight: f32, turn: f32) {
         self.weight += weight;
         self.position += offset * weight;
         self.normal += patch.normal * (weight * turn);
         self.spread += (patch.spread + Symmetric::square(offset)) * weight;
         self.facing += patch.facing * weight;
-        self.bulge += weight * turn * (patch.bulge + height);
+        self.bulge += (patch.bulge + Symmetric::product(offset, patch.normal)) * (weight * turn);
     }
 
     fn part(self) -> Part {
@@ -142,7 +192,7 @@ impl Sum {
         let (position, normal) = (self.position * share, self.normal * share);
         let spread = self.spread * share + Symmetric::square(position) * -1.0;
         let facing = self.facing * share;
-        let bulge = self.bulge * share - position.dot(normal);
+        let bulge = self.bulge.trace() * share - position.dot(normal);
         let normal_variance = (1.0 - normal.length_squared()).max(MIN_NORMAL_VARIANCE);
         let variance = spread.trace().max(f32::MIN_POSITIVE);
         Part {
@@ -151,6 +201,45 @@ impl Sum {
             spread,
             facing,
         }
+    }
+
+    /// How the patches curve, given the sums within them by the same weights.
+    fn curvature(self, within: &Within) -> Curvature {
+        if self.weight == 0.0 {
+            return Curvature::default();
+        }
+        let share = 1.0 / self.weight;
+        let (position, normal) = (self.position * share, self.normal * share);
+        let [_, _, least] = within.facing.eigenvalues();
+        let axis = within.facing.eigenvector(least).into();
+        let parted = |covariance: Symmetric| {
+            let along = covariance.between(axis, axis);
+            (along.max(0.0), (covariance.trace() - along).max(0.0))
+        };
+        let (_, spread) = parted(self.spread * share + Symmetric::square(position) * -1.0);
+        let (_, facing) = parted(self.facing * share + Symmetric::square(normal) * -1.0);
+        let (_, bulge) = parted(self.bulge * share + Symmetric::product(position, normal) * -1.0);
+        let (spread_along, spread_across) = parted(within.spread);
+        let (facing_along, facing_across) = parted(within.facing);
+        let ratio = facing_along * spread_across / (facing_across * spread_along).max(f32::MIN_POSITIVE);
+        Curvature {
+            roundness: (bulge * bulge / (spread * facing).max(f32::MIN_POSITIVE)).min(1.0),
+            along: ratio.min(1.0).sqrt(),
+        }
+    }
+}
+
+/// Weighted sums of the covariances within patches.
+#[derive(Default)]
+struct Within {
+    spread: Symmetric,
+    facing: Symmetric,
+}
+
+impl Within {
+    fn add(&mut self, patch: &Patch, weight: f32) {
+        self.spread += patch.spread * weight;
+        self.facing += (patch.facing + Symmetric::square(patch.normal) * -1.0) * weight;
     }
 }
 
@@ -197,12 +286,12 @@ impl Patch {
         let mean = |of: fn(&SurfaceSample) -> Vec3| samples.iter().map(of).sum::<Vec3>() * share;
         let position = Vec3A::from(mean(|sample| sample.position));
         let normal = Vec3A::from(mean(|sample| sample.normal));
-        let (mut spread, mut facing, mut bulge) = (Symmetric::default(), Symmetric::default(), 0.0);
+        let (mut spread, mut facing, mut bulge) = <(Symmetric, Symmetric, Symmetric)>::default();
         for sample in samples {
             let (offset, normal) = (Vec3A::from(sample.position) - position, sample.normal.into());
             spread += Symmetric::square(offset) * share;
             facing += Symmetric::square(normal) * share;
-            bulge += share * offset.dot(normal);
+            bulge += Symmetric::product(offset, normal) * share;
         }
         Some(Self {
             position,
@@ -215,12 +304,69 @@ impl Patch {
     }
 }
 
+/// Most groups of touched points: enough for a contact on each link and the palm. Further points are ignored.
+const MAX_GROUPS: usize = 4;
+
+/// Points of a surface, in groups of four that are compared with a patch at once.
+struct TouchedPoints {
+    groups: [PointGroup; MAX_GROUPS],
+    count: usize,
+}
+
+/// The coordinates of four points and of the normals there. By default, the normals are zero, so that no patch is near.
+#[derive(Clone, Copy, Default)]
+struct PointGroup {
+    position: [Vec4; 3],
+    normal: [Vec4; 3],
+}
+
+impl TouchedPoints {
+    fn new(points: impl IntoIterator<Item = SurfaceSample>) -> Self {
+        let mut groups = [PointGroup::default(); MAX_GROUPS];
+        let mut count = 0;
+        for (index, point) in points.into_iter().take(4 * MAX_GROUPS).enumerate() {
+            let (group, lane) = (&mut groups[index / 4], index % 4);
+            for axis in 0..3 {
+                group.position[axis][lane] = point.position[axis];
+                group.normal[axis][lane] = point.normal[axis];
+            }
+            count = index / 4 + 1;
+        }
+        Self { groups, count }
+    }
+
+    /// How many points are on a patch; those nearby count in part.
+    fn nearness(&self, patch: &Patch) -> f32 {
+        let (position, normal) = (patch.position.to_array(), patch.normal.to_array());
+        let mut sum = Vec4::ZERO;
+        for group in &self.groups[..self.count] {
+            let (mut cosine, mut squared) = (Vec4::ZERO, Vec4::ZERO);
+            for axis in 0..3 {
+                cosine += group.normal[axis] * normal[axis];
+                let offset = group.position[axis] - position[axis];
+                squared += offset * offset;
+            }
+            let fraction = TOUCHED * TOUCHED / (squared + TOUCHED * TOUCHED);
+            sum += (cosine - OTHER_SIDE).max(Vec4::ZERO) * fraction * fraction;
+        }
+        (sum.element_sum() - NEGLIGIBLE).max(0.0)
+    }
+}
+
 impl Symmetric {
     /// The product of a vector with itself, v vᵀ.
     fn square(v: Vec3A) -> Self {
         Self {
             diagonal: v * v,
             others: v.yzx() * v.zxy(),
+        }
+    }
+
+    /// The symmetric part of the product of two vectors, (a bᵀ + b aᵀ) / 2.
+    fn product(a: Vec3A, b: Vec3A) -> Self {
+        Self {
+            diagonal: a * b,
+            others: (a.yzx() * b.zxy() + a.zxy() * b.yzx()) * 0.5,
         }
     }
 
@@ -251,6 +397,21 @@ impl Symmetric {
         let first = mean + 2.0 * scale * angle.cos();
         let last = mean + 2.0 * scale * (angle + std::f64::consts::TAU / 3.0).cos();
         [first, 3.0 * mean - first - last, last].map(|value| value as f32)
+    }
+
+    /// The eigenvector of an eigenvalue, a unit vector; zero if all directions of a plane are eigenvectors.
+    fn eigenvector(&self, value: f32) -> Vec3A {
+        let [xx, yy, zz] = (self.diagonal - value).to_array();
+        let [yz, xz, xy] = self.others.to_array();
+        let [x, y, z] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(Vec3A::from);
+        // All rows are perpendicular to it; the longest product is the most exact.
+        let mut longest = x.cross(y);
+        for product in [y.cross(z), z.cross(x)] {
+            if product.length_squared() > longest.length_squared() {
+                longest = product;
+            }
+        }
+        longest.normalize_or_zero()
     }
 }
 

@@ -3,7 +3,10 @@
 use glam::Vec3;
 
 use crate::{
-    geometry::local_shape::{LocalShape, Symmetric},
+    geometry::{
+        local_shape::{Curvature, LocalShape, Symmetric},
+        surface_samples::SurfaceSample,
+    },
     model::{
         grasp::Contact,
         hand::{HandPose, rig::Rig},
@@ -21,6 +24,9 @@ const RADIUS_RANGE: [f32; 2] = [0.15, 0.35];
 /// Diameter of a rod over [`HeldPart::thickness`]: √2 for a round one, 1.34 for a square one.
 const DIAMETER_PER_THICKNESS: f32 = 1.38;
 
+/// [`HeldPart::thin`] over which a section becomes as thick as wide. An oval handle is a bar.
+pub(super) const EVEN_SECTION: [f32; 2] = [0.78, 0.86];
+
 /// The shape of the held part. By default, nothing is held.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HeldPart {
@@ -35,6 +41,8 @@ pub(super) struct HeldPart {
     /// How alike it is on all sides around the palm's normal, 0 to 1: 1 for a disk or jar that the palm faces, near 0 for a
     /// can that lies across the hand and for what is long.
     pub(super) all_around: f32,
+    /// How it curves under the contacts; flat if `thin` is below [`EVEN_SECTION`], where nobody asks.
+    pub(super) curvature: Curvature,
 }
 
 impl HeldPart {
@@ -53,12 +61,24 @@ impl HeldPart {
             return Self::default();
         };
         let [largest, middle, smallest] = part.spreads.map(|spread| spread.max(f32::MIN_POSITIVE));
+        let thin = smallest / middle;
+        // Only what is as thick as wide can be a ball, so most parts need no closer look.
+        let curvature = if thin > EVEN_SECTION[0] {
+            let touched = contacts.iter().map(|contact| SurfaceSample {
+                position: contact.position,
+                normal: contact.normal,
+            });
+            shape.under(centre, radius, touched)
+        } else {
+            Curvature::default()
+        };
         let wrist = pose.frame_from_wrist;
         let [x, y] = [Vec3::X, Vec3::Y].map(|axis| wrist.transform_vector(axis));
         Self {
-            thin: smallest / middle,
+            thin,
             compact: smallest / largest,
             thickness: 2.0 * smallest / rig.reach.max(f32::MIN_POSITIVE),
+            curvature,
             sphericity: part.sphericity,
             all_around: evenness(&part.facing, x, y) * evenness(&part.spread, x, y),
         }

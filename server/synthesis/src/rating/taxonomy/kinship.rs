@@ -5,7 +5,7 @@ use GraspType as T;
 
 /// Pairs of types that pass into each other: on one shape they differ in the object's size, the number of fingers by one, the
 /// thumb's place, or how much of the fingers holds; between a ball and a disk, in the palm's side.
-const KIN: [(GraspType, GraspType); 43] = [
+const KIN: [(GraspType, GraspType); 44] = [
     // By diameter.
     (T::SmallDiameter, T::MediumWrap),
     (T::MediumWrap, T::LargeDiameter),
@@ -34,9 +34,10 @@ const KIN: [(GraspType, GraspType); 43] = [
     (T::Prismatic4Finger, T::Prismatic3Finger),
     (T::Prismatic3Finger, T::Prismatic2Finger),
     (T::Prismatic2Finger, T::PalmarPinch),
-    // Between fingertips in a row and around something small.
+    // Between fingertips in a row and around something.
     (T::Prismatic2Finger, T::Tripod),
     (T::Prismatic3Finger, T::Quadpod),
+    (T::Prismatic4Finger, T::PrecisionSphere),
     // By the flexion of fingers on something flat.
     (T::Prismatic4Finger, T::ParallelExtension),
     (T::ParallelExtension, T::ExtensionType),

@@ -25,7 +25,8 @@ const AROUND: [f32; 2] = [15.0, 45.0];
 /// Mean of [`Finger::inner`] over which precision becomes power.
 const POWER: [f32; 2] = [0.3, 0.7];
 
-/// Fit of fingertips if more than the tips holds something that is no ball: the taxonomy shows none with these fingers.
+/// Fit of fingertips if more than the tips holds something for which the taxonomy shows no power type with these fingers: two or
+/// three on what is no ball, one on a ball.
 const MORE_THAN_TIPS: f32 = 0.6;
 
 /// How far a finger's side counts as its pad on what cannot be held against a side: a ball, or something wide.
@@ -144,9 +145,11 @@ impl<'a> View<'a> {
             // A thumb that opposes pads needs no test of its position. Parallel Extension, adducted in the table, itself
             // requires the thumb along the fingers.
             (GraspClass::Power, Opposition::Pad, _) => self.pad * rising(self.inner, POWER) * fingers,
-            (_, Opposition::Pad, VirtualFinger::Two | VirtualFinger::TwoToFive) => {
-                self.pad * falling(self.inner, POWER) * fingers
+            (_, Opposition::Pad, VirtualFinger::Two) => {
+                let precise = falling(self.inner, POWER).max(MORE_THAN_TIPS * self.shape.ball);
+                self.pad * precise * fingers
             }
+            (_, Opposition::Pad, VirtualFinger::TwoToFive) => self.pad * falling(self.inner, POWER) * fingers,
             (_, Opposition::Pad, _) => {
                 let precise = falling(self.inner, POWER).max(MORE_THAN_TIPS * (1.0 - self.shape.ball));
                 self.pad * precise * fingers
@@ -177,7 +180,7 @@ impl<'a> View<'a> {
             GraspType::SmallDiameter => shape.bar * self.around * shape.small,
             GraspType::MediumWrap => shape.bar * self.around * shape.medium,
             GraspType::PowerDisk => shape.disk,
-            GraspType::PowerSphere => shape.ball,
+            GraspType::PowerSphere => shape.ball_in_fist,
 
             GraspType::AdductedThumb if thumb.is_inner => wrapped,
             GraspType::AdductedThumb if thumb.touches => 0.5 * wrapped * (1.0 - shape.small),

@@ -2,6 +2,7 @@
 
 use super::{
     features::Features,
+    held_part::{EVEN_SECTION, HeldPart},
     membership::{falling, rising},
 };
 
@@ -38,6 +39,27 @@ const BALL: [f32; 2] = [0.76, 0.92];
 /// What convergent fingers add to the sphericity: whoever takes something roundish by its round side takes it as a ball.
 const TAKEN_AS_BALL: f32 = 0.1;
 
+/// [`Curvature::roundness`](crate::geometry::local_shape::Curvature::roundness) over which what is touched becomes round: more than a
+/// square rod.
+const ROUND_SECTION: [f32; 2] = [0.7, 0.85];
+
+/// [`Curvature::along`](crate::geometry::local_shape::Curvature::along) over which a round part bulges like a ball or the bowl of a
+/// glass: its outline curves with five to two and a half times the radius of its section.
+const CURVED_ALONG: [f32; 2] = [0.2, 0.4];
+
+/// Widths in hand lengths that fingertips feel as bulging: from 27 to 36 mm on an adult's hand, up to 11 to 14 cm. They feel the
+/// ends of something thinner as ends, and cannot reach around anything wider.
+const WIDE_ENOUGH: [f32; 2] = [0.14, 0.19];
+const TOO_WIDE: [f32; 2] = [0.6, 0.75];
+
+/// Degrees of bulging over which a part becomes a ball and ceases to be a prism. In between, people call it by either name.
+const AT_LEAST_BULGING: [f32; 2] = [0.0, 0.7];
+const NO_LONGER_PRISM: [f32; 2] = [0.3, 1.0];
+
+/// [`HeldPart::compact`](super::held_part::HeldPart::compact) over which a fist, which feels more than fingertips do, holds
+/// something that bulges as a ball.
+const COMPACT_IN_FIST: [f32; 2] = [0.5, 0.75];
+
 /// [`HeldPart::all_around`](super::held_part::HeldPart::all_around) over which what the palm faces becomes a disk.
 const ALL_AROUND: [f32; 2] = [0.3, 0.6];
 
@@ -61,15 +83,17 @@ const OTHER_SHAPE: f32 = 0.6;
 /// How well what is held fits, 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShapeFits {
-    /// A ball.
+    /// A ball, or what feels like one to fingertips.
     pub(super) ball: f32,
+    /// A ball for a whole hand.
+    pub(super) ball_in_fist: f32,
     /// A disk, or the end of a cylinder, that the palm faces and the digits hold by its rim.
     pub(super) disk: f32,
     /// Something straight across the fingers: neither ball nor disk.
     pub(super) prismatic: f32,
     /// Something round or at least compact.
     pub(super) compact: f32,
-    /// Something that fingers wrap around: prismatic, but not flat.
+    /// Something that a hand wraps around: neither ball nor disk, and not flat.
     pub(super) bar: f32,
     /// A plate, whatever it is held by.
     pub(super) plate: f32,
@@ -104,19 +128,25 @@ impl ShapeFits {
         let width = features.thickness;
         let small = falling(width, NO_LONGER_SMALL);
         let round = rising(features.convergence, ROUND);
-        let ball = rising(part.sphericity + TAKEN_AS_BALL * round, BALL);
+        let whole_ball = rising(part.sphericity + TAKEN_AS_BALL * round, BALL);
+        let bulge = bulge(part, width);
+        let bulging = rising(bulge, AT_LEAST_BULGING);
+        let ball = whole_ball.max(bulging);
+        let ball_in_fist = whole_ball.max(bulging * rising(part.compact, COMPACT_IN_FIST));
         let rim = rising(part.all_around, ALL_AROUND) * rising(part.thickness, RIM);
         let disk = (1.0 - ball) * round * rim * falling(features.pull, BEYOND_RIM);
         let curved = ball.max(disk);
         let is_compact = rising(part.compact, COMPACT);
         let body = (1.0 - curved) * round * is_compact;
-        let prismatic = 1.0 - curved - (1.0 - OTHER_SHAPE) * body;
+        let straight = (1.0 - whole_ball.max(disk)).min(falling(bulge, NO_LONGER_PRISM));
+        let prismatic = straight - (1.0 - OTHER_SHAPE) * body;
         let thick = rising(part.thin, BAR);
-        let bar = prismatic * at_least(OTHER_SHAPE, thick);
+        let bar = (1.0 - ball_in_fist.max(disk)) * at_least(OTHER_SHAPE, thick);
         let rod = thick * (1.0 - is_compact);
         let between_sides = (1.0 - ball) * falling(width, BETWEEN_SIDES);
         Self {
             ball,
+            ball_in_fist,
             disk,
             prismatic,
             compact: curved + OTHER_SHAPE * body,
@@ -125,7 +155,7 @@ impl ShapeFits {
             flat: prismatic * at_least(OTHER_SHAPE, 1.0 - thick),
             pen: between_sides * at_least(OTHER_SHAPE, rod),
             stick: at_least(OTHER_SHAPE, rod),
-            ring: bar * at_least(OTHER_SHAPE, rising(width, RING)),
+            ring: prismatic * at_least(OTHER_SHAPE, thick) * at_least(OTHER_SHAPE, rising(width, RING)),
             loops: prismatic * at_least(OTHER_SHAPE, falling(width, LOOP)),
             pinchable: at_least(OTHER_SHAPE, falling(width, PINCHABLE)),
             between_sides,
@@ -135,6 +165,15 @@ impl ShapeFits {
             large: rising(width, AT_LEAST_LARGE),
         }
     }
+}
+
+/// Degree to which a part of some width is round and also curves along itself under the contacts, as the bowl of a glass does.
+fn bulge(part: &HeldPart, width: f32) -> f32 {
+    rising(part.curvature.roundness, ROUND_SECTION)
+        * rising(part.curvature.along, CURVED_ALONG)
+        * rising(part.thin, EVEN_SECTION)
+        * rising(width, WIDE_ENOUGH)
+        * falling(width, TOO_WIDE)
 }
 
 /// Maps 0 to `least`, 1 to 1.

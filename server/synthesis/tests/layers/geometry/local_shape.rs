@@ -2,9 +2,9 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::geometry::{
-    local_shape::{LocalShape, Part},
+    local_shape::{Curvature, LocalShape, Part},
     mesh::TriangleMesh,
-    surface_samples::even_samples,
+    surface_samples::{SurfaceSample, even_samples},
 };
 
 use crate::fixtures::meshes::{Parts, cuboid, cylinder_mesh, moved, sphere};
@@ -18,6 +18,16 @@ const SPHERE_CENTRE: Vec3 = Vec3::new(0.01, -0.02, 0.03);
 fn around(mesh: &TriangleMesh, centre: Vec3, radius: f32) -> Part {
     let shape = LocalShape::of(&even_samples(mesh));
     shape.around(centre, radius).expect("the mesh has a surface")
+}
+
+/// How a mesh curves under points with normals.
+fn under<const N: usize>(mesh: &TriangleMesh, centre: Vec3, points: [(Vec3, Vec3); N]) -> Curvature {
+    let shape = LocalShape::of(&even_samples(mesh));
+    shape.under(
+        centre,
+        0.06,
+        points.map(|(position, normal)| SurfaceSample { position, normal }),
+    )
 }
 
 fn assert_near(found: f32, expected: f32, what: &str) {
@@ -91,4 +101,30 @@ fn far_from_a_mesh_its_nearest_part_counts() {
     let part = around(&parts.mesh(), Vec3::new(0.0, 0.5, 0.0), 0.03);
     assert!(part.spreads.iter().all(|spread| spread.is_finite()), "{part:?}");
     assert!(LocalShape::default().around(Vec3::ZERO, 0.03).is_none());
+}
+
+#[test]
+fn balls_curve_alike_in_all_directions_and_rods_do_not() {
+    let touched = |radius: f32| [Vec3::X, Vec3::NEG_X, Vec3::Z].map(|normal| (radius * normal, normal));
+    let on_ball = touched(0.04).map(|(position, normal)| (SPHERE_CENTRE + position, normal));
+    let ball = under(&sphere(0.04, 24), SPHERE_CENTRE, on_ball);
+    assert!(ball.along > 0.7 && ball.roundness > 0.95, "{ball:?}");
+    let rod = under(&cylinder_mesh(0.02, 0.1, 32, 8), Vec3::ZERO, touched(0.02));
+    assert!(rod.along < 0.2 && rod.roundness > 0.9, "{rod:?}");
+}
+
+#[test]
+fn edges_and_corners_do_not_curve() {
+    let rim = Vec3::new(0.03, 0.05, 0.0);
+    let slanted = Vec3::new(1.0, 1.0, 0.0) * std::f32::consts::FRAC_1_SQRT_2;
+    let points = [(rim, slanted), (-rim, -slanted), (Vec3::Z * 0.03, Vec3::Z)];
+    let can = under(&cylinder_mesh(0.03, 0.05, 48, 8), Vec3::ZERO, points);
+    assert!(can.along < 0.25, "{can:?}");
+}
+
+#[test]
+fn nothing_curves_far_from_the_surface() {
+    let far = (Vec3::splat(1.0), Vec3::X);
+    let none = under(&sphere(0.04, 24), SPHERE_CENTRE, [far]);
+    assert_eq!(none, Curvature::default());
 }
