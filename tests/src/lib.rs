@@ -1,8 +1,9 @@
-//! Shared by integration tests and benches: a server inside the process, recorded hands, placed givers and random
-//! holdouts.
+//! Shared by integration tests and benches: a server inside the process, recorded hands, placed givers, random holdouts
+//! and labelled pairs of grasps.
 
 pub mod giver;
 mod harness;
+pub mod pairs;
 pub mod random_holdouts;
 pub mod recorded;
 pub mod searches;

@@ -1,0 +1,215 @@
+//! Holdouts of labelled objects, and valid grasps of them that no score has chosen.
+
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Duration,
+};
+
+use glam::{Quat, Vec3};
+use grasp_assets::{hands::hand, holdouts::holdouts};
+use grasp_synthesis::{
+    base::{
+        mechanisms::{Mechanism, Mechanisms},
+        pose::Pose,
+    },
+    model::{
+        grasp::Grasp,
+        hand::{
+            Handedness,
+            joints::{HandJoints, index},
+        },
+        holdout::Holdout,
+        receiver::Stance,
+        score::{Score, Term},
+    },
+    physical::scene::Presented,
+    propose::prepared::PreparedRig,
+    search::{
+        find_grasp,
+        scene::Task,
+        settings::{Query, Run, SearchSettings},
+    },
+};
+use rand::SeedableRng as _;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::{
+    catalogue::LabelledObject,
+    reasons::{Rules, Verdicts},
+};
+use crate::{
+    random_holdouts::{ClientHoldout, Givers, GivingHand, place},
+    searches::MonotonicClock,
+};
+
+/// Attempts of a search: enough for most objects that a giver holds.
+const ATTEMPTS: u64 = 400;
+
+/// Searches for each grasp wanted, after which a holdout has no more.
+const SEARCHES_PER_GRASP: u64 = 3;
+
+/// Wrists nearer than this, in metres, with fingers in the same directions are of one grasp.
+const SAME_GRASP: f32 = 0.005;
+
+/// Range of the rise of a giver's forearm, from wrist to elbow, as sines: people hand things over with their elbows beside or
+/// below their hands.
+const ELBOW_RISES: [f32; 2] = [-0.9, 0.2];
+
+/// Draws after which a giver may stand on its head.
+const GIVER_DRAWS: usize = 100;
+
+/// A labelled object, held out or free.
+#[derive(Clone, Debug)]
+pub struct Offer {
+    /// The object.
+    pub object: Arc<LabelledObject>,
+    /// Who holds it: a recorded hand or a built-in holdout, or nobody.
+    pub giver: String,
+    /// The holdout in the object's frame, to a receiver who faces the giver.
+    pub holdout: Holdout,
+    /// The object in a world with +Y up.
+    pub world_from_object: Pose,
+}
+
+impl Offer {
+    /// The object as it usually lies or stands, held by nobody.
+    pub fn free(object: &Arc<LabelledObject>) -> Self {
+        let up = object.usual_up;
+        Self {
+            giver: "nobody".to_owned(),
+            holdout: Holdout::new(Arc::clone(&object.object), None, up).expect("up is a unit vector"),
+            world_from_object: Pose::new(Vec3::ZERO, Quat::from_rotation_arc(up, Vec3::Y)),
+            object: Arc::clone(object),
+        }
+    }
+
+    /// The object in a hand that `draw` draws from `hands`.
+    pub fn held(object: &Arc<LabelledObject>, hands: &[GivingHand], draw: u64) -> Self {
+        let placed = place(&object.object, hands, draw);
+        let givers = Givers::new(hands, std::slice::from_ref(&placed)).expect("the hand is one of these");
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(draw);
+        let mut held = givers.draw(&mut random);
+        for _ in 0..GIVER_DRAWS {
+            if stands(&held.giver) {
+                break;
+            }
+            held = givers.draw(&mut random);
+        }
+        Self::of_client(object, placed.hand, &held)
+    }
+
+    /// The built-in holdouts of the object.
+    pub fn built_in(object: &Arc<LabelledObject>) -> Vec<Self> {
+        let own = holdouts().iter().filter(|holdout| holdout.object == object.name);
+        own.map(|holdout| Self::of_client(object, holdout.name.clone(), &ClientHoldout::of_built_in(holdout)))
+            .collect()
+    }
+
+    fn of_client(object: &Arc<LabelledObject>, giver: String, held: &ClientHoldout) -> Self {
+        Self {
+            giver,
+            holdout: held.holdout(Arc::clone(&object.object)),
+            world_from_object: held.client_from_object,
+            object: Arc::clone(object),
+        }
+    }
+
+    /// The giver's joints in the object's frame.
+    pub fn giver_joints(&self) -> Option<&HandJoints> {
+        self.holdout.presenting_hand.as_ref().map(|hand| &hand.joints)
+    }
+}
+
+/// Whether a giver's forearm is one of a standing person.
+fn stands(giver: &HandJoints) -> bool {
+    let forearm = giver.joints[index::WRIST].pose.transform_vector(Vec3::Z);
+    let [lowest, highest] = ELBOW_RISES;
+    (lowest..=highest).contains(&forearm.y)
+}
+
+/// A valid grasp with its score and what the rules say of it.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The grasp.
+    pub grasp: Grasp,
+    /// Its score for a receiver who faces the giver.
+    pub score: Score,
+    /// What the rules say.
+    pub verdicts: Verdicts,
+}
+
+/// The hand of all grasps: the right one of an adult.
+pub fn receiving_rig() -> &'static PreparedRig {
+    &hand("adult", Handedness::Right)
+        .expect("the adult rig is built in")
+        .rig
+}
+
+/// Up to `count` different valid grasps of an offer, each the first of a search of its own from anywhere, with what the rules
+/// say of them. Equal for equal arguments.
+pub fn gather(pool: &rayon::ThreadPool, offer: &Offer, count: usize, seed: u64) -> Vec<Candidate> {
+    let rig = receiving_rig();
+    let from_anywhere = Holdout {
+        stance: Stance::Any,
+        ..offer.holdout.clone()
+    };
+    let task = Task {
+        holdout: &from_anywhere,
+        object: &offer.object.prepared,
+        rig,
+    };
+    let receiver = Presented::of(&offer.holdout).receiver;
+    let rules = Rules::new(&offer.object, offer.giver_joints(), offer.holdout.up);
+    let mut found: Vec<Candidate> = Vec::new();
+    for number in 0..count as u64 * SEARCHES_PER_GRASP {
+        if found.len() >= count {
+            break;
+        }
+        let settings = settings(seed + number, number % 2 == 0);
+        let clock = MonotonicClock::default();
+        let outcome = find_grasp(pool, task, &settings, &clock, &AtomicBool::new(false));
+        let Some(grasp) = outcome.grasp else { continue };
+        let is_new = |other: &Candidate| !is_same(&grasp, &other.grasp);
+        if !found.iter().all(is_new) {
+            continue;
+        }
+        let Some(mut score) = grasp.score else { continue };
+        score.values[Term::Stance as usize] = receiver.suits(grasp.pose.frame_from_wrist);
+        let joints = HandJoints::of_pose(rig, &grasp.pose);
+        found.push(Candidate {
+            verdicts: rules.verdicts(&joints, &grasp.contacts),
+            score,
+            grasp,
+        });
+    }
+    found
+}
+
+/// A search for any valid grasp. Proposals neither follow a prior nor are the same for every seed; handles may be wrapped.
+fn settings(seed: u64, wraps_handles: bool) -> SearchSettings {
+    let mut mechanisms = Mechanisms::ALL
+        .without(Mechanism::PlacementCache)
+        .without(Mechanism::SuccessPrior);
+    if !wraps_handles {
+        mechanisms = mechanisms.without(Mechanism::Handles);
+    }
+    SearchSettings {
+        query: Query {
+            improvement: Duration::ZERO,
+            ..Query::default()
+        },
+        run: Run {
+            seed,
+            max_attempts: ATTEMPTS,
+            mechanisms,
+            ..Run::default()
+        },
+        ..SearchSettings::default()
+    }
+}
+
+fn is_same(a: &Grasp, b: &Grasp) -> bool {
+    let [a, b] = [a, b].map(|grasp| grasp.pose.frame_from_wrist);
+    a.position.distance(b.position) < SAME_GRASP
+        && a.orientation.dot(b.orientation).abs() > (0.5 * 10.0_f32.to_radians()).cos()
+}
