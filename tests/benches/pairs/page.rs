@@ -15,6 +15,10 @@ use crate::{
 const ON_SHEET: usize = 24;
 const COLUMNS: usize = 3;
 
+/// Objects are shown in the order of their multiples of the first number, modulo the second, a prime.
+const STRIDE: usize = 11;
+const WHEEL: usize = 37;
+
 /// What the page looks like.
 const STYLE: &str = "body{font:15px/1.4 sans-serif;margin:24px;background:#fafafa;color:#222}\
 main{display:flex;flex-wrap:wrap;gap:16px}\
@@ -32,18 +36,32 @@ pub(crate) fn chosen<'a>(pairs: &'a [Pair<'a>], most: usize) -> Vec<&'a Pair<'a>
     wrong.into_iter().chain(in_turn(&right)).take(most).collect()
 }
 
-/// The pairs of all reasons by turns, each reason's spread over its objects.
+/// The pairs of all reasons by turns, those of a reason from one object after the other.
 fn in_turn<'a>(pairs: &[&'a Pair<'a>]) -> Vec<&'a Pair<'a>> {
-    let mut ranked: Vec<(usize, Reason, &Pair<'_>)> = Vec::new();
     let mut used: BTreeMap<(Reason, usize), usize> = BTreeMap::new();
-    for pair in pairs {
-        let rank = used.entry((pair.reason, pair.gathered.object)).or_default();
-        // Objects of different numbers start at different reasons.
-        ranked.push((*rank * 64 + pair.gathered.object * 7 % 64, pair.reason, pair));
-        *rank += 1;
-    }
-    ranked.sort_by_key(|(rank, reason, _)| (*rank, *reason));
-    ranked.into_iter().map(|(_, _, pair)| pair).collect()
+    let mut turns: Vec<_> = pairs
+        .iter()
+        .map(|&pair| {
+            let Pair { reason, gathered, .. } = *pair;
+            let round = used.entry((reason, gathered.object)).or_default();
+            *round += 1;
+            // Each reason begins with other objects.
+            let place = (gathered.object * STRIDE + reason as usize * STRIDE * STRIDE) % WHEEL;
+            (*round, place, reason, pair)
+        })
+        .collect();
+    turns.sort_by_key(|&(round, place, reason, _)| (reason, round, place));
+    let mut places: BTreeMap<Reason, usize> = BTreeMap::new();
+    let mut in_turn: Vec<_> = turns
+        .into_iter()
+        .map(|(.., reason, pair)| {
+            let place = places.entry(reason).or_default();
+            *place += 1;
+            (*place, reason, pair)
+        })
+        .collect();
+    in_turn.sort_by_key(|&(place, reason, _)| (place, reason));
+    in_turn.into_iter().map(|(.., pair)| pair).collect()
 }
 
 /// Writes `index.html`, the pictures of the chosen pairs and `pairs.png` into a folder. Calls `drawn` for each picture.
@@ -88,11 +106,11 @@ pub(crate) fn write(
     fs::write(folder.join("index.html"), html(all, chosen))
 }
 
-/// Pairs for the sheet: half of them ranked wrong, as far as there are that many.
+/// Pairs for the sheet, of all reasons and many objects.
 fn for_sheet<'a>(chosen: &[&'a Pair<'a>]) -> Vec<&'a Pair<'a>> {
     let (wrong, right): (Vec<_>, Vec<_>) = chosen.iter().partition(|pair| !pair.is_right());
     let wrong = in_turn(&wrong).into_iter().take(ON_SHEET / 2);
-    wrong.chain(right).take(ON_SHEET).collect()
+    wrong.chain(in_turn(&right)).take(ON_SHEET).collect()
 }
 
 /// The name of a grasp's picture.

@@ -8,6 +8,9 @@ use serde::Serialize;
 pub(crate) const LINE_BELOW_HEADER: TableStyle =
     TableStyle::new().header_separator(LineStyle::none().fill('─').junction('─'));
 
+/// The columns of the table.
+const HEADER: [&str; 5] = ["reason", "objects", "pairs", "ranked right", "mean margin"];
+
 /// The pairs of a reason, or all.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Line {
@@ -31,6 +34,10 @@ impl Line {
             mean_margin: pairs.iter().map(|pair| pair.margin()).sum::<f32>() / pairs.len().max(1) as f32,
         }
     }
+
+    fn share_right(&self) -> f64 {
+        self.right as f64 / self.pairs as f64
+    }
 }
 
 /// One line for each reason, and one for all together.
@@ -46,13 +53,13 @@ pub(crate) fn lines(pairs: &[Pair<'_>]) -> Vec<Line> {
 
 /// The table of the lines.
 pub(crate) fn render(lines: &[Line]) -> String {
-    let mut table = empty(&["reason", "objects", "pairs", "ranked right", "mean margin"]);
+    let mut table = empty(HEADER.map(str::to_owned));
     for line in lines {
         table.add_row([
             line.reason.to_owned(),
             line.objects.to_string(),
             line.pairs.to_string(),
-            percent(line.right, line.pairs),
+            percent(line.share_right()),
             format!("{:.3}", line.mean_margin),
         ]);
     }
@@ -60,23 +67,24 @@ pub(crate) fn render(lines: &[Line]) -> String {
 }
 
 /// A table of texts, then numbers.
-pub(crate) fn empty(header: &[&str]) -> Table {
+pub(crate) fn empty(header: impl IntoIterator<Item = String>) -> Table {
     let mut table = Table::new();
     table
         .load_style(LINE_BELOW_HEADER)
         .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(header);
+        .set_header(header.into_iter().collect::<Vec<_>>());
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);
     }
     table
 }
 
-fn percent(part: usize, whole: usize) -> String {
-    if whole == 0 {
+/// A share as text; a dash if it is of nothing.
+pub(crate) fn percent(share: f64) -> String {
+    if share.is_nan() {
         "–".to_owned()
     } else {
-        format!("{:.1} %", 100.0 * part as f32 / whole as f32)
+        format!("{:.1} %", 100.0 * share)
     }
 }
 
@@ -88,10 +96,10 @@ pub(crate) fn html_rows(lines: &[Line]) -> String {
             line.reason,
             line.objects,
             line.pairs,
-            percent(line.right, line.pairs),
+            percent(line.share_right()),
             line.mean_margin
         )
     };
-    let header = "<tr><th>reason<th>objects<th>pairs<th>ranked right<th>mean margin\n".to_owned();
+    let header = format!("<tr><th>{}\n", HEADER.join("<th>"));
     [header].into_iter().chain(lines.iter().map(row)).collect()
 }

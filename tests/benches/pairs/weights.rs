@@ -10,83 +10,127 @@ use grasp_tests::pairs::{
 };
 use serde::Serialize;
 
-use crate::table::empty;
+use crate::table::{empty, percent};
 
 /// What a weight's squared distance from the shipped one costs: small changes are cheap, doublings of the largest are not.
 const RIDGE: f64 = 2e-3;
 
-/// Weights that the pairs of some objects suggest.
+/// Which weights a fit may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Free {
+    /// Those of terms about what the reasons are about. No reason judges how firm or natural a grip is.
+    Judged,
+    /// All.
+    All,
+}
+
+/// Which objects a fit sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Half {
+    /// Those of even numbers.
+    Even,
+    /// Those of odd numbers.
+    Odd,
+}
+
+/// Weights that pairs suggest.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Suggestion {
-    terms: Vec<Suggested>,
-    /// Of pairs of the objects that the fit has seen, and of those it has not.
-    fits: [Accuracy; 2],
+    terms: [&'static str; TERMS],
+    shipped: [f64; TERMS],
+    fits: Vec<Fit>,
 }
 
-/// The weights of a term.
+/// Weights fitted to the pairs of one half of the objects.
 #[derive(Clone, Debug, Serialize)]
-struct Suggested {
-    term: &'static str,
-    shipped: f64,
-    /// By objects of even and of odd number.
-    fitted: [f64; 2],
+struct Fit {
+    free: Free,
+    half: Half,
+    weights: [f64; TERMS],
+    /// Of the pairs of this half, and of those of the other, which the fit has not seen.
+    seen: Accuracy,
+    unseen: Accuracy,
 }
 
-/// Shares of pairs ranked right: by the shipped weights and by those fitted to objects of one half.
+/// Shares of pairs ranked right.
 #[derive(Clone, Copy, Debug, Serialize)]
 struct Accuracy {
-    fitted_to: &'static str,
     pairs: usize,
-    pairs_held_out: usize,
     shipped: f64,
     fitted: f64,
-    shipped_held_out: f64,
-    fitted_held_out: f64,
 }
 
-/// The weights that the objects of even numbers suggest, and those that the odd ones do, with the same sum as the shipped.
+impl Free {
+    /// Whether a fit may change the weight of a term.
+    fn includes(self, term: Term) -> bool {
+        self == Self::All
+            || matches!(
+                term,
+                Term::EnoughDigits
+                    | Term::AwayFromGiver
+                    | Term::Stance
+                    | Term::FromSideOrAbove
+                    | Term::WristLoad
+                    | Term::AcrossLongAxis
+                    | Term::NearCentre
+                    | Term::OnHandle
+                    | Term::OffSharp
+            )
+    }
+}
+
+impl Half {
+    fn of(pair: &Pair<'_>) -> Self {
+        if pair.gathered.object.is_multiple_of(2) {
+            Self::Even
+        } else {
+            Self::Odd
+        }
+    }
+}
+
+/// What each half of the objects suggests, if some or all weights may change.
 pub(crate) fn suggest(pairs: &[Pair<'_>]) -> Suggestion {
-    let shipped: [f64; TERMS] = Term::ALL.map(|term| f64::from(term.weight()));
-    let halves = [0, 1].map(|half| {
-        let own: Vec<&Pair<'_>> = pairs
-            .iter()
-            .filter(|pair| pair.gathered.object % 2 == half)
-            .collect();
-        own
-    });
-    let differences = halves
-        .each_ref()
-        .map(|half| half.iter().map(|pair| pair.differences()).collect::<Vec<_>>());
-    let fitted = [0, 1].map(|half| {
-        let fit = Regression {
-            differences: &differences[half],
-            importances: &importances(&halves[half]),
-            near: shipped,
-            ridge: RIDGE,
-        };
-        let weights = fit.weights();
-        let scale = shipped.iter().sum::<f64>() / weights.iter().sum::<f64>();
-        weights.map(|weight| weight * scale)
-    });
-    let terms = Term::ALL.into_iter().map(|term| Suggested {
-        term: term.name(),
-        shipped: shipped[term as usize],
-        fitted: fitted.map(|weights| weights[term as usize]),
-    });
+    let shipped = Term::ALL.map(|term| f64::from(term.weight()));
+    let fits = [Free::Judged, Free::All]
+        .into_iter()
+        .flat_map(|free| [Half::Even, Half::Odd].map(|half| fit(pairs, shipped, free, half)));
     Suggestion {
-        terms: terms.collect(),
-        fits: [0, 1].map(|half| {
-            let [seen, unseen] = [&differences[half], &differences[1 - half]];
-            Accuracy {
-                fitted_to: ["even", "odd"][half],
-                pairs: seen.len(),
-                pairs_held_out: unseen.len(),
-                shipped: share_right(&shipped, seen),
-                fitted: share_right(&fitted[half], seen),
-                shipped_held_out: share_right(&shipped, unseen),
-                fitted_held_out: share_right(&fitted[half], unseen),
-            }
-        }),
+        terms: Term::ALL.map(Term::name),
+        shipped,
+        fits: fits.collect(),
+    }
+}
+
+fn fit(pairs: &[Pair<'_>], shipped: [f64; TERMS], free: Free, half: Half) -> Fit {
+    let (seen, unseen): (Vec<&Pair<'_>>, Vec<&Pair<'_>>) =
+        pairs.iter().partition(|pair| Half::of(pair) == half);
+    let importances = importances(&seen);
+    let [seen, unseen] = [seen, unseen].map(|half| {
+        let differences = half.iter().map(|pair| pair.differences());
+        differences.collect::<Vec<_>>()
+    });
+    let regression = Regression {
+        differences: &seen,
+        importances: &importances,
+        near: shipped,
+        is_free: Term::ALL.map(|term| free.includes(term)),
+        ridge: RIDGE,
+    };
+    let weights = regression.weights();
+    let accuracy = |differences: &[[f64; TERMS]]| Accuracy {
+        pairs: differences.len(),
+        shipped: share_right(&shipped, differences),
+        fitted: share_right(&weights, differences),
+    };
+    Fit {
+        free,
+        half,
+        seen: accuracy(&seen),
+        unseen: accuracy(&unseen),
+        weights,
     }
 }
 
@@ -102,32 +146,41 @@ fn importances(pairs: &[&Pair<'_>]) -> Vec<f64> {
 
 /// The weights as a table, and how well they rank.
 pub(crate) fn render(suggestion: &Suggestion) -> String {
-    let mut table = empty(&["term", "shipped", "fitted to even", "fitted to odd"]);
-    for Suggested {
-        term,
-        shipped,
-        fitted: [even, odd],
-    } in &suggestion.terms
-    {
-        table.add_row([
-            (*term).to_owned(),
-            format!("{shipped:.2}"),
-            format!("{even:.2}"),
-            format!("{odd:.2}"),
-        ]);
+    let name = |fit: &Fit| {
+        let free = match fit.free {
+            Free::Judged => "judged",
+            Free::All => "all",
+        };
+        let half = match fit.half {
+            Half::Even => "even",
+            Half::Odd => "odd",
+        };
+        format!("{free}, {half}")
+    };
+    let header = ["term", "shipped"].map(str::to_owned).into_iter();
+    let mut table = empty(header.chain(suggestion.fits.iter().map(name)));
+    for (k, term) in suggestion.terms.into_iter().enumerate() {
+        let weights = suggestion.fits.iter().map(|fit| fit.weights[k]);
+        let weights = [suggestion.shipped[k]].into_iter().chain(weights);
+        table.add_row(
+            [term.to_owned()]
+                .into_iter()
+                .chain(weights.map(|weight| format!("{weight:.2}"))),
+        );
     }
     let mut text = format!("{table}\n");
-    for fit in suggestion.fits {
+    for fit in &suggestion.fits {
+        let Fit { seen, unseen, .. } = fit;
         let _ = write!(
             text,
-            "\nfitted to {} objects, {} pairs: {:.1} % right instead of {:.1} %; of {} pairs of the others: {:.1} % instead of {:.1} %",
-            fit.fitted_to,
-            fit.pairs,
-            100.0 * fit.fitted,
-            100.0 * fit.shipped,
-            fit.pairs_held_out,
-            100.0 * fit.fitted_held_out,
-            100.0 * fit.shipped_held_out,
+            "\n{}: {} of {} pairs ranked right instead of {}; held out, {} of {} instead of {}",
+            name(fit),
+            percent(seen.fitted),
+            seen.pairs,
+            percent(seen.shipped),
+            percent(unseen.fitted),
+            unseen.pairs,
+            percent(unseen.shipped),
         );
     }
     text

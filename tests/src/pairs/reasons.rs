@@ -1,9 +1,12 @@
 //! Why a person would not choose a grasp, by rules that read joints, contacts and named parts alone.
 
 use glam::Vec3;
-use grasp_synthesis::model::{
-    grasp::Contact,
-    hand::joints::{HandJoints, index},
+use grasp_synthesis::{
+    geometry::aabb::Aabb,
+    model::{
+        grasp::Contact,
+        hand::joints::{HandJoints, index},
+    },
 };
 use serde::Serialize;
 
@@ -11,6 +14,10 @@ use super::catalogue::{Label, LabelledObject};
 
 /// Angles between both forearms, in degrees: within the first, the hands come from one side.
 const FOREARMS: [f32; 2] = [60.0, 100.0];
+
+/// Rise of a forearm, from wrist to elbow, up to which it clearly comes from where a receiver stands, as a sine: higher elbows
+/// are above the shoulder.
+const ELBOW_RISE: f32 = 0.7;
 
 /// Shares of contacts on the handle.
 const ON_HANDLE: [f32; 2] = [0.25, 0.66];
@@ -24,14 +31,16 @@ const ON_BLADE: [f32; 2] = [0.25, 0.0];
 /// Angles between approach and long axis, in degrees.
 const ACROSS: [f32; 2] = [45.0, 65.0];
 
-/// An object is long if its longest side is at least this many times the next, and in metres.
+/// An object is long if its longest side is at least this many times the next, and in metres; a handle, by the first alone.
 const LONG: (f32, f32) = (1.6, 0.1);
 
 /// Rises of palm and of the way from wrist to contacts, in degrees over the horizontal.
 const BENEATH: [f32; 2] = [45.0, 15.0];
 
-/// Mass in kilograms from which fewer than this many digits are too few without the palm.
-const HEAVY: (f32, usize) = (1.0, 4);
+/// Masses in kilograms from which so many digits are clearly enough, with the palm for all of them, and the number of digits
+/// that are too few.
+const HEAVY: (f32, [f32; 2]) = (1.0, [3.0, 4.0]);
+const NOT_LIGHT: (f32, [f32; 2]) = (0.1, [0.0, 3.0]);
 
 /// Offsets of the contacts' middle from the centre of mass, as shares of the object's length.
 const OFFSETS: [f32; 2] = [0.35, 0.2];
@@ -156,10 +165,7 @@ pub struct Rules<'a> {
 impl<'a> Rules<'a> {
     /// The rules for an object that `giver` holds, or nobody. `up` is a unit vector; both are in the object's frame.
     pub fn new(object: &'a LabelledObject, giver: Option<&HandJoints>, up: Vec3) -> Self {
-        let extents = object.object.surface.mesh().aabb().extents();
-        let longest = extents.max_position();
-        let length = extents[longest];
-        let next = extents[(longest + 1) % 3].max(extents[(longest + 2) % 3]);
+        let (axis, length, next) = longest_side(object.object.surface.mesh().positions().iter().copied());
         let centre = object.object.centre_of_mass;
         let has_handle = object.has(Label::Handle);
         Self {
@@ -171,7 +177,8 @@ impl<'a> Rules<'a> {
             asks_for_middle: !has_handle
                 && object.object.mass >= OFFSET_MATTERS
                 && giver.is_none_or(|giver| distance_from_skin(giver, centre) > HAND_ROOM),
-            long_axis: (length >= LONG.0 * next && length >= LONG.1).then_some(Vec3::AXES[longest]),
+            long_axis: (length >= LONG.0 * next && length >= LONG.1 && is_held_across(object, axis))
+                .then_some(Vec3::AXES[axis]),
             length,
         }
     }
@@ -183,9 +190,18 @@ impl<'a> Rules<'a> {
 
     fn verdict(&self, reason: Reason, hand: &HandJoints, contacts: &[Contact]) -> Verdict {
         let measured = match reason {
-            Reason::GiversSide => self
-                .giver_forearm
-                .map(|giver| (giver.angle_between(forearm(hand)).to_degrees(), FOREARMS)),
+            Reason::GiversSide => self.giver_forearm.map(|giver| {
+                let angle = giver.angle_between(forearm(hand)).to_degrees();
+                let is_high = forearm(hand).dot(self.up) > ELBOW_RISE;
+                (
+                    if is_high {
+                        angle.min(FOREARMS[1] - 1.0)
+                    } else {
+                        angle
+                    },
+                    FOREARMS,
+                )
+            }),
             Reason::OffHandle => self
                 .asks_for_handle
                 // What is on the blade has a reason of its own.
@@ -202,13 +218,10 @@ impl<'a> Rules<'a> {
                 .giver_forearm
                 .is_none()
                 .then(|| (self.rise(hand, contacts), BENEATH)),
-            Reason::TooFewDigits => {
-                let (heavy, enough) = HEAVY;
-                (self.object.object.mass > heavy).then(|| {
-                    let digits = digits_and_palm(contacts);
-                    (digits as f32, [enough as f32 - 1.0, enough as f32])
-                })
-            }
+            Reason::TooFewDigits => [HEAVY, NOT_LIGHT]
+                .into_iter()
+                .find(|(mass, _)| self.object.object.mass > *mass)
+                .map(|(_, limits)| (digits_and_palm(contacts), limits)),
             Reason::FarEnd => self.asks_for_middle.then(|| {
                 let offset = middle(contacts).distance(self.object.object.centre_of_mass);
                 (offset / self.length, OFFSETS)
@@ -248,6 +261,24 @@ fn verdict(value: f32, [reason, opposite]: [f32; 2]) -> Verdict {
     }
 }
 
+/// The axis along which points extend most, by number, their extent along it, and the larger of the others.
+fn longest_side(points: impl IntoIterator<Item = Vec3>) -> (usize, f32, f32) {
+    let extents = Aabb::around(points).extents();
+    let axis = extents.max_position();
+    (
+        axis,
+        extents[axis],
+        extents[(axis + 1) % 3].max(extents[(axis + 2) % 3]),
+    )
+}
+
+/// Whether a hand across this axis fits the handle, if the object has one: a saw's handle is across the saw.
+fn is_held_across(object: &LabelledObject, axis: usize) -> bool {
+    let corners: Vec<Vec3> = object.triangles_of(Label::Handle).flatten().collect();
+    let (along, length, next) = longest_side(corners.iter().copied());
+    corners.is_empty() || along == axis && length >= LONG.0 * next
+}
+
 /// The direction of a forearm, from the wrist.
 fn forearm(hand: &HandJoints) -> Vec3 {
     hand.joints[index::WRIST].pose.transform_vector(Vec3::Z)
@@ -265,15 +296,15 @@ fn angle_to_line(direction: Vec3, line: Vec3) -> f32 {
 }
 
 /// How many digits touch; all, if the palm does.
-fn digits_and_palm(contacts: &[Contact]) -> usize {
+fn digits_and_palm(contacts: &[Contact]) -> f32 {
     let mut touching = [false; 5];
     for contact in contacts {
         match contact.part.digit() {
             Some(digit) => touching[digit.index()] = true,
-            None => return touching.len(),
+            None => return touching.len() as f32,
         }
     }
-    touching.into_iter().filter(|touches| *touches).count()
+    touching.into_iter().filter(|touches| *touches).count() as f32
 }
 
 /// The mean of the contacts' positions.

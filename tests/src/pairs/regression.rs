@@ -13,6 +13,8 @@ pub struct Regression<'a, const N: usize> {
     pub importances: &'a [f64],
     /// The weights to stay near.
     pub near: [f64; N],
+    /// Which of them may change.
+    pub is_free: [bool; N],
     /// What a squared distance from them costs, next to the mean loss of the pairs.
     pub ridge: f64,
 }
@@ -32,8 +34,8 @@ impl<const N: usize> Regression<'_, N> {
         let mut weights = self.near;
         for _ in 0..STEPS {
             let gradient = self.gradient(&weights);
-            for (weight, slope) in weights.iter_mut().zip(gradient) {
-                *weight = (*weight - slope / curvature).max(0.0);
+            for k in (0..N).filter(|&k| self.is_free[k]) {
+                weights[k] = (weights[k] - gradient[k] / curvature).max(0.0);
             }
         }
         weights
@@ -75,6 +77,7 @@ mod tests {
             differences: &[[0.8]],
             importances: &[1.0],
             near: [1.5],
+            is_free: [true],
             ridge: 0.1,
         };
         // ridge (w − near) = d / (1 + exp(w d)), by bisection.
@@ -100,6 +103,7 @@ mod tests {
             differences: &differences,
             importances: &importances,
             near,
+            is_free: [true; 2],
             ridge: 0.05,
         };
         let loss = |weights: &[f64; 2]| {
@@ -131,12 +135,20 @@ mod tests {
             differences: &[[-1.0, 0.5, 0.0]; 3],
             importances: &[1.0; 3],
             near: [0.5, 1.0, 2.0],
+            is_free: [true; 3],
             ridge: 0.01,
         };
         let [misleading, useful, unused] = fit.weights();
         assert_eq!(misleading, 0.0);
         assert!(useful > 1.0);
         assert!((unused - 2.0).abs() < 1e-9);
+        let held = Regression {
+            is_free: [false, true, true],
+            ..fit
+        };
+        let [misleading, more_useful, _] = held.weights();
+        assert_eq!(misleading, 0.5);
+        assert!(more_useful > useful);
         assert_eq!(share_right(&[0.0, 1.0, 0.0], fit.differences), 1.0);
         assert_eq!(share_right(&[1.0, 1.0, 0.0], fit.differences), 0.0);
     }
