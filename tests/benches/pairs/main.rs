@@ -41,6 +41,7 @@ const QUICK_DRAWN: usize = 2;
 
 /// Checks the score's weights by pairs of grasps.
 #[derive(Debug, Parser)]
+#[expect(clippy::struct_excessive_bools, reason = "they are flags of a command line")]
 struct Arguments {
     /// Only these objects.
     #[arg(long, value_name = "NAME", value_delimiter = ',', num_args = 1..)]
@@ -101,7 +102,8 @@ fn main() {
         lines: table::lines(&pairs),
         fit: (arguments.fit || arguments.test).then(|| weights::suggest(&pairs)),
     };
-    let folder = folder();
+    // A quick run leaves the page of a full one alone.
+    let folder = folder(if arguments.test { "pairs-test" } else { "pairs" });
     let drawn = if arguments.test {
         QUICK_DRAWN
     } else {
@@ -179,12 +181,10 @@ fn draw(folder: &Path, pairs: &[Pair<'_>], most: usize) {
     page::write(folder, pairs, &chosen, || bar.inc(1)).expect("cargo's target folder can be written");
 }
 
-/// `pairs` in cargo's target folder.
-fn folder() -> PathBuf {
+/// A folder in cargo's target folder.
+fn folder(name: &str) -> PathBuf {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
-    target
-        .expect("cargo's temporary folder has a parent")
-        .join("pairs")
+    target.expect("cargo's temporary folder has a parent").join(name)
 }
 
 /// A progress bar; hidden unless standard error is a terminal, cleared when dropped.

@@ -11,6 +11,9 @@ pub(crate) const LINE_BELOW_HEADER: TableStyle =
 /// The columns of the table.
 const HEADER: [&str; 5] = ["reason", "objects", "pairs", "ranked right", "mean margin"];
 
+/// What stands for a figure of no pairs.
+const NOTHING: &str = "–";
+
 /// The pairs of a reason, or all.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Line {
@@ -31,12 +34,20 @@ impl Line {
             objects: objects.len(),
             pairs: pairs.len(),
             right: pairs.iter().filter(|pair| pair.is_right()).count(),
-            mean_margin: pairs.iter().map(|pair| pair.margin()).sum::<f32>() / pairs.len().max(1) as f32,
+            mean_margin: pairs.iter().map(|pair| pair.margin()).sum::<f32>() / pairs.len() as f32,
         }
     }
 
     fn share_right(&self) -> f64 {
         self.right as f64 / self.pairs as f64
+    }
+
+    fn margin(&self) -> String {
+        if self.pairs == 0 {
+            NOTHING.to_owned()
+        } else {
+            format!("{:.3}", self.mean_margin)
+        }
     }
 }
 
@@ -60,7 +71,7 @@ pub(crate) fn render(lines: &[Line]) -> String {
             line.objects.to_string(),
             line.pairs.to_string(),
             percent(line.share_right()),
-            format!("{:.3}", line.mean_margin),
+            line.margin(),
         ]);
     }
     table.to_string()
@@ -82,7 +93,7 @@ pub(crate) fn empty(header: impl IntoIterator<Item = String>) -> Table {
 /// A share as text; a dash if it is of nothing.
 pub(crate) fn percent(share: f64) -> String {
     if share.is_nan() {
-        "–".to_owned()
+        NOTHING.to_owned()
     } else {
         format!("{:.1} %", 100.0 * share)
     }
@@ -92,12 +103,12 @@ pub(crate) fn percent(share: f64) -> String {
 pub(crate) fn html_rows(lines: &[Line]) -> String {
     let row = |line: &Line| {
         format!(
-            "<tr><td>{}<td>{}<td>{}<td>{}<td>{:.3}\n",
+            "<tr><td>{}<td>{}<td>{}<td>{}<td>{}\n",
             line.reason,
             line.objects,
             line.pairs,
             percent(line.share_right()),
-            line.mean_margin
+            line.margin()
         )
     };
     let header = format!("<tr><th>{}\n", HEADER.join("<th>"));

@@ -49,14 +49,23 @@ const OBJECTS: [Entry; 36] = [
     ("torch", &[], &[]),
     ("remote", &[], &[]),
     ("banana", &[], &[]),
-    ("scissors", &[], &[]),
+    ("can", &[], &[]),
     ("key", &[], &[]),
     ("dumbbell", &[], &[]),
     ("brick", &[], &[]),
 ];
 
 /// Objects whose shape says enough for a test that takes little time.
-const FEW: [&str; 5] = ["hammer", "kitchen-knife", "large-bottle", "ruler", "remote"];
+const FEW: [&str; 8] = [
+    "hammer",
+    "pan",
+    "kettle",
+    "kitchen-knife",
+    "large-bottle",
+    "ruler",
+    "remote",
+    "scalpel",
+];
 
 /// What a triangle of an object belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,8 +155,13 @@ pub fn labelled_objects() -> Vec<LabelledObject> {
 
 /// A few of [`labelled_objects`].
 pub fn few_labelled_objects() -> Vec<LabelledObject> {
-    let few = OBJECTS.into_iter().filter(|(name, ..)| FEW.contains(name));
-    few.map(labelled).collect()
+    FEW.into_iter().filter_map(labelled_object).collect()
+}
+
+/// One of [`labelled_objects`] by its name.
+pub fn labelled_object(name: &str) -> Option<LabelledObject> {
+    let entry = OBJECTS.into_iter().find(|(own, ..)| *own == name);
+    entry.map(labelled)
 }
 
 fn labelled((name, handles, blades): Entry) -> LabelledObject {
@@ -171,7 +185,7 @@ fn labelled((name, handles, blades): Entry) -> LabelledObject {
     let everyday = everyday.unwrap_or_else(|| panic!("there is no {name}"));
     let about = About {
         mass: everyday.mass_kg() as f32,
-        centre_of_mass: everyday.centre_of_mass().map(|centre| centre.as_vec3()),
+        centre_of_mass: everyday.centre_of_mass().map(DVec3::as_vec3),
         friction: Some(everyday.surface.friction() as f32),
         usual_up: Vec3::Y,
     };
@@ -215,7 +229,7 @@ mod tests {
 
     #[test]
     fn centroid_of_a_brick_is_its_middle() {
-        let brick = labelled(("brick", &[], &[]));
+        let brick = labelled_object("brick").unwrap();
         assert!(brick.object.centre_of_mass.length() < 1e-6);
     }
 }

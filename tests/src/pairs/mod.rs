@@ -10,3 +10,6 @@ pub mod gathering;
 pub mod pairing;
 pub mod reasons;
 pub mod regression;
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,7 @@
 //! Why a person would not choose a grasp, by rules that read joints, contacts and named parts alone.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
 use glam::Vec3;
 use grasp_synthesis::{
     geometry::aabb::Aabb,
@@ -287,7 +289,7 @@ fn forearm(hand: &HandJoints) -> Vec3 {
 /// Where a hand moves to take something: between where its fingers point and where its palm faces.
 fn approach(hand: &HandJoints) -> Vec3 {
     let wrist = hand.joints[index::WRIST].pose;
-    wrist.transform_vector(Vec3::new(0.0, -1.0, -1.0).normalize())
+    wrist.transform_vector(Vec3::new(0.0, -FRAC_1_SQRT_2, -FRAC_1_SQRT_2))
 }
 
 /// The angle between a direction and a line, both unit vectors, in degrees: at most 90.

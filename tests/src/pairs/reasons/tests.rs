@@ -11,7 +11,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::*;
-use crate::pairs::catalogue::About;
+use crate::pairs::catalogue::{About, labelled_object};
 
 /// Triangles of a box in its OBJ text.
 const OF_BOX: u32 = 12;
@@ -208,7 +208,7 @@ fn long_things_are_taken_across() {
     assert_eq!(of(&plain, ahead, down), Verdict::Implausible);
     assert_eq!(of(&plain, Vec3::Z, Vec3::NEG_Y), Verdict::Plausible);
     assert_eq!(
-        of(&plain, Vec3::X, Vec3::new(0.0, -1.0, 0.0)),
+        of(&plain, Vec3::new(1.0, 0.2, 0.0), Vec3::NEG_Y),
         Verdict::Implausible
     );
     assert_eq!(
@@ -223,6 +223,18 @@ fn long_things_are_taken_across() {
     let giver = distant_giver();
     let held = Rules::new(&plain, Some(&giver), Vec3::Y).verdicts(&usual(), &contacts(2, 2));
     assert_eq!(held.of(Reason::EndOn), Verdict::Inapplicable);
+}
+
+#[test]
+fn the_handle_says_what_is_across() {
+    let long_axis = |name| Rules::new(&labelled_object(name).unwrap(), None, Vec3::Y).long_axis;
+    assert_eq!(long_axis("hammer"), Some(Vec3::X));
+    // A saw's handle is a ring at its end.
+    assert_eq!(long_axis("saw"), None);
+    assert_eq!(long_axis("large-bottle"), Some(Vec3::Y));
+    assert_eq!(long_axis("brick"), Some(Vec3::X));
+    // Short things are pinched from anywhere.
+    assert_eq!(long_axis("key"), None);
 }
 
 #[test]
