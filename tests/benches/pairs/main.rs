@@ -56,7 +56,7 @@ struct Arguments {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Pairs on the page: those ranked wrong, then others.
-    #[arg(long, default_value_t = 300)]
+    #[arg(long, default_value_t = 200)]
     drawn: usize,
     /// Suggest weights.
     #[arg(long)]

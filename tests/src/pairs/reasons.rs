@@ -34,7 +34,7 @@ const ON_BLADE: [f32; 2] = [0.25, 0.0];
 const ACROSS: [f32; 2] = [45.0, 65.0];
 
 /// An object is long if its longest side is at least this many times the next, and in metres; a handle, by the first alone.
-const LONG: (f32, f32) = (1.6, 0.1);
+const LONG: (f32, f32) = (1.6, 0.12);
 
 /// Rises of palm and of the way from wrist to contacts, in degrees over the horizontal.
 const BENEATH: [f32; 2] = [45.0, 15.0];
