@@ -149,11 +149,13 @@ fn gathered(objects: Vec<LabelledObject>, arguments: &Arguments) -> Vec<Gathered
     pool.install(|| {
         objects
             .par_iter()
-            .flat_map_iter(|(number, object)| {
+            .flat_map_iter(|(object_number, object)| {
                 let gathered = offers(object, &hands, givers as usize, arguments.seed)
                     .into_iter()
-                    .map(|offer| Gathered {
-                        object: *number,
+                    .enumerate()
+                    .map(|(number, offer)| Gathered {
+                        object: *object_number,
+                        number,
                         candidates: gather(&pool, &offer, grasps, arguments.seed),
                         offer,
                     })

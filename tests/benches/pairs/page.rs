@@ -115,13 +115,8 @@ fn for_sheet<'a>(chosen: &[&'a Pair<'a>]) -> Vec<&'a Pair<'a>> {
 
 /// The name of a grasp's picture.
 fn file(pair: &Pair<'_>, number: usize) -> String {
-    let offer = &pair.gathered.offer;
-    let giver: String = offer
-        .giver
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-        .collect();
-    format!("{}-{giver}-{number}.png", offer.object.name)
+    let gathered = pair.gathered;
+    format!("{}-{}-{number}.png", gathered.offer.object.name, gathered.number)
 }
 
 fn caption(pair: &Pair<'_>) -> String {

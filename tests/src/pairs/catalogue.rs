@@ -55,7 +55,7 @@ const OBJECTS: [Entry; 36] = [
     ("brick", &[], &[]),
 ];
 
-/// Objects whose shape says enough for a test that takes little time.
+/// Objects of all kinds, few enough for a test.
 const FEW: [&str; 8] = [
     "hammer",
     "pan",

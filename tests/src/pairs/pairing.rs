@@ -17,6 +17,8 @@ pub const MOST_PER_REASON: usize = 6;
 pub struct Gathered {
     /// Number of the object.
     pub object: usize,
+    /// Number of the offer among those of the object.
+    pub number: usize,
     /// The offer.
     pub offer: Offer,
     /// The grasps.

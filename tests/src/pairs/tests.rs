@@ -21,19 +21,21 @@ fn pool() -> rayon::ThreadPool {
 fn weights_rank_most_pairs_right() {
     use rayon::prelude::*;
     let pool = pool();
-    let offers: Vec<(usize, Offer)> = few_labelled_objects()
+    let offers: Vec<(usize, usize, Offer)> = few_labelled_objects()
         .into_iter()
         .enumerate()
         .flat_map(|(number, object)| {
             let object = Arc::new(object);
             let held = Offer::built_in(&object).into_iter().take(2);
             let all: Vec<_> = [Offer::free(&object)].into_iter().chain(held).collect();
-            all.into_iter().map(move |offer| (number, offer))
+            let all = all.into_iter().enumerate();
+            all.map(move |(offer_number, offer)| (number, offer_number, offer))
         })
         .collect();
     let all: Vec<Gathered> = pool.install(|| {
-        let gathered = offers.into_par_iter().map(|(object, offer)| Gathered {
+        let gathered = offers.into_par_iter().map(|(object, number, offer)| Gathered {
             object,
+            number,
             candidates: gather(&pool, &offer, GRASPS, 1),
             offer,
         });

@@ -66,8 +66,8 @@ fn knife(mass: f32, handles: &[&str], blades: &[&str]) -> LabelledObject {
 /// A hand at `wrist` whose fingers point along `fingers` and whose palm faces along `palm`, as far as that is across.
 fn hand_at(wrist: Vec3, fingers: Vec3, palm: Vec3) -> HandJoints {
     let rig = &hand("adult", Handedness::Right).unwrap().rig;
-    let y = fingers.normalize();
-    let z = palm.reject_from(y).normalize();
+    let y = fingers.normalize_or_zero();
+    let z = palm.reject_from(y).normalize_or_zero();
     let pose = HandPose {
         frame_from_wrist: Pose::new(wrist, Quat::from_mat3(&Mat3::from_cols(y.cross(z), y, z))),
         digits: rig.stretched(),
