@@ -28,10 +28,11 @@ img{width:260px;vertical-align:top}\
 .plausible{border:4px solid #2e8b46}.implausible{border:4px solid #c03028}\
 td,th{padding:2px 12px;text-align:right}td:first-child,th:first-child{text-align:left}";
 
-/// Up to `most` pairs: those ranked wrong, then others, one of each reason in turn.
+/// Up to `most` pairs: those ranked wrong, then others, one of each reason in turn. Some are ranked right.
 pub(crate) fn chosen<'a>(pairs: &'a [Pair<'a>], most: usize) -> Vec<&'a Pair<'a>> {
     let mut wrong: Vec<&Pair<'_>> = pairs.iter().filter(|pair| !pair.is_right()).collect();
     wrong.sort_by(|a, b| a.margin().total_cmp(&b.margin()));
+    wrong.truncate(most - (ON_SHEET / 2).min(most / 2));
     let right: Vec<&Pair<'_>> = pairs.iter().filter(|pair| pair.is_right()).collect();
     wrong.into_iter().chain(in_turn(&right)).take(most).collect()
 }
