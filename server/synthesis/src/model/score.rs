@@ -109,19 +109,18 @@ impl Term {
     /// The weight in the mean, relative to the other terms.
     pub const fn weight(self) -> f32 {
         match self {
+            Self::GiverClearance | Self::SterileDistance => 0.5,
             Self::Comfort | Self::Ease => 1.0,
             Self::Pads | Self::SmallSpan => 1.5,
-            Self::SharedFlexion | Self::NearCentre | Self::WristLoad => 2.0,
+            Self::SharedFlexion | Self::WristLoad | Self::AwayFromGiver => 2.0,
             // Weighted by how well they predict which grips survive pushes from all sides in an independent
             // simulation; each is mostly earned at a threshold (see [`crate::rating::scoring`]).
-            Self::EnoughDigits => 4.0,
-            Self::Closure | Self::Steadiness | Self::NaturalType | Self::OffSharp => 6.0,
+            Self::Closure | Self::Steadiness | Self::NaturalType => 6.0,
             Self::FrictionReserve => 8.0,
-            Self::AwayFromGiver => 0.75,
-            Self::GiverClearance | Self::SterileDistance => 0.5,
-            // Where a hand comes from and what it holds are what a person notices first.
-            Self::FromSideOrAbove => 3.0,
-            Self::AcrossLongAxis => 5.0,
+            // Where a hand comes from and what it holds are what a person notices first: weighted by how well they tell hands
+            // that people would choose from others (`tests/src/pairs`).
+            Self::EnoughDigits | Self::NearCentre => 4.0,
+            Self::FromSideOrAbove | Self::AcrossLongAxis | Self::OffSharp => 6.0,
             Self::OnHandle => 10.0,
             Self::Stance => 12.0,
         }
