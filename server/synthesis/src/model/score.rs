@@ -113,14 +113,18 @@ impl Term {
             Self::Comfort | Self::Ease => 1.0,
             Self::Pads | Self::SmallSpan => 1.5,
             Self::SharedFlexion | Self::WristLoad | Self::AwayFromGiver => 2.0,
-            // Weighted by how well they predict which grips survive pushes from all sides in an independent
-            // simulation; each is mostly earned at a threshold (see [`crate::rating::scoring`]).
-            Self::Closure | Self::Steadiness | Self::NaturalType => 6.0,
-            Self::FrictionReserve => 8.0,
-            // Where a hand comes from and what it holds are what a person notices first: weighted by how well they tell hands
-            // that people would choose from others (`tests/src/pairs`).
+            // Firmness is weighted by how well it predicts which grips survive pushes from all sides in an independent
+            // simulation; each of its terms is mostly earned at a threshold (see [`crate::rating::scoring`]). Where a hand comes
+            // from and what it holds are what a person notices first: weighted by how well they tell hands that people would
+            // choose from others (`tests/src/pairs`).
             Self::EnoughDigits | Self::NearCentre => 4.0,
-            Self::FromSideOrAbove | Self::AcrossLongAxis | Self::OffSharp => 6.0,
+            Self::Closure
+            | Self::Steadiness
+            | Self::NaturalType
+            | Self::FromSideOrAbove
+            | Self::AcrossLongAxis
+            | Self::OffSharp => 6.0,
+            Self::FrictionReserve => 8.0,
             Self::OnHandle => 10.0,
             Self::Stance => 12.0,
         }
