@@ -174,7 +174,7 @@ pub fn gather(pool: &rayon::ThreadPool, offer: &Offer, count: usize, seed: u64) 
             continue;
         }
         let Some(mut score) = grasp.score else { continue };
-        score.values[Term::Stance as usize] = receiver.suits(grasp.pose.frame_from_wrist);
+        score.values[Term::Stance as usize] = receiver.suits(rig, grasp.pose.frame_from_wrist);
         let joints = HandJoints::of_pose(rig, &grasp.pose);
         found.push(Candidate {
             verdicts: rules.verdicts(&joints, &grasp.contacts),
