@@ -203,10 +203,24 @@ async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
         }
     };
     let mut replayed = 0;
-    for holdout in givers_of_the_scissors() {
+    // Few givers leave no known grip, so each of them is asked for with several seeds.
+    let searches = givers_of_the_scissors().flat_map(|holdout| {
         let request = reproducible_search(&holdout);
+        (7..12).map(move |seed| v1::FindGraspRequest {
+            seed: Some(seed),
+            ..request.clone()
+        })
+    });
+    let mut answered_by_atlas = None;
+    for request in searches {
+        if answered_by_atlas == request.presenting_hand {
+            continue;
+        }
         let first = ask(&server, request.clone()).await;
         let report = first.report.as_ref().expect("every answer has a report");
+        if report.source() == v1::GraspSource::Atlas {
+            answered_by_atlas = request.presenting_hand.clone();
+        }
         if report.source() != v1::GraspSource::Search {
             continue;
         }
@@ -217,9 +231,9 @@ async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
         assert_eq!((replay.attempts, replay.atlas_entries), (1, 0));
         assert_eq!(replay.atlas_stamp, report.atlas_stamp);
         assert!(!replay.atlas_stamp.is_empty());
-        // Without the atlas, that attempt gives another grasp or, usually, none.
+        // Without the atlas, an attempt that perturbs a known grip gives another grasp or, usually, none.
         let without = ask(&server, replay_of(&request, report, v1::AtlasUse::None)).await;
-        replayed += usize::from(without.grasp.is_none());
+        replayed += usize::from(without.grasp != first.grasp);
         if replayed == 2 {
             break;
         }
