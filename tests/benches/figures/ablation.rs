@@ -25,7 +25,10 @@ use grasp_synthesis::{
     propose::prepared::PreparedRig,
     search::{LookUp, find_grasp, find_known_grasp, scene::Task},
 };
-use grasp_tests::searches::{MonotonicClock, prepared};
+use grasp_tests::{
+    progress::bar,
+    searches::{MonotonicClock, prepared},
+};
 use rand::{SeedableRng as _, seq::SliceRandom as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::ThreadPool;
@@ -34,7 +37,7 @@ use crate::{
     Row,
     core::{CoreSearcher, KnownGrips, LOOK_UP_TIME, WORKERS, settings, thread_time},
     requests::ANSWERED_WITHIN,
-    setting::{Setting, TestObject, bar, built_in_holdouts, default_hand},
+    setting::{Setting, TestObject, built_in_holdouts, default_hand},
     table::{Line, Spread, Unit, time},
 };
 use processor_clock::ProcessorClock;

@@ -2,12 +2,12 @@
 
 use grasp_assets::objects::objects;
 use grasp_proto::v1;
-use grasp_tests::TestServer;
+use grasp_tests::{TestServer, progress::bar};
 
 use crate::{
     Row,
     requests::{Answer, assert_some_found, search_times, send, share},
-    setting::{Setting, TestObject, bar, copy_of},
+    setting::{Setting, TestObject, copy_of},
     table::{Line, Unit},
 };
 

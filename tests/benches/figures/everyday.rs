@@ -3,11 +3,13 @@
 use grasp_everyday::{EverydayObject, Hands, everyday_objects};
 use grasp_proto::v1;
 
+use grasp_tests::progress::bar;
+
 use crate::{
     Row,
     cold::without_atlas,
     requests::{Answer, assert_some_found, search_times, send, share, within_50_ms},
-    setting::{Setting, bar},
+    setting::Setting,
     table::{Line, Target, Unit},
 };
 

@@ -6,14 +6,14 @@ use std::{
 };
 
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
-use grasp_tests::{TestServer, recorded::object_of};
+use grasp_tests::{TestServer, progress::bar, recorded::object_of};
 use tonic::transport::Channel;
 
 use crate::{
     Row,
     ellipsoid::ellipsoid,
     requests::{Answer, round_trips, search_times, send, share, within_50_ms},
-    setting::{Setting, TestObject, atlas_state, bar},
+    setting::{Setting, TestObject, atlas_state},
     table::{Line, Spread, Target, Unit, time},
 };
 

@@ -21,10 +21,11 @@ use grasp_synthesis::{
 };
 use grasp_tests::{
     TestServer,
+    progress::bar,
     random_holdouts::{ClientHoldout, Givers, GivingHand, PlacedGiver, giving_hands, place},
     recorded::data_folder,
 };
-use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
+
 use rand::SeedableRng as _;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
@@ -361,16 +362,4 @@ async fn is_complete(server: &TestServer, name: &str, handedness: v1::Handedness
     let answer = server.grasps().await.find_grasp(request).await;
     let report = answer.expect("the request is valid").into_inner().report;
     report.is_some_and(|report| report.atlas_entries > 0)
-}
-
-/// A progress bar; hidden unless standard error is a terminal, cleared when dropped.
-pub(crate) fn bar(steps: usize, message: String) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:32} {pos:>5}/{len} {elapsed:>4} {msg}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(steps as u64)
-        .with_style(style)
-        .with_message(message)
-        .with_finish(ProgressFinish::AndClear);
-    bar.enable_steady_tick(Duration::from_millis(100));
-    bar
 }

@@ -1,12 +1,12 @@
 //! Whole calls over gRPC on loopback, alternating with an echo of the same sizes.
 
-use grasp_tests::TestServer;
+use grasp_tests::{TestServer, progress::bar};
 
 use crate::{
     Row,
     echo::EchoServer,
     requests::{Answer, round_trips, search_times, send, within_50_ms},
-    setting::{Setting, TestObject, bar},
+    setting::{Setting, TestObject},
     table::{Line, Spread, Target, Unit, time},
 };
 

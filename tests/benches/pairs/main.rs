@@ -14,7 +14,6 @@ use std::{
     path::{Path, PathBuf},
     sync::Arc,
     thread,
-    time::Duration,
 };
 
 use clap::Parser;
@@ -24,9 +23,9 @@ use grasp_tests::{
         gathering::{Offer, gather},
         pairing::{Gathered, Pair, pairs},
     },
+    progress::bar,
     random_holdouts::{GivingHand, giving_hands},
 };
-use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -187,16 +186,4 @@ fn draw(folder: &Path, pairs: &[Pair<'_>], most: usize) {
 fn folder(name: &str) -> PathBuf {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
     target.expect("cargo's temporary folder has a parent").join(name)
-}
-
-/// A progress bar; hidden unless standard error is a terminal, cleared when dropped.
-fn bar(steps: usize, message: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:32} {pos:>5}/{len} {elapsed:>4} {msg}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(steps as u64)
-        .with_style(style)
-        .with_message(message)
-        .with_finish(ProgressFinish::AndClear);
-    bar.enable_steady_tick(Duration::from_millis(100));
-    bar
 }

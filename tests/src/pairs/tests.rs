@@ -10,7 +10,7 @@ use super::{
 /// Grasps of each object.
 const GRASPS: usize = 16;
 
-/// Least share of the pairs that the weights have to rank right. They do so with 79 % here, and with 82 % for all objects.
+/// Least share of the pairs that the weights have to rank right. `tests/README.md` has the share of all objects.
 const LEAST_RIGHT: f32 = 0.75;
 
 fn pool() -> rayon::ThreadPool {

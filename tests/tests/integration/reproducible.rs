@@ -233,7 +233,7 @@ async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
         assert!(!replay.atlas_stamp.is_empty());
         // Without the atlas, an attempt that perturbs a known grip gives another grasp or, usually, none.
         let without = ask(&server, replay_of(&request, report, v1::AtlasUse::None)).await;
-        replayed += usize::from(without.grasp != first.grasp);
+        replayed += usize::from(without.grasp.is_none());
         if replayed == 2 {
             break;
         }

@@ -83,14 +83,15 @@ pub(super) fn elbows(
     } else {
         (SWIVEL_RANGE, MAX_RISE)
     };
+    let (wrist_from_frame, range) = (wrist.inverse(), WristRange::of(rig.handedness));
     (0..count).filter_map(move |index| {
         let share = index as f32 / (SWIVELS - 1) as f32;
         let swivel = innermost + share * (outermost - innermost);
         let (sin, cos) = (outward * swivel).sin_cos();
         let elbow = shoulder + toward * along + (hanging * cos + out * sin) * radius;
-        let back = wrist.inverse().transform_vector(elbow - wrist.position);
+        let back = wrist_from_frame.transform_vector(elbow - wrist.position);
         let is_raised = (elbow - shoulder).dot(up) > max_rise * upper_arm;
-        if is_raised || !wrist_allows(rig.handedness, back) {
+        if is_raised || !range.allows(back) {
             return None;
         }
         let (flexion, deviation) = wrist_angles(rig.handedness, back);
@@ -133,16 +134,35 @@ fn little(handedness: Handedness, direction: Vec3) -> f32 {
     }
 }
 
-/// True if a wrist bends so far that its forearm goes in a direction in the wrist's frame.
+/// The directions in which a forearm may go in the wrist's frame.
 ///
 /// Each of flexion and deviation is measured as the other axis shows it, straight from behind, so that both are in range
 /// whichever of them comes first.
-fn wrist_allows(handedness: Handedness, back: Vec3) -> bool {
-    let is_between =
-        |part: f32, [least, most]: [f32; 2]| part >= least.tan() * -back.y && part <= most.tan() * -back.y;
-    back.y < 0.0
-        && is_between(back.z, [-EXTENSION, FLEXION])
-        && is_between(little(handedness, back), [-TOWARD_THUMB, TOWARD_LITTLE])
+#[derive(Clone, Copy)]
+struct WristRange {
+    handedness: Handedness,
+    /// Tangents of the least and the largest angle.
+    flexion: [f32; 2],
+    deviation: [f32; 2],
+}
+
+impl WristRange {
+    fn of(handedness: Handedness) -> Self {
+        Self {
+            handedness,
+            flexion: [-EXTENSION, FLEXION].map(f32::tan),
+            deviation: [-TOWARD_THUMB, TOWARD_LITTLE].map(f32::tan),
+        }
+    }
+
+    /// True if the wrist bends so far that its forearm goes in a direction.
+    fn allows(&self, back: Vec3) -> bool {
+        let is_between =
+            |part: f32, [least, most]: [f32; 2]| part >= least * -back.y && part <= most * -back.y;
+        back.y < 0.0
+            && is_between(back.z, self.flexion)
+            && is_between(little(self.handedness, back), self.deviation)
+    }
 }
 
 /// Forearm and upper arm as solids, in the arm's frame. The forearm starts some way behind the wrist, where the hand's own

@@ -138,23 +138,25 @@ struct Grading<'a> {
 }
 
 impl Grading<'_> {
-    /// The grade of a grip with this forearm. The entry is looked at only if it matters.
-    fn grade(&self, forearm: Vec3, entry: &Entry) -> Grade {
-        let mut suits = self.receiver.suits_forearm(forearm);
-        if suits >= SUITABLE {
-            suits = self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist);
+    /// True if a grip with this forearm has a grade. What takes longest is looked at only if it matters.
+    fn has(&self, grade: Grade, forearm: Vec3, entry: &Entry) -> bool {
+        let suits = self.receiver.suits_forearm(forearm);
+        if suits < SUITABLE {
+            return grade
+                == if suits <= 0.0 {
+                    Grade::Valid
+                } else {
+                    Grade::Possible
+                };
         }
-        if suits <= 0.0 {
-            Grade::Valid
-        } else if suits < SUITABLE {
-            Grade::Possible
-        } else if self
-            .preference
-            .is_met_by_grip(&entry.grip_values, entry.classification, false)
-        {
-            Grade::Chosen
-        } else {
-            Grade::Suitable
+        let preference = self.preference;
+        let is_chosen = || preference.is_met_by_grip(&entry.grip_values, entry.classification, false);
+        let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
+        match grade {
+            Grade::Chosen => is_chosen() && is_reached(),
+            Grade::Suitable => !is_chosen() && is_reached(),
+            Grade::Possible => !is_reached(),
+            Grade::Valid => false,
         }
     }
 
@@ -239,9 +241,9 @@ impl<'a> KnownGrips<'a> {
         let (Some(grading), Some(atlas)) = (&self.grading, self.atlas) else {
             return true;
         };
+        let grade = grading.grades()[pass];
         let index = usize::from(index);
-        let grade = grading.grade(atlas.grips().forearms()[index], &atlas.entries()[index]);
-        grade == grading.grades()[pass]
+        grading.has(grade, atlas.grips().forearms()[index], &atlas.entries()[index])
     }
 
     /// The number of grips in the atlas.
@@ -295,9 +297,6 @@ impl<'a> KnownGrips<'a> {
         }
         let (pass, index) = (place / self.order.len(), self.order[place % self.order.len()]);
         let atlas = self.atlas?;
-        if !self.has_grade(index, pass) {
-            return None;
-        }
         if let Some(giver) = self.barriers.giver
             && self.mechanisms.has(Mechanism::CellOccupancy)
         {
@@ -305,6 +304,9 @@ impl<'a> KnownGrips<'a> {
             if excluded.contains(index) {
                 return None;
             }
+        }
+        if !self.has_grade(index, pass) {
+            return None;
         }
         if self.barriers.is_empty() || !self.mechanisms.has(Mechanism::InnerSpheres) {
             let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);

@@ -11,18 +11,10 @@ use crate::{
     physical::{barriers::Barriers, receiver::SUITABLE},
 };
 
-/// Least steadiness of a firm hold. With less, four in five are lost to pushes as strong as the object's weight, in an independent
-/// simulation; with more, one in eight.
-const STEADY: f32 = 0.3;
-
-/// Least values of terms without which people would take an object otherwise: first of terms that depend on hand and object
-/// alone, then of the others.
-const LEAST_OF_GRIP: [(Term, f32); 4] = [
-    (Term::Steadiness, STEADY),
-    (Term::EnoughDigits, 0.65),
-    (Term::AcrossLongAxis, 0.5),
-    (Term::OffSharp, 1.0),
-];
+/// Least values of terms without which people would take an object otherwise. With less steadiness, two in three are lost to
+/// pushes as strong as the object's weight in an independent simulation; with more, one in ten.
+const LEAST_OF_CLOSED_HAND: [(Term, f32); 2] = [(Term::Steadiness, 0.3), (Term::EnoughDigits, 0.65)];
+const LEAST_OF_GRIP: [(Term, f32); 2] = [(Term::AcrossLongAxis, 0.5), (Term::OffSharp, 1.0)];
 const LEAST_AS_PRESENTED: [(Term, f32); 3] = [
     (Term::Stance, SUITABLE),
     (Term::FromSideOrAbove, 0.2),
@@ -71,13 +63,9 @@ impl Preference {
 
     /// True if a person would choose such a grip, as far as hand and object alone tell.
     pub(super) fn is_met_by_grip(self, values: &Values, classification: Classification, hangs: bool) -> bool {
-        let least = if hangs {
-            &LEAST_OF_GRIP[2..]
-        } else {
-            &LEAST_OF_GRIP
-        };
         classification.is_clear()
-            && reach(values, least)
+            && reach(values, &LEAST_OF_GRIP)
+            && (hangs || reach(values, &LEAST_OF_CLOSED_HAND))
             && (!self.wants_handle || values[Term::OnHandle as usize] >= HELD_BY_HANDLE)
     }
 }
