@@ -174,7 +174,6 @@ def objects(tmp_path):
     (folder / "my-remote.toml").write_text(
         f"mass_kg = {about['mass_kg']}\n"
         f"centre_of_mass = {about['centre_of_mass_m']}\n"
-        f"friction = {about['friction']}\n"
         f"forbidden = {{ groups = {about['forbidden_groups']} }}\n"
     )
     # Independent of this process' umask.

@@ -90,8 +90,8 @@ def test_serves_a_mounted_folder_of_objects(start, objects, tmp_path):
     found = []
     for name in ("objects/my-remote", "objects/remote"):
         request = tmp_path / "request.json"
-        # Only the built-in one has an atlas by now, and their friction differs.
-        asked = {"object": name, "seed": "3", "reproducible": True, "atlas": "none", "friction": 0.6}
+        # Only the built-in one has an atlas by now.
+        asked = {"object": name, "seed": "3", "reproducible": True, "atlas": "none"}
         request.write_text(json.dumps({**asked, "budget_seconds": 10}))
         answer = grasp(service.address(), "find", "--request", request, "--json")
         assert answer.returncode == 0, answer.stderr
