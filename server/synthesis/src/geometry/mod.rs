@@ -20,6 +20,7 @@ mod stack_entry;
 pub mod surface_samples;
 pub mod tapered_capsule;
 pub mod topology;
+mod wedges;
 mod wide_bvh;
 
 use glam::Vec3;

@@ -6,7 +6,9 @@ use glam::{IVec3, Vec3};
 
 use super::{
     mesh::TriangleMesh,
+    mesh_bvh::MeshBvh,
     topology::{DisjointSets, EdgeUse, sorted_edges},
+    wedges::worn_edges,
 };
 
 /// Cosine of the angle between the outward normals of two faces beyond which the edge between them is sharp: the faces enclose
@@ -37,8 +39,9 @@ pub struct SharpFeatures {
 }
 
 impl SharpFeatures {
-    /// Finds the sharp edges and points of a mesh; O(n log n).
-    pub fn of(mesh: &TriangleMesh) -> Self {
+    /// Finds the sharp edges and points of a surface; O(n log n).
+    pub fn of(surface: &MeshBvh) -> Self {
+        let mesh = surface.mesh();
         let mut sharp = Self::default();
         let edges = sorted_edges(mesh);
         let sharp_edges: Vec<[u32; 2]> = edges
@@ -64,7 +67,7 @@ impl SharpFeatures {
                 sharp.add(at(a), at(b));
             }
         }
-        for point in points(mesh, &edges) {
+        for point in points(mesh, &edges).into_iter().chain(worn_edges(surface)) {
             sharp.add(point, point);
         }
         sharp

@@ -52,7 +52,6 @@ pub struct Parts {
 impl Parts {
     /// Finds the parts; takes some milliseconds.
     pub(super) fn of(object: &GraspObject) -> Self {
-        let mesh = object.surface.mesh();
         let is_forbidden = |triangle: u32| object.is_forbidden(triangle);
         let handles = Handles::of(&object.surface, is_forbidden);
         let share = share_on(&handles, object);
@@ -73,7 +72,7 @@ impl Parts {
                 && (least..=most).contains(&share)
                 && main >= LEAST_PLACES
                 && radii >= LEAST_RADIUS * main as f32,
-            sharp: SharpFeatures::of(mesh),
+            sharp: SharpFeatures::of(&object.surface),
             handles,
             long_axis: axis.normalize_or(Vec3::Y),
             is_long: ((ratio - LONG[0]) / (LONG[1] - LONG[0])).clamp(0.0, 1.0),

@@ -119,14 +119,14 @@ impl Term {
             // choose from others (`tests/src/pairs`).
             Self::EnoughDigits | Self::NearCentre => 4.0,
             Self::Closure
-            | Self::Steadiness
             | Self::NaturalType
             | Self::FromSideOrAbove
             | Self::AcrossLongAxis
             | Self::OffSharp => 6.0,
-            Self::FrictionReserve => 8.0,
-            Self::OnHandle => 10.0,
+            Self::Steadiness => 10.0,
+            Self::FrictionReserve => 10.0,
             Self::Stance => 12.0,
+            Self::OnHandle => 13.0,
         }
     }
 

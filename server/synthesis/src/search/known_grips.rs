@@ -121,6 +121,8 @@ pub(super) enum TryResult {
 enum Grade {
     /// Its forearm comes from there, and people would take the object so.
     Chosen,
+    /// Its forearm comes from there, and it holds what people would hold, firmly.
+    Firm,
     /// Its forearm comes from there.
     Suitable,
     /// Its forearm comes roughly from there.
@@ -150,11 +152,14 @@ impl Grading<'_> {
                 };
         }
         let preference = self.preference;
-        let is_chosen = || preference.is_met_by_grip(&entry.grip_values, entry.classification, false);
+        let values = &entry.grip_values;
+        let is_chosen = || preference.is_met_by_grip(values, entry.classification, false);
+        let is_firm = || preference.is_firm(values);
         let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
         match grade {
             Grade::Chosen => is_chosen() && is_reached(),
-            Grade::Suitable => !is_chosen() && is_reached(),
+            Grade::Firm => is_firm() && !is_chosen() && is_reached(),
+            Grade::Suitable => !is_firm() && is_reached(),
             Grade::Possible => !is_reached(),
             Grade::Valid => false,
         }
@@ -163,9 +168,15 @@ impl Grading<'_> {
     /// The grades that there are, best first: all grips are passed once for each.
     fn grades(&self) -> &'static [Grade] {
         if self.receiver.is_expected() {
-            &[Grade::Chosen, Grade::Suitable, Grade::Possible, Grade::Valid]
+            &[
+                Grade::Chosen,
+                Grade::Firm,
+                Grade::Suitable,
+                Grade::Possible,
+                Grade::Valid,
+            ]
         } else {
-            &[Grade::Chosen, Grade::Suitable]
+            &[Grade::Chosen, Grade::Firm, Grade::Suitable]
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::{
 /// pushes as strong as the object's weight in an independent simulation; with more, one in ten.
 const LEAST_OF_CLOSED_HAND: [(Term, f32); 2] = [(Term::Steadiness, 0.3), (Term::EnoughDigits, 0.65)];
 const LEAST_OF_GRIP: [(Term, f32); 2] = [(Term::AcrossLongAxis, 0.5), (Term::OffSharp, 1.0)];
+const LEAST_OF_FIRM_GRIP: [(Term, f32); 2] = [(Term::Steadiness, 0.3), (Term::OffSharp, 1.0)];
 const LEAST_AS_PRESENTED: [(Term, f32); 3] = [
     (Term::Stance, SUITABLE),
     (Term::FromSideOrAbove, 0.2),
@@ -66,7 +67,18 @@ impl Preference {
         classification.is_clear()
             && reach(values, &LEAST_OF_GRIP)
             && (hangs || reach(values, &LEAST_OF_CLOSED_HAND))
-            && (!self.wants_handle || values[Term::OnHandle as usize] >= HELD_BY_HANDLE)
+            && self.has_handle(values)
+    }
+
+    /// True if a grip holds firmly what people would hold, though they may prefer another hand. All that
+    /// [`Self::is_met_by_grip`] accepts are firm, but for hooks.
+    pub(super) fn is_firm(self, values: &Values) -> bool {
+        reach(values, &LEAST_OF_FIRM_GRIP) && self.has_handle(values)
+    }
+
+    /// True unless a handle is free and the contacts of a grip are off it.
+    fn has_handle(self, values: &Values) -> bool {
+        !self.wants_handle || values[Term::OnHandle as usize] >= HELD_BY_HANDLE
     }
 }
 
