@@ -1,17 +1,121 @@
-//! Reads meshes from untrusted bytes.
+//! Reads meshes from untrusted bytes: OBJ, STL, PLY, and glTF with its buffers inside, recognised by their content.
 //!
 //! One module per format. Each reader is given [`MeshLimits`] and keeps to them:
 //! - Memory stays proportional to the bytes within the limits, whatever counts and sizes the file claims.
-//! - No file is opened and no network is used: references to other files are ignored.
-//! - Every violation is reported with its place in the file, up to a bounded number; nothing panics.
+//! - No file is opened and no network is used: references to other files are ignored or refused by name.
+//! - Violations are reported with their places in the file, up to a bounded number; nothing panics.
 //!
-//! What a reader accepts is welded and checked: see [`obj::ObjMesh`].
+//! What a reader returns is split into triangles, welded and checked in the same way: see [`read_mesh`].
 
+mod clean;
 mod ears;
 mod edges;
+mod error;
+mod faces;
+mod foreign;
+mod format;
+mod gltf;
 mod limits;
-pub mod obj;
+mod obj;
+mod ply;
 mod polygon;
+mod raw;
+mod stl;
 mod weld;
 
+use glam::Vec3;
+use grasp_synthesis::geometry::mesh::TriangleMesh;
+
+pub use error::ImportError;
 pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
+pub use obj::MAX_NAMES_PER_LINE;
+
+use format::Format;
+
+/// The axis that points up in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +Y, as in glTF and in the service.
+    #[default]
+    Y,
+    /// +Z, as modelling tools and CAD have it: (x, y, z) becomes (x, z, −y).
+    Z,
+}
+
+/// How the coordinates of a file become those of an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Import {
+    /// The length of one unit of the file, in metres.
+    pub unit_metres: f32,
+    /// The axis that points up in the file.
+    pub up_axis: UpAxis,
+}
+
+impl Import {
+    /// Of a file in metres, with +Y up.
+    pub const METRES: Self = Self::with_unit(1.0);
+
+    /// Of a file whose unit has a length in metres, with +Y up.
+    pub const fn with_unit(unit_metres: f32) -> Self {
+        Self {
+            unit_metres,
+            up_axis: UpAxis::Y,
+        }
+    }
+
+    /// A position of the file in the object's frame, in metres.
+    fn metres_from_file(self, position: Vec3) -> Vec3 {
+        let Vec3 { x, y, z } = position * self.unit_metres;
+        match self.up_axis {
+            UpAxis::Y => Vec3::new(x, y, z),
+            UpAxis::Z => Vec3::new(x, z, -y),
+        }
+    }
+}
+
+/// A mesh and the names of its parts.
+#[derive(Clone, Debug)]
+pub struct ImportedMesh {
+    /// Vertices (welded, in order of first use) and triangles (in the file's order, n - 2 for a polygon of n corners; the
+    /// fan from its first corner if that one sees all others), in metres with +Y up.
+    pub mesh: TriangleMesh,
+    /// For each triangle, its index in the file, counted from 0 after polygons are split and before triangles are
+    /// dropped; ascending.
+    pub indices_in_file: Vec<u32>,
+    /// Number of triangles in the file, dropped ones included.
+    pub triangles_in_file: usize,
+    /// The triangles of each name, ascending; sorted by name. Names are those of groups (`g`), objects (`o`) and materials
+    /// (`usemtl`) of OBJ, of solids of STL, and of nodes, meshes and materials of glTF.
+    pub groups: Vec<(String, Vec<u32>)>,
+    /// Defects that do not prevent use: dropped triangles, unused vertices, open edges and the like.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a mesh.
+///
+/// Polygons are split into triangles that cover them once; only one that intersects itself becomes a fan that overlaps, with
+/// a warning. Vertices at equal positions are welded. A closed mesh that is inside out is turned, with a warning.
+///
+/// # Errors
+/// Every violation; see [`ImportError`]. Beyond 16 they are only counted.
+pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<ImportedMesh, Vec<ImportError>> {
+    let unit = import.unit_metres;
+    if !(unit.is_finite() && unit > 0.0) {
+        return Err(vec![ImportError::Unit(unit)]);
+    }
+    if bytes.len() > limits.bytes {
+        return Err(vec![ImportError::TooLong {
+            bytes: bytes.len(),
+            limit: limits.bytes,
+        }]);
+    }
+    let raw = match Format::of(bytes) {
+        Format::Obj => obj::read(bytes, unit, limits)?,
+        Format::StlText => stl::read_text(bytes, limits)?,
+        Format::StlBinary => stl::read_binary(bytes, limits)?,
+        Format::Ply => ply::read(bytes, limits)?,
+        Format::Gltf => gltf::read(bytes, limits)?,
+    };
+    raw.check_coordinates(unit)?;
+    clean::clean(&raw, import)
+}

@@ -4,8 +4,10 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 
-/// Scales positions to metres and merges equal ones; returns them with the new index of each vertex.
-pub(crate) fn weld(coordinates: &[f32], unit_metres: f32) -> (Vec<Vec3>, Vec<u32>) {
+use crate::Import;
+
+/// Scales positions to metres, turns +Y up and merges equal ones; returns them with the new index of each vertex.
+pub(crate) fn weld(coordinates: &[f32], import: Import) -> (Vec<Vec3>, Vec<u32>) {
     let mut known = HashMap::new();
     let mut positions = Vec::new();
     let indices = coordinates
@@ -14,7 +16,7 @@ pub(crate) fn weld(coordinates: &[f32], unit_metres: f32) -> (Vec<Vec3>, Vec<u32
         .iter()
         .map(|&[x, y, z]: &[f32; 3]| {
             // Adding zero turns −0 into 0, so that equal numbers have equal bits.
-            let position = Vec3::new(x, y, z) * unit_metres + Vec3::ZERO;
+            let position = import.metres_from_file(Vec3::new(x, y, z)) + Vec3::ZERO;
             *known
                 .entry(position.to_array().map(f32::to_bits))
                 .or_insert_with(|| {

@@ -8,7 +8,7 @@ const STATEMENTS: [&[u8]; 12] = [
 ];
 
 /// Whether a line that starts with the word is a statement of OBJ.
-pub(super) fn is_statement(word: &[u8]) -> bool {
+pub(crate) fn is_statement(word: &[u8]) -> bool {
     STATEMENTS.contains(&word)
 }
 
@@ -16,13 +16,13 @@ pub(super) fn is_statement(word: &[u8]) -> bool {
 ///
 /// A line ends with a line feed, a carriage return, or both in this order.
 #[derive(Debug)]
-pub(super) struct Lines<'a> {
+pub(crate) struct Lines<'a> {
     rest: Option<&'a [u8]>,
     number: usize,
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn of(text: &'a [u8]) -> Self {
+    pub(crate) fn of(text: &'a [u8]) -> Self {
         Self {
             rest: Some(text),
             number: 0,
@@ -89,14 +89,14 @@ fn has_comment(line: &[u8]) -> bool {
 }
 
 /// The words of a line, up to a comment.
-pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     line.split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty())
         .take_while(|word| word[0] != b'#')
 }
 
 /// A word for a message: truncated, and with invalid UTF-8 replaced.
-pub(super) fn shown(word: &[u8]) -> String {
+pub(crate) fn shown(word: &[u8]) -> String {
     const SHOWN_BYTES: usize = 32;
     let cut = &word[..word.len().min(SHOWN_BYTES)];
     let mut text = String::from_utf8_lossy(cut).into_owned();

@@ -1,44 +1,17 @@
 //! The first pass over OBJ text: enforces limits, collects violations and groups, writes plain text for `tobj`.
 
-use std::{
-    collections::{BTreeMap, HashMap},
-    ops::Range,
-};
+use std::collections::HashMap;
 
 use super::{
     MAX_NAMES_PER_LINE,
-    error::{ObjError, Violations},
     lines::{Lines, shown, words},
     seven_numbers::SevenNumbers,
 };
-use crate::limits::{MAX_COORDINATE_METRES, MeshLimits};
-
-/// A face of three or more corners.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Face {
-    /// Its line, counted from 1.
-    pub(super) line: usize,
-    /// Number of corners, at least 3.
-    pub(super) corners: usize,
-    /// Index of its names in [`Scan::name_sets`].
-    names: usize,
-}
-
-/// How often something occurred, and on which line first.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Occurrences {
-    pub(super) count: usize,
-    pub(super) first_line: usize,
-}
-
-impl Occurrences {
-    pub(super) fn note(&mut self, line: usize) {
-        if self.count == 0 {
-            self.first_line = line;
-        }
-        self.count += 1;
-    }
-}
+use crate::{
+    error::{ImportError, Violations},
+    limits::{MAX_COORDINATE_METRES, MeshLimits},
+    raw::{NameSets, Occurrences, RawFace},
+};
 
 /// Result of the first pass.
 #[derive(Debug, Default)]
@@ -46,7 +19,7 @@ pub(super) struct Scan {
     /// Text for `tobj`: only `v` with 3 or 4 numbers and `f` with positive vertex indices.
     pub(super) plain: String,
     /// The faces of `plain`.
-    pub(super) faces: Vec<Face>,
+    pub(super) faces: Vec<RawFace>,
     /// Number of triangles of those faces.
     pub(super) triangles: usize,
     /// Number of vertices in `plain`.
@@ -57,17 +30,13 @@ pub(super) struct Scan {
     pub(super) unknown: Occurrences,
     /// How vertices were read, where that may surprise.
     pub(super) warnings: Vec<String>,
-    /// Names by index.
-    names: Vec<String>,
-    /// Sets of names shared by faces, as ranges of `listed_names`.
-    name_sets: Vec<Range<usize>>,
-    /// Indices into `names`, set after set.
-    listed_names: Vec<u32>,
+    /// The names of the faces.
+    pub(super) names: NameSets,
 }
 
 impl Scan {
     /// Scans the text; allocates in proportion to what was read within the limits.
-    pub(super) fn of(text: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<Self, Vec<ObjError>> {
+    pub(super) fn of(text: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<Self, Vec<ImportError>> {
         let mut scanner = Scanner {
             text,
             unit_metres,
@@ -81,6 +50,7 @@ impl Scan {
             names: HashMap::new(),
             current: Names::default(),
             names_changed: true,
+            names_of_faces: 0,
         };
         for (number, line) in Lines::of(text) {
             scanner.line(number, &line);
@@ -89,31 +59,6 @@ impl Scan {
             }
         }
         scanner.finish()
-    }
-
-    /// The error for a mesh without triangles, of which `without_area` were dropped for their area.
-    pub(super) fn empty(&self, without_area: usize) -> ObjError {
-        ObjError::Empty {
-            dropped: self.without_area.count + without_area,
-            unknown: self.unknown.count,
-        }
-    }
-
-    /// The triangles of each name; `faces[t]` is the face of triangle t.
-    pub(super) fn groups(&self, faces: &[usize]) -> Vec<(String, Vec<u32>)> {
-        let mut groups = BTreeMap::<&str, Vec<u32>>::new();
-        for (triangle, &face) in faces.iter().enumerate() {
-            for &name in &self.listed_names[self.name_sets[self.faces[face].names].clone()] {
-                groups
-                    .entry(&self.names[name as usize])
-                    .or_default()
-                    .push(triangle as u32);
-            }
-        }
-        groups
-            .into_iter()
-            .map(|(name, triangles)| (name.to_owned(), triangles))
-            .collect()
     }
 }
 
@@ -142,6 +87,8 @@ struct Scanner<'t> {
     names: HashMap<String, u32>,
     current: Names,
     names_changed: bool,
+    /// The set of names that faces have from here on.
+    names_of_faces: usize,
 }
 
 impl Scanner<'_> {
@@ -168,7 +115,7 @@ impl Scanner<'_> {
         if self.scan.vertices == self.limits.vertices {
             self.over_limit = true;
             let limit = self.limits.vertices;
-            return self.violations.push(ObjError::TooManyVertices { line, limit });
+            return self.violations.push(ImportError::TooManyVertices { line, limit });
         }
         self.scan.vertices += 1;
         // Three coordinates, then a weight or a colour, which is ignored.
@@ -181,7 +128,7 @@ impl Scanner<'_> {
                 if seven.have_weights { 4 } else { 3 }
             }
             found => {
-                return self.violations.push(ObjError::NumberCount { line, found });
+                return self.violations.push(ImportError::NumberCount { line, found });
             }
         };
         let mut values = [1.0_f32; 4];
@@ -193,10 +140,14 @@ impl Scanner<'_> {
             {
                 Some(number) if number.is_finite() => *value = number,
                 Some(_) => {
-                    return self.violations.push(ObjError::NotFinite { line, text: text() });
+                    return self
+                        .violations
+                        .push(ImportError::NotFinite { line, text: text() });
                 }
                 None => {
-                    return self.violations.push(ObjError::NotANumber { line, text: text() });
+                    return self
+                        .violations
+                        .push(ImportError::NotANumber { line, text: text() });
                 }
             }
         }
@@ -207,11 +158,11 @@ impl Scanner<'_> {
             .fold(0.0, f32::max);
         if weight == 0.0 || !largest.is_finite() {
             let text = shown(numbers[read - 1]);
-            return self.violations.push(ObjError::NotFinite { line, text });
+            return self.violations.push(ImportError::NotFinite { line, text });
         }
         if largest > MAX_COORDINATE_METRES {
             let metres = largest;
-            return self.violations.push(ObjError::TooFar { line, metres });
+            return self.violations.push(ImportError::TooFar { line, metres });
         }
         if weight != 1.0 {
             self.weighted.note(line);
@@ -229,14 +180,16 @@ impl Scanner<'_> {
         if self.scan.triangles > self.limits.triangles {
             self.over_limit = true;
             let limit = self.limits.triangles;
-            return self.violations.push(ObjError::TooManyTriangles { line, limit });
+            return self
+                .violations
+                .push(ImportError::TooManyTriangles { line, limit });
         }
         self.scan.plain.push('f');
         for corner in words {
             match vertex_index(corner) {
                 None => {
                     let text = shown(corner);
-                    self.violations.push(ObjError::NotAnIndex { line, text });
+                    self.violations.push(ImportError::NotAnIndex { line, text });
                 }
                 Some(index) => self.corner(line, index),
             }
@@ -248,18 +201,14 @@ impl Scanner<'_> {
                 object,
                 material,
             } = &self.current;
-            let mut set: Vec<u32> = groups.iter().chain(object).chain(material).copied().collect();
-            set.sort_unstable();
-            set.dedup();
-            let start = self.scan.listed_names.len();
-            self.scan.listed_names.extend(set);
-            self.scan.name_sets.push(start..self.scan.listed_names.len());
+            let set = groups.iter().chain(object).chain(material).copied().collect();
+            self.names_of_faces = self.scan.names.add(set);
             self.names_changed = false;
         }
-        self.scan.faces.push(Face {
-            line,
+        self.scan.faces.push(RawFace {
+            place: line,
             corners,
-            names: self.scan.name_sets.len() - 1,
+            names: self.names_of_faces,
         });
     }
 
@@ -274,7 +223,7 @@ impl Scanner<'_> {
             usize::try_from(index).ok()
         };
         let Some(positive) = positive.filter(|&positive| positive > 0) else {
-            return self.violations.push(ObjError::IndexOutOfRange {
+            return self.violations.push(ImportError::IndexOutOfRange {
                 line,
                 index,
                 vertices,
@@ -298,7 +247,7 @@ impl Scanner<'_> {
             }
         }
         if found > MAX_NAMES_PER_LINE {
-            self.violations.push(ObjError::TooManyNames { line, found });
+            self.violations.push(ImportError::TooManyNames { line, found });
         }
     }
 
@@ -327,14 +276,14 @@ impl Scanner<'_> {
         self.scan.plain.push('\n');
     }
 
-    fn finish(mut self) -> Result<Scan, Vec<ObjError>> {
+    fn finish(mut self) -> Result<Scan, Vec<ImportError>> {
         let vertices = self.scan.vertices;
         if self.over_limit {
             self.forward.clear();
         }
         for &(line, index) in self.forward.iter().filter(|(_, index)| *index > vertices) {
             let index = i64::try_from(index).unwrap_or(i64::MAX);
-            self.violations.push(ObjError::IndexOutOfRange {
+            self.violations.push(ImportError::IndexOutOfRange {
                 line,
                 index,
                 vertices,
@@ -345,15 +294,15 @@ impl Scanner<'_> {
             .warnings
             .extend(self.seven_numbers.and_then(|seven| seven.warning));
         if self.weighted.count > 0 {
-            let Occurrences { count, first_line } = self.weighted;
+            let Occurrences { count, first } = self.weighted;
             self.scan.warnings.push(format!(
                 "{count} vertices have a weight other than 1, by which their coordinates were divided; the first is on \
-                 line {first_line}"
+                 line {first}"
             ));
         }
-        self.scan.names = vec![String::new(); self.names.len()];
+        self.scan.names.names = vec![String::new(); self.names.len()];
         for (name, index) in self.names {
-            self.scan.names[index as usize] = name;
+            self.scan.names.names[index as usize] = name;
         }
         Ok(self.scan)
     }

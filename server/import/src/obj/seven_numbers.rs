@@ -4,10 +4,8 @@
 //! file's vertices are judged together: they are colours with alpha, unless the numbers cannot be or the file has other
 //! weights.
 
-use super::{
-    lines::{Lines, words},
-    scan::Occurrences,
-};
+use super::lines::{Lines, words};
+use crate::raw::Occurrences;
 
 /// Least brightest component of colours from 0 to 255; smaller numbers would all be black, and are other quantities.
 const DARKEST: f32 = 16.0;
@@ -142,10 +140,10 @@ impl Evidence {
                 } else {
                     ("a colour with alpha", "a weight and a colour")
                 };
-                let Occurrences { count, first_line } = self.vertices;
+                let Occurrences { count, first } = self.vertices;
                 format!(
                     "{count} vertices have seven numbers, read as x y z and {read}, not as x y z and {other}; the first \
-                     is on line {first_line}"
+                     is on line {first}"
                 )
             }),
         }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use grasp_import::obj::{ObjError, ObjMesh, read_obj};
+use grasp_import::{Import, ImportError, ImportedMesh, read_mesh};
 
 use crate::{LIMITS, polygons, reference, volume};
 
@@ -40,7 +40,7 @@ fn built_in_objects_agree_with_reference_reader_without_warnings() {
     for name in ["remote", "scalpel", "scissors"] {
         let text = fs::read_to_string(folder.join(name).with_extension("obj")).unwrap();
         reference::compare(&text, 1.0);
-        let read = read_obj(text.as_bytes(), 1.0, LIMITS).unwrap();
+        let read = read_mesh(text.as_bytes(), Import::METRES, LIMITS).unwrap();
         assert_eq!(read.warnings, [""; 0], "{name}");
     }
 }
@@ -48,7 +48,8 @@ fn built_in_objects_agree_with_reference_reader_without_warnings() {
 #[test]
 fn reads_real_objects_completely() {
     for (name, bytes) in data("objects") {
-        let read = read_obj(&bytes, 1.0, LIMITS).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
+        let read =
+            read_mesh(&bytes, Import::METRES, LIMITS).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
         reference::compare(std::str::from_utf8(&bytes).unwrap(), 1.0);
         // Between 1 cm³ and 2 l.
         let volume = volume(&read);
@@ -63,15 +64,15 @@ fn reads_real_objects_completely() {
 #[test]
 fn reads_or_rejects_ugly_files_for_the_right_reason() {
     for (name, bytes) in data("ugly") {
-        let result = read_obj(&bytes, 1.0, LIMITS);
+        let result = read_mesh(&bytes, Import::METRES, LIMITS);
         match name.as_str() {
             "tinyobj_invalid-face-definition" | "tinyobj_line-prim" | "tinyobj_points-prim" => {
                 assert!(
-                    matches!(result.unwrap_err()[..], [ObjError::Empty { .. }]),
+                    matches!(result.unwrap_err()[..], [ImportError::Empty { .. }]),
                     "{name}"
                 );
             }
-            "trimesh_empty" => assert_eq!(result.unwrap_err(), [ObjError::Blank], "{name}"),
+            "trimesh_empty" => assert_eq!(result.unwrap_err(), [ImportError::Blank], "{name}"),
             "trimesh_wallhole" => {
                 // Its walls have holes, each reached over a side that is passed in both directions.
                 let read = result.unwrap();
@@ -81,7 +82,7 @@ fn reads_or_rejects_ugly_files_for_the_right_reason() {
             "tinyobj_invalid-relative-vertex-index" => {
                 let errors = result.unwrap_err();
                 assert_eq!(errors.len(), 3, "{name}: {errors:?}");
-                let first = ObjError::IndexOutOfRange {
+                let first = ImportError::IndexOutOfRange {
                     line: 1,
                     index: -4,
                     vertices: 0,
@@ -90,7 +91,7 @@ fn reads_or_rejects_ugly_files_for_the_right_reason() {
             }
             "tinyobj_issue-140-zero-face-idx" => {
                 let errors = result.unwrap_err();
-                let only = ObjError::IndexOutOfRange {
+                let only = ImportError::IndexOutOfRange {
                     line: 16,
                     index: 0,
                     vertices: 4,
@@ -100,7 +101,7 @@ fn reads_or_rejects_ugly_files_for_the_right_reason() {
             "tinyobj_test-nan" => {
                 let errors = result.unwrap_err();
                 assert!(
-                    matches!(errors[0], ObjError::NotFinite { line: 12, .. }),
+                    matches!(errors[0], ImportError::NotFinite { line: 12, .. }),
                     "{name}: {errors:?}"
                 );
             }
@@ -114,7 +115,7 @@ fn reads_or_rejects_ugly_files_for_the_right_reason() {
 }
 
 /// Known defects of some of them.
-fn check_warnings(name: &str, read: &ObjMesh) {
+fn check_warnings(name: &str, read: &ImportedMesh) {
     let expected = match name {
         "trimesh_polygonfaces" | "tinyobj_leading-decimal-dot-issue-201" => "edges are open",
         _ => return,

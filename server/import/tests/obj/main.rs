@@ -9,10 +9,7 @@ mod reference;
 mod rejecting;
 mod vertices;
 
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjError, ObjMesh, read_obj},
-};
+use grasp_import::{Import, ImportError, ImportedMesh, MeshLimits, read_mesh};
 
 /// Ample for every file of these tests.
 const LIMITS: MeshLimits = MeshLimits {
@@ -21,8 +18,8 @@ const LIMITS: MeshLimits = MeshLimits {
     triangles: 100_000,
 };
 
-fn read(text: &str) -> Result<ObjMesh, Vec<ObjError>> {
-    read_obj(text.as_bytes(), 1.0, LIMITS)
+fn read(text: &str) -> Result<ImportedMesh, Vec<ImportError>> {
+    read_mesh(text.as_bytes(), Import::METRES, LIMITS)
 }
 
 /// A cube of 2 m, by quads, wound outward.
@@ -31,7 +28,7 @@ v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1
 f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
 /// The volume enclosed by a mesh, by the divergence theorem.
-fn volume(read: &ObjMesh) -> f64 {
+fn volume(read: &ImportedMesh) -> f64 {
     (0..read.mesh.triangles().len())
         .map(|triangle| {
             let [a, b, c] = read.mesh.corners(triangle).map(glam::Vec3::as_dvec3);

@@ -1,7 +1,7 @@
 //! Polygons are covered once by their triangles, wherever they lie and whatever their shape.
 
 use glam::{DVec2, DVec3, Quat, Vec3};
-use grasp_import::obj::{ObjMesh, read_obj};
+use grasp_import::{Import, ImportedMesh, read_mesh};
 use proptest::{
     collection::vec,
     prelude::*,
@@ -46,7 +46,7 @@ fn shoelace(corners: &[DVec3]) -> DVec3 {
 
 /// Asserts that the triangles of each face have the face's winding, and together its area. A polygon that folds over
 /// itself has triangles of both windings, or more area.
-pub(crate) fn assert_areas_match(text: &str, read: &ObjMesh) {
+pub(crate) fn assert_areas_match(text: &str, read: &ImportedMesh) {
     let (vertices, faces) = parsed(text);
     let extent = vertices.iter().map(|vertex| vertex.length()).fold(0.0, f64::max);
     let tolerance = AREA_ERROR * extent * extent;
@@ -81,7 +81,7 @@ pub(crate) fn assert_areas_match(text: &str, read: &ObjMesh) {
 }
 
 /// Asserts that no triangle reaches out of the polygon: that points of each lie inside.
-fn assert_inside(outline: &[DVec2], plane: Plane, read: &ObjMesh) {
+fn assert_inside(outline: &[DVec2], plane: Plane, read: &ImportedMesh) {
     for triangle in 0..read.mesh.triangles().len() {
         let [a, b, c] = read.mesh.corners(triangle).map(|corner| plane.flatten(corner));
         for weights in [[1.0, 1.0, 1.0], [8.0, 1.0, 1.0], [1.0, 8.0, 1.0], [1.0, 1.0, 8.0]] {
@@ -165,7 +165,7 @@ fn assert_covered(outline: &[DVec2], plane: Plane) {
     assert_inside(outline, plane, &read);
 }
 
-fn assert_areas_covered(outline: &[DVec2], plane: Plane) -> ObjMesh {
+fn assert_areas_covered(outline: &[DVec2], plane: Plane) -> ImportedMesh {
     let text = text_of(outline, plane);
     let read = read(&text).unwrap();
     assert!(
@@ -295,7 +295,7 @@ proptest! {
         let snapped: Vec<_> = outline.iter().map(|point| (point * 4.0).round()).collect();
         let snapped = with_more_corners(&snapped, &extra);
         let text = text_of(&snapped, Plane { orientation: Quat::IDENTITY, origin: Vec3::ZERO });
-        if let Ok(read) = read_obj(text.as_bytes(), 1.0, LIMITS)
+        if let Ok(read) = read_mesh(text.as_bytes(), Import::METRES, LIMITS)
             && !read.warnings.iter().any(|warning| warning.contains("intersect"))
         {
             assert_areas_match(&text, &read);

@@ -1,9 +1,6 @@
 //! No input makes the reader panic, and its results are always consistent.
 
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjMesh, read_obj},
-};
+use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use proptest::{
     collection::vec,
     prelude::*,
@@ -29,7 +26,7 @@ fn config(cases: u32) -> ProptestConfig {
 }
 
 /// Invariants of every accepted mesh.
-fn assert_sound(read: &ObjMesh, limits: MeshLimits) {
+fn assert_sound(read: &ImportedMesh, limits: MeshLimits) {
     let triangles = read.mesh.triangles().len();
     assert!((1..=limits.triangles).contains(&triangles));
     assert!(read.mesh.positions().len() <= limits.vertices);
@@ -128,7 +125,7 @@ proptest! {
 
     #[test]
     fn survives_arbitrary_bytes(bytes in vec(any::<u8>(), 0..600)) {
-        if let Ok(read) = read_obj(&bytes, 1.0, SMALL) {
+        if let Ok(read) = read_mesh(&bytes, Import::METRES, SMALL) {
             assert_sound(&read, SMALL);
         }
     }
@@ -136,7 +133,7 @@ proptest! {
     #[test]
     fn survives_almost_valid_text(lines in vec(statement(), 0..40), ending in "\n|\r|\r\n") {
         let text = lines.join(&ending);
-        match read_obj(text.as_bytes(), 1.0, SMALL) {
+        match read_mesh(text.as_bytes(), Import::METRES, SMALL) {
             Ok(read) => assert_sound(&read, SMALL),
             Err(errors) => prop_assert!((1..=17).contains(&errors.len())),
         }
@@ -150,7 +147,7 @@ proptest! {
             bytes[place] = byte;
         }
         bytes.truncate(cut.index(2 * bytes.len()));
-        if let Ok(read) = read_obj(&bytes, 1.0, SMALL) {
+        if let Ok(read) = read_mesh(&bytes, Import::METRES, SMALL) {
             assert_sound(&read, SMALL);
         }
     }
@@ -159,7 +156,7 @@ proptest! {
     fn agrees_with_reference_reader(text in well_formed(), unit in 0.001_f32..2.0) {
         let expected = reference::read(&text, unit);
         if expected.triangles.is_empty() {
-            prop_assert!(read_obj(text.as_bytes(), unit, SMALL).is_err());
+            prop_assert!(read_mesh(text.as_bytes(), Import::with_unit(unit), SMALL).is_err());
         } else {
             reference::compare(&text, unit);
         }

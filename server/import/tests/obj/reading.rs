@@ -1,7 +1,7 @@
 //! Accepted text, and its warnings.
 
 use glam::Vec3;
-use grasp_import::obj::read_obj;
+use grasp_import::{Import, read_mesh};
 
 use crate::{CUBE, LIMITS, read, volume};
 
@@ -25,7 +25,7 @@ fn splits_polygons_into_fans_from_first_corner() {
 
 #[test]
 fn scales_coordinates_to_metres() {
-    let cube = read_obj(CUBE.as_bytes(), 0.01, LIMITS).unwrap();
+    let cube = read_mesh(CUBE.as_bytes(), Import::with_unit(0.01), LIMITS).unwrap();
     assert!((volume(&cube) - 8e-6).abs() < 1e-12);
 }
 
@@ -71,11 +71,11 @@ fn reads_utf16_like_utf8() {
         format!("{mark}{text}").encode_utf16().flat_map(unit).collect()
     };
     for unit in [u16::to_le_bytes, u16::to_be_bytes] {
-        let marked = read_obj(&encoded("\u{feff}", unit), 1.0, LIMITS).unwrap();
+        let marked = read_mesh(&encoded("\u{feff}", unit), Import::METRES, LIMITS).unwrap();
         assert_eq!(marked.mesh, plain.mesh);
         assert_eq!(marked.groups, plain.groups);
         assert_eq!(marked.warnings, [""; 0]);
-        let unmarked = read_obj(&encoded("", unit), 1.0, LIMITS).unwrap();
+        let unmarked = read_mesh(&encoded("", unit), Import::METRES, LIMITS).unwrap();
         assert_eq!(unmarked.mesh, plain.mesh);
         assert_eq!(
             unmarked.warnings,
@@ -96,7 +96,7 @@ fn backslash_in_name_swallows_no_statement() {
 fn replaces_invalid_utf8_in_names() {
     let mut text = b"# caf\xE9\ng caf\xE9\n".to_vec();
     text.extend_from_slice(CUBE.as_bytes());
-    let cube = read_obj(&text, 1.0, LIMITS).unwrap();
+    let cube = read_mesh(&text, Import::METRES, LIMITS).unwrap();
     assert_eq!(cube.groups.len(), 1);
     assert_eq!(cube.groups[0].0, "caf\u{fffd}");
 }

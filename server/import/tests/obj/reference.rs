@@ -87,7 +87,12 @@ pub(crate) fn read(text: &str, unit_metres: f32) -> Reference {
 
 /// Compares the mesh of the real reader with that of this one.
 pub(crate) fn compare(text: &str, unit_metres: f32) {
-    let real = crate::read_obj(text.as_bytes(), unit_metres, crate::LIMITS).unwrap();
+    let real = crate::read_mesh(
+        text.as_bytes(),
+        grasp_import::Import::with_unit(unit_metres),
+        crate::LIMITS,
+    )
+    .unwrap();
     let reference = read(text, unit_metres);
     let turned = real.warnings.iter().any(|warning| warning.contains("turned"));
     let triangles: Vec<[Vec3; 3]> = (0..real.mesh.triangles().len())

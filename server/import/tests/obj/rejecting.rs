@@ -1,9 +1,6 @@
 //! Rejected text, and the messages.
 
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjError, read_obj},
-};
+use grasp_import::{Import, ImportError, MeshLimits, read_mesh};
 
 use crate::{CUBE, LIMITS, read};
 
@@ -18,9 +15,9 @@ fn messages(text: &str) -> Vec<String> {
 #[test]
 fn rejects_text_without_triangles() {
     for text in ["", "\n", "# only a comment", "\\", "\u{feff}"] {
-        assert_eq!(read(text).unwrap_err(), [ObjError::Blank], "{text:?}");
+        assert_eq!(read(text).unwrap_err(), [ImportError::Blank], "{text:?}");
     }
-    let empty = ObjError::Empty {
+    let empty = ImportError::Empty {
         dropped: 0,
         unknown: 0,
     };
@@ -67,14 +64,14 @@ fn rejects_wrong_number_of_coordinates() {
     for (numbers, found) in [("", 0), ("1 2", 2), ("1 2 3 4 5", 5), ("1 2 3 4 5 6 7 8", 8)] {
         assert_eq!(
             read(&format!("v {numbers}\n{CUBE}")).unwrap_err(),
-            [ObjError::NumberCount { line: 1, found }]
+            [ImportError::NumberCount { line: 1, found }]
         );
     }
 }
 
 #[test]
 fn rejects_bad_vertex_references() {
-    let out_of_range = |index: i64| ObjError::IndexOutOfRange {
+    let out_of_range = |index: i64| ImportError::IndexOutOfRange {
         line: 15,
         index,
         vertices: 8,
@@ -86,7 +83,7 @@ fn rejects_bad_vertex_references() {
     for bad in ["x", "/1", "1/2/3/4", "1.5", "1/x", "99999999999999999999", "１"] {
         assert_eq!(
             read(&format!("{CUBE}f 1 2 {bad}\n")).unwrap_err(),
-            [ObjError::NotAnIndex {
+            [ImportError::NotAnIndex {
                 line: 15,
                 text: bad.to_owned()
             }]
@@ -109,7 +106,7 @@ fn lists_sixteen_violations_and_counts_the_rest() {
     );
     let many = read(&"v x y z\n".repeat(100)).unwrap_err();
     assert_eq!(many.len(), 17);
-    assert_eq!(many[16], ObjError::More(84));
+    assert_eq!(many[16], ImportError::More(84));
 }
 
 #[test]
@@ -119,7 +116,7 @@ fn enforces_limits_exactly() {
         vertices: 8,
         triangles: 12,
     };
-    let read = |limits| read_obj(CUBE.as_bytes(), 1.0, limits);
+    let read = |limits| read_mesh(CUBE.as_bytes(), Import::METRES, limits);
     assert!(read(limits).is_ok());
     assert_eq!(
         read(MeshLimits {
@@ -127,7 +124,7 @@ fn enforces_limits_exactly() {
             ..limits
         })
         .unwrap_err(),
-        [ObjError::TooLong {
+        [ImportError::TooLong {
             bytes: CUBE.len(),
             limit: CUBE.len() - 1
         }]
@@ -138,7 +135,7 @@ fn enforces_limits_exactly() {
             ..limits
         })
         .unwrap_err(),
-        [ObjError::TooManyVertices { line: 8, limit: 7 }]
+        [ImportError::TooManyVertices { line: 8, limit: 7 }]
     );
     assert_eq!(
         read(MeshLimits {
@@ -146,7 +143,7 @@ fn enforces_limits_exactly() {
             ..limits
         })
         .unwrap_err(),
-        [ObjError::TooManyTriangles { line: 14, limit: 11 }]
+        [ImportError::TooManyTriangles { line: 14, limit: 11 }]
     );
 }
 
@@ -158,13 +155,13 @@ fn bounds_triangles_of_a_face_and_names_of_a_group() {
         ..LIMITS
     };
     assert_eq!(
-        read_obj(fan.as_bytes(), 1.0, limits).unwrap_err(),
-        [ObjError::TooManyTriangles { line: 3, limit: 197 }]
+        read_mesh(fan.as_bytes(), Import::METRES, limits).unwrap_err(),
+        [ImportError::TooManyTriangles { line: 3, limit: 197 }]
     );
     let names = format!("g{}\n{CUBE}", " a".repeat(17));
     assert_eq!(
         read(&names).unwrap_err(),
-        [ObjError::TooManyNames { line: 1, found: 17 }]
+        [ImportError::TooManyNames { line: 1, found: 17 }]
     );
     assert!(read(&names.replacen(" a", "", 1)).is_ok());
 }
@@ -177,20 +174,20 @@ fn rejects_concave_polygon_of_too_many_corners() {
         .collect();
     let face: Vec<_> = (1..=corners).map(|k| k.to_string()).collect();
     let text = format!("{}f {}\n", teeth.concat(), face.join(" "));
-    let errors = read_obj(text.as_bytes(), 0.01, LIMITS).unwrap_err();
-    let line = corners + 1;
-    assert_eq!(errors, [ObjError::TooManyCorners { line, corners }]);
+    let errors = read_mesh(text.as_bytes(), Import::with_unit(0.01), LIMITS).unwrap_err();
+    let place = format!("on line {}", corners + 1);
+    assert_eq!(errors, [ImportError::TooManyCorners { place, corners }]);
 }
 
 #[test]
 fn rejects_unit_that_is_not_positive() {
     for unit in [0.0, -1.0, f32::INFINITY] {
         assert_eq!(
-            read_obj(CUBE.as_bytes(), unit, LIMITS).unwrap_err(),
-            [ObjError::Unit(unit)]
+            read_mesh(CUBE.as_bytes(), Import::with_unit(unit), LIMITS).unwrap_err(),
+            [ImportError::Unit(unit)]
         );
     }
-    let nan = read_obj(CUBE.as_bytes(), f32::NAN, LIMITS).unwrap_err();
+    let nan = read_mesh(CUBE.as_bytes(), Import::with_unit(f32::NAN), LIMITS).unwrap_err();
     assert_eq!(
         nan[0].to_string(),
         "a unit of NaN m cannot be used; it must be finite and more than 0"

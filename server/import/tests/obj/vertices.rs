@@ -1,12 +1,12 @@
 //! Vertices with weights and colours.
 
 use glam::Vec3;
-use grasp_import::obj::ObjMesh;
+use grasp_import::ImportedMesh;
 
 use crate::read;
 
 /// A right triangle with legs of 2 and 1, each corner followed by more numbers.
-fn triangle(extras: [&str; 3]) -> ObjMesh {
+fn triangle(extras: [&str; 3]) -> ImportedMesh {
     let [a, b, c] = extras;
     read(&format!("v 0 0 0 {a}\nv 2 0 0 {b}\nv 0 1 0 {c}\nf 1 2 3\n")).unwrap()
 }

@@ -1,32 +1,32 @@
-//! Splits the faces of a parsed mesh into triangles.
+//! Splits the faces of a mesh into triangles.
 
 use glam::Vec3;
 
-use super::{
-    error::{ObjError, Violations},
-    scan::{Occurrences, Scan},
+use crate::{
+    error::{ImportError, Violations},
+    polygon::{Split, split},
+    raw::{Occurrences, Place, RawMesh},
 };
-use crate::polygon::{Split, split};
 
 /// The triangles of all faces.
 #[derive(Debug, Default)]
-pub(super) struct Triangles {
-    /// Their corners as vertices of the parsed mesh, in the file's order.
-    pub(super) corners: Vec<[u32; 3]>,
+pub(crate) struct Triangles {
+    /// Their corners as vertices of the mesh, in the file's order.
+    pub(crate) corners: Vec<[u32; 3]>,
     /// Polygons that intersect themselves.
-    pub(super) overlapping: Occurrences,
+    pub(crate) overlapping: Occurrences,
 }
 
 /// Splits every face; one of n corners becomes n - 2 triangles.
-pub(super) fn triangles(scan: &Scan, parsed: &tobj::Mesh) -> Result<Triangles, Vec<ObjError>> {
+pub(crate) fn triangles(raw: &RawMesh) -> Result<Triangles, Vec<ImportError>> {
     let mut triangles = Triangles {
-        corners: Vec::with_capacity(scan.triangles),
+        corners: Vec::with_capacity(raw.triangle_count()),
         ..Triangles::default()
     };
     let mut violations = Violations::default();
-    let mut rest = parsed.indices.as_slice();
+    let mut rest = raw.corners.as_slice();
     let (mut positions, mut places) = (Vec::new(), Vec::new());
-    for face in &scan.faces {
+    for face in &raw.faces {
         let (corners, others) = rest.split_at(face.corners);
         rest = others;
         if let &[a, b, c] = corners {
@@ -36,14 +36,14 @@ pub(super) fn triangles(scan: &Scan, parsed: &tobj::Mesh) -> Result<Triangles, V
         positions.clear();
         positions.extend(corners.iter().map(|&vertex| {
             let start = 3 * vertex as usize;
-            Vec3::from_slice(&parsed.positions[start..start + 3]).as_dvec3()
+            Vec3::from_slice(&raw.coordinates[start..start + 3]).as_dvec3()
         }));
         places.clear();
         match split(&positions, &mut places) {
             Split::Exact => {}
-            Split::Overlapping => triangles.overlapping.note(face.line),
-            Split::TooManyCorners => violations.push(ObjError::TooManyCorners {
-                line: face.line,
+            Split::Overlapping => triangles.overlapping.note(face.place),
+            Split::TooManyCorners => violations.push(ImportError::TooManyCorners {
+                place: Place(raw.places, face.place).to_string(),
                 corners: face.corners,
             }),
         }

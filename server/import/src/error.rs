@@ -1,21 +1,20 @@
-//! Why OBJ text is rejected.
+//! Why a file is rejected.
 
 use grasp_synthesis::geometry::mesh::MeshError;
 
-use super::MAX_NAMES_PER_LINE;
-use crate::{limits::MAX_COORDINATE_METRES, polygon::MAX_CLIPPED_CORNERS};
+use crate::{limits::MAX_COORDINATE_METRES, obj::MAX_NAMES_PER_LINE, polygon::MAX_CLIPPED_CORNERS};
 
 /// Violations listed before the rest is only counted; bounds the size of the answer.
 const LISTED_ERRORS: usize = 16;
 
-/// Why OBJ text was rejected.
+/// Why a file was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ObjError {
+pub enum ImportError {
     /// The unit is not a length.
     #[error("a unit of {0} m cannot be used; it must be finite and more than 0")]
     Unit(f32),
-    /// The text is too long.
-    #[error("the text has {bytes} bytes; at most {limit} are allowed")]
+    /// The file is too long.
+    #[error("the file has {bytes} bytes; at most {limit} are allowed")]
     TooLong {
         /// Its length.
         bytes: usize,
@@ -108,23 +107,23 @@ pub enum ObjError {
     },
     /// A polygon that is not convex has too many corners.
     #[error(
-        "line {line}: a polygon that is not convex has {corners} corners; at most {MAX_CLIPPED_CORNERS} are allowed, \
+        "{place}: a polygon that is not convex has {corners} corners; at most {MAX_CLIPPED_CORNERS} are allowed, \
          split it into triangles"
     )]
     TooManyCorners {
-        /// The line, counted from 1.
-        line: usize,
+        /// Where it is.
+        place: String,
         /// Their number.
         corners: usize,
     },
     /// There is no statement at all.
     #[error(
-        "the text is empty or has only blank lines and comments; a mesh is required as Wavefront OBJ text"
+        "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL"
     )]
     Blank,
-    /// The bytes are not OBJ text.
+    /// The bytes are no mesh of a format that can be read.
     #[error("{}; this looks like {looks_like}", statements_of(*.statements, *.lines))]
-    NotObj {
+    NotAMesh {
         /// Number of lines that are neither blank nor comments.
         lines: usize,
         /// How many of them start with a word of OBJ.
@@ -146,6 +145,24 @@ pub enum ObjError {
     /// The parser rejected what the scan accepted.
     #[error("the mesh cannot be parsed")]
     Unreadable(#[source] tobj::LoadError),
+    /// There are too many vertices or triangles.
+    #[error("the mesh has {found} {what}; at most {limit} are allowed")]
+    TooMany {
+        /// What is counted.
+        what: &'static str,
+        /// How many there are.
+        found: u64,
+        /// The limit.
+        limit: usize,
+    },
+    /// Something else is wrong with a file.
+    #[error("{place}: {what}")]
+    At {
+        /// The part of the file.
+        place: String,
+        /// What is wrong with it, and what would be right.
+        what: String,
+    },
     /// The resulting mesh cannot be used.
     #[error("the mesh cannot be used")]
     Unusable(#[source] MeshError),
@@ -162,15 +179,25 @@ fn statements_of(statements: usize, lines: usize) -> String {
     }
 }
 
+impl ImportError {
+    /// An error at a place of a file.
+    pub(crate) fn at(place: impl Into<String>, what: impl Into<String>) -> Self {
+        Self::At {
+            place: place.into(),
+            what: what.into(),
+        }
+    }
+}
+
 /// A bounded list of violations.
 #[derive(Debug, Default)]
-pub(super) struct Violations {
-    listed: Vec<ObjError>,
+pub(crate) struct Violations {
+    listed: Vec<ImportError>,
     more: usize,
 }
 
 impl Violations {
-    pub(super) fn push(&mut self, error: ObjError) {
+    pub(crate) fn push(&mut self, error: ImportError) {
         if self.listed.len() < LISTED_ERRORS {
             self.listed.push(error);
         } else {
@@ -178,9 +205,9 @@ impl Violations {
         }
     }
 
-    pub(super) fn into_result(mut self) -> Result<(), Vec<ObjError>> {
+    pub(crate) fn into_result(mut self) -> Result<(), Vec<ImportError>> {
         if self.more > 0 {
-            self.listed.push(ObjError::More(self.more));
+            self.listed.push(ImportError::More(self.more));
         }
         if self.listed.is_empty() {
             Ok(())

@@ -1,0 +1,59 @@
+//! Recognises the format of a mesh by its content.
+
+use crate::stl;
+
+/// Bytes at the start that are searched for a format's marks.
+const SEARCHED_BYTES: usize = 4096;
+
+/// A format that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    /// Wavefront OBJ, and what is none of the others: its reader says what that is.
+    Obj,
+    StlText,
+    StlBinary,
+    Ply,
+    /// glTF as JSON, or as GLB.
+    Gltf,
+}
+
+impl Format {
+    /// The format that bytes claim to have.
+    pub(crate) fn of(bytes: &[u8]) -> Self {
+        if bytes.starts_with(b"glTF") {
+            return Self::Gltf;
+        }
+        if stl::is_binary(bytes) {
+            return Self::StlBinary;
+        }
+        let text = without_mark(bytes);
+        let start = text[..text.len().min(SEARCHED_BYTES)].trim_ascii_start();
+        let mut lines = start
+            .split(|&byte| byte == b'\n')
+            .map(<[u8]>::trim_ascii)
+            .filter(|line| !line.is_empty());
+        let mut words = move || lines.next().map(first_word).unwrap_or_default();
+        let (first, second) = (words(), words());
+        match first.as_slice() {
+            b"ply" if matches!(second.as_slice(), b"format" | b"comment" | b"obj_info") => Self::Ply,
+            b"solid" if matches!(second.as_slice(), b"facet" | b"endsolid") => Self::StlText,
+            _ if start.starts_with(b"{") && contains(text, b"\"asset\"") => Self::Gltf,
+            _ => Self::Obj,
+        }
+    }
+}
+
+/// Text without the mark of UTF-8 that some editors put in front of it.
+pub(crate) fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
+}
+
+/// The first word of a line, in lower case.
+fn first_word(line: &[u8]) -> Vec<u8> {
+    let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+    word.to_ascii_lowercase()
+}
+
+fn contains(bytes: &[u8], part: &[u8]) -> bool {
+    bytes.windows(part.len()).any(|window| window == part)
+}

@@ -1,0 +1,128 @@
+//! Numbers out of buffers, with every bound checked.
+
+use std::borrow::Cow;
+
+use gltf::{
+    Accessor,
+    accessor::{DataType, sparse::IndexType},
+    buffer::View,
+};
+
+use crate::error::ImportError;
+
+/// The bytes of a document's buffers.
+#[derive(Debug)]
+pub(super) struct Buffers<'a>(Vec<Cow<'a, [u8]>>);
+
+impl<'a> Buffers<'a> {
+    pub(super) fn new(buffers: Vec<Cow<'a, [u8]>>) -> Self {
+        Self(buffers)
+    }
+
+    /// All elements of an accessor of `N` components as numbers; integers that stand for fractions become those. The caller has
+    /// checked that the count is within limits.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        accessor: &Accessor<'_>,
+    ) -> Result<Vec<[f64; N]>, ImportError> {
+        let wrong = |what: String| ImportError::at(format!("accessors[{}]", accessor.index()), what);
+        let components = accessor.dimensions().multiplicity();
+        if components != N {
+            return Err(wrong(format!("has {components} components; {N} are needed")));
+        }
+        let kind = accessor.data_type();
+        let size = kind.size() * N;
+        let mut numbers = match accessor.view() {
+            Some(view) => {
+                let stride = view.stride().unwrap_or(size);
+                self.elements(&view, accessor.offset(), stride, size, accessor.count())
+                    .ok_or_else(|| wrong(beyond(accessor.count())))?
+                    .map(|element| components_of(element, kind))
+                    .collect()
+            }
+            None => vec![[0.0; N]; accessor.count()],
+        };
+        if let Some(sparse) = accessor.sparse() {
+            let (indices, values) = (sparse.indices(), sparse.values());
+            let count = sparse.count();
+            let index_kind = match indices.index_type() {
+                IndexType::U8 => DataType::U8,
+                IndexType::U16 => DataType::U16,
+                IndexType::U32 => DataType::U32,
+            };
+            let width = index_kind.size();
+            let places = self.elements(&indices.view(), indices.offset(), width, width, count);
+            let replaced = self.elements(&values.view(), values.offset(), size, size, count);
+            let (Some(places), Some(replaced)) = (places, replaced) else {
+                return Err(wrong(beyond(count)));
+            };
+            for (place, element) in places.zip(replaced) {
+                let [place] = components_of::<1>(place, index_kind);
+                let target = numbers.get_mut(place as usize);
+                *target.ok_or_else(|| wrong(format!("replaces element {place}, which does not exist")))? =
+                    components_of(element, kind);
+            }
+        }
+        if accessor.normalized() {
+            let scale = match kind {
+                DataType::I8 => 127.0,
+                DataType::U8 => 255.0,
+                DataType::I16 => 32767.0,
+                DataType::U16 => 65535.0,
+                DataType::U32 | DataType::F32 => 1.0,
+            };
+            // The smallest signed integer stands for −1 as well.
+            let fraction = |number: f64| {
+                if scale == 1.0 {
+                    number
+                } else {
+                    (number / scale).max(-1.0)
+                }
+            };
+            for element in &mut numbers {
+                *element = element.map(fraction);
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// The bytes of `count` elements, if all are within their view and its buffer.
+    fn elements(
+        &self,
+        view: &View<'_>,
+        offset: usize,
+        stride: usize,
+        size: usize,
+        count: usize,
+    ) -> Option<impl Iterator<Item = &[u8]> + use<'_, 'a>> {
+        let buffer = self.0.get(view.buffer().index())?;
+        let end = view.offset().checked_add(view.length())?;
+        let bytes = buffer.get(view.offset()..end)?;
+        let last = count.checked_sub(1)?.checked_mul(stride)?.checked_add(offset)?;
+        if last.checked_add(size)? > bytes.len() || stride < size {
+            return None;
+        }
+        Some((0..count).map(move |element| &bytes[offset + element * stride..][..size]))
+    }
+}
+
+fn beyond(count: usize) -> String {
+    format!("has {count} elements, which reach beyond its buffer")
+}
+
+/// The little-endian numbers of one element.
+fn components_of<const N: usize>(element: &[u8], kind: DataType) -> [f64; N] {
+    let width = kind.size();
+    std::array::from_fn(|component| {
+        let bytes = &element[component * width..][..width];
+        match (kind, bytes) {
+            (DataType::I8, &[a]) => f64::from(i8::from_le_bytes([a])),
+            (DataType::U8, &[a]) => f64::from(a),
+            (DataType::I16, &[a, b]) => f64::from(i16::from_le_bytes([a, b])),
+            (DataType::U16, &[a, b]) => f64::from(u16::from_le_bytes([a, b])),
+            (DataType::U32, &[a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
+            (DataType::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+            _ => f64::NAN,
+        }
+    })
+}

@@ -1,0 +1,184 @@
+//! Reads glTF 2.0 (JSON with its buffers inside, or GLB) with the crate `gltf`: the default scene as a viewer shows it before
+//! anything moves, with skins and morph targets at rest.
+//!
+//! The crate parses and validates the document. Accessors are read by [`accessors`], because the crate's own iterators trust
+//! lengths. What has no shape (materials, textures, animations, cameras) is dropped before validation, so that unusual ones
+//! do not keep a mesh from being read.
+
+mod accessors;
+mod nodes;
+mod primitives;
+
+use std::borrow::Cow;
+
+use base64::{Engine as _, prelude::BASE64_STANDARD};
+use gltf::{
+    Document, Glb,
+    buffer::Source,
+    json::{Root, deserialize, validation},
+};
+
+use crate::{
+    error::ImportError,
+    format::without_mark,
+    limits::MeshLimits,
+    raw::{Places, RawMesh},
+};
+use accessors::Buffers;
+use nodes::Scene;
+
+/// Largest number of validation errors that are listed.
+const LISTED_ERRORS: usize = 16;
+
+/// Required extensions that do not change the shape, and one that is read.
+const HARMLESS: &[&str] = &[
+    "KHR_mesh_quantization",
+    "KHR_lights_punctual",
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "MSFT_texture_dds",
+    "KHR_xmp",
+    "VRM",
+];
+
+/// Reads the default scene, or the first one; all nodes if there is none.
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+    let (json, binary) = parts(bytes).map_err(|error| vec![error])?;
+    let mut root: Root = deserialize::from_slice(&json)
+        .map_err(|error| vec![ImportError::at("the glTF document", error.to_string())])?;
+    let refused: Vec<ImportError> = root
+        .extensions_required
+        .iter()
+        .filter(|extension| !HARMLESS.iter().any(|harmless| extension.starts_with(harmless)))
+        .take(LISTED_ERRORS)
+        .map(|extension| refusal(extension))
+        .collect();
+    if !refused.is_empty() {
+        return Err(refused);
+    }
+    strip(&mut root);
+    let document = Document::from_json(root).map_err(|error| invalid(&error))?;
+    let buffers = decode(&document, binary).map_err(|error| vec![error])?;
+    let mut raw = RawMesh {
+        places: Places::Triangles,
+        ..RawMesh::default()
+    };
+    let scene = Scene::of(&document);
+    primitives::read_into(&mut raw, &scene, &document, &buffers, limits).map_err(|error| vec![error])?;
+    Ok(raw)
+}
+
+/// The JSON and the binary chunk.
+fn parts(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<Cow<'_, [u8]>>), ImportError> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok((Cow::Borrowed(without_mark(bytes)), None));
+    }
+    let wrong = |what: String| ImportError::at("the GLB container", what);
+    let number = |at: usize| {
+        let four = bytes.get(at..at + 4)?;
+        Some(u32::from_le_bytes(four.try_into().ok()?))
+    };
+    // The crate takes for granted that the length covers the header.
+    match (number(4), number(8)) {
+        (Some(2), Some(length)) if length >= 20 && length as usize <= bytes.len() => {}
+        (Some(2), Some(length)) => {
+            let found = bytes.len();
+            return Err(wrong(format!(
+                "claims {length} bytes and has {found}: it is cut off or damaged"
+            )));
+        }
+        (Some(version), _) => return Err(wrong(format!("has version {version}; it must be 2"))),
+        (None, _) => return Err(wrong("is cut off".to_owned())),
+    }
+    let glb = Glb::from_slice(bytes).map_err(|error| wrong(error.to_string()))?;
+    Ok((glb.json, glb.bin))
+}
+
+/// Why a required extension keeps a file from being read.
+fn refusal(extension: &str) -> ImportError {
+    let what = match extension {
+        "KHR_draco_mesh_compression" => "the mesh is compressed by Draco; export it without compression",
+        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            "the mesh is compressed by meshopt; export it without compression"
+        }
+        _ => "is required by the file and not known; export it without",
+    };
+    ImportError::at(format!("extension {extension:?}"), what)
+}
+
+/// Drops what has no shape.
+fn strip(root: &mut Root) {
+    root.extensions_required.clear();
+    root.animations.clear();
+    root.cameras.clear();
+    root.images.clear();
+    root.samplers.clear();
+    root.textures.clear();
+    for material in &mut root.materials {
+        let name = material.name.take();
+        *material = gltf::json::Material {
+            name,
+            ..Default::default()
+        };
+    }
+    for node in &mut root.nodes {
+        node.camera = None;
+    }
+}
+
+fn invalid(error: &gltf::Error) -> Vec<ImportError> {
+    match error {
+        gltf::Error::Validation(errors) => errors
+            .iter()
+            .take(LISTED_ERRORS)
+            .map(|(path, error)| {
+                let what = match error {
+                    validation::Error::IndexOutOfBounds => "refers to something that does not exist",
+                    validation::Error::Invalid => "has a value that is not allowed",
+                    validation::Error::Missing => "is missing",
+                    validation::Error::Unsupported => "is not supported",
+                    validation::Error::Oversize => "is too large",
+                };
+                ImportError::at(path.to_string(), what)
+            })
+            .collect(),
+        other => vec![ImportError::at("the glTF document", other.to_string())],
+    }
+}
+
+/// The bytes of all buffers.
+fn decode<'a>(document: &Document, binary: Option<Cow<'a, [u8]>>) -> Result<Buffers<'a>, ImportError> {
+    let mut binary = binary;
+    let mut buffers = Vec::new();
+    for buffer in document.buffers() {
+        let place = format!("buffers[{}]", buffer.index());
+        let bytes = match buffer.source() {
+            Source::Bin => binary
+                .take()
+                .ok_or_else(|| ImportError::at(place.clone(), "has no bytes: the GLB has no binary chunk"))?,
+            Source::Uri(uri) if uri.starts_with("data:") => {
+                let (_, encoded) = uri
+                    .split_once(";base64,")
+                    .ok_or_else(|| ImportError::at(place.clone(), "is a data URL without ;base64,"))?;
+                let decoded = BASE64_STANDARD.decode(encoded.trim_end());
+                Cow::Owned(decoded.map_err(|error| ImportError::at(place.clone(), error.to_string()))?)
+            }
+            Source::Uri(_) => {
+                return Err(ImportError::at(
+                    place,
+                    "is in another file; embed the buffers, or send a GLB",
+                ));
+            }
+        };
+        if bytes.len() < buffer.length() {
+            let (claimed, found) = (buffer.length(), bytes.len());
+            return Err(ImportError::at(
+                place,
+                format!("claims {claimed} bytes and has {found}"),
+            ));
+        }
+        buffers.push(bytes);
+    }
+    Ok(Buffers::new(buffers))
+}

@@ -1,0 +1,243 @@
+//! The triangles of a scene's meshes.
+
+use glam::{DMat4, DVec3};
+use gltf::{Document, Node, Primitive, Semantic, mesh::Mode};
+
+use super::{accessors::Buffers, nodes::Scene};
+use crate::{
+    error::ImportError,
+    limits::MeshLimits,
+    raw::{RawMesh, check_counts},
+};
+
+/// Sets of four joints per vertex that are read.
+const JOINT_SETS: u32 = 4;
+
+/// Appends all triangles that a scene shows.
+pub(super) fn read_into(
+    raw: &mut RawMesh,
+    scene: &Scene,
+    document: &Document,
+    buffers: &Buffers<'_>,
+    limits: MeshLimits,
+) -> Result<(), ImportError> {
+    let nodes: Vec<Node<'_>> = document.nodes().collect();
+    let mut skipped = 0;
+    for &index in &scene.shown {
+        let node = &nodes[index];
+        let Some(mesh) = node.mesh() else { continue };
+        let joints = joints(node, scene, buffers)?;
+        for primitive in mesh.primitives() {
+            if !matches!(
+                primitive.mode(),
+                Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+            ) {
+                skipped += 1;
+                continue;
+            }
+            let place = |error: ImportError| {
+                let mesh = mesh
+                    .name()
+                    .map_or_else(|| mesh.index().to_string(), |name| format!("{name:?}"));
+                ImportError::at(
+                    format!("mesh {mesh}, primitive {}", primitive.index()),
+                    error.to_string(),
+                )
+            };
+            let names = raw.names.add_named(
+                [node.name(), mesh.name(), primitive.material().name()]
+                    .into_iter()
+                    .flatten(),
+            );
+            let positions = positions(&primitive, node, buffers, raw, limits).map_err(place)?;
+            let indices = indices(&primitive, positions.len(), buffers, limits).map_err(place)?;
+            let scene_from_vertex = match &joints {
+                Some(joints) => skinned(&primitive, joints, positions.len(), buffers).map_err(place)?,
+                None => vec![scene.scene_from_node[index]],
+            };
+            let first = (raw.coordinates.len() / 3) as u32;
+            for (vertex, position) in positions.iter().enumerate() {
+                let transform = scene_from_vertex[vertex.min(scene_from_vertex.len() - 1)];
+                raw.add_vertex(transform.transform_point3(*position).as_vec3().to_array());
+            }
+            // A mirrored instance shows its other side.
+            let is_mirrored = joints.is_none() && scene.scene_from_node[index].determinant() < 0.0;
+            check_counts(0, (raw.faces.len() + indices.len()) as u64, limits)?;
+            for [a, b, c] in triangles(&indices, primitive.mode()) {
+                let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
+                raw.add_triangle(corners.map(|corner| first + corner), names);
+            }
+        }
+    }
+    check_counts(0, raw.faces.len() as u64, limits)?;
+    if skipped > 0 {
+        raw.warnings
+            .push(format!("{skipped} primitives of points or lines were ignored"));
+    }
+    Ok(())
+}
+
+/// The positions of a primitive's vertices with morph targets at their default weights, in the mesh's frame.
+fn positions(
+    primitive: &Primitive<'_>,
+    node: &Node<'_>,
+    buffers: &Buffers<'_>,
+    raw: &RawMesh,
+    limits: MeshLimits,
+) -> Result<Vec<DVec3>, ImportError> {
+    let accessor = primitive
+        .get(&Semantic::Positions)
+        .ok_or_else(|| ImportError::at("attributes", "has no POSITION"))?;
+    let before = raw.coordinates.len() / 3;
+    check_counts((before + accessor.count()) as u64, 0, limits)?;
+    let mut positions: Vec<DVec3> = buffers
+        .numbers(&accessor)?
+        .into_iter()
+        .map(DVec3::from_array)
+        .collect();
+    let mesh = node.mesh();
+    let defaults = mesh.as_ref().and_then(gltf::Mesh::weights);
+    let weights = node.weights().or(defaults).unwrap_or_default();
+    for (target, &weight) in primitive.morph_targets().zip(weights) {
+        let Some(offsets) = target.positions().filter(|_| weight != 0.0) else {
+            continue;
+        };
+        if offsets.count() != positions.len() {
+            return Err(ImportError::at(
+                "targets",
+                "a morph target has another number of vertices",
+            ));
+        }
+        for (position, offset) in positions.iter_mut().zip(buffers.numbers(&offsets)?) {
+            *position += f64::from(weight) * DVec3::from_array(offset);
+        }
+    }
+    Ok(positions)
+}
+
+/// The indices of a primitive; those of a primitive without are its vertices in turn.
+fn indices(
+    primitive: &Primitive<'_>,
+    vertices: usize,
+    buffers: &Buffers<'_>,
+    limits: MeshLimits,
+) -> Result<Vec<u32>, ImportError> {
+    let Some(accessor) = primitive.indices() else {
+        return Ok((0..vertices as u32).collect());
+    };
+    check_counts(0, accessor.count() as u64 / 3, limits)?;
+    let indices = buffers.numbers(&accessor)?;
+    indices
+        .into_iter()
+        .map(|[index]| {
+            if (0.0..vertices as f64).contains(&index) {
+                Ok(index as u32)
+            } else {
+                Err(ImportError::at(
+                    "indices",
+                    format!("vertex {index} does not exist; there are {vertices}, counted from 0"),
+                ))
+            }
+        })
+        .collect()
+}
+
+/// The triangles of a list, strip or fan of indices.
+fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
+    match mode {
+        Mode::TriangleStrip => indices
+            .windows(3)
+            .enumerate()
+            .map(|(place, corners)| match (place % 2, corners) {
+                (0, &[a, b, c]) | (_, &[b, a, c]) => [a, b, c],
+                _ => [0; 3],
+            })
+            .collect(),
+        Mode::TriangleFan => {
+            let middle = indices.first().copied().unwrap_or_default();
+            let rest = indices.get(1..).unwrap_or_default();
+            rest.array_windows().map(|&[a, b]| [middle, a, b]).collect()
+        }
+        _ => indices.as_chunks().0.to_vec(),
+    }
+}
+
+/// The transforms of a skin's joints from where the mesh was bound; none without a skin.
+fn joints(node: &Node<'_>, scene: &Scene, buffers: &Buffers<'_>) -> Result<Option<Vec<DMat4>>, ImportError> {
+    let Some(skin) = node.skin() else { return Ok(None) };
+    let joints: Vec<DMat4> = skin
+        .joints()
+        .map(|joint| scene.scene_from_node[joint.index()])
+        .collect();
+    let Some(accessor) = skin.inverse_bind_matrices() else {
+        return Ok(Some(joints));
+    };
+    let place = format!("skins[{}]", skin.index());
+    if accessor.count() < joints.len() {
+        let (found, needed) = (accessor.count(), joints.len());
+        return Err(ImportError::at(
+            place,
+            format!("has {found} inverse bind matrices for {needed} joints"),
+        ));
+    }
+    let inverse = buffers.numbers::<16>(&accessor)?;
+    let bound = joints.iter().zip(inverse);
+    Ok(Some(
+        bound
+            .map(|(&joint, inverse)| joint * DMat4::from_cols_array(&inverse))
+            .collect(),
+    ))
+}
+
+/// The transform of each vertex of a skinned primitive: that of its joints by their weights.
+fn skinned(
+    primitive: &Primitive<'_>,
+    joints: &[DMat4],
+    vertices: usize,
+    buffers: &Buffers<'_>,
+) -> Result<Vec<DMat4>, ImportError> {
+    let mut transforms = vec![(DMat4::ZERO, 0.0); vertices];
+    for set in 0..JOINT_SETS {
+        let sets = (
+            primitive.get(&Semantic::Joints(set)),
+            primitive.get(&Semantic::Weights(set)),
+        );
+        let (Some(indices), Some(weights)) = sets else {
+            break;
+        };
+        if indices.count() != vertices || weights.count() != vertices {
+            return Err(ImportError::at(
+                "attributes",
+                "joints and positions differ in number",
+            ));
+        }
+        let indices = buffers.numbers::<4>(&indices)?;
+        let weights = buffers.numbers::<4>(&weights)?;
+        for ((transform, indices), weights) in transforms.iter_mut().zip(indices).zip(weights) {
+            for (index, weight) in indices.into_iter().zip(weights) {
+                if weight == 0.0 {
+                    continue;
+                }
+                let joint = joints.get(index as usize).ok_or_else(|| {
+                    ImportError::at(
+                        "attributes",
+                        format!("joint {index} does not exist; there are {}", joints.len()),
+                    )
+                })?;
+                transform.0 += *joint * weight;
+                transform.1 += weight;
+            }
+        }
+    }
+    // Vertices without weights stay where they are.
+    let transforms = transforms.into_iter();
+    Ok(transforms
+        .map(|(sum, weight)| {
+            if weight > 0.0 {
+                sum * weight.recip()
+            } else {
+                DMat4::IDENTITY
+            }
+        })
+        .collect())
+}

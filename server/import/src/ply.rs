@@ -1,0 +1,254 @@
+//! Reads PLY, as text and binary, with `ply-rs-bw`.
+//!
+//! The numbers of elements in a header are checked before anything is read by them: the parser reads as many as a header
+//! claims.
+
+use std::io::{BufReader, Read as _};
+
+use ply_rs_bw::{
+    parser::{Parser, Reader},
+    ply::{
+        ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
+        ScalarType,
+    },
+};
+
+use crate::{
+    error::ImportError,
+    format::without_mark,
+    limits::MeshLimits,
+    raw::{Places, RawFace, RawMesh, check_counts},
+};
+
+/// The names under which files list the vertices of a face.
+const INDEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// A vertex, in the file's units.
+#[derive(Debug, Default)]
+struct Vertex([f64; 3]);
+
+/// A face's vertices; none if one of them is negative.
+#[derive(Debug, Default)]
+struct Face(Option<Vec<u32>>);
+
+/// An element that is not used.
+#[derive(Debug, Default)]
+struct Ignored;
+
+/// Reads a file.
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+    read_all(without_mark(bytes), limits).map_err(|error| vec![error])
+}
+
+fn read_all(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, ImportError> {
+    let failed =
+        |error: ply_rs_bw::parser::ParseError| ImportError::at("the PLY file", brief(&error.to_string()));
+    // No line of a header or of text may take more memory than the file.
+    let mut reader = Reader::new(BufReader::new(bytes.take(bytes.len() as u64)));
+    let header = Parser::<Ignored>::new()
+        .read_header(&mut reader)
+        .map_err(failed)?;
+    check_header(&header, bytes.len(), limits)?;
+    let mut raw = RawMesh {
+        places: Places::Faces,
+        ..RawMesh::default()
+    };
+    let names = raw.names.add_named([]);
+    let mut faces = Vec::new();
+    for element in header.elements.values() {
+        match element.name.as_str() {
+            "vertex" => {
+                let vertices = Parser::<Vertex>::new();
+                for Vertex(position) in vertices
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(failed)?
+                {
+                    raw.add_vertex(position.map(|coordinate| coordinate as f32));
+                }
+            }
+            "face" => {
+                faces = Parser::<Face>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(failed)?;
+            }
+            _ => {
+                Parser::<Ignored>::new()
+                    .read_payload_for_element(&mut reader, element, &header)
+                    .map_err(failed)?;
+            }
+        }
+    }
+    let vertices = raw.coordinates.len() / 3;
+    let mut triangles = 0;
+    for (place, face) in faces.into_iter().enumerate() {
+        let corners = face.0.ok_or_else(|| {
+            ImportError::at(
+                format!("face {place}"),
+                "a vertex index is negative or no whole number",
+            )
+        })?;
+        if let Some(index) = corners.iter().find(|&&index| index as usize >= vertices) {
+            return Err(ImportError::at(
+                format!("face {place}"),
+                format!("vertex {index} does not exist; there are {vertices}, counted from 0"),
+            ));
+        }
+        if corners.len() < 3 {
+            raw.without_area.note(place);
+            continue;
+        }
+        triangles += corners.len() as u64 - 2;
+        check_counts(0, triangles, limits)?;
+        raw.faces.push(RawFace {
+            place,
+            corners: corners.len(),
+            names,
+        });
+        raw.corners.extend(corners);
+    }
+    Ok(raw)
+}
+
+/// A parser's message on one line, and cut short: it may repeat a whole line of the file.
+fn brief(message: &str) -> String {
+    let words: Vec<&str> = message.split_whitespace().collect();
+    words.join(" ").chars().take(240).collect()
+}
+
+/// Checks what a header claims against the bytes that there are.
+fn check_header(header: &Header, bytes: usize, limits: MeshLimits) -> Result<(), ImportError> {
+    let wrong = |what: String| Err(ImportError::at("the PLY header", what));
+    let count = |name: &str| {
+        header
+            .elements
+            .get(name)
+            .map_or(0, |element| element.count as u64)
+    };
+    if count("face") == 0 {
+        return wrong(if count("tristrips") > 0 {
+            "has triangle strips; export the mesh with faces".to_owned()
+        } else {
+            format!(
+                "has {} vertices and no faces: a point cloud; make a mesh with faces of it",
+                count("vertex")
+            )
+        });
+    }
+    for element in header.elements.values() {
+        let least = least_bytes(element, header.encoding);
+        if least == 0 {
+            return wrong(format!("element {:?} has no properties", element.name));
+        }
+        if (element.count as u64).saturating_mul(least) > bytes as u64 {
+            return wrong(format!(
+                "claims {} elements {:?}, more than the {bytes} bytes of the file can hold",
+                element.count, element.name
+            ));
+        }
+    }
+    let has = |name: &str, is_kind: fn(&PropertyType) -> bool, properties: &[&str]| {
+        header.elements.get(name).is_some_and(|element| {
+            let known = |property: &&str| {
+                let found = element.properties.get(*property);
+                found.is_some_and(|found| is_kind(&found.data_type))
+            };
+            properties.iter().filter(|property| known(property)).count() > 0
+                && (properties.len() < 3 || properties.iter().all(|property| known(&property)))
+        })
+    };
+    if !has(
+        "vertex",
+        |kind| matches!(kind, PropertyType::Scalar(_)),
+        &["x", "y", "z"],
+    ) {
+        return wrong("has no vertices with x, y and z".to_owned());
+    }
+    if !has(
+        "face",
+        |kind| matches!(kind, PropertyType::List(..)),
+        &INDEX_LISTS,
+    ) {
+        return wrong("has faces without a list vertex_indices or vertex_index".to_owned());
+    }
+    check_counts(count("vertex"), count("face"), limits)
+}
+
+/// The fewest bytes that an element takes.
+fn least_bytes(element: &ElementDef, encoding: Encoding) -> u64 {
+    if encoding == Encoding::Ascii {
+        // A digit and what separates it for each property.
+        return 2 * element.properties.len() as u64;
+    }
+    let size = |scalar: &ScalarType| match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    };
+    let properties = element
+        .properties
+        .values()
+        .map(|property| match &property.data_type {
+            PropertyType::Scalar(scalar) => size(scalar),
+            PropertyType::List(count, _) => size(count),
+        });
+    properties.sum()
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        let axis = match name {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.0[axis] = match value {
+            Property::Char(value) => value.into(),
+            Property::UChar(value) => value.into(),
+            Property::Short(value) => value.into(),
+            Property::UShort(value) => value.into(),
+            Property::Int(value) => value.into(),
+            Property::UInt(value) => value.into(),
+            Property::Float(value) => value.into(),
+            Property::Double(value) => value,
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+impl PropertyAccess for Face {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        fn indices<T: TryInto<u32>>(list: Vec<T>) -> Option<Vec<u32>> {
+            list.into_iter().map(|index| index.try_into().ok()).collect()
+        }
+        if !INDEX_LISTS.contains(&name) {
+            return PropertyAccessResult::Ignored;
+        }
+        self.0 = match value {
+            Property::ListChar(list) => indices(list),
+            Property::ListUChar(list) => indices(list),
+            Property::ListShort(list) => indices(list),
+            Property::ListUShort(list) => indices(list),
+            Property::ListInt(list) => indices(list),
+            Property::ListUInt(list) => Some(list),
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+impl PropertyAccess for Ignored {
+    fn new() -> Self {
+        Self
+    }
+}

@@ -1,0 +1,195 @@
+//! A mesh as a file has it, before it is split into triangles, welded and checked.
+
+use std::{collections::BTreeMap, fmt, ops::Range};
+
+use crate::{
+    error::{ImportError, Violations},
+    limits::{MAX_COORDINATE_METRES, MeshLimits},
+};
+
+/// Checks numbers of vertices and triangles that a file claims.
+///
+/// # Errors
+/// [`ImportError::TooMany`].
+pub(crate) fn check_counts(vertices: u64, triangles: u64, limits: MeshLimits) -> Result<(), ImportError> {
+    for (what, found, limit) in [
+        ("vertices", vertices, limits.vertices),
+        ("triangles", triangles, limits.triangles),
+    ] {
+        if found > limit as u64 {
+            return Err(ImportError::TooMany { what, found, limit });
+        }
+    }
+    Ok(())
+}
+
+/// What every reader returns.
+#[derive(Debug, Default)]
+pub(crate) struct RawMesh {
+    /// x, y and z of each vertex, in the file's units and axes.
+    pub(crate) coordinates: Vec<f32>,
+    /// The corners of all faces, as indices of vertices.
+    pub(crate) corners: Vec<u32>,
+    /// The faces, in the file's order.
+    pub(crate) faces: Vec<RawFace>,
+    /// The names of faces' parts.
+    pub(crate) names: NameSets,
+    /// What faces are counted by.
+    pub(crate) places: Places,
+    /// Vertices that no face uses, if the reader knows.
+    pub(crate) unused_vertices: usize,
+    /// Points, lines, and faces with fewer than three corners.
+    pub(crate) without_area: Occurrences,
+    /// Lines that start with an unknown keyword.
+    pub(crate) unknown: Occurrences,
+    /// What was read otherwise than may be expected.
+    pub(crate) warnings: Vec<String>,
+}
+
+/// A face of three or more corners.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RawFace {
+    /// Its place in the file, counted as [`RawMesh::places`] says.
+    pub(crate) place: usize,
+    /// Number of corners, at least 3.
+    pub(crate) corners: usize,
+    /// Index of its names in [`RawMesh::names`].
+    pub(crate) names: usize,
+}
+
+impl RawMesh {
+    /// Number of triangles after polygons are split.
+    pub(crate) fn triangle_count(&self) -> usize {
+        self.faces.iter().map(|face| face.corners - 2).sum()
+    }
+
+    /// Checks that every vertex is finite and near enough to the origin.
+    pub(crate) fn check_coordinates(&self, unit_metres: f32) -> Result<(), Vec<ImportError>> {
+        let mut violations = Violations::default();
+        for (vertex, position) in self.coordinates.as_chunks::<3>().0.iter().enumerate() {
+            let largest = position.iter().fold(0.0_f32, |largest, coordinate| {
+                let metres = (coordinate * unit_metres).abs();
+                // A maximum ignores what is not a number.
+                largest.max(if metres.is_finite() { metres } else { f32::INFINITY })
+            });
+            if !largest.is_finite() {
+                violations.push(ImportError::at(format!("vertex {vertex}"), "is not finite"));
+            } else if largest > MAX_COORDINATE_METRES {
+                violations.push(ImportError::at(
+                    format!("vertex {vertex}"),
+                    format!(
+                        "a coordinate is {largest} m from the origin; it must be at most {MAX_COORDINATE_METRES} m, is the \
+                         unit right?"
+                    ),
+                ));
+            }
+        }
+        violations.into_result()
+    }
+
+    /// Adds a vertex.
+    pub(crate) fn add_vertex(&mut self, position: [f32; 3]) {
+        self.coordinates.extend(position);
+    }
+
+    /// Adds a triangle, whose place is its number.
+    pub(crate) fn add_triangle(&mut self, corners: [u32; 3], names: usize) {
+        self.corners.extend(corners);
+        self.faces.push(RawFace {
+            place: self.faces.len(),
+            corners: 3,
+            names,
+        });
+    }
+}
+
+/// How the places of faces are counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Places {
+    /// By lines, from 1.
+    #[default]
+    Lines,
+    /// By faces, from 0.
+    Faces,
+    /// By triangles, from 0.
+    Triangles,
+}
+
+/// A place in a file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place(pub(crate) Places, pub(crate) usize);
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(places, number) = self;
+        match places {
+            Places::Lines => write!(f, "on line {number}"),
+            Places::Faces => write!(f, "face {number}"),
+            Places::Triangles => write!(f, "triangle {number}"),
+        }
+    }
+}
+
+/// How often something occurred, and where first.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Occurrences {
+    pub(crate) count: usize,
+    pub(crate) first: usize,
+}
+
+impl Occurrences {
+    pub(crate) fn note(&mut self, place: usize) {
+        if self.count == 0 {
+            self.first = place;
+        }
+        self.count += 1;
+    }
+}
+
+/// Sets of names that faces share.
+#[derive(Debug, Default)]
+pub(crate) struct NameSets {
+    /// Names by index.
+    pub(crate) names: Vec<String>,
+    /// The sets, as ranges of `listed`.
+    sets: Vec<Range<usize>>,
+    /// Indices into `names`, set after set.
+    listed: Vec<u32>,
+}
+
+impl NameSets {
+    /// Adds a set of names by their indices; returns its index.
+    pub(crate) fn add(&mut self, mut set: Vec<u32>) -> usize {
+        set.sort_unstable();
+        set.dedup();
+        let start = self.listed.len();
+        self.listed.extend(set);
+        self.sets.push(start..self.listed.len());
+        self.sets.len() - 1
+    }
+
+    /// Adds a set of names; empty ones do not count. Returns its index.
+    pub(crate) fn add_named<'n>(&mut self, names: impl IntoIterator<Item = &'n str>) -> usize {
+        let names = names.into_iter().filter(|name| !name.is_empty());
+        let first = self.names.len();
+        self.names.extend(names.map(str::to_owned));
+        self.add((first as u32..self.names.len() as u32).collect())
+    }
+
+    /// The triangles of each name, sorted by name; `sets` are those of the triangles.
+    pub(crate) fn groups(&self, sets: impl Iterator<Item = usize>) -> Vec<(String, Vec<u32>)> {
+        let mut groups = BTreeMap::<&str, Vec<u32>>::new();
+        for (triangle, set) in sets.enumerate() {
+            for &name in &self.listed[self.sets[set].clone()] {
+                let triangles = groups.entry(&self.names[name as usize]).or_default();
+                if triangles.last() != Some(&(triangle as u32)) {
+                    triangles.push(triangle as u32);
+                }
+            }
+        }
+        groups
+            .into_iter()
+            .map(|(name, triangles)| (name.to_owned(), triangles))
+            .collect()
+    }
+}

@@ -1,0 +1,173 @@
+//! Reads STL, as text and binary, with `stl_io`.
+//!
+//! Text is first rewritten in the form that the parser expects: lower case, one solid, and normals, which are ignored, that
+//! are numbers. The names of its solids are those of the triangles' parts.
+
+use std::io::Cursor;
+
+use stl_io::{Triangle, create_stl_reader};
+
+use crate::{
+    error::ImportError,
+    format::without_mark,
+    limits::MeshLimits,
+    raw::{Occurrences, Places, RawMesh, check_counts},
+};
+
+/// Bytes of a binary file before its triangles, and per triangle.
+const HEADER_BYTES: usize = 84;
+const TRIANGLE_BYTES: usize = 50;
+
+/// Tolerance for the length of a normal that shows that a file is binary STL although its length is wrong.
+const UNIT_LENGTH: std::ops::RangeInclusive<f32> = 0.98..=1.02;
+
+/// True if bytes are binary STL: they have the length that follows from the number of triangles, or at least a first triangle
+/// with a normal of unit length. A file may be cut off, or have bytes behind its triangles.
+pub(crate) fn is_binary(bytes: &[u8]) -> bool {
+    let Some(claimed) = claimed_triangles(bytes) else {
+        return false;
+    };
+    if (bytes.len() - HEADER_BYTES) as u64 == claimed * TRIANGLE_BYTES as u64 {
+        return claimed > 0;
+    }
+    let is_text = !bytes[..bytes.len().min(2 * HEADER_BYTES)].contains(&0);
+    let normal = bytes.get(HEADER_BYTES..HEADER_BYTES + 12).map(|normal| {
+        let squares = normal
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&number| f32::from_le_bytes(number).powi(2));
+        squares.sum::<f32>().sqrt()
+    });
+    claimed > 0 && !is_text && normal.is_some_and(|length| UNIT_LENGTH.contains(&length))
+}
+
+fn claimed_triangles(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(HEADER_BYTES - 4..HEADER_BYTES)?;
+    Some(u64::from(u32::from_le_bytes(count.try_into().ok()?)))
+}
+
+/// Reads a binary file.
+pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+    let claimed = claimed_triangles(bytes).unwrap_or_default();
+    check_counts(0, claimed, limits).map_err(|error| vec![error])?;
+    let present = (bytes.len() - HEADER_BYTES) / TRIANGLE_BYTES;
+    if (present as u64) < claimed {
+        return Err(vec![ImportError::at(
+            "the STL file",
+            format!("is cut off: it claims {claimed} triangles and has {present}"),
+        )]);
+    }
+    // A header may begin with the word by which the parser knows text.
+    let mut blank = bytes.to_vec();
+    blank[..HEADER_BYTES - 4].fill(0);
+    let mut raw = RawMesh {
+        places: Places::Triangles,
+        ..RawMesh::default()
+    };
+    let names = raw.names.add_named([]);
+    read_into(&mut raw, Cursor::new(blank), |_| (names, None))?;
+    let spare = bytes.len() - HEADER_BYTES - raw.faces.len() * TRIANGLE_BYTES;
+    if spare > 0 {
+        raw.warnings
+            .push(format!("{spare} bytes behind the last triangle were ignored"));
+    }
+    Ok(raw)
+}
+
+/// Reads a text file.
+pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+    let mut raw = RawMesh {
+        places: Places::Lines,
+        ..RawMesh::default()
+    };
+    let plain = PlainText::of(without_mark(bytes), &mut raw, limits).map_err(|error| vec![error])?;
+    let facets = &plain.facets;
+    read_into(&mut raw, Cursor::new(plain.text), |triangle| {
+        let &(line, names) = facets.get(triangle).unwrap_or(&(plain.lines, 0));
+        (names, Some(line))
+    })?;
+    if raw.unknown.count > 0 {
+        let Occurrences { count, first } = raw.unknown;
+        raw.warnings.push(format!(
+            "{count} lines are no statements of STL and were ignored; the first is on line {first}"
+        ));
+        raw.unknown = Occurrences::default();
+    }
+    Ok(raw)
+}
+
+/// Appends all triangles; `about` gives the set of names of each and its place, if that is not its number.
+fn read_into(
+    raw: &mut RawMesh,
+    mut file: Cursor<Vec<u8>>,
+    about: impl Fn(usize) -> (usize, Option<usize>),
+) -> Result<(), Vec<ImportError>> {
+    let failed = |triangle: usize, line: Option<usize>, error: &std::io::Error| {
+        let place = line.map_or_else(
+            || format!("triangle {triangle}"),
+            |line| format!("the facet on line {line}"),
+        );
+        vec![ImportError::at(place, error.to_string())]
+    };
+    let triangles = create_stl_reader(&mut file).map_err(|error| failed(0, None, &error))?;
+    for (number, triangle) in triangles.enumerate() {
+        let (names, line) = about(number);
+        let Triangle { vertices, .. } = triangle.map_err(|error| failed(number, line, &error))?;
+        let first = (raw.coordinates.len() / 3) as u32;
+        for vertex in vertices {
+            raw.add_vertex(vertex.0);
+        }
+        raw.add_triangle([first, first + 1, first + 2], names);
+        if let (Some(line), Some(face)) = (line, raw.faces.last_mut()) {
+            face.place = line;
+        }
+    }
+    Ok(())
+}
+
+/// Text in the form that the parser expects.
+#[derive(Debug, Default)]
+struct PlainText {
+    text: Vec<u8>,
+    /// The line of each facet, and its set of names.
+    facets: Vec<(usize, usize)>,
+    /// Number of lines.
+    lines: usize,
+}
+
+impl PlainText {
+    fn of(text: &[u8], raw: &mut RawMesh, limits: MeshLimits) -> Result<Self, ImportError> {
+        let mut plain = Self {
+            text: b"solid all\n".to_vec(),
+            ..Self::default()
+        };
+        let mut names = raw.names.add_named([]);
+        for (index, line) in text.split(|&byte| byte == b'\n').enumerate() {
+            let number = index + 1;
+            plain.lines = number;
+            let line = line.trim_ascii();
+            let lower = line.to_ascii_lowercase();
+            let keyword = lower.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+            match keyword {
+                b"" | b"endsolid" => {}
+                b"solid" => {
+                    let name = String::from_utf8_lossy(line[keyword.len()..].trim_ascii()).into_owned();
+                    names = raw.names.add_named([name.as_str()]);
+                }
+                b"facet" => {
+                    plain.facets.push((number, names));
+                    check_counts(0, plain.facets.len() as u64, limits)?;
+                    plain.text.extend(b"facet normal 0 0 0\n");
+                }
+                b"outer" | b"vertex" | b"endloop" | b"endfacet" => {
+                    plain.text.extend(String::from_utf8_lossy(&lower).bytes());
+                    plain.text.push(b'\n');
+                }
+                _ => raw.unknown.note(number),
+            }
+        }
+        plain.text.extend(b"endsolid all\n");
+        Ok(plain)
+    }
+}

@@ -1,0 +1,90 @@
+//! The same solid in every format, and files from elsewhere.
+
+use std::{fs, path::PathBuf};
+
+use grasp_import::{Import, UpAxis, read_mesh};
+
+use crate::{LIMITS, read, solid::Ring, volume};
+
+#[test]
+fn all_formats_give_the_same_mesh() {
+    let ring = Ring::new();
+    let reference = read(&ring.obj()).unwrap();
+    assert!(
+        (volume(&reference) / Ring::volume() - 1.0).abs() < 1e-5,
+        "{}",
+        volume(&reference)
+    );
+    for (name, bytes) in [
+        ("text STL", ring.stl_text()),
+        ("binary STL", ring.stl_binary()),
+        ("text PLY", ring.ply("ascii")),
+        ("little-endian PLY", ring.ply("binary_little_endian")),
+        ("big-endian PLY", ring.ply("binary_big_endian")),
+        ("GLB", ring.glb("")),
+    ] {
+        let found = read(&bytes).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
+        assert_eq!(found.warnings, [""; 0], "{name}");
+        assert_eq!(
+            found.mesh.triangles().len(),
+            reference.mesh.triangles().len(),
+            "{name}"
+        );
+        for triangle in 0..found.mesh.triangles().len() {
+            assert_eq!(
+                found.mesh.corners(triangle),
+                reference.mesh.corners(triangle),
+                "{name}"
+            );
+        }
+        assert_eq!(
+            found.mesh.positions().len(),
+            reference.mesh.positions().len(),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn files_with_z_up_are_turned() {
+    let import = Import {
+        up_axis: UpAxis::Z,
+        ..Import::with_unit(0.5)
+    };
+    let found = read_mesh(&Ring::new().stl_binary(), import, LIMITS).unwrap();
+    assert!((volume(&found) / (Ring::volume() / 8.0) - 1.0).abs() < 1e-5);
+    // The first vertex was (0.04, 0, 0), the ring's axis +Y: it is −Z now.
+    let flat = found.mesh.positions().iter().map(|position| position.z.abs());
+    assert!((flat.fold(0.0, f32::max) - 0.005).abs() < 1e-6);
+}
+
+#[test]
+fn files_from_elsewhere_are_read() {
+    let root = std::env::var_os("GRASP_TEST_DATA").map_or_else(
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
+        PathBuf::from,
+    );
+    for (name, triangles, warning) in [
+        ("trimesh_cycloidal.ply", 7000, ""),
+        ("trimesh_multibody.stl", 32, "disconnected"),
+        ("trimesh_soup.stl", 4, "open"),
+    ] {
+        let Ok(bytes) = fs::read(root.join("ugly").join(name)) else {
+            eprintln!(
+                "SKIPPED: {name} is not in {}; GRASP_TEST_DATA names the folder",
+                root.display()
+            );
+            continue;
+        };
+        let millimetres = Import::with_unit(1e-3);
+        let found =
+            read_mesh(&bytes, millimetres, LIMITS).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
+        assert!(
+            found.mesh.triangles().len() >= triangles,
+            "{name}: {}",
+            found.mesh.triangles().len()
+        );
+        let is_told = found.warnings.iter().any(|found| found.contains(warning));
+        assert!(warning.is_empty() || is_told, "{name}: {:?}", found.warnings);
+    }
+}

@@ -1,0 +1,256 @@
+//! glTF, as JSON and as GLB.
+
+use base64::{Engine as _, prelude::BASE64_STANDARD};
+
+use crate::{
+    message, read,
+    solid::{Ring, glb},
+    volume,
+};
+
+/// A scene with a square of four vertices of one primitive, whose members and accessors are given, beside the buffer that
+/// they refer to.
+fn square(primitive: &str, accessors: &str, views: &str, more: &str, buffer: &[u8]) -> Vec<u8> {
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{{primitive}}}]}}],
+        "accessors":[{accessors}],"bufferViews":[{views}],"buffers":[{{"byteLength":{}}}]{more}}}"#,
+        buffer.len()
+    );
+    glb(&json, buffer)
+}
+
+const CORNERS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+const POSITIONS: &str =
+    r#"{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}"#;
+
+fn floats<'a>(numbers: impl IntoIterator<Item = &'a f32>) -> Vec<u8> {
+    numbers
+        .into_iter()
+        .flat_map(|number| number.to_le_bytes())
+        .collect()
+}
+
+fn view(offset: usize, length: usize) -> String {
+    format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#)
+}
+
+/// The area of a mesh in the plane z = 0, signed by its winding.
+fn signed_area(bytes: &[u8]) -> f32 {
+    let read = read(bytes).unwrap();
+    let areas = (0..read.mesh.triangles().len()).map(|triangle| {
+        let [a, b, c] = read.mesh.corners(triangle);
+        0.5 * (b - a).cross(c - a).z
+    });
+    areas.sum()
+}
+
+#[test]
+fn nodes_place_scale_and_turn_meshes() {
+    let ring = Ring::new();
+    let scaled =
+        read(&ring.glb(r#","scale":[2,2,2],"rotation":[0.70710677,0,0,0.70710677],"translation":[1,0,0]"#))
+            .unwrap();
+    assert!((volume(&scaled) / (8.0 * Ring::volume()) - 1.0).abs() < 1e-5);
+    let thickness = |axis: usize| {
+        let along = scaled.mesh.positions().iter().map(|position| position[axis]);
+        along.clone().fold(f32::MIN, f32::max) - along.fold(f32::MAX, f32::min)
+    };
+    // The ring's axis was +Y, and is +Z.
+    assert!((thickness(2) - 0.04).abs() < 1e-5 && (thickness(1) - 0.16).abs() < 1e-5);
+    let names: Vec<&str> = scaled.groups.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["ring", "steel", "torus"]);
+}
+
+#[test]
+fn mirrored_nodes_show_their_other_side() {
+    // The ring is the same in a mirror.
+    let mirrored = read(&Ring::new().glb(r#","scale":[-1,1,1]"#)).unwrap();
+    assert!((volume(&mirrored) / Ring::volume() - 1.0).abs() < 1e-5);
+    assert_eq!(mirrored.warnings, [""; 0]);
+}
+
+#[test]
+fn buffers_may_be_data_urls_but_no_files() {
+    let ring = Ring::new();
+    let encoded = BASE64_STANDARD.encode(ring.buffer());
+    let uri = format!(r#","uri":"data:application/octet-stream;base64,{encoded}""#);
+    let inside = read(ring.gltf_json("", &uri).as_bytes()).unwrap();
+    assert!((volume(&inside) / Ring::volume() - 1.0).abs() < 1e-5);
+    let outside = ring.gltf_json("", r#","uri":"ring.bin""#);
+    assert_eq!(
+        message(outside.as_bytes()),
+        "buffers[0]: is in another file; embed the buffers, or send a GLB"
+    );
+}
+
+#[test]
+fn strips_and_fans_are_wound_alike() {
+    let buffer = floats(CORNERS.iter().flatten());
+    let strip = square(
+        r#""attributes":{"POSITION":0},"mode":5"#,
+        POSITIONS,
+        &view(0, 48),
+        "",
+        &buffer,
+    );
+    assert_eq!(signed_area(&strip), 1.0);
+    let [a, b, c, d] = CORNERS;
+    let buffer = floats([a, b, d, c].iter().flatten());
+    let fan = square(
+        r#""attributes":{"POSITION":0},"mode":6"#,
+        POSITIONS,
+        &view(0, 48),
+        "",
+        &buffer,
+    );
+    assert_eq!(signed_area(&fan), 1.0);
+}
+
+#[test]
+fn integers_stand_for_fractions_or_for_themselves() {
+    for (normalized, side) in [(true, 1.0), (false, 255.0)] {
+        let accessor = format!(
+            r#"{{"bufferView":0,"componentType":5121,"count":4,"type":"VEC3","normalized":{normalized},"min":[0,0,0],"max":[255,255,0]}}"#
+        );
+        // Each vertex is padded to four bytes.
+        let bytes: Vec<u8> = CORNERS
+            .iter()
+            .flat_map(|&[x, y, z]| [x * 255.0, y * 255.0, z, 9.0].map(|number| number as u8))
+            .collect();
+        let strided = r#"{"buffer":0,"byteLength":16,"byteStride":4}"#;
+        let more =
+            r#","extensionsUsed":["KHR_mesh_quantization"],"extensionsRequired":["KHR_mesh_quantization"]"#;
+        let scene = square(
+            r#""attributes":{"POSITION":0},"mode":5"#,
+            &accessor,
+            strided,
+            more,
+            &bytes,
+        );
+        assert_eq!(signed_area(&scene), side * side);
+    }
+}
+
+#[test]
+fn sparse_accessors_replace_single_vertices() {
+    let mut buffer = floats(CORNERS.iter().flatten());
+    // The last corner moves from (1, 1) to (2, 2).
+    buffer.extend([3, 0, 0, 0]);
+    buffer.extend(floats(&[2.0, 2.0, 0.0]));
+    let accessor = POSITIONS.replace(
+        r#""min""#,
+        r#""sparse":{"count":1,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":2}},"min""#,
+    );
+    let views = [view(0, 48), view(48, 1), view(52, 12)].join(",");
+    let scene = square(
+        r#""attributes":{"POSITION":0},"mode":5"#,
+        &accessor,
+        &views,
+        "",
+        &buffer,
+    );
+    assert_eq!(signed_area(&scene), 2.0);
+}
+
+#[test]
+fn morph_targets_count_by_their_default_weights() {
+    let mut buffer = floats(CORNERS.iter().flatten());
+    // At full weight, the square is twice as wide.
+    buffer.extend(floats(CORNERS.iter().flat_map(|[x, _, _]| [x, &0.0, &0.0])));
+    let accessors = format!(
+        "{POSITIONS},{}",
+        POSITIONS.replace(r#""bufferView":0"#, r#""bufferView":1"#)
+    );
+    let views = [view(0, 48), view(48, 48)].join(",");
+    let primitive = r#""attributes":{"POSITION":0},"mode":5,"targets":[{"POSITION":1}]"#;
+    for (weights, area) in [("[1]", 2.0), ("[0.5]", 1.5), ("[0]", 1.0)] {
+        let scene = square(primitive, &accessors, &views, "", &buffer);
+        let json = String::from_utf8_lossy(&scene[20..]).into_owned();
+        let json = json[..json
+            .find("}BIN")
+            .map_or(json.rfind("]}").unwrap() + 2, |end| end + 1)]
+            .to_owned();
+        let json = json.trim_end_matches(|c: char| c == '\0').to_owned();
+        let json = json.replace(r#""primitives""#, &format!(r#""weights":{weights},"primitives""#));
+        assert_eq!(signed_area(&glb(&json, &buffer)), area, "{weights}");
+    }
+}
+
+#[test]
+fn skins_are_at_rest_as_their_joints_stand() {
+    let mut buffer = floats(CORNERS.iter().flatten());
+    let joints = buffer.len();
+    buffer.extend([0, 1, 0, 0].repeat(4));
+    let weights = buffer.len();
+    // All of the first joint for the lower corners, half and half for the upper ones.
+    for shares in [[1.0, 0.0], [1.0, 0.0], [0.5, 0.5], [0.5, 0.5]] {
+        buffer.extend(floats(&[shares[0], shares[1], 0.0, 0.0]));
+    }
+    let accessors = format!(
+        r#"{POSITIONS},{{"bufferView":1,"componentType":5121,"count":4,"type":"VEC4"}},
+        {{"bufferView":2,"componentType":5126,"count":4,"type":"VEC4"}}"#
+    );
+    let views = [view(0, joints), view(joints, 16), view(weights, 64)].join(",");
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0,1]}}],
+        "nodes":[{{"mesh":0,"skin":0,"translation":[9,9,9]}},{{"children":[2]}},{{"translation":[0,2,0]}}],
+        "skins":[{{"joints":[1,2]}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"JOINTS_0":1,"WEIGHTS_0":2}},"mode":5}}]}}],
+        "accessors":[{accessors}],"bufferViews":[{views}],"buffers":[{{"byteLength":{}}}]}}"#,
+        buffer.len()
+    );
+    // The upper corners rise by half of two metres; the node's own place does not count.
+    assert_eq!(signed_area(&glb(&json, &buffer)), 2.0);
+}
+
+#[test]
+fn what_cannot_be_read_is_named() {
+    let ring = Ring::new();
+    let json = ring.gltf_json("", "");
+    let required = |extension: &str| {
+        let more =
+            format!(r#""extensionsUsed":["{extension}"],"extensionsRequired":["{extension}"],"asset""#);
+        glb(&json.replace(r#""asset""#, &more), &ring.buffer())
+    };
+    let changed = |from: &str, to: &str| glb(&json.replace(from, to), &ring.buffer());
+    for (bytes, expected) in [
+        (required("KHR_draco_mesh_compression"), "compressed by Draco"),
+        (required("EXT_meshopt_compression"), "compressed by meshopt"),
+        (required("ACME_secret"), "extension \"ACME_secret\": is required"),
+        (
+            changed(r#""count":576"#, r#""count":577"#),
+            "reach beyond its buffer",
+        ),
+        (
+            changed(r#""count":576"#, r#""count":4294967295"#),
+            "4294967295 vertices; at most 100000",
+        ),
+        (changed(r#""count":576"#, r#""count":9"#), "indices: vertex"),
+        (
+            changed(r#""indices":1"#, r#""indices":7"#),
+            "refers to something that does not exist",
+        ),
+        (
+            changed(r#""byteOffset":0"#, r#""byteOffset":18446744073709551610"#),
+            "reach beyond its buffer",
+        ),
+        (changed(r#""POSITION":0"#, r#""NORMAL":0"#), "is missing"),
+        (glb(&json, &[0; 8]), "claims 20736 bytes and has 8"),
+        (ring.glb("")[..500].to_vec(), "it is cut off or damaged"),
+        (b"glTF\x02\0\0\0\x05\0\0\0".to_vec(), "claims 5 bytes"),
+        (b"glTF\x01\0\0\0\x14\0\0\0".to_vec(), "has version 1"),
+    ] {
+        let errors = read(&bytes).expect_err(expected);
+        let message = errors[0].to_string();
+        assert!(message.contains(expected), "{expected}: {message}");
+    }
+    let empty = read(br#"{"asset":{"version":"2.0"}}"#).unwrap_err();
+    assert!(empty[0].to_string().contains("no triangles"));
+}
+
+#[test]
+fn nodes_in_a_circle_end() {
+    let json = Ring::new().gltf_json(r#","children":[0]"#, "");
+    let found = read(&glb(&json, &Ring::new().buffer())).unwrap();
+    assert!((volume(&found) / Ring::volume() - 1.0).abs() < 1e-5);
+}
