@@ -31,6 +31,7 @@ pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
 pub use obj::MAX_NAMES_PER_LINE;
 
 use format::Format;
+use raw::check_counts;
 
 /// The axis that points up in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -113,9 +114,11 @@ pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<Imp
         Format::Obj => obj::read(bytes, unit, limits)?,
         Format::StlText => stl::read_text(bytes, limits)?,
         Format::StlBinary => stl::read_binary(bytes, limits)?,
-        Format::Ply => ply::read(bytes, limits)?,
-        Format::Gltf => gltf::read(bytes, limits)?,
+        Format::Ply => ply::read(bytes, limits.unwelded())?,
+        Format::Gltf => gltf::read(bytes, limits.unwelded())?,
     };
     raw.check_coordinates(unit)?;
-    clean::clean(&raw, import)
+    let read = clean::clean(&raw, import)?;
+    check_counts(read.mesh.positions().len() as u64, 0, limits).map_err(|error| vec![error])?;
+    Ok(read)
 }

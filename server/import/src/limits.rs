@@ -14,3 +14,13 @@ pub struct MeshLimits {
     /// Number of triangles, after polygons are split.
     pub triangles: usize,
 }
+
+impl MeshLimits {
+    /// For formats in which every triangle may have vertices of its own, which are welded later.
+    pub(crate) fn unwelded(self) -> Self {
+        Self {
+            vertices: self.vertices.max(self.triangles.saturating_mul(3)),
+            ..self
+        }
+    }
+}

@@ -1,6 +1,10 @@
 //! A mesh as a file has it, before it is split into triangles, welded and checked.
 
-use std::{collections::BTreeMap, fmt, ops::Range};
+use std::{
+    collections::{BTreeMap, HashMap},
+    fmt,
+    ops::Range,
+};
 
 use crate::{
     error::{ImportError, Violations},
@@ -149,8 +153,9 @@ impl Occurrences {
 /// Sets of names that faces share.
 #[derive(Debug, Default)]
 pub(crate) struct NameSets {
-    /// Names by index.
-    pub(crate) names: Vec<String>,
+    /// Names by index, and their indices.
+    names: Vec<String>,
+    indices: HashMap<String, u32>,
     /// The sets, as ranges of `listed`.
     sets: Vec<Range<usize>>,
     /// Indices into `names`, set after set.
@@ -158,6 +163,17 @@ pub(crate) struct NameSets {
 }
 
 impl NameSets {
+    /// The index of a name.
+    pub(crate) fn intern(&mut self, name: &str) -> u32 {
+        if let Some(&index) = self.indices.get(name) {
+            return index;
+        }
+        let index = self.names.len() as u32;
+        self.indices.insert(name.to_owned(), index);
+        self.names.push(name.to_owned());
+        index
+    }
+
     /// Adds a set of names by their indices; returns its index.
     pub(crate) fn add(&mut self, mut set: Vec<u32>) -> usize {
         set.sort_unstable();
@@ -171,9 +187,8 @@ impl NameSets {
     /// Adds a set of names; empty ones do not count. Returns its index.
     pub(crate) fn add_named<'n>(&mut self, names: impl IntoIterator<Item = &'n str>) -> usize {
         let names = names.into_iter().filter(|name| !name.is_empty());
-        let first = self.names.len();
-        self.names.extend(names.map(str::to_owned));
-        self.add((first as u32..self.names.len() as u32).collect())
+        let set = names.map(|name| self.intern(name)).collect();
+        self.add(set)
     }
 
     /// The triangles of each name, sorted by name; `sets` are those of the triangles.
@@ -182,9 +197,7 @@ impl NameSets {
         for (triangle, set) in sets.enumerate() {
             for &name in &self.listed[self.sets[set].clone()] {
                 let triangles = groups.entry(&self.names[name as usize]).or_default();
-                if triangles.last() != Some(&(triangle as u32)) {
-                    triangles.push(triangle as u32);
-                }
+                triangles.push(triangle as u32);
             }
         }
         groups

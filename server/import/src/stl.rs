@@ -18,11 +18,8 @@ use crate::{
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
 
-/// Tolerance for the length of a normal that shows that a file is binary STL although its length is wrong.
-const UNIT_LENGTH: std::ops::RangeInclusive<f32> = 0.98..=1.02;
-
-/// True if bytes are binary STL: they have the length that follows from the number of triangles, or at least a first triangle
-/// with a normal of unit length. A file may be cut off, or have bytes behind its triangles.
+/// True if bytes are binary STL: they have the length that follows from the number of triangles, or at least one of that order.
+/// A file may be cut off, or have bytes behind its triangles.
 pub(crate) fn is_binary(bytes: &[u8]) -> bool {
     let Some(claimed) = claimed_triangles(bytes) else {
         return false;
@@ -31,15 +28,8 @@ pub(crate) fn is_binary(bytes: &[u8]) -> bool {
         return claimed > 0;
     }
     let is_text = !bytes[..bytes.len().min(2 * HEADER_BYTES)].contains(&0);
-    let normal = bytes.get(HEADER_BYTES..HEADER_BYTES + 12).map(|normal| {
-        let squares = normal
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&number| f32::from_le_bytes(number).powi(2));
-        squares.sum::<f32>().sqrt()
-    });
-    claimed > 0 && !is_text && normal.is_some_and(|length| UNIT_LENGTH.contains(&length))
+    let present = ((bytes.len() - HEADER_BYTES) / TRIANGLE_BYTES) as u64;
+    !is_text && present > 0 && (present / 2..=present.saturating_mul(100)).contains(&claimed) && claimed > 0
 }
 
 fn claimed_triangles(bytes: &[u8]) -> Option<u64> {

@@ -3,10 +3,7 @@
 use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjMesh, read_obj},
-};
+use grasp_import::{ImportedMesh, MeshLimits, read_mesh};
 use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
 use super::{
@@ -39,38 +36,39 @@ pub(crate) fn build_object(
     limits: MeshLimits,
     mut violations: Violations,
 ) -> Result<StoredObject, ServiceError> {
-    if fields.obj.is_empty() || fields.obj.len() > limits.bytes {
+    if fields.mesh.is_empty() || fields.mesh.len() > limits.bytes {
         // `object_fields` has added the violation.
         return Err(violations.into_error());
     }
-    let obj = match read_obj(&fields.obj, fields.unit_metres, limits) {
-        Ok(obj) => obj,
+    let mesh_field = Field::root(fields.mesh_field);
+    let read = match read_mesh(&fields.mesh, fields.import, limits) {
+        Ok(read) => read,
         Err(errors) => {
             for error in errors {
-                violations.add(Field::root("obj"), error.to_string());
+                violations.add(mesh_field, error.to_string());
             }
             return Err(violations.into_error());
         }
     };
-    let mut warnings = obj.warnings.clone();
-    check_extent(&obj.mesh, &mut warnings, &mut violations);
-    let forbidden = forbidden_triangles(&fields, &obj, &mut violations);
+    let mut warnings = read.warnings.clone();
+    check_extent(&read.mesh, mesh_field, &mut warnings, &mut violations);
+    let forbidden = forbidden_triangles(&fields, &read, &mut violations);
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
     let centre_of_mass = fields.centre_of_mass.unwrap_or_else(|| {
-        let (centre, source) = centre_of_mass(&obj.mesh);
+        let (centre, source) = centre_of_mass(&read.mesh);
         if source == Source::Surface {
             warnings
                 .push("the mesh encloses no volume: the centre of mass is that of its surface".to_owned());
         }
         centre
     });
-    match GraspObject::new(obj.mesh, fields.mass, centre_of_mass, fields.friction, &forbidden) {
+    match GraspObject::new(read.mesh, fields.mass, centre_of_mass, fields.friction, &forbidden) {
         Ok(object) => Ok(StoredObject::new(fields.id, false, Arc::new(object), warnings)),
         Err(errors) => {
             for error in errors {
-                violations.add(Field::root("obj"), error.to_string());
+                violations.add(mesh_field, error.to_string());
             }
             Err(violations.into_error())
         }
@@ -78,7 +76,12 @@ pub(crate) fn build_object(
 }
 
 /// Checks that the object has the size of something that can be held.
-fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>, violations: &mut Violations) {
+fn check_extent(
+    mesh: &TriangleMesh,
+    field: Field<'_>,
+    warnings: &mut Vec<String>,
+    violations: &mut Violations,
+) {
     let mut low = Vec3::INFINITY;
     let mut high = Vec3::NEG_INFINITY;
     for &position in mesh.positions() {
@@ -89,7 +92,7 @@ fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>, violations: &mu
     // The negation also rejects an extent that overflowed.
     if !(SMALLEST_EXTENT..=LARGEST_EXTENT).contains(&extent) {
         violations.add(
-            Field::root("obj"),
+            field,
             format_args!(
                 "is {extent} m long; it must be {SMALLEST_EXTENT} m to {LARGEST_EXTENT} m (is unit_metres right?)"
             ),
@@ -100,9 +103,9 @@ fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>, violations: &mu
 }
 
 /// The triangles of all forbidden groups and indices.
-fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Violations) -> Vec<u32> {
+fn forbidden_triangles(fields: &ObjectFields, read: &ImportedMesh, violations: &mut Violations) -> Vec<u32> {
     let field = Field::root("forbidden");
-    let groups: HashMap<&str, &[u32]> = obj
+    let groups: HashMap<&str, &[u32]> = read
         .groups
         .iter()
         .map(|(name, triangles)| (name.as_str(), triangles.as_slice()))
@@ -113,14 +116,14 @@ fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Vi
             Some(triangles) => forbidden.extend_from_slice(triangles),
             None => violations.add(
                 field.child("groups").at(place),
-                format_args!("is {}; {}", quoted(name), known_groups(obj)),
+                format_args!("is {}; {}", quoted(name), known_groups(read)),
             ),
         }
     }
     // Clients count the triangles of their file, some of which may have been dropped.
-    let triangles = obj.triangles_in_file;
+    let triangles = read.triangles_in_file;
     for (place, &triangle) in fields.forbidden_triangles.iter().enumerate() {
-        if let Ok(index) = obj.indices_in_file.binary_search(&triangle) {
+        if let Ok(index) = read.indices_in_file.binary_search(&triangle) {
             forbidden.push(index as u32);
         } else if triangle as usize >= triangles {
             violations.add(
@@ -134,17 +137,17 @@ fn forbidden_triangles(fields: &ObjectFields, obj: &ObjMesh, violations: &mut Vi
     forbidden
 }
 
-fn known_groups(obj: &ObjMesh) -> String {
-    if obj.groups.is_empty() {
+fn known_groups(read: &ImportedMesh) -> String {
+    if read.groups.is_empty() {
         return "the mesh names no groups, objects or materials".to_owned();
     }
-    let names: Vec<String> = obj
+    let names: Vec<String> = read
         .groups
         .iter()
         .take(LISTED_GROUPS)
         .map(|(name, _)| quoted(name))
         .collect();
-    let more = obj.groups.len().saturating_sub(LISTED_GROUPS);
+    let more = read.groups.len().saturating_sub(LISTED_GROUPS);
     let more = if more > 0 {
         format!(" and {more} more")
     } else {
@@ -162,6 +165,8 @@ mod tests {
         test_runner::{Config, RngSeed, TestRunner},
     };
 
+    use grasp_import::Import;
+
     use super::*;
 
     const LIMITS: MeshLimits = MeshLimits {
@@ -174,9 +179,10 @@ mod tests {
     fn fields(forbidden_triangles: &[u32]) -> ObjectFields {
         ObjectFields {
             id: "tetrahedron".to_owned(),
-            obj: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 1 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+            mesh: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 1 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
                 .to_vec(),
-            unit_metres: 0.1,
+            mesh_field: "mesh",
+            import: Import::with_unit(0.1),
             mass: 0.1,
             centre_of_mass: None,
             friction: None,
@@ -206,8 +212,8 @@ mod tests {
     /// A mesh that has a group "lid", with its first triangle forbidden as well.
     fn text_fields(obj: String, unit_metres: f32) -> ObjectFields {
         ObjectFields {
-            obj: obj.into_bytes(),
-            unit_metres,
+            mesh: obj.into_bytes(),
+            import: Import::with_unit(unit_metres),
             forbidden_groups: vec!["lid".to_owned()],
             ..fields(&[0])
         }

@@ -118,7 +118,7 @@ impl ObjectStore {
         let bytes = object.bytes();
         if bytes > self.limits.bytes {
             return Err(ServiceError::invalid(
-                "obj",
+                "mesh",
                 format!(
                     "takes about {bytes} bytes with its search structures; the cache holds {}",
                     self.limits.bytes

@@ -1,6 +1,7 @@
 //! Checks object names, and all fields of a new object but its mesh.
 
 use glam::Vec3;
+use grasp_import::{Import, UpAxis};
 use grasp_proto::v1;
 
 use super::{Field, Violations, friction, point, quoted};
@@ -22,17 +23,19 @@ const UNIT_RANGE: std::ops::RangeInclusive<f32> = 1e-6..=1e3;
 pub(crate) struct ObjectFields {
     /// The last part of its name.
     pub id: String,
-    /// The mesh as OBJ text.
-    pub obj: Vec<u8>,
-    /// Metres per unit of the mesh.
-    pub unit_metres: f32,
+    /// The mesh as the content of a file.
+    pub mesh: Vec<u8>,
+    /// The field that has it.
+    pub mesh_field: &'static str,
+    /// Unit and axes of the file.
+    pub import: Import,
     /// Mass in kilograms.
     pub mass: f32,
     /// Centre of mass in metres, in the object's frame; none to compute it.
     pub centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction, if given.
     pub friction: Option<f32>,
-    /// Groups, objects and materials of the OBJ text that must not be touched.
+    /// Named parts of the mesh that must not be touched.
     pub forbidden_groups: Vec<String>,
     /// Triangles that must not be touched.
     pub forbidden_triangles: Vec<u32>,
@@ -71,17 +74,36 @@ pub(crate) fn object_fields(
             ),
         );
     }
-    if request.obj.is_empty() {
+    let (mesh_field, mesh) = match (request.mesh, request.obj) {
+        (mesh, obj) if obj.is_empty() => ("mesh", mesh),
+        (mesh, obj) if mesh.is_empty() => ("obj", obj),
+        (mesh, _) => {
+            violations.add(Field::root("obj"), "is the former name of mesh, which is given, too; give one of them");
+            ("mesh", mesh)
+        }
+    };
+    if mesh.is_empty() {
         violations.add(
-            Field::root("obj"),
-            "is empty; the mesh is required as Wavefront OBJ text",
+            Field::root(mesh_field),
+            "is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL",
         );
-    } else if request.obj.len() > maximum_bytes {
+    } else if mesh.len() > maximum_bytes {
         violations.add(
-            Field::root("obj"),
-            format_args!("has {} bytes; the limit is {maximum_bytes}", request.obj.len()),
+            Field::root(mesh_field),
+            format_args!("has {} bytes; the limit is {maximum_bytes}", mesh.len()),
         );
     }
+    let up_axis = match v1::UpAxis::try_from(request.up_axis) {
+        Ok(v1::UpAxis::Unspecified | v1::UpAxis::Y) => UpAxis::Y,
+        Ok(v1::UpAxis::Z) => UpAxis::Z,
+        Err(_) => {
+            violations.add(
+                Field::root("up_axis"),
+                format_args!("is {}; it must be UP_AXIS_Y or UP_AXIS_Z", request.up_axis),
+            );
+            UpAxis::Y
+        }
+    };
     let unit_metres = match request.unit_metres {
         None => 1.0,
         Some(unit) if UNIT_RANGE.contains(&unit) => unit,
@@ -116,8 +138,9 @@ pub(crate) fn object_fields(
     let forbidden = request.forbidden.unwrap_or_default();
     ObjectFields {
         id: request.object_id,
-        obj: request.obj,
-        unit_metres,
+        mesh,
+        mesh_field,
+        import: Import { unit_metres, up_axis },
         mass: request.mass_kg,
         centre_of_mass,
         friction,
@@ -142,7 +165,9 @@ mod tests {
     fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest {
             object_id: "mug-1".into(),
-            obj: b"v 0 0 0".to_vec(),
+            obj: Vec::new(),
+            mesh: b"v 0 0 0".to_vec(),
+            up_axis: 0,
             unit_metres: None,
             mass_kg: 0.3,
             centre_of_mass: None,
@@ -166,7 +191,7 @@ mod tests {
         let mut violations = Violations::default();
         let fields = object_fields(valid(), 100, &mut violations);
         assert!(violations.is_empty());
-        assert_eq!((fields.unit_metres, fields.friction), (1.0, None));
+        assert_eq!((fields.import, fields.friction), (Import::METRES, None));
     }
 
     #[test]
@@ -204,12 +229,18 @@ mod tests {
             };
             assert_eq!(fields_of_violations(request), ["centre_of_mass"], "{x}");
         }
-        for obj in [vec![], vec![b' '; 101]] {
-            let request = v1::CreateObjectRequest { obj, ..valid() };
+        for mesh in [vec![], vec![b' '; 101]] {
+            let request = v1::CreateObjectRequest { mesh, ..valid() };
+            assert_eq!(fields_of_violations(request), ["mesh"]);
+        }
+        for (mesh, obj) in [(vec![b' '], vec![b' ']), (vec![], vec![b' '; 101])] {
+            let request = v1::CreateObjectRequest { mesh, obj, ..valid() };
             assert_eq!(fields_of_violations(request), ["obj"]);
         }
+        let request = v1::CreateObjectRequest { up_axis: 9, ..valid() };
+        assert_eq!(fields_of_violations(request), ["up_axis"]);
         let all = v1::CreateObjectRequest::default();
-        assert_eq!(fields_of_violations(all), ["object_id", "obj", "mass_kg"]);
+        assert_eq!(fields_of_violations(all), ["object_id", "mesh", "mass_kg"]);
     }
 
     #[test]

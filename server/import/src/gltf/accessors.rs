@@ -1,6 +1,6 @@
 //! Numbers out of buffers, with every bound checked.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, cell::Cell};
 
 use gltf::{
     Accessor,
@@ -8,19 +8,41 @@ use gltf::{
     buffer::View,
 };
 
-use crate::error::ImportError;
+use crate::{error::ImportError, limits::MeshLimits};
+
+/// How often, on average, each vertex and index of the largest mesh may be read: for morph targets, joints and weights.
+const READS: u64 = 16;
 
 /// The bytes of a document's buffers.
 #[derive(Debug)]
-pub(super) struct Buffers<'a>(Vec<Cow<'a, [u8]>>);
+pub(super) struct Buffers<'a> {
+    buffers: Vec<Cow<'a, [u8]>>,
+    /// Elements that may still be read: scenes can ask for the same ones again and again.
+    left: Cell<u64>,
+}
 
 impl<'a> Buffers<'a> {
-    pub(super) fn new(buffers: Vec<Cow<'a, [u8]>>) -> Self {
-        Self(buffers)
+    pub(super) fn new(buffers: Vec<Cow<'a, [u8]>>, limits: MeshLimits) -> Self {
+        let largest = limits.vertices as u64 + 3 * limits.triangles as u64;
+        Self {
+            buffers,
+            left: Cell::new(READS.saturating_mul(largest)),
+        }
     }
 
-    /// All elements of an accessor of `N` components as numbers; integers that stand for fractions become those. The caller has
-    /// checked that the count is within limits.
+    /// Counts elements that are about to be read.
+    pub(super) fn spend(&self, elements: u64) -> Result<(), ImportError> {
+        let left = self.left.get().checked_sub(elements.saturating_add(1));
+        self.left.set(left.ok_or_else(|| {
+            ImportError::at(
+                "the scene",
+                "repeats its meshes, joints or morph targets too often to be read",
+            )
+        })?);
+        Ok(())
+    }
+
+    /// All elements of an accessor of `N` components as numbers; integers that stand for fractions become those.
     pub(super) fn numbers<const N: usize>(
         &self,
         accessor: &Accessor<'_>,
@@ -30,6 +52,7 @@ impl<'a> Buffers<'a> {
         if components != N {
             return Err(wrong(format!("has {components} components; {N} are needed")));
         }
+        self.spend(accessor.count() as u64)?;
         let kind = accessor.data_type();
         let size = kind.size() * N;
         let mut numbers = match accessor.view() {
@@ -45,6 +68,12 @@ impl<'a> Buffers<'a> {
         if let Some(sparse) = accessor.sparse() {
             let (indices, values) = (sparse.indices(), sparse.values());
             let count = sparse.count();
+            if count > accessor.count() {
+                return Err(wrong(format!(
+                    "replaces {count} of {} elements",
+                    accessor.count()
+                )));
+            }
             let index_kind = match indices.index_type() {
                 IndexType::U8 => DataType::U8,
                 IndexType::U16 => DataType::U16,
@@ -95,7 +124,7 @@ impl<'a> Buffers<'a> {
         size: usize,
         count: usize,
     ) -> Option<impl Iterator<Item = &[u8]> + use<'_, 'a>> {
-        let buffer = self.0.get(view.buffer().index())?;
+        let buffer = self.buffers.get(view.buffer().index())?;
         let end = view.offset().checked_add(view.length())?;
         let bytes = buffer.get(view.offset()..end)?;
         let last = count.checked_sub(1)?.checked_mul(stride)?.checked_add(offset)?;

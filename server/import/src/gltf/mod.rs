@@ -59,7 +59,7 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<Impo
     }
     strip(&mut root);
     let document = Document::from_json(root).map_err(|error| invalid(&error))?;
-    let buffers = decode(&document, binary).map_err(|error| vec![error])?;
+    let buffers = decode(&document, binary, limits).map_err(|error| vec![error])?;
     let mut raw = RawMesh {
         places: Places::Triangles,
         ..RawMesh::default()
@@ -148,7 +148,11 @@ fn invalid(error: &gltf::Error) -> Vec<ImportError> {
 }
 
 /// The bytes of all buffers.
-fn decode<'a>(document: &Document, binary: Option<Cow<'a, [u8]>>) -> Result<Buffers<'a>, ImportError> {
+fn decode<'a>(
+    document: &Document,
+    binary: Option<Cow<'a, [u8]>>,
+    limits: MeshLimits,
+) -> Result<Buffers<'a>, ImportError> {
     let mut binary = binary;
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
@@ -180,5 +184,5 @@ fn decode<'a>(document: &Document, binary: Option<Cow<'a, [u8]>>) -> Result<Buff
         }
         buffers.push(bytes);
     }
-    Ok(Buffers::new(buffers))
+    Ok(Buffers::new(buffers, limits))
 }

@@ -1,7 +1,9 @@
 //! The triangles of a scene's meshes.
 
+use std::collections::{HashMap, hash_map::Entry};
+
 use glam::{DMat4, DVec3};
-use gltf::{Document, Node, Primitive, Semantic, mesh::Mode};
+use gltf::{Document, Node, Primitive, Semantic, Skin, mesh::Mode};
 
 use super::{accessors::Buffers, nodes::Scene};
 use crate::{
@@ -22,12 +24,29 @@ pub(super) fn read_into(
     limits: MeshLimits,
 ) -> Result<(), ImportError> {
     let nodes: Vec<Node<'_>> = document.nodes().collect();
+    // Each name once: scenes may show a part with a long one thousands of times.
+    let mut by_name = |name: Option<&str>| {
+        let name = name.filter(|name| !name.is_empty());
+        name.map(|name| raw.names.intern(name))
+    };
+    let nodes_by_name: Vec<Option<u32>> = document.nodes().map(|node| by_name(node.name())).collect();
+    let meshes_by_name: Vec<Option<u32>> = document.meshes().map(|mesh| by_name(mesh.name())).collect();
+    let materials = document.materials();
+    let materials_by_name: Vec<Option<u32>> = materials.map(|material| by_name(material.name())).collect();
+    let mut skins = HashMap::new();
     let mut skipped = 0;
     for &index in &scene.shown {
         let node = &nodes[index];
         let Some(mesh) = node.mesh() else { continue };
-        let joints = joints(node, scene, buffers)?;
+        let joints = match node.skin() {
+            Some(skin) => match skins.entry(skin.index()) {
+                Entry::Occupied(known) => Some(&*known.into_mut()),
+                Entry::Vacant(unknown) => Some(&*unknown.insert(joints(&skin, scene, buffers)?)),
+            },
+            None => None,
+        };
         for primitive in mesh.primitives() {
+            buffers.spend(0)?;
             if !matches!(
                 primitive.mode(),
                 Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
@@ -44,14 +63,18 @@ pub(super) fn read_into(
                     error.to_string(),
                 )
             };
-            let names = raw.names.add_named(
-                [node.name(), mesh.name(), primitive.material().name()]
-                    .into_iter()
-                    .flatten(),
-            );
+            let own = [
+                nodes_by_name[index],
+                meshes_by_name[mesh.index()],
+                primitive
+                    .material()
+                    .index()
+                    .and_then(|material| materials_by_name[material]),
+            ];
+            let names = raw.names.add(own.into_iter().flatten().collect());
             let positions = positions(&primitive, node, buffers, raw, limits).map_err(place)?;
             let indices = indices(&primitive, positions.len(), buffers, limits).map_err(place)?;
-            let scene_from_vertex = match &joints {
+            let scene_from_vertex = match joints {
                 Some(joints) => skinned(&primitive, joints, positions.len(), buffers).map_err(place)?,
                 None => vec![scene.scene_from_node[index]],
             };
@@ -61,15 +84,15 @@ pub(super) fn read_into(
                 raw.add_vertex(transform.transform_point3(*position).as_vec3().to_array());
             }
             // A mirrored instance shows its other side.
-            let is_mirrored = joints.is_none() && scene.scene_from_node[index].determinant() < 0.0;
-            check_counts(0, (raw.faces.len() + indices.len()) as u64, limits)?;
-            for [a, b, c] in triangles(&indices, primitive.mode()) {
+            let is_mirrored = scene_from_vertex[0].determinant() < 0.0;
+            let triangles = triangles(&indices, primitive.mode());
+            check_counts(0, (raw.faces.len() + triangles.len()) as u64, limits).map_err(place)?;
+            for [a, b, c] in triangles {
                 let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
                 raw.add_triangle(corners.map(|corner| first + corner), names);
             }
         }
     }
-    check_counts(0, raw.faces.len() as u64, limits)?;
     if skipped > 0 {
         raw.warnings
             .push(format!("{skipped} primitives of points or lines were ignored"));
@@ -99,6 +122,7 @@ fn positions(
     let defaults = mesh.as_ref().and_then(gltf::Mesh::weights);
     let weights = node.weights().or(defaults).unwrap_or_default();
     for (target, &weight) in primitive.morph_targets().zip(weights) {
+        buffers.spend(0)?;
         let Some(offsets) = target.positions().filter(|_| weight != 0.0) else {
             continue;
         };
@@ -162,15 +186,14 @@ fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     }
 }
 
-/// The transforms of a skin's joints from where the mesh was bound; none without a skin.
-fn joints(node: &Node<'_>, scene: &Scene, buffers: &Buffers<'_>) -> Result<Option<Vec<DMat4>>, ImportError> {
-    let Some(skin) = node.skin() else { return Ok(None) };
+/// The transforms of a skin's joints from where the mesh was bound.
+fn joints(skin: &Skin<'_>, scene: &Scene, buffers: &Buffers<'_>) -> Result<Vec<DMat4>, ImportError> {
     let joints: Vec<DMat4> = skin
         .joints()
         .map(|joint| scene.scene_from_node[joint.index()])
         .collect();
     let Some(accessor) = skin.inverse_bind_matrices() else {
-        return Ok(Some(joints));
+        return Ok(joints);
     };
     let place = format!("skins[{}]", skin.index());
     if accessor.count() < joints.len() {
@@ -182,11 +205,9 @@ fn joints(node: &Node<'_>, scene: &Scene, buffers: &Buffers<'_>) -> Result<Optio
     }
     let inverse = buffers.numbers::<16>(&accessor)?;
     let bound = joints.iter().zip(inverse);
-    Ok(Some(
-        bound
-            .map(|(&joint, inverse)| joint * DMat4::from_cols_array(&inverse))
-            .collect(),
-    ))
+    Ok(bound
+        .map(|(&joint, inverse)| joint * DMat4::from_cols_array(&inverse))
+        .collect())
 }
 
 /// The transform of each vertex of a skinned primitive: that of its joints by their weights.

@@ -1,7 +1,5 @@
 //! The first pass over OBJ text: enforces limits, collects violations and groups, writes plain text for `tobj`.
 
-use std::collections::HashMap;
-
 use super::{
     MAX_NAMES_PER_LINE,
     lines::{Lines, shown, words},
@@ -47,7 +45,6 @@ impl Scan {
             seven_numbers: None,
             weighted: Occurrences::default(),
             forward: Vec::new(),
-            names: HashMap::new(),
             current: Names::default(),
             names_changed: true,
             names_of_faces: 0,
@@ -84,7 +81,6 @@ struct Scanner<'t> {
     weighted: Occurrences,
     /// Line and index of corners that refer to a vertex further down.
     forward: Vec<(usize, usize)>,
-    names: HashMap<String, u32>,
     current: Names,
     names_changed: bool,
     /// The set of names that faces have from here on.
@@ -242,7 +238,7 @@ impl Scanner<'_> {
         for name in names {
             found += 1;
             if found <= MAX_NAMES_PER_LINE {
-                let index = self.intern(&name);
+                let index = self.scan.names.intern(&name);
                 self.current.groups.push(index);
             }
         }
@@ -255,16 +251,7 @@ impl Scanner<'_> {
     fn rest_of_line(&mut self, line: &[u8], keyword: &[u8]) -> Option<u32> {
         let line = line.trim_ascii();
         let name = String::from_utf8_lossy(line[keyword.len()..].trim_ascii());
-        (!name.is_empty()).then(|| self.intern(&name))
-    }
-
-    fn intern(&mut self, name: &str) -> u32 {
-        if let Some(&index) = self.names.get(name) {
-            return index;
-        }
-        let index = self.names.len() as u32;
-        self.names.insert(name.to_owned(), index);
-        index
+        (!name.is_empty()).then(|| self.scan.names.intern(&name))
     }
 
     fn write_numbers(&mut self, numbers: &[&[u8]]) {
@@ -299,10 +286,6 @@ impl Scanner<'_> {
                 "{count} vertices have a weight other than 1, by which their coordinates were divided; the first is on \
                  line {first}"
             ));
-        }
-        self.scan.names.names = vec![String::new(); self.names.len()];
-        for (name, index) in self.names {
-            self.scan.names.names[index as usize] = name;
         }
         Ok(self.scan)
     }

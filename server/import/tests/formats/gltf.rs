@@ -223,7 +223,7 @@ fn what_cannot_be_read_is_named() {
         ),
         (
             changed(r#""count":576"#, r#""count":4294967295"#),
-            "4294967295 vertices; at most 100000",
+            "4294967295 vertices; at most 300000",
         ),
         (changed(r#""count":576"#, r#""count":9"#), "indices: vertex"),
         (
@@ -252,5 +252,59 @@ fn what_cannot_be_read_is_named() {
 fn nodes_in_a_circle_end() {
     let json = Ring::new().gltf_json(r#","children":[0]"#, "");
     let found = read(&glb(&json, &Ring::new().buffer())).unwrap();
+    assert!((volume(&found) / Ring::volume() - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn scenes_that_repeat_themselves_end() {
+    // Thousands of nodes show a mesh of thousands of primitives, by name and of points.
+    let many = |count: usize, part: &str| vec![part; count].join(",");
+    let scene = |primitive: &str, name: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"nodes":[{}],"meshes":[{{"name":"{name}","primitives":[{}]}}],
+            "accessors":[{{"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[0,0,0],
+            "sparse":{{"count":1,"indices":{{"bufferView":0,"componentType":5121}},"values":{{"bufferView":0}}}}}}],
+            "bufferViews":[{{"buffer":0,"byteLength":64}}],"buffers":[{{"byteLength":64}}]}}"#,
+            many(20_000, r#"{"mesh":0}"#),
+            many(20_000, primitive)
+        )
+    };
+    let points = scene(r#"{"attributes":{"POSITION":0},"mode":0}"#, "points");
+    assert!(message(&glb(&points, &[0; 64])).contains("too often"));
+    let named = scene(r#"{"attributes":{"POSITION":0}}"#, &"n".repeat(1 << 20));
+    assert!(message(&glb(&named, &[0; 64])).contains("at most 300000"));
+    let joints = r#"{"asset":{"version":"2.0"},"nodes":[{"mesh":0,"skin":0}],"skins":[{"joints":[0],"inverseBindMatrices":1}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[
+        {"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[0,0,0],
+         "sparse":{"count":1,"indices":{"bufferView":0,"componentType":5121},"values":{"bufferView":0}}},
+        {"componentType":5126,"count":4294967296,"type":"MAT4",
+         "sparse":{"count":1,"indices":{"bufferView":0,"componentType":5121},"values":{"bufferView":0}}}],
+        "bufferViews":[{"buffer":0,"byteLength":64}],"buffers":[{"byteLength":64}]}"#;
+    assert!(message(&glb(joints, &[0; 64])).contains("too often"));
+}
+
+#[test]
+fn every_triangle_may_have_vertices_of_its_own() {
+    let ring = Ring::new();
+    let corners = ring
+        .triangles
+        .iter()
+        .flatten()
+        .map(|&vertex| ring.positions[vertex as usize]);
+    let buffer = floats(corners.collect::<Vec<_>>().iter().flatten());
+    let accessor = POSITIONS.replace(r#""count":4"#, r#""count":3456"#);
+    let scene = square(
+        r#""attributes":{"POSITION":0}"#,
+        &accessor,
+        &view(0, buffer.len()),
+        "",
+        &buffer,
+    );
+    let limits = grasp_import::MeshLimits {
+        vertices: 576,
+        triangles: 1152,
+        ..crate::LIMITS
+    };
+    let found = grasp_import::read_mesh(&scene, grasp_import::Import::METRES, limits).unwrap();
     assert!((volume(&found) / Ring::volume() - 1.0).abs() < 1e-5);
 }
