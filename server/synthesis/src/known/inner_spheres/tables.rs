@@ -4,26 +4,26 @@
 use super::InnerSphere;
 use crate::physical::solids::SPHERES;
 
-/// They miss 6.7 % of the collisions of known grips and givers.
+/// They miss 5.5 % of the collisions of known grips and givers.
 pub(super) const FIRST: [InnerSphere; SPHERES] = [
     (2, 0.5),
-    (7, 0.7),
-    (9, 0.5),
-    (5, 0.1),
-    (25, 0.3),
+    (7, 0.5),
+    (13, 0.3),
+    (5, 0.3),
+    (26, 0.9),
     (11, 0.9),
-    (14, 0.3),
     (3, 0.7),
+    (22, 0.3),
 ];
 
-/// With these as well, 2.2 % are missed.
+/// With these as well, 1.9 % are missed.
 pub(super) const SECOND: [InnerSphere; SPHERES] = [
-    (22, 0.1),
     (8, 0.9),
-    (1, 0.7),
+    (1, 0.5),
+    (14, 0.9),
     (2, 0.9),
+    (29, 0.1),
+    (12, 0.1),
+    (30, 0.7),
     (5, 0.9),
-    (29, 0.7),
-    (12, 0.3),
-    (29, 0.3),
 ];
