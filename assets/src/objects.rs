@@ -3,10 +3,7 @@
 use std::sync::{Arc, LazyLock};
 
 use glam::{Quat, Vec3};
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjMesh, read_obj},
-};
+use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_synthesis::{model::object::GraspObject, propose::prepared::PreparedObject};
 use serde::{Deserialize, Serialize};
 
@@ -127,7 +124,7 @@ pub fn object(name: &str) -> Option<&'static BuiltInObject> {
 fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> BuiltInObject {
     let about = Manifest::parse(manifest)
         .unwrap_or_else(|error| panic!("the manifest of the built-in {name} is broken: {error}"));
-    let ObjMesh { mesh, groups, .. } = read_obj(obj.as_bytes(), 1.0, LIMITS)
+    let ImportedMesh { mesh, groups, .. } = read_mesh(obj.as_bytes(), Import::METRES, LIMITS)
         .unwrap_or_else(|errors| panic!("the mesh of the built-in {name} is broken: {errors:?}"));
     let forbidden: Vec<u32> = groups
         .iter()

@@ -58,7 +58,7 @@ pub use hand::{
     PresentingHand, ReceivingHand,
 };
 pub use key_frame::{KeyFrame, KeyFrameKind};
-pub use object::{AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage};
+pub use object::{AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage, UpAxis};
 pub use obstacle::{Capsule, Obstacle, SolidBox};
 pub use pose::Pose;
 pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};

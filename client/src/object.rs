@@ -56,11 +56,22 @@ pub struct AtlasState {
 /// Surfaces that must not be touched.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ForbiddenSurfaces {
-    /// Names of OBJ groups (`g`), objects (`o`) or materials (`usemtl`).
+    /// Names of groups (`g`), objects (`o`) and materials (`usemtl`) of OBJ, of solids of STL, and of nodes, meshes and materials
+    /// of glTF.
     pub groups: Vec<String>,
     /// Indices of triangles, counted from 0 in the file's order after polygons are split: n - 2 for a polygon of n corners,
     /// the fan from its first corner if that corner sees all others.
     pub triangles: Vec<u32>,
+}
+
+/// The axis that points up in a mesh file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum UpAxis {
+    /// +Y: the file's axes are the object's.
+    #[default]
+    Y,
+    /// +Z: (x, y, z) of the file becomes (x, z, −y) of the object.
+    Z,
 }
 
 /// An object to create.
@@ -68,8 +79,10 @@ pub struct ForbiddenSurfaces {
 pub struct NewObject {
     /// Last part of the name: 1 to 63 characters of a-z, 0-9 and -, starting with a letter.
     pub id: String,
-    /// The mesh as Wavefront OBJ text.
-    pub obj: Vec<u8>,
+    /// The mesh as the content of an OBJ, STL, PLY, GLB or glTF file, recognised by content.
+    pub mesh: Vec<u8>,
+    /// The axis that points up in the file.
+    pub up_axis: UpAxis,
     /// Metres per unit of the mesh; more than 0; none: 1.
     pub unit_metres: Option<f32>,
     /// Mass in kilograms; more than 0.
@@ -83,11 +96,12 @@ pub struct NewObject {
 }
 
 impl NewObject {
-    /// An object with a mesh in metres and the server's defaults for everything else.
-    pub fn new(id: impl Into<String>, obj: impl Into<Vec<u8>>, mass_kg: f32) -> Self {
+    /// An object with a mesh in metres, +Y up, and the server's defaults for everything else.
+    pub fn new(id: impl Into<String>, mesh: impl Into<Vec<u8>>, mass_kg: f32) -> Self {
         Self {
             id: id.into(),
-            obj: obj.into(),
+            mesh: mesh.into(),
+            up_axis: UpAxis::Y,
             unit_metres: None,
             mass_kg,
             centre_of_mass: None,

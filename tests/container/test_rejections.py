@@ -60,7 +60,7 @@ def test_small_settings_survive_their_largest_load(start, tmp_path):
     mesh = tmp_path / "large.obj"
     write_wavy_sheet(mesh, 315)
     for number in range(4):
-        created = grasp(service.address(), "objects", "create", "--obj", mesh, "--mass", "1", f"large-{number}")
+        created = grasp(service.address(), "objects", "create", "--mesh", mesh, "--mass", "1", f"large-{number}")
         assert created.returncode == 0, created.stderr
     # The cache holds one of them; the others were evicted.
     listed = json.loads(grasp(service.address(), "objects", "list", "--json").stdout)["objects"]

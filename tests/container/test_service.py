@@ -77,7 +77,7 @@ def test_engine_reports_it_healthy(start):
 def test_environment_configures_the_service(start):
     service = start(environment={"GRASP_MAXIMUM_OBJECT_TRIANGLES": "4", "GRASP_LISTEN": "0.0.0.0:50051"})
     mesh = "assets/objects/remote.obj"
-    rejected = grasp(service.address(), "objects", "create", "--obj", mesh, "--mass", "0.1", "mesh")
+    rejected = grasp(service.address(), "objects", "create", "--mesh", mesh, "--mass", "0.1", "mesh")
     assert rejected.returncode == 4
     assert "more than 4 " in rejected.stderr
 

@@ -76,7 +76,7 @@ def test_pages_list_each_object_once(objects):
 
 def test_created_box_has_its_dimensions_and_can_be_grasped(objects, grasps):
     created = objects.CreateObject(
-        object_service_pb2.CreateObjectRequest(object_id="box", obj=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1)
+        object_service_pb2.CreateObjectRequest(object_id="box", mesh=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1)
     ).object
     assert created.triangle_count == 12
     half = created.box_half_extents
@@ -101,7 +101,7 @@ def test_created_box_has_its_dimensions_and_can_be_grasped(objects, grasps):
 
 def test_rejects_an_object_id_that_exists(objects):
     request = object_service_pb2.CreateObjectRequest(
-        object_id="twice", obj=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1
+        object_id="twice", mesh=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1
     )
     objects.CreateObject(request)
     with pytest.raises(grpc.RpcError) as rejected:
@@ -145,7 +145,7 @@ def slippery(objects):
     objects.CreateObject(
         object_service_pb2.CreateObjectRequest(
             object_id="slippery",
-            obj=BOX_OBJ.encode(),
+            mesh=BOX_OBJ.encode(),
             unit_metres=0.01,
             mass_kg=0.1,
             # All twelve triangles are forbidden, so nothing can be touched.

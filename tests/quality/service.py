@@ -61,7 +61,7 @@ class Service:
 
     def create(self, identifier, path, mass, *more):
         """Creates an object from a file and returns the server's description of it; `more` are options of the client."""
-        return self._client("objects", "create", identifier, "--obj", path, "--mass", mass, *more)
+        return self._client("objects", "create", identifier, "--mesh", path, "--mass", mass, *more)
 
     def object(self, name):
         """The server's description of an object."""

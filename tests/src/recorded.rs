@@ -9,7 +9,7 @@ use std::{
 };
 
 use glam::{Quat, Vec3};
-use grasp_import::{MeshLimits, obj::read_obj};
+use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
@@ -48,7 +48,7 @@ pub fn object_of(obj: &[u8], mass: f32) -> GraspObject {
         vertices: 1 << 20,
         triangles: 1 << 20,
     };
-    let read = read_obj(obj, 1.0, limits).expect("the mesh can be read");
+    let read = read_mesh(obj, Import::METRES, limits).expect("the mesh can be read");
     GraspObject::new(read.mesh, mass, Vec3::ZERO, None, &[]).expect("the object is sound")
 }
 

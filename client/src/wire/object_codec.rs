@@ -8,12 +8,18 @@ use super::{
     geometry_codec::{duration_from_wire, pose_from_wire, vector_from_wire, vector_to_wire},
     required,
 };
-use crate::object::{AtlasState, Health, NewObject, Object, ObjectPage};
+use crate::object::{AtlasState, Health, NewObject, Object, ObjectPage, UpAxis};
 
 pub(crate) fn new_object_to_wire(object: &NewObject) -> v1::CreateObjectRequest {
     v1::CreateObjectRequest {
         object_id: object.id.clone(),
-        obj: object.obj.clone(),
+        obj: Vec::new(),
+        mesh: object.mesh.clone(),
+        up_axis: match object.up_axis {
+            UpAxis::Y => v1::UpAxis::Y,
+            UpAxis::Z => v1::UpAxis::Z,
+        }
+        .into(),
         unit_metres: object.unit_metres,
         mass_kg: object.mass_kg,
         centre_of_mass: object.centre_of_mass.map(vector_to_wire),
@@ -178,7 +184,7 @@ mod tests {
         object.forbidden.triangles = vec![4, 5];
         let wire = new_object_to_wire(&object);
         assert_eq!(wire.object_id, "mug");
-        assert_eq!(wire.obj, b"v 0 0 0");
+        assert_eq!(wire.mesh, b"v 0 0 0");
         assert_eq!(wire.unit_metres, Some(0.001));
         assert_eq!(wire.friction, None);
         assert_eq!(wire.centre_of_mass.unwrap().z, 3.0);

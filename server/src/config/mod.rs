@@ -38,7 +38,7 @@ pub struct Config {
     pub maximum_searches: NonZeroUsize,
     /// Largest number of objects received or built at a time; others are rejected.
     pub maximum_uploads: NonZeroUsize,
-    /// Largest OBJ mesh, in bytes.
+    /// Largest mesh file, in bytes.
     pub maximum_object_bytes: NonZeroUsize,
     /// Largest number of triangles, and of vertices, in a mesh.
     pub maximum_object_triangles: NonZeroUsize,

@@ -53,7 +53,7 @@ pub struct RawConfig {
     /// Most objects received or built at a time; others are rejected [default: 4].
     #[arg(long, env = "GRASP_MAXIMUM_UPLOADS", value_name = "COUNT")]
     pub maximum_uploads: Option<u64>,
-    /// Largest OBJ mesh, in bytes [default: 8388608].
+    /// Largest mesh file, in bytes [default: 8388608].
     #[arg(long, env = "GRASP_MAXIMUM_OBJECT_BYTES", value_name = "BYTES")]
     pub maximum_object_bytes: Option<u64>,
     /// Most triangles, and most vertices, in a mesh [default: 200000].
@@ -65,7 +65,7 @@ pub struct RawConfig {
     /// Memory for created objects and atlases, in bytes, by estimate [default: 536870912].
     #[arg(long, env = "GRASP_CACHE_BYTES", value_name = "BYTES")]
     pub cache_bytes: Option<u64>,
-    /// Folder of objects to start with: NAME.obj with NAME.toml becomes objects/NAME [default: none].
+    /// Folder of objects to start with: a mesh NAME.obj, .stl, .ply, .glb or .gltf with NAME.toml becomes objects/NAME [default: none].
     ///
     /// The TOML file has the keys of a `CreateObject` request: `mass_kg` and optionally `unit_metres`,
     /// `centre_of_mass`, `friction`, `forbidden.groups` and `forbidden.triangles`. Each file has the limits of an

@@ -64,7 +64,13 @@ pub(crate) fn build_object(
         }
         centre
     });
-    match GraspObject::new(read.mesh, fields.mass, centre_of_mass, fields.friction, &forbidden) {
+    match GraspObject::new(
+        read.mesh,
+        fields.mass,
+        centre_of_mass,
+        fields.friction,
+        &forbidden,
+    ) {
         Ok(object) => Ok(StoredObject::new(fields.id, false, Arc::new(object), warnings)),
         Err(errors) => {
             for error in errors {

@@ -78,7 +78,10 @@ pub(crate) fn object_fields(
         (mesh, obj) if obj.is_empty() => ("mesh", mesh),
         (mesh, obj) if mesh.is_empty() => ("obj", obj),
         (mesh, _) => {
-            violations.add(Field::root("obj"), "is the former name of mesh, which is given, too; give one of them");
+            violations.add(
+                Field::root("obj"),
+                "is the former name of mesh, which is given, too; give one of them",
+            );
             ("mesh", mesh)
         }
     };
@@ -237,7 +240,10 @@ mod tests {
             let request = v1::CreateObjectRequest { mesh, obj, ..valid() };
             assert_eq!(fields_of_violations(request), ["obj"]);
         }
-        let request = v1::CreateObjectRequest { up_axis: 9, ..valid() };
+        let request = v1::CreateObjectRequest {
+            up_axis: 9,
+            ..valid()
+        };
         assert_eq!(fields_of_violations(request), ["up_axis"]);
         let all = v1::CreateObjectRequest::default();
         assert_eq!(fields_of_violations(all), ["object_id", "mesh", "mass_kg"]);

@@ -84,7 +84,7 @@ fn create(object: &EverydayObject) -> v1::CreateObjectRequest {
     });
     v1::CreateObjectRequest {
         object_id: object.name.to_owned(),
-        obj: object.obj().into_bytes(),
+        mesh: object.obj().into_bytes(),
         mass_kg: object.mass_kg() as f32,
         centre_of_mass,
         friction: Some(object.surface.friction() as f32),

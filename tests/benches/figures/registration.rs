@@ -77,7 +77,7 @@ pub(crate) fn measure(setting: &Setting, others: &[TestObject]) -> Vec<Line> {
 fn create(number: u8) -> v1::CreateObjectRequest {
     v1::CreateObjectRequest {
         object_id: format!("ellipsoid-{number}"),
-        obj: ellipsoid(number).into_bytes(),
+        mesh: ellipsoid(number).into_bytes(),
         mass_kg: MASS,
         ..Default::default()
     }

@@ -312,7 +312,7 @@ pub(crate) fn copy_of(built_in: &BuiltInObject, id: &str) -> v1::CreateObjectReq
     let [x, y, z] = about.centre_of_mass_m.to_array();
     v1::CreateObjectRequest {
         object_id: id.to_owned(),
-        obj: built_in.obj.as_bytes().to_vec(),
+        mesh: built_in.obj.as_bytes().to_vec(),
         mass_kg: about.mass_kg,
         centre_of_mass: Some(v1::Vector3 { x, y, z }),
         forbidden: Some(v1::ForbiddenSurfaces {

@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use grasp_everyday::everyday_objects;
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjMesh, read_obj},
-};
+use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_synthesis::{
     geometry::mesh::TriangleMesh, model::object::GraspObject, propose::prepared::PreparedObject,
 };
@@ -98,7 +95,13 @@ impl LabelledObject {
     ///
     /// # Panics
     /// The object is not sound, or has no such group.
-    pub fn new(name: &'static str, read: ObjMesh, about: &About, handles: &[&str], blades: &[&str]) -> Self {
+    pub fn new(
+        name: &'static str,
+        read: ImportedMesh,
+        about: &About,
+        handles: &[&str],
+        blades: &[&str],
+    ) -> Self {
         let mut labels = vec![Label::Plain; read.mesh.triangles().len()];
         for (groups, label) in [(handles, Label::Handle), (blades, Label::Blade)] {
             for &group in groups {
@@ -170,7 +173,9 @@ fn labelled((name, handles, blades): Entry) -> LabelledObject {
         vertices: 1 << 20,
         triangles: 1 << 20,
     };
-    let read = |obj: &str| read_obj(obj.as_bytes(), 1.0, limits).expect("the project's meshes are sound");
+    let read = |obj: &str| {
+        read_mesh(obj.as_bytes(), Import::METRES, limits).expect("the project's meshes are sound")
+    };
     if let Some(built_in) = grasp_assets::objects::object(name) {
         let about = About {
             mass: built_in.object.mass,

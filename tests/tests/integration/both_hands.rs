@@ -21,7 +21,7 @@ const WEIGHT: f32 = 2.0 * 9.80665;
 async fn create_box(server: &TestServer) {
     let create = v1::CreateObjectRequest {
         object_id: "crate".to_owned(),
-        obj: BOX_OBJ.as_bytes().to_vec(),
+        mesh: BOX_OBJ.as_bytes().to_vec(),
         mass_kg: 2.0,
         unit_metres: Some(10.0),
         ..Default::default()

@@ -40,7 +40,7 @@ f 4 1 5 8
 pub(crate) fn box_request(id: &str) -> v1::CreateObjectRequest {
     v1::CreateObjectRequest {
         object_id: id.to_owned(),
-        obj: BOX_OBJ.as_bytes().to_vec(),
+        mesh: BOX_OBJ.as_bytes().to_vec(),
         mass_kg: 0.1,
         ..Default::default()
     }

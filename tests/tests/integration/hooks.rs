@@ -66,7 +66,7 @@ async fn a_case_hangs_by_its_handle() {
     let server = TestServer::start().await;
     let create = v1::CreateObjectRequest {
         object_id: "case".to_owned(),
-        obj: case().into_bytes(),
+        mesh: case().into_bytes(),
         mass_kg: 2.0,
         ..Default::default()
     };

@@ -297,7 +297,7 @@ async fn every_field_of_a_new_object_is_validated() {
     let mut client = server.objects().await;
     let request = v1::CreateObjectRequest {
         object_id: "Bad Name".into(),
-        obj: crate::fixtures::BOX_OBJ.as_bytes().to_vec(),
+        mesh: crate::fixtures::BOX_OBJ.as_bytes().to_vec(),
         unit_metres: Some(-1.0),
         mass_kg: f32::NAN,
         centre_of_mass: Some(vector(f32::INFINITY)),
@@ -306,6 +306,7 @@ async fn every_field_of_a_new_object_is_validated() {
             groups: vec!["lid".into()],
             triangles: vec![3, 12],
         }),
+        ..Default::default()
     };
     let status = client.create_object(request).await.unwrap_err();
     let fields = [
@@ -326,13 +327,13 @@ async fn every_field_of_a_new_object_is_validated() {
         "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n",
     ] {
         let request = v1::CreateObjectRequest {
-            obj: obj.as_bytes().to_vec(),
+            mesh: obj.as_bytes().to_vec(),
             ..crate::fixtures::box_request("broken")
         };
         let status = client.create_object(request).await.unwrap_err();
         assert_eq!(status.code(), Code::InvalidArgument, "{obj:?}: {status}");
         assert!(
-            blamed_fields(&status).iter().all(|field| field == "obj"),
+            blamed_fields(&status).iter().all(|field| field == "mesh"),
             "{obj:?}: {status}"
         );
     }
@@ -342,7 +343,7 @@ async fn every_field_of_a_new_object_is_validated() {
         ..crate::fixtures::box_request("tower")
     };
     let status = client.create_object(request).await.unwrap_err();
-    assert_eq!(blamed_fields(&status), ["obj"]);
+    assert_eq!(blamed_fields(&status), ["mesh"]);
     assert!(status.message().contains("unit_metres"), "{}", status.message());
     server.stop().await;
 }

@@ -15,6 +15,7 @@ mod invalid_barriers;
 mod key_frames;
 mod limits;
 mod load;
+mod mesh_formats;
 mod objects;
 mod objects_directory;
 mod physical;

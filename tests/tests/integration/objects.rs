@@ -161,7 +161,7 @@ async fn rejects_meshes_above_the_limits() {
     let status = client.create_object(box_request("triangles")).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument, "{status}");
     let padded = |bytes: usize| v1::CreateObjectRequest {
-        obj: format!("{BOX_OBJ}{}", "#\n".repeat(bytes / 2)).into_bytes(),
+        mesh: format!("{BOX_OBJ}{}", "#\n".repeat(bytes / 2)).into_bytes(),
         ..box_request("bytes")
     };
     let status = client.create_object(padded(8192)).await.unwrap_err();
@@ -186,7 +186,7 @@ async fn broken_files_do_not_break_the_server() {
     files.sort();
     for (number, path) in files.iter().enumerate() {
         let request = v1::CreateObjectRequest {
-            obj: std::fs::read(path).unwrap(),
+            mesh: std::fs::read(path).unwrap(),
             ..box_request(&format!("ugly-{number}"))
         };
         match bounded("an answer", client.create_object(Request::new(request))).await {

@@ -12,7 +12,7 @@ const BOX_HALF_EXTENTS: [f32; 3] = [0.01, 0.015, 0.02];
 
 async fn create(server: &TestServer, id: &str, obj: impl Into<Vec<u8>>) -> Result<v1::Object, tonic::Status> {
     let request = v1::CreateObjectRequest {
-        obj: obj.into(),
+        mesh: obj.into(),
         ..box_request(id)
     };
     let answer = server.objects().await.create_object(request).await?;
@@ -106,7 +106,7 @@ async fn other_formats_are_named() {
             .await
             .expect_err("it is not OBJ text");
         assert_eq!(status.code(), Code::InvalidArgument);
-        assert_eq!(blamed_fields(&status), ["obj"]);
+        assert_eq!(blamed_fields(&status), ["mesh"]);
         let message = status.message();
         assert!(
             message.contains("begins with a word of OBJ") && message.contains(name),
@@ -130,7 +130,7 @@ async fn contacts_on_a_concave_polygon_lie_on_the_surface() {
         .collect();
     let server = TestServer::start().await;
     let request = v1::CreateObjectRequest {
-        obj: format!(
+        mesh: format!(
             "{}{}f 9 10 11 12 7 8\nf 2 1 6 5 4 3\n",
             vertices.concat(),
             sides.concat()

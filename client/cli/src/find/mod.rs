@@ -150,7 +150,7 @@ pub(crate) struct Arguments {
     /// Pixels of each of the picture's two views.
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
-    /// The object's OBJ mesh, for pictures of objects that are not built in.
+    /// The object's mesh file, for pictures of objects that are not built in.
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh: 0.001 for millimetres.

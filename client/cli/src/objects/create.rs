@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use glam::Vec3;
-use grasp_client::{ForbiddenSurfaces, NewObject};
+use grasp_client::{ForbiddenSurfaces, NewObject, UpAxis};
 
 use crate::{
     Ending,
@@ -14,7 +14,7 @@ use crate::{
     values::{TriangleRange, parse_triangles, parse_vector},
 };
 
-/// Create an object from an OBJ mesh.
+/// Create an object from a mesh: OBJ, STL, PLY, GLB or glTF.
 ///
 /// Shows the new object, like `grasp objects get`.
 #[derive(Args, Debug)]
@@ -22,15 +22,18 @@ pub(crate) struct Arguments {
     /// Last part of the object's name. Default: the file's name in lower case, with hyphens.
     id: Option<String>,
     /// The mesh.
-    #[arg(long, value_name = "FILE")]
-    obj: PathBuf,
+    #[arg(long, value_name = "FILE", alias = "obj")]
+    mesh: PathBuf,
     /// Mass in kilograms.
     #[arg(long, value_name = "KG")]
     mass: f32,
     /// Metres per unit of the mesh: 0.001 for millimetres. Default: 1.
     #[arg(long, value_name = "METRES")]
     unit_metres: Option<f32>,
-    /// Centre of mass in metres after scaling. Default: that of the mesh's volume.
+    /// The axis that points up in the file.
+    #[arg(long, value_name = "AXIS", default_value = "y")]
+    up_axis: Axis,
+    /// Centre of mass in metres after scaling and turning. Default: that of the mesh's volume.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction between skin and surface. Default: the server's.
@@ -46,23 +49,36 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
+/// An axis that points up.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Axis {
+    /// +Y.
+    Y,
+    /// +Z, as in CAD and modelling tools.
+    Z,
+}
+
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let obj = std::fs::read(&arguments.obj)
-        .map_err(|error| Failure::other(format!("cannot read {}", arguments.obj.display()), error))?;
+    let mesh = std::fs::read(&arguments.mesh)
+        .map_err(|error| Failure::other(format!("cannot read {}", arguments.mesh.display()), error))?;
     let id = match arguments.id {
         Some(id) => id,
-        None => id_from_file(&arguments.obj),
+        None => id_from_file(&arguments.mesh),
     };
     let triangles = arguments.forbidden_triangles.iter();
     let object = NewObject {
         unit_metres: arguments.unit_metres,
+        up_axis: match arguments.up_axis {
+            Axis::Y => UpAxis::Y,
+            Axis::Z => UpAxis::Z,
+        },
         centre_of_mass: arguments.centre_of_mass,
         friction: arguments.friction,
         forbidden: ForbiddenSurfaces {
             groups: arguments.forbidden_group,
             triangles: triangles.flat_map(|range| range.0.clone()).collect(),
         },
-        ..NewObject::new(id, obj, arguments.mass)
+        ..NewObject::new(id, mesh, arguments.mass)
     };
     let object = arguments.server.connect().await?.create_object(&object).await?;
     output.write(&object, super::describe)?;

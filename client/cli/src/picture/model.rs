@@ -4,10 +4,7 @@ use std::{fmt::Display, path::Path, sync::Arc};
 
 use grasp_assets::objects::object;
 use grasp_everyday::{EverydayObject, Surface as Material};
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjMesh, read_obj},
-};
+use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_scene::{Finish, linear_from_srgb};
 use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
 
@@ -102,9 +99,9 @@ impl Model {
     }
 }
 
-/// Reads OBJ text; an error names its `source`.
-fn read_text(text: &[u8], unit_metres: f32, source: impl Display) -> Result<ObjMesh, Failure> {
-    read_obj(text, unit_metres, LIMITS).map_err(|errors| {
+/// Reads a mesh; an error names its `source`.
+fn read_text(text: &[u8], unit_metres: f32, source: impl Display) -> Result<ImportedMesh, Failure> {
+    read_mesh(text, Import::with_unit(unit_metres), LIMITS).map_err(|errors| {
         let errors: Vec<_> = errors.iter().map(ToString::to_string).collect();
         Failure::other(format!("cannot read {source}"), errors.join("; "))
     })

@@ -96,7 +96,7 @@ async fn names_created_object_after_its_file() {
     std::fs::write(&mesh, "v 0 0 0\n").unwrap();
     let mesh = mesh.to_str().unwrap();
     let output = run(&[
-        "objects", "create", "--obj", mesh, "--mass", "0.2", "--json", "--server", &url,
+        "objects", "create", "--mesh", mesh, "--mass", "0.2", "--json", "--server", &url,
     ]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     assert_eq!(json(&output.stdout)["name"], "objects/coffee-mug");
@@ -121,7 +121,7 @@ async fn lists_each_violation_on_its_own_line() {
         "objects",
         "create",
         "x",
-        "--obj",
+        "--mesh",
         mesh,
         "--mass=-1",
         "--server",
@@ -138,7 +138,7 @@ async fn lists_each_violation_on_its_own_line() {
         "objects",
         "create",
         "x",
-        "--obj",
+        "--mesh",
         mesh,
         "--mass=-1",
         "--server",

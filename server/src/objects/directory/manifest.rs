@@ -6,9 +6,10 @@ use toml::{Table, Value};
 use crate::validate::{Field, Violations, quoted};
 
 /// The keys of a manifest.
-const KEYS: [&str; 5] = [
+const KEYS: [&str; 6] = [
     "mass_kg",
     "unit_metres",
+    "up_axis",
     "centre_of_mass",
     "friction",
     "forbidden",
@@ -25,6 +26,7 @@ const PLACEHOLDER_MASS: f32 = 1.0;
 pub(super) struct Manifest {
     mass_kg: f32,
     unit_metres: Option<f32>,
+    up_axis: v1::UpAxis,
     centre_of_mass: Option<v1::Vector3>,
     friction: Option<f32>,
     forbidden: v1::ForbiddenSurfaces,
@@ -32,10 +34,12 @@ pub(super) struct Manifest {
 
 impl Manifest {
     /// The request that would create the object.
-    pub(super) fn into_request(self, id: &str, obj: Vec<u8>) -> v1::CreateObjectRequest {
+    pub(super) fn into_request(self, id: &str, mesh: Vec<u8>) -> v1::CreateObjectRequest {
         v1::CreateObjectRequest {
             object_id: id.to_owned(),
-            obj,
+            obj: Vec::new(),
+            mesh,
+            up_axis: self.up_axis.into(),
             unit_metres: self.unit_metres,
             mass_kg: self.mass_kg,
             centre_of_mass: self.centre_of_mass,
@@ -83,6 +87,10 @@ pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option
         // A missing or wrong mass was added to the violations.
         mass_kg: mass_kg.unwrap_or(PLACEHOLDER_MASS),
         unit_metres,
+        up_axis: table
+            .get("up_axis")
+            .and_then(|value| up_axis(Field::root("up_axis"), value, violations))
+            .unwrap_or_default(),
         centre_of_mass: table
             .get("centre_of_mass")
             .and_then(|value| vector(Field::root("centre_of_mass"), value, violations)),
@@ -110,6 +118,15 @@ fn number(field: Field<'_>, value: &Value, violations: &mut Violations) -> Optio
         Value::Float(number) => Some(*number as f32),
         Value::Integer(number) => Some(*number as f32),
         _ => reject(field, value, "a number", violations),
+    }
+}
+
+/// The axis that points up.
+fn up_axis(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::UpAxis> {
+    match value.as_str() {
+        Some("y") => Some(v1::UpAxis::Y),
+        Some("z") => Some(v1::UpAxis::Z),
+        _ => reject(field, value, "\"y\" or \"z\"", violations),
     }
 }
 

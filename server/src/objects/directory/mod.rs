@@ -1,4 +1,5 @@
-//! The folder of objects that the server starts with: every `NAME.obj` has a `NAME.toml` next to it.
+//! The folder of objects that the server starts with: every mesh `NAME.obj` (or `.stl`, `.ply`, `.glb`,
+//! `.gltf`) has a `NAME.toml` next to it.
 //!
 //! They pass the same checks and limits as objects that clients create. Any mistake keeps the server from starting, and
 //! the error lists all of them: a pipeline that misses an object silently would fail much later.
@@ -32,7 +33,7 @@ const LISTED_PROBLEMS: usize = 100;
 pub struct DirectoryProblem {
     /// The file's name; empty for the folder itself.
     pub file: String,
-    /// The key of the manifest, or `obj` for the mesh; empty for the file itself.
+    /// The key of the manifest, or `mesh` for the mesh; empty for the file itself.
     pub field: String,
     /// The value, and what a valid one is.
     pub description: String,
@@ -101,7 +102,7 @@ pub(crate) fn load(
                 bytes = bytes.saturating_add(object.bytes());
                 if bytes > store.bytes {
                     problems.push(DirectoryProblem::of(
-                        pair.obj,
+                        pair.mesh,
                         format_args!(
                             "makes all objects so far take about {bytes} bytes with their search structures; the \
                              limit is cache_bytes, {} (later files were not read)",
@@ -136,17 +137,17 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<StoredObjec
         }
     };
     let manifest = read(&pair.toml, BYTES_BESIDES_MESH);
-    let obj = read(&pair.obj, limits.bytes);
+    let mesh = read(&pair.mesh, limits.bytes);
     if is_built_in(&pair.id) {
         problems.push(DirectoryProblem::of(
-            &pair.obj,
+            &pair.mesh,
             format_args!(
                 "has the name of the built-in object {}; choose another name",
                 quoted(&pair.id)
             ),
         ));
     }
-    let (Some(manifest), Some(obj)) = (manifest, obj) else {
+    let (Some(manifest), Some(mesh)) = (manifest, mesh) else {
         return Err(problems);
     };
     let mut violations = Violations::default();
@@ -155,7 +156,7 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<StoredObjec
         return Err(problems);
     };
     let fields = object_fields(
-        manifest.into_request(&pair.id, obj),
+        manifest.into_request(&pair.id, mesh),
         limits.bytes,
         &mut violations,
     );
@@ -172,18 +173,18 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<StoredObjec
 /// The violations of a request as problems of the files that it was made from.
 fn problems_of(pair: &Pair, error: ServiceError) -> Vec<DirectoryProblem> {
     let ServiceError::Invalid(violations) = error else {
-        return vec![DirectoryProblem::of(&pair.obj, error)];
+        return vec![DirectoryProblem::of(&pair.mesh, error)];
     };
     violations
         .into_iter()
         .map(|violation| match violation.field.as_str() {
-            "obj" => DirectoryProblem {
-                file: pair.obj.clone(),
+            "mesh" => DirectoryProblem {
+                file: pair.mesh.clone(),
                 field: String::new(),
                 description: violation.description,
             },
             "object_id" => DirectoryProblem {
-                file: pair.obj.clone(),
+                file: pair.mesh.clone(),
                 field: "the name".to_owned(),
                 description: violation.description,
             },

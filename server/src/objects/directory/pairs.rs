@@ -10,7 +10,7 @@ pub(super) struct Pair {
     /// The object's id: the name of both without their extensions.
     pub id: String,
     /// The mesh's file name.
-    pub obj: String,
+    pub mesh: String,
     /// The manifest's file name.
     pub toml: String,
 }
@@ -18,9 +18,13 @@ pub(super) struct Pair {
 /// Which files exist under one name.
 #[derive(Debug, Default)]
 struct Found {
-    obj: bool,
+    /// The extensions of meshes.
+    meshes: Vec<&'static str>,
     toml: bool,
 }
+
+/// The extensions of meshes.
+const MESHES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
 
 /// All pairs of a folder, sorted by name. A file without a partner and an unreadable folder are problems.
 ///
@@ -47,22 +51,31 @@ pub(super) fn pairs(path: &Path, maximum: usize, problems: &mut Vec<DirectoryPro
     }
     let mut pairs = Vec::new();
     for (id, found) in names {
-        let (obj, toml) = (format!("{id}.obj"), format!("{id}.toml"));
-        match found {
-            Found {
-                obj: true,
-                toml: true,
-            } => pairs.push(Pair { id, obj, toml }),
-            Found { toml: false, .. } => problems.push(DirectoryProblem::of(
-                obj,
+        let toml = format!("{id}.toml");
+        let mut found_meshes = found.meshes.iter().map(|extension| format!("{id}.{extension}"));
+        let Some(mesh) = found_meshes.next() else {
+            problems.push(DirectoryProblem::of(
+                toml,
+                format_args!(
+                    "has no mesh next to it: {id}.{}",
+                    MESHES.join(&format!(", {id}."))
+                ),
+            ));
+            continue;
+        };
+        for other in found_meshes {
+            problems.push(DirectoryProblem::of(
+                other,
+                format_args!("is a second mesh beside {mesh}; keep one of them"),
+            ));
+        }
+        if found.toml {
+            pairs.push(Pair { id, mesh, toml });
+        } else {
+            problems.push(DirectoryProblem::of(
+                mesh,
                 format_args!("has no {toml} next to it, which must give at least mass_kg"),
-            )),
-            Found { obj: false, .. } => {
-                problems.push(DirectoryProblem::of(
-                    toml,
-                    format_args!("has no {obj} next to it"),
-                ));
-            }
+            ));
         }
     }
     pairs
@@ -77,20 +90,27 @@ fn read_names(path: &Path, problems: &mut Vec<DirectoryProblem>) -> io::Result<B
         let Some((stem, extension)) = text.rsplit_once('.').filter(|(stem, _)| !stem.is_empty()) else {
             continue;
         };
-        if text.starts_with('.') || !["obj", "toml"].iter().any(|e| extension.eq_ignore_ascii_case(e)) {
+        let mesh = MESHES
+            .into_iter()
+            .find(|mesh| extension.eq_ignore_ascii_case(mesh));
+        if text.starts_with('.') || (mesh.is_none() && !extension.eq_ignore_ascii_case("toml")) {
             continue;
         }
         if name.to_str().is_none() {
             problems.push(DirectoryProblem::of(text, "has a name that is not UTF-8"));
             continue;
         }
-        match extension {
-            "obj" => names.entry(stem.to_owned()).or_default().obj = true,
-            "toml" => names.entry(stem.to_owned()).or_default().toml = true,
+        match (extension, mesh) {
+            ("toml", _) => names.entry(stem.to_owned()).or_default().toml = true,
+            (_, Some(mesh)) if extension == mesh => {
+                let found = names.entry(stem.to_owned()).or_default();
+                found.meshes.push(mesh);
+                found.meshes.sort_unstable();
+            }
             // Only case-insensitive file systems would find it.
             _ => problems.push(DirectoryProblem::of(
                 text.as_ref(),
-                "has an extension in capitals; it must be .obj or .toml",
+                "has an extension in capitals; it must be in small letters",
             )),
         }
     }

@@ -115,9 +115,9 @@ fn reports_all_problems_at_once() {
     );
     let problems = folder.problems();
     let expected = [
-        "LOUD.OBJ: has an extension in capitals; it must be .obj or .toml",
+        "LOUD.OBJ: has an extension in capitals; it must be in small letters",
         "alone.obj: has no alone.toml next to it, which must give at least mass_kg",
-        "orphan.toml: has no orphan.obj next to it",
+        "orphan.toml: has no mesh next to it: orphan.glb, orphan.gltf, orphan.obj, orphan.ply, orphan.stl",
         "Big Mug.obj: the name: is \"Big Mug\"; it must be 1 to 63 of a-z, 0-9 and -, starting with a letter",
         "heavy.toml: unit_metres: is -1; it must be 0.000001 to 1000",
         "heavy.toml: mass_kg: is 2000; it must be more than 0 and at most 1000",

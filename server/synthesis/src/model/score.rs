@@ -123,8 +123,7 @@ impl Term {
             | Self::FromSideOrAbove
             | Self::AcrossLongAxis
             | Self::OffSharp => 6.0,
-            Self::Steadiness => 10.0,
-            Self::FrictionReserve => 10.0,
+            Self::Steadiness | Self::FrictionReserve => 10.0,
             Self::Stance => 12.0,
             Self::OnHandle => 13.0,
         }

@@ -4,10 +4,7 @@ use std::collections::HashSet;
 
 use glam::{DVec3, Vec3};
 use grasp_everyday::{EverydayObject, Hands, everyday_objects, table};
-use grasp_import::{
-    MeshLimits,
-    obj::{ObjMesh, read_obj},
-};
+use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_synthesis::geometry::{mesh::TriangleMesh, topology::Topology};
 
 /// Most triangles of an object: as many as a detailed scan has, and quick to search.
@@ -20,13 +17,13 @@ const SIZE_TOLERANCE: f64 = 0.02;
 /// Names that no created object may have.
 const BUILT_IN: [&str; 3] = ["remote", "scalpel", "scissors"];
 
-fn read(object: &EverydayObject) -> ObjMesh {
+fn read(object: &EverydayObject) -> ImportedMesh {
     let limits = MeshLimits {
         bytes: 8 << 20,
         vertices: 200_000,
         triangles: 200_000,
     };
-    read_obj(object.obj().as_bytes(), 1.0, limits)
+    read_mesh(object.obj().as_bytes(), Import::METRES, limits)
         .unwrap_or_else(|errors| panic!("{}: {errors:?}", object.name))
 }
 
@@ -36,7 +33,7 @@ fn object(name: &str) -> EverydayObject {
 }
 
 /// The part of a mesh that belongs to a group.
-fn part(read: &ObjMesh, name: &str) -> TriangleMesh {
+fn part(read: &ImportedMesh, name: &str) -> TriangleMesh {
     let (_, triangles) = read.groups.iter().find(|(group, _)| group == name).unwrap();
     let triangles: HashSet<usize> = triangles.iter().map(|&triangle| triangle as usize).collect();
     read.mesh

@@ -2,7 +2,7 @@ use std::fmt::Write as _;
 
 use glam::{Mat3, Quat};
 use grasp_assets::hands::hand;
-use grasp_import::{MeshLimits, obj::read_obj};
+use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{Digit, HandPart, HandPose, Handedness, Phalanx},
@@ -53,7 +53,7 @@ fn knife(mass: f32, handles: &[&str], blades: &[&str]) -> LabelledObject {
         vertices: 1000,
         triangles: 1000,
     };
-    let read = read_obj(cuboids("handle", "blade").as_bytes(), 1.0, limits).unwrap();
+    let read = read_mesh(cuboids("handle", "blade").as_bytes(), Import::METRES, limits).unwrap();
     let about = About {
         mass,
         centre_of_mass: Some(Vec3::ZERO),
