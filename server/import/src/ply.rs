@@ -146,28 +146,16 @@ fn check_header(header: &Header, bytes: usize, limits: MeshLimits) -> Result<(),
             ));
         }
     }
-    let has = |name: &str, is_kind: fn(&PropertyType) -> bool, properties: &[&str]| {
-        header.elements.get(name).is_some_and(|element| {
-            let known = |property: &&str| {
-                let found = element.properties.get(*property);
-                found.is_some_and(|found| is_kind(&found.data_type))
-            };
-            properties.iter().filter(|property| known(property)).count() > 0
-                && (properties.len() < 3 || properties.iter().all(|property| known(&property)))
-        })
+    let property = |element: &str, name: &str| {
+        let element = header.elements.get(element)?;
+        element.properties.get(name).map(|property| &property.data_type)
     };
-    if !has(
-        "vertex",
-        |kind| matches!(kind, PropertyType::Scalar(_)),
-        &["x", "y", "z"],
-    ) {
+    let is_number = |name: &&str| matches!(property("vertex", name), Some(PropertyType::Scalar(_)));
+    let is_list = |name: &&str| matches!(property("face", name), Some(PropertyType::List(..)));
+    if !["x", "y", "z"].iter().all(is_number) {
         return wrong("has no vertices with x, y and z".to_owned());
     }
-    if !has(
-        "face",
-        |kind| matches!(kind, PropertyType::List(..)),
-        &INDEX_LISTS,
-    ) {
+    if !INDEX_LISTS.iter().any(is_list) {
         return wrong("has faces without a list vertex_indices or vertex_index".to_owned());
     }
     check_counts(count("vertex"), count("face"), limits)

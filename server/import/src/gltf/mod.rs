@@ -44,7 +44,7 @@ const HARMLESS: &[&str] = &[
 
 /// Reads the default scene, or the first one; all nodes if there is none.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
-    let (json, binary) = parts(bytes).map_err(|error| vec![error])?;
+    let Parts { json, binary } = parts(bytes).map_err(|error| vec![error])?;
     let mut root: Root = deserialize::from_slice(&json)
         .map_err(|error| vec![ImportError::at("the glTF document", error.to_string())])?;
     let refused: Vec<ImportError> = root
@@ -69,10 +69,18 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<Impo
     Ok(raw)
 }
 
-/// The JSON and the binary chunk.
-fn parts(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<Cow<'_, [u8]>>), ImportError> {
+/// The JSON of a scene, and the binary chunk of a GLB.
+struct Parts<'a> {
+    json: Cow<'a, [u8]>,
+    binary: Option<Cow<'a, [u8]>>,
+}
+
+fn parts(bytes: &[u8]) -> Result<Parts<'_>, ImportError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((Cow::Borrowed(without_mark(bytes)), None));
+        return Ok(Parts {
+            json: Cow::Borrowed(without_mark(bytes)),
+            binary: None,
+        });
     }
     let wrong = |what: String| ImportError::at("the GLB container", what);
     let number = |at: usize| {
@@ -92,7 +100,10 @@ fn parts(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<Cow<'_, [u8]>>), ImportE
         (None, _) => return Err(wrong("is cut off".to_owned())),
     }
     let glb = Glb::from_slice(bytes).map_err(|error| wrong(error.to_string()))?;
-    Ok((glb.json, glb.bin))
+    Ok(Parts {
+        json: glb.json,
+        binary: glb.bin,
+    })
 }
 
 /// Why a required extension keeps a file from being read.
