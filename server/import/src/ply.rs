@@ -3,8 +3,6 @@
 //! The numbers of elements in a header are checked before anything is read by them: the parser reads as many as a header
 //! claims.
 
-use std::io::{BufReader, Read as _};
-
 use ply_rs_bw::{
     parser::{Parser, Reader},
     ply::{
@@ -43,8 +41,7 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<Impo
 fn read_all(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, ImportError> {
     let failed =
         |error: ply_rs_bw::parser::ParseError| ImportError::at("the PLY file", brief(&error.to_string()));
-    // No line of a header or of text may take more memory than the file.
-    let mut reader = Reader::new(BufReader::new(bytes.take(bytes.len() as u64)));
+    let mut reader = Reader::new(bytes);
     let header = Parser::<Ignored>::new()
         .read_header(&mut reader)
         .map_err(failed)?;

@@ -3,7 +3,7 @@
 //! Text is first rewritten in the form that the parser expects: lower case, one solid, and normals, which are ignored, that
 //! are numbers. The names of its solids are those of the triangles' parts.
 
-use std::io::Cursor;
+use std::{io::Cursor, ops::RangeInclusive};
 
 use stl_io::{Triangle, create_stl_reader};
 
@@ -18,18 +18,29 @@ use crate::{
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
 
-/// True if bytes are binary STL: they have the length that follows from the number of triangles, or at least one of that order.
-/// A file may be cut off, or have bytes behind its triangles.
+/// Sizes of numbers, other than 0, that a first triangle may have: those of other data, such as text in UTF-16, are mostly beyond.
+const USUAL_NUMBERS: RangeInclusive<f32> = 1e-12..=1e9;
+
+/// True if bytes are binary STL: they have the length that follows from the number of triangles, or one of that order and a first
+/// triangle of usual numbers. Such a file is cut off, or has bytes behind its triangles.
 pub(crate) fn is_binary(bytes: &[u8]) -> bool {
-    let Some(claimed) = claimed_triangles(bytes) else {
+    let Some(claimed) = claimed_triangles(bytes).filter(|&claimed| claimed > 0) else {
         return false;
     };
-    if (bytes.len() - HEADER_BYTES) as u64 == claimed * TRIANGLE_BYTES as u64 {
-        return claimed > 0;
+    let rest = &bytes[HEADER_BYTES..];
+    if rest.len() as u64 == claimed * TRIANGLE_BYTES as u64 {
+        return true;
     }
-    let is_text = !bytes[..bytes.len().min(2 * HEADER_BYTES)].contains(&0);
-    let present = ((bytes.len() - HEADER_BYTES) / TRIANGLE_BYTES) as u64;
-    !is_text && present > 0 && (present / 2..=present.saturating_mul(100)).contains(&claimed) && claimed > 0
+    let present = (rest.len() / TRIANGLE_BYTES) as u64;
+    let is_near = (present / 2..=present.saturating_mul(100)).contains(&claimed);
+    let numbers = rest
+        .get(..TRIANGLE_BYTES - 2)
+        .map(|numbers| numbers.as_chunks().0);
+    is_near
+        && numbers.is_some_and(|numbers| {
+            let mut numbers = numbers.iter().map(|&number| f32::from_le_bytes(number).abs());
+            numbers.all(|number| number == 0.0 || USUAL_NUMBERS.contains(&number))
+        })
 }
 
 fn claimed_triangles(bytes: &[u8]) -> Option<u64> {

@@ -50,6 +50,23 @@ fn binary_files_have_the_triangles_that_they_claim() {
 }
 
 #[test]
+fn other_bytes_with_a_number_in_that_place_are_no_stl() {
+    // In UTF-16, any four bytes of text claim about two million triangles, or half a billion.
+    let text =
+        String::from_utf8(Ring::new().obj()).unwrap() + &"# a comment in a large file\n".repeat(40_000);
+    for bytes in [
+        text.encode_utf16()
+            .flat_map(u16::to_le_bytes)
+            .collect::<Vec<u8>>(),
+        text.encode_utf16().flat_map(u16::to_be_bytes).collect(),
+    ] {
+        let marked = if bytes[0] == 0 { [0xFE, 0xFF] } else { [0xFF, 0xFE] };
+        let found = read(&[marked.to_vec(), bytes].concat()).unwrap();
+        assert_eq!(found.mesh.triangles().len(), 1152);
+    }
+}
+
+#[test]
 fn triangles_above_the_limit_are_refused_before_they_are_read() {
     let limits = MeshLimits {
         triangles: 1000,
