@@ -1,6 +1,6 @@
 //! Recognises the format of a mesh by its content.
 
-use crate::stl;
+use crate::{error::ImportError, stl};
 
 /// Bytes at the start that are searched for a format's marks.
 const SEARCHED_BYTES: usize = 4096;
@@ -40,6 +40,26 @@ impl Format {
             _ if start.starts_with(b"{") && contains(text, b"\"asset\"") => Self::Gltf,
             _ => Self::Obj,
         }
+    }
+}
+
+impl Format {
+    /// Errors that say of which format an empty mesh is: its file may be of another one than its sender believes.
+    pub(crate) fn named(self, errors: Vec<ImportError>) -> Vec<ImportError> {
+        let place = match self {
+            Self::Obj => return errors,
+            Self::StlText | Self::StlBinary => "the STL mesh",
+            Self::Ply => "the PLY mesh",
+            Self::Gltf => "the glTF scene",
+        };
+        let named = |error| match error {
+            ImportError::Empty { dropped, .. } => ImportError::at(
+                place,
+                format!("has no triangles; {dropped} faces without area were ignored"),
+            ),
+            other => other,
+        };
+        errors.into_iter().map(named).collect()
     }
 }
 

@@ -110,7 +110,8 @@ pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<Imp
             limit: limits.bytes,
         }]);
     }
-    let raw = match Format::of(bytes) {
+    let format = Format::of(bytes);
+    let raw = match format {
         Format::Obj => obj::read(bytes, unit, limits)?,
         Format::StlText => stl::read_text(bytes, limits)?,
         Format::StlBinary => stl::read_binary(bytes, limits)?,
@@ -118,7 +119,7 @@ pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<Imp
         Format::Gltf => gltf::read(bytes, limits.unwelded())?,
     };
     raw.check_coordinates(unit)?;
-    let read = clean::clean(&raw, import)?;
+    let read = clean::clean(&raw, import).map_err(|errors| format.named(errors))?;
     check_counts(read.mesh.positions().len() as u64, 0, limits).map_err(|error| vec![error])?;
     Ok(read)
 }

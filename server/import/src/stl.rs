@@ -107,7 +107,7 @@ fn read_into(
     let failed = |triangle: usize, line: Option<usize>, error: &std::io::Error| {
         let place = line.map_or_else(
             || format!("triangle {triangle}"),
-            |line| format!("the facet on line {line}"),
+            |line| format!("the STL facet on line {line}"),
         );
         vec![ImportError::at(place, error.to_string())]
     };

@@ -76,7 +76,7 @@ async fn objects_of_the_folder_are_never_evicted() {
     add(
         &folder,
         "shelf",
-        std::str::from_utf8(&shelf.obj).unwrap(),
+        std::str::from_utf8(&shelf.mesh).unwrap(),
         "mass_kg = 0.1\n",
     );
     let server = TestServer::start_with(|config| {

@@ -30,10 +30,10 @@ fn wrong_facets_are_named_by_their_line() {
     ] {
         let text = format!("solid a\n{FACET}{}endsolid\n", FACET.replace(wrong, right));
         let message = message(text.as_bytes());
-        assert!(message.starts_with("the facet on line 9: "), "{message}");
+        assert!(message.starts_with("the STL facet on line 9: "), "{message}");
     }
     let cut = format!("solid a\n{FACET}{}", &FACET[..40]);
-    assert!(message(cut.as_bytes()).starts_with("the facet on line 9: "));
+    assert!(message(cut.as_bytes()).starts_with("the STL facet on line 9: "));
 }
 
 #[test]
