@@ -102,7 +102,13 @@ fn look_ups_find_a_grip_exactly_where_one_is_clear_of_everything() {
     let (mut found, mut nothing) = (0, 0);
     let scene = object_scene(object("remote"));
     for setting in 0..SETTINGS {
-        let holdout = crowded(&mut random);
+        let mut holdout = crowded(&mut random);
+        if setting % 3 == 0 {
+            // Among twice as many, often nothing is clear.
+            let more = crowded(&mut random);
+            holdout.other_hands.extend(more.other_hands);
+            holdout.obstacles.extend(more.obstacles);
+        }
         let search = Search {
             atlas: Some(Arc::clone(&REMOTE)),
             reproducible: false,
