@@ -116,6 +116,8 @@ def hands_on(service, thing, seed):
             "receiving_hand": {"handedness": "left" if turn % 2 else "right"},
             "seed": str(seed + turn),
             "budget_seconds": SEARCH_SECONDS,
+            # The first valid hands are spread over an object; better ones meet at its best part.
+            "improvement_seconds": 0.0,
         }
         grasp = service.find(wanted)["grasp"]
         if grasp:
