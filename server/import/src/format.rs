@@ -41,9 +41,7 @@ impl Format {
             _ => Self::Obj,
         }
     }
-}
 
-impl Format {
     /// Errors that say of which format an empty mesh is: its file may be of another one than its sender believes.
     pub(crate) fn named(self, errors: Vec<ImportError>) -> Vec<ImportError> {
         let place = match self {

@@ -4,7 +4,7 @@
 //! claims.
 
 use ply_rs_bw::{
-    parser::{Parser, Reader},
+    parser::{ParseError, Parser, Reader},
     ply::{
         ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
         ScalarType,
@@ -12,7 +12,7 @@ use ply_rs_bw::{
 };
 
 use crate::{
-    error::ImportError,
+    error::{ImportError, Violations},
     format::without_mark,
     limits::MeshLimits,
     raw::{Places, RawFace, RawMesh, check_counts},
@@ -35,22 +35,16 @@ struct Ignored;
 
 /// Reads a file.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
-    read_all(without_mark(bytes), limits).map_err(|error| vec![error])
-}
-
-fn read_all(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, ImportError> {
-    let failed =
-        |error: ply_rs_bw::parser::ParseError| ImportError::at("the PLY file", brief(&error.to_string()));
-    let mut reader = Reader::new(bytes);
+    let failed = |error: ParseError| vec![ImportError::at("the PLY file", brief(&error.to_string()))];
+    let mut reader = Reader::new(without_mark(bytes));
     let header = Parser::<Ignored>::new()
         .read_header(&mut reader)
         .map_err(failed)?;
-    check_header(&header, bytes.len(), limits)?;
+    check_header(&header, bytes.len(), limits).map_err(|error| vec![error])?;
     let mut raw = RawMesh {
         places: Places::Faces,
         ..RawMesh::default()
     };
-    let names = raw.names.add_named([]);
     let mut faces = Vec::new();
     for element in header.elements.values() {
         match element.name.as_str() {
@@ -75,27 +69,34 @@ fn read_all(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, ImportError> {
             }
         }
     }
+    add_faces(&mut raw, faces, limits)?;
+    Ok(raw)
+}
+
+/// Appends all faces.
+fn add_faces(raw: &mut RawMesh, faces: Vec<Face>, limits: MeshLimits) -> Result<(), Vec<ImportError>> {
+    let names = raw.names.add_named([]);
     let vertices = raw.coordinates.len() / 3;
     let mut triangles = 0;
+    let mut violations = Violations::default();
     for (place, face) in faces.into_iter().enumerate() {
-        let corners = face.0.ok_or_else(|| {
-            ImportError::at(
-                format!("face {place}"),
-                "a vertex index is negative or no whole number",
-            )
-        })?;
+        let mut wrong = |what: String| violations.push(ImportError::at(format!("face {place}"), what));
+        let Some(corners) = face.0 else {
+            wrong("a vertex index is negative or no whole number".to_owned());
+            continue;
+        };
         if let Some(index) = corners.iter().find(|&&index| index as usize >= vertices) {
-            return Err(ImportError::at(
-                format!("face {place}"),
-                format!("vertex {index} does not exist; there are {vertices}, counted from 0"),
+            wrong(format!(
+                "vertex {index} does not exist; there are {vertices}, counted from 0"
             ));
+            continue;
         }
         if corners.len() < 3 {
             raw.without_area.note(place);
             continue;
         }
         triangles += corners.len() as u64 - 2;
-        check_counts(0, triangles, limits)?;
+        check_counts(0, triangles, limits).map_err(|error| vec![error])?;
         raw.faces.push(RawFace {
             place,
             corners: corners.len(),
@@ -103,7 +104,7 @@ fn read_all(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, ImportError> {
         });
         raw.corners.extend(corners);
     }
-    Ok(raw)
+    violations.into_result()
 }
 
 /// A parser's message on one line, and cut short: it may repeat a whole line of the file.

@@ -96,11 +96,11 @@ impl RawMesh {
         self.coordinates.extend(position);
     }
 
-    /// Adds a triangle, whose place is its number.
-    pub(crate) fn add_triangle(&mut self, corners: [u32; 3], names: usize) {
+    /// Adds a triangle.
+    pub(crate) fn add_triangle(&mut self, corners: [u32; 3], place: usize, names: usize) {
         self.corners.extend(corners);
         self.faces.push(RawFace {
-            place: self.faces.len(),
+            place,
             corners: 3,
             names,
         });
@@ -153,8 +153,7 @@ impl Occurrences {
 /// Sets of names that faces share.
 #[derive(Debug, Default)]
 pub(crate) struct NameSets {
-    /// Names by index, and their indices.
-    names: Vec<String>,
+    /// The index of each name.
     indices: HashMap<String, u32>,
     /// The sets, as ranges of `listed`.
     sets: Vec<Range<usize>>,
@@ -168,9 +167,8 @@ impl NameSets {
         if let Some(&index) = self.indices.get(name) {
             return index;
         }
-        let index = self.names.len() as u32;
+        let index = self.indices.len() as u32;
         self.indices.insert(name.to_owned(), index);
-        self.names.push(name.to_owned());
         index
     }
 
@@ -193,10 +191,14 @@ impl NameSets {
 
     /// The triangles of each name, sorted by name; `sets` are those of the triangles.
     pub(crate) fn groups(&self, sets: impl Iterator<Item = usize>) -> Vec<(String, Vec<u32>)> {
+        let mut names = vec![""; self.indices.len()];
+        for (name, &index) in &self.indices {
+            names[index as usize] = name;
+        }
         let mut groups = BTreeMap::<&str, Vec<u32>>::new();
         for (triangle, set) in sets.enumerate() {
             for &name in &self.listed[self.sets[set].clone()] {
-                let triangles = groups.entry(&self.names[name as usize]).or_default();
+                let triangles = groups.entry(names[name as usize]).or_default();
                 triangles.push(triangle as u32);
             }
         }

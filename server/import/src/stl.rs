@@ -11,7 +11,7 @@ use crate::{
     error::ImportError,
     format::without_mark,
     limits::MeshLimits,
-    raw::{Occurrences, Places, RawMesh, check_counts},
+    raw::{Place, Places, RawMesh, check_counts},
 };
 
 /// Bytes of a binary file before its triangles, and per triangle.
@@ -67,7 +67,7 @@ pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, V
         ..RawMesh::default()
     };
     let names = raw.names.add_named([]);
-    read_into(&mut raw, Cursor::new(blank), |_| (names, None))?;
+    read_into(&mut raw, Cursor::new(blank), |triangle| (triangle, names))?;
     let spare = bytes.len() - HEADER_BYTES - raw.faces.len() * TRIANGLE_BYTES;
     if spare > 0 {
         raw.warnings
@@ -84,45 +84,32 @@ pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec
     };
     let plain = PlainText::of(without_mark(bytes), &mut raw, limits).map_err(|error| vec![error])?;
     let facets = &plain.facets;
-    read_into(&mut raw, Cursor::new(plain.text), |triangle| {
-        let &(line, names) = facets.get(triangle).unwrap_or(&(plain.lines, 0));
-        (names, Some(line))
+    read_into(&mut raw, Cursor::new(plain.text), |facet| {
+        facets.get(facet).copied().unwrap_or((plain.lines, 0))
     })?;
-    if raw.unknown.count > 0 {
-        let Occurrences { count, first } = raw.unknown;
-        raw.warnings.push(format!(
-            "{count} lines are no statements of STL and were ignored; the first is on line {first}"
-        ));
-        raw.unknown = Occurrences::default();
-    }
     Ok(raw)
 }
 
-/// Appends all triangles; `about` gives the set of names of each and its place, if that is not its number.
+/// Appends all triangles; `about` gives the place and the set of names of each by its number.
 fn read_into(
     raw: &mut RawMesh,
     mut file: Cursor<Vec<u8>>,
-    about: impl Fn(usize) -> (usize, Option<usize>),
+    about: impl Fn(usize) -> (usize, usize),
 ) -> Result<(), Vec<ImportError>> {
-    let failed = |triangle: usize, line: Option<usize>, error: &std::io::Error| {
-        let place = line.map_or_else(
-            || format!("triangle {triangle}"),
-            |line| format!("the STL facet on line {line}"),
-        );
+    let places = raw.places;
+    let failed = |place: usize, error: &std::io::Error| {
+        let place = format!("the STL facet {}", Place(places, place));
         vec![ImportError::at(place, error.to_string())]
     };
-    let triangles = create_stl_reader(&mut file).map_err(|error| failed(0, None, &error))?;
+    let triangles = create_stl_reader(&mut file).map_err(|error| failed(0, &error))?;
     for (number, triangle) in triangles.enumerate() {
-        let (names, line) = about(number);
-        let Triangle { vertices, .. } = triangle.map_err(|error| failed(number, line, &error))?;
+        let (place, names) = about(number);
+        let Triangle { vertices, .. } = triangle.map_err(|error| failed(place, &error))?;
         let first = (raw.coordinates.len() / 3) as u32;
         for vertex in vertices {
             raw.add_vertex(vertex.0);
         }
-        raw.add_triangle([first, first + 1, first + 2], names);
-        if let (Some(line), Some(face)) = (line, raw.faces.last_mut()) {
-            face.place = line;
-        }
+        raw.add_triangle([first, first + 1, first + 2], place, names);
     }
     Ok(())
 }

@@ -90,25 +90,35 @@ async fn utf16_and_backslashes_in_comments_are_read() {
 #[tokio::test(flavor = "multi_thread")]
 async fn other_formats_are_named() {
     let server = TestServer::start().await;
-    let cases: [(&[u8], &str); 6] = [
+    let begins = "begins with a word of OBJ";
+    let cases: [(&[u8], &str, &str); 6] = [
         (
             b"version https://git-lfs.github.com/spec/v1\nsize 9\n",
             "Git LFS pointer",
+            begins,
         ),
-        (b"solid a\nfacet normal 0 0 1\nendfacet\nendsolid\n", "STL"),
-        (b"{\"asset\": {\"version\": \"2.0\"}}", "glTF"),
-        (b"<!DOCTYPE html><html></html>", "HTML"),
-        (b"\x1F\x8B\x08\0\0", "gzip"),
-        (b"once upon a time", "some other text"),
+        (b"<!DOCTYPE html><html></html>", "HTML", begins),
+        (b"\x1F\x8B\x08\0\0", "gzip", begins),
+        (b"once upon a time", "some other text", begins),
+        // Formats that are read, without a mesh.
+        (
+            b"solid a\nfacet normal 0 0 1\nendfacet\nendsolid\n",
+            "STL",
+            "facet on line 2",
+        ),
+        (b"{\"asset\": {\"version\": \"2.0\"}}", "glTF", "has no triangles"),
     ];
-    for (obj, name) in cases {
+    for (obj, name, reason) in cases {
         let status = create(&server, "other", obj)
             .await
             .expect_err("it is not OBJ text");
         assert_eq!(status.code(), Code::InvalidArgument);
         assert_eq!(blamed_fields(&status), ["mesh"]);
         let message = status.message();
-        assert!(message.contains(name), "{name}: {message}");
+        assert!(
+            message.contains(reason) && message.contains(name),
+            "{name}: {message}"
+        );
     }
     server.stop().await;
 }

@@ -54,7 +54,7 @@ impl Model {
 
     /// An everyday object.
     pub(crate) fn everyday(object: &EverydayObject) -> Result<Self, Failure> {
-        let read = read_text(object.obj().as_bytes(), 1.0, object.name)?;
+        let read = read(object.obj().as_bytes(), 1.0, object.name)?;
         let is_forbidden = |name: &String| object.forbidden.contains(&name.as_str());
         let groups = read.groups.iter().filter(|(name, _)| is_forbidden(name));
         let (colour, finish) = look(object.surface);
@@ -70,7 +70,7 @@ impl Model {
     pub(crate) fn from_file(path: &Path, unit_metres: f32) -> Result<Self, Failure> {
         let text = std::fs::read(path)
             .map_err(|error| Failure::other(format!("cannot read {}", path.display()), error))?;
-        let read = read_text(&text, unit_metres, path.display())?;
+        let read = read(&text, unit_metres, path.display())?;
         Ok(Self {
             surface: Surface::File(read.mesh),
             forbidden: Vec::new(),
@@ -100,8 +100,8 @@ impl Model {
 }
 
 /// Reads a mesh; an error names its `source`.
-fn read_text(text: &[u8], unit_metres: f32, source: impl Display) -> Result<ImportedMesh, Failure> {
-    read_mesh(text, Import::with_unit(unit_metres), LIMITS).map_err(|errors| {
+fn read(bytes: &[u8], unit_metres: f32, source: impl Display) -> Result<ImportedMesh, Failure> {
+    read_mesh(bytes, Import::with_unit(unit_metres), LIMITS).map_err(|errors| {
         let errors: Vec<_> = errors.iter().map(ToString::to_string).collect();
         Failure::other(format!("cannot read {source}"), errors.join("; "))
     })

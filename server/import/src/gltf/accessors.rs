@@ -42,54 +42,58 @@ impl<'a> Buffers<'a> {
         Ok(())
     }
 
-    /// All elements of an accessor of `N` components as numbers; integers that stand for fractions become those.
+    /// The first `count` elements of an accessor of `N` components as numbers; integers that stand for fractions become those.
+    /// Memory grows with `count`, not with what the accessor claims.
     pub(super) fn numbers<const N: usize>(
         &self,
         accessor: &Accessor<'_>,
+        count: usize,
     ) -> Result<Vec<[f64; N]>, ImportError> {
         let wrong = |what: String| ImportError::at(format!("accessors[{}]", accessor.index()), what);
         let components = accessor.dimensions().multiplicity();
         if components != N {
             return Err(wrong(format!("has {components} components; {N} are needed")));
         }
-        self.spend(accessor.count() as u64)?;
+        if accessor.count() < count {
+            let found = accessor.count();
+            return Err(wrong(format!("has {found} elements; {count} are needed")));
+        }
+        self.spend(count as u64)?;
         let kind = accessor.data_type();
         let size = kind.size() * N;
         let mut numbers = match accessor.view() {
             Some(view) => {
                 let stride = view.stride().unwrap_or(size);
-                self.elements(&view, accessor.offset(), stride, size, accessor.count())
-                    .ok_or_else(|| wrong(beyond(accessor.count())))?
+                self.elements(&view, accessor.offset(), stride, size, count)
+                    .ok_or_else(|| wrong(beyond(count)))?
                     .map(|element| components_of(element, kind))
                     .collect()
             }
-            None => vec![[0.0; N]; accessor.count()],
+            None => vec![[0.0; N]; count],
         };
         if let Some(sparse) = accessor.sparse() {
             let (indices, values) = (sparse.indices(), sparse.values());
-            let count = sparse.count();
-            if count > accessor.count() {
-                return Err(wrong(format!(
-                    "replaces {count} of {} elements",
-                    accessor.count()
-                )));
-            }
+            let changed = sparse.count();
+            self.spend(changed as u64)?;
             let index_kind = match indices.index_type() {
                 IndexType::U8 => DataType::U8,
                 IndexType::U16 => DataType::U16,
                 IndexType::U32 => DataType::U32,
             };
             let width = index_kind.size();
-            let places = self.elements(&indices.view(), indices.offset(), width, width, count);
-            let replaced = self.elements(&values.view(), values.offset(), size, size, count);
+            let places = self.elements(&indices.view(), indices.offset(), width, width, changed);
+            let replaced = self.elements(&values.view(), values.offset(), size, size, changed);
             let (Some(places), Some(replaced)) = (places, replaced) else {
-                return Err(wrong(beyond(count)));
+                return Err(wrong(beyond(changed)));
             };
             for (place, element) in places.zip(replaced) {
-                let [place] = components_of::<1>(place, index_kind);
-                let target = numbers.get_mut(place as usize);
-                *target.ok_or_else(|| wrong(format!("replaces element {place}, which does not exist")))? =
-                    components_of(element, kind);
+                let [place] = components_of::<1>(place, index_kind).map(|place| place as usize);
+                if place >= accessor.count() {
+                    return Err(wrong(format!("replaces element {place}, which does not exist")));
+                }
+                if let Some(number) = numbers.get_mut(place) {
+                    *number = components_of(element, kind);
+                }
             }
         }
         if accessor.normalized() {

@@ -45,6 +45,15 @@ const HARMLESS: &[&str] = &[
 /// Reads the default scene, or the first one; all nodes if there is none.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
     let Parts { json, binary } = parts(bytes).map_err(|error| vec![error])?;
+    // Each object of the text takes some hundred bytes in memory, however short it is.
+    let objects = json.split(|&byte| byte == b'{').count() - 1;
+    if objects > limits.triangles {
+        return Err(vec![ImportError::TooMany {
+            what: "JSON objects",
+            found: objects as u64,
+            limit: limits.triangles,
+        }]);
+    }
     let mut root: Root = deserialize::from_slice(&json)
         .map_err(|error| vec![ImportError::at("the glTF document", error.to_string())])?;
     let refused: Vec<ImportError> = root

@@ -40,15 +40,21 @@ impl Scene {
 /// The nodes below some others, each once and after its parent, with the parent.
 fn walk(nodes: &[Node<'_>], start: &[usize]) -> Vec<(usize, Option<usize>)> {
     let mut is_met = vec![false; nodes.len()];
-    let mut order = Vec::new();
-    let mut waiting: Vec<(usize, Option<usize>)> = start.iter().rev().map(|&node| (node, None)).collect();
-    while let Some((node, parent)) = waiting.pop() {
-        if std::mem::replace(&mut is_met[node], true) {
-            continue;
+    let mut order: Vec<(usize, Option<usize>)> = Vec::new();
+    let mut meet = |order: &mut Vec<_>, node: usize, parent| {
+        if !std::mem::replace(&mut is_met[node], true) {
+            order.push((node, parent));
         }
-        order.push((node, parent));
-        let children: Vec<usize> = nodes[node].children().map(|child| child.index()).collect();
-        waiting.extend(children.into_iter().rev().map(|child| (child, Some(node))));
+    };
+    for &node in start {
+        meet(&mut order, node, None);
+    }
+    let mut next = 0;
+    while let Some(&(node, _)) = order.get(next) {
+        for child in nodes[node].children() {
+            meet(&mut order, child.index(), Some(node));
+        }
+        next += 1;
     }
     order
 }

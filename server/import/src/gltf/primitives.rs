@@ -72,24 +72,29 @@ pub(super) fn read_into(
                     .and_then(|material| materials_by_name[material]),
             ];
             let names = raw.names.add(own.into_iter().flatten().collect());
-            let positions = positions(&primitive, node, buffers, raw, limits).map_err(place)?;
+            let mut positions = positions(&primitive, node, buffers, raw, limits).map_err(place)?;
             let indices = indices(&primitive, positions.len(), buffers, limits).map_err(place)?;
-            let scene_from_vertex = match joints {
-                Some(joints) => skinned(&primitive, joints, positions.len(), buffers).map_err(place)?,
-                None => vec![scene.scene_from_node[index]],
-            };
             let first = (raw.coordinates.len() / 3) as u32;
-            for (vertex, position) in positions.iter().enumerate() {
-                let transform = scene_from_vertex[vertex.min(scene_from_vertex.len() - 1)];
-                raw.add_vertex(transform.transform_point3(*position).as_vec3().to_array());
+            let mut scene_from_mesh = scene.scene_from_node[index];
+            if let Some(joints) = joints {
+                positions = skinned(&primitive, joints, &positions, buffers).map_err(place)?;
+                // Joints mirror a mesh together, and the node's own place does not count.
+                scene_from_mesh = joints.first().copied().unwrap_or(DMat4::IDENTITY);
+            } else {
+                for position in &mut positions {
+                    *position = scene_from_mesh.transform_point3(*position);
+                }
+            }
+            for position in positions {
+                raw.add_vertex(position.as_vec3().to_array());
             }
             // A mirrored instance shows its other side.
-            let is_mirrored = scene_from_vertex[0].determinant() < 0.0;
+            let is_mirrored = scene_from_mesh.determinant() < 0.0;
             let triangles = triangles(&indices, primitive.mode());
             check_counts(0, (raw.faces.len() + triangles.len()) as u64, limits).map_err(place)?;
             for [a, b, c] in triangles {
                 let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
-                raw.add_triangle(corners.map(|corner| first + corner), names);
+                raw.add_triangle(corners.map(|corner| first + corner), raw.faces.len(), names);
             }
         }
     }
@@ -114,7 +119,7 @@ fn positions(
     let before = raw.coordinates.len() / 3;
     check_counts((before + accessor.count()) as u64, 0, limits)?;
     let mut positions: Vec<DVec3> = buffers
-        .numbers(&accessor)?
+        .numbers(&accessor, accessor.count())?
         .into_iter()
         .map(DVec3::from_array)
         .collect();
@@ -126,13 +131,8 @@ fn positions(
         let Some(offsets) = target.positions().filter(|_| weight != 0.0) else {
             continue;
         };
-        if offsets.count() != positions.len() {
-            return Err(ImportError::at(
-                "targets",
-                "a morph target has another number of vertices",
-            ));
-        }
-        for (position, offset) in positions.iter_mut().zip(buffers.numbers(&offsets)?) {
+        let offsets = buffers.numbers(&offsets, positions.len())?;
+        for (position, offset) in positions.iter_mut().zip(offsets) {
             *position += f64::from(weight) * DVec3::from_array(offset);
         }
     }
@@ -150,7 +150,7 @@ fn indices(
         return Ok((0..vertices as u32).collect());
     };
     check_counts(0, accessor.count() as u64 / 3, limits)?;
-    let indices = buffers.numbers(&accessor)?;
+    let indices = buffers.numbers(&accessor, accessor.count())?;
     indices
         .into_iter()
         .map(|[index]| {
@@ -195,29 +195,21 @@ fn joints(skin: &Skin<'_>, scene: &Scene, buffers: &Buffers<'_>) -> Result<Vec<D
     let Some(accessor) = skin.inverse_bind_matrices() else {
         return Ok(joints);
     };
-    let place = format!("skins[{}]", skin.index());
-    if accessor.count() < joints.len() {
-        let (found, needed) = (accessor.count(), joints.len());
-        return Err(ImportError::at(
-            place,
-            format!("has {found} inverse bind matrices for {needed} joints"),
-        ));
-    }
-    let inverse = buffers.numbers::<16>(&accessor)?;
+    let inverse = buffers.numbers::<16>(&accessor, joints.len())?;
     let bound = joints.iter().zip(inverse);
     Ok(bound
         .map(|(&joint, inverse)| joint * DMat4::from_cols_array(&inverse))
         .collect())
 }
 
-/// The transform of each vertex of a skinned primitive: that of its joints by their weights.
+/// Where the vertices of a skinned primitive are: as its joints move them, by their weights.
 fn skinned(
     primitive: &Primitive<'_>,
     joints: &[DMat4],
-    vertices: usize,
+    positions: &[DVec3],
     buffers: &Buffers<'_>,
-) -> Result<Vec<DMat4>, ImportError> {
-    let mut transforms = vec![(DMat4::ZERO, 0.0); vertices];
+) -> Result<Vec<DVec3>, ImportError> {
+    let mut sums = vec![(DVec3::ZERO, 0.0); positions.len()];
     for set in 0..JOINT_SETS {
         let sets = (
             primitive.get(&Semantic::Joints(set)),
@@ -226,16 +218,10 @@ fn skinned(
         let (Some(indices), Some(weights)) = sets else {
             break;
         };
-        if indices.count() != vertices || weights.count() != vertices {
-            return Err(ImportError::at(
-                "attributes",
-                "joints and positions differ in number",
-            ));
-        }
-        let indices = buffers.numbers::<4>(&indices)?;
-        let weights = buffers.numbers::<4>(&weights)?;
-        for ((transform, indices), weights) in transforms.iter_mut().zip(indices).zip(weights) {
-            for (index, weight) in indices.into_iter().zip(weights) {
+        let indices = buffers.numbers::<4>(&indices, positions.len())?;
+        let weights = buffers.numbers::<4>(&weights, positions.len())?;
+        for (vertex, (sum, total)) in sums.iter_mut().enumerate() {
+            for (index, weight) in indices[vertex].into_iter().zip(weights[vertex]) {
                 if weight == 0.0 {
                     continue;
                 }
@@ -245,20 +231,14 @@ fn skinned(
                         format!("joint {index} does not exist; there are {}", joints.len()),
                     )
                 })?;
-                transform.0 += *joint * weight;
-                transform.1 += weight;
+                *sum += weight * joint.transform_point3(positions[vertex]);
+                *total += weight;
             }
         }
     }
     // Vertices without weights stay where they are.
-    let transforms = transforms.into_iter();
-    Ok(transforms
-        .map(|(sum, weight)| {
-            if weight > 0.0 {
-                sum * weight.recip()
-            } else {
-                DMat4::IDENTITY
-            }
-        })
+    let moved = sums.into_iter().zip(positions);
+    Ok(moved
+        .map(|((sum, total), &position)| if total > 0.0 { sum / total } else { position })
         .collect())
 }

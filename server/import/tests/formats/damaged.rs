@@ -1,6 +1,6 @@
 //! Damaged files are meshes or errors, never panics.
 
-use std::{cell::Cell, time::Instant};
+use std::cell::Cell;
 
 use proptest::{
     prelude::*,
@@ -69,7 +69,6 @@ fn damaged_files_are_read_or_rejected() {
                 }
             }
         }
-        let begin = Instant::now();
         match read(&bytes) {
             Ok(_) => accepted.set(accepted.get() + 1),
             Err(errors) => {
@@ -78,8 +77,6 @@ fn damaged_files_are_read_or_rejected() {
                 prop_assert!(errors.iter().all(|error| error.to_string().len() < 2000));
             }
         }
-        // Whatever a file claims: thousands of times what reading it takes.
-        prop_assert!(begin.elapsed().as_secs() < 60);
         Ok(())
     });
     outcome.unwrap_or_else(|failure| panic!("{failure}"));

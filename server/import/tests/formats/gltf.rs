@@ -279,7 +279,13 @@ fn scenes_that_repeat_themselves_end() {
         {"componentType":5126,"count":4294967296,"type":"MAT4",
          "sparse":{"count":1,"indices":{"bufferView":0,"componentType":5121},"values":{"bufferView":0}}}],
         "bufferViews":[{"buffer":0,"byteLength":64}],"buffers":[{"byteLength":64}]}"#;
-    assert!(message(&glb(joints, &[0; 64])).contains("too often"));
+    assert!(message(&glb(joints, &[0; 64])).contains("has no triangles"));
+    // Each takes a hundred times its two bytes.
+    let nodes = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#,
+        many(200_000, "{}")
+    );
+    assert!(message(nodes.as_bytes()).contains("200002 JSON objects; at most 100000"));
 }
 
 #[test]

@@ -89,6 +89,24 @@ fn what_is_no_mesh_of_faces_is_named() {
 }
 
 #[test]
+fn every_wrong_face_is_named() {
+    let faces = FACES.replace(" 1\n", " 3\n");
+    let bytes = ply(
+        &format!("{VERTICES}{faces}"),
+        &format!("{SQUARE}3 0 1 4\n3 0 1 2\n3 9 1 2\n"),
+    );
+    let errors: Vec<String> = read(&bytes)
+        .unwrap_err()
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    let expected = |face: usize, index: usize| {
+        format!("face {face}: vertex {index} does not exist; there are 4, counted from 0")
+    };
+    assert_eq!(errors, [expected(0, 4), expected(2, 9)]);
+}
+
+#[test]
 fn claims_beyond_the_file_are_refused_before_they_are_read() {
     let vertices = VERTICES.replace(" 4", " 18446744073709551615");
     assert!(message(&ply(&format!("{vertices}{FACES}"), SQUARE)).contains("more than the"));

@@ -13,7 +13,7 @@ fn solids_of_text_are_groups() {
     let read = read(text.as_bytes()).unwrap();
     assert_eq!(read.mesh.triangles().len(), 2);
     assert_eq!(read.groups, [("Left Half".to_owned(), vec![0])]);
-    let ignored = "1 lines are no statements of STL and were ignored; the first is on line 19";
+    let ignored = "1 lines start with an unknown keyword and were ignored; the first is on line 19";
     assert!(
         read.warnings.iter().any(|warning| warning == ignored),
         "{:?}",

@@ -32,9 +32,9 @@ const NEIGHBOURS: f32 = 0.005;
 /// Depth below the surface at which a ray starts, in metres, so that it does not hit its own triangle.
 const START_DEPTH: f32 = 1e-5;
 
-/// A face, and the one opposite it.
+/// The part below a face.
 struct Section {
-    normal: Vec3,
+    /// The normal of the face opposite it.
     opposite: Vec3,
     middle: Vec3,
     thickness: f32,
@@ -55,19 +55,19 @@ pub(super) fn worn_edges(surface: &MeshBvh) -> Vec<Vec3> {
 fn end_of_wedge(surface: &MeshBvh, triangle: usize, position: Vec3) -> Option<Vec3> {
     let normal = surface.mesh().normal(triangle);
     let here = section(surface, normal, position)?;
-    let angle = here.normal.angle_between(-here.opposite);
+    let angle = normal.angle_between(-here.opposite);
     if !(ANGLES[0]..=ANGLES[1]).contains(&angle) {
         return None;
     }
     // Both faces of a wedge look toward its end.
-    let ahead = (here.normal + here.opposite).try_normalize()?;
+    let ahead = (normal + here.opposite).try_normalize()?;
     let end = surface.first_hit(Segment::new(here.middle, here.middle + ahead * TO_END[1]))?;
     let growth = 2.0 * (0.5 * angle).tan();
     if end.distance < TO_END[0] || here.thickness - end.distance * growth > BLUNT {
         return None;
     }
     let behind = here.middle - ahead * BEHIND;
-    let thickness_behind = thickness_around(surface, behind, here.normal)?;
+    let thickness_behind = thickness_around(surface, behind, normal)?;
     let least_growth = 2.0 * (0.5 * ANGLES[0]).tan() * BEHIND;
     (thickness_behind >= here.thickness + least_growth).then_some(end.position)
 }
@@ -77,7 +77,6 @@ fn section(surface: &MeshBvh, normal: Vec3, position: Vec3) -> Option<Section> {
     let start = position - normal * START_DEPTH;
     let exit = surface.first_hit(Segment::new(start, start - normal * THIN))?;
     Some(Section {
-        normal,
         opposite: surface.mesh().normal(exit.triangle as usize),
         middle: start.midpoint(exit.position),
         thickness: exit.distance,

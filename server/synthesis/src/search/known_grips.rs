@@ -154,7 +154,7 @@ impl Grading<'_> {
         let preference = self.preference;
         let values = &entry.grip_values;
         let is_chosen = || preference.is_met_by_grip(values, entry.classification, false);
-        let is_firm = || preference.is_firm(values);
+        let is_firm = || preference.is_firm(values, false);
         let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
         match grade {
             Grade::Chosen => is_chosen() && is_reached(),

@@ -13,9 +13,10 @@ use crate::{
 
 /// Least values of terms without which people would take an object otherwise. With less steadiness, two in three are lost to
 /// pushes as strong as the object's weight in an independent simulation; with more, one in ten.
-const LEAST_OF_CLOSED_HAND: [(Term, f32); 2] = [(Term::Steadiness, 0.3), (Term::EnoughDigits, 0.65)];
-const LEAST_OF_GRIP: [(Term, f32); 2] = [(Term::AcrossLongAxis, 0.5), (Term::OffSharp, 1.0)];
-const LEAST_OF_FIRM_GRIP: [(Term, f32); 2] = [(Term::Steadiness, 0.3), (Term::OffSharp, 1.0)];
+const LEAST_OF_FIRM_HAND: [(Term, f32); 1] = [(Term::Steadiness, 0.3)];
+const LEAST_OF_CLOSED_HAND: [(Term, f32); 1] = [(Term::EnoughDigits, 0.65)];
+const LEAST_OF_FIRM_GRIP: [(Term, f32); 1] = [(Term::OffSharp, 1.0)];
+const LEAST_OF_GRIP: [(Term, f32); 1] = [(Term::AcrossLongAxis, 0.5)];
 const LEAST_AS_PRESENTED: [(Term, f32); 3] = [
     (Term::Stance, SUITABLE),
     (Term::FromSideOrAbove, 0.2),
@@ -65,15 +66,16 @@ impl Preference {
     /// True if a person would choose such a grip, as far as hand and object alone tell.
     pub(super) fn is_met_by_grip(self, values: &Values, classification: Classification, hangs: bool) -> bool {
         classification.is_clear()
+            && self.is_firm(values, hangs)
             && reach(values, &LEAST_OF_GRIP)
             && (hangs || reach(values, &LEAST_OF_CLOSED_HAND))
-            && self.has_handle(values)
     }
 
-    /// True if a grip holds firmly what people would hold, though they may prefer another hand. All that
-    /// [`Self::is_met_by_grip`] accepts are firm, but for hooks.
-    pub(super) fn is_firm(self, values: &Values) -> bool {
-        reach(values, &LEAST_OF_FIRM_GRIP) && self.has_handle(values)
+    /// True if a grip holds firmly what people would hold, though they may prefer another hand.
+    pub(super) fn is_firm(self, values: &Values, hangs: bool) -> bool {
+        reach(values, &LEAST_OF_FIRM_GRIP)
+            && (hangs || reach(values, &LEAST_OF_FIRM_HAND))
+            && self.has_handle(values)
     }
 
     /// True unless a handle is free and the contacts of a grip are off it.
