@@ -119,7 +119,7 @@ fn callable(setting: &Setting) -> Line {
 /// Registers an object and watches its atlas grow.
 fn growth(setting: &Setting, server: &TestServer) -> Vec<Line> {
     let request = create(1);
-    let object = Arc::new(object_of(&request.obj, MASS));
+    let object = Arc::new(object_of(&request.mesh, MASS));
     let test_object = setting.test_object(&request.object_id.clone(), object, Some(request.clone()));
     let probes: Vec<_> = test_object.requests().into_iter().take(PROBES).collect();
     let bar = bar(0, "an atlas grows".to_owned());
