@@ -29,7 +29,7 @@ def test_logs_every_error_in_the_objects_folder(log_of_rejected, objects):
     for part in (
         "my-remote.toml: mass_kg: is -1; it must be more than 0",
         "my-remote.toml: colour: is unknown",
-        "orphan.toml: has no orphan.obj next to it",
+        "orphan.toml: has no mesh next to it: orphan.glb, ",
         "scissors.obj: has the name of the built-in object",
     ):
         assert part in error, error
