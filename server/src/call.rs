@@ -19,7 +19,7 @@ use tower::{Layer, Service};
 
 use crate::{
     budget::parse_grpc_timeout,
-    error::{Limit, ServiceError},
+    error::{Limit, ServiceError, blame_malformed_messages},
     reserve::DeadlineReserve,
 };
 
@@ -254,7 +254,7 @@ where
         }
         let answer = self.inner.call(request);
         Box::pin(async move {
-            let answer = answer.await;
+            let answer = answer.await.map(blame_malformed_messages);
             drop(delay);
             line.set_code(match &answer {
                 Ok(response) => code_of(response),

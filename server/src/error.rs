@@ -2,6 +2,7 @@
 
 use std::{collections::HashMap, time::Duration};
 
+use http::Response;
 use tonic::{Code, Status, metadata::MetadataValue};
 use tonic_types::{ErrorDetails, FieldViolation, StatusExt as _};
 
@@ -29,6 +30,8 @@ pub enum Limit {
     Uploads,
     /// Created objects, all of which are in use.
     ObjectCache,
+    /// Bytes of answers that wait on a connection.
+    UnreadAnswers,
 }
 
 /// Why a call failed.
@@ -37,6 +40,9 @@ pub enum ServiceError {
     /// The request violates the contract; with all violations.
     #[error("{}", summary(.0))]
     Invalid(Vec<Violation>),
+    /// The request is no message of the contract.
+    #[error("the request is not a valid message: {0}")]
+    Malformed(String),
     /// No object has the name.
     #[error("{name} does not exist{}", if *.evicted { ": it was evicted from the cache; create it again" } else { "" })]
     ObjectNotFound {
@@ -96,6 +102,9 @@ impl From<ServiceError> for Status {
                 );
                 Status::with_error_details(Code::InvalidArgument, message, details)
             }
+            ServiceError::Malformed(_) => {
+                Status::with_error_details(Code::InvalidArgument, message, info("MALFORMED_MESSAGE", []))
+            }
             ServiceError::ObjectNotFound { name, evicted } => {
                 let reason = if evicted {
                     "OBJECT_EVICTED"
@@ -137,6 +146,17 @@ impl From<ServiceError> for Status {
     }
 }
 
+/// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed. Every other
+/// status in the headers of a response comes from a handler, and has details.
+pub(crate) fn blame_malformed_messages<R: Default>(response: Response<R>) -> Response<R> {
+    match Status::from_header_map(response.headers()) {
+        Some(status) if status.code() == Code::Internal && status.details().is_empty() => {
+            Status::from(ServiceError::Malformed(status.message().to_owned())).into_http()
+        }
+        _ => response,
+    }
+}
+
 /// Details with the `ErrorInfo` that every status carries.
 fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDetails {
     let metadata: HashMap<String, String> = metadata
@@ -151,6 +171,7 @@ fn limit_reason(limit: Limit) -> &'static str {
         Limit::Searches => "TOO_MANY_SEARCHES",
         Limit::Uploads => "TOO_MANY_UPLOADS",
         Limit::ObjectCache => "OBJECT_CACHE_FULL",
+        Limit::UnreadAnswers => "TOO_MANY_UNREAD_ANSWERS",
     }
 }
 
@@ -159,6 +180,9 @@ fn limit_text(limit: Limit) -> &'static str {
         Limit::Searches => "the server is at its limit of concurrent searches",
         Limit::Uploads => "the server is at its limit of concurrent uploads",
         Limit::ObjectCache => "every object in the full cache is in use",
+        Limit::UnreadAnswers => {
+            "this connection is at its limit of bytes that wait for the client to read them"
+        }
     }
 }
 
@@ -222,6 +246,11 @@ mod tests {
                 Code::DeadlineExceeded,
                 "DEADLINE_EXCEEDED",
             ),
+            (
+                ServiceError::Malformed("a key has wire type 7".into()),
+                Code::InvalidArgument,
+                "MALFORMED_MESSAGE",
+            ),
             (ServiceError::Cancelled, Code::Cancelled, "CALL_CANCELLED"),
             (ServiceError::Panicked, Code::Internal, "JOB_PANICKED"),
         ];
@@ -232,6 +261,25 @@ mod tests {
             let info = details.error_info().expect("an ErrorInfo");
             assert_eq!((info.reason.as_str(), info.domain.as_str()), (reason, "grasp.v1"));
         }
+    }
+
+    #[test]
+    fn only_a_failure_without_details_is_a_malformed_message() {
+        let code_after = |status: Status| {
+            let response = blame_malformed_messages(status.into_http::<()>());
+            let status = Status::from_header_map(response.headers()).expect("it has a status");
+            (status.code(), status.message().to_owned())
+        };
+        let (code, message) = code_after(Status::internal("failed to decode: invalid wire type"));
+        assert_eq!(code, Code::InvalidArgument);
+        assert_eq!(
+            message,
+            "the request is not a valid message: failed to decode: invalid wire type"
+        );
+        assert_eq!(code_after(ServiceError::Panicked.into()).0, Code::Internal);
+        assert_eq!(code_after(Status::cancelled("gone")).0, Code::Cancelled);
+        let ok = blame_malformed_messages(Response::new(7));
+        assert_eq!(ok.into_body(), 7);
     }
 
     #[test]

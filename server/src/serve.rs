@@ -24,7 +24,7 @@ use crate::{
     config::Config,
     executor::SearchExecutor,
     limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
-    net::{AcceptLimits, accept},
+    net::{AcceptLimits, UnreadAnswers, UnreadLayer, accept},
     objects::{
         StoredObject,
         directory::{self, DirectoryError},
@@ -105,6 +105,7 @@ pub struct Server {
     calls: CallsInFlight,
     maximum_uploads: NonZeroUsize,
     maximum_connections: NonZeroUsize,
+    unread: Arc<UnreadAnswers>,
     drain: Duration,
     directory_bytes: usize,
 }
@@ -114,6 +115,7 @@ pub struct Server {
 pub struct Gauges {
     shared: Arc<Shared>,
     calls: CallsInFlight,
+    unread: Arc<UnreadAnswers>,
 }
 
 impl Gauges {
@@ -130,6 +132,11 @@ impl Gauges {
     /// Number of calls in flight.
     pub fn calls(&self) -> usize {
         self.calls.count()
+    }
+
+    /// Bytes of answers that wait for clients to read them.
+    pub fn unread_bytes(&self) -> usize {
+        self.unread.bytes()
     }
 }
 
@@ -202,6 +209,7 @@ impl Server {
             calls: CallsInFlight::default(),
             maximum_uploads: config.maximum_uploads,
             maximum_connections: config.maximum_connections,
+            unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
             drain: config.drain,
             directory_bytes,
         })
@@ -217,6 +225,7 @@ impl Server {
         Gauges {
             shared: Arc::clone(&self.shared),
             calls: self.calls.clone(),
+            unread: Arc::clone(&self.unread),
         }
     }
 
@@ -244,7 +253,8 @@ impl Server {
             connections: self.maximum_connections.get(),
             preface: PREFACE_TIME,
         };
-        let incoming = accept(listener, limits, stop.clone(), close.clone());
+        let unread = Arc::clone(&self.unread);
+        let incoming = accept(listener, limits, unread, stop.clone(), close.clone());
         let serving = transport::Server::builder()
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
             .concurrency_limit_per_connection(CALLS_PER_CONNECTION)
@@ -263,6 +273,7 @@ impl Server {
                 maximum_uploads: self.maximum_uploads.get(),
                 reserve: Arc::clone(&self.shared.reserve),
             })
+            .layer(UnreadLayer)
             .add_service(grasps)
             .add_service(objects)
             .add_service(health_service)
@@ -294,6 +305,7 @@ impl Server {
         };
         tokio::select! {
             served = serving => served?,
+            () = self.unread.close_stalled() => {}
             () = shutting_down => {}
         }
         tracing::info!("stopped");

@@ -5,7 +5,10 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, path::Pa
 use grasp_assets::hands::RIG_NAMES;
 
 use super::{BadValue, Config, ConfigError, LogFormat, RawConfig};
-use crate::{budget::BudgetLimits, limits::StoreLimits};
+use crate::{
+    budget::BudgetLimits,
+    limits::{LARGEST_RESPONSE, StoreLimits},
+};
 
 impl RawConfig {
     /// Checks every value; absent ones get their defaults.
@@ -73,6 +76,12 @@ impl RawConfig {
                 self.maximum_connections,
                 1..=1_000_000,
                 defaults.maximum_connections,
+            ),
+            maximum_unread_bytes: check.count(
+                "maximum_unread_bytes",
+                self.maximum_unread_bytes,
+                LARGEST_RESPONSE as u64..=1 << 30,
+                defaults.maximum_unread_bytes,
             ),
             drain: check.time("drain_ms", self.drain_ms, 0..=600_000, defaults.drain),
             default_rig: check.parsed(
@@ -298,6 +307,7 @@ mod tests {
             builder_threads: Some(65),
             atlas_directory: Some(PathBuf::new()),
             maximum_connections: Some(0),
+            maximum_unread_bytes: Some(0),
             drain_ms: Some(u64::MAX),
             default_rig: Some("robot".into()),
             log_format: Some("xml".into()),
@@ -306,7 +316,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 21, "{bad:?}");
+        assert_eq!(bad.len(), 22, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

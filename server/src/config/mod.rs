@@ -52,6 +52,8 @@ pub struct Config {
     pub atlas_directory: Option<PathBuf>,
     /// Largest number of connections; others wait.
     pub maximum_connections: NonZeroUsize,
+    /// Largest number of bytes of answers that wait for clients to read them; beyond, the connection with the most is closed.
+    pub maximum_unread_bytes: NonZeroUsize,
     /// How long to wait for running calls at shutdown.
     pub drain: Duration,
     /// Rig of the receiving hand if a request names none. Under `THESIS` validity it is always the rig `thesis`.
@@ -92,6 +94,7 @@ impl Default for Config {
             builder_threads: 1,
             atlas_directory: None,
             maximum_connections: non_zero(1000),
+            maximum_unread_bytes: non_zero(32 << 20),
             drain: Duration::from_secs(10),
             default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,

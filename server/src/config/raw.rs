@@ -88,6 +88,11 @@ pub struct RawConfig {
     /// Most connections; others wait [default: 1000].
     #[arg(long, env = "GRASP_MAXIMUM_CONNECTIONS", value_name = "COUNT")]
     pub maximum_connections: Option<u64>,
+    /// Most bytes of answers that wait for clients to read them [default: 33554432].
+    ///
+    /// Beyond, the connection with the most is closed.
+    #[arg(long, env = "GRASP_MAXIMUM_UNREAD_BYTES", value_name = "BYTES")]
+    pub maximum_unread_bytes: Option<u64>,
     /// How long to wait for running calls at shutdown, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
     pub drain_ms: Option<u64>,
@@ -155,6 +160,7 @@ impl RawConfig {
             builder_threads: self.builder_threads.or(fallback.builder_threads),
             atlas_directory: self.atlas_directory.or(fallback.atlas_directory),
             maximum_connections: self.maximum_connections.or(fallback.maximum_connections),
+            maximum_unread_bytes: self.maximum_unread_bytes.or(fallback.maximum_unread_bytes),
             drain_ms: self.drain_ms.or(fallback.drain_ms),
             default_rig: self.default_rig.or(fallback.default_rig),
             log_format: self.log_format.or(fallback.log_format),
@@ -185,6 +191,7 @@ impl From<&Config> for RawConfig {
             builder_threads: count(config.builder_threads),
             atlas_directory: config.atlas_directory.clone(),
             maximum_connections: count(config.maximum_connections.get()),
+            maximum_unread_bytes: count(config.maximum_unread_bytes.get()),
             drain_ms: time(config.drain),
             default_rig: Some(config.default_rig.clone()),
             log_format: Some(

@@ -160,6 +160,7 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     let searches = config.maximum_searches.get() as u64;
     let builders = config.builder_threads as u64;
     let connections = config.maximum_connections.get() as u64;
+    let unread = config.maximum_unread_bytes.get() as u64;
     let share = |bytes, purpose| MemoryShare { bytes, purpose };
     let mut shares = vec![
         share(AT_REST, "for the server at rest".to_owned()),
@@ -195,6 +196,10 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
         share(
             connections.saturating_mul(PER_CONNECTION),
             format!("for connections (maximum_connections is {connections})"),
+        ),
+        share(
+            unread,
+            format!("for answers that wait for their readers (maximum_unread_bytes is {unread})"),
         ),
     ];
     if let Some(path) = &config.objects_directory {
@@ -242,7 +247,7 @@ mod tests {
     }
 
     /// 20 MiB at rest, 2 threads of 64 KiB, a cache of 100 MiB, 3 uploads of 2.5 MiB and 1000 triangles, 5 searches of
-    /// 2 MiB, 7 connections of 32 KiB, 1 builder of 20 MiB.
+    /// 2 MiB, 7 connections of 32 KiB, 1 builder of 20 MiB, 8 MiB of answers.
     fn config() -> Config {
         let count = |n: usize| n.try_into().unwrap();
         Config {
@@ -257,11 +262,12 @@ mod tests {
             maximum_object_triangles: count(1000),
             maximum_searches: count(5),
             maximum_connections: count(7),
+            maximum_unread_bytes: count(8 << 20),
             ..Config::default()
         }
     }
 
-    const NEEDED: u64 = (20 + 100 + 3 * 2 + 5 * 2 + 20) * MIB
+    const NEEDED: u64 = (20 + 100 + 3 * 2 + 5 * 2 + 20 + 8) * MIB
         + 3 * (512 << 10)
         + 2 * (64 << 10)
         + 3 * 640_000
@@ -310,8 +316,8 @@ mod tests {
         assert_eq!(
             lines[..4],
             [
-                "too little memory: the limit is 30 MiB (a test); this configuration may use 160 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may use 188 MiB",
+                "too little memory: the limit is 30 MiB (a test); this configuration may use 168 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may use 196 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]
@@ -325,6 +331,7 @@ mod tests {
             "maximum_searches",
             "maximum_connections",
             "builder_threads",
+            "maximum_unread_bytes",
         ] {
             assert!(text.contains(&format!("{key} is ")), "{key} in {text}");
         }

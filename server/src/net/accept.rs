@@ -12,7 +12,7 @@ use tokio::{
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 
-use super::Connection;
+use super::{Connection, unread::UnreadAnswers};
 
 /// First pause after an accept failed for lack of resources; doubles up to [`LONGEST_PAUSE`].
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
@@ -33,13 +33,14 @@ pub(crate) struct AcceptLimits {
 pub(crate) fn accept(
     listener: TcpListener,
     limits: AcceptLimits,
+    unread: Arc<UnreadAnswers>,
     stop: CancellationToken,
     close: CancellationToken,
 ) -> ReceiverStream<io::Result<Connection>> {
     // One connection may wait while the transport sets up the previous one.
     let (sender, receiver) = mpsc::channel(1);
     tokio::spawn(async move {
-        let accepting = accept_all(listener, limits, close, sender);
+        let accepting = accept_all(listener, limits, unread, close, sender);
         stop.run_until_cancelled_owned(accepting).await;
     });
     ReceiverStream::new(receiver)
@@ -48,6 +49,7 @@ pub(crate) fn accept(
 async fn accept_all(
     listener: TcpListener,
     limits: AcceptLimits,
+    unread: Arc<UnreadAnswers>,
     close: CancellationToken,
     sender: mpsc::Sender<io::Result<Connection>>,
 ) {
@@ -60,7 +62,8 @@ async fn accept_all(
                 pause = FIRST_PAUSE;
                 // Small messages must not wait for others. If this fails, the first read fails too.
                 let _ = stream.set_nodelay(true);
-                let connection = Connection::new(stream, place, close.clone(), limits.preface);
+                let connection =
+                    Connection::new(stream, place, unread.connect(), close.clone(), limits.preface);
                 if sender.send(Ok(connection)).await.is_err() {
                     return;
                 }

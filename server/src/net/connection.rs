@@ -3,6 +3,7 @@
 use std::{
     io,
     pin::Pin,
+    sync::Arc,
     task::{Context, Poll},
     time::Duration,
 };
@@ -14,17 +15,22 @@ use tokio::{
     time::Sleep,
 };
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
-use tonic::transport::server::{Connected, TcpConnectInfo};
+use tonic::transport::server::Connected;
+
+use super::unread::Reader;
 
 /// Bytes of the client's HTTP/2 preface (RFC 9113, 3.4).
 const PREFACE_BYTES: usize = 24;
 
 /// A TCP connection that counts to the server's limit. Reading ends when the server closes the connection, and fails if
-/// the client does not send the HTTP/2 preface in time, for which the transport would wait forever.
+/// the client does not send the HTTP/2 preface in time, for which the transport would wait forever. Reading and writing fail
+/// once the connection is cut off because its client does not read.
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,
     closed: Pin<Box<WaitForCancellationFutureOwned>>,
+    cut_off: Pin<Box<WaitForCancellationFutureOwned>>,
+    reader: Arc<Reader>,
     preface: Option<Preface>,
     _place: OwnedSemaphorePermit,
 }
@@ -41,12 +47,15 @@ impl Connection {
     pub(crate) fn new(
         stream: TcpStream,
         place: OwnedSemaphorePermit,
+        reader: Arc<Reader>,
         close: CancellationToken,
         preface_time: Duration,
     ) -> Self {
         Self {
             stream,
             closed: Box::pin(close.cancelled_owned()),
+            cut_off: Box::pin(reader.cut_off().cancelled_owned()),
+            reader,
             preface: Some(Preface {
                 missing: PREFACE_BYTES,
                 deadline: Box::pin(tokio::time::sleep(preface_time)),
@@ -54,13 +63,30 @@ impl Connection {
             _place: place,
         }
     }
+
+    /// Fails once the connection is cut off.
+    fn check_cut_off(&mut self, cx: &mut Context<'_>) -> io::Result<()> {
+        match self.cut_off.as_mut().poll(cx) {
+            Poll::Ready(()) => Err(io::ErrorKind::ConnectionAborted.into()),
+            Poll::Pending => Ok(()),
+        }
+    }
+}
+
+/// What requests know of their connection.
+#[derive(Clone, Debug)]
+pub(crate) struct ConnectionInfo {
+    /// What of the answers waits for the client.
+    pub(super) reader: Arc<Reader>,
 }
 
 impl Connected for Connection {
-    type ConnectInfo = TcpConnectInfo;
+    type ConnectInfo = ConnectionInfo;
 
-    fn connect_info(&self) -> TcpConnectInfo {
-        self.stream.connect_info()
+    fn connect_info(&self) -> ConnectionInfo {
+        ConnectionInfo {
+            reader: Arc::clone(&self.reader),
+        }
     }
 }
 
@@ -70,7 +96,7 @@ impl AsyncRead for Connection {
         cx: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        use std::future::Future as _;
+        self.check_cut_off(cx)?;
         if self.closed.as_mut().poll(cx).is_ready() {
             // Reading 0 bytes means the end of the stream.
             return Poll::Ready(Ok(()));
@@ -91,6 +117,7 @@ impl AsyncRead for Connection {
 
 impl AsyncWrite for Connection {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buffer: &[u8]) -> Poll<io::Result<usize>> {
+        self.check_cut_off(cx)?;
         Pin::new(&mut self.stream).poll_write(cx, buffer)
     }
 
@@ -99,6 +126,7 @@ impl AsyncWrite for Connection {
         cx: &mut Context<'_>,
         buffers: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
+        self.check_cut_off(cx)?;
         Pin::new(&mut self.stream).poll_write_vectored(cx, buffers)
     }
 
@@ -126,14 +154,19 @@ mod tests {
     };
 
     use super::*;
+    use crate::net::unread::UnreadAnswers;
 
     /// A client's end, and the server's end of the same connection.
     async fn connected(close: CancellationToken, preface_time: Duration) -> (TcpStream, Connection) {
+        let reader = UnreadAnswers::new(usize::MAX).connect();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
         let (stream, _) = listener.accept().await.unwrap();
         let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
-        (client, Connection::new(stream, place, close, preface_time))
+        (
+            client,
+            Connection::new(stream, place, reader, close, preface_time),
+        )
     }
 
     #[tokio::test]

@@ -1,7 +1,11 @@
-//! Accepts connections, bounds their number and closes them.
+//! Accepts connections, bounds their number and what waits on them unread, and closes them.
 
 mod accept;
+mod answers;
 mod connection;
+mod unread;
 
 pub(crate) use accept::{AcceptLimits, accept};
-pub(crate) use connection::Connection;
+pub(crate) use answers::UnreadLayer;
+pub(crate) use connection::{Connection, ConnectionInfo};
+pub(crate) use unread::UnreadAnswers;

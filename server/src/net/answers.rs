@@ -1,0 +1,187 @@
+//! The layer and the body that count what waits for a client.
+
+use std::{
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll},
+};
+
+use bytes::Bytes;
+use http::{Request, Response};
+use http_body::Frame;
+use tonic::{Status, body::Body};
+use tower::{Layer, Service};
+
+use super::{ConnectionInfo, unread::Reader};
+
+/// Largest chunk that is handed to the transport at once, in bytes: what a slow client takes of it shows.
+const CHUNK: usize = 32 << 10;
+
+/// Counts the answers of the services inside.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct UnreadLayer;
+
+impl<S> Layer<S> for UnreadLayer {
+    type Service = UnreadService<S>;
+
+    fn layer(&self, inner: S) -> Self::Service {
+        UnreadService(inner)
+    }
+}
+
+/// A service in its [`UnreadLayer`].
+#[derive(Clone, Debug)]
+pub(crate) struct UnreadService<S>(S);
+
+impl<S, B> Service<Request<B>> for UnreadService<S>
+where
+    S: Service<Request<B>, Response = Response<Body>>,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        self.0.poll_ready(cx)
+    }
+
+    fn call(&mut self, request: Request<B>) -> Self::Future {
+        let connection = request.extensions().get::<ConnectionInfo>();
+        let reader = connection.map(|connection| Arc::clone(&connection.reader));
+        let answer = self.0.call(request);
+        Box::pin(async move {
+            let answer = answer.await?;
+            let Some(reader) = reader else { return Ok(answer) };
+            if let Err(error) = reader.admit() {
+                return Ok(Status::from(error).into_http());
+            }
+            Ok(answer.map(|body| {
+                Body::new(CountedBody {
+                    inner: body,
+                    rest: None,
+                    reader,
+                })
+            }))
+        })
+    }
+}
+
+/// A body whose chunks count until they are dropped.
+struct CountedBody {
+    inner: Body,
+    /// What is left of the last frame of the inner body.
+    rest: Option<Counted>,
+    reader: Arc<Reader>,
+}
+
+impl http_body::Body for CountedBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        if self.rest.is_none() {
+            match Pin::new(&mut self.inner).poll_frame(cx) {
+                Poll::Ready(Some(Ok(frame))) => match frame.into_data() {
+                    Ok(data) => self.rest = Some(Counted::new(data, &self.reader)),
+                    Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
+                },
+                other => return other,
+            }
+        }
+        let chunk = self.rest.as_mut().map(Counted::take_chunk);
+        self.rest.take_if(|rest| rest.bytes.is_empty());
+        Poll::Ready(chunk.map(|chunk| Ok(Frame::data(chunk))))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.rest.is_none() && self.inner.is_end_stream()
+    }
+}
+
+/// Bytes that count until they are dropped.
+struct Counted {
+    bytes: Bytes,
+    reader: Arc<Reader>,
+}
+
+impl Counted {
+    fn new(bytes: Bytes, reader: &Arc<Reader>) -> Self {
+        reader.add(bytes.len());
+        Self {
+            bytes,
+            reader: Arc::clone(reader),
+        }
+    }
+
+    /// Splits off the first chunk, which then counts for itself.
+    fn take_chunk(&mut self) -> Bytes {
+        let chunk = self.bytes.split_to(self.bytes.len().min(CHUNK));
+        Bytes::from_owner(Self {
+            bytes: chunk,
+            reader: Arc::clone(&self.reader),
+        })
+    }
+}
+
+impl AsRef<[u8]> for Counted {
+    fn as_ref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.reader.remove(self.bytes.len());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use http_body_util::{BodyExt as _, Full};
+
+    use super::*;
+    use crate::net::unread::UnreadAnswers;
+
+    #[tokio::test]
+    async fn chunks_count_until_they_are_dropped() {
+        let all = UnreadAnswers::new(usize::MAX);
+        let content: Vec<u8> = (0..3 * CHUNK + 5).map(|byte| byte as u8).collect();
+        let mut body = CountedBody {
+            inner: Body::new(Full::new(Bytes::from(content.clone()))),
+            rest: None,
+            reader: all.connect(),
+        };
+        let mut chunks = Vec::new();
+        while let Some(frame) = body.frame().await {
+            chunks.push(frame.expect("it does not fail").into_data().expect("it is data"));
+            assert_eq!(all.bytes(), content.len());
+        }
+        assert_eq!(chunks.concat(), content);
+        assert_eq!(chunks.len(), 4);
+        let first = chunks.remove(0);
+        drop(chunks);
+        assert_eq!(all.bytes(), CHUNK);
+        drop(first);
+        assert_eq!(all.bytes(), 0);
+    }
+
+    #[tokio::test]
+    async fn a_body_dropped_unread_counts_no_longer() {
+        let all = UnreadAnswers::new(usize::MAX);
+        let mut body = CountedBody {
+            inner: Body::new(Full::new(Bytes::from(vec![0; 2 * CHUNK]))),
+            rest: None,
+            reader: all.connect(),
+        };
+        let first = body.frame().await;
+        drop(body);
+        assert_eq!(all.bytes(), CHUNK);
+        drop(first);
+        assert_eq!(all.bytes(), 0);
+    }
+}

@@ -1,0 +1,242 @@
+//! Bounds answers that wait for clients who do not read them.
+//!
+//! Flow control lets a client receive nothing while the server keeps what it answered. So every chunk of an answer counts
+//! from when the transport asks for it until its last byte was handed to the socket: per connection, whose further calls
+//! are rejected beyond a limit, and over all connections, of which the one with the most is closed beyond a limit. A
+//! connection is also closed if it takes no chunk for a while.
+
+use std::{
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError, Weak,
+        atomic::{AtomicU64, AtomicUsize, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use tokio_util::sync::CancellationToken;
+
+use crate::{
+    error::{Limit, ServiceError},
+    limits::LARGEST_RESPONSE,
+};
+
+/// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size, or all that 64
+/// concurrent searches answer.
+pub(crate) const MOST_PER_CONNECTION: usize = 2 * LARGEST_RESPONSE;
+
+/// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
+const LONGEST_STALL: Duration = Duration::from_secs(20);
+
+/// How often stalled connections are looked for.
+const STALL_CHECK: Duration = Duration::from_secs(1);
+
+/// When a client whose answers wait unread should try again.
+const RETRY_AFTER: Duration = Duration::from_millis(250);
+
+/// The unread answers of all connections.
+#[derive(Debug)]
+pub(crate) struct UnreadAnswers {
+    /// Largest number of bytes on all connections.
+    most: usize,
+    /// Bytes on all connections.
+    total: AtomicUsize,
+    /// The zero of [`Reader::progress`].
+    start: Instant,
+    readers: Mutex<Vec<Weak<Reader>>>,
+}
+
+/// What waits on one connection.
+#[derive(Debug)]
+pub(crate) struct Reader {
+    all: Arc<UnreadAnswers>,
+    unread: AtomicUsize,
+    /// When the client last took a chunk or the first one began to wait, in milliseconds since the start.
+    progress: AtomicU64,
+    /// Cut off to close the connection.
+    cut_off: CancellationToken,
+}
+
+impl UnreadAnswers {
+    /// No connections yet, with a bound in bytes on all of them.
+    pub(crate) fn new(most: usize) -> Arc<Self> {
+        Arc::new(Self {
+            most,
+            total: AtomicUsize::new(0),
+            start: Instant::now(),
+            readers: Mutex::default(),
+        })
+    }
+
+    /// Bytes that wait on all connections.
+    pub(crate) fn bytes(&self) -> usize {
+        self.total.load(Ordering::Relaxed)
+    }
+
+    /// A new connection.
+    pub(crate) fn connect(self: &Arc<Self>) -> Arc<Reader> {
+        let reader = Arc::new(Reader {
+            all: Arc::clone(self),
+            unread: AtomicUsize::new(0),
+            progress: AtomicU64::new(0),
+            cut_off: CancellationToken::new(),
+        });
+        let mut readers = self.readers();
+        if readers.len() == readers.capacity() {
+            readers.retain(|reader| reader.strong_count() > 0);
+        }
+        readers.push(Arc::downgrade(&reader));
+        reader
+    }
+
+    /// Closes connections that stall, until this is dropped.
+    pub(crate) async fn close_stalled(&self) {
+        let mut check = tokio::time::interval(STALL_CHECK);
+        loop {
+            check.tick().await;
+            self.close_stalled_since(LONGEST_STALL);
+        }
+    }
+
+    /// Closes connections that have taken nothing of what waits for so long.
+    fn close_stalled_since(&self, longest: Duration) {
+        let now = self.now();
+        for reader in self.open() {
+            let since = now.saturating_sub(reader.progress.load(Ordering::Relaxed));
+            if reader.unread() > 0 && Duration::from_millis(since) > longest {
+                reader.close("it has taken nothing for too long");
+            }
+        }
+    }
+
+    /// Closes the connections with the most unread bytes until the others are within the bound.
+    fn close_largest(&self) {
+        let mut open = self.open();
+        open.sort_by_key(|reader| reader.unread());
+        let mut sum: usize = open.iter().map(|reader| reader.unread()).sum();
+        while sum > self.most
+            && let Some(largest) = open.pop()
+        {
+            sum -= largest.unread().min(sum);
+            largest.close("it has the most of too many unread bytes");
+        }
+    }
+
+    /// The connections that are not being closed.
+    fn open(&self) -> Vec<Arc<Reader>> {
+        let readers = self.readers();
+        let readers = readers.iter().filter_map(Weak::upgrade);
+        readers.filter(|reader| !reader.cut_off.is_cancelled()).collect()
+    }
+
+    fn now(&self) -> u64 {
+        u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    fn readers(&self) -> MutexGuard<'_, Vec<Weak<Reader>>> {
+        // No code panics while it holds the lock.
+        self.readers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Reader {
+    /// Checks that the connection may get another answer.
+    ///
+    /// # Errors
+    /// [`ServiceError::Overloaded`] if too much waits already.
+    pub(super) fn admit(&self) -> Result<(), ServiceError> {
+        if self.unread() < MOST_PER_CONNECTION {
+            return Ok(());
+        }
+        Err(ServiceError::Overloaded {
+            limit: Limit::UnreadAnswers,
+            maximum: MOST_PER_CONNECTION,
+            retry_after: RETRY_AFTER,
+        })
+    }
+
+    /// Ends when the connection is to be closed at once.
+    pub(super) fn cut_off(&self) -> CancellationToken {
+        self.cut_off.clone()
+    }
+
+    fn unread(&self) -> usize {
+        self.unread.load(Ordering::Relaxed)
+    }
+
+    fn close(&self, reason: &str) {
+        tracing::warn!(
+            unread_bytes = self.unread(),
+            reason,
+            "closing a connection whose client does not read"
+        );
+        self.cut_off.cancel();
+    }
+
+    /// Counts bytes that begin to wait.
+    pub(super) fn add(&self, bytes: usize) {
+        if self.unread.fetch_add(bytes, Ordering::Relaxed) == 0 {
+            self.progress.store(self.all.now(), Ordering::Relaxed);
+        }
+        if self.all.total.fetch_add(bytes, Ordering::Relaxed) + bytes > self.all.most {
+            self.all.close_largest();
+        }
+    }
+
+    /// Counts bytes that the client took, or that went with the connection.
+    pub(super) fn remove(&self, bytes: usize) {
+        self.unread.fetch_sub(bytes, Ordering::Relaxed);
+        self.all.total.fetch_sub(bytes, Ordering::Relaxed);
+        self.progress.store(self.all.now(), Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is_closed(reader: &Reader) -> bool {
+        reader.cut_off.is_cancelled()
+    }
+
+    #[test]
+    fn rejects_calls_of_a_connection_on_which_too_much_waits() {
+        let all = UnreadAnswers::new(usize::MAX);
+        let (one, other) = (all.connect(), all.connect());
+        one.add(MOST_PER_CONNECTION);
+        assert!(one.admit().is_err() && other.admit().is_ok());
+        one.remove(1);
+        assert!(one.admit().is_ok());
+        assert!(!is_closed(&one));
+    }
+
+    #[test]
+    fn closes_the_connection_with_the_most_beyond_the_bound() {
+        let all = UnreadAnswers::new(100);
+        let readers: Vec<_> = (0..3).map(|_| all.connect()).collect();
+        for (reader, bytes) in readers.iter().zip([30, 50, 20]) {
+            reader.add(bytes);
+        }
+        assert!(readers.iter().all(|reader| !is_closed(reader)));
+        readers[2].add(1);
+        let closed: Vec<bool> = readers.iter().map(|reader| is_closed(reader)).collect();
+        assert_eq!(closed, [false, true, false]);
+        // What waits on connections that are being closed closes no others.
+        readers[0].add(10);
+        assert!(!is_closed(&readers[0]));
+        assert_eq!(all.bytes(), 111);
+        readers[1].remove(50);
+        assert_eq!(all.bytes(), 61);
+    }
+
+    #[test]
+    fn closes_only_connections_that_take_nothing() {
+        let all = UnreadAnswers::new(usize::MAX);
+        let (stalled, slow, idle) = (all.connect(), all.connect(), all.connect());
+        stalled.add(10);
+        slow.add(10);
+        std::thread::sleep(Duration::from_millis(60));
+        slow.remove(1);
+        all.close_stalled_since(Duration::from_millis(40));
+        assert!(is_closed(&stalled) && !is_closed(&slow) && !is_closed(&idle));
+    }
+}

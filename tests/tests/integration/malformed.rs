@@ -1,0 +1,78 @@
+//! Bytes that are no message of the contract.
+
+use bytes::Bytes;
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+use http::{HeaderMap, Request};
+use tokio::net::TcpStream;
+use tonic::{Code, Status};
+
+use crate::fixtures::{bounded, reason};
+
+/// Sends bytes as the body of a unary call; returns the status.
+async fn status_of(server: &TestServer, method: &str, body: Vec<u8>) -> Status {
+    let stream = TcpStream::connect(server.address()).await.unwrap();
+    let (sender, connection) = h2::client::handshake(stream).await.unwrap();
+    let connection = tokio::spawn(connection);
+    let request = Request::post(format!("{}/grasp.v1.{method}", server.endpoint()))
+        .header("content-type", "application/grpc")
+        .header("te", "trailers")
+        .body(())
+        .unwrap();
+    let mut sender = sender.ready().await.unwrap();
+    let (answer, mut stream) = sender.send_request(request, false).unwrap();
+    stream.send_data(Bytes::from(body), true).unwrap();
+    let answer = answer.await.unwrap();
+    let mut headers: HeaderMap = answer.headers().clone();
+    let mut body = answer.into_body();
+    while let Some(data) = body.data().await {
+        data.unwrap();
+    }
+    headers.extend(body.trailers().await.unwrap().unwrap_or_default());
+    connection.abort();
+    Status::from_header_map(&headers).expect("every answer has a status")
+}
+
+/// A message as gRPC frames it.
+fn framed(message: &[u8]) -> Vec<u8> {
+    let length = u32::try_from(message.len()).unwrap().to_be_bytes();
+    [&[0], &length[..], message].concat()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bytes_that_are_no_message_are_invalid_arguments() {
+    let server = TestServer::start().await;
+    let wrong = [
+        ("an unknown wire type", framed(&[0x0f])),
+        ("a length beyond the end", framed(&[0x0a, 0x7f, b'x'])),
+        ("text that is not UTF-8", framed(&[0x0a, 0x02, 0xff, 0xfe])),
+        ("a varint without an end", framed(&[0xff; 12])),
+        ("a frame cut short", framed(b"name")[..7].to_vec()),
+        ("no frame", Vec::new()),
+        (
+            "compression that was not announced",
+            [&[1, 0, 0, 0, 1], &b"x"[..]].concat(),
+        ),
+        ("an invalid flag", [&[9, 0, 0, 0, 1], &b"x"[..]].concat()),
+    ];
+    for method in [
+        "ObjectService/GetObject",
+        "ObjectService/CreateObject",
+        "GraspService/FindGrasp",
+    ] {
+        for (what, body) in &wrong {
+            let status = bounded(what, status_of(&server, method, body.clone())).await;
+            let found = (status.code(), reason(&status));
+            let expected = (Code::InvalidArgument, "MALFORMED_MESSAGE".to_owned());
+            assert_eq!(found, expected, "{what} to {method}: {status:?}");
+        }
+    }
+    // The server is as before, and right bytes are understood.
+    let name = b"\x0a\x0eobjects/remote";
+    let status = status_of(&server, "ObjectService/GetObject", framed(name)).await;
+    assert_eq!(status.code(), Code::Ok);
+    let mut objects = server.objects().await;
+    let listed = objects.list_objects(v1::ListObjectsRequest::default());
+    listed.await.unwrap();
+    server.stop().await;
+}

@@ -1,0 +1,118 @@
+//! Clients that do not read their answers.
+
+use bytes::Bytes;
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+use h2::client::ResponseFuture;
+use http::Request;
+use prost::Message as _;
+use tokio::{net::TcpStream, task::JoinHandle};
+use tonic_reflection::pb::v1::{ServerReflectionRequest, server_reflection_request::MessageRequest};
+
+use crate::fixtures::{bounded, until};
+
+/// Calls per connection: as many as the server lets run at a time.
+const CALLS: usize = 64;
+
+/// The smallest allowed bound on unread answers, in bytes.
+const LEAST: usize = 4 << 20;
+
+/// A client with open calls whose answers it never lets the server send.
+struct Unreading {
+    _calls: Vec<ResponseFuture>,
+    connection: JoinHandle<Result<(), h2::Error>>,
+}
+
+impl Unreading {
+    /// Asks for a description of the contract, one of the largest answers of a server without many objects.
+    async fn start(server: &TestServer) -> Self {
+        let stream = TcpStream::connect(server.address()).await.unwrap();
+        let (mut sender, connection) = h2::client::Builder::new()
+            .initial_window_size(0)
+            .handshake::<_, Bytes>(stream)
+            .await
+            .unwrap();
+        let connection = tokio::spawn(connection);
+        let mut calls = Vec::new();
+        for _ in 0..CALLS {
+            let Ok(ready) = sender.clone().ready().await else {
+                break;
+            };
+            sender = ready;
+            let uri = format!(
+                "{}/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
+                server.endpoint()
+            );
+            let request = Request::post(uri)
+                .header("content-type", "application/grpc")
+                .header("te", "trailers")
+                .body(())
+                .unwrap();
+            let Ok((answer, mut body)) = sender.send_request(request, false) else {
+                break;
+            };
+            // The connection may have been closed meanwhile.
+            let _ = body.send_data(frame(), true);
+            calls.push(answer);
+        }
+        Self {
+            _calls: calls,
+            connection,
+        }
+    }
+}
+
+/// The request as gRPC frames it.
+fn frame() -> Bytes {
+    let request = ServerReflectionRequest {
+        host: String::new(),
+        message_request: Some(MessageRequest::FileContainingSymbol(
+            "grasp.v1.GraspService".to_owned(),
+        )),
+    };
+    let message = request.encode_to_vec();
+    let length = u32::try_from(message.len()).unwrap().to_be_bytes();
+    Bytes::from([&[0], &length[..], &message].concat())
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
+    let server =
+        TestServer::start_with(|config| config.maximum_unread_bytes = LEAST.try_into().unwrap()).await;
+    let first = Unreading::start(&server).await;
+    until("the first answers to wait", || server.gauges().unread_bytes() > 0).await;
+    let each = server.gauges().unread_bytes();
+    let mut others = Vec::new();
+    while !first.connection.is_finished()
+        && !others
+            .iter()
+            .any(|other: &Unreading| other.connection.is_finished())
+    {
+        assert!(
+            others.len() < 2 * LEAST * CALLS / each,
+            "no connection was closed"
+        );
+        others.push(bounded("a connection", Unreading::start(&server)).await);
+        let unread = server.gauges().unread_bytes();
+        // What waits on connections that are being closed is freed a moment later.
+        assert!(unread <= 2 * LEAST, "{unread} bytes wait");
+    }
+    until("what was beyond the bound to be freed", || {
+        server.gauges().unread_bytes() <= LEAST
+    })
+    .await;
+    // Others are served.
+    let mut objects = server.objects().await;
+    let listed = objects.list_objects(v1::ListObjectsRequest::default());
+    assert!(
+        !bounded("a list", listed)
+            .await
+            .unwrap()
+            .into_inner()
+            .objects
+            .is_empty()
+    );
+    drop((first, others));
+    until("all to be freed", || server.gauges().unread_bytes() == 0).await;
+    server.stop().await;
+}
