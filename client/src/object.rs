@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{json, pose::Pose};
@@ -37,6 +37,9 @@ pub struct Object {
     /// The object's atlas; none if the server keeps no atlases.
     #[serde(default)]
     pub atlas: Option<AtlasState>,
+    /// Where the origin of the object's frame is in the mesh file, in the file's units and axes; none: at the file's origin.
+    #[serde(default)]
+    pub origin_in_file: Option<DVec3>,
 }
 
 /// State of an object's atlas: the grasps found for it in advance.
@@ -87,7 +90,8 @@ pub struct NewObject {
     pub unit_metres: Option<f32>,
     /// Mass in kilograms; more than 0.
     pub mass_kg: f32,
-    /// Centre of mass in the object's frame, in metres after scaling; none: that of the mesh's volume.
+    /// Centre of mass in the object's frame, in metres after scaling (see [`Object::origin_in_file`]); none: that of the
+    /// mesh's volume.
     pub centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction; more than 0, at most 5; none: the server's default.
     pub friction: Option<f32>,

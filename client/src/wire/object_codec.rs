@@ -1,5 +1,6 @@
 //! Objects and health.
 
+use glam::DVec3;
 use grasp_proto::v1;
 use tonic_health::pb::{HealthCheckResponse, health_check_response::ServingStatus};
 
@@ -53,6 +54,9 @@ fn object_fields_from_wire(object: v1::Object) -> Result<Object, Malformed> {
             .map(atlas_from_wire)
             .transpose()
             .map_err(|malformed| malformed.within("atlas"))?,
+        origin_in_file: object
+            .origin_in_file
+            .map(|origin| DVec3::new(origin.x, origin.y, origin.z)),
     })
 }
 
@@ -108,6 +112,11 @@ mod tests {
                 z: 0.09,
             }),
             warnings: vec!["12 open edges".to_owned()],
+            origin_in_file: Some(v1::DoubleVector3 {
+                x: 4e6,
+                y: 0.0,
+                z: -0.5,
+            }),
             ..v1::Object::default()
         }
     }
@@ -120,6 +129,7 @@ mod tests {
         assert_eq!(object.box_half_extents, Vec3::new(0.02, 0.01, 0.09));
         assert_eq!(object.warnings, ["12 open edges"]);
         assert_eq!(object.atlas, None);
+        assert_eq!(object.origin_in_file, Some(DVec3::new(4e6, 0.0, -0.5)));
     }
 
     #[test]

@@ -1,120 +1,160 @@
-//! Splits the polygons of a mesh from a file, welds it and checks it.
+//! Splits the polygons of a mesh from a file, welds it, checks it and repairs what is certain.
 
-use std::collections::HashSet;
-
-use glam::Vec3;
+use glam::DVec3;
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 
 use crate::{
     Import, ImportedMesh,
+    doubles::Doubles,
     edges::Edges,
     error::ImportError,
     faces::triangles,
+    polygon_twins::split_alike,
     raw::{Occurrences, Place, RawMesh},
-    weld::{has_area, has_repeated_corner, smallest_first, weld},
+    weld::{has_area, has_repeated_corner, weld},
+    winding::{Turned, repair},
 };
 
-/// Splits polygons, welds, drops degenerate and repeated triangles, and checks how the rest join.
-pub(crate) fn clean(raw: &RawMesh, import: Import) -> Result<ImportedMesh, Vec<ImportError>> {
-    let split = triangles(raw)?;
-    let (positions, welded) = weld(&raw.coordinates, import);
-    let corners = split
-        .corners
-        .iter()
-        .map(|triangle| triangle.map(|vertex| welded[vertex as usize]));
+/// Splits polygons, welds, drops degenerate and repeated triangles, turns those that face the wrong way, and checks how they
+/// join.
+pub(crate) fn clean(
+    raw: &RawMesh,
+    import: Import,
+    origin_in_file: DVec3,
+) -> Result<ImportedMesh, Vec<ImportError>> {
+    let mut split = triangles(raw)?;
+    let (positions, welded) = weld(raw.positions(), import);
+    for corner in split.corners.as_flattened_mut() {
+        *corner = welded[*corner as usize];
+    }
+    split_alike(raw, &welded, &mut split.corners);
     let origins = raw
         .faces
         .iter()
-        .enumerate()
-        .flat_map(|(face, read)| std::iter::repeat_n(face, read.corners - 2));
+        .zip(0..)
+        .flat_map(|(read, face)| std::iter::repeat_n(face, read.corners - 2));
 
-    let mut dropped = Dropped::default();
-    let mut seen = HashSet::new();
-    let mut triangles = Vec::new();
-    let mut faces = Vec::new();
-    let mut indices_in_file = Vec::new();
     // Slivers with three distinct vertices have no area but still close the gap between their neighbours.
-    let mut joined = Vec::new();
-    for (index, (triangle, face)) in corners.zip(origins).enumerate() {
-        let place = raw.faces[face].place;
+    let mut joined = Vec::with_capacity(split.corners.len());
+    let mut faces: Vec<u32> = Vec::with_capacity(split.corners.len());
+    let mut indices_in_file: Vec<u32> = Vec::with_capacity(split.corners.len());
+    let mut without_area = Occurrences::default();
+    for ((&triangle, face), index) in split.corners.iter().zip(origins).zip(0..) {
         if has_repeated_corner(triangle) {
-            dropped.without_area.note(place);
-        } else if !seen.insert(smallest_first(triangle)) {
-            dropped.repeated.note(place);
+            without_area.note(raw.faces[face as usize].place);
         } else {
             joined.push(triangle);
-            if has_area(&positions, triangle) {
-                triangles.push(triangle);
-                faces.push(face);
-                indices_in_file.push(index as u32);
-            } else {
-                dropped.without_area.note(place);
-            }
+            faces.push(face);
+            indices_in_file.push(index);
         }
     }
-    if triangles.is_empty() {
+    let place_of = |triangle: usize| Place(raw.places, raw.faces[faces[triangle] as usize].place);
+    let mut doubles = Doubles::of(&joined);
+    let turned = repair(&positions, &mut joined, &mut doubles.uses);
+    let edges = Edges::of(&doubles.uses, positions.len());
+    let mut is_kept = vec![false; joined.len()];
+    for triangle in (0..joined.len()).filter(|&triangle| !doubles.is_dropped[triangle]) {
+        is_kept[triangle] = has_area(&positions, joined[triangle]);
+        if !is_kept[triangle] {
+            without_area.note_least(place_of(triangle).1);
+        }
+    }
+    if !is_kept.contains(&true) {
         return Err(vec![ImportError::Empty {
-            dropped: raw.without_area.count + dropped.without_area.count,
+            dropped: raw.without_area.count + without_area.count,
             unknown: raw.unknown.count,
         }]);
     }
 
     let mut warnings = raw.warnings.clone();
-    warnings.extend(dropped.warnings(raw, split.overlapping));
+    warnings.extend(of_faces(raw, without_area, split.overlapping));
+    warnings.extend(of_triangles(&doubles, &turned, place_of));
     if raw.unused_vertices > 0 {
         let unused = raw.unused_vertices;
         warnings.push(format!("{unused} vertices are not used by any face"));
     }
-    let edges = Edges::of(&joined, positions.len());
-    warnings.extend(edges.warnings());
-    let mut mesh = usable(positions, triangles)?;
-    if edges.is_closed() && mesh.signed_volume() < 0.0 {
-        let turned = mesh.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
-        mesh = usable(mesh.positions().to_vec(), turned)?;
-        warnings.push("the mesh was inside out; all triangles were turned".to_owned());
-    }
+    warnings.extend(edges.warnings(place_of));
+    let names = faces.iter().map(|&face| raw.faces[face as usize].names);
+    let groups = raw.names.groups(chosen(names, &is_kept));
+    let triangles = chosen(joined.iter().copied(), &is_kept).collect();
+    let mesh = TriangleMesh::new(positions, triangles).map_err(|error| vec![ImportError::Unusable(error)])?;
     Ok(ImportedMesh {
         mesh,
+        origin_in_file,
         triangles_in_file: raw.triangle_count(),
-        groups: raw.names.groups(faces.iter().map(|&face| raw.faces[face].names)),
-        indices_in_file,
+        groups,
+        indices_in_file: chosen(indices_in_file.iter().copied(), &is_kept).collect(),
         warnings,
     })
 }
 
-fn usable(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<TriangleMesh, Vec<ImportError>> {
-    TriangleMesh::new(positions, triangles).map_err(|error| vec![ImportError::Unusable(error)])
+fn chosen<T>(items: impl Iterator<Item = T>, is_chosen: &[bool]) -> impl Iterator<Item = T> {
+    let paired = items.zip(is_chosen);
+    paired.filter(|(_, is_chosen)| **is_chosen).map(|(item, _)| item)
 }
 
-/// Triangles that were dropped.
-#[derive(Debug, Default)]
-struct Dropped {
+/// Warnings of what is wrong with faces as the file has them.
+fn of_faces(
+    raw: &RawMesh,
     without_area: Occurrences,
-    repeated: Occurrences,
+    overlapping: Occurrences,
+) -> impl Iterator<Item = String> {
+    [
+        (
+            raw.unknown,
+            "lines start with an unknown keyword and were ignored",
+        ),
+        (
+            raw.without_area,
+            "points, lines and faces with fewer than three corners were dropped",
+        ),
+        (without_area, "triangles without area were dropped"),
+        (
+            overlapping,
+            "polygons intersect themselves; their fans of triangles overlap",
+        ),
+    ]
+    .into_iter()
+    .filter(|(oddity, _)| oddity.count > 0)
+    .map(|(Occurrences { count, first }, what)| {
+        format!("{count} {what}; the first is {}", Place(raw.places, first))
+    })
 }
 
-impl Dropped {
-    fn warnings(&self, raw: &RawMesh, overlapping: Occurrences) -> impl Iterator<Item = String> {
-        [
-            (
-                raw.unknown,
-                "lines start with an unknown keyword and were ignored",
-            ),
-            (
-                raw.without_area,
-                "points, lines and faces with fewer than three corners were dropped",
-            ),
-            (self.without_area, "triangles without area were dropped"),
-            (self.repeated, "triangles that repeat an earlier one were dropped"),
-            (
-                overlapping,
-                "polygons intersect themselves; their fans of triangles overlap",
-            ),
-        ]
-        .into_iter()
-        .filter(|(oddity, _)| oddity.count > 0)
-        .map(|(Occurrences { count, first }, what)| {
-            format!("{count} {what}; the first is {}", Place(raw.places, first))
-        })
-    }
+/// Warnings of triangles that were dropped or turned.
+fn of_triangles(
+    doubles: &Doubles,
+    turned: &Turned,
+    place_of: impl Fn(usize) -> Place,
+) -> impl Iterator<Item = String> {
+    let kept = doubles.is_dropped.iter().filter(|is_dropped| !*is_dropped);
+    let is_whole = turned.inside_out.count == kept.count();
+    let some_inside_out = if is_whole {
+        Occurrences::default()
+    } else {
+        turned.inside_out
+    };
+    [
+        (doubles.repeated, "triangles that repeat an earlier one were dropped"),
+        (
+            doubles.two_sided,
+            "triangles that repeat an earlier one with the opposite winding were dropped: of faces with two sides, one was kept",
+        ),
+        (
+            doubles.undecided,
+            "triangles that repeat an earlier one with the opposite winding were kept: the rest of the surface is closed without \
+             either",
+        ),
+        (
+            turned.disagreeing,
+            "triangles faced the opposite way of the rest of their part and were turned",
+        ),
+        (some_inside_out, "triangles of parts that were inside out were turned"),
+    ]
+    .into_iter()
+    .filter(|(oddity, _)| oddity.count > 0)
+    .map(move |(Occurrences { count, first }, what)| {
+        format!("{count} {what}; the first is {}", place_of(first))
+    })
+    .chain(is_whole.then(|| "the mesh was inside out; all triangles were turned".to_owned()))
 }

@@ -1,78 +1,102 @@
 //! How triangles join at their edges, and what is wrong with it.
 
-/// Counts of edges by how the triangles at them join.
-#[derive(Debug)]
+use crate::raw::{Occurrences, Place};
+
+/// One triangle's use of an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct EdgeUse {
+    /// The vertices, the lower index first.
+    pub(crate) ends: [u32; 2],
+    pub(crate) triangle: u32,
+    /// Whether the triangle passes from the lower index to the higher.
+    pub(crate) is_forward: bool,
+}
+
+impl EdgeUse {
+    /// 1 from the lower index to the higher, -1 the other way.
+    pub(crate) fn direction(self) -> i32 {
+        if self.is_forward { 1 } else { -1 }
+    }
+}
+
+/// The edges of some triangles, in the order of their ends.
+pub(crate) fn edge_uses(triangles: impl Iterator<Item = (u32, [u32; 3])>) -> Vec<EdgeUse> {
+    let mut uses: Vec<EdgeUse> = triangles
+        .flat_map(|(triangle, [a, b, c])| [(a, b), (b, c), (c, a)].map(|(from, to)| (triangle, from, to)))
+        .map(|(triangle, from, to)| EdgeUse {
+            ends: [from.min(to), from.max(to)],
+            triangle,
+            is_forward: from < to,
+        })
+        .collect();
+    uses.sort_unstable();
+    uses
+}
+
+/// The uses of each edge.
+pub(crate) fn by_edge(uses: &[EdgeUse]) -> impl Iterator<Item = &[EdgeUse]> {
+    uses.chunk_by(|a, b| a.ends == b.ends)
+}
+
+/// Edges by how the triangles at them join; the first of a kind is that of the first triangle.
+#[derive(Debug, Default)]
 pub(crate) struct Edges {
     /// Edges of a single triangle.
-    open: usize,
+    open: Occurrences,
     /// Edges of two triangles with opposite windings.
-    inconsistent: usize,
+    inconsistent: Occurrences,
     /// Edges of more than two triangles.
-    crowded: usize,
-    /// Edges that are not traversed equally often in both directions.
-    unbalanced: usize,
+    crowded: Occurrences,
     /// Connected sets of triangles; two sets share no vertex.
     components: usize,
 }
 
 impl Edges {
     /// Counts the edges of triangles over `vertices` vertices.
-    pub(crate) fn of(triangles: &[[u32; 3]], vertices: usize) -> Self {
-        let mut directed: Vec<([u32; 2], i32)> = triangles
-            .iter()
-            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-            .map(|(from, to)| ([from.min(to), from.max(to)], if from < to { 1 } else { -1 }))
-            .collect();
-        directed.sort_unstable();
+    pub(crate) fn of(uses: &[EdgeUse], vertices: usize) -> Self {
         let mut edges = Self {
-            open: 0,
-            inconsistent: 0,
-            crowded: 0,
-            unbalanced: 0,
-            components: components(triangles, vertices),
+            components: components(uses, vertices),
+            ..Self::default()
         };
-        for passes in directed.chunk_by(|(first, _), (second, _)| first == second) {
-            let balance: i32 = passes.iter().map(|(_, direction)| direction).sum();
-            match passes.len() {
-                1 => edges.open += 1,
-                2 if balance != 0 => edges.inconsistent += 1,
-                2 => {}
-                _ => edges.crowded += 1,
+        for users in by_edge(uses) {
+            let first = users[0].triangle as usize;
+            match users {
+                [_] => edges.open.note_least(first),
+                [a, b] if a.is_forward == b.is_forward => edges.inconsistent.note_least(first),
+                [_, _] => {}
+                _ => edges.crowded.note_least(first),
             }
-            edges.unbalanced += usize::from(balance != 0);
         }
         edges
     }
 
-    /// Whether the surface encloses a volume.
-    pub(crate) fn is_closed(&self) -> bool {
-        self.unbalanced == 0
-    }
-
-    /// One line per kind of defect.
-    pub(crate) fn warnings(&self) -> impl Iterator<Item = String> {
-        [
+    /// One line per kind of defect; `place_of` gives the place of a triangle.
+    pub(crate) fn warnings(&self, place_of: impl Fn(usize) -> Place) -> impl Iterator<Item = String> {
+        let edges = [
             (
                 self.open,
-                0,
                 "edges are open: the surface has holes and its volume is an estimate",
             ),
             (
                 self.inconsistent,
-                0,
                 "edges join triangles that face opposite ways: the winding is inconsistent",
             ),
-            (self.crowded, 0, "edges join more than two triangles"),
-            (self.components, 1, "parts are disconnected: they share no vertex"),
+            (self.crowded, "edges join more than two triangles"),
         ]
         .into_iter()
-        .filter(|(count, usual, _)| count > usual)
-        .map(|(count, _, what)| format!("{count} {what}"))
+        .filter(|(edges, _)| edges.count > 0)
+        .map(move |(Occurrences { count, first }, what)| {
+            format!("{count} {what}; the first is at {}", place_of(first).face())
+        });
+        let components = self.components;
+        let parts =
+            (components > 1).then(|| format!("{components} parts are disconnected: they share no vertex"));
+        edges.chain(parts)
     }
 }
 
 /// Number of connected sets of triangles, by union-find with path halving.
-fn components(triangles: &[[u32; 3]], vertices: usize) -> usize {
+fn components(uses: &[EdgeUse], vertices: usize) -> usize {
     fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
         while parents[vertex as usize] != vertex {
             let above = parents[parents[vertex as usize] as usize];
@@ -82,18 +106,13 @@ fn components(triangles: &[[u32; 3]], vertices: usize) -> usize {
         vertex
     }
     let mut parents: Vec<u32> = (0..vertices as u32).collect();
-    for &[a, b, c] in triangles {
-        let first = root(&mut parents, a);
-        for other in [b, c] {
-            let other = root(&mut parents, other);
-            parents[other as usize] = first;
-        }
+    let mut is_used = vec![false; vertices];
+    for edge in uses {
+        let [a, b] = edge.ends.map(|end| root(&mut parents, end));
+        parents[b as usize] = a;
+        is_used[edge.ends[0] as usize] = true;
+        is_used[edge.ends[1] as usize] = true;
     }
-    let mut roots: Vec<u32> = triangles
-        .iter()
-        .map(|triangle| root(&mut parents, triangle[0]))
-        .collect();
-    roots.sort_unstable();
-    roots.dedup();
-    roots.len()
+    let is_root = |&vertex: &usize| is_used[vertex] && parents[vertex] == vertex as u32;
+    (0..vertices).filter(is_root).count()
 }

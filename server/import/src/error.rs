@@ -73,7 +73,7 @@ pub enum ImportError {
         /// The line, counted from 1.
         line: usize,
         /// The largest coordinate.
-        metres: f32,
+        metres: f64,
     },
     /// A corner of a face is not a vertex reference.
     #[error(

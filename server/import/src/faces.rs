@@ -1,6 +1,6 @@
 //! Splits the faces of a mesh into triangles.
 
-use glam::Vec3;
+use glam::DVec3;
 
 use crate::{
     error::{ImportError, Violations},
@@ -36,7 +36,7 @@ pub(crate) fn triangles(raw: &RawMesh) -> Result<Triangles, Vec<ImportError>> {
         positions.clear();
         positions.extend(corners.iter().map(|&vertex| {
             let start = 3 * vertex as usize;
-            Vec3::from_slice(&raw.coordinates[start..start + 3]).as_dvec3()
+            DVec3::from_slice(&raw.coordinates[start..start + 3])
         }));
         places.clear();
         match split(&positions, &mut places) {

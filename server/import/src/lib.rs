@@ -8,6 +8,7 @@
 //! What a reader returns is split into triangles, welded and checked in the same way: see [`read_mesh`].
 
 mod clean;
+mod doubles;
 mod ears;
 mod edges;
 mod error;
@@ -16,14 +17,18 @@ mod foreign;
 mod format;
 mod gltf;
 mod limits;
+mod nesting;
 mod obj;
+mod placement;
 mod ply;
 mod polygon;
+mod polygon_twins;
 mod raw;
 mod stl;
 mod weld;
+mod winding;
 
-use glam::Vec3;
+use glam::DVec3;
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 
 pub use error::ImportError;
@@ -64,12 +69,12 @@ impl Import {
         }
     }
 
-    /// A position of the file in the object's frame, in metres.
-    fn metres_from_file(self, position: Vec3) -> Vec3 {
-        let Vec3 { x, y, z } = position * self.unit_metres;
+    /// A position or an offset of the file in the object's axes, in metres.
+    fn metres_from_file(self, position: DVec3) -> DVec3 {
+        let DVec3 { x, y, z } = position * f64::from(self.unit_metres);
         match self.up_axis {
-            UpAxis::Y => Vec3::new(x, y, z),
-            UpAxis::Z => Vec3::new(x, z, -y),
+            UpAxis::Y => DVec3::new(x, y, z),
+            UpAxis::Z => DVec3::new(x, z, -y),
         }
     }
 }
@@ -80,6 +85,9 @@ pub struct ImportedMesh {
     /// Vertices (welded, in order of first use) and triangles (in the file's order, n - 2 for a polygon of n corners; the
     /// fan from its first corner if that one sees all others), in metres with +Y up.
     pub mesh: TriangleMesh,
+    /// The origin of the mesh in the file, in the file's units and axes: zero, unless the mesh was too far from the file's origin
+    /// and its own is the centre of its box.
+    pub origin_in_file: DVec3,
     /// For each triangle, its index in the file, counted from 0 after polygons are split and before triangles are
     /// dropped; ascending.
     pub indices_in_file: Vec<u32>,
@@ -95,7 +103,8 @@ pub struct ImportedMesh {
 /// Reads a mesh.
 ///
 /// Polygons are split into triangles that cover them once; only one that intersects itself becomes a fan that overlaps, with
-/// a warning. Vertices at equal positions are welded. A closed mesh that is inside out is turned, with a warning.
+/// a warning. Coordinates are in double precision until unit, axes and origin are applied: a mesh whose box is centred more than
+/// 10 m from the file's origin is moved there, with a warning. Vertices at equal positions are welded. A closed mesh that is inside out is turned, with a warning.
 ///
 /// # Errors
 /// Every violation; see [`ImportError`]. Beyond 16 they are only counted.
@@ -111,15 +120,16 @@ pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<Imp
         }]);
     }
     let format = Format::of(bytes);
-    let raw = match format {
+    let mut raw = match format {
         Format::Obj => obj::read(bytes, unit, limits)?,
         Format::StlText => stl::read_text(bytes, limits)?,
         Format::StlBinary => stl::read_binary(bytes, limits)?,
         Format::Ply => ply::read(bytes, limits.unwelded())?,
         Format::Gltf => gltf::read(bytes, limits.unwelded())?,
     };
-    raw.check_coordinates(unit)?;
-    let read = clean::clean(&raw, import).map_err(|errors| format.named(errors))?;
+    raw.check_coordinates(f64::from(unit))?;
+    let origin_in_file = placement::recentre(&mut raw, import);
+    let read = clean::clean(&raw, import, origin_in_file).map_err(|errors| format.named(errors))?;
     check_counts(read.mesh.positions().len() as u64, 0, limits).map_err(|error| vec![error])?;
     Ok(read)
 }

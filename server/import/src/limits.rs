@@ -1,8 +1,8 @@
 //! Bounds on what a reader accepts.
 
-/// Largest distance of a vertex from the origin along an axis, in metres. Anything a hand can hold is far smaller; a
-/// larger value means a wrong unit, and products of such coordinates lose their precision.
-pub const MAX_COORDINATE_METRES: f32 = 1000.0;
+/// Largest distance of a vertex from the file's origin along an axis, in metres. Farther out, even double precision has steps of
+/// more than a tenth of a micrometre.
+pub const MAX_COORDINATE_METRES: f64 = 1e9;
 
 /// The largest file that a reader accepts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -54,7 +54,7 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<Impo
                     .read_payload_for_element(&mut reader, element, &header)
                     .map_err(failed)?
                 {
-                    raw.add_vertex(position.map(|coordinate| coordinate as f32));
+                    raw.add_vertex(position);
                 }
             }
             "face" => {

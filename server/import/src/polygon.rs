@@ -29,7 +29,7 @@ pub(crate) enum Split {
 
 /// Splits a polygon of at least three corners; appends triples of corners, wound as the polygon.
 ///
-/// The positions must be those of a file: exact to the precision of `f32`. A polygon that is not flat is split as its
+/// The positions are taken to be exact to single precision, at least as seen from the mesh's origin. A polygon that is not flat is split as its
 /// projection on the plane of its mean normal.
 pub(crate) fn split(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) -> Split {
     let mut fan = || triangles.extend((2..corners.len()).map(|k| [0, k - 1, k]));

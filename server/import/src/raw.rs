@@ -10,6 +10,7 @@ use crate::{
     error::{ImportError, Violations},
     limits::{MAX_COORDINATE_METRES, MeshLimits},
 };
+use glam::DVec3;
 
 /// Checks numbers of vertices and triangles that a file claims.
 ///
@@ -31,7 +32,7 @@ pub(crate) fn check_counts(vertices: u64, triangles: u64, limits: MeshLimits) ->
 #[derive(Debug, Default)]
 pub(crate) struct RawMesh {
     /// x, y and z of each vertex, in the file's units and axes.
-    pub(crate) coordinates: Vec<f32>,
+    pub(crate) coordinates: Vec<f64>,
     /// The corners of all faces, as indices of vertices.
     pub(crate) corners: Vec<u32>,
     /// The faces, in the file's order.
@@ -67,16 +68,18 @@ impl RawMesh {
         self.faces.iter().map(|face| face.corners - 2).sum()
     }
 
+    /// The vertices.
+    pub(crate) fn positions(&self) -> impl Iterator<Item = DVec3> {
+        let positions = self.coordinates.as_chunks::<3>().0;
+        positions.iter().copied().map(DVec3::from_array)
+    }
+
     /// Checks that every vertex is finite and near enough to the origin.
-    pub(crate) fn check_coordinates(&self, unit_metres: f32) -> Result<(), Vec<ImportError>> {
+    pub(crate) fn check_coordinates(&self, unit_metres: f64) -> Result<(), Vec<ImportError>> {
         let mut violations = Violations::default();
-        for (vertex, position) in self.coordinates.as_chunks::<3>().0.iter().enumerate() {
-            let largest = position.iter().fold(0.0_f32, |largest, coordinate| {
-                let metres = (coordinate * unit_metres).abs();
-                // A maximum ignores what is not a number.
-                largest.max(if metres.is_finite() { metres } else { f32::INFINITY })
-            });
-            if !largest.is_finite() {
+        for (vertex, position) in self.positions().enumerate() {
+            let largest = position.abs().max_element() * unit_metres;
+            if !position.is_finite() {
                 violations.push(ImportError::at(format!("vertex {vertex}"), "is not finite"));
             } else if largest > MAX_COORDINATE_METRES {
                 violations.push(ImportError::at(
@@ -92,7 +95,7 @@ impl RawMesh {
     }
 
     /// Adds a vertex.
-    pub(crate) fn add_vertex(&mut self, position: [f32; 3]) {
+    pub(crate) fn add_vertex(&mut self, position: [f64; 3]) {
         self.coordinates.extend(position);
     }
 
@@ -123,6 +126,16 @@ pub(crate) enum Places {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place(pub(crate) Places, pub(crate) usize);
 
+impl Place {
+    /// The face that is there.
+    pub(crate) fn face(self) -> String {
+        match self.0 {
+            Places::Lines => format!("the face {self}"),
+            Places::Faces | Places::Triangles => self.to_string(),
+        }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(places, number) = self;
@@ -146,6 +159,16 @@ impl Occurrences {
         if self.count == 0 {
             self.first = place;
         }
+        self.count += 1;
+    }
+
+    /// Notes a place that may be before those noted already.
+    pub(crate) fn note_least(&mut self, place: usize) {
+        self.first = if self.count == 0 {
+            place
+        } else {
+            self.first.min(place)
+        };
         self.count += 1;
     }
 }

@@ -87,6 +87,10 @@ pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec
     read_into(&mut raw, Cursor::new(plain.text), |facet| {
         facets.get(facet).copied().unwrap_or((plain.lines, 0))
     })?;
+    // The parser has accepted every line, but reads in single precision.
+    for (coordinate, exact) in raw.coordinates.iter_mut().zip(plain.coordinates) {
+        *coordinate = exact;
+    }
     Ok(raw)
 }
 
@@ -107,7 +111,7 @@ fn read_into(
         let Triangle { vertices, .. } = triangle.map_err(|error| failed(place, &error))?;
         let first = (raw.coordinates.len() / 3) as u32;
         for vertex in vertices {
-            raw.add_vertex(vertex.0);
+            raw.add_vertex(vertex.0.map(f64::from));
         }
         raw.add_triangle([first, first + 1, first + 2], place, names);
     }
@@ -118,6 +122,8 @@ fn read_into(
 #[derive(Debug, Default)]
 struct PlainText {
     text: Vec<u8>,
+    /// x, y and z of the facets' vertices; not a number where the text is none.
+    coordinates: Vec<f64>,
     /// The line of each facet, and its set of names.
     facets: Vec<(usize, usize)>,
     /// Number of lines.
@@ -136,7 +142,10 @@ impl PlainText {
             plain.lines = number;
             let line = line.trim_ascii();
             let lower = line.to_ascii_lowercase();
-            let keyword = lower.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+            let mut words = lower
+                .split(u8::is_ascii_whitespace)
+                .filter(|word| !word.is_empty());
+            let keyword = words.next().unwrap_or_default();
             match keyword {
                 b"" | b"endsolid" => {}
                 b"solid" => {
@@ -151,6 +160,9 @@ impl PlainText {
                 b"outer" | b"vertex" | b"endloop" | b"endfacet" => {
                     plain.text.extend(String::from_utf8_lossy(&lower).bytes());
                     plain.text.push(b'\n');
+                    if keyword == b"vertex" {
+                        plain.coordinates.extend(words.take(3).map(coordinate));
+                    }
                 }
                 _ => raw.unknown.note(number),
             }
@@ -158,4 +170,10 @@ impl PlainText {
         plain.text.extend(b"endsolid all\n");
         Ok(plain)
     }
+}
+
+/// The number that a word stands for, or not a number.
+fn coordinate(word: &[u8]) -> f64 {
+    let text = str::from_utf8(word).ok();
+    text.and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
 }

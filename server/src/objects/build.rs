@@ -2,27 +2,18 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use glam::Vec3;
 use grasp_import::{ImportedMesh, MeshLimits, read_mesh};
-use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
+use grasp_synthesis::model::object::GraspObject;
 
 use super::{
     StoredObject,
     centre_of_mass::{Source, centre_of_mass},
+    extent::check_extent,
 };
 use crate::{
     error::ServiceError,
     validate::{Field, ObjectFields, Violations, quoted},
 };
-
-/// Upper bound on the longest edge of an object's bounding box, in metres; a longer one means a wrong unit.
-const LARGEST_EXTENT: f32 = 10.0;
-
-/// Lower bound on the longest edge of an object's bounding box, in metres; a shorter one means a wrong unit.
-const SMALLEST_EXTENT: f32 = 1e-3;
-
-/// Longest edge in metres without a warning: longer objects are not handed over with one hand.
-const USUAL_EXTENT: f32 = 2.0;
 
 /// Largest number of group names in an error.
 const LISTED_GROUPS: usize = 12;
@@ -51,7 +42,10 @@ pub(crate) fn build_object(
         }
     };
     let mut warnings = read.warnings.clone();
-    check_extent(&read.mesh, mesh_field, &mut warnings, &mut violations);
+    match check_extent(&read.mesh) {
+        Ok(warning) => warnings.extend(warning),
+        Err(wrong) => violations.add(mesh_field, wrong),
+    }
     let forbidden = forbidden_triangles(&fields, &read, &mut violations);
     if !violations.is_empty() {
         return Err(violations.into_error());
@@ -71,40 +65,16 @@ pub(crate) fn build_object(
         fields.friction,
         &forbidden,
     ) {
-        Ok(object) => Ok(StoredObject::new(fields.id, false, Arc::new(object), warnings)),
+        Ok(object) => Ok(StoredObject {
+            origin_in_file: read.origin_in_file,
+            ..StoredObject::new(fields.id, false, Arc::new(object), warnings)
+        }),
         Err(errors) => {
             for error in errors {
                 violations.add(mesh_field, error.to_string());
             }
             Err(violations.into_error())
         }
-    }
-}
-
-/// Checks that the object has the size of something that can be held.
-fn check_extent(
-    mesh: &TriangleMesh,
-    field: Field<'_>,
-    warnings: &mut Vec<String>,
-    violations: &mut Violations,
-) {
-    let mut low = Vec3::INFINITY;
-    let mut high = Vec3::NEG_INFINITY;
-    for &position in mesh.positions() {
-        low = low.min(position);
-        high = high.max(position);
-    }
-    let extent = (high - low).max_element();
-    // The negation also rejects an extent that overflowed.
-    if !(SMALLEST_EXTENT..=LARGEST_EXTENT).contains(&extent) {
-        violations.add(
-            field,
-            format_args!(
-                "is {extent} m long; it must be {SMALLEST_EXTENT} m to {LARGEST_EXTENT} m (is unit_metres right?)"
-            ),
-        );
-    } else if extent > USUAL_EXTENT {
-        warnings.push(format!("the object is {extent} m long: is unit_metres right?"));
     }
 }
 
@@ -267,21 +237,6 @@ mod tests {
                 .warnings
                 .iter()
                 .any(|warning| warning.contains("centre of mass")),
-            "{:?}",
-            stored.warnings
-        );
-    }
-
-    #[test]
-    fn warns_about_an_unusually_large_object() {
-        let beam = "g lid\nv 0 0 0\nv 3 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
-        let stored =
-            build_object(text_fields(beam, 1.0), ROOMY, Violations::default()).expect("a beam is an object");
-        assert!(
-            stored
-                .warnings
-                .iter()
-                .any(|warning| warning.contains("unit_metres")),
             "{:?}",
             stored.warnings
         );

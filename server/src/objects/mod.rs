@@ -4,6 +4,7 @@
 pub(crate) mod build;
 mod centre_of_mass;
 pub(crate) mod directory;
+mod extent;
 pub(crate) mod store;
 
 use std::{
@@ -11,6 +12,7 @@ use std::{
     thread,
 };
 
+use glam::DVec3;
 use grasp_assets::{
     hands::{Hand, hand},
     primitives::held_primitives,
@@ -47,6 +49,8 @@ pub(crate) struct StoredObject {
     pub content_hash: String,
     /// Oddities of its mesh.
     pub warnings: Vec<String>,
+    /// Its origin in the file of its mesh, in the file's units and axes.
+    pub origin_in_file: DVec3,
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
     /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
@@ -54,7 +58,7 @@ pub(crate) struct StoredObject {
 }
 
 impl StoredObject {
-    /// An object with its id.
+    /// An object with its id, whose frame is that of its file.
     pub(crate) fn new(id: String, built_in: bool, object: Arc<GraspObject>, warnings: Vec<String>) -> Self {
         Self {
             id,
@@ -62,6 +66,7 @@ impl StoredObject {
             content_hash: content_hash(&object),
             object: Arc::new(PreparedObject::new(object)),
             warnings,
+            origin_in_file: DVec3::ZERO,
             atlas_slots: AtlasSlots::default(),
             transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
         }
@@ -144,6 +149,11 @@ impl StoredObject {
             content_hash: self.content_hash.clone(),
             warnings: self.warnings.clone(),
             atlas,
+            origin_in_file: (self.origin_in_file != DVec3::ZERO).then_some(v1::DoubleVector3 {
+                x: self.origin_in_file.x,
+                y: self.origin_in_file.y,
+                z: self.origin_in_file.z,
+            }),
         }
     }
 }

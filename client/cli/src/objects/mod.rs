@@ -83,6 +83,12 @@ fn describe(object: &Object) -> String {
         ("atlas", atlas(object.atlas.as_ref())),
         ("content hash", object.content_hash.clone()),
     ];
+    if let Some(origin) = object.origin_in_file {
+        lines.push((
+            "origin in file",
+            format!("{}, {}, {}", origin.x, origin.y, origin.z),
+        ));
+    }
     lines.extend(object.warnings.iter().map(|warning| ("warning", warning.clone())));
     pairs(&lines)
 }

@@ -86,7 +86,7 @@ pub(super) fn read_into(
                 }
             }
             for position in positions {
-                raw.add_vertex(position.as_vec3().to_array());
+                raw.add_vertex(position.to_array());
             }
             // A mirrored instance shows its other side.
             let is_mirrored = scene_from_mesh.determinant() < 0.0;

@@ -127,12 +127,12 @@ impl Scanner<'_> {
                 return self.violations.push(ImportError::NumberCount { line, found });
             }
         };
-        let mut values = [1.0_f32; 4];
+        let mut values = [1.0_f64; 4];
         for (value, word) in values.iter_mut().zip(&numbers[..read]) {
             let text = || shown(word);
             match std::str::from_utf8(word)
                 .ok()
-                .and_then(|word| word.parse::<f32>().ok())
+                .and_then(|word| word.parse::<f64>().ok())
             {
                 Some(number) if number.is_finite() => *value = number,
                 Some(_) => {
@@ -149,9 +149,9 @@ impl Scanner<'_> {
         }
         let [x, y, z, weight] = values;
         let largest = [x, y, z]
-            .map(|coordinate| (coordinate / weight * self.unit_metres).abs())
+            .map(|coordinate| (coordinate / weight * f64::from(self.unit_metres)).abs())
             .into_iter()
-            .fold(0.0, f32::max);
+            .fold(0.0, f64::max);
         if weight == 0.0 || !largest.is_finite() {
             let text = shown(numbers[read - 1]);
             return self.violations.push(ImportError::NotFinite { line, text });

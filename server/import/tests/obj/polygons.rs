@@ -349,7 +349,9 @@ f 1 2 3 4 5 6\nf 3 2 1 9 8 7\n";
     assert_areas_match(text, &read);
     assert_eq!(
         read.warnings,
-        ["8 edges are open: the surface has holes and its volume is an estimate"]
+        [
+            "8 edges are open: the surface has holes and its volume is an estimate; the first is at the face on line 10"
+        ]
     );
 }
 

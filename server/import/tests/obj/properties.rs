@@ -1,5 +1,6 @@
 //! No input makes the reader panic, and its results are always consistent.
 
+use glam::DVec3;
 use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use proptest::{
     collection::vec,
@@ -154,7 +155,7 @@ proptest! {
 
     #[test]
     fn agrees_with_reference_reader(text in well_formed(), unit in 0.001_f32..2.0) {
-        let expected = reference::read(&text, unit);
+        let expected = reference::read(&text, unit, DVec3::ZERO);
         if expected.triangles.is_empty() {
             prop_assert!(read_mesh(text.as_bytes(), Import::with_unit(unit), SMALL).is_err());
         } else {

@@ -174,12 +174,17 @@ fn drops_degenerate_elements_and_reports_their_line() {
 }
 
 #[test]
-fn drops_repeated_triangles_but_keeps_back_faces() {
+fn keeps_one_of_triangles_that_repeat_with_either_winding() {
     let sheet = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 2 3 1\nf 3 2 1\n").unwrap();
-    assert_eq!(sheet.mesh.triangles(), [[0, 1, 2], [2, 1, 0]]);
+    assert_eq!(sheet.mesh.triangles(), [[0, 1, 2]]);
     assert_eq!(
         sheet.warnings,
-        ["1 triangles that repeat an earlier one were dropped; the first is on line 5"]
+        [
+            "1 triangles that repeat an earlier one were dropped; the first is on line 5",
+            "1 triangles that repeat an earlier one with the opposite winding were dropped: of faces with two sides, one was \
+             kept; the first is on line 6",
+            "3 edges are open: the surface has holes and its volume is an estimate; the first is at the face on line 4",
+        ]
     );
 }
 
@@ -205,11 +210,15 @@ fn warns_of_holes_winding_parts_and_unused_vertices() {
     let warnings = |text: &str| read(text).unwrap().warnings;
     assert_eq!(
         warnings(&CUBE.replace("f 5 6 7 8\n", "")),
-        ["4 edges are open: the surface has holes and its volume is an estimate"]
+        [
+            "4 edges are open: the surface has holes and its volume is an estimate; the first is at the face on line 10"
+        ]
     );
     assert_eq!(
         warnings(&CUBE.replace("f 5 6 7 8\n", "f 8 7 6 5\n")),
-        ["4 edges join triangles that face opposite ways: the winding is inconsistent"]
+        [
+            "2 triangles faced the opposite way of the rest of their part and were turned; the first is on line 10"
+        ]
     );
     let far_cube: String = CUBE
         .lines()
@@ -235,7 +244,7 @@ fn warns_of_holes_winding_parts_and_unused_vertices() {
     );
     let fin = warnings(&format!("{CUBE}v 0 0 9\nf 1 2 9\n"));
     assert!(
-        fin.contains(&"1 edges join more than two triangles".to_owned()),
+        fin.contains(&"1 edges join more than two triangles; the first is at the face on line 9".to_owned()),
         "{fin:?}"
     );
 }

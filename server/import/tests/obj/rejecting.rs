@@ -54,7 +54,7 @@ fn rejects_coordinates_that_are_not_finite() {
     );
     assert_eq!(
         messages(&format!("{CUBE}v 1e30 0 0"))[0],
-        "line 15: a coordinate is 1000000000000000000000000000000 m from the origin; it must be at most 1000 m, is the \
+        "line 15: a coordinate is 1000000000000000000000000000000 m from the origin; it must be at most 1000000000 m, is the \
          unit right?"
     );
 }

@@ -8,9 +8,16 @@ use super::{aabb::Aabb, tapered_capsule::TaperedCapsule};
 /// of preparation and 4 bytes per node.
 const TARGET_NODES: f32 = 32_768.0;
 
+/// Largest number of grid nodes. Objects that are very long and thin for their grid need more than the target, because no axis has
+/// fewer than two.
+const MOST_NODES: f32 = 4.0 * TARGET_NODES;
+
 /// How far the grid extends beyond the mesh's box, in metres: about the length of a phalanx. Farther out, the box
 /// itself gives as good a bound.
 const MARGIN: f32 = 0.04;
+
+/// By how much the spacing grows until the nodes are few enough.
+const COARSER: f32 = 1.25;
 
 /// Number of spheres along the axis that cover a capsule. More tighten the bound and take longer.
 const SPHERES: usize = 3;
@@ -32,8 +39,12 @@ impl DistanceField {
     /// surface, or `within` if it is larger.
     pub(super) fn new(aabb: &Aabb, distance: impl Fn(Vec3, f32) -> f32) -> Self {
         let size = aabb.max - aabb.min + 2.0 * MARGIN;
-        let spacing = (size.element_product() / TARGET_NODES).cbrt();
-        let counts = (size / spacing).ceil().as_uvec3() + 1;
+        let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
+        let counts_at = |spacing: f32| (size / spacing).ceil() + 1.0;
+        while counts_at(spacing).element_product() > MOST_NODES {
+            spacing *= COARSER;
+        }
+        let counts = counts_at(spacing).as_uvec3();
         let origin = aabb.min - MARGIN;
         let diagonal = size.length();
         let mut distances = Vec::with_capacity((counts.x * counts.y * counts.z) as usize);

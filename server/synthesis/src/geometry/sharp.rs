@@ -32,6 +32,9 @@ const CELL: f32 = 0.002;
 /// Largest number of cells that are kept, against meshes that are all edges.
 const MOST_CELLS: usize = 1 << 16;
 
+/// Largest number of steps along features: half a kilometre of edges.
+const MOST_STEPS: usize = 1 << 18;
+
 /// Where a mesh is sharp.
 #[derive(Clone, Debug, Default)]
 pub struct SharpFeatures {
@@ -59,16 +62,17 @@ impl SharpFeatures {
         for &[a, b] in &sharp_edges {
             *lengths.entry(chains.root(a)).or_default() += at(a).distance(at(b));
         }
+        let mut marked = Marked::default();
         for &[a, b] in &sharp_edges {
             if lengths
                 .get(&chains.root(a))
                 .is_some_and(|&length| length >= LEAST_LENGTH)
             {
-                sharp.add(at(a), at(b));
+                sharp.add(at(a), at(b), &mut marked);
             }
         }
         for point in points(mesh, &edges).into_iter().chain(worn_edges(surface)) {
-            sharp.add(point, point);
+            sharp.add(point, point, &mut marked);
         }
         sharp
     }
@@ -89,10 +93,17 @@ impl SharpFeatures {
     }
 
     /// Marks the cells along a line and those next to them.
-    fn add(&mut self, start: Vec3, end: Vec3) {
+    fn add(&mut self, start: Vec3, end: Vec3, marked: &mut Marked) {
         let steps = (start.distance(end) / CELL).ceil().clamp(1.0, MOST_CELLS as f32) as usize;
         for step in 0..=steps {
+            if self.cells.len() >= MOST_CELLS || marked.steps >= MOST_STEPS {
+                return;
+            }
+            marked.steps += 1;
             let cell = cell_of(start.lerp(end, step as f32 / steps as f32));
+            if !marked.cells.insert(cell) {
+                continue;
+            }
             for x in -1..=1 {
                 for y in -1..=1 {
                     for z in -1..=1 {
@@ -104,6 +115,13 @@ impl SharpFeatures {
             }
         }
     }
+}
+
+/// The cells on features so far: features that pass through the same place, such as thousands of needles, mark it once.
+#[derive(Default)]
+struct Marked {
+    cells: HashSet<IVec3>,
+    steps: usize,
 }
 
 fn cell_of(point: Vec3) -> IVec3 {
