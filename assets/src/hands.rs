@@ -1,6 +1,6 @@
 //! The built-in hands: rig and skin of `thesis` and `adult`, left and right; and the reader for skins.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use glam::{Affine3A, Mat4, Vec3};
 use grasp_synthesis::{
@@ -18,23 +18,42 @@ use grasp_synthesis::{
 /// The names of the built-in rigs.
 pub const RIG_NAMES: [&str; 2] = ["thesis", "adult"];
 
-/// A rig with its skin.
+/// A rig with its skin. Two are equal if their rigs are.
 #[derive(Clone, Debug)]
 pub struct Hand {
     /// Bones, limits, widths and collision segments.
     pub rig: PreparedRig,
     /// The skin in the wrist frame, bound to the 26 joints of a relaxed, slightly spread hand.
-    pub skin: Skin,
-    /// The same hand as a GLB file with `WebXR` joint names, in the `OpenXR` frame of the wrist.
-    pub glb: &'static [u8],
+    pub skin: Arc<Skin>,
 }
 
+impl PartialEq for Hand {
+    fn eq(&self, other: &Self) -> bool {
+        self.rig == other.rig
+    }
+}
+
+impl Eq for Hand {}
+
+/// The built-in hands, in the order of [`FILES`].
+static HANDS: LazyLock<[Arc<Hand>; 4]> =
+    LazyLock::new(|| FILES.map(|(json, glb)| Arc::new(built_in(json, glb))));
+
 /// A built-in hand; parsed on first use.
-pub fn hand(rig: &str, handedness: Handedness) -> Option<&'static Hand> {
-    static HANDS: LazyLock<[Hand; 4]> = LazyLock::new(|| FILES.map(|(json, glb)| built_in(json, glb)));
+pub fn hand(rig: &str, handedness: Handedness) -> Option<&'static Arc<Hand>> {
+    place(rig, handedness).map(|place| &HANDS[place])
+}
+
+/// A built-in hand as a GLB file with `WebXR` joint names, in the `OpenXR` frame of the wrist.
+pub fn glb(rig: &str, handedness: Handedness) -> Option<&'static [u8]> {
+    place(rig, handedness).map(|place| FILES[place].1)
+}
+
+/// The place of a built-in hand in [`FILES`].
+fn place(rig: &str, handedness: Handedness) -> Option<usize> {
     HANDS
         .iter()
-        .find(|hand| hand.rig.name == rig && hand.rig.handedness == handedness)
+        .position(|hand| hand.rig.name == rig && hand.rig.handedness == handedness)
 }
 
 /// The embedded files: description and GLB.
@@ -59,13 +78,12 @@ const FILES: [(&str, &[u8]); 4] = [
 
 /// Parses the embedded files. The generator writes them and the tests read them, so they are valid in any build that
 /// passed.
-fn built_in(json: &str, glb: &'static [u8]) -> Hand {
+fn built_in(json: &str, glb: &[u8]) -> Hand {
     let rig = read_rig(json).expect("an embedded rig is valid");
     let skin = read_skin(glb, &rig).expect("an embedded skin is valid");
     Hand {
         rig: PreparedRig::new(rig),
-        skin,
-        glb,
+        skin: Arc::new(skin),
     }
 }
 

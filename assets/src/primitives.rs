@@ -25,13 +25,13 @@ const RIG: &str = "adult";
 const FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/primitives.rs"));
 
 /// A hand with its grips at primitives.
-type Known = (&'static Hand, Arc<[HeldPrimitive]>);
+type Known = (Arc<Hand>, Arc<[HeldPrimitive]>);
 
 /// The hands that have grips at primitives, and the grips. Reading them on first use takes some tens of milliseconds.
 pub fn held_primitives() -> &'static [Known] {
     static HELD: LazyLock<Vec<Known>> = LazyLock::new(|| {
         let hands = [Handedness::Left, Handedness::Right].map(|side| hand(RIG, side));
-        let mut held: Vec<(&Hand, Vec<HeldPrimitive>)> = hands
+        let mut held: Vec<(&Arc<Hand>, Vec<HeldPrimitive>)> = hands
             .into_iter()
             .flatten()
             .map(|hand| (hand, Vec::new()))
@@ -43,7 +43,9 @@ pub fn held_primitives() -> &'static [Known] {
                 held.extend(held_by(&hand.rig, primitive, &object));
             }
         }
-        held.into_iter().map(|(hand, held)| (hand, held.into())).collect()
+        held.into_iter()
+            .map(|(hand, held)| (Arc::clone(hand), held.into()))
+            .collect()
     });
     &HELD
 }

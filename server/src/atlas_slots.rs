@@ -68,18 +68,18 @@ impl Update {
 
 /// The slots of one object, for each hand that was requested.
 #[derive(Debug, Default)]
-pub(crate) struct AtlasSlots(Mutex<Vec<(&'static Hand, Slot)>>);
+pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 
 impl AtlasSlots {
     /// A copy of a hand's slot; none if the hand was never requested.
-    pub(crate) fn get(&self, hand: &'static Hand) -> Option<Slot> {
+    pub(crate) fn get(&self, hand: &Arc<Hand>) -> Option<Slot> {
         let slots = self.lock();
-        let slot = slots.iter().find(|(other, _)| std::ptr::eq(*other, hand));
+        let slot = slots.iter().find(|(other, _)| other == hand);
         slot.map(|(_, slot)| slot.clone())
     }
 
     /// Records a use at the time `now`. True if the atlas must be put in the build queue.
-    pub(crate) fn request(&self, hand: &'static Hand, now: u64) -> bool {
+    pub(crate) fn request(&self, hand: &Arc<Hand>, now: u64) -> bool {
         self.with(hand, |slot| {
             slot.last_used = now;
             let is_new = slot.state == BuildState::Absent;
@@ -91,7 +91,7 @@ impl AtlasSlots {
     }
 
     /// Replaces the atlas; `spent` is the work done on it since the last time.
-    pub(crate) fn publish(&self, hand: &'static Hand, update: Update, spent: Duration) {
+    pub(crate) fn publish(&self, hand: &Arc<Hand>, update: Update, spent: Duration) {
         self.with(hand, |slot| {
             slot.bytes = update.bytes();
             slot.grown = Some(update.grown);
@@ -101,12 +101,12 @@ impl AtlasSlots {
     }
 
     /// Ends the growth of an atlas.
-    pub(crate) fn finish(&self, hand: &'static Hand) {
+    pub(crate) fn finish(&self, hand: &Arc<Hand>) {
         self.with(hand, |slot| slot.state = BuildState::Finished);
     }
 
     /// Keeps a grip that a search found. True if the number of kept grips grew: false if the grip replaced another.
-    pub(crate) fn remember(&self, hand: &'static Hand, grip: Entry) -> bool {
+    pub(crate) fn remember(&self, hand: &Arc<Hand>, grip: Entry) -> bool {
         self.with(hand, |slot| {
             let before = slot.recent.entries().len();
             slot.recent = slot.recent.with(grip);
@@ -115,12 +115,12 @@ impl AtlasSlots {
     }
 
     /// Drops the oldest recent grip.
-    pub(crate) fn forget_oldest(&self, hand: &'static Hand) {
+    pub(crate) fn forget_oldest(&self, hand: &Arc<Hand>) {
         self.with(hand, |slot| slot.recent = slot.recent.without_oldest());
     }
 
     /// Drops the atlas and keeps the recent grips. An atlas in the build queue stays there.
-    pub(crate) fn evict(&self, hand: &'static Hand) {
+    pub(crate) fn evict(&self, hand: &Arc<Hand>) {
         self.with(hand, |slot| {
             *slot = Slot {
                 state: match slot.state {
@@ -134,17 +134,17 @@ impl AtlasSlots {
         });
     }
 
-    fn with<T>(&self, hand: &'static Hand, change: impl FnOnce(&mut Slot) -> T) -> T {
+    fn with<T>(&self, hand: &Arc<Hand>, change: impl FnOnce(&mut Slot) -> T) -> T {
         let mut slots = self.lock();
-        let place = slots.iter().position(|(other, _)| std::ptr::eq(*other, hand));
+        let place = slots.iter().position(|(other, _)| other == hand);
         let place = place.unwrap_or_else(|| {
-            slots.push((hand, Slot::default()));
+            slots.push((Arc::clone(hand), Slot::default()));
             slots.len() - 1
         });
         change(&mut slots[place].1)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<(&'static Hand, Slot)>> {
+    fn lock(&self) -> MutexGuard<'_, Vec<(Arc<Hand>, Slot)>> {
         // No code panics while it holds the lock; if some did, the slots would still be consistent.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -3,7 +3,7 @@
 use std::{
     collections::VecDeque,
     sync::{
-        Condvar, Mutex, MutexGuard, PoisonError, Weak,
+        Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak,
         atomic::{AtomicBool, Ordering},
     },
     time::Duration,
@@ -22,7 +22,7 @@ pub(super) struct BuildJob {
     /// The object; gone once it was evicted.
     pub object: Weak<StoredObject>,
     /// The hand that holds it.
-    pub hand: &'static Hand,
+    pub hand: Arc<Hand>,
     /// Work done since the atlas was requested.
     pub worked: Duration,
 }
@@ -88,8 +88,6 @@ impl BuildQueue {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use grasp_assets::hands::hand;
     use grasp_synthesis::model::hand::Handedness;
 
@@ -104,7 +102,7 @@ mod tests {
         for (object, worked) in objects.iter().zip(milliseconds) {
             queue.push(BuildJob {
                 object: Arc::downgrade(object),
-                hand: hand("adult", Handedness::Right).expect("it is built in"),
+                hand: Arc::clone(hand("adult", Handedness::Right).expect("it is built in")),
                 worked: Duration::from_millis(worked),
             });
         }
@@ -125,7 +123,7 @@ mod tests {
         let object = Arc::new(tetrahedron("a", 0.1, &[]));
         queue.push(BuildJob {
             object: Arc::downgrade(&object),
-            hand: hand("adult", Handedness::Right).expect("it is built in"),
+            hand: Arc::clone(hand("adult", Handedness::Right).expect("it is built in")),
             worked: Duration::ZERO,
         });
         queue.stop();

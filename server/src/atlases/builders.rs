@@ -110,19 +110,19 @@ impl Builders {
     }
 
     /// A hand of the default rig.
-    pub(super) fn default_hand(&self, handedness: Handedness) -> Option<&'static Hand> {
+    pub(super) fn default_hand(&self, handedness: Handedness) -> Option<&'static Arc<Hand>> {
         hand(&self.default_rig, handedness)
     }
 
     /// Records a use of the atlases of one or two hands at the same time, so that neither evicts the other, and puts those that
     /// are absent in the queue.
-    pub(super) fn request(&self, object: &Arc<StoredObject>, hands: [Option<&'static Hand>; 2]) {
+    pub(super) fn request(&self, object: &Arc<StoredObject>, hands: [Option<&Arc<Hand>>; 2]) {
         let now = self.requests.fetch_add(1, Ordering::Relaxed) + 1;
         let hands = hands.into_iter().flatten();
         for hand in hands.filter(|hand| object.atlas_slots.request(hand, now)) {
             self.queue.push(BuildJob {
                 object: Arc::downgrade(object),
-                hand,
+                hand: Arc::clone(hand),
                 worked: Duration::ZERO,
             });
         }
@@ -203,10 +203,10 @@ fn work(builders: &Builders, job: BuildJob) {
             ..job
         }),
         Ok(Turn::Dropped) => {}
-        Ok(Turn::Finished) => object.atlas_slots.finish(job.hand),
+        Ok(Turn::Finished) => object.atlas_slots.finish(&job.hand),
         Err(_) => {
-            tracing::error!(object = object.name(), hand = %hand_label(job.hand), "building an atlas panicked");
-            object.atlas_slots.finish(job.hand);
+            tracing::error!(object = object.name(), hand = %hand_label(&job.hand), "building an atlas panicked");
+            object.atlas_slots.finish(&job.hand);
         }
     }
 }
@@ -214,7 +214,7 @@ fn work(builders: &Builders, job: BuildJob) {
 /// Reads an atlas or grows it, and publishes it.
 pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
     let start = Instant::now();
-    let hand = job.hand;
+    let hand = &job.hand;
     let slot = object.atlas_slots.get(hand).unwrap_or_default();
     if slot.grown.is_none()
         && let Some(read) = read(builders, object, hand)
@@ -296,7 +296,7 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
 }
 
 /// The atlas on disk. Unless it is complete, shipped grips answer requests and growth resumes from it.
-fn read(builders: &Builders, object: &StoredObject, hand: &'static Hand) -> Option<Update> {
+fn read(builders: &Builders, object: &StoredObject, hand: &Arc<Hand>) -> Option<Update> {
     let on_disk = builders.files.as_ref().and_then(|files| files.read(object, hand));
     let on_disk = on_disk.map(Arc::new);
     let is_complete = on_disk.as_ref().is_some_and(|read| read.atlas.is_complete());
@@ -329,7 +329,7 @@ fn is_shipped(grown: &Grown) -> bool {
 }
 
 /// The grips that ship with the server for an object and a hand.
-fn shipped_grips(object: &StoredObject, hand: &'static Hand) -> Option<Grown> {
+fn shipped_grips(object: &StoredObject, hand: &Arc<Hand>) -> Option<Grown> {
     let bytes = object
         .built_in
         .then(|| shipped_atlas(&object.id, &hand.rig))
@@ -357,7 +357,7 @@ fn pause_for_searches(builders: &Builders, worked: Duration) {
 }
 
 /// Logs when an atlas becomes useful and when it is complete.
-fn log_progress(object: &StoredObject, hand: &'static Hand, grown: &Grown, published: usize) {
+fn log_progress(object: &StoredObject, hand: &Arc<Hand>, grown: &Grown, published: usize) {
     let entries = grown.atlas.entries().len();
     let message = if grown.atlas.is_complete() {
         "an atlas is complete"

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// The owner of an atlas: an object and a hand.
-type Owner = (Weak<StoredObject>, &'static Hand);
+type Owner = (Weak<StoredObject>, Arc<Hand>);
 
 /// The atlases in memory, which share `cache_bytes` with created objects.
 #[derive(Debug)]
@@ -37,15 +37,14 @@ impl LoadedAtlases {
     pub(super) fn publish(
         &self,
         object: &Arc<StoredObject>,
-        hand: &'static Hand,
+        hand: &Arc<Hand>,
         update: Update,
         spent: Duration,
     ) -> bool {
         let bytes = update.bytes();
         let mut owners = self.owners();
-        let is_same = |(other, its_hand): &Owner| {
-            std::ptr::eq(other.as_ptr(), Arc::as_ptr(object)) && std::ptr::eq(*its_hand, hand)
-        };
+        let is_same =
+            |(other, its_hand): &Owner| std::ptr::eq(other.as_ptr(), Arc::as_ptr(object)) && its_hand == hand;
         owners.retain(|owner| owner.0.strong_count() > 0 && !is_same(owner));
         let slot = object.atlas_slots.get(hand).unwrap_or_default();
         let room = self.objects.room();
@@ -54,7 +53,7 @@ impl LoadedAtlases {
             object.atlas_slots.publish(hand, update, spent);
         }
         if fits || slot.grown.is_some() {
-            owners.push((Arc::downgrade(object), hand));
+            owners.push((Arc::downgrade(object), Arc::clone(hand)));
         }
         fits
     }

@@ -93,11 +93,7 @@ impl Atlases {
     }
 
     /// The known grips of an object and one or two hands; requests the atlases that are absent.
-    pub(crate) fn get(
-        &self,
-        object: &Arc<StoredObject>,
-        hands: [Option<&'static Hand>; 2],
-    ) -> [KnownGrips; 2] {
+    pub(crate) fn get(&self, object: &Arc<StoredObject>, hands: [Option<&Arc<Hand>>; 2]) -> [KnownGrips; 2] {
         if !self.0.are_running() {
             return Default::default();
         }
@@ -115,7 +111,7 @@ impl Atlases {
     }
 
     /// Remembers a grip that a search found under the object's own friction, for later requests.
-    pub(crate) fn remember(&self, object: &Arc<StoredObject>, hand: &'static Hand, grip: Entry) {
+    pub(crate) fn remember(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, grip: Entry) {
         if self.0.are_running() {
             self.0.remembered.add(object, hand, grip);
         }

@@ -31,7 +31,7 @@ pub(super) fn small(id: &str) -> StoredObject {
     cuboid(id, Vec3::new(0.02, 0.015, 0.05))
 }
 
-pub(super) fn adult() -> &'static Hand {
+pub(super) fn adult() -> &'static Arc<Hand> {
     hand("adult", Handedness::Right).unwrap()
 }
 
@@ -62,7 +62,7 @@ fn start(threads: usize, store: &Arc<ObjectStore>) -> Atlases {
 }
 
 /// The known grips of one hand.
-fn known(atlases: &Atlases, object: &Arc<StoredObject>, hand: &'static Hand) -> KnownGrips {
+fn known(atlases: &Atlases, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> KnownGrips {
     let [known, _] = atlases.get(object, [Some(hand), None]);
     known
 }
@@ -202,7 +202,7 @@ fn complete_atlas_replaces_shipped_grips() {
     let atlases = start(0, &store(10, 1 << 30));
     let job = BuildJob {
         object: Arc::downgrade(&object),
-        hand: adult(),
+        hand: Arc::clone(adult()),
         worked: Duration::ZERO,
     };
     let turn = || builders::turn(&atlases.0, &object, &job);

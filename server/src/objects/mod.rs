@@ -92,9 +92,9 @@ impl StoredObject {
 
     /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if there
     /// are no primitives for the hand or none of their grips fits.
-    pub(crate) fn transferred_grips(&self, hand: &'static Hand) -> Option<Arc<TransferredGrips>> {
+    pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
         let mut all = held_primitives().iter().zip(&self.transferred_grips);
-        let ((_, held), grips) = all.find(|((of, _), _)| std::ptr::eq(*of, hand))?;
+        let ((_, held), grips) = all.find(|((of, _), _)| **of == *hand)?;
         let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
         (!grips.is_empty()).then(|| Arc::clone(grips))
     }

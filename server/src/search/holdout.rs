@@ -28,7 +28,7 @@ pub(super) fn holdout(
             giver.joints.transformed(object_from_client),
         )),
         Some(giver) => Some(
-            PresentingHand::in_frame(giver.skin, &giver.joints, object_from_client)
+            PresentingHand::in_frame(&giver.skin, &giver.joints, object_from_client)
                 .map_err(|error| ServiceError::invalid(giver.field, error.to_string()))?,
         ),
     };

@@ -74,7 +74,7 @@ pub(crate) struct Answered {
     /// The response to the call.
     pub response: v1::FindGraspResponse,
     /// The grip with its hand if it was not known before, to be remembered.
-    pub new_grip: Option<(&'static Hand, Entry)>,
+    pub new_grip: Option<(Arc<Hand>, Entry)>,
     /// When the search ended, before the response was made.
     pub ended: Instant,
 }
@@ -82,7 +82,7 @@ pub(crate) struct Answered {
 /// One hand's search, ready to be run.
 #[derive(Debug)]
 struct HandSearch {
-    hand: &'static Hand,
+    hand: Arc<Hand>,
     /// The holdout, with the arm of this hand.
     holdout: Holdout,
     settings: SearchSettings,
@@ -138,20 +138,23 @@ impl FindJob {
     /// The giver's joints fold its skin.
     pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
-        let first = self.query.receiving_hand;
+        let first = Arc::clone(&self.query.receiving_hand);
         let stance = |hand: &Hand| self.query.stances.of(hand.rig.handedness);
-        let of_first = holdout(&self.query, self.object.object(), stance(first))?;
+        let of_first = holdout(&self.query, self.object.object(), stance(&first))?;
         let object_from_client = self.query.client_from_object.inverse();
         let of_other = |hand: &Hand| Holdout {
             stance: stance(hand).transformed(object_from_client),
             ..of_first.clone()
         };
-        let alternative = self.query.alternative_hand.map(|hand| (hand, of_other(hand)));
+        let alternative = self.query.alternative_hand.clone().map(|hand| {
+            let holdout = of_other(&hand);
+            (hand, holdout)
+        });
         let hands = [(first, of_first)].into_iter().chain(alternative);
         let hands = hands.zip(&self.known).map(|((hand, holdout), known)| HandSearch {
+            settings: self.settings(&hand, known),
             hand,
             holdout,
-            settings: self.settings(hand, known),
         });
         Ok(PreparedJob {
             hands: hands.collect(),
@@ -165,7 +168,7 @@ impl FindJob {
     }
 
     /// The settings of one hand's search.
-    fn settings(&self, hand: &'static Hand, known: &KnownGrips) -> SearchSettings {
+    fn settings(&self, hand: &Hand, known: &KnownGrips) -> SearchSettings {
         let query = &self.query;
         let object_from_client = query.client_from_object.inverse();
         // Reproducible answers need a complete atlas: a growing one would change them.
@@ -188,7 +191,7 @@ impl FindJob {
                 constraints: query.constraints.transformed(object_from_client),
                 choice: query.choice,
                 improvement: self.improvement,
-                other_hand: query.other_hand.map(|hand| hand.rig.clone()),
+                other_hand: query.other_hand.as_ref().map(|hand| hand.rig.clone()),
             },
             known: Known {
                 // A replay runs one attempt and tries no known grips.
@@ -311,7 +314,7 @@ impl PreparedJob {
         };
         let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
         let warnings: Vec<String> = hands.flat_map(|hand| hand.warnings.iter().cloned()).collect();
-        let other = self.hands.iter().find(|other| !std::ptr::eq(other.hand, *hand));
+        let other = self.hands.iter().find(|other| other.hand != *hand);
         let circumstances = Circumstances {
             search_time,
             budget: self.budget,
@@ -342,7 +345,7 @@ impl PreparedJob {
 
     /// The grip to remember: one that was found by an attempt under the object's own friction, which the grips of an
     /// atlas are made for.
-    fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(&'static Hand, Entry)> {
+    fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(Arc<Hand>, Entry)> {
         let HandSearch {
             hand,
             holdout,
@@ -354,7 +357,7 @@ impl PreparedJob {
         let entry = (is_new && settings.query.friction_on(&holdout.object) == own_friction)
             .then(|| Entry::of_grasp(grasp))
             .flatten();
-        entry.map(|entry| (*hand, entry))
+        entry.map(|entry| (Arc::clone(hand), entry))
     }
 }
 

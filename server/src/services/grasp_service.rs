@@ -51,7 +51,7 @@ impl GraspHandler {
         let admission = shared.executor.admit()?;
         let uses_atlas = query.uses_atlas();
         let known = if uses_atlas {
-            let [first, alternative] = [Some(query.receiving_hand), query.alternative_hand];
+            let [first, alternative] = [Some(&query.receiving_hand), query.alternative_hand.as_ref()];
             shared.atlases.get(&stored, [first, alternative])
         } else {
             Default::default()
@@ -78,7 +78,7 @@ impl GraspHandler {
         let answered = search::find(job, &shared.executor, admission).await?;
         call.search_ended(answered.ended);
         if let Some((hand, grip)) = answered.new_grip.filter(|_| uses_atlas) {
-            shared.atlases.remember(&stored, hand, grip);
+            shared.atlases.remember(&stored, &hand, grip);
         }
         call.log_search(summary(&answered.response));
         Ok(answered.response)

@@ -1,5 +1,7 @@
 //! Checks `FindGraspRequest`.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
@@ -42,11 +44,11 @@ pub(crate) struct FindQuery {
     /// Obstacles to keep clear of, in the client's frame and `OpenXR` axes.
     pub obstacles: Vec<Obstacle>,
     /// The hand to pose.
-    pub receiving_hand: &'static Hand,
+    pub receiving_hand: Arc<Hand>,
     /// The hand that may be posed in its place: the request leaves the choice to the search.
-    pub alternative_hand: Option<&'static Hand>,
+    pub alternative_hand: Option<Arc<Hand>>,
     /// The receiver's other hand, if both take the object.
-    pub other_hand: Option<&'static Hand>,
+    pub other_hand: Option<Arc<Hand>>,
     /// Where the receiver's arms may come from, in the client's frame and `OpenXR` axes.
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
@@ -214,7 +216,7 @@ pub(crate) fn find_query(
         // The function that returned none has added a violation.
         return Err(violations.into_error());
     };
-    let other_hand = |is_posed: bool| is_posed.then(|| hand::other_hand(receiving_hand)).flatten();
+    let other_hand = |is_posed: bool| is_posed.then(|| hand::other_hand(&receiving_hand)).flatten();
     violations.finish(FindQuery {
         object_id,
         convention,
@@ -222,9 +224,9 @@ pub(crate) fn find_query(
         presenting_hand,
         other_hands,
         obstacles,
-        receiving_hand,
         alternative_hand: other_hand(chooses_hand),
         other_hand: other_hand(takes_both_hands),
+        receiving_hand,
         stances,
         up,
         limits,

@@ -288,7 +288,7 @@ fn classes(setting: &Setting, test_objects: &[TestObject]) -> Vec<(Class, Vec<Ca
     let rig = &default_hand(Handedness::Right).rig;
     let (_, held) = held_primitives()
         .iter()
-        .find(|(hand, _)| std::ptr::eq(&raw const hand.rig, rig))
+        .find(|(hand, _)| hand.rig == *rig)
         .expect("the default hand has grips on primitives");
     let known: Vec<_> = test_objects
         .iter()

@@ -37,7 +37,7 @@ use crate::{
 
 /// The receiving hand of a set: the right hand of its rig.
 pub fn receiving_hand(set: Set) -> Option<&'static Hand> {
-    hand(set.rig_name(), Handedness::Right)
+    hand(set.rig_name(), Handedness::Right).map(|hand| &**hand)
 }
 
 /// The machine's monotonic clock.

@@ -4,7 +4,7 @@ use glam::{Mat4, Quat, Vec3};
 use grasp_assets::hands::{HandError, read_skin};
 use grasp_synthesis::model::hand::joints::JOINT_NAMES;
 
-use super::all;
+use super::{all, file_of};
 
 /// The transform from a node to the scene.
 fn global(document: &gltf::Document, node: usize) -> Mat4 {
@@ -24,7 +24,7 @@ fn global(document: &gltf::Document, node: usize) -> Mat4 {
 #[test]
 fn skeletons_have_the_webxr_joints_in_their_bind_pose() {
     for hand in all() {
-        let file = gltf::Gltf::from_slice(hand.glb).expect("it is a GLB file");
+        let file = gltf::Gltf::from_slice(file_of(hand)).expect("it is a GLB file");
         let skin = file.skins().next().expect("it has a skin");
         let names: Vec<_> = skin
             .joints()
@@ -51,7 +51,7 @@ fn skeletons_have_the_webxr_joints_in_their_bind_pose() {
 #[test]
 fn vertex_normals_point_out_of_the_skin() {
     for hand in all() {
-        let file = gltf::Gltf::from_slice(hand.glb).expect("it is a GLB file");
+        let file = gltf::Gltf::from_slice(file_of(hand)).expect("it is a GLB file");
         let primitive = file
             .meshes()
             .flat_map(|mesh| mesh.primitives().collect::<Vec<_>>())
@@ -84,10 +84,11 @@ fn vertex_normals_point_out_of_the_skin() {
 fn broken_files_are_rejected() {
     let hand = all().next().expect("there are hands");
     assert!(matches!(read_skin(b"glTF", &hand.rig), Err(HandError::Gltf(_))));
-    let half = &hand.glb[..hand.glb.len() / 2];
+    let file = file_of(hand);
+    let half = &file[..file.len() / 2];
     assert!(read_skin(half, &hand.rig).is_err());
     // With one letter of its name changed, a joint is reported missing by name.
-    let mut renamed = hand.glb.to_vec();
+    let mut renamed = file.to_vec();
     let at = renamed
         .windows(10)
         .position(|window| window == b"thumb-tip\"")

@@ -35,6 +35,7 @@ pub(crate) fn synthesis_handedness(handedness: Handedness) -> synthesis::Handedn
 
 fn built_in(rig: &str, handedness: Handedness) -> Result<&'static hands::Hand, Failure> {
     hand(rig, synthesis_handedness(handedness))
+        .map(|hand| &**hand)
         .ok_or_else(|| Failure::Usage(format!("rig {rig:?} is not built in; its hand cannot be drawn")))
 }
 

@@ -1,5 +1,7 @@
 //! Checks a hand given as joint angles of a rig.
 
+use std::sync::Arc;
+
 use grasp_proto::v1;
 use grasp_synthesis::model::hand::{
     DigitAngles, HandPose, Handedness,
@@ -57,7 +59,7 @@ pub(super) fn angled_hand(
     };
     Some(GiverHand {
         joints: HandJoints::of_pose(&hand.rig, &pose),
-        skin: &hand.skin,
+        skin: Arc::clone(&hand.skin),
         field: "presenting_hand.angles",
         warnings: Vec::new(),
     })

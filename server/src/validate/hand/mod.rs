@@ -11,6 +11,8 @@ mod reference;
 mod tests;
 mod tracked;
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use grasp_assets::hands::{self, Hand, RIG_NAMES};
 use grasp_proto::v1;
@@ -33,7 +35,7 @@ pub(crate) struct GiverHand {
     /// Its joints.
     pub joints: HandJoints,
     /// The skin to pose on them.
-    pub skin: &'static Skin,
+    pub skin: Arc<Skin>,
     /// The field that gave the joints, for the error if they fold the skin.
     pub field: &'static str,
     /// What was repaired, for the report.
@@ -67,7 +69,7 @@ pub(super) fn receiving_hand(
     hand: Option<v1::ReceivingHand>,
     (validity, default_rig): (Validity, &str),
     violations: &mut Violations,
-) -> (Option<&'static Hand>, bool) {
+) -> (Option<Arc<Hand>>, bool) {
     let hand = hand.unwrap_or_default();
     let is_named = hand.handedness != i32::from(v1::Handedness::Unspecified);
     let handedness = match known(field.child("handedness"), hand.handedness, violations) {
@@ -84,8 +86,8 @@ pub(super) fn receiving_hand(
 }
 
 /// The same person's other hand.
-pub(super) fn other_hand(hand: &Hand) -> Option<&'static Hand> {
-    hands::hand(&hand.rig.name, hand.rig.handedness.other())
+pub(super) fn other_hand(hand: &Hand) -> Option<Arc<Hand>> {
+    hands::hand(&hand.rig.name, hand.rig.handedness.other()).cloned()
 }
 
 fn built_in(
@@ -93,7 +95,7 @@ fn built_in(
     rig: &str,
     handedness: Handedness,
     violations: &mut Violations,
-) -> Option<&'static Hand> {
+) -> Option<Arc<Hand>> {
     let hand = hands::hand(rig, handedness);
     if hand.is_none() {
         violations.add(
@@ -105,7 +107,7 @@ fn built_in(
             ),
         );
     }
-    hand
+    hand.cloned()
 }
 
 /// A handedness without a default.

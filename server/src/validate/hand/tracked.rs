@@ -1,6 +1,6 @@
 //! Checks a hand given as tracked joints, and repairs missing radii.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, sync::Arc};
 
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -100,7 +100,7 @@ pub(super) fn tracked_hand(
             handedness,
             joints: sent.joints,
         },
-        skin: &built_in(field, TRACKED_HAND_RIG, handedness, violations)?.skin,
+        skin: Arc::clone(&built_in(field, TRACKED_HAND_RIG, handedness, violations)?.skin),
         field: "presenting_hand.joints",
         warnings,
     })

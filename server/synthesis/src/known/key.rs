@@ -6,18 +6,7 @@ use std::fmt::Write as _;
 
 use sha2::{Digest as _, Sha256};
 
-use crate::{
-    base::pose::Pose,
-    geometry::Segment,
-    model::{
-        hand::{
-            Handedness,
-            rig::{AngleRange, DigitRig, Rig},
-        },
-        object::GraspObject,
-        strategy::Validity,
-    },
-};
+use crate::model::{hand::rig::Rig, object::GraspObject, strategy::Validity};
 
 pub use crate::known::key::algorithm::ALGORITHM;
 
@@ -32,7 +21,7 @@ pub fn key(object: &GraspObject, rig: &Rig) -> [u8; KEY_BYTES] {
     let mut hash = Hash(Sha256::new());
     hash.0.update(ALGORITHM.to_le_bytes());
     hash.object(object);
-    hash.rig(rig);
+    hash.0.update(rig.content());
     hash.0.finalize().into()
 }
 
@@ -75,44 +64,5 @@ impl Hash {
         }
         self.numbers([object.mass, object.friction_under(Validity::Physical)]);
         self.numbers(object.centre_of_mass.to_array());
-    }
-
-    /// Everything but the name, which does not affect grips.
-    fn rig(&mut self, rig: &Rig) {
-        self.0.update([u8::from(rig.handedness == Handedness::Right)]);
-        self.numbers(rig.palm.to_array());
-        self.numbers([rig.reach]);
-        for digit in &rig.digits {
-            self.digit(digit);
-        }
-        for start in rig.finger_metacarpals {
-            self.numbers(start.to_array());
-        }
-        for Segment { start, end } in rig.palm_segments {
-            self.numbers(start.to_array());
-            self.numbers(end.to_array());
-        }
-        self.numbers(rig.joint_radii);
-    }
-
-    fn digit(&mut self, digit: &DigitRig) {
-        let Pose {
-            position,
-            orientation,
-        } = digit.wrist_from_base;
-        self.numbers(position.to_array());
-        self.numbers(orientation.to_array());
-        self.numbers([digit.yaw_sign]);
-        self.numbers(digit.lengths);
-        self.numbers(digit.diameters);
-        let limits = &digit.limits;
-        for AngleRange { min, max } in [
-            limits.base_yaw,
-            limits.base_pitch,
-            limits.second_pitch,
-            limits.third_pitch,
-        ] {
-            self.numbers([min, max]);
-        }
     }
 }

@@ -125,7 +125,7 @@ impl PlacementCaches {
             let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let found = slots
                 .iter()
-                .find(|(slot_rig, by, _)| *by == mechanisms && slot_rig.ptr_eq(rig));
+                .find(|(slot_rig, by, _)| *by == mechanisms && slot_rig == rig);
             if let Some((_, _, slot)) = found {
                 Arc::clone(slot)
             } else {

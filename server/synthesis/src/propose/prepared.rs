@@ -5,6 +5,8 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
+use sha2::{Digest as _, Sha256};
+
 use super::{
     holdable::HoldableSurface,
     opposition::Oppositions,
@@ -16,13 +18,16 @@ use crate::{
     model::{hand::rig::Rig, object::GraspObject},
 };
 
-/// A rig and its oppositions, which are sampled on first use. Clones share both.
+/// A rig and its oppositions, which are sampled on first use. Clones share both. Two are equal if their rigs make the same
+/// grips, whatever their names.
 #[derive(Clone, Debug)]
 pub struct PreparedRig(Arc<RigParts>);
 
 #[derive(Debug)]
 struct RigParts {
     rig: Rig,
+    /// SHA-256 of the rig's content.
+    hash: [u8; 32],
     oppositions: OnceLock<Oppositions>,
 }
 
@@ -30,6 +35,7 @@ impl PreparedRig {
     /// Wraps a rig; its oppositions are sampled on first use.
     pub fn new(rig: Rig) -> Self {
         Self(Arc::new(RigParts {
+            hash: Sha256::digest(rig.content()).into(),
             rig,
             oppositions: OnceLock::new(),
         }))
@@ -44,12 +50,15 @@ impl PreparedRig {
     pub fn is_derived(&self) -> bool {
         self.0.oppositions.get().is_some()
     }
+}
 
-    /// True if both are clones of the same prepared rig.
-    pub(super) fn ptr_eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
+impl PartialEq for PreparedRig {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) || self.0.hash == other.0.hash
     }
 }
+
+impl Eq for PreparedRig {}
 
 impl Deref for PreparedRig {
     type Target = Rig;

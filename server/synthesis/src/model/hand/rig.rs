@@ -94,6 +94,42 @@ impl Rig {
         self.digits[digit.index()].lengths[phalanx.index()]
     }
 
+    /// Its numbers as little-endian bytes: everything but the name, which does not affect grips. Equal rigs have equal bytes.
+    pub fn content(&self) -> Vec<u8> {
+        let mut numbers: Vec<f32> = Vec::with_capacity(256);
+        numbers.extend(self.palm.to_array());
+        numbers.push(self.reach);
+        for digit in &self.digits {
+            let Pose {
+                position,
+                orientation,
+            } = digit.wrist_from_base;
+            numbers.extend(position.to_array());
+            numbers.extend(orientation.to_array());
+            numbers.push(digit.yaw_sign);
+            numbers.extend(digit.lengths);
+            numbers.extend(digit.diameters);
+            let limits = &digit.limits;
+            for AngleRange { min, max } in [
+                limits.base_yaw,
+                limits.base_pitch,
+                limits.second_pitch,
+                limits.third_pitch,
+            ] {
+                numbers.extend([min, max]);
+            }
+        }
+        numbers.extend(self.finger_metacarpals.iter().flat_map(Vec3::to_array));
+        for Segment { start, end } in self.palm_segments {
+            numbers.extend(start.to_array());
+            numbers.extend(end.to_array());
+        }
+        numbers.extend(self.joint_radii);
+        let handedness = u8::from(self.handedness == Handedness::Right);
+        let numbers = numbers.iter().flat_map(|number| number.to_le_bytes());
+        std::iter::once(handedness).chain(numbers).collect()
+    }
+
     /// The angles of the stretched hand, in radians: each as close to zero as its limits allow.
     pub fn stretched(&self) -> [DigitAngles; 5] {
         self.digits.map(|digit| DigitAngles {
