@@ -205,14 +205,22 @@ impl Violations {
         }
     }
 
-    pub(crate) fn into_result(mut self) -> Result<(), Vec<ImportError>> {
+    /// Number of violations.
+    pub(crate) fn len(&self) -> usize {
+        self.listed.len() + self.more
+    }
+
+    pub(crate) fn into_errors(mut self) -> Vec<ImportError> {
         if self.more > 0 {
             self.listed.push(ImportError::More(self.more));
         }
-        if self.listed.is_empty() {
-            Ok(())
-        } else {
-            Err(self.listed)
+        self.listed
+    }
+
+    pub(crate) fn into_result(self) -> Result<(), Vec<ImportError>> {
+        match self.into_errors() {
+            none if none.is_empty() => Ok(()),
+            errors => Err(errors),
         }
     }
 }

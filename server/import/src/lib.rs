@@ -1,4 +1,5 @@
-//! Reads meshes from untrusted bytes: OBJ, STL, PLY, and glTF with its buffers inside, recognised by their content.
+//! Reads meshes and hands' rigs from untrusted bytes: OBJ, STL, PLY, and glTF with its buffers inside, recognised by their
+//! content.
 //!
 //! One module per format. Each reader is given [`MeshLimits`] and keeps to them:
 //! - Memory stays proportional to the bytes within the limits, whatever counts and sizes the file claims.
@@ -24,6 +25,7 @@ mod ply;
 mod polygon;
 mod polygon_twins;
 mod raw;
+mod rig;
 mod stl;
 mod weld;
 mod winding;
@@ -34,6 +36,7 @@ use grasp_synthesis::geometry::mesh::TriangleMesh;
 pub use error::ImportError;
 pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
 pub use obj::MAX_NAMES_PER_LINE;
+pub use rig::{Binding, ImportedHand, ImportedRig, MappedJoint, PosedNode, RigSource, read_rig, rig_at_rest};
 
 use format::Format;
 use raw::check_counts;

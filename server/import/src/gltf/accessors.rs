@@ -15,7 +15,7 @@ const READS: u64 = 16;
 
 /// The bytes of a document's buffers.
 #[derive(Debug)]
-pub(super) struct Buffers<'a> {
+pub(crate) struct Buffers<'a> {
     buffers: Vec<Cow<'a, [u8]>>,
     /// Elements that may still be read: scenes can ask for the same ones again and again.
     left: Cell<u64>,
@@ -31,7 +31,7 @@ impl<'a> Buffers<'a> {
     }
 
     /// Counts elements that are about to be read.
-    pub(super) fn spend(&self, elements: u64) -> Result<(), ImportError> {
+    pub(crate) fn spend(&self, elements: u64) -> Result<(), ImportError> {
         let left = self.left.get().checked_sub(elements.saturating_add(1));
         self.left.set(left.ok_or_else(|| {
             ImportError::at(
@@ -44,7 +44,7 @@ impl<'a> Buffers<'a> {
 
     /// The first `count` elements of an accessor of `N` components as numbers; integers that stand for fractions become those.
     /// Memory grows with `count`, not with what the accessor claims.
-    pub(super) fn numbers<const N: usize>(
+    pub(crate) fn numbers<const N: usize>(
         &self,
         accessor: &Accessor<'_>,
         count: usize,

@@ -24,8 +24,8 @@ use crate::{
     limits::MeshLimits,
     raw::{Places, RawMesh},
 };
-use accessors::Buffers;
-use nodes::Scene;
+pub(crate) use accessors::Buffers;
+pub(crate) use nodes::Scene;
 
 /// Largest number of validation errors that are listed.
 const LISTED_ERRORS: usize = 16;
@@ -44,6 +44,31 @@ const HARMLESS: &[&str] = &[
 
 /// Reads the default scene, or the first one; all nodes if there is none.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+    let Opened {
+        document, buffers, ..
+    } = open(bytes, limits)?;
+    let mut raw = RawMesh {
+        places: Places::Triangles,
+        ..RawMesh::default()
+    };
+    let scene = Scene::of(&document);
+    primitives::read_into(&mut raw, &scene, &document, &buffers, limits).map_err(|error| vec![error])?;
+    Ok(raw)
+}
+
+/// A validated document with the bytes that it refers to.
+#[derive(Debug)]
+pub(crate) struct Opened<'a> {
+    /// Its text.
+    pub(crate) json: Cow<'a, [u8]>,
+    /// What has a shape.
+    pub(crate) document: Document,
+    /// Its buffers.
+    pub(crate) buffers: Buffers<'a>,
+}
+
+/// Opens and validates a document.
+pub(crate) fn open(bytes: &[u8], limits: MeshLimits) -> Result<Opened<'_>, Vec<ImportError>> {
     let Parts { json, binary } = parts(bytes).map_err(|error| vec![error])?;
     // Each object of the text takes some hundred bytes in memory, however short it is.
     let objects = json.split(|&byte| byte == b'{').count() - 1;
@@ -69,13 +94,11 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<Impo
     strip(&mut root);
     let document = Document::from_json(root).map_err(|error| invalid(&error))?;
     let buffers = decode(&document, binary, limits).map_err(|error| vec![error])?;
-    let mut raw = RawMesh {
-        places: Places::Triangles,
-        ..RawMesh::default()
-    };
-    let scene = Scene::of(&document);
-    primitives::read_into(&mut raw, &scene, &document, &buffers, limits).map_err(|error| vec![error])?;
-    Ok(raw)
+    Ok(Opened {
+        json,
+        document,
+        buffers,
+    })
 }
 
 /// The JSON of a scene, and the binary chunk of a GLB.

@@ -5,16 +5,19 @@ use gltf::{Document, Node, scene::Transform};
 
 /// The nodes of a scene.
 #[derive(Debug)]
-pub(super) struct Scene {
+#[expect(clippy::struct_field_names, reason = "transforms are named a_from_b")]
+pub(crate) struct Scene {
     /// The transform of each node, by index; of nodes in a cycle, their own.
-    pub(super) scene_from_node: Vec<DMat4>,
+    pub(crate) scene_from_node: Vec<DMat4>,
+    /// The parent of each node, by index.
+    pub(crate) parents: Vec<Option<usize>>,
     /// The nodes that the scene shows, each once, parents first.
-    pub(super) shown: Vec<usize>,
+    pub(crate) shown: Vec<usize>,
 }
 
 impl Scene {
     /// The default scene of a validated document, or its first one; all nodes if it has none.
-    pub(super) fn of(document: &Document) -> Self {
+    pub(crate) fn of(document: &Document) -> Self {
         let nodes: Vec<Node<'_>> = document.nodes().collect();
         let mut is_child = vec![false; nodes.len()];
         for child in nodes.iter().flat_map(Node::children) {
@@ -22,8 +25,10 @@ impl Scene {
         }
         let roots: Vec<usize> = (0..nodes.len()).filter(|&node| !is_child[node]).collect();
         let mut scene_from_node: Vec<DMat4> = nodes.iter().map(local).collect();
+        let mut parents = vec![None; nodes.len()];
         // Joints may be outside the scene.
         for (node, parent) in walk(&nodes, &roots) {
+            parents[node] = parent;
             if let Some(parent) = parent {
                 scene_from_node[node] = scene_from_node[parent] * scene_from_node[node];
             }
@@ -32,6 +37,7 @@ impl Scene {
         let start = scene.map_or(roots, |scene| scene.nodes().map(|node| node.index()).collect());
         Self {
             shown: walk(&nodes, &start).into_iter().map(|(node, _)| node).collect(),
+            parents,
             scene_from_node,
         }
     }

@@ -1,0 +1,206 @@
+//! Poses the nodes of the model that a rig was made from: local rotations that make its skin take the rig's pose.
+//!
+//! Each bone keeps its place relative to the rig's link that it was bound along, so that the skin follows the links whatever
+//! axes the model's nodes have.
+
+use glam::{DMat4, DQuat, DVec3, Quat, Vec3};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        joints::{JOINT_COUNT, index},
+        kinematics::{DigitFrames, HandFrames},
+        rig::{DigitRig, Rig},
+    },
+};
+
+use super::{hand_nodes::HandNodes, model::Model, rest::yaw_of};
+
+/// Relative change of a translation that counts as one.
+const TRANSLATION_TOLERANCE: f64 = 1e-4;
+
+/// What a node moves with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Bone {
+    /// The wrist and the bones of the palm.
+    Wrist,
+    /// A link of a digit.
+    Link(usize, usize),
+}
+
+impl Bone {
+    /// The bone of a joint.
+    fn of_joint(joint: usize) -> Self {
+        let digit = (0..5)
+            .find(|&digit| (index::TIP_OF_DIGIT[digit] - 3..=index::TIP_OF_DIGIT[digit]).contains(&joint));
+        digit.map_or(Self::Wrist, |digit| {
+            let link = joint + 3 - index::TIP_OF_DIGIT[digit];
+            Self::Link(digit, link.min(2))
+        })
+    }
+
+    /// Its frame among those of a hand.
+    fn frame(self, frames: &HandFrames) -> Pose {
+        match self {
+            Self::Wrist => frames.wrist,
+            Self::Link(digit, link) => frames.digits[digit].links[link],
+        }
+    }
+}
+
+/// A node that is a joint of the hand.
+#[derive(Clone, Debug)]
+struct BoundNode {
+    name: String,
+    joint: usize,
+    bone: Bone,
+    parent: Bone,
+    /// The bound hand's wrist in the frame of the node's parent.
+    parent_from_wrist: DMat4,
+    wrist_from_node: DMat4,
+    /// The node's translation when nothing has moved, in its parent.
+    translation: DVec3,
+}
+
+/// The nodes of a hand and how they are bound to its rig.
+#[derive(Clone, Debug)]
+pub struct Binding {
+    root: String,
+    wrist_from_root: Pose,
+    /// The bound hand, with the wrist at the origin.
+    bound: HandFrames,
+    nodes: Vec<BoundNode>,
+}
+
+/// A node's place in its parent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PosedNode<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its rotation.
+    pub rotation: Quat,
+    /// Its translation in the units of the file, if it is not what the file has.
+    pub translation: Option<Vec3>,
+}
+
+impl Binding {
+    /// Binds the nodes of a hand to its rig. `scene_from_wrist` is the rig's wrist, `joints` are the joints at rest in its frame.
+    pub(super) fn new(
+        model: &Model,
+        hand: &HandNodes,
+        scene_from_mesh: DMat4,
+        rig: &Rig,
+        (scene_from_wrist, joints): (Pose, &[Vec3; JOINT_COUNT]),
+    ) -> Self {
+        let scene_from_wrist = DMat4::from_rotation_translation(
+            scene_from_wrist.orientation.as_dquat(),
+            scene_from_wrist.position.as_dvec3(),
+        );
+        let wrist_from_scene = scene_from_wrist.inverse();
+        let joint_of = |node: usize| hand.joints.iter().position(|&other| other == Some(node));
+        let bone_of = |node: usize| {
+            let nearest = model.nearest(node, |node| joint_of(node).is_some());
+            nearest.and_then(joint_of).map_or(Bone::Wrist, Bone::of_joint)
+        };
+        let root = root(model, hand);
+        let nodes = hand.joints.iter().enumerate().filter_map(|(joint, node)| {
+            let node = (*node)?;
+            let parent = model.parents[node].filter(|_| node != root)?;
+            let rest = model.scene_from_node[parent].inverse() * model.scene_from_node[node];
+            Some(BoundNode {
+                name: model.names[node].clone(),
+                joint,
+                bone: Bone::of_joint(joint),
+                parent: bone_of(parent),
+                parent_from_wrist: model.bound(parent, scene_from_mesh).inverse() * scene_from_wrist,
+                wrist_from_node: wrist_from_scene * model.bound(node, scene_from_mesh),
+                translation: rest.w_axis.truncate(),
+            })
+        });
+        let (_, orientation, position) =
+            (wrist_from_scene * model.bound(root, scene_from_mesh)).to_scale_rotation_translation();
+        Self {
+            root: model.names[root].clone(),
+            wrist_from_root: Pose::new(position.as_vec3(), orientation.as_quat().normalize()),
+            bound: bound_frames(rig, joints),
+            nodes: nodes.collect(),
+        }
+    }
+
+    /// The name of the node that all others are below: the hand's own or, in a flat hierarchy, their parent.
+    pub fn root(&self) -> &str {
+        &self.root
+    }
+
+    /// The names of the nodes and the `OpenXR` indices of their joints.
+    pub fn joints(&self) -> impl Iterator<Item = (&str, usize)> {
+        self.nodes.iter().map(|node| (node.name.as_str(), node.joint))
+    }
+
+    /// The root's frame in that of the pose. `scale` is how much larger the posed rig is than the one of the model.
+    pub fn frame_from_root(&self, frames: &HandFrames, scale: f32) -> Pose {
+        let Pose {
+            position,
+            orientation,
+        } = self.wrist_from_root;
+        frames.wrist * Pose::new(scale * position, orientation)
+    }
+
+    /// The nodes of a posed rig, which is `scale` times as large as the one of the model.
+    pub fn posed(&self, frames: &HandFrames, scale: f32) -> impl Iterator<Item = PosedNode<'_>> {
+        self.nodes.iter().map(move |node| {
+            let bound = |bone: Bone| bone.frame(&self.bound);
+            let mut moved = node.parent.frame(frames).inverse() * node.bone.frame(frames);
+            moved.position /= scale;
+            let moved = bound(node.parent) * moved * bound(node.bone).inverse();
+            let moved =
+                DMat4::from_rotation_translation(moved.orientation.as_dquat(), moved.position.as_dvec3());
+            let parent_from_node = node.parent_from_wrist * moved * node.wrist_from_node;
+            let (_, rotation, translation): (_, DQuat, _) = parent_from_node.to_scale_rotation_translation();
+            let change = translation.distance(node.translation);
+            let is_changed = change > TRANSLATION_TOLERANCE * node.translation.length();
+            PosedNode {
+                name: &node.name,
+                rotation: rotation.normalize().as_quat(),
+                translation: is_changed.then(|| translation.as_vec3()),
+            }
+        })
+    }
+}
+
+/// The lowest node that is or is above every joint of the hand.
+fn root(model: &Model, hand: &HandNodes) -> usize {
+    let mut joints = hand.joints.iter().flatten().copied();
+    let first = joints.next().unwrap_or_default();
+    joints.fold(first, |root, joint| {
+        let is_above_joint = |node| model.nearest(joint, |above| above == node).is_some();
+        model.nearest(root, is_above_joint).unwrap_or(root)
+    })
+}
+
+/// The frames of a rig's links along the joints at rest, with the wrist at the origin.
+fn bound_frames(rig: &Rig, joints: &[Vec3; JOINT_COUNT]) -> HandFrames {
+    HandFrames {
+        wrist: Pose::IDENTITY,
+        digits: std::array::from_fn(|digit| {
+            let tip = index::TIP_OF_DIGIT[digit];
+            bound_digit(&rig.digits[digit], [3, 2, 1, 0].map(|place| joints[tip - place]))
+        }),
+    }
+}
+
+fn bound_digit(chain: &DigitRig, points: [Vec3; 4]) -> DigitFrames {
+    let along = |link: usize| (points[link + 1] - points[link]).normalize_or(Vec3::Y);
+    let yaw = chain.yaw_sign * yaw_of(chain, along(0));
+    let mut orientation = chain.wrist_from_base.orientation * Quat::from_rotation_z(yaw);
+    let links = std::array::from_fn(|link| {
+        let local = orientation.inverse() * along(link);
+        // Bends by pitch as far as that can follow the bone, and turns the rest of the way.
+        let bent = orientation * Quat::from_rotation_x(local.z.atan2(local.y));
+        orientation = (Quat::from_rotation_arc(bent * Vec3::Y, along(link)) * bent).normalize();
+        Pose::new(points[link], orientation)
+    });
+    DigitFrames {
+        links,
+        tip: points[3],
+    }
+}

@@ -1,0 +1,255 @@
+//! Finds the nodes of a model that are the joints of its hands.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use grasp_synthesis::model::hand::{
+    Handedness,
+    joints::{JOINT_COUNT, JOINT_NAMES, index},
+};
+
+use super::{
+    MappedJoint,
+    model::Model,
+    names::{self, NodeName, Part, Segment},
+    vrm::VrmJoint,
+};
+use crate::error::{ImportError, Violations};
+
+/// The nodes of a hand's joints.
+#[derive(Clone, Debug)]
+pub(super) struct HandNodes {
+    pub(super) side: Handedness,
+    /// By `OpenXR` index.
+    pub(super) joints: [Option<usize>; JOINT_COUNT],
+}
+
+/// Joints without which a hand cannot be posed; tips and the fingers' metacarpals are derived, and the palm is no node.
+pub(super) fn is_required(joint: usize) -> bool {
+    let is_metacarpal = index::FIRST_OF_DIGIT[1..].contains(&joint);
+    joint != index::PALM && !index::TIP_OF_DIGIT.contains(&joint) && !is_metacarpal
+}
+
+/// "left hand" or "right hand".
+pub(super) fn hand_name(side: Handedness) -> &'static str {
+    match side {
+        Handedness::Left => "left hand",
+        Handedness::Right => "right hand",
+    }
+}
+
+/// The hands of a model: by the map, by the extension of VRM if there is one, and otherwise by names. Adds a violation for
+/// every required joint that is missing.
+pub(super) fn hand_nodes(
+    model: &Model,
+    vrm: Option<&[VrmJoint]>,
+    map: &[MappedJoint],
+    side: Option<Handedness>,
+    violations: &mut Violations,
+) -> Vec<HandNodes> {
+    let mut hands = [Handedness::Left, Handedness::Right].map(|side| HandNodes {
+        side,
+        joints: [None; JOINT_COUNT],
+    });
+    match vrm {
+        Some(joints) => {
+            for joint in joints {
+                if joint.node < model.names.len() {
+                    hand_mut(&mut hands, joint.side).joints[joint.joint] = Some(joint.node);
+                }
+            }
+        }
+        None => by_names(model, side, &mut hands),
+    }
+    for (place, mapped) in map.iter().enumerate() {
+        apply(model, mapped, place, side, &mut hands, violations);
+    }
+    for hand in &mut hands {
+        if hand.joints[index::WRIST].is_none() {
+            hand.joints[index::WRIST] = common_ancestor(model, &hand.joints);
+        }
+    }
+    let has_digits = |hand: &HandNodes| {
+        let count = hand.joints.iter().flatten().count();
+        count > usize::from(hand.joints[index::WRIST].is_some())
+    };
+    let found: Vec<HandNodes> = hands.into_iter().filter(has_digits).collect();
+    if found.is_empty() {
+        violations.push(ImportError::at(
+            "the model",
+            "has no nodes with the names of a hand's joints (WebXR, OpenXR, VRM, Unity, Mixamo, Unreal, MANO and Quest are \
+             known); name them in joint_map, and the hand in handedness if the names do not say which it is",
+        ));
+    }
+    for hand in &found {
+        check(model, hand, violations);
+    }
+    found
+}
+
+fn hand_mut(hands: &mut [HandNodes; 2], side: Handedness) -> &mut HandNodes {
+    match side {
+        Handedness::Left => &mut hands[0],
+        Handedness::Right => &mut hands[1],
+    }
+}
+
+/// The nodes with the names of joints. Of several for a joint, those that move a skin come first, then the shallowest.
+fn by_names(model: &Model, side: Option<Handedness>, hands: &mut [HandNodes; 2]) {
+    let mut read: Vec<(usize, NodeName)> = model
+        .names
+        .iter()
+        .enumerate()
+        .filter_map(|(node, name)| Some((node, names::read(name)?)))
+        .collect();
+    let is_sided =
+        |(_, name): &(usize, NodeName)| name.side.is_some() && matches!(name.part, Part::Segment(..));
+    let has_sides = read.iter().any(is_sided);
+    for (_, name) in &mut read {
+        if !has_sides {
+            name.side = side;
+        }
+    }
+    read.sort_by_cached_key(|&(node, _)| (!model.moves_skin(node), model.depth(node), node));
+    for hand in hands {
+        let own: Vec<(usize, Part)> = read
+            .iter()
+            .filter(|(_, name)| name.side == Some(hand.side))
+            .map(|&(node, name)| (node, name.part))
+            .collect();
+        let mut segments: BTreeMap<usize, Vec<Segment>> = BTreeMap::new();
+        for (_, part) in &own {
+            if let Part::Segment(digit, segment) = *part {
+                segments.entry(digit.index()).or_default().push(segment);
+            }
+        }
+        for &(node, part) in &own {
+            if let Part::Segment(digit, segment) = part
+                && let Some(joint) = names::joint(digit, segment, &segments[&digit.index()])
+            {
+                let _ = hand.joints[joint].get_or_insert(node);
+            }
+        }
+        let above = ancestors_of_all(model, &hand.joints);
+        let wrists = own.iter().filter(|(_, part)| *part == Part::Wrist);
+        // The nearest one above the digits or, in a flat hierarchy, any.
+        hand.joints[index::WRIST] = wrists
+            .map(|&(node, _)| node)
+            .max_by_key(|node| (above.contains(node), model.moves_skin(*node), model.depth(*node)));
+    }
+}
+
+/// Nodes above all of some joints.
+fn ancestors_of_all(model: &Model, joints: &[Option<usize>; JOINT_COUNT]) -> BTreeSet<usize> {
+    let above = |node: usize| -> BTreeSet<usize> {
+        std::iter::successors(model.parents[node], |&node| model.parents[node]).collect()
+    };
+    let mut all = joints.iter().flatten().map(|&node| above(node));
+    let first = all.next().unwrap_or_default();
+    all.fold(first, |common, above| {
+        common.intersection(&above).copied().collect()
+    })
+}
+
+/// The lowest node above all joints.
+fn common_ancestor(model: &Model, joints: &[Option<usize>; JOINT_COUNT]) -> Option<usize> {
+    let above = ancestors_of_all(model, joints);
+    above.into_iter().max_by_key(|&node| model.depth(node))
+}
+
+/// Applies one entry of a client's map.
+fn apply(
+    model: &Model,
+    mapped: &MappedJoint,
+    place: usize,
+    side: Option<Handedness>,
+    hands: &mut [HandNodes; 2],
+    violations: &mut Violations,
+) {
+    let wrong = |what: String| ImportError::at(format!("joint_map[{place}]"), what);
+    let joint = names::joint_named(&mapped.joint).filter(|&joint| joint != index::PALM);
+    let node = model.names.iter().position(|name| *name == mapped.node);
+    let named_side = names::read(&mapped.node).and_then(|name| name.side);
+    let side = mapped.side.or(side).or(named_side);
+    if joint.is_none() {
+        violations.push(wrong(format!(
+            "maps to {:?}, which is no joint; the joints are {}",
+            shortened(&mapped.joint),
+            JOINT_NAMES[1..].join(", ")
+        )));
+    }
+    if node.is_none() {
+        violations.push(wrong(format!(
+            "names the node {:?}, which the model does not have",
+            shortened(&mapped.node)
+        )));
+    }
+    if side.is_none() {
+        violations.push(wrong(format!(
+            "does not say of which hand {:?} is; set its handedness",
+            shortened(&mapped.node)
+        )));
+    }
+    if let (Some(joint), Some(node), Some(side)) = (joint, node, side) {
+        hand_mut(hands, side).joints[joint] = Some(node);
+    }
+}
+
+/// The start of a text, for messages.
+pub(super) fn shortened(text: &str) -> String {
+    text.chars().take(80).collect()
+}
+
+/// Adds a violation for every required joint that is missing, and for nodes that are two joints or not below one another.
+fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
+    let name = hand_name(hand.side);
+    for (joint, node) in hand.joints.iter().enumerate() {
+        if node.is_none() && is_required(joint) {
+            violations.push(ImportError::at(
+                format!("{name}, {}", JOINT_NAMES[joint]),
+                "is missing: no node has its name. Hands with fewer than five digits cannot be posed; if it is there under \
+                 another name, give that in joint_map",
+            ));
+        }
+    }
+    for (place, node) in hand.joints.iter().enumerate() {
+        let Some(node) = *node else { continue };
+        let joint = JOINT_NAMES[place];
+        if let Some(other) = hand.joints[..place].iter().position(|&other| other == Some(node)) {
+            violations.push(ImportError::at(
+                format!("{name}, {joint}"),
+                format!(
+                    "is the node {:?}, which is {}, too; each joint needs a node of its own",
+                    shortened(&model.names[node]),
+                    JOINT_NAMES[other]
+                ),
+            ));
+            continue;
+        }
+        // Of the joints of one digit, none may be below one that is farther out. Flat hierarchies are allowed.
+        let above = model.parents[node]
+            .and_then(|parent| model.nearest(parent, |node| hand.joints.contains(&Some(node))));
+        let above = above.and_then(|above| hand.joints.iter().position(|&other| other == Some(above)));
+        if let Some(above) = above.filter(|&above| !may_be_above(above, place)) {
+            violations.push(ImportError::at(
+                format!("{name}, {joint}"),
+                format!(
+                    "is below {}; the joints must form a tree from the wrist to the tips, as in a hand",
+                    JOINT_NAMES[above]
+                ),
+            ));
+        }
+    }
+}
+
+/// True if a joint may hang below another: on the wrist, on the same digit nearer to the wrist, or on the palm's bones.
+fn may_be_above(above: usize, joint: usize) -> bool {
+    let digit = |joint: usize| {
+        (0..5).find(|&digit| (index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]).contains(&joint))
+    };
+    if joint == index::WRIST {
+        return false;
+    }
+    above == index::WRIST
+        || digit(above) == digit(joint) && above < joint
+        || index::FIRST_OF_DIGIT[1..].contains(&above) && digit(above) != digit(joint)
+}

@@ -1,0 +1,316 @@
+//! Makes rigs of hands from models (GLB, glTF or VRM with a skinned hand or a whole character) and from joints at rest.
+//!
+//! [`hand_nodes`] finds the joints among the model's nodes, [`rest`] places a reference hand's axes and limits on them,
+//! [`radii`] measures the skin, and [`binding`] later poses the model's nodes like the rig. Right hands are made; the joints of
+//! left ones are mirrored first.
+
+mod binding;
+mod hand_nodes;
+mod model;
+mod names;
+mod radii;
+mod rest;
+mod vrm;
+
+use std::collections::HashMap;
+
+use glam::{DMat4, DVec4, Vec3};
+use grasp_synthesis::model::hand::{
+    Handedness,
+    joints::{HandJoints, JOINT_COUNT, index},
+    rig::{DigitLimits, Rig},
+};
+
+pub use binding::{Binding, PosedNode};
+
+use crate::{
+    error::{ImportError, Violations},
+    format::Format,
+    gltf::{self, Scene},
+    limits::MeshLimits,
+};
+use hand_nodes::{HandNodes, hand_name, hand_nodes};
+use model::Model;
+use radii::{SkinVertex, Widths};
+use rest::{RestJoints, Skeleton};
+
+/// Most nodes of a model: characters have some hundreds.
+const MOST_NODES: usize = 10_000;
+
+/// Largest difference of a hand's scale along its axes, as a share.
+const UNEVEN_SCALE: f64 = 0.02;
+
+/// A node of a model that is a joint.
+#[derive(Clone, Debug)]
+pub struct MappedJoint {
+    /// The node's name.
+    pub node: String,
+    /// The hand; if absent, that of [`RigSource::side`] or of the node's name.
+    pub side: Option<Handedness>,
+    /// The joint's name in `WebXR`.
+    pub joint: String,
+}
+
+/// What a rig is made from beside the file or joints.
+#[derive(Clone, Copy, Debug)]
+pub struct RigSource<'a> {
+    /// The rig's name.
+    pub name: &'a str,
+    /// The right hand whose axes, limits and, where nothing else is known, proportions it takes.
+    pub reference: &'a Rig,
+    /// The hand that a model shows if its names do not say.
+    pub side: Option<Handedness>,
+    /// Nodes whose joints are given, which go before names.
+    pub joint_map: &'a [MappedJoint],
+    /// The limits of the joints, thumb first; absent: the reference's.
+    pub limits: Option<[DigitLimits; 5]>,
+}
+
+/// A hand of a rig.
+#[derive(Clone, Debug)]
+pub struct ImportedHand {
+    /// Its bones, limits and widths.
+    pub rig: Rig,
+    /// The nodes of the model; none for a hand that is the other one's mirror image or was not made from a model.
+    pub binding: Option<Binding>,
+    /// True if it is the other hand's mirror image.
+    pub is_mirrored: bool,
+}
+
+/// Both hands.
+#[derive(Clone, Debug)]
+pub struct ImportedRig {
+    /// The left hand.
+    pub left: ImportedHand,
+    /// The right hand.
+    pub right: ImportedHand,
+}
+
+/// Reads the hands of a model. The other hand of a model with one is its mirror image.
+///
+/// # Errors
+/// Every violation; see [`ImportError`]. Beyond 16 they are only counted.
+pub fn read_rig(
+    bytes: &[u8],
+    source: RigSource<'_>,
+    limits: MeshLimits,
+) -> Result<ImportedRig, Vec<ImportError>> {
+    if bytes.len() > limits.bytes {
+        return Err(vec![ImportError::TooLong {
+            bytes: bytes.len(),
+            limit: limits.bytes,
+        }]);
+    }
+    if Format::of(bytes) != Format::Gltf {
+        return Err(vec![ImportError::at(
+            "the model",
+            "is no glTF; a hand is required as GLB, glTF or VRM",
+        )]);
+    }
+    let limits = limits.unwelded();
+    let opened = gltf::open(bytes, limits)?;
+    let nodes = opened.document.nodes().len();
+    if nodes > MOST_NODES {
+        return Err(vec![ImportError::TooMany {
+            what: "nodes",
+            found: nodes as u64,
+            limit: MOST_NODES,
+        }]);
+    }
+    let scene = Scene::of(&opened.document);
+    let shown = scene.shown.clone();
+    let model = Model::of(&opened, scene).map_err(|error| vec![error])?;
+    let mut violations = Violations::default();
+    let vrm = vrm::joints(&opened.json);
+    let hands = hand_nodes(
+        &model,
+        vrm.as_deref(),
+        source.joint_map,
+        source.side,
+        &mut violations,
+    );
+    if violations.len() > 0 {
+        return Err(violations.into_errors());
+    }
+    let mut read = Vec::new();
+    for hand in &hands {
+        let joints = SkinJoints::new(&model, hand);
+        let vertices = model::vertices(
+            &opened.document,
+            &opened.buffers,
+            &shown,
+            |node| joints.of(node).is_some(),
+            limits,
+        );
+        let vertices = vertices.map_err(|error| vec![error])?;
+        if let Some(hand) = read_hand(&model, hand, &joints, &vertices, source, &mut violations) {
+            read.push(hand);
+        }
+    }
+    violations.into_result()?;
+    Ok(both(&read))
+}
+
+/// Makes a rig of the joints of one or both hands, flat and at rest, in any frame and in metres.
+///
+/// # Errors
+/// Every violation; see [`ImportError`].
+pub fn rig_at_rest(hands: &[HandJoints], source: RigSource<'_>) -> Result<ImportedRig, Vec<ImportError>> {
+    let mut violations = Violations::default();
+    let made: Vec<ImportedHand> = hands
+        .iter()
+        .filter_map(|hand| {
+            let rest = RestJoints {
+                side: hand.handedness,
+                positions: hand
+                    .joints
+                    .map(|joint| Some(as_right(hand.handedness, joint.pose.position))),
+            };
+            let skeleton = Skeleton::new(&rest, source.reference, &mut violations)?;
+            let widths = Widths {
+                radii: hand.joints.map(|joint| joint.radius),
+                tips: [None; 5],
+            };
+            let rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
+            Some(ImportedHand {
+                rig: of_side(hand.handedness, rig),
+                binding: None,
+                is_mirrored: false,
+            })
+        })
+        .collect();
+    violations.into_result()?;
+    Ok(both(&made))
+}
+
+/// A position of a hand as of a right hand.
+fn as_right(side: Handedness, position: Vec3) -> Vec3 {
+    match side {
+        Handedness::Left => position * Vec3::new(-1.0, 1.0, 1.0),
+        Handedness::Right => position,
+    }
+}
+
+/// A right hand's rig as one of a side.
+fn of_side(side: Handedness, rig: Rig) -> Rig {
+    match side {
+        Handedness::Left => rig.mirrored(),
+        Handedness::Right => rig,
+    }
+}
+
+/// Both hands of a rig, of which at least one was made.
+fn both(hands: &[ImportedHand]) -> ImportedRig {
+    let of = |side: Handedness| {
+        let own = hands.iter().find(|hand| hand.rig.handedness == side);
+        own.cloned().unwrap_or_else(|| ImportedHand {
+            rig: hands[0].rig.mirrored(),
+            binding: None,
+            is_mirrored: true,
+        })
+    };
+    ImportedRig {
+        left: of(Handedness::Left),
+        right: of(Handedness::Right),
+    }
+}
+
+/// The joint that each node of a model belongs to: its own, or that of the nearest node above it, up to the wrist.
+struct SkinJoints(HashMap<usize, usize>);
+
+impl SkinJoints {
+    fn new(model: &Model, hand: &HandNodes) -> Self {
+        let joint_of = |node: usize| hand.joints.iter().position(|&other| other == Some(node));
+        let of_node = (0..model.names.len()).filter_map(|node| {
+            let nearest = model.nearest(node, |node| joint_of(node).is_some())?;
+            Some((node, joint_of(nearest)?))
+        });
+        Self(of_node.collect())
+    }
+
+    fn of(&self, node: usize) -> Option<usize> {
+        self.0.get(&node).copied()
+    }
+}
+
+fn read_hand(
+    model: &Model,
+    hand: &HandNodes,
+    joints: &SkinJoints,
+    vertices: &[model::BoundVertex],
+    source: RigSource<'_>,
+    violations: &mut Violations,
+) -> Option<ImportedHand> {
+    let wrist = hand.joints[index::WRIST]?;
+    let anchor = if model.moves_skin(wrist) {
+        wrist
+    } else {
+        // A wrist without vertices is where the first bone of the hand puts it.
+        let skinned = hand.joints.iter().flatten().find(|&&node| model.moves_skin(node));
+        *skinned.unwrap_or(&wrist)
+    };
+    let scene_from_mesh = model.scene_from_mesh(anchor);
+    check_scale(model.bound(wrist, scene_from_mesh), hand.side, violations)?;
+    let mut positions = [None; JOINT_COUNT];
+    for (position, node) in positions.iter_mut().zip(hand.joints) {
+        let bound = node.map(|node| model.bound(node, scene_from_mesh).w_axis.truncate());
+        *position = bound.map(|bound| as_right(hand.side, bound.as_vec3()));
+    }
+    let rest = RestJoints {
+        side: hand.side,
+        positions,
+    };
+    let skeleton = Skeleton::new(&rest, source.reference, violations)?;
+    let wrist_from_scene = skeleton.frame_from_wrist.inverse();
+    let skin: Vec<SkinVertex> = vertices
+        .iter()
+        .filter_map(|vertex| {
+            let position = scene_from_mesh.transform_point3(vertex.position).as_vec3();
+            let position = wrist_from_scene.transform_point(as_right(hand.side, position));
+            let joint = joints.of(vertex.node)?;
+            position.is_finite().then_some(SkinVertex { joint, position })
+        })
+        .collect();
+    let widths = Widths::of(&skin, &skeleton, source.reference);
+    let rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
+    let rig = of_side(hand.side, rig);
+    let at_rest = skeleton.joints.map(|joint| as_right(hand.side, joint));
+    let scene_from_wrist = match hand.side {
+        Handedness::Left => skeleton.frame_from_wrist.mirrored_x(),
+        Handedness::Right => skeleton.frame_from_wrist,
+    };
+    let binding = Binding::new(model, hand, scene_from_mesh, &rig, (scene_from_wrist, &at_rest));
+    Some(ImportedHand {
+        rig,
+        binding: Some(binding),
+        is_mirrored: false,
+    })
+}
+
+/// Refuses hands that are scaled unevenly or mirrored: their bones would not turn as rigid ones.
+fn check_scale(bound: DMat4, side: Handedness, violations: &mut Violations) -> Option<()> {
+    let lengths = [bound.x_axis, bound.y_axis, bound.z_axis].map(DVec4::length);
+    let most = lengths.into_iter().fold(0.0, f64::max);
+    let least = lengths.into_iter().fold(f64::INFINITY, f64::min);
+    if !(least > 0.0 && most.is_finite()) {
+        violations.push(ImportError::at(
+            hand_name(side),
+            "has a scale of zero, or one that is not finite",
+        ));
+    } else if most > least * (1.0 + UNEVEN_SCALE) {
+        violations.push(ImportError::at(
+            hand_name(side),
+            format!(
+                "is scaled by {least:.4} to {most:.4} along its axes; the scale must be the same along all"
+            ),
+        ));
+    } else if bound.determinant() < 0.0 {
+        violations.push(ImportError::at(
+            hand_name(side),
+            "is mirrored by a negative scale; apply the scale in the program that made the model",
+        ));
+    } else {
+        return Some(());
+    }
+    None
+}

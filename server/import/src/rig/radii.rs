@@ -1,0 +1,211 @@
+//! How far the skin is from the joints, measured on the vertices that follow each bone.
+//!
+//! Medians are used throughout, so that nails, rings, seams and single stray vertices do not count.
+
+use glam::Vec3;
+use grasp_synthesis::model::hand::{
+    joints::{JOINT_COUNT, index},
+    rig::Rig,
+};
+
+use super::rest::Skeleton;
+
+/// The part of a bone's length on either side of a joint in which vertices count to the joint.
+const NEAR_JOINT: f32 = 0.3;
+
+/// The part of the last bone that shows the width of a fingertip.
+const TIP_BAND: [f32; 2] = [0.35, 0.85];
+
+/// Width of a fingertip relative to its last joint, as in the built-in rigs: where the search for it starts.
+const TIP_SHARE: f32 = 0.84;
+
+/// Fewest vertices for a width.
+const FEWEST: usize = 4;
+
+/// How much longer than expected a last bone may be; vertices farther out are strays, or long nails.
+const LONGEST_TIP: f32 = 1.5;
+
+/// The largest radius that counts, as a multiple of the reference's in a hand of the same size, and the smallest.
+const RADIUS_RANGE: [f32; 2] = [0.25, 3.0];
+
+/// A vertex in the wrist's frame of a right hand, with the joint that moves it most, as an `OpenXR` index.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SkinVertex {
+    pub(super) joint: usize,
+    pub(super) position: Vec3,
+}
+
+/// Distances from joints to the skin, and fingertips on the skin.
+#[derive(Clone, Debug)]
+pub(super) struct Widths {
+    /// By `OpenXR` index, in metres.
+    pub(super) radii: [f32; JOINT_COUNT],
+    /// Where the skin ends; none where no skin shows it.
+    pub(super) tips: [Option<Vec3>; 5],
+}
+
+impl Widths {
+    /// Of a hand without a skin: the reference's, made as large as the hand.
+    pub(super) fn like(reference: &Rig, size: f32) -> Self {
+        Self {
+            radii: reference.joint_radii.map(|radius| radius * size),
+            tips: [None; 5],
+        }
+    }
+
+    /// Measures a skin. Where it has too few vertices, the reference's widths count, scaled like the rest of the digit.
+    pub(super) fn of(skin: &[SkinVertex], skeleton: &Skeleton, reference: &Rig) -> Self {
+        let mut widths = Self::like(reference, skeleton.size);
+        if skin.is_empty() {
+            return widths;
+        }
+        for digit in 0..5 {
+            widths.measure_digit(digit, skin, skeleton);
+        }
+        widths.measure_palm(skin, skeleton);
+        widths
+    }
+
+    fn measure_digit(&mut self, digit: usize, skin: &[SkinVertex], skeleton: &Skeleton) {
+        let tip = index::TIP_OF_DIGIT[digit];
+        let base = tip - 3;
+        let of_joint = |joint: usize| {
+            skin.iter()
+                .filter(move |vertex| vertex.joint == joint || joint + 1 == tip && vertex.joint == tip)
+                .map(|vertex| vertex.position)
+        };
+        let end =
+            last_direction(of_joint(tip - 1), skeleton, tip).inspect(|&end| self.tips[digit] = Some(end));
+        let mut points = [0, 1, 2, 3].map(|place| skeleton.joints[base + place]);
+        points[3] = end.unwrap_or(points[3]);
+        let mut measured = [None; 4];
+        for place in 0..3_usize {
+            // The thumb's first joint is deep in the palm.
+            if digit == 0 && place == 0 {
+                continue;
+            }
+            // The ball of the thumb is no part of the finger that bends at its second joint.
+            let first = if digit == 0 { 1 } else { 0 };
+            let links = place.saturating_sub(1).max(first)..=place;
+            let distances = links.flat_map(|link| {
+                let (start, end) = (points[link], points[link + 1]);
+                let length = start.distance(end);
+                let window = NEAR_JOINT * length;
+                let joint = points[place];
+                of_joint(base + link).filter_map(move |vertex| {
+                    let axis = (end - start).normalize_or(Vec3::Y);
+                    let along = (vertex - joint).dot(axis);
+                    (along.abs() < window).then(|| (vertex - start).reject_from_normalized(axis).length())
+                })
+            });
+            measured[place] = median(distances.collect());
+        }
+        let around = measured[2].unwrap_or(self.radii[tip - 1]);
+        measured[3] = tip_radius(of_joint(tip - 1), [points[2], points[3]], around);
+        let expected = [0, 1, 2, 3].map(|place| self.radii[base + place]);
+        for place in 0..4 {
+            let [least, most] = RADIUS_RANGE.map(|share| share * expected[place]);
+            measured[place] = measured[place].filter(|radius| (least..=most).contains(radius));
+        }
+        // What the skin does not show is as thick, relative to the reference, as what it shows.
+        let ratios = measured.iter().zip(expected);
+        let ratio = middle(
+            ratios
+                .filter_map(|(radius, expected)| Some((*radius)? / expected))
+                .collect(),
+        );
+        let ratio = ratio.unwrap_or(1.0);
+        for place in 0..4 {
+            self.radii[base + place] = measured[place].unwrap_or(ratio * expected[place]);
+        }
+    }
+
+    fn measure_palm(&mut self, skin: &[SkinVertex], skeleton: &Skeleton) {
+        for joint in index::FIRST_OF_DIGIT.into_iter().chain([index::WRIST]) {
+            let mut distances: Vec<f32> = skin
+                .iter()
+                .map(|vertex| vertex.position.distance(skeleton.joints[joint]))
+                .collect();
+            // A few stray vertices inside do not count.
+            let place = FEWEST.min(distances.len()) - 1;
+            let (_, &mut nearest, _) = distances.select_nth_unstable_by(place, f32::total_cmp);
+            self.set_palm_radius(joint, nearest);
+        }
+        let middle = index::FIRST_OF_DIGIT[2];
+        let palm = skeleton.joints[middle].midpoint(skeleton.joints[middle + 1]);
+        let around = 0.5 * self.radii[index::PALM];
+        let depths = skin
+            .iter()
+            .map(|vertex| vertex.position - palm)
+            .filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
+        if let Some(depth) = median(depths.map(|offset| offset.z).collect()) {
+            self.set_palm_radius(index::PALM, depth);
+        }
+    }
+
+    fn set_palm_radius(&mut self, joint: usize, radius: f32) {
+        let [least, most] = RADIUS_RANGE.map(|share| share * self.radii[joint]);
+        if (least..=most).contains(&radius) {
+            self.radii[joint] = radius;
+        }
+    }
+}
+
+/// The radius of the sphere that ends a last bone: the solid between it, one radius before the tip, and the joint with its
+/// radius lies on the skin in the median.
+fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_joint: f32) -> Option<f32> {
+    let axis = (end - start).normalize_or(Vec3::Y);
+    let length = start.distance(end);
+    let around: Vec<(f32, f32)> = vertices
+        .map(|vertex| {
+            let along = (vertex - start).dot(axis);
+            (along, (vertex - start).reject_from_normalized(axis).length())
+        })
+        .filter(|(along, _)| (TIP_BAND[0] * length..TIP_BAND[1] * length).contains(along))
+        .collect();
+    let mut radius = TIP_SHARE * at_joint;
+    for _ in 0..4 {
+        let axis_length = (length - radius).max(0.3 * length);
+        let cylinder = around.iter().filter(|(along, _)| *along < axis_length);
+        let of_vertex =
+            |&(along, distance): &(f32, f32)| at_joint + (distance - at_joint) * axis_length / along;
+        radius = median(cylinder.map(of_vertex).collect())?;
+    }
+    Some(radius)
+}
+
+/// Where the skin of the last bone ends along the line through the middle of its outer half; none if too few vertices follow it.
+fn last_direction(vertices: impl Iterator<Item = Vec3>, skeleton: &Skeleton, tip: usize) -> Option<Vec3> {
+    let start = skeleton.joints[tip - 1];
+    let (expected, length) = {
+        let bone = skeleton.joints[tip] - start;
+        (bone.normalize_or(Vec3::Y), bone.length())
+    };
+    let outer: Vec<(f32, Vec3)> = vertices
+        .map(|vertex| ((vertex - start).dot(expected), vertex))
+        .filter(|(along, vertex)| {
+            (0.4 * length..LONGEST_TIP * length).contains(along)
+                && (vertex - start).reject_from_normalized(expected).length() < length
+        })
+        .collect();
+    if outer.len() < FEWEST {
+        return None;
+    }
+    let end = outer.iter().map(|(along, _)| *along).fold(0.0, f32::max);
+    Some(start + end * expected)
+}
+
+/// The median of at least [`FEWEST`] numbers.
+fn median(numbers: Vec<f32>) -> Option<f32> {
+    (numbers.len() >= FEWEST).then(|| middle(numbers)).flatten()
+}
+
+/// The median of any numbers.
+fn middle(mut numbers: Vec<f32>) -> Option<f32> {
+    let middle = numbers.len() / 2;
+    if numbers.is_empty() {
+        return None;
+    }
+    let (_, median, _) = numbers.select_nth_unstable_by(middle, f32::total_cmp);
+    Some(*median)
+}

@@ -1,0 +1,292 @@
+//! A rig from the joints of a hand at rest: bones and widths are the hand's own, axes and limits those of a reference hand
+//! that is placed on its knuckles.
+
+use glam::{Mat3, Quat, Vec3};
+use grasp_synthesis::{
+    base::pose::Pose,
+    geometry::Segment,
+    model::hand::{
+        Digit, DigitAngles, Handedness,
+        joints::{JOINT_COUNT, JOINT_NAMES, index},
+        kinematics::digit_frames,
+        rig::{DigitLimits, DigitRig, Rig},
+    },
+};
+
+use super::{hand_nodes::hand_name, radii::Widths};
+use crate::error::{ImportError, Violations};
+
+/// Smallest and largest length of a bone, in metres: from a doll's to a giant's.
+const BONE_RANGE: std::ops::RangeInclusive<f32> = 0.002..=0.25;
+
+/// Smallest shares of the palm's breadth by which the thumb's first and second joint must be on the index finger's side of the
+/// palm's middle. The built-in hands have 0.4 and 0.8.
+const THUMB_BESIDE: [f32; 2] = [-0.1, 0.2];
+
+/// Diameter of the thumb's first link relative to its second joint's, as in the built-in rigs.
+const THUMB_BASE: f32 = 1.24 / 1.1;
+
+/// Mean bend of the fingers, in radians, beyond which they are bent backward.
+const BENT_BACK: f32 = -0.15;
+
+/// The joints of a hand at rest, as of a right hand in any frame, in metres.
+#[derive(Clone, Debug)]
+pub(super) struct RestJoints {
+    /// What the hand is, for messages. The joints of a left hand are mirrored.
+    pub(super) side: Handedness,
+    /// By `OpenXR` index; tips, the fingers' metacarpals and the palm may be absent.
+    pub(super) positions: [Option<Vec3>; JOINT_COUNT],
+}
+
+/// The parts of a hand's skeleton in its wrist's frame.
+#[derive(Clone, Debug)]
+pub(super) struct Skeleton {
+    /// The wrist's frame: +y along the fingers, +z out of the palm.
+    pub(super) frame_from_wrist: Pose,
+    /// Size relative to the reference: of the distance from the wrist to the knuckles.
+    pub(super) size: f32,
+    /// Breadth of the knuckles relative to the reference.
+    pub(super) breadth: f32,
+    /// The joints in the wrist's frame, without the palm; tips are where the file has them or as long as the reference's.
+    pub(super) joints: [Vec3; JOINT_COUNT],
+}
+
+/// A bone's ends as `OpenXR` indices.
+fn bones() -> impl Iterator<Item = (usize, usize)> {
+    (0..5).flat_map(|digit| {
+        let tip = index::TIP_OF_DIGIT[digit];
+        [
+            (index::WRIST, tip - 3),
+            (tip - 3, tip - 2),
+            (tip - 2, tip - 1),
+            (tip - 1, tip),
+        ]
+    })
+}
+
+/// The first of the three links of a digit, as an `OpenXR` index.
+fn base_of(digit: usize) -> usize {
+    index::TIP_OF_DIGIT[digit] - 3
+}
+
+/// The axes across the knuckles, from the wrist to them and out of the palm of a right hand, the distance to the knuckles and
+/// their breadth.
+fn palm_frame(wrist: Vec3, knuckles: [Vec3; 4]) -> (Mat3, f32, f32) {
+    let middle = knuckles.iter().sum::<Vec3>() / 4.0;
+    let y = (middle - wrist).normalize_or_zero();
+    let across = knuckles[0] - knuckles[3];
+    let x = across.reject_from(y.normalize_or(Vec3::Y)).normalize_or_zero();
+    (
+        Mat3::from_cols(x, y, x.cross(y)),
+        middle.distance(wrist),
+        across.length(),
+    )
+}
+
+impl Skeleton {
+    /// Places the wrist's frame and completes the joints; adds a violation for every joint that cannot be that of a hand.
+    pub(super) fn new(rest: &RestJoints, reference: &Rig, violations: &mut Violations) -> Option<Self> {
+        let name = hand_name(rest.side);
+        let before = violations.len();
+        for (joint, position) in rest.positions.iter().enumerate() {
+            if position.is_some_and(|position| !position.is_finite()) {
+                violations.push(ImportError::at(
+                    format!("{name}, {}", JOINT_NAMES[joint]),
+                    "is not at a finite place",
+                ));
+            }
+        }
+        let at = |joint: usize| rest.positions[joint].filter(|position| position.is_finite());
+        for (start, end) in bones() {
+            // The thumb's metacarpal may start at the wrist.
+            let may_coincide = (start, end) == (index::WRIST, base_of(0));
+            if let (Some(from), Some(to)) = (at(start), at(end)) {
+                let length = from.distance(to);
+                if length > *BONE_RANGE.end() || length < *BONE_RANGE.start() && !may_coincide {
+                    violations.push(ImportError::at(
+                        format!("{name}, {}", JOINT_NAMES[end]),
+                        format!(
+                            "is {length:.4} m from {}; a bone of a hand must be {} to {} m long, after units and the \
+                             armature's scale",
+                            JOINT_NAMES[start],
+                            BONE_RANGE.start(),
+                            BONE_RANGE.end()
+                        ),
+                    ));
+                }
+            }
+        }
+        if violations.len() > before {
+            return None;
+        }
+        let wrist = at(index::WRIST)?;
+        let knuckle = |finger: usize| at(base_of(finger + 1));
+        let knuckles = [knuckle(0)?, knuckle(1)?, knuckle(2)?, knuckle(3)?];
+        let (axes, length, breadth) = palm_frame(wrist, knuckles);
+        let of_reference =
+            std::array::from_fn(|finger| reference.digits[finger + 1].wrist_from_base.position);
+        let (reference_axes, reference_length, reference_breadth) = palm_frame(Vec3::ZERO, of_reference);
+        if axes.determinant() < 0.5 || breadth < *BONE_RANGE.start() {
+            violations.push(ImportError::at(
+                name,
+                "has its knuckles in line with the wrist, so that the palm has no breadth",
+            ));
+            return None;
+        }
+        let frame_from_wrist = Pose::new(
+            wrist,
+            Quat::from_mat3(&(axes * reference_axes.transpose())).normalize(),
+        );
+        let (size, breadth) = (length / reference_length, breadth / reference_breadth);
+        let wrist_from_frame = frame_from_wrist.inverse();
+        let mut joints = [Vec3::ZERO; JOINT_COUNT];
+        for (joint, position) in joints.iter_mut().enumerate() {
+            if let Some(at) = at(joint) {
+                *position = wrist_from_frame.transform_point(at);
+            }
+        }
+        for digit in 0..5 {
+            let (tip, chain) = (index::TIP_OF_DIGIT[digit], &reference.digits[digit]);
+            if at(tip).is_none() {
+                let last = joints[tip - 1] - joints[tip - 2];
+                let length = last.length() * chain.lengths[2] / chain.lengths[1];
+                joints[tip] = joints[tip - 1] + length * last.normalize_or(Vec3::Y);
+            }
+            let first = index::FIRST_OF_DIGIT[digit];
+            if digit > 0 && at(first).is_none() {
+                // The same share of the way to the knuckle, and the same distance from the line, as in the reference.
+                let start = reference.finger_metacarpals[digit - 1];
+                let reference_knuckle = chain.wrist_from_base.position;
+                let share = start.dot(reference_knuckle) / reference_knuckle.length_squared();
+                joints[first] = share * joints[first + 1] + size * (start - share * reference_knuckle);
+            }
+        }
+        let skeleton = Self {
+            frame_from_wrist,
+            size,
+            breadth,
+            joints,
+        };
+        skeleton.check_shape(name, violations);
+        (violations.len() == before).then_some(skeleton)
+    }
+
+    /// Adds a violation if the thumb is not beside the fingers, or if all digits bend backward.
+    fn check_shape(&self, name: &str, violations: &mut Violations) {
+        let joint = |joint: usize| self.joints[joint];
+        let (index_knuckle, little_knuckle) = (joint(base_of(1)), joint(base_of(4)));
+        let across = index_knuckle - little_knuckle;
+        let thumb = base_of(0) + 1;
+        let middle = index_knuckle.midpoint(little_knuckle);
+        let beside = |joint: Vec3| (joint - middle).dot(across) / across.length_squared();
+        if beside(joint(thumb - 1)) < THUMB_BESIDE[0] || beside(joint(thumb)) < THUMB_BESIDE[1] {
+            violations.push(ImportError::at(
+                format!("{name}, {}", JOINT_NAMES[thumb]),
+                "is among the fingers or on the little finger's side of the palm; the thumb must be on the index finger's \
+                 side (are the fingers' names in order?)",
+            ));
+            return;
+        }
+        let bend = |digit: usize| {
+            let base = base_of(digit);
+            let links =
+                [0, 1, 2].map(|link| (joint(base + link + 1) - joint(base + link)).normalize_or(Vec3::Y));
+            let rise = |direction: Vec3| direction.z.atan2(direction.y.max(1e-3));
+            rise(links[2]) - rise(links[0])
+        };
+        let mean = (1..5).map(bend).sum::<f32>() / 4.0;
+        if mean < BENT_BACK && joint(thumb + 1).z < 0.0 {
+            violations.push(ImportError::at(
+                name,
+                "has fingers that bend backward and a thumb behind the palm, as the other hand would: left and right are \
+                 swapped",
+            ));
+        }
+    }
+
+    /// The rig with the reference's axes and limits.
+    pub(super) fn rig(
+        &self,
+        name: &str,
+        widths: &Widths,
+        reference: &Rig,
+        limits: Option<[DigitLimits; 5]>,
+    ) -> Rig {
+        let mut joints = self.joints;
+        for (digit, &tip) in index::TIP_OF_DIGIT.iter().enumerate() {
+            if let Some(place) = widths.tips[digit] {
+                joints[tip] = place;
+            }
+        }
+        let digits = std::array::from_fn(|digit| {
+            let base = base_of(digit);
+            let chain = &reference.digits[digit];
+            let length = |link: usize| joints[base + link].distance(joints[base + link + 1]);
+            let limits = limits.map_or(chain.limits, |limits| limits[digit]);
+            let direction = (joints[base + 1] - joints[base]).normalize_or(Vec3::Y);
+            let orientation = if digit == Digit::Thumb.index() {
+                chain.wrist_from_base.orientation
+            } else {
+                within_reach(chain, &limits, direction)
+            };
+            DigitRig {
+                wrist_from_base: Pose::new(joints[base], orientation),
+                yaw_sign: chain.yaw_sign,
+                lengths: std::array::from_fn(length),
+                diameters: link_diameters(digit, [0, 1, 2].map(|link| 2.0 * widths.radii[base + link])),
+                limits,
+            }
+        });
+        let finger_metacarpals = std::array::from_fn(|finger| joints[index::FIRST_OF_DIGIT[finger + 1]]);
+        let middle_knuckle = joints[base_of(2)];
+        let along = (middle_knuckle - finger_metacarpals[1]).normalize_or(Vec3::Y);
+        let palmar = Quat::from_rotation_arc(Vec3::Y, along) * Vec3::Z;
+        let palm_radius = widths.radii[index::PALM];
+        let scale = Vec3::new(
+            self.breadth,
+            self.size,
+            palm_radius / reference.joint_radii[index::PALM],
+        );
+        let mut rig = Rig {
+            name: name.to_owned(),
+            handedness: Handedness::Right,
+            palm: finger_metacarpals[1].midpoint(middle_knuckle) + palm_radius * palmar,
+            reach: 0.0,
+            digits,
+            finger_metacarpals,
+            palm_segments: reference
+                .palm_segments
+                .map(|segment| Segment::new(scale * segment.start, scale * segment.end)),
+            joint_radii: widths.radii,
+        };
+        rig.reach = digit_frames(&rig.digits[2], Pose::IDENTITY, DigitAngles::default())
+            .tip
+            .length();
+        rig
+    }
+}
+
+/// The orientation of a finger's base: the reference's or, if the bone at rest is beyond its sideways limits, turned until it is
+/// at the nearer one, so that widely spread fingers stay apart.
+fn within_reach(chain: &DigitRig, limits: &DigitLimits, direction: Vec3) -> Quat {
+    let orientation = chain.wrist_from_base.orientation;
+    let yaw = yaw_of(chain, direction);
+    let beyond = yaw - yaw.clamp(limits.base_yaw.min, limits.base_yaw.max);
+    orientation * Quat::from_rotation_z(chain.yaw_sign * beyond)
+}
+
+/// The yaw by which a digit's first link points in a direction of the wrist's frame, in radians.
+pub(super) fn yaw_of(chain: &DigitRig, direction: Vec3) -> f32 {
+    let local = chain.wrist_from_base.orientation.inverse() * direction;
+    chain.yaw_sign * (-local.x).atan2(local.y)
+}
+
+/// Diameters of a digit's links from those of its joints: at the first phalanx that of its far joint, then the mean of both
+/// joints, then a little less than the last joint; of the thumb, whose first joint is in the palm, one joint farther.
+fn link_diameters(digit: usize, [_, second, third]: [f32; 3]) -> [f32; 3] {
+    if digit == Digit::Thumb.index() {
+        [THUMB_BASE * second, 0.5 * (second + third), 0.92 * third]
+    } else {
+        [second, 0.5 * (second + third), 0.95 * third]
+    }
+}

@@ -1,0 +1,320 @@
+//! Writes characters with the built-in hands, as programs with their own names, units and axes would.
+
+use glam::{Mat4, Quat, Vec3};
+use grasp_assets::hands::hand;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        Handedness,
+        joints::{HandJoints, JOINT_COUNT, index},
+        skin::Skin,
+    },
+};
+use serde_json::{Value, json};
+
+/// How a program writes characters.
+pub(crate) struct Style {
+    /// The name of a joint's node; none for joints that it does not have.
+    pub(crate) name: fn(Handedness, usize) -> Option<String>,
+    /// Units of the file per metre; the armature's scale makes metres of them.
+    pub(crate) units_per_metre: f32,
+    /// Which hands it shows.
+    pub(crate) sides: &'static [Handedness],
+    /// Metres per metre of the built-in hand.
+    pub(crate) size: f32,
+    /// True for nodes that are all next to one another.
+    pub(crate) is_flat: bool,
+    /// The document's extensions, from the names of the nodes.
+    pub(crate) extensions: fn(&[String]) -> Value,
+}
+
+impl Style {
+    /// Both hands in metres, in a tree.
+    pub(crate) const PLAIN: Self = Self {
+        name: webxr,
+        units_per_metre: 1.0,
+        sides: &[Handedness::Left, Handedness::Right],
+        size: 1.0,
+        is_flat: false,
+        extensions: |_| json!({}),
+    };
+}
+
+/// "Left" or "Right".
+pub(crate) fn side_name(side: Handedness) -> &'static str {
+    match side {
+        Handedness::Left => "Left",
+        Handedness::Right => "Right",
+    }
+}
+
+fn webxr(side: Handedness, joint: usize) -> Option<String> {
+    let name = grasp_synthesis::model::hand::joints::JOINT_NAMES[joint];
+    (joint != index::PALM).then(|| format!("{}-{name}", side_name(side)))
+}
+
+/// A character, and where its wrists are.
+pub(crate) struct Character {
+    pub(crate) glb: Vec<u8>,
+}
+
+struct Node {
+    name: String,
+    parent: Option<usize>,
+    /// In metres, in the frame of the character.
+    pose: Pose,
+}
+
+/// The wrist of a hand that is stretched to the side, in `OpenXR` axes.
+pub(crate) fn character_from_wrist(side: Handedness) -> Pose {
+    let right = Pose::new(
+        Vec3::new(-0.68, 1.38, 0.04),
+        Quat::from_rotation_z(0.2) * Quat::from_rotation_y(std::f32::consts::FRAC_PI_2),
+    );
+    match side {
+        Handedness::Left => right.mirrored_x(),
+        Handedness::Right => right,
+    }
+}
+
+/// The nearest ancestor of a joint that the style has.
+fn parent_of(joint: usize, has: impl Fn(usize) -> bool) -> usize {
+    let mut parent = joint;
+    loop {
+        parent = if index::FIRST_OF_DIGIT.contains(&parent) {
+            index::WRIST
+        } else {
+            parent - 1
+        };
+        if has(parent) {
+            return parent;
+        }
+    }
+}
+
+/// Axes of a node that have nothing to do with the bone's.
+fn odd_axes(joint: usize) -> Quat {
+    let angle = joint as f32;
+    Quat::from_rotation_x(angle) * Quat::from_rotation_y(0.7 * angle) * Quat::from_rotation_z(-1.3 * angle)
+}
+
+impl Character {
+    /// Writes a character whose hands are the adult's, bound and standing in the bind pose.
+    pub(crate) fn new(style: &Style) -> Self {
+        let mut nodes = vec![
+            Node {
+                name: "Armature".to_owned(),
+                parent: None,
+                pose: Pose::IDENTITY,
+            },
+            Node {
+                name: "Hips".to_owned(),
+                parent: Some(0),
+                pose: Pose::from_position(Vec3::Y),
+            },
+            Node {
+                name: "Head".to_owned(),
+                parent: Some(1),
+                pose: Pose::from_position(1.6 * Vec3::Y),
+            },
+        ];
+        let mut positions: Vec<Vec3> = Vec::new();
+        let mut joints: Vec<[u16; 4]> = Vec::new();
+        let mut weights: Vec<[f32; 4]> = Vec::new();
+        let mut corners: Vec<u32> = Vec::new();
+        // The body: a box.
+        for corner in 0..8_u32 {
+            let side = |bit: u32| if corner >> bit & 1 == 0 { -0.2 } else { 0.2 };
+            positions.push(Vec3::new(side(0), 1.2 + 2.0 * side(1), 0.5 * side(2)));
+            joints.push([1, 0, 0, 0]);
+            weights.push([1.0, 0.0, 0.0, 0.0]);
+        }
+        corners.extend([0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6]);
+        for &side in style.sides {
+            let adult = hand("adult", side).expect("the rig is built in");
+            let Skin { bind, .. } = &*adult.skin;
+            let character_from_hand = character_from_wrist(side) * bind.joints[index::WRIST].pose.inverse();
+            let place = |pose: Pose| {
+                let wrist = bind.joints[index::WRIST].pose.position;
+                let scaled = Pose {
+                    position: wrist + style.size * (pose.position - wrist),
+                    ..pose
+                };
+                character_from_hand * scaled
+            };
+            let arm = nodes.len();
+            nodes.push(Node {
+                name: format!("{}ForeArm", side_name(side)),
+                parent: Some(1),
+                pose: Pose::from_position(character_from_wrist(side).position * Vec3::new(0.6, 1.0, 1.0)),
+            });
+            let name = |joint: usize| (style.name)(side, joint);
+            let has = |joint: usize| name(joint).is_some();
+            let mut node_of = [0; JOINT_COUNT];
+            for joint in 1..JOINT_COUNT {
+                let Some(name) = name(joint) else { continue };
+                node_of[joint] = nodes.len();
+                let pose = place(bind.joints[joint].pose);
+                nodes.push(Node {
+                    name,
+                    parent: Some(match joint {
+                        _ if style.is_flat => arm,
+                        index::WRIST => arm,
+                        _ => node_of[parent_of(joint, has)],
+                    }),
+                    pose: Pose::new(pose.position, pose.orientation * odd_axes(joint)),
+                });
+            }
+            let first = positions.len() as u32;
+            let placed = adult.skin.positions.iter();
+            positions.extend(placed.map(|&position| place(Pose::from_position(position)).position));
+            joints.extend(adult.skin.joint_indices.iter().map(|indices| {
+                indices.map(|joint| {
+                    let joint = usize::from(joint).max(1);
+                    let joint = if has(joint) { joint } else { parent_of(joint, has) };
+                    node_of[joint] as u16
+                })
+            }));
+            weights.extend(&adult.skin.weights);
+            corners.extend(adult.skin.triangles.iter().flatten().map(|corner| first + corner));
+        }
+        Self {
+            glb: write(style, &nodes, &positions, &joints, &weights, &corners),
+        }
+    }
+}
+
+fn write(
+    style: &Style,
+    nodes: &[Node],
+    positions: &[Vec3],
+    joints: &[[u16; 4]],
+    weights: &[[f32; 4]],
+    corners: &[u32],
+) -> Vec<u8> {
+    let units = style.units_per_metre;
+    let in_units = |pose: Pose| Pose::new(units * pose.position, pose.orientation);
+    let mut described: Vec<Value> = nodes
+        .iter()
+        .enumerate()
+        .map(|(place, node)| {
+            let parent = node.parent.map_or(Pose::IDENTITY, |parent| nodes[parent].pose);
+            let local = in_units(parent.inverse() * node.pose);
+            let children: Vec<usize> = (0..nodes.len())
+                .filter(|&child| nodes[child].parent == Some(place))
+                .collect();
+            let mut described = json!({
+                "name": node.name,
+                "translation": local.position.to_array(),
+                "rotation": local.orientation.to_array(),
+            });
+            if !children.is_empty() {
+                described["children"] = json!(children);
+            }
+            if place == 0 {
+                described["scale"] = json!([1.0 / units, 1.0 / units, 1.0 / units]);
+            }
+            described
+        })
+        .collect();
+    described.push(json!({ "name": "Body", "mesh": 0, "skin": 0 }));
+    let bytes =
+        |numbers: &mut dyn Iterator<Item = f32>| numbers.flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
+    let positions_in_units = positions.iter().map(|&position| units * position);
+    let inverse_binds = nodes.iter().flat_map(|node| {
+        let Pose {
+            position,
+            orientation,
+        } = in_units(node.pose);
+        Mat4::from_rotation_translation(orientation, position)
+            .inverse()
+            .to_cols_array()
+    });
+    let blocks = [
+        (
+            bytes(&mut positions_in_units.flat_map(|v| v.to_array())),
+            5126,
+            "VEC3",
+            positions.len(),
+        ),
+        (
+            joints
+                .iter()
+                .flatten()
+                .flat_map(|joint| joint.to_le_bytes())
+                .collect(),
+            5123,
+            "VEC4",
+            joints.len(),
+        ),
+        (
+            bytes(&mut weights.iter().flatten().copied()),
+            5126,
+            "VEC4",
+            weights.len(),
+        ),
+        (
+            corners.iter().flat_map(|corner| corner.to_le_bytes()).collect(),
+            5125,
+            "SCALAR",
+            corners.len(),
+        ),
+        (bytes(&mut inverse_binds.into_iter()), 5126, "MAT4", nodes.len()),
+    ];
+    let mut buffer: Vec<u8> = Vec::new();
+    let (mut views, mut accessors) = (Vec::new(), Vec::new());
+    for (view, (block, component, kind, count)) in blocks.into_iter().enumerate() {
+        views.push(json!({ "buffer": 0, "byteOffset": buffer.len(), "byteLength": block.len() }));
+        let mut accessor =
+            json!({ "bufferView": view, "componentType": component, "type": kind, "count": count });
+        if view == 0 {
+            accessor["min"] = json!([-1e6, -1e6, -1e6]);
+            accessor["max"] = json!([1e6, 1e6, 1e6]);
+        }
+        accessors.push(accessor);
+        buffer.extend(block);
+    }
+    let names: Vec<String> = nodes.iter().map(|node| node.name.clone()).collect();
+    let document = json!({
+        "asset": { "version": "2.0" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0, described.len() - 1] }],
+        "nodes": described,
+        "skins": [{ "joints": (0..nodes.len()).collect::<Vec<_>>(), "inverseBindMatrices": 4 }],
+        "meshes": [{ "primitives": [{
+            "attributes": { "POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2 }, "indices": 3,
+        }] }],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{ "byteLength": buffer.len() }],
+        "extensions": (style.extensions)(&names),
+    });
+    glb(&document, buffer)
+}
+
+/// Packs a document and its buffer.
+pub(crate) fn glb(document: &Value, mut buffer: Vec<u8>) -> Vec<u8> {
+    let mut text = document.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    buffer.resize(buffer.len().next_multiple_of(4), 0);
+    let length = 12 + 8 + text.len() + 8 + buffer.len();
+    let mut file = b"glTF".to_vec();
+    for number in [2, length as u32, text.len() as u32] {
+        file.extend(number.to_le_bytes());
+    }
+    file.extend(b"JSON");
+    file.extend(text);
+    file.extend((buffer.len() as u32).to_le_bytes());
+    file.extend(b"BIN\0");
+    file.extend(buffer);
+    file
+}
+
+/// The adult's joints at rest, as a client would describe them.
+pub(crate) fn adult_at_rest(side: Handedness) -> HandJoints {
+    hand("adult", side)
+        .expect("the rig is built in")
+        .skin
+        .bind
+        .clone()
+}
