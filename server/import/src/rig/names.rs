@@ -86,7 +86,8 @@ pub(super) fn read(name: &str) -> Option<NodeName> {
             "tip" | "end" | "null" | "nub" => segment = Some(Segment::Tip),
             "wrist" | "hand" => is_wrist = true,
             number => {
-                if let Ok(number) = number.parse() {
+                // Numbers before the digit are those of the character.
+                if let (Some(_), Ok(number)) = (digit, number.parse()) {
                     segment = segment.or(Some(Segment::Number(number)));
                 }
             }
@@ -109,11 +110,10 @@ pub(super) fn joint(digit: Digit, segment: Segment, others: &[Segment]) -> Optio
     let from_tip = match (digit, segment) {
         (_, Segment::Tip) => 0,
         (_, Segment::Distal) => 1,
-        (_, Segment::Intermediate) => 2,
         (Digit::Thumb, Segment::Metacarpal) => 3,
         // As in Unity's humanoid, whose thumb has the names of a finger.
         (Digit::Thumb, Segment::Proximal) if has(Segment::Intermediate) && !has(Segment::Metacarpal) => 3,
-        (Digit::Thumb, Segment::Proximal) => 2,
+        (_, Segment::Intermediate) | (Digit::Thumb, Segment::Proximal) => 2,
         (Digit::Thumb, Segment::Number(number)) => {
             // Quest's thumb counts a bone of the wrist as 0; others start with the metacarpal.
             let base = u8::from(!has(Segment::Number(0)) || has(Segment::Number(3)));

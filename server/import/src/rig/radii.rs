@@ -85,7 +85,7 @@ impl Widths {
                 continue;
             }
             // The ball of the thumb is no part of the finger that bends at its second joint.
-            let first = if digit == 0 { 1 } else { 0 };
+            let first = usize::from(digit == 0);
             let links = place.saturating_sub(1).max(first)..=place;
             let distances = links.flat_map(|link| {
                 let (start, end) = (points[link], points[link + 1]);

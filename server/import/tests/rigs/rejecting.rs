@@ -80,8 +80,8 @@ fn impossible_joints_at_rest_are_all_named() {
     );
     let among = with(&|joints| {
         let across = joints[17] - joints[2];
-        for joint in 2..6 {
-            joints[joint] += 1.1 * across;
+        for joint in &mut joints[2..6] {
+            *joint += 1.1 * across;
         }
     });
     assert!(
