@@ -22,6 +22,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = PathBuf::from(std::env::var("OUT_DIR")?);
     std::fs::write(out.join("grasp_descriptor.bin"), descriptors.encode_to_vec())?;
     tonic_prost_build::configure()
+        // Sorted, so that equal messages have equal bytes.
+        .btree_map(".")
         .codec_path("crate::codec::SliceCodec")
         .compile_fds(descriptors)?;
     Ok(())

@@ -5,9 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_proto::v1::{
-    self, grasp_service_client::GraspServiceClient, object_service_client::ObjectServiceClient,
-};
+use grasp_proto::v1::grasp_service_client::GraspServiceClient;
 use tonic::{
     Code, Request, Response, Status,
     transport::{Channel, Endpoint},
@@ -16,7 +14,7 @@ use tonic_health::pb::{HealthCheckRequest, health_client::HealthClient};
 
 use crate::{
     error::ClientError,
-    object::{Health, NewObject, Object, ObjectPage},
+    object::Health,
     retry::RetryPolicy,
     search::{FindAnswer, FindRequest},
     wire,
@@ -133,7 +131,7 @@ impl GraspClientBuilder {
 #[derive(Clone, Debug)]
 pub struct GraspClient {
     channel: Channel,
-    call_timeout: Duration,
+    pub(crate) call_timeout: Duration,
     retry: RetryPolicy,
 }
 
@@ -174,90 +172,6 @@ impl GraspClient {
         Ok(wire::find_answer_from_wire(answer)?)
     }
 
-    /// One page of the objects, sorted by name. With `page_size` 0 the server chooses the size; the first page has no
-    /// `page_token`.
-    ///
-    /// # Errors
-    /// Any except those of connecting.
-    pub async fn list_objects_page(
-        &self,
-        page_size: u16,
-        page_token: Option<String>,
-    ) -> Result<ObjectPage, ClientError> {
-        let message = v1::ListObjectsRequest {
-            page_size: page_size.into(),
-            page_token: page_token.unwrap_or_default(),
-        };
-        let page = self
-            .call(
-                "ListObjects",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).list_objects(request).await },
-            )
-            .await?;
-        Ok(wire::object_page_from_wire(page)?)
-    }
-
-    /// All objects, sorted by name, from as many pages as needed.
-    ///
-    /// # Errors
-    /// Any except those of connecting.
-    pub async fn list_objects(&self) -> Result<Vec<Object>, ClientError> {
-        let mut objects = Vec::new();
-        let mut token = None;
-        loop {
-            let page = self.list_objects_page(0, token.clone()).await?;
-            objects.extend(page.objects);
-            match page.next_page_token {
-                None => return Ok(objects),
-                // A repeated token would make this loop endless.
-                next if next == token => {
-                    return Err(ClientError::Malformed {
-                        field: "next_page_token".to_owned(),
-                        problem: "repeats the token of the previous page".to_owned(),
-                    });
-                }
-                next => token = next,
-            }
-        }
-    }
-
-    /// One object; `name` is "objects/{object}".
-    ///
-    /// # Errors
-    /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
-    pub async fn get_object(&self, name: impl Into<String>) -> Result<Object, ClientError> {
-        let message = v1::GetObjectRequest { name: name.into() };
-        let answer = self
-            .call(
-                "GetObject",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).get_object(request).await },
-            )
-            .await?;
-        Ok(wire::object_from_wire(answer.object)?)
-    }
-
-    /// Creates an object. The call is retried like any other: if an answer was lost, the retry finds the object in place
-    /// and ends with [`ClientError::AlreadyExists`].
-    ///
-    /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the object.
-    pub async fn create_object(&self, object: &NewObject) -> Result<Object, ClientError> {
-        let message = wire::new_object_to_wire(object);
-        let answer = self
-            .call(
-                "CreateObject",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).create_object(request).await },
-            )
-            .await?;
-        Ok(wire::object_from_wire(answer.object)?)
-    }
-
     /// Queries the health of the whole server.
     ///
     /// # Errors
@@ -276,7 +190,7 @@ impl GraspClient {
     }
 
     /// Sends `message` until it is answered, fails permanently, or `timeout` has passed since the first attempt.
-    async fn call<M, T, F>(
+    pub(crate) async fn call<M, T, F>(
         &self,
         method: &'static str,
         timeout: Duration,

@@ -35,9 +35,15 @@ pub enum ClientError {
     /// A resource named in the request does not exist; see [`ErrorDetails::resource`].
     #[error("not found: {0}")]
     NotFound(Box<CallError>),
-    /// The resource to create exists. After a retry (see [`CallError::attempts`]), this very call may have created it.
+    /// The resource to create exists.
     #[error("already exists: {0}")]
     AlreadyExists(Box<CallError>),
+    /// The resource cannot be changed like this; [`ErrorDetails::reason`] says why.
+    #[error("failed precondition: {0}")]
+    FailedPrecondition(Box<CallError>),
+    /// The resource was changed by another call; get it, and decide again.
+    #[error("aborted: {0}")]
+    Aborted(Box<CallError>),
     /// The server has no capacity for the request; [`ErrorDetails::retry_delay`] may say when to retry.
     #[error("resource exhausted: {0}")]
     ResourceExhausted(Box<CallError>),
@@ -129,6 +135,8 @@ impl ClientError {
             Self::InvalidArgument(call)
             | Self::NotFound(call)
             | Self::AlreadyExists(call)
+            | Self::FailedPrecondition(call)
+            | Self::Aborted(call)
             | Self::ResourceExhausted(call)
             | Self::Unavailable(call)
             | Self::DeadlineExceeded(call)
@@ -149,6 +157,8 @@ impl ClientError {
             Code::InvalidArgument => Self::InvalidArgument(call),
             Code::NotFound => Self::NotFound(call),
             Code::AlreadyExists => Self::AlreadyExists(call),
+            Code::FailedPrecondition => Self::FailedPrecondition(call),
+            Code::Aborted => Self::Aborted(call),
             Code::ResourceExhausted => Self::ResourceExhausted(call),
             Code::Unavailable => Self::Unavailable(call),
             Code::DeadlineExceeded => Self::DeadlineExceeded(call),
@@ -156,8 +166,6 @@ impl ClientError {
             | Code::Cancelled
             | Code::Unknown
             | Code::PermissionDenied
-            | Code::FailedPrecondition
-            | Code::Aborted
             | Code::OutOfRange
             | Code::Unimplemented
             | Code::Internal

@@ -1,5 +1,12 @@
-//! JSON forms of durations and seeds. Durations are numbers of seconds. Seeds are strings of digits, as in protobuf's
+//! JSON forms of durations, times and seeds. Times are in RFC 3339. Durations are numbers of seconds. Seeds are strings of digits, as in protobuf's
 //! JSON mapping, since many readers' numbers hold fewer than 64 bits; numbers are accepted, too.
+
+use std::time::SystemTime;
+
+/// A time in RFC 3339, such as `2026-11-26T10:20:30.500Z`.
+pub fn rfc3339(time: SystemTime) -> String {
+    prost_types::Timestamp::from(time).to_string()
+}
 
 /// A duration as a number of seconds.
 pub(crate) mod seconds {
@@ -42,6 +49,27 @@ pub(crate) mod optional_seconds {
         deserializer: D,
     ) -> Result<Option<Duration>, D::Error> {
         Ok(Option::<Seconds>::deserialize(deserializer)?.map(|Seconds(duration)| duration))
+    }
+}
+
+/// A time as [`rfc3339`] writes it.
+pub(crate) mod time {
+    use std::time::SystemTime;
+
+    use prost_types::Timestamp;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
+
+    pub(crate) fn serialize<S: Serializer>(time: &SystemTime, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&super::rfc3339(*time))
+    }
+
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SystemTime, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let time = text.parse::<Timestamp>().ok().map(SystemTime::try_from);
+        match time {
+            Some(Ok(time)) => Ok(time),
+            _ => Err(D::Error::custom(format!("{text:?} is not a time in RFC 3339"))),
+        }
     }
 }
 
@@ -93,9 +121,27 @@ pub(crate) mod optional_seed {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
+    use std::time::{Duration, SystemTime};
+
+    use serde::{Deserialize, Serialize};
 
     use crate::search::FindRequest;
+
+    #[test]
+    fn times_are_texts_of_rfc_3339() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct Timed(#[serde(with = "super::time")] SystemTime);
+
+        let timed = Timed(SystemTime::UNIX_EPOCH + Duration::new(1_000_000_000, 500_000_000));
+        let text = serde_json::to_string(&timed).unwrap();
+        assert!(
+            text.starts_with("\"2001-09-09T01:46:40.5") && text.ends_with("Z\""),
+            "{text}"
+        );
+        assert_eq!(serde_json::from_str::<Timed>(&text).unwrap(), timed);
+        let error = serde_json::from_str::<Timed>("\"yesterday\"").unwrap_err();
+        assert!(error.to_string().contains("RFC 3339"), "{error}");
+    }
 
     #[test]
     fn seed_round_trips_through_json() {

@@ -40,6 +40,7 @@ mod hand;
 mod json;
 mod key_frame;
 mod object;
+mod objects;
 mod obstacle;
 mod pose;
 mod query;
@@ -57,8 +58,12 @@ pub use hand::{
     Digit, DigitAngles, HandAngles, HandJoints, Handedness, JOINT_COUNT, JointPose, JointSet, Phalanx,
     PresentingHand, ReceivingHand,
 };
+pub use json::rfc3339;
 pub use key_frame::{KeyFrame, KeyFrameKind};
-pub use object::{AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage, UpAxis};
+pub use object::{
+    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage, ObjectQuery, ObjectUpdate, Reset,
+    UpAxis,
+};
 pub use obstacle::{Capsule, Obstacle, SolidBox};
 pub use pose::Pose;
 pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};

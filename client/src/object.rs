@@ -1,6 +1,9 @@
 //! Objects that can be held out.
 
-use std::time::Duration;
+use std::{
+    collections::BTreeMap,
+    time::{Duration, SystemTime},
+};
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -40,6 +43,17 @@ pub struct Object {
     /// Where the origin of the object's frame is in the mesh file, in the file's units and axes; none: at the file's origin.
     #[serde(default)]
     pub origin_in_file: Option<DVec3>,
+    /// Labels that clients gave it.
+    #[serde(default)]
+    pub labels: BTreeMap<String, String>,
+    /// Identifies this state of the object: every change by a client gives another one.
+    pub etag: String,
+    /// When it was created; for objects that the server started with, the start.
+    #[serde(with = "json::time")]
+    pub create_time: SystemTime,
+    /// When a client last changed it; the time of creation if none did.
+    #[serde(with = "json::time")]
+    pub update_time: SystemTime,
 }
 
 /// State of an object's atlas: the grasps found for it in advance.
@@ -97,6 +111,11 @@ pub struct NewObject {
     pub friction: Option<f32>,
     /// Surfaces that must not be touched.
     pub forbidden: ForbiddenSurfaces,
+    /// Labels: at most 16, with keys of 1 to 63 of a-z, 0-9, -, _, . and /, and values of at most 63 bytes.
+    pub labels: BTreeMap<String, String>,
+    /// A UUID that lets the server recognise the request when it comes again; none: the client draws one for each call, so
+    /// that its own retries are recognised.
+    pub request_id: Option<String>,
 }
 
 impl NewObject {
@@ -111,14 +130,62 @@ impl NewObject {
             centre_of_mass: None,
             friction: None,
             forbidden: ForbiddenSurfaces::default(),
+            labels: BTreeMap::new(),
+            request_id: None,
         }
     }
+}
+
+/// Changes of an object; none keeps what is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjectUpdate {
+    /// The etag of the state to change; the call fails if the object has another one by now. None: any state.
+    pub etag: Option<String>,
+    /// Mass in kilograms; more than 0.
+    pub mass_kg: Option<f32>,
+    /// Centre of mass in the object's frame, in metres.
+    pub centre_of_mass: Option<Reset<Vec3>>,
+    /// Coefficient of static friction; more than 0, at most 5.
+    pub friction: Option<Reset<f32>>,
+    /// Surfaces that must not be touched, instead of all former ones.
+    pub forbidden: Option<ForbiddenSurfaces>,
+    /// Labels, instead of all former ones.
+    pub labels: Option<BTreeMap<String, String>>,
+}
+
+impl ObjectUpdate {
+    /// True if it changes nothing.
+    pub fn is_empty(&self) -> bool {
+        let without_etag = Self {
+            etag: None,
+            ..self.clone()
+        };
+        without_etag == Self::default()
+    }
+}
+
+/// A new value, or the one that an object has if its creator gives none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reset<T> {
+    /// This value.
+    To(T),
+    /// The server's default.
+    Default,
+}
+
+/// Which objects to list, and in which order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ObjectQuery {
+    /// Labels that the objects must have, such as `level=kitchen AND fragile`; empty: all objects.
+    pub filter: String,
+    /// `name`, `create_time` or `update_time`, each optionally followed by `desc`, with commas in between; empty: by name.
+    pub order_by: String,
 }
 
 /// A page of objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectPage {
-    /// Sorted by name.
+    /// In the order of the query.
     pub objects: Vec<Object>,
     /// Token of the next page; none on the last page.
     pub next_page_token: Option<String>,

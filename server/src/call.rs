@@ -23,8 +23,11 @@ use crate::{
     reserve::DeadlineReserve,
 };
 
-/// Path of the only method with large messages; its calls are admitted before the message is received.
-const UPLOAD_METHOD: &str = "/grasp.v1.ObjectService/CreateObject";
+/// Paths of the methods that build objects from large messages; their calls are admitted before the message is received.
+const UPLOAD_METHODS: [&str; 2] = [
+    "/grasp.v1.ObjectService/CreateObject",
+    "/grasp.v1.ObjectService/UpdateObject",
+];
 
 /// Services whose calls are logged at level info. Probes and tools call the others.
 const LOGGED_PACKAGE: &str = "/grasp.v1.";
@@ -231,7 +234,7 @@ where
             search_end: Arc::clone(&context.search_end),
             reserve: Arc::clone(&self.layer.reserve),
         };
-        let upload = if request.uri().path() == UPLOAD_METHOD {
+        let upload = if UPLOAD_METHODS.contains(&request.uri().path()) {
             let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
                 line.set_code(Code::ResourceExhausted);
                 let status = Status::from(ServiceError::Overloaded {
@@ -430,8 +433,8 @@ mod tests {
         let layer = layer();
         let keeper = Keeper::default();
         let mut service = layer.layer(keeper.clone());
-        let first = service.call(request(UPLOAD_METHOD));
-        let second = service.call(request(UPLOAD_METHOD)).await.unwrap();
+        let first = service.call(request(UPLOAD_METHODS[0]));
+        let second = service.call(request(UPLOAD_METHODS[1])).await.unwrap();
         assert_eq!(code_of(&second), Code::ResourceExhausted);
         // Other methods need no permit.
         let other = service.call(request("/grasp.v1.GraspService/FindGrasp"));

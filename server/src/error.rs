@@ -26,7 +26,7 @@ pub struct Violation {
 pub enum Limit {
     /// Running and waiting searches.
     Searches,
-    /// Objects being received or built.
+    /// Objects being received, built or changed.
     Uploads,
     /// Created objects, all of which are in use.
     ObjectCache,
@@ -56,6 +56,32 @@ pub enum ServiceError {
     ObjectExists {
         /// The requested name.
         name: String,
+    },
+    /// A request with the same id and other content created an object.
+    #[error("request_id {request_id} created {name} from other content; a new request needs a new id")]
+    RequestIdReused {
+        /// The id.
+        request_id: String,
+        /// The object that it created.
+        name: String,
+    },
+    /// The object came with the server.
+    #[error(
+        "{name} came with the server, which neither changes nor deletes it; create an object of your own"
+    )]
+    ObjectReadOnly {
+        /// The requested name.
+        name: String,
+    },
+    /// The object is not in the state that the request is about.
+    #[error("{name} was changed: its etag is {current:?}, not {etag:?}; get it, and decide again")]
+    ObjectChanged {
+        /// The requested name.
+        name: String,
+        /// The etag of the request.
+        etag: String,
+        /// The etag of the object.
+        current: String,
     },
     /// The server is at one of its limits.
     #[error("{} ({maximum}); try again", limit_text(*.limit))]
@@ -119,6 +145,24 @@ impl From<ServiceError> for Status {
                 let mut details = info("OBJECT_EXISTS", [("name", name.clone())]);
                 details.set_resource_info("grasp.v1.Object", name, "", message.clone());
                 Status::with_error_details(Code::AlreadyExists, message, details)
+            }
+            ServiceError::RequestIdReused { request_id, name } => {
+                let mut details = info(
+                    "REQUEST_ID_REUSED",
+                    [("name", name.clone()), ("request_id", request_id)],
+                );
+                details.add_precondition_failure_violation("REQUEST_ID", name, message.clone());
+                Status::with_error_details(Code::FailedPrecondition, message, details)
+            }
+            ServiceError::ObjectReadOnly { name } => {
+                let mut details = info("OBJECT_READ_ONLY", [("name", name.clone())]);
+                details.add_precondition_failure_violation("READ_ONLY", name, message.clone());
+                Status::with_error_details(Code::FailedPrecondition, message, details)
+            }
+            ServiceError::ObjectChanged { name, current, .. } => {
+                let mut details = info("OBJECT_CHANGED", [("name", name.clone()), ("etag", current)]);
+                details.set_resource_info("grasp.v1.Object", name, "", message.clone());
+                Status::with_error_details(Code::Aborted, message, details)
             }
             ServiceError::Overloaded {
                 limit,
@@ -231,6 +275,30 @@ mod tests {
                 },
                 Code::AlreadyExists,
                 "OBJECT_EXISTS",
+            ),
+            (
+                ServiceError::RequestIdReused {
+                    request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".into(),
+                    name: "objects/x".into(),
+                },
+                Code::FailedPrecondition,
+                "REQUEST_ID_REUSED",
+            ),
+            (
+                ServiceError::ObjectReadOnly {
+                    name: "objects/remote".into(),
+                },
+                Code::FailedPrecondition,
+                "OBJECT_READ_ONLY",
+            ),
+            (
+                ServiceError::ObjectChanged {
+                    name: "objects/x".into(),
+                    etag: "1-2".into(),
+                    current: "1-3".into(),
+                },
+                Code::Aborted,
+                "OBJECT_CHANGED",
             ),
             (
                 ServiceError::Overloaded {

@@ -1,7 +1,7 @@
 //! The overhead of gRPC: a replayed attempt over loopback against the same replay as a plain call, and a listing.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use grasp_client::{FindRequest, Outcome, Validity, built_in::request_for};
+use grasp_client::{FindRequest, ObjectQuery, Outcome, Validity, built_in::request_for};
 use grasp_synthesis::model::strategy::Strategy;
 use grasp_tests::{TestServer, searches::Bench};
 
@@ -44,9 +44,12 @@ fn round_trip(criterion: &mut Criterion) {
         });
     });
     group.bench_function("list objects", |bencher| {
-        bencher
-            .to_async(&runtime)
-            .iter(|| async { client.list_objects().await.expect("the server lists its objects") });
+        bencher.to_async(&runtime).iter(|| async {
+            client
+                .list_objects(&ObjectQuery::default())
+                .await
+                .expect("the server lists its objects")
+        });
     });
     group.finish();
     runtime.block_on(server.stop());

@@ -36,7 +36,9 @@ impl Failure {
             Self::Client(error) => match error {
                 ClientError::InvalidArgument(_)
                 | ClientError::NotFound(_)
-                | ClientError::AlreadyExists(_) => 4,
+                | ClientError::AlreadyExists(_)
+                | ClientError::FailedPrecondition(_)
+                | ClientError::Aborted(_) => 4,
                 ClientError::Connect { .. }
                 | ClientError::Unavailable(_)
                 | ClientError::ResourceExhausted(_)
@@ -61,6 +63,8 @@ impl Failure {
                 ClientError::InvalidArgument(_) => "invalid_argument",
                 ClientError::NotFound(_) => "not_found",
                 ClientError::AlreadyExists(_) => "already_exists",
+                ClientError::FailedPrecondition(_) => "failed_precondition",
+                ClientError::Aborted(_) => "aborted",
                 ClientError::ResourceExhausted(_) => "resource_exhausted",
                 ClientError::Unavailable(_) => "unavailable",
                 ClientError::DeadlineExceeded(_) => "deadline_exceeded",

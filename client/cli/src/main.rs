@@ -30,7 +30,7 @@ Exit codes:
     1  any other error, such as a file that cannot be read
     2  usage: unknown options, values or names, or a malformed request file
     3  no grasp within the budget
-    4  rejected by the server: invalid, not found, or already exists
+    4  rejected by the server: invalid, not found, already exists, read-only, or changed meanwhile
     5  no answer: the server is unreachable, not serving, or too slow
   130  interrupted";
 

@@ -52,6 +52,17 @@ pub(crate) fn parse_vector(text: &str) -> Result<Vec3, String> {
     Ok(Vec3::new(x, y, z))
 }
 
+/// Parses a label such as `level=kitchen`; without `=`, its value is empty.
+pub(crate) fn parse_label(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').unwrap_or((text, ""));
+    if key.is_empty() {
+        return Err(format!(
+            "{text:?} is not a label; write a key and a value, for example level=kitchen"
+        ));
+    }
+    Ok((key.to_owned(), value.to_owned()))
+}
+
 /// A cone of directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cone {
@@ -355,6 +366,15 @@ impl ValueEnum for GraspTypeName {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn labels_are_keys_with_or_without_a_value() {
+        let of = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
+        assert_eq!(parse_label("level=kitchen"), of("level", "kitchen"));
+        assert_eq!(parse_label("a=b=c"), of("a", "b=c"));
+        assert_eq!(parse_label("fragile"), of("fragile", ""));
+        assert!(parse_label("=x").is_err());
+    }
 
     #[test]
     fn zero_is_a_duration_only_where_it_switches_off() {

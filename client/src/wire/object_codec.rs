@@ -1,17 +1,24 @@
 //! Objects and health.
 
+use std::time::SystemTime;
+
 use glam::DVec3;
 use grasp_proto::v1;
 use tonic_health::pb::{HealthCheckResponse, health_check_response::ServingStatus};
+use uuid::Uuid;
 
 use super::{
     Malformed, each,
     geometry_codec::{duration_from_wire, pose_from_wire, vector_from_wire, vector_to_wire},
     required,
 };
-use crate::object::{AtlasState, Health, NewObject, Object, ObjectPage, UpAxis};
+use crate::object::{
+    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage, ObjectUpdate, Reset, UpAxis,
+};
 
+/// The request, with a new id if the object has none.
 pub(crate) fn new_object_to_wire(object: &NewObject) -> v1::CreateObjectRequest {
+    let request_id = object.request_id.clone();
     v1::CreateObjectRequest {
         object_id: object.id.clone(),
         obj: Vec::new(),
@@ -25,10 +32,55 @@ pub(crate) fn new_object_to_wire(object: &NewObject) -> v1::CreateObjectRequest 
         mass_kg: object.mass_kg,
         centre_of_mass: object.centre_of_mass.map(vector_to_wire),
         friction: object.friction,
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: object.forbidden.groups.clone(),
-            triangles: object.forbidden.triangles.clone(),
+        forbidden: Some(forbidden_to_wire(&object.forbidden)),
+        labels: object.labels.clone(),
+        request_id: request_id.unwrap_or_else(|| Uuid::new_v4().to_string()),
+    }
+}
+
+fn forbidden_to_wire(forbidden: &ForbiddenSurfaces) -> v1::ForbiddenSurfaces {
+    v1::ForbiddenSurfaces {
+        groups: forbidden.groups.clone(),
+        triangles: forbidden.triangles.clone(),
+    }
+}
+
+/// The request whose mask lists what is to change.
+pub(crate) fn update_to_wire(name: String, update: &ObjectUpdate) -> v1::UpdateObjectRequest {
+    let ObjectUpdate {
+        etag,
+        mass_kg,
+        centre_of_mass,
+        friction,
+        forbidden,
+        labels,
+    } = update;
+    let listed = [
+        ("mass_kg", mass_kg.is_some()),
+        ("centre_of_mass", centre_of_mass.is_some()),
+        ("friction", friction.is_some()),
+        ("forbidden", forbidden.is_some()),
+        ("labels", labels.is_some()),
+    ];
+    let paths = listed.iter().filter(|(_, is_listed)| *is_listed);
+    v1::UpdateObjectRequest {
+        name,
+        update_mask: Some(prost_types::FieldMask {
+            paths: paths.map(|(path, _)| (*path).to_owned()).collect(),
         }),
+        etag: etag.clone().unwrap_or_default(),
+        mass_kg: *mass_kg,
+        centre_of_mass: given(*centre_of_mass).map(vector_to_wire),
+        friction: given(*friction),
+        forbidden: forbidden.as_ref().map(forbidden_to_wire),
+        labels: labels.clone().unwrap_or_default(),
+    }
+}
+
+fn given<T>(value: Option<Reset<T>>) -> Option<T> {
+    match value {
+        Some(Reset::To(value)) => Some(value),
+        Some(Reset::Default) | None => None,
     }
 }
 
@@ -57,7 +109,16 @@ fn object_fields_from_wire(object: v1::Object) -> Result<Object, Malformed> {
         origin_in_file: object
             .origin_in_file
             .map(|origin| DVec3::new(origin.x, origin.y, origin.z)),
+        labels: object.labels,
+        etag: object.etag,
+        create_time: time_from_wire("create_time", object.create_time)?,
+        update_time: time_from_wire("update_time", object.update_time)?,
     })
+}
+
+fn time_from_wire(field: &str, time: Option<prost_types::Timestamp>) -> Result<SystemTime, Malformed> {
+    let time = required(field, time)?;
+    SystemTime::try_from(time).map_err(|_| Malformed::new(field, "is beyond the clock's range"))
 }
 
 fn atlas_from_wire(atlas: v1::AtlasState) -> Result<AtlasState, Malformed> {
@@ -117,6 +178,13 @@ mod tests {
                 y: 0.0,
                 z: -0.5,
             }),
+            labels: [("level".to_owned(), "kitchen".to_owned())].into(),
+            etag: "17-2".to_owned(),
+            create_time: Some(prost_types::Timestamp {
+                seconds: 1_000_000_000,
+                nanos: 5,
+            }),
+            update_time: Some(prost_types::Timestamp::default()),
             ..v1::Object::default()
         }
     }
@@ -130,6 +198,44 @@ mod tests {
         assert_eq!(object.warnings, ["12 open edges"]);
         assert_eq!(object.atlas, None);
         assert_eq!(object.origin_in_file, Some(DVec3::new(4e6, 0.0, -0.5)));
+        assert_eq!(
+            (object.labels["level"].as_str(), object.etag.as_str()),
+            ("kitchen", "17-2")
+        );
+        assert_eq!(
+            object.create_time,
+            SystemTime::UNIX_EPOCH + Duration::new(1_000_000_000, 5)
+        );
+        assert_eq!(object.update_time, SystemTime::UNIX_EPOCH);
+    }
+
+    #[test]
+    fn an_update_lists_what_changes() {
+        let wire = update_to_wire(
+            "objects/mug".to_owned(),
+            &ObjectUpdate {
+                mass_kg: Some(0.3),
+                friction: Some(Reset::Default),
+                centre_of_mass: Some(Reset::To(Vec3::X)),
+                ..ObjectUpdate::default()
+            },
+        );
+        assert_eq!(
+            wire.update_mask.unwrap().paths,
+            ["mass_kg", "centre_of_mass", "friction"]
+        );
+        assert_eq!((wire.mass_kg, wire.friction), (Some(0.3), None));
+        assert_eq!(wire.centre_of_mass.unwrap().x, 1.0);
+        assert_eq!(wire.etag, "");
+    }
+
+    #[test]
+    fn every_request_has_an_id_of_its_own_unless_one_is_given() {
+        let mut object = NewObject::new("mug", b"v 0 0 0".as_slice(), 0.3);
+        let [first, second] = [(); 2].map(|()| new_object_to_wire(&object).request_id);
+        assert!(first != second && Uuid::try_parse(&first).is_ok());
+        object.request_id = Some(first.clone());
+        assert_eq!(new_object_to_wire(&object).request_id, first);
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use grasp_client::{ClientError, FindRequest, GraspClient, Health, NewObject, Outcome, RetryPolicy};
+use grasp_client::{
+    ClientError, FindRequest, GraspClient, Health, NewObject, ObjectQuery, Outcome, RetryPolicy,
+};
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
@@ -44,6 +46,27 @@ async fn retries_unavailable_until_answered() {
     assert_eq!(answer.outcome, Outcome::BudgetExhausted);
     assert_eq!(answer.report.attempts, 5);
     assert_eq!(service.calls(), 3);
+}
+
+#[tokio::test]
+async fn retries_of_a_creation_have_the_same_id_and_other_calls_another() {
+    let service = Scripted::new([Act::Answer, Act::Answer]);
+    let client = connect(&service, PATIENT).await;
+    let object = NewObject::new("mug", "v 0 0 0", 0.3);
+    for _ in 0..2 {
+        client.create_object(&object).await.unwrap();
+    }
+    let ids = service.request_ids.lock().unwrap().clone();
+    assert!(
+        ids.len() == 2 && ids[0] != ids[1] && ids[0].len() == 36,
+        "{ids:?}"
+    );
+    // The id is recorded before the script decides.
+    let service = Scripted::new([unavailable(), Act::Answer]);
+    let client = connect(&service, PATIENT).await;
+    client.create_object(&object).await.unwrap();
+    let ids = service.request_ids.lock().unwrap().clone();
+    assert!(ids.len() == 2 && ids[0] == ids[1], "{ids:?}");
 }
 
 #[tokio::test]
@@ -161,7 +184,7 @@ async fn returns_field_violations() {
 async fn reads_all_pages_of_a_list() {
     let service = Scripted::new([Act::Answer, Act::Answer, Act::Answer]);
     let client = connect(&service, PATIENT).await;
-    let objects = client.list_objects().await.unwrap();
+    let objects = client.list_objects(&ObjectQuery::default()).await.unwrap();
     let names: Vec<_> = objects.iter().map(|object| object.name.as_str()).collect();
     assert_eq!(names, ["objects/", "objects/b", "objects/c"]);
 }
@@ -171,7 +194,7 @@ async fn rejects_repeated_page_token() {
     let mut service = Scripted::new((0..9).map(|_| Act::Answer));
     service.repeats_page_token = true;
     let client = connect(&service, PATIENT).await;
-    let error = client.list_objects().await.unwrap_err();
+    let error = client.list_objects(&ObjectQuery::default()).await.unwrap_err();
     assert!(matches!(error, ClientError::Malformed { .. }), "{error:?}");
     assert_eq!(service.calls(), 2);
 }

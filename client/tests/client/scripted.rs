@@ -25,6 +25,8 @@ pub(crate) enum Act {
 pub(crate) struct Scripted {
     script: Arc<Mutex<VecDeque<Act>>>,
     pub(crate) grpc_timeouts: Arc<Mutex<Vec<String>>>,
+    /// The ids of requests to create objects.
+    pub(crate) request_ids: Arc<Mutex<Vec<String>>>,
     /// Whether the second page of objects repeats its own token.
     pub(crate) repeats_page_token: bool,
 }
@@ -103,6 +105,8 @@ fn wire_object(name: &str) -> v1::Object {
         name: name.to_owned(),
         centre_of_mass: Some(v1::Vector3::default()),
         box_half_extents: Some(v1::Vector3::default()),
+        create_time: Some(prost_types::Timestamp::default()),
+        update_time: Some(prost_types::Timestamp::default()),
         ..v1::Object::default()
     }
 }
@@ -113,6 +117,8 @@ impl ObjectService for Scripted {
         &self,
         request: Request<v1::CreateObjectRequest>,
     ) -> Result<Response<v1::CreateObjectResponse>, Status> {
+        let id = request.get_ref().request_id.clone();
+        self.request_ids.lock().unwrap().push(id);
         self.act(&request).await?;
         let name = format!("objects/{}", request.into_inner().object_id);
         Ok(Response::new(v1::CreateObjectResponse {
@@ -148,5 +154,23 @@ impl ObjectService for Scripted {
             objects: vec![wire_object(&format!("objects/{token}"))],
             next_page_token: next.to_owned(),
         }))
+    }
+
+    async fn update_object(
+        &self,
+        request: Request<v1::UpdateObjectRequest>,
+    ) -> Result<Response<v1::UpdateObjectResponse>, Status> {
+        self.act(&request).await?;
+        Ok(Response::new(v1::UpdateObjectResponse {
+            object: Some(wire_object(&request.into_inner().name)),
+        }))
+    }
+
+    async fn delete_object(
+        &self,
+        request: Request<v1::DeleteObjectRequest>,
+    ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
+        self.act(&request).await?;
+        Ok(Response::new(v1::DeleteObjectResponse {}))
     }
 }

@@ -15,15 +15,14 @@ use grasp_synthesis::{
 use sha2::{Digest as _, Sha256};
 
 use super::{build_queue::BuildJob, builders::Turn, files::tests::Folder, *};
-use crate::{atlas_slots::Update, limits::StoreLimits};
+use crate::{atlas_slots::Update, limits::StoreLimits, objects::store::Origin};
 
 /// Longest wait for any event; reached only if something hangs.
 const HANGS_AFTER: Duration = Duration::from_mins(1);
 
 /// A closed box; half extents in metres.
 pub(super) fn cuboid(id: &str, half_extents: Vec3) -> StoredObject {
-    let object = Primitive { half_extents }.object();
-    StoredObject::new(id.to_owned(), false, Arc::new(object), Vec::new())
+    StoredObject::plain(id, Primitive { half_extents }.object())
 }
 
 /// A box that fits in a hand.
@@ -198,7 +197,7 @@ fn nearly_complete(object: &StoredObject) -> Grown {
 #[test]
 fn complete_atlas_replaces_shipped_grips() {
     let remote = Arc::clone(&grasp_assets::objects::object("remote").unwrap().object);
-    let object = Arc::new(StoredObject::new("remote".to_owned(), true, remote, Vec::new()));
+    let object = Arc::new(StoredObject::built_in("remote".to_owned(), remote));
     let atlases = start(0, &store(10, 1 << 30));
     let job = BuildJob {
         object: Arc::downgrade(&object),
@@ -263,7 +262,10 @@ fn stops_building_for_an_evicted_object() {
     let store = store(1, 1 << 30);
     let atlases = start(1, &store);
     let first = {
-        let first = store.insert(cuboid("first", Vec3::splat(0.2))).unwrap();
+        let first = store
+            .insert(cuboid("first", Vec3::splat(0.2)), Origin::default())
+            .unwrap()
+            .object;
         atlases.register(&first);
         Arc::downgrade(&first)
     };
@@ -273,7 +275,7 @@ fn stops_building_for_an_evicted_object() {
             slot.is_some_and(|slot| slot.build_time > Duration::ZERO)
         })
     });
-    let second = store.insert(small("second")).unwrap();
+    let second = store.insert(small("second"), Origin::default()).unwrap().object;
     atlases.register(&second);
     until("the end of the first", || first.strong_count() == 0);
 }
@@ -291,7 +293,7 @@ fn entries(object: &StoredObject) -> [usize; 2] {
 fn both_hands_of_every_new_object_become_useful_before_any_grows_on() {
     const USEFUL: usize = 100;
     let store = store(10, 1 << 30);
-    let objects = ["a", "b"].map(|id| store.insert(small(id)).unwrap());
+    let objects = ["a", "b"].map(|id| store.insert(small(id), Origin::default()).unwrap().object);
     let atlases = start(1, &store);
     for object in &objects {
         atlases.register(object);
@@ -324,7 +326,10 @@ fn hands_requested_together_do_not_evict_each_other() {
 #[test]
 fn builders_end_when_stopped_or_dropped() {
     let store = store(10, 1 << 30);
-    let object = store.insert(cuboid("large", Vec3::splat(0.2))).unwrap();
+    let object = store
+        .insert(cuboid("large", Vec3::splat(0.2)), Origin::default())
+        .unwrap()
+        .object;
     for stop in [|atlases: &Atlases| drop(atlases.stopper()), |_: &Atlases| {}] {
         let atlases = start(2, &store);
         atlases.register(&object);

@@ -36,7 +36,7 @@ pub struct Config {
     pub improvement: Duration,
     /// Largest number of running and waiting searches; others are rejected.
     pub maximum_searches: NonZeroUsize,
-    /// Largest number of objects received or built at a time; others are rejected.
+    /// Largest number of objects received, built or changed at a time; others are rejected.
     pub maximum_uploads: NonZeroUsize,
     /// Largest mesh file, in bytes.
     pub maximum_object_bytes: NonZeroUsize,

@@ -50,7 +50,7 @@ pub struct RawConfig {
     /// Most searches running or waiting; others are rejected [default: 64].
     #[arg(long, env = "GRASP_MAXIMUM_SEARCHES", value_name = "COUNT")]
     pub maximum_searches: Option<u64>,
-    /// Most objects received or built at a time; others are rejected [default: 4].
+    /// Most objects received, built or changed at a time; others are rejected [default: 4].
     #[arg(long, env = "GRASP_MAXIMUM_UPLOADS", value_name = "COUNT")]
     pub maximum_uploads: Option<u64>,
     /// Largest mesh file, in bytes [default: 8388608].

@@ -1,22 +1,15 @@
 //! Builds objects from meshes.
 
-use std::{collections::HashMap, sync::Arc};
+use std::sync::Arc;
 
-use grasp_import::{ImportedMesh, MeshLimits, read_mesh};
+use grasp_import::{MeshLimits, read_mesh};
 use grasp_synthesis::model::object::GraspObject;
 
-use super::{
-    StoredObject,
-    centre_of_mass::{Source, centre_of_mass},
-    extent::check_extent,
-};
+use super::{StoredObject, centre_of_mass::centre_or_computed, extent::check_extent, mesh_file::MeshFile};
 use crate::{
     error::ServiceError,
-    validate::{Field, ObjectFields, Violations, quoted},
+    validate::{Field, ObjectFields, Violations},
 };
-
-/// Largest number of group names in an error.
-const LISTED_GROUPS: usize = 12;
 
 /// Reads and checks the mesh and builds its search structures. Takes up to seconds for the largest meshes.
 ///
@@ -46,18 +39,17 @@ pub(crate) fn build_object(
         Ok(warning) => warnings.extend(warning),
         Err(wrong) => violations.add(mesh_field, wrong),
     }
-    let forbidden = forbidden_triangles(&fields, &read, &mut violations);
+    // Clients count the triangles of their file, some of which may have been dropped.
+    let file = MeshFile::of(&read);
+    let forbidden = file.forbidden(
+        &fields.forbidden.groups,
+        &fields.forbidden.triangles,
+        &mut violations,
+    );
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
-    let centre_of_mass = fields.centre_of_mass.unwrap_or_else(|| {
-        let (centre, source) = centre_of_mass(&read.mesh);
-        if source == Source::Surface {
-            warnings
-                .push("the mesh encloses no volume: the centre of mass is that of its surface".to_owned());
-        }
-        centre
-    });
+    let centre_of_mass = centre_or_computed(&read.mesh, fields.centre_of_mass, &mut warnings);
     match GraspObject::new(
         read.mesh,
         fields.mass,
@@ -65,10 +57,12 @@ pub(crate) fn build_object(
         fields.friction,
         &forbidden,
     ) {
-        Ok(object) => Ok(StoredObject {
-            origin_in_file: read.origin_in_file,
-            ..StoredObject::new(fields.id, false, Arc::new(object), warnings)
-        }),
+        Ok(object) => Ok(StoredObject::from_file(
+            fields.id,
+            Arc::new(object),
+            warnings,
+            Arc::new(file),
+        )),
         Err(errors) => {
             for error in errors {
                 violations.add(mesh_field, error.to_string());
@@ -76,60 +70,6 @@ pub(crate) fn build_object(
             Err(violations.into_error())
         }
     }
-}
-
-/// The triangles of all forbidden groups and indices.
-fn forbidden_triangles(fields: &ObjectFields, read: &ImportedMesh, violations: &mut Violations) -> Vec<u32> {
-    let field = Field::root("forbidden");
-    let groups: HashMap<&str, &[u32]> = read
-        .groups
-        .iter()
-        .map(|(name, triangles)| (name.as_str(), triangles.as_slice()))
-        .collect();
-    let mut forbidden = Vec::new();
-    for (place, name) in fields.forbidden_groups.iter().enumerate() {
-        match groups.get(name.as_str()) {
-            Some(triangles) => forbidden.extend_from_slice(triangles),
-            None => violations.add(
-                field.child("groups").at(place),
-                format_args!("is {}; {}", quoted(name), known_groups(read)),
-            ),
-        }
-    }
-    // Clients count the triangles of their file, some of which may have been dropped.
-    let triangles = read.triangles_in_file;
-    for (place, &triangle) in fields.forbidden_triangles.iter().enumerate() {
-        if let Ok(index) = read.indices_in_file.binary_search(&triangle) {
-            forbidden.push(index as u32);
-        } else if triangle as usize >= triangles {
-            violations.add(
-                field.child("triangles").at(place),
-                format_args!("is {triangle}; the mesh has {triangles} triangles, counted from 0"),
-            );
-        }
-    }
-    forbidden.sort_unstable();
-    forbidden.dedup();
-    forbidden
-}
-
-fn known_groups(read: &ImportedMesh) -> String {
-    if read.groups.is_empty() {
-        return "the mesh names no groups, objects or materials".to_owned();
-    }
-    let names: Vec<String> = read
-        .groups
-        .iter()
-        .take(LISTED_GROUPS)
-        .map(|(name, _)| quoted(name))
-        .collect();
-    let more = read.groups.len().saturating_sub(LISTED_GROUPS);
-    let more = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
-    format!("the mesh has {}{more}", names.join(", "))
 }
 
 #[cfg(test)]
@@ -144,6 +84,7 @@ mod tests {
     use grasp_import::Import;
 
     use super::*;
+    use crate::validate::Forbidden;
 
     const LIMITS: MeshLimits = MeshLimits {
         bytes: 1000,
@@ -154,16 +95,14 @@ mod tests {
     /// A tetrahedron of 10 cm whose second face has no area and is dropped.
     fn fields(forbidden_triangles: &[u32]) -> ObjectFields {
         ObjectFields {
-            id: "tetrahedron".to_owned(),
             mesh: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 1 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
                 .to_vec(),
-            mesh_field: "mesh",
             import: Import::with_unit(0.1),
-            mass: 0.1,
-            centre_of_mass: None,
-            friction: None,
-            forbidden_groups: Vec::new(),
-            forbidden_triangles: forbidden_triangles.to_vec(),
+            forbidden: Forbidden {
+                groups: Vec::new(),
+                triangles: forbidden_triangles.to_vec(),
+            },
+            ..ObjectFields::named("tetrahedron", 0.1)
         }
     }
 
@@ -190,8 +129,11 @@ mod tests {
         ObjectFields {
             mesh: obj.into_bytes(),
             import: Import::with_unit(unit_metres),
-            forbidden_groups: vec!["lid".to_owned()],
-            ..fields(&[0])
+            forbidden: Forbidden {
+                groups: vec!["lid".to_owned()],
+                triangles: vec![0],
+            },
+            ..fields(&[])
         }
     }
 

@@ -5,7 +5,7 @@ use grasp_synthesis::geometry::mesh::TriangleMesh;
 
 /// What a centre of mass was computed from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Source {
+enum Source {
     /// The volume that the mesh encloses, at uniform density.
     Volume,
     /// The surface, at uniform thickness: the mesh encloses almost no volume.
@@ -16,10 +16,30 @@ pub(super) enum Source {
 /// does an open mesh whose signed tetrahedra cancel.
 const SMALLEST_VOLUME_SHARE: f64 = 1e-4;
 
+/// The warning about a centre of mass that was computed from the surface.
+const SURFACE_WARNING: &str = "the mesh encloses no volume: the centre of mass is that of its surface";
+
+/// The given centre of mass or, without one, that of the mesh, in metres. Adds a warning if the latter is that of the
+/// surface, and removes one from before.
+pub(super) fn centre_or_computed(
+    mesh: &TriangleMesh,
+    given: Option<Vec3>,
+    warnings: &mut Vec<String>,
+) -> Vec3 {
+    warnings.retain(|warning| warning != SURFACE_WARNING);
+    given.unwrap_or_else(|| {
+        let (centre, source) = centre_of_mass(mesh);
+        if source == Source::Surface {
+            warnings.push(SURFACE_WARNING.to_owned());
+        }
+        centre
+    })
+}
+
 /// The centre of mass of a mesh, in metres: that of the volume, by the divergence theorem (signed tetrahedra between
 /// every triangle and one point). It is that of the surface if there is no volume, or if the volume's would be outside
 /// the bounding box, as it may be for a mesh that is open or has inconsistent winding.
-pub(super) fn centre_of_mass(mesh: &TriangleMesh) -> (Vec3, Source) {
+fn centre_of_mass(mesh: &TriangleMesh) -> (Vec3, Source) {
     let mut low = DVec3::INFINITY;
     let mut high = DVec3::NEG_INFINITY;
     for position in mesh.positions() {

@@ -3,8 +3,11 @@
 
 pub(crate) mod build;
 mod centre_of_mass;
+pub(crate) mod change;
 pub(crate) mod directory;
 mod extent;
+mod mesh_file;
+mod revision;
 pub(crate) mod store;
 
 use std::{
@@ -27,6 +30,8 @@ use grasp_synthesis::{
 };
 use sha2::{Digest as _, Sha256};
 
+use self::mesh_file::MeshFile;
+pub(crate) use self::revision::{Record, Revision};
 use crate::{
     answer::{vector, wire_pose},
     atlas_slots::AtlasSlots,
@@ -49,8 +54,8 @@ pub(crate) struct StoredObject {
     pub content_hash: String,
     /// Oddities of its mesh.
     pub warnings: Vec<String>,
-    /// Its origin in the file of its mesh, in the file's units and axes.
-    pub origin_in_file: DVec3,
+    /// What is kept of its file.
+    pub file: Arc<MeshFile>,
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
     /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
@@ -58,15 +63,29 @@ pub(crate) struct StoredObject {
 }
 
 impl StoredObject {
-    /// An object with its id, whose frame is that of its file.
-    pub(crate) fn new(id: String, built_in: bool, object: Arc<GraspObject>, warnings: Vec<String>) -> Self {
+    /// A built-in object.
+    pub(crate) fn built_in(id: String, object: Arc<GraspObject>) -> Self {
+        let file = MeshFile::plain(object.surface.mesh().triangles().len());
+        Self {
+            built_in: true,
+            ..Self::from_file(id, object, Vec::new(), Arc::new(file))
+        }
+    }
+
+    /// An object from a client's file.
+    pub(crate) fn from_file(
+        id: String,
+        object: Arc<GraspObject>,
+        warnings: Vec<String>,
+        file: Arc<MeshFile>,
+    ) -> Self {
         Self {
             id,
-            built_in,
+            built_in: false,
             content_hash: content_hash(&object),
             object: Arc::new(PreparedObject::new(object)),
             warnings,
-            origin_in_file: DVec3::ZERO,
+            file,
             atlas_slots: AtlasSlots::default(),
             transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
         }
@@ -99,6 +118,13 @@ impl StoredObject {
         (!grips.is_empty()).then(|| Arc::clone(grips))
     }
 
+    /// The triangles that must not be touched, ascending.
+    pub(crate) fn forbidden_triangles(&self) -> Vec<u32> {
+        let all = 0..count(self.object.surface.mesh().triangles().len());
+        all.filter(|&triangle| self.object.is_forbidden(triangle))
+            .collect()
+    }
+
     /// "objects/{object}".
     pub(crate) fn name(&self) -> String {
         name_of(&self.id)
@@ -129,10 +155,11 @@ impl StoredObject {
             + PlacementCaches::MAX_BYTES
             + self.transferred_grips.len() * TransferredGrips::MAX_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()
+            + self.file.bytes()
     }
 
-    /// The message that describes the object, with the state of its atlas.
-    pub(crate) fn to_wire(&self, atlas: Option<v1::AtlasState>) -> v1::Object {
+    /// The message that describes the object but for its labels, etag and times, with the state of its atlas.
+    fn to_wire(&self, atlas: Option<v1::AtlasState>) -> v1::Object {
         let mesh = self.object.surface.mesh();
         let bounding_box = &self.object.bounding_box;
         v1::Object {
@@ -149,11 +176,12 @@ impl StoredObject {
             content_hash: self.content_hash.clone(),
             warnings: self.warnings.clone(),
             atlas,
-            origin_in_file: (self.origin_in_file != DVec3::ZERO).then_some(v1::DoubleVector3 {
-                x: self.origin_in_file.x,
-                y: self.origin_in_file.y,
-                z: self.origin_in_file.z,
+            origin_in_file: (self.file.origin != DVec3::ZERO).then_some(v1::DoubleVector3 {
+                x: self.file.origin.x,
+                y: self.file.origin.y,
+                z: self.file.origin.z,
             }),
+            ..v1::Object::default()
         }
     }
 }
@@ -201,13 +229,21 @@ pub(crate) mod tests {
 
     use super::*;
 
+    impl StoredObject {
+        /// An object whose file has the triangles of its mesh.
+        pub(crate) fn plain(id: &str, object: GraspObject) -> Self {
+            let file = MeshFile::plain(object.surface.mesh().triangles().len());
+            Self::from_file(id.to_owned(), Arc::new(object), Vec::new(), Arc::new(file))
+        }
+    }
+
     /// A tetrahedron of the given edge with one forbidden triangle.
     pub(crate) fn tetrahedron(id: &str, edge: f32, forbidden: &[u32]) -> StoredObject {
         let positions = vec![Vec3::ZERO, Vec3::X * edge, Vec3::Y * edge, Vec3::Z * edge];
         let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let mesh = TriangleMesh::new(positions, triangles).unwrap();
         let object = GraspObject::new(mesh, 0.1, Vec3::ZERO, Some(0.3), forbidden).unwrap();
-        StoredObject::new(id.to_owned(), false, Arc::new(object), Vec::new())
+        StoredObject::plain(id, object)
     }
 
     #[test]

@@ -38,7 +38,7 @@ impl GraspHandler {
         let shared = &self.shared;
         let query = find_query(request, &shared.default_rig, |id| shared.objects.contains(id))?;
         call.log_object(&query.object_id);
-        let stored = shared.objects.get(&query.object_id)?;
+        let stored = shared.objects.get(&query.object_id)?.object;
         let object = Arc::clone(&stored.object);
         let reserve = shared.reserve.at(Instant::now());
         call.log_reserve(reserve);

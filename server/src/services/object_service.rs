@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use grasp_proto::v1::{self, object_service_server::ObjectService};
+use prost::Message as _;
 use tonic::{Request, Response, Status};
 
 use super::Shared;
@@ -10,9 +11,22 @@ use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
     executor::run_blocking,
-    objects::{StoredObject, build::build_object, name_of},
-    validate::{Field, Violations, object_fields, object_id_of, page_query, page_token},
+    limits::LARGEST_RESPONSE,
+    objects::{Revision, build::build_object, change::changed, store::Origin},
+    validate::{
+        Field, UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token,
+        update_query,
+    },
 };
+
+/// Bytes of a page that are kept for its token.
+const TOKEN_ROOM: usize = 1 << 10;
+
+/// Bytes that an element of a repeated field takes beside its own: the field's number and its length.
+const ELEMENT_OVERHEAD: usize = 6;
+
+/// How often a change without an etag starts again because others change the same object meanwhile.
+const CHANGE_ATTEMPTS: usize = 8;
 
 /// Implements `ObjectService`.
 #[derive(Clone, Debug)]
@@ -32,56 +46,166 @@ impl ObjectHandler {
         permit: Option<UploadPermit>,
         call: &CallContext,
     ) -> Result<v1::CreateObjectResponse, ServiceError> {
-        let limits = self.shared.obj_limits;
-        let mut violations = Violations::default();
-        let fields = object_fields(request, limits.bytes, &mut violations);
-        if violations.is_empty() {
-            call.log_object(&fields.id);
-            // Checked again on insertion; checked here to avoid building the object in vain.
-            if self.shared.objects.contains(&fields.id) {
-                return Err(ServiceError::ObjectExists {
-                    name: name_of(&fields.id),
-                });
-            }
-        }
-        let shared = Arc::clone(&self.shared);
+        let handler = self.clone();
+        let call = call.clone();
         let object = run_blocking(move || {
             let _permit = permit;
-            let object = build_object(fields, limits, violations)?;
-            object.prepare(&shared.default_rig);
-            Ok::<_, ServiceError>(object)
+            handler.create_blocking(request, &call)
         })
         .await??;
-        let object = self.shared.objects.insert(object)?;
-        self.shared.atlases.register(&object);
         Ok(v1::CreateObjectResponse {
             object: Some(self.message(&object)),
         })
     }
 
-    fn get(&self, name: &str, call: &CallContext) -> Result<v1::GetObjectResponse, ServiceError> {
+    fn create_blocking(
+        &self,
+        request: v1::CreateObjectRequest,
+        call: &CallContext,
+    ) -> Result<Revision, ServiceError> {
+        let shared = &self.shared;
+        let limits = shared.obj_limits;
         let mut violations = Violations::default();
-        let Some(id) = object_id_of(Field::root("name"), name, &mut violations) else {
-            return Err(violations.into_error());
+        let mut fields = object_fields(request, limits.bytes, &mut violations);
+        let origin = Origin {
+            labels: std::mem::take(&mut fields.labels),
+            request: fields.request,
         };
+        if violations.is_empty() {
+            call.log_object(&fields.id);
+            // Checked again on insertion; checked here to avoid building the object in vain.
+            if let Some(object) = shared.objects.repeated(&fields.id, origin.request.as_ref())? {
+                return Ok(object);
+            }
+        }
+        let object = build_object(fields, limits, violations)?;
+        object.prepare(&shared.default_rig);
+        let revision = shared.objects.insert(object, origin)?;
+        shared.atlases.register(&revision.object);
+        Ok(revision)
+    }
+
+    fn get(&self, name: &str, call: &CallContext) -> Result<v1::GetObjectResponse, ServiceError> {
+        let id = checked_id(name)?;
         call.log_object(&id);
         Ok(v1::GetObjectResponse {
-            object: Some(self.message(&*self.shared.objects.get(&id)?)),
+            object: Some(self.message(&self.shared.objects.get(&id)?)),
         })
     }
 
     fn list(&self, request: &v1::ListObjectsRequest) -> Result<v1::ListObjectsResponse, ServiceError> {
         let query = page_query(request)?;
-        let (objects, more) = self.shared.objects.page(query.after.as_deref(), query.size);
-        let last = objects.last().filter(|_| more);
+        let (revisions, more) = self.shared.objects.page(&query);
+        let all = revisions.iter().map(|revision| self.message(revision));
+        let objects = fitting(all, LARGEST_RESPONSE - TOKEN_ROOM);
+        let last = objects.len().checked_sub(1);
+        let last = last.filter(|_| more || objects.len() < revisions.len());
+        let token = last.map(|last| page_token(&query, &revisions[last].place()));
         Ok(v1::ListObjectsResponse {
-            next_page_token: last.map(|last| page_token(&last.id)).unwrap_or_default(),
-            objects: objects.iter().map(|object| self.message(object)).collect(),
+            next_page_token: token.unwrap_or_default(),
+            objects,
         })
     }
 
-    fn message(&self, object: &StoredObject) -> v1::Object {
-        object.to_wire(self.shared.atlases.state(object))
+    async fn update(
+        &self,
+        request: v1::UpdateObjectRequest,
+        permit: Option<UploadPermit>,
+        call: &CallContext,
+    ) -> Result<v1::UpdateObjectResponse, ServiceError> {
+        let query = update_query(request)?;
+        call.log_object(&query.id);
+        let handler = self.clone();
+        let object = run_blocking(move || {
+            let _permit = permit;
+            handler.update_blocking(&query)
+        })
+        .await??;
+        Ok(v1::UpdateObjectResponse {
+            object: Some(self.message(&object)),
+        })
+    }
+
+    fn update_blocking(&self, query: &UpdateQuery) -> Result<Revision, ServiceError> {
+        let mut attempts = 0;
+        loop {
+            attempts += 1;
+            match self.try_update(query) {
+                // Without an etag, the change applies to whatever others made of the object meanwhile.
+                Err(ServiceError::ObjectChanged { .. })
+                    if query.etag.is_none() && attempts < CHANGE_ATTEMPTS => {}
+                result => return result,
+            }
+        }
+    }
+
+    fn try_update(&self, query: &UpdateQuery) -> Result<Revision, ServiceError> {
+        let Shared {
+            objects,
+            atlases,
+            default_rig,
+            ..
+        } = &*self.shared;
+        let base = objects.changeable(&query.id, query.etag.as_deref())?;
+        let object = if query.change.is_empty() {
+            None
+        } else {
+            changed(&base.object, &query.change)?
+        };
+        let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
+        let Some(object) = object else {
+            return if *labels == base.record.labels {
+                Ok(base)
+            } else {
+                objects.replace(&base, labels.clone(), None)
+            };
+        };
+        object.prepare(default_rig);
+        let revision = objects.replace(&base, labels.clone(), Some(object))?;
+        atlases.register(&revision.object);
+        Ok(revision)
+    }
+
+    fn delete(
+        &self,
+        request: v1::DeleteObjectRequest,
+        call: &CallContext,
+    ) -> Result<v1::DeleteObjectResponse, ServiceError> {
+        let id = checked_id(&request.name)?;
+        call.log_object(&id);
+        let etag = given_etag(request.etag);
+        match self.shared.objects.remove(&id, etag.as_deref()) {
+            Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
+            result => result?,
+        }
+        Ok(v1::DeleteObjectResponse {})
+    }
+
+    fn message(&self, revision: &Revision) -> v1::Object {
+        revision.to_wire(self.shared.atlases.state(&revision.object))
+    }
+}
+
+/// The first objects whose messages take no more than `room` bytes together; at least one, if there is any.
+fn fitting(objects: impl Iterator<Item = v1::Object>, mut room: usize) -> Vec<v1::Object> {
+    let mut fitting = Vec::new();
+    for object in objects {
+        let bytes = object.encoded_len() + ELEMENT_OVERHEAD;
+        if bytes > room && !fitting.is_empty() {
+            break;
+        }
+        room = room.saturating_sub(bytes);
+        fitting.push(object);
+    }
+    fitting
+}
+
+/// The id in the field `name`, which is all that may be wrong with a request.
+fn checked_id(name: &str) -> Result<String, ServiceError> {
+    let mut violations = Violations::default();
+    match object_id_of(Field::root("name"), name, &mut violations) {
+        Some(id) => Ok(id),
+        None => Err(violations.into_error()),
     }
 }
 
@@ -111,5 +235,51 @@ impl ObjectService for ObjectHandler {
         request: Request<v1::ListObjectsRequest>,
     ) -> Result<Response<v1::ListObjectsResponse>, Status> {
         Ok(Response::new(self.list(request.get_ref())?))
+    }
+
+    async fn update_object(
+        &self,
+        mut request: Request<v1::UpdateObjectRequest>,
+    ) -> Result<Response<v1::UpdateObjectResponse>, Status> {
+        let call = CallContext::of(&request);
+        let permit = request.extensions_mut().remove::<UploadPermit>();
+        Ok(Response::new(
+            self.update(request.into_inner(), permit, &call).await?,
+        ))
+    }
+
+    async fn delete_object(
+        &self,
+        request: Request<v1::DeleteObjectRequest>,
+    ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.delete(request.into_inner(), &call)?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_ends_before_it_is_too_large() {
+        let object = |length: usize| v1::Object {
+            name: "n".repeat(length),
+            ..Default::default()
+        };
+        for (lengths, expected) in [
+            (&[300, 300, 300][..], 3),
+            (&[600, 300, 300], 2),
+            (&[9000, 1], 1),
+            (&[], 0),
+        ] {
+            let objects = fitting(lengths.iter().map(|&length| object(length)), 1000);
+            assert_eq!(objects.len(), expected, "{lengths:?}");
+            let response = v1::ListObjectsResponse {
+                objects,
+                next_page_token: String::new(),
+            };
+            assert!(response.encoded_len() <= 1000 || expected == 1);
+        }
     }
 }

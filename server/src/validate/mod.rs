@@ -7,11 +7,13 @@
 mod constraints;
 mod find_grasp;
 mod hand;
+mod labels;
 mod object;
 mod obstacles;
 mod page;
 mod receiver;
 mod search_limits;
+mod update;
 
 use std::fmt;
 
@@ -23,10 +25,12 @@ pub(crate) use find_grasp::{FindQuery, find_query};
 pub(crate) use hand::GiverHand;
 #[cfg(test)]
 pub(crate) use hand::fixtures;
-pub(crate) use object::{ObjectFields, object_fields, object_id_of};
+pub(crate) use labels::Labels;
+pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, object_id_of};
 #[cfg(test)]
 pub(crate) use obstacles::tests::any_obstacles;
-pub(crate) use page::{page_query, page_token};
+pub(crate) use page::{PageQuery, Place, page_query, page_token};
+pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
 
 use crate::error::{ServiceError, Violation};
 

@@ -1,10 +1,13 @@
-//! Checks object names, and all fields of a new object but its mesh.
+//! Checks object names, and all fields of a new or changed object but its mesh.
 
 use glam::Vec3;
 use grasp_import::{Import, UpAxis};
 use grasp_proto::v1;
+use prost::Message as _;
+use sha2::{Digest as _, Sha256};
+use uuid::Uuid;
 
-use super::{Field, Violations, friction, point, quoted};
+use super::{Field, Labels, Violations, friction, labels::labels, point, quoted};
 
 /// Prefix of every object's name.
 const COLLECTION: &str = "objects/";
@@ -35,10 +38,37 @@ pub(crate) struct ObjectFields {
     pub centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction, if given.
     pub friction: Option<f32>,
-    /// Named parts of the mesh that must not be touched.
-    pub forbidden_groups: Vec<String>,
-    /// Triangles that must not be touched.
-    pub forbidden_triangles: Vec<u32>,
+    /// Surfaces that must not be touched.
+    pub forbidden: Forbidden,
+    /// Labels.
+    pub labels: Labels,
+    /// What identifies the request, if it may be repeated.
+    pub request: Option<RequestKey>,
+}
+
+/// Surfaces that must not be touched, as a client names them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Forbidden {
+    /// Named parts of the mesh.
+    pub groups: Vec<String>,
+    /// Triangles of the file.
+    pub triangles: Vec<u32>,
+}
+
+impl From<v1::ForbiddenSurfaces> for Forbidden {
+    fn from(surfaces: v1::ForbiddenSurfaces) -> Self {
+        let v1::ForbiddenSurfaces { groups, triangles } = surfaces;
+        Self { groups, triangles }
+    }
+}
+
+/// Identifies a request to create an object, so that it can be repeated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct RequestKey {
+    /// The client's id of the request.
+    pub id: Uuid,
+    /// SHA-256 of everything else in it.
+    pub content: [u8; 32],
 }
 
 /// The id of a name like `objects/remote`.
@@ -59,12 +89,22 @@ pub(crate) fn object_id_of(field: Field<'_>, name: &str, violations: &mut Violat
     }
 }
 
-/// Checks the fields of a new object. Reading the mesh adds its own violations later.
+/// Checks the fields of a new object. Reading the mesh adds its own violations later. If the request may be repeated, this
+/// hashes the mesh, which takes milliseconds.
 pub(crate) fn object_fields(
-    request: v1::CreateObjectRequest,
+    mut request: v1::CreateObjectRequest,
     maximum_bytes: usize,
     violations: &mut Violations,
 ) -> ObjectFields {
+    let (mesh, obj) = (
+        std::mem::take(&mut request.mesh),
+        std::mem::take(&mut request.obj),
+    );
+    let request_key = request_key(
+        &mut request,
+        if mesh.is_empty() { &obj } else { &mesh },
+        violations,
+    );
     if !is_object_id(&request.object_id) {
         violations.add(
             Field::root("object_id"),
@@ -74,7 +114,7 @@ pub(crate) fn object_fields(
             ),
         );
     }
-    let (mesh_field, mesh) = match (request.mesh, request.obj) {
+    let (mesh_field, mesh) = match (mesh, obj) {
         (mesh, obj) if obj.is_empty() => ("mesh", mesh),
         (mesh, obj) if mesh.is_empty() => ("obj", obj),
         (mesh, _) => {
@@ -123,22 +163,14 @@ pub(crate) fn object_fields(
             1.0
         }
     };
-    if !(request.mass_kg > 0.0 && request.mass_kg <= LARGEST_MASS) {
-        violations.add(
-            Field::root("mass_kg"),
-            format_args!(
-                "is {}; it must be more than 0 and at most {LARGEST_MASS}",
-                request.mass_kg
-            ),
-        );
-    }
+    check_mass(request.mass_kg, violations);
     let centre_of_mass = request
         .centre_of_mass
         .map(|v| point(Field::root("centre_of_mass"), v, 1.0, violations));
     let friction = request
         .friction
         .map(|value| friction(Field::root("friction"), value, violations));
-    let forbidden = request.forbidden.unwrap_or_default();
+    labels(Field::root("labels"), &request.labels, violations);
     ObjectFields {
         id: request.object_id,
         mesh,
@@ -147,8 +179,48 @@ pub(crate) fn object_fields(
         mass: request.mass_kg,
         centre_of_mass,
         friction,
-        forbidden_groups: forbidden.groups,
-        forbidden_triangles: forbidden.triangles,
+        forbidden: request.forbidden.unwrap_or_default().into(),
+        labels: request.labels,
+        request: request_key,
+    }
+}
+
+/// Takes the id out of a request whose mesh was taken out, and identifies the request by it; none without an id.
+fn request_key(
+    request: &mut v1::CreateObjectRequest,
+    mesh: &[u8],
+    violations: &mut Violations,
+) -> Option<RequestKey> {
+    let id = std::mem::take(&mut request.request_id);
+    if id.is_empty() {
+        return None;
+    }
+    let Ok(id) = Uuid::try_parse(&id) else {
+        violations.add(
+            Field::root("request_id"),
+            format_args!(
+                "is {}; it must be a UUID like 3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683",
+                quoted(&id)
+            ),
+        );
+        return None;
+    };
+    let mut hash = Sha256::new();
+    hash.update(Sha256::digest(request.encode_to_vec()));
+    hash.update(mesh);
+    Some(RequestKey {
+        id,
+        content: hash.finalize().into(),
+    })
+}
+
+/// Checks a mass.
+pub(super) fn check_mass(mass_kg: f32, violations: &mut Violations) {
+    if !(mass_kg > 0.0 && mass_kg <= LARGEST_MASS) {
+        violations.add(
+            Field::root("mass_kg"),
+            format_args!("is {mass_kg}; it must be more than 0 and at most {LARGEST_MASS}"),
+        );
     }
 }
 
@@ -161,6 +233,25 @@ fn is_object_id(id: &str) -> bool {
 }
 
 #[cfg(test)]
+impl ObjectFields {
+    /// Fields without a mesh, for tests to complete.
+    pub(crate) fn named(id: &str, mass: f32) -> Self {
+        Self {
+            id: id.to_owned(),
+            mesh: Vec::new(),
+            mesh_field: "mesh",
+            import: Import::METRES,
+            mass,
+            centre_of_mass: None,
+            friction: None,
+            forbidden: Forbidden::default(),
+            labels: Labels::new(),
+            request: None,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::error::ServiceError;
@@ -168,14 +259,9 @@ mod tests {
     fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest {
             object_id: "mug-1".into(),
-            obj: Vec::new(),
             mesh: b"v 0 0 0".to_vec(),
-            up_axis: 0,
-            unit_metres: None,
             mass_kg: 0.3,
-            centre_of_mass: None,
-            friction: None,
-            forbidden: None,
+            ..Default::default()
         }
     }
 
@@ -245,8 +331,42 @@ mod tests {
             ..valid()
         };
         assert_eq!(fields_of_violations(request), ["up_axis"]);
+        let request = v1::CreateObjectRequest {
+            request_id: "1234".into(),
+            labels: [("K".to_owned(), String::new())].into(),
+            ..valid()
+        };
+        assert_eq!(fields_of_violations(request), ["request_id", "labels"]);
         let all = v1::CreateObjectRequest::default();
         assert_eq!(fields_of_violations(all), ["object_id", "mesh", "mass_kg"]);
+    }
+
+    #[test]
+    fn a_request_is_identified_by_its_id_and_fields() {
+        let key = |request: v1::CreateObjectRequest| {
+            let mut violations = Violations::default();
+            let fields = object_fields(request, 100, &mut violations);
+            assert!(violations.is_empty());
+            fields.request
+        };
+        let with_id = || v1::CreateObjectRequest {
+            request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".into(),
+            labels: [("a".to_owned(), "b".to_owned()), ("c".to_owned(), "d".to_owned())].into(),
+            ..valid()
+        };
+        assert_eq!(key(valid()), None);
+        let [first, second] = [key(with_id()), key(with_id())];
+        assert!(first.is_some() && first == second);
+        let heavier = v1::CreateObjectRequest {
+            mass_kg: 0.4,
+            ..with_id()
+        };
+        assert_ne!(key(heavier), first);
+        let other_mesh = v1::CreateObjectRequest {
+            mesh: b"v 0 0 1".to_vec(),
+            ..with_id()
+        };
+        assert_ne!(key(other_mesh), first);
     }
 
     #[test]

@@ -1,8 +1,15 @@
 //! Checks list requests, and makes page tokens.
 
-use grasp_proto::v1;
+use std::{cmp::Ordering, fmt::Write as _};
 
-use super::{Field, Violations, quoted};
+use grasp_proto::v1;
+use sha2::{Digest as _, Sha256};
+
+use super::{
+    Field, Violations,
+    labels::{LabelFilter, label_filter},
+    quoted,
+};
 use crate::error::ServiceError;
 
 /// Number of objects on a page if the request gives no size.
@@ -12,15 +19,81 @@ const DEFAULT_PAGE_SIZE: usize = 50;
 const LARGEST_PAGE_SIZE: usize = 1000;
 
 /// Prefix of tokens of this version, so that tokens of other versions are rejected.
-const TOKEN_PREFIX: &str = "a1-";
+const TOKEN_PREFIX: &str = "a2-";
 
 /// A page to list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PageQuery {
     /// Number of objects.
     pub size: usize,
-    /// The last id of the previous page; none for the first page.
-    pub after: Option<String>,
+    /// The place of the last object of the previous page; none for the first page.
+    pub after: Option<Place>,
+    /// Which objects.
+    pub filter: LabelFilter,
+    /// In which order.
+    pub order: ObjectOrder,
+    /// Identifies filter and order in tokens.
+    list: String,
+}
+
+/// Where an object is in a list, whatever its order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// Nanoseconds from 1970 to the object's creation.
+    pub created: u64,
+    /// Nanoseconds from 1970 to its last change.
+    pub updated: u64,
+    /// Its id.
+    pub id: String,
+}
+
+/// What objects are sorted by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Key {
+    Name,
+    CreateTime,
+    UpdateTime,
+}
+
+impl Key {
+    fn of(name: &str) -> Option<Self> {
+        match name {
+            "name" => Some(Self::Name),
+            "create_time" => Some(Self::CreateTime),
+            "update_time" => Some(Self::UpdateTime),
+            _ => None,
+        }
+    }
+}
+
+/// The order of a list.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ObjectOrder(Vec<(Key, Direction)>);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Direction {
+    Ascending,
+    Descending,
+}
+
+impl ObjectOrder {
+    /// Compares two places; only places of the same object are equal.
+    pub(crate) fn compare(&self, a: &Place, b: &Place) -> Ordering {
+        let by_keys = self.0.iter().map(|(key, direction)| {
+            let ascending = match key {
+                Key::Name => a.id.cmp(&b.id),
+                Key::CreateTime => a.created.cmp(&b.created),
+                Key::UpdateTime => a.updated.cmp(&b.updated),
+            };
+            match direction {
+                Direction::Ascending => ascending,
+                Direction::Descending => ascending.reverse(),
+            }
+        });
+        by_keys
+            .fold(Ordering::Equal, Ordering::then)
+            .then_with(|| a.id.cmp(&b.id))
+    }
 }
 
 /// Checks a list request.
@@ -40,85 +113,236 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
             DEFAULT_PAGE_SIZE
         }
     };
+    let list = list_of(request);
     let after = if request.page_token.is_empty() {
         None
     } else {
-        let after = id_of_token(&request.page_token);
-        if after.is_none() {
-            violations.add(
-                Field::root("page_token"),
-                format_args!(
-                    "is {}; it must be the next_page_token of an earlier response",
-                    quoted(&request.page_token)
-                ),
-            );
-        }
-        after
+        place_of_token(&request.page_token, &list, &mut violations)
     };
-    violations.finish(PageQuery { size, after })
+    let filter = label_filter(Field::root("filter"), &request.filter, &mut violations);
+    let order = object_order(&request.order_by, &mut violations);
+    violations.finish(PageQuery {
+        size,
+        after,
+        filter,
+        order,
+        list,
+    })
 }
 
-/// The token of the page after the object with this id.
-pub(crate) fn page_token(last_id: &str) -> String {
-    use std::fmt::Write as _;
-    let mut token = TOKEN_PREFIX.to_owned();
-    for byte in last_id.bytes() {
-        // Writing to a string cannot fail.
-        let _ = write!(token, "{byte:02x}");
+fn object_order(text: &str, violations: &mut Violations) -> ObjectOrder {
+    let mut keys: Vec<(Key, Direction)> = Vec::new();
+    if text.trim().is_empty() {
+        return ObjectOrder(keys);
     }
-    token
+    for (place, part) in text.split(',').enumerate() {
+        let mut words = part.split_ascii_whitespace();
+        let key = words.next().and_then(Key::of);
+        let direction = match words.next() {
+            None => Some(Direction::Ascending),
+            Some("desc") => Some(Direction::Descending),
+            Some(_) => None,
+        };
+        match (key, direction, words.next()) {
+            (Some(key), Some(direction), None) if keys.iter().all(|(other, _)| *other != key) => {
+                keys.push((key, direction));
+            }
+            _ => {
+                violations.add(
+                    Field::root("order_by"),
+                    format_args!(
+                        "has {} as part {}; parts must be name, create_time or update_time, each at most once and \
+                         optionally followed by desc",
+                        quoted(part.trim()),
+                        place + 1
+                    ),
+                );
+                break;
+            }
+        }
+    }
+    ObjectOrder(keys)
 }
 
-fn id_of_token(token: &str) -> Option<String> {
+/// Identifies the filter and order of a request.
+fn list_of(request: &v1::ListObjectsRequest) -> String {
+    let mut hash = Sha256::new();
+    hash.update((request.filter.len() as u64).to_le_bytes());
+    hash.update(&request.filter);
+    hash.update(&request.order_by);
+    hex(&hash.finalize()[..8])
+}
+
+/// The token of the page after an object.
+pub(crate) fn page_token(query: &PageQuery, last: &Place) -> String {
+    let Place { created, updated, id } = last;
+    let text = format!("{} {created} {updated} {id}", query.list);
+    format!("{TOKEN_PREFIX}{}", hex(text.as_bytes()))
+}
+
+fn place_of_token(token: &str, list: &str, violations: &mut Violations) -> Option<Place> {
+    let field = Field::root("page_token");
+    let Some((of_list, place)) = parse_token(token) else {
+        violations.add(
+            field,
+            format_args!(
+                "is {}; it must be the next_page_token of an earlier response",
+                quoted(token)
+            ),
+        );
+        return None;
+    };
+    if of_list != list {
+        violations.add(
+            field,
+            "is of a list with another filter or order_by; they must stay the same from page to page",
+        );
+    }
+    Some(place)
+}
+
+/// The list that a token is of, and the place in it.
+fn parse_token(token: &str) -> Option<(String, Place)> {
     let digits = token.strip_prefix(TOKEN_PREFIX)?;
-    if digits.is_empty() || digits.len() % 2 != 0 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
+    if digits.len() % 2 != 0 || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;
     }
     let bytes: Option<Vec<u8>> = (0..digits.len())
         .step_by(2)
         .map(|at| u8::from_str_radix(&digits[at..at + 2], 16).ok())
         .collect();
-    String::from_utf8(bytes?).ok()
+    let text = String::from_utf8(bytes?).ok()?;
+    let mut parts = text.splitn(4, ' ');
+    let list = parts.next()?.to_owned();
+    let place = Place {
+        created: parts.next()?.parse().ok()?,
+        updated: parts.next()?.parse().ok()?,
+        id: parts.next()?.to_owned(),
+    };
+    Some((list, place))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn query(page_size: i32, page_token: &str) -> Result<PageQuery, ServiceError> {
-        page_query(&v1::ListObjectsRequest {
+    fn request(page_size: i32, page_token: &str) -> v1::ListObjectsRequest {
+        v1::ListObjectsRequest {
             page_size,
             page_token: page_token.to_owned(),
-        })
+            ..Default::default()
+        }
+    }
+
+    fn ordered_by(order_by: &str) -> Result<ObjectOrder, ServiceError> {
+        let request = v1::ListObjectsRequest {
+            order_by: order_by.to_owned(),
+            ..Default::default()
+        };
+        Ok(page_query(&request)?.order)
+    }
+
+    fn blamed(error: ServiceError) -> Vec<String> {
+        match error {
+            ServiceError::Invalid(violations) => violations.into_iter().map(|v| v.field).collect(),
+            other => panic!("{other}"),
+        }
+    }
+
+    fn place(id: &str, created: u64, updated: u64) -> Place {
+        Place {
+            created,
+            updated,
+            id: id.to_owned(),
+        }
     }
 
     #[test]
-    fn reads_its_own_tokens() {
-        let token = page_token("mug-1");
-        assert!(!token.contains("mug"));
-        assert_eq!(
-            query(3, &token).unwrap(),
-            PageQuery {
-                size: 3,
-                after: Some("mug-1".into())
-            }
-        );
+    fn reads_its_own_tokens_of_the_same_list() {
+        let first = v1::ListObjectsRequest {
+            filter: "a=b".to_owned(),
+            order_by: "update_time desc".to_owned(),
+            ..Default::default()
+        };
+        let query = page_query(&first).unwrap();
+        let last = place("mug-1", 17, 18);
+        let next = v1::ListObjectsRequest {
+            page_token: page_token(&query, &last),
+            ..first
+        };
+        assert!(!next.page_token.contains("mug"));
+        assert_eq!(page_query(&next).unwrap().after, Some(last));
+        let other = v1::ListObjectsRequest {
+            filter: "a=c".to_owned(),
+            ..next
+        };
+        assert_eq!(blamed(page_query(&other).unwrap_err()), ["page_token"]);
     }
 
     #[test]
     fn page_size_has_a_default_and_a_maximum() {
-        assert_eq!(query(0, "").unwrap().size, 50);
-        assert_eq!(query(5000, "").unwrap().size, 1000);
+        assert_eq!(page_query(&request(0, "")).unwrap().size, 50);
+        assert_eq!(page_query(&request(5000, "")).unwrap().size, 1000);
     }
 
     #[test]
-    fn reports_both_fields_at_once() {
-        for token in ["x", "a1-", "a1-6", "a1-zz", "a1-ff", "a1-é0", "mug"] {
-            let Err(ServiceError::Invalid(violations)) = query(-1, token) else {
-                panic!("{token} must be rejected");
+    fn reports_every_field_at_once() {
+        for token in ["x", "a2-", "a2-6", "a2-zz", "a2-ff", "a2-é0", "mug", "a1-6d7567"] {
+            let request = v1::ListObjectsRequest {
+                filter: "=".to_owned(),
+                order_by: "size".to_owned(),
+                ..request(-1, token)
             };
-            let fields: Vec<_> = violations.iter().map(|v| v.field.as_str()).collect();
-            assert_eq!(fields, ["page_size", "page_token"], "{token}");
+            let fields = blamed(page_query(&request).unwrap_err());
+            assert_eq!(
+                fields,
+                ["page_size", "page_token", "filter", "order_by"],
+                "{token}"
+            );
+        }
+    }
+
+    #[test]
+    fn orders_by_each_key_then_by_name() {
+        let [a, b, c] = [place("a", 2, 5), place("b", 1, 5), place("c", 3, 4)];
+        for (order_by, expected) in [
+            ("", ["a", "b", "c"]),
+            ("name desc", ["c", "b", "a"]),
+            ("create_time", ["b", "a", "c"]),
+            ("create_time desc", ["c", "a", "b"]),
+            ("update_time", ["c", "a", "b"]),
+            (" update_time  desc , name desc", ["b", "a", "c"]),
+        ] {
+            let order = ordered_by(order_by).unwrap();
+            let mut places = [&a, &b, &c];
+            places.sort_by(|a, b| order.compare(a, b));
+            assert_eq!(places.map(|place| place.id.as_str()), expected, "{order_by}");
+        }
+    }
+
+    #[test]
+    fn rejects_other_orders() {
+        for order_by in [
+            "size",
+            "name up",
+            "name desc desc",
+            "name,",
+            "name, name desc",
+            "Name",
+        ] {
+            assert_eq!(
+                blamed(ordered_by(order_by).unwrap_err()),
+                ["order_by"],
+                "{order_by}"
+            );
         }
     }
 }

@@ -362,8 +362,13 @@ async fn names_and_pages_are_validated() {
     let request = v1::ListObjectsRequest {
         page_size: -1,
         page_token: "made up".into(),
+        filter: "level=kitchen OR fragile".into(),
+        order_by: "size".into(),
     };
     let status = client.list_objects(request).await.unwrap_err();
-    assert_eq!(blamed_fields(&status), ["page_size", "page_token"]);
+    assert_eq!(
+        blamed_fields(&status),
+        ["page_size", "page_token", "filter", "order_by"]
+    );
     server.stop().await;
 }

@@ -17,6 +17,8 @@ mod limits;
 mod load;
 mod malformed;
 mod mesh_formats;
+mod object_changes;
+mod object_lists;
 mod objects;
 mod objects_directory;
 mod physical;

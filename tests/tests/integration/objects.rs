@@ -23,6 +23,7 @@ async fn all_names(server: &TestServer, page_size: i32) -> Vec<String> {
         let request = v1::ListObjectsRequest {
             page_size,
             page_token,
+            ..Default::default()
         };
         let page = client.list_objects(request).await.unwrap().into_inner();
         names.extend(page.objects.into_iter().map(|object| object.name));

@@ -14,7 +14,7 @@ use std::{
 use clap::Args;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
 use grasp_client::{
-    FindAnswer, FindRequest, GraspClient, Handedness, Object, Outcome, ReceivingHand, Validity,
+    FindAnswer, FindRequest, GraspClient, Handedness, Object, ObjectQuery, Outcome, ReceivingHand, Validity,
     built_in::request_for,
 };
 
@@ -182,7 +182,7 @@ impl Arguments {
 async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
     let start = Instant::now();
     loop {
-        let objects = client.list_objects().await?;
+        let objects = client.list_objects(&ObjectQuery::default()).await?;
         let is_read = |object: &Object| object.atlas.as_ref().is_some_and(|atlas| atlas.entries > 0);
         if objects.iter().all(is_read) || start.elapsed() > ATLAS_LOAD_TIME {
             return Ok(());

@@ -11,7 +11,7 @@ use crate::{
     failure::Failure,
     output::Output,
     server_options::ServerOptions,
-    values::{TriangleRange, parse_triangles, parse_vector},
+    values::{TriangleRange, parse_label, parse_triangles, parse_vector},
 };
 
 /// Create an object from a mesh: OBJ, STL, PLY, GLB or glTF.
@@ -45,6 +45,9 @@ pub(crate) struct Arguments {
     /// Triangles that must not be touched: indices and ranges, such as 7,10-20.
     #[arg(long, value_name = "INDICES", value_parser = parse_triangles, value_delimiter = ',')]
     forbidden_triangles: Vec<TriangleRange>,
+    /// A label, such as level=kitchen; may be repeated.
+    #[arg(long = "label", value_name = "KEY=VALUE", value_parser = parse_label)]
+    labels: Vec<(String, String)>,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -78,6 +81,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             groups: arguments.forbidden_group,
             triangles: triangles.flat_map(|range| range.0.clone()).collect(),
         },
+        labels: arguments.labels.into_iter().collect(),
         ..NewObject::new(id, mesh, arguments.mass)
     };
     let object = arguments.server.connect().await?.create_object(&object).await?;

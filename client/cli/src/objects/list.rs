@@ -1,7 +1,7 @@
 //! `grasp objects list`
 
 use clap::Args;
-use grasp_client::Object;
+use grasp_client::{Object, ObjectQuery};
 use serde::Serialize;
 
 use crate::{
@@ -11,11 +11,17 @@ use crate::{
     server_options::ServerOptions,
 };
 
-/// List all objects of the server.
+/// List the objects of the server, all or those with certain labels.
 ///
 /// With --json: {"objects": […]}, each like the output of `grasp objects get --json`.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
+    /// Labels that the objects must have, such as "level=kitchen AND fragile".
+    #[arg(long, value_name = "FILTER", default_value = "", hide_default_value = true)]
+    filter: String,
+    /// `name`, `create_time` or `update_time`, each optionally followed by desc, with commas in between [default: name].
+    #[arg(long, value_name = "FIELDS", default_value = "", hide_default_value = true)]
+    order_by: String,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -26,7 +32,11 @@ struct Answer {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let objects = arguments.server.connect().await?.list_objects().await?;
+    let query = ObjectQuery {
+        filter: arguments.filter,
+        order_by: arguments.order_by,
+    };
+    let objects = arguments.server.connect().await?.list_objects(&query).await?;
     output.write(&Answer { objects }, |answer| {
         let mut table = table(&[
             "object",
@@ -36,6 +46,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             "box",
             ">forbidden",
             "built in",
+            "labels",
             ">atlas",
             "warnings",
         ]);
@@ -48,6 +59,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
                 super::size(object.box_half_extents),
                 object.forbidden_triangle_count.to_string(),
                 if object.built_in { "yes" } else { "no" }.to_owned(),
+                super::labels(&object.labels),
                 super::atlas(object.atlas.as_ref()),
                 object.warnings.len().to_string(),
             ]);

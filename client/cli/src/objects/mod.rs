@@ -1,12 +1,16 @@
 //! `grasp objects`
 
 mod create;
+mod delete;
 mod get;
 mod list;
+mod update;
+
+use std::collections::BTreeMap;
 
 use clap::Subcommand;
 use glam::Vec3;
-use grasp_client::{AtlasState, Object};
+use grasp_client::{AtlasState, Object, rfc3339};
 
 use crate::{
     Ending,
@@ -14,12 +18,14 @@ use crate::{
     output::{Output, pairs},
 };
 
-/// List, show and create objects.
+/// List, show, create, change and delete objects.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     List(list::Arguments),
     Get(get::Arguments),
     Create(create::Arguments),
+    Update(update::Arguments),
+    Delete(delete::Arguments),
 }
 
 pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
@@ -27,6 +33,8 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Fail
         Command::List(arguments) => list::run(arguments, output).await,
         Command::Get(arguments) => get::run(arguments, output).await,
         Command::Create(arguments) => create::run(arguments, output).await,
+        Command::Update(arguments) => update::run(arguments, output).await,
+        Command::Delete(arguments) => delete::run(arguments, output).await,
     }
 }
 
@@ -56,6 +64,15 @@ fn atlas(atlas: Option<&AtlasState>) -> String {
     }
 }
 
+/// Labels as `key=value`, and as `key` without a value.
+fn labels(labels: &BTreeMap<String, String>) -> String {
+    let written = labels.iter().map(|(key, value)| match value.as_str() {
+        "" => key.clone(),
+        value => format!("{key}={value}"),
+    });
+    written.collect::<Vec<_>>().join(", ")
+}
+
 /// Everything about an object, for people.
 fn describe(object: &Object) -> String {
     let com = object.centre_of_mass * 1000.0;
@@ -82,6 +99,10 @@ fn describe(object: &Object) -> String {
         ),
         ("atlas", atlas(object.atlas.as_ref())),
         ("content hash", object.content_hash.clone()),
+        ("labels", labels(&object.labels)),
+        ("created", rfc3339(object.create_time)),
+        ("changed", rfc3339(object.update_time)),
+        ("etag", object.etag.clone()),
     ];
     if let Some(origin) = object.origin_in_file {
         lines.push((
@@ -116,6 +137,13 @@ mod tests {
         assert_eq!(atlas(None), "none");
         assert_eq!(atlas(Some(&state(false))), "120 grips so far");
         assert_eq!(atlas(Some(&state(true))), "120 grips");
+    }
+
+    #[test]
+    fn labels_show_keys_and_values() {
+        let of = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+        let both = [of("level", "kitchen"), of("fragile", "")].into();
+        assert_eq!(labels(&both), "fragile, level=kitchen");
     }
 
     #[test]

@@ -37,7 +37,6 @@ impl Manifest {
     pub(super) fn into_request(self, id: &str, mesh: Vec<u8>) -> v1::CreateObjectRequest {
         v1::CreateObjectRequest {
             object_id: id.to_owned(),
-            obj: Vec::new(),
             mesh,
             up_axis: self.up_axis.into(),
             unit_metres: self.unit_metres,
@@ -45,6 +44,7 @@ impl Manifest {
             centre_of_mass: self.centre_of_mass,
             friction: self.friction,
             forbidden: Some(self.forbidden),
+            ..Default::default()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Objects that can be grasped.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
@@ -25,8 +25,8 @@ pub const MAX_NAMED_TRIANGLES: usize = 10;
 /// A graspable object with its search structures, in its own frame.
 #[derive(Clone, Debug)]
 pub struct GraspObject {
-    /// Its surface with search structure.
-    pub surface: MeshBvh,
+    /// Its surface with search structure, which [`Self::with_properties`] shares.
+    pub surface: Arc<MeshBvh>,
     /// Its tight bounding box: B of thesis 4.3.
     pub bounding_box: OrientedBox,
     /// How thick it is where a hand may hold it.
@@ -91,47 +91,57 @@ impl GraspObject {
         friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
-        let mut errors = Vec::new();
-        if !(mass.is_finite() && mass > 0.0) {
-            errors.push(ObjectError::Mass(mass));
-        }
-        if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
-            errors.push(ObjectError::Friction(friction));
-        }
-        if !centre_of_mass.is_finite() {
-            errors.push(ObjectError::CentreOfMass(centre_of_mass));
-        }
-        let triangles = mesh.triangles().len();
-        let mut forbidden = vec![false; triangles];
-        let mut unknown = Vec::new();
-        for &triangle in forbidden_triangles {
-            match forbidden.get_mut(triangle as usize) {
-                Some(flag) => *flag = true,
-                None => unknown.push(triangle),
-            }
-        }
-        errors.extend(
-            unknown
-                .iter()
-                .take(MAX_NAMED_TRIANGLES)
-                .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
-        );
-        if unknown.len() > MAX_NAMED_TRIANGLES {
-            errors.push(ObjectError::MoreForbiddenTriangles {
-                count: unknown.len() - MAX_NAMED_TRIANGLES,
-                triangles,
-            });
-        }
-        if !errors.is_empty() {
-            return Err(errors);
-        }
+        let checked = CheckedProperties::new(
+            mesh.triangles().len(),
+            mass,
+            centre_of_mass,
+            friction,
+            forbidden_triangles,
+        )?;
         let (measures, surface) = measures_and_surface(mesh);
+        Ok(Self::of_parts(measures, Arc::new(surface), checked))
+    }
+
+    /// The same shape with other physical properties. Shares the mesh and its search structure, and repeats none of its
+    /// measurements.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn with_properties(
+        &self,
+        mass: f32,
+        centre_of_mass: Vec3,
+        friction: Option<f32>,
+        forbidden_triangles: &[u32],
+    ) -> Result<Self, Vec<ObjectError>> {
+        let checked = CheckedProperties::new(
+            self.forbidden.len(),
+            mass,
+            centre_of_mass,
+            friction,
+            forbidden_triangles,
+        )?;
+        let measures = Measures {
+            bounding_box: self.bounding_box,
+            local_thickness: self.local_thickness.clone(),
+            local_shape: self.local_shape.clone(),
+        };
+        Ok(Self::of_parts(measures, Arc::clone(&self.surface), checked))
+    }
+
+    fn of_parts(measures: Measures, surface: Arc<MeshBvh>, properties: CheckedProperties) -> Self {
         let Measures {
             bounding_box,
             local_thickness,
             local_shape,
         } = measures;
-        Ok(Self {
+        let CheckedProperties {
+            mass,
+            centre_of_mass,
+            friction,
+            forbidden,
+        } = properties;
+        Self {
             bounding_box,
             local_thickness,
             local_shape,
@@ -145,7 +155,7 @@ impl GraspObject {
             surface,
             forbidden,
             parts: OnceLock::new(),
-        })
+        }
     }
 
     /// The coefficient of friction to judge grasps by: the object's own, or the default of the kind of validity.
@@ -186,6 +196,66 @@ impl GraspObject {
     pub fn is_forbidden_within(&self, capsule: &TaperedCapsule, distance: f32) -> bool {
         let surface = self.forbidden_surface.as_ref();
         surface.is_some_and(|surface| surface.comes_within(capsule, distance))
+    }
+}
+
+/// What does not follow from an object's mesh.
+struct CheckedProperties {
+    mass: f32,
+    centre_of_mass: Vec3,
+    friction: Option<f32>,
+    /// One flag per triangle.
+    forbidden: Vec<bool>,
+}
+
+impl CheckedProperties {
+    /// The properties of an object of so many triangles, or everything that is wrong with them.
+    fn new(
+        triangles: usize,
+        mass: f32,
+        centre_of_mass: Vec3,
+        friction: Option<f32>,
+        forbidden_triangles: &[u32],
+    ) -> Result<Self, Vec<ObjectError>> {
+        let mut errors = Vec::new();
+        if !(mass.is_finite() && mass > 0.0) {
+            errors.push(ObjectError::Mass(mass));
+        }
+        if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
+            errors.push(ObjectError::Friction(friction));
+        }
+        if !centre_of_mass.is_finite() {
+            errors.push(ObjectError::CentreOfMass(centre_of_mass));
+        }
+        let mut forbidden = vec![false; triangles];
+        let mut unknown = Vec::new();
+        for &triangle in forbidden_triangles {
+            match forbidden.get_mut(triangle as usize) {
+                Some(flag) => *flag = true,
+                None => unknown.push(triangle),
+            }
+        }
+        errors.extend(
+            unknown
+                .iter()
+                .take(MAX_NAMED_TRIANGLES)
+                .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
+        );
+        if unknown.len() > MAX_NAMED_TRIANGLES {
+            errors.push(ObjectError::MoreForbiddenTriangles {
+                count: unknown.len() - MAX_NAMED_TRIANGLES,
+                triangles,
+            });
+        }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        Ok(Self {
+            mass,
+            centre_of_mass,
+            friction,
+            forbidden,
+        })
     }
 }
 

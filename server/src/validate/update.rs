@@ -1,0 +1,206 @@
+//! Checks requests to change an object.
+
+use glam::Vec3;
+use grasp_proto::v1;
+
+use super::{
+    Field, Forbidden, Labels, Violations, friction,
+    labels::labels,
+    object::{check_mass, object_id_of},
+    point, quoted,
+};
+use crate::error::ServiceError;
+
+/// The fields that a mask may name.
+const PATHS: [&str; 5] = ["mass_kg", "centre_of_mass", "friction", "forbidden", "labels"];
+
+/// A checked request to change an object.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct UpdateQuery {
+    /// The object's id.
+    pub id: String,
+    /// The etag of the state to change; none for any.
+    pub etag: Option<String>,
+    /// The physical properties to change.
+    pub change: ObjectChange,
+    /// New labels; none to keep them.
+    pub labels: Option<Labels>,
+}
+
+/// Physical properties to change.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ObjectChange {
+    /// Mass in kilograms; none to keep it.
+    pub mass: Option<f32>,
+    /// Centre of mass in metres, in the object's frame; by default that of the mesh.
+    pub centre_of_mass: Setting<Vec3>,
+    /// Coefficient of static friction.
+    pub friction: Setting<f32>,
+    /// Surfaces that must not be touched; none to keep them.
+    pub forbidden: Option<Forbidden>,
+}
+
+/// What becomes of a property that has a default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Setting<T> {
+    /// It stays.
+    #[default]
+    Kept,
+    /// It becomes the default.
+    Default,
+    /// It becomes this.
+    To(T),
+}
+
+impl<T> From<Option<T>> for Setting<T> {
+    fn from(given: Option<T>) -> Self {
+        given.map_or(Self::Default, Self::To)
+    }
+}
+
+impl ObjectChange {
+    /// True if it changes nothing.
+    pub(crate) fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// An etag to compare; none if it is empty.
+pub(crate) fn given_etag(etag: String) -> Option<String> {
+    Some(etag).filter(|etag| !etag.is_empty())
+}
+
+/// Checks a request to change an object. Forbidden surfaces are compared with the object's file later.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] with every violation.
+pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQuery, ServiceError> {
+    let mut violations = Violations::default();
+    let id = object_id_of(Field::root("name"), &request.name, &mut violations);
+    let mask = request.update_mask.unwrap_or_default().paths;
+    let field = Field::root("update_mask");
+    for (place, path) in mask.iter().enumerate() {
+        if !PATHS.contains(&path.as_str()) {
+            violations.add(
+                field.child("paths").at(place),
+                format_args!("is {}; it must be {}", quoted(path), PATHS.join(", ")),
+            );
+        }
+    }
+    let is_changed = |path: &str, is_present: bool| {
+        if mask.is_empty() {
+            is_present
+        } else {
+            mask.iter().any(|listed| listed == path)
+        }
+    };
+    let mut change = ObjectChange::default();
+    if is_changed("mass_kg", request.mass_kg.is_some()) {
+        // Like a new object, a changed one must have a mass.
+        let mass = request.mass_kg.unwrap_or_default();
+        check_mass(mass, &mut violations);
+        change.mass = Some(mass);
+    }
+    if is_changed("centre_of_mass", request.centre_of_mass.is_some()) {
+        let field = Field::root("centre_of_mass");
+        let given = request.centre_of_mass;
+        change.centre_of_mass = given
+            .map(|centre| point(field, centre, 1.0, &mut violations))
+            .into();
+    }
+    if is_changed("friction", request.friction.is_some()) {
+        let field = Field::root("friction");
+        let given = request.friction;
+        change.friction = given.map(|value| friction(field, value, &mut violations)).into();
+    }
+    if is_changed("forbidden", request.forbidden.is_some()) {
+        change.forbidden = Some(request.forbidden.unwrap_or_default().into());
+    }
+    let new_labels = is_changed("labels", !request.labels.is_empty()).then_some(request.labels);
+    if let Some(new_labels) = &new_labels {
+        labels(Field::root("labels"), new_labels, &mut violations);
+    }
+    violations.finish(UpdateQuery {
+        id: id.unwrap_or_default(),
+        etag: given_etag(request.etag),
+        change,
+        labels: new_labels,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(paths: &[&str]) -> v1::UpdateObjectRequest {
+        v1::UpdateObjectRequest {
+            name: "objects/mug".to_owned(),
+            update_mask: Some(prost_types::FieldMask {
+                paths: paths.iter().map(|&path| path.to_owned()).collect(),
+            }),
+            mass_kg: Some(0.2),
+            labels: [("a".to_owned(), "b".to_owned())].into(),
+            ..Default::default()
+        }
+    }
+
+    fn blamed(request: v1::UpdateObjectRequest) -> Vec<String> {
+        match update_query(request).unwrap_err() {
+            ServiceError::Invalid(violations) => violations.into_iter().map(|v| v.field).collect(),
+            other => panic!("{other}"),
+        }
+    }
+
+    #[test]
+    fn without_a_mask_what_is_present_changes() {
+        let query = update_query(request(&[])).unwrap();
+        let expected = ObjectChange {
+            mass: Some(0.2),
+            ..ObjectChange::default()
+        };
+        assert_eq!((query.change, query.labels.map(|l| l.len())), (expected, Some(1)));
+        let nothing = v1::UpdateObjectRequest {
+            name: "objects/mug".to_owned(),
+            ..Default::default()
+        };
+        let query = update_query(nothing).unwrap();
+        assert!(query.change.is_empty() && query.labels.is_none() && query.etag.is_none());
+    }
+
+    #[test]
+    fn a_mask_selects_and_resets() {
+        let query = update_query(request(&["friction", "centre_of_mass", "forbidden"])).unwrap();
+        let expected = ObjectChange {
+            mass: None,
+            centre_of_mass: Setting::Default,
+            friction: Setting::Default,
+            forbidden: Some(Forbidden::default()),
+        };
+        assert_eq!((query.change, query.labels), (expected, None));
+        let cleared = v1::UpdateObjectRequest {
+            labels: Labels::new(),
+            ..request(&["labels"])
+        };
+        assert_eq!(update_query(cleared).unwrap().labels, Some(Labels::new()));
+    }
+
+    #[test]
+    fn reports_every_violation_by_field() {
+        let wrong = v1::UpdateObjectRequest {
+            name: "mug".to_owned(),
+            mass_kg: None,
+            friction: Some(9.0),
+            ..request(&["mass_kg", "mesh", "friction", "labels.a"])
+        };
+        assert_eq!(
+            blamed(wrong),
+            [
+                "name",
+                "update_mask.paths[1]",
+                "update_mask.paths[3]",
+                "mass_kg",
+                "friction"
+            ]
+        );
+    }
+}
