@@ -40,6 +40,7 @@ mod hand;
 mod json;
 mod key_frame;
 mod object;
+mod object_streams;
 mod objects;
 mod obstacle;
 mod pose;
@@ -61,9 +62,10 @@ pub use hand::{
 pub use json::rfc3339;
 pub use key_frame::{KeyFrame, KeyFrameKind};
 pub use object::{
-    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage, ObjectQuery, ObjectUpdate, Reset,
-    UpAxis,
+    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectChange, ObjectMesh, ObjectNews,
+    ObjectPage, ObjectQuery, ObjectUpdate, Reset, UpAxis,
 };
+pub use object_streams::ObjectWatch;
 pub use obstacle::{Capsule, Obstacle, SolidBox};
 pub use pose::Pose;
 pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};

@@ -182,6 +182,51 @@ pub struct ObjectQuery {
     pub order_by: String,
 }
 
+/// An object's mesh as searches use it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectMesh {
+    /// A GLB file in the object's frame, in metres and +Y up. Triangles that may be touched have the material `surface`, the
+    /// others `forbidden`.
+    pub glb: Vec<u8>,
+    /// The state of the object that it belongs to.
+    pub object: Object,
+}
+
+/// What happened to an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObjectChange {
+    /// It was there when the watch began.
+    Present,
+    /// All objects that were there were told; about no object.
+    PresentEnd,
+    /// A client created it, or changed its labels so that they match.
+    Created,
+    /// A client changed it.
+    Updated,
+    /// Its atlas answers most requests.
+    AtlasUseful,
+    /// Its atlas is complete.
+    AtlasComplete,
+    /// A client deleted it, or changed its labels so that they no longer match.
+    Deleted,
+    /// The server dropped it to make room for others.
+    Evicted,
+    /// Of a newer server.
+    Unrecognised,
+}
+
+/// What happened to an object since the last news of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectNews {
+    /// What happened, in this order.
+    pub changes: Vec<ObjectChange>,
+    /// "objects/{object}"; none if the news is about no object.
+    pub name: Option<String>,
+    /// The latest state; none if the object is gone.
+    pub object: Option<Object>,
+}
+
 /// A page of objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectPage {

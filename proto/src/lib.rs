@@ -3,7 +3,7 @@
 pub mod codec;
 
 /// Messages, clients and servers of package `grasp.v1`.
-#[allow(missing_docs, clippy::pedantic, unreachable_pub)]
+#[allow(missing_docs, clippy::large_enum_variant, clippy::pedantic, unreachable_pub)]
 pub mod v1 {
     tonic::include_proto!("grasp.v1");
 }

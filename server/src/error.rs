@@ -32,6 +32,10 @@ pub enum Limit {
     ObjectCache,
     /// Bytes of answers that wait on a connection.
     UnreadAnswers,
+    /// Bytes of meshes that are uploaded in pieces.
+    UploadBytes,
+    /// Watchers of objects.
+    Watchers,
 }
 
 /// Why a call failed.
@@ -93,6 +97,30 @@ pub enum ServiceError {
         /// When to retry.
         retry_after: Duration,
     },
+    /// A client took none of the messages that wait for it.
+    #[error("the client took no message for {} s", limit.as_secs())]
+    ReaderStalled {
+        /// The longest allowed time.
+        limit: Duration,
+    },
+    /// A client sent nothing of what it has to send.
+    #[error("nothing arrived for {} ms; send the parts of an upload without pauses", limit.as_millis())]
+    UploadStalled {
+        /// The longest allowed time.
+        limit: Duration,
+    },
+    /// The call took longer than the server allows.
+    #[error("the call took more than {} s, the server's limit", limit.as_secs())]
+    TookTooLong {
+        /// The longest allowed time.
+        limit: Duration,
+    },
+    /// A watcher has too many objects to be told about.
+    #[error("the watcher reads too slowly: it is too many objects behind; watch again")]
+    WatcherTooSlow,
+    /// The server shuts down.
+    #[error("the server shuts down; call again")]
+    ShuttingDown,
     /// The call's deadline passed before a search could start.
     #[error("the deadline passed before the search could start")]
     DeadlineExceeded,
@@ -177,6 +205,21 @@ impl From<ServiceError> for Status {
                 status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
                 status
             }
+            ServiceError::ReaderStalled { .. } => {
+                Status::with_error_details(Code::DeadlineExceeded, message, info("READER_STALLED", []))
+            }
+            ServiceError::UploadStalled { .. } => {
+                Status::with_error_details(Code::DeadlineExceeded, message, info("UPLOAD_STALLED", []))
+            }
+            ServiceError::TookTooLong { .. } => {
+                Status::with_error_details(Code::DeadlineExceeded, message, info("CALL_TOOK_TOO_LONG", []))
+            }
+            ServiceError::WatcherTooSlow => {
+                Status::with_error_details(Code::ResourceExhausted, message, info("WATCHER_TOO_SLOW", []))
+            }
+            ServiceError::ShuttingDown => {
+                Status::with_error_details(Code::Unavailable, message, info("SHUTTING_DOWN", []))
+            }
             ServiceError::DeadlineExceeded => {
                 Status::with_error_details(Code::DeadlineExceeded, message, info("DEADLINE_EXCEEDED", []))
             }
@@ -216,6 +259,8 @@ fn limit_reason(limit: Limit) -> &'static str {
         Limit::Uploads => "TOO_MANY_UPLOADS",
         Limit::ObjectCache => "OBJECT_CACHE_FULL",
         Limit::UnreadAnswers => "TOO_MANY_UNREAD_ANSWERS",
+        Limit::UploadBytes => "TOO_MANY_UPLOAD_BYTES",
+        Limit::Watchers => "TOO_MANY_WATCHERS",
     }
 }
 
@@ -224,6 +269,8 @@ fn limit_text(limit: Limit) -> &'static str {
         Limit::Searches => "the server is at its limit of concurrent searches",
         Limit::Uploads => "the server is at its limit of concurrent uploads",
         Limit::ObjectCache => "every object in the full cache is in use",
+        Limit::UploadBytes => "the uploads that run leave too little of the bytes that they share",
+        Limit::Watchers => "the server is at its limit of watchers",
         Limit::UnreadAnswers => {
             "this connection is at its limit of bytes that wait for the client to read them"
         }
@@ -244,6 +291,35 @@ fn summary(violations: &[Violation]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    /// Errors of calls that stream, with their code and reason.
+    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 5] {
+        [
+            (
+                ServiceError::ReaderStalled { limit: SECOND },
+                Code::DeadlineExceeded,
+                "READER_STALLED",
+            ),
+            (
+                ServiceError::UploadStalled { limit: SECOND },
+                Code::DeadlineExceeded,
+                "UPLOAD_STALLED",
+            ),
+            (
+                ServiceError::TookTooLong { limit: SECOND },
+                Code::DeadlineExceeded,
+                "CALL_TOOK_TOO_LONG",
+            ),
+            (
+                ServiceError::WatcherTooSlow,
+                Code::ResourceExhausted,
+                "WATCHER_TOO_SLOW",
+            ),
+            (ServiceError::ShuttingDown, Code::Unavailable, "SHUTTING_DOWN"),
+        ]
+    }
 
     #[test]
     fn every_status_has_a_reason_in_the_domain() {
@@ -322,7 +398,7 @@ mod tests {
             (ServiceError::Cancelled, Code::Cancelled, "CALL_CANCELLED"),
             (ServiceError::Panicked, Code::Internal, "JOB_PANICKED"),
         ];
-        for (error, code, reason) in errors {
+        for (error, code, reason) in errors.into_iter().chain(errors_of_streams()) {
             let status = Status::from(error);
             assert_eq!(status.code(), code);
             let details = status.get_error_details();

@@ -5,7 +5,8 @@
 //! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the
 //! message into checked values or a list of everything that is wrong; `objects` finds the object with its search
 //! structures, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
-//! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response.
+//! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages
+//! go through `services::streaming`.
 //! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
 //!
 //! Before serving, `memory` compares what the configuration may use with the limits of the process, and
@@ -53,7 +54,7 @@ mod validate;
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
 pub use health_check::{HealthCheckError, check_health};
-pub use limits::StoreLimits;
+pub use limits::{StoreLimits, StreamLimits};
 pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory, memory_limits};
 pub use objects::directory::{DirectoryError, DirectoryProblem};
 pub use serve::{Gauges, ServeError, Server, run};

@@ -1,5 +1,7 @@
 //! Bounds that more than one module needs.
 
+use std::{num::NonZeroUsize, time::Duration};
+
 /// Bound on the objects that clients create.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoreLimits {
@@ -7,6 +9,17 @@ pub struct StoreLimits {
     pub objects: usize,
     /// Total size of the objects in bytes, by estimate.
     pub bytes: usize,
+}
+
+/// Bounds on calls that stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StreamLimits {
+    /// Bytes of meshes uploaded in pieces, of all uploads together and thus of one.
+    pub upload_bytes: NonZeroUsize,
+    /// Longest pause between the pieces of an upload.
+    pub upload_idle: Duration,
+    /// Number of watchers of objects.
+    pub watchers: NonZeroUsize,
 }
 
 /// Largest size in bytes of everything but the mesh in a `CreateObject` request, and of a manifest on disk.
@@ -17,3 +30,6 @@ pub(crate) const LARGEST_FIND_REQUEST: usize = 64 << 10;
 
 /// Largest response of either service, in bytes. A full page of objects takes less than 1 MiB.
 pub(crate) const LARGEST_RESPONSE: usize = 4 << 20;
+
+/// Largest piece of an uploaded mesh, in bytes.
+pub(crate) const LARGEST_PIECE: usize = 1 << 20;

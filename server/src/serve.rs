@@ -31,7 +31,7 @@ use crate::{
         store::ObjectStore,
     },
     reserve::DeadlineReserve,
-    services::{GraspHandler, ObjectHandler, Shared},
+    services::{GraspHandler, ObjectHandler, Shared, Uploads},
 };
 
 /// Largest number of open streams per connection.
@@ -201,6 +201,9 @@ impl Server {
             budgets: config.budgets,
             improvement: config.improvement,
             obj_limits,
+            uploads: Uploads::new(config.streams.upload_bytes.get(), config.streams.upload_idle),
+            maximum_watchers: config.streams.watchers.get(),
+            shutdown: CancellationToken::new(),
             default_rig: config.default_rig,
             mechanisms: config.mechanisms,
         };
@@ -247,7 +250,7 @@ impl Server {
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, ServingStatus::Serving).await;
 
-        let stop = CancellationToken::new();
+        let stop = self.shared.shutdown.clone();
         let close = CancellationToken::new();
         let limits = AcceptLimits {
             connections: self.maximum_connections.get(),
@@ -259,7 +262,6 @@ impl Server {
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
             .concurrency_limit_per_connection(CALLS_PER_CONNECTION)
             .load_shed(true)
-            .timeout(self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET)
             .http2_max_header_list_size(LARGEST_HEADERS)
             .http2_max_pending_accept_reset_streams(Some(PENDING_RESETS))
             .initial_stream_window_size(STREAM_WINDOW)
@@ -272,6 +274,7 @@ impl Server {
                 uploads: Arc::new(Semaphore::new(self.maximum_uploads.get())),
                 maximum_uploads: self.maximum_uploads.get(),
                 reserve: Arc::clone(&self.shared.reserve),
+                longest_call: self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
             })
             .layer(UnreadLayer)
             .add_service(grasps)

@@ -1,6 +1,8 @@
 """Calls the service through grpcio, which wraps gRPC's C++ implementation."""
 
+import hashlib
 import time
+import uuid
 
 import grpc
 import pytest
@@ -107,6 +109,83 @@ def test_rejects_an_object_id_that_exists(objects):
     with pytest.raises(grpc.RpcError) as rejected:
         objects.CreateObject(request)
     assert rejected.value.code() == grpc.StatusCode.ALREADY_EXISTS
+
+
+def test_a_repeated_request_answers_the_object_it_created(objects):
+    request = object_service_pb2.CreateObjectRequest(
+        object_id="repeated",
+        mesh=BOX_OBJ.encode(),
+        unit_metres=0.01,
+        mass_kg=0.1,
+        labels={"level": "kitchen", "fragile": ""},
+        request_id=str(uuid.uuid4()),
+    )
+    first = objects.CreateObject(request).object
+    assert objects.CreateObject(request).object.etag == first.etag
+    assert dict(first.labels) == {"level": "kitchen", "fragile": ""}
+    age = time.time() - first.create_time.ToSeconds()
+    assert -1 <= age < 300
+
+
+def test_updates_what_the_mask_names_and_deletes(objects):
+    created = objects.CreateObject(
+        object_service_pb2.CreateObjectRequest(
+            object_id="changing", mesh=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1, friction=0.9
+        )
+    ).object
+    request = object_service_pb2.UpdateObjectRequest(
+        name=created.name, mass_kg=0.2, labels={"level": "cellar"}, etag=created.etag
+    )
+    request.update_mask.paths.extend(["mass_kg", "labels", "friction"])
+    changed = objects.UpdateObject(request).object
+    assert (changed.mass_kg, changed.friction) == (pytest.approx(0.2), pytest.approx(0.34))
+    with pytest.raises(grpc.RpcError) as rejected:
+        objects.UpdateObject(request)
+    assert rejected.value.code() == grpc.StatusCode.ABORTED
+    listed = objects.ListObjects(object_service_pb2.ListObjectsRequest(filter="level=cellar")).objects
+    assert [o.name for o in listed] == [created.name]
+    objects.DeleteObject(object_service_pb2.DeleteObjectRequest(name=created.name, etag=changed.etag))
+    with pytest.raises(grpc.RpcError) as rejected:
+        objects.GetObject(object_service_pb2.GetObjectRequest(name=created.name))
+    assert rejected.value.code() == grpc.StatusCode.NOT_FOUND
+
+
+def upload_parts(object_id, mesh, sha256):
+    header = object_service_pb2.UploadHeader(
+        object=object_service_pb2.CreateObjectRequest(object_id=object_id, unit_metres=0.01, mass_kg=0.1),
+        total_bytes=len(mesh),
+    )
+    yield object_service_pb2.UploadObjectRequest(header=header)
+    for start in range(0, len(mesh), 100):
+        yield object_service_pb2.UploadObjectRequest(piece=mesh[start : start + 100])
+    yield object_service_pb2.UploadObjectRequest(sha256=sha256)
+
+
+def test_uploads_in_pieces_and_returns_the_mesh(objects):
+    mesh = BOX_OBJ.encode()
+    with pytest.raises(grpc.RpcError) as rejected:
+        objects.UploadObject(upload_parts("uploaded", mesh, hashlib.sha256(b"other").hexdigest()))
+    assert rejected.value.code() == grpc.StatusCode.INVALID_ARGUMENT
+    uploaded = objects.UploadObject(upload_parts("uploaded", mesh, hashlib.sha256(mesh).hexdigest())).object
+    assert uploaded.triangle_count == 12
+    header, *pieces = objects.GetMesh(object_service_pb2.GetMeshRequest(name=uploaded.name))
+    glb = b"".join(part.piece for part in pieces)
+    assert glb.startswith(b"glTF")
+    assert (len(glb), hashlib.sha256(glb).hexdigest()) == (header.header.total_bytes, header.header.sha256)
+
+
+def test_watches_objects(objects):
+    watch = objects.WatchObjects(object_service_pb2.WatchObjectsRequest(filter="watched", include_present=True))
+    end = next(watch)
+    assert list(end.changes) == [object_service_pb2.OBJECT_CHANGE_PRESENT_END]
+    request = object_service_pb2.CreateObjectRequest(
+        object_id="watched", mesh=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1, labels={"watched": ""}
+    )
+    objects.CreateObject(request)
+    told = next(watch)
+    assert told.object.name == "objects/watched"
+    assert object_service_pb2.OBJECT_CHANGE_CREATED in told.changes
+    watch.cancel()
 
 
 def test_reports_all_violations_at_once(grasps):

@@ -47,6 +47,13 @@ pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
     write_line(&text)
 }
 
+/// Writes `value` as one line of JSON.
+pub(crate) fn write_json_line<T: Serialize>(value: &T) -> Result<(), Failure> {
+    let text = serde_json::to_string(value)
+        .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
+    write_line(&text)
+}
+
 /// Writes raw bytes to standard output.
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
@@ -55,7 +62,8 @@ pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
         .map_err(Failure::Output)
 }
 
-fn write_line(text: &str) -> Result<(), Failure> {
+/// Writes a line of text.
+pub(crate) fn write_line(text: &str) -> Result<(), Failure> {
     write_bytes(format!("{text}\n").as_bytes())
 }
 

@@ -12,7 +12,8 @@ mod receiver_codec;
 mod search_codec;
 
 pub(crate) use object_codec::{
-    health_from_wire, new_object_to_wire, object_from_wire, object_page_from_wire, update_to_wire,
+    described_object_to_wire, health_from_wire, new_object_to_wire, news_from_wire, object_from_wire,
+    object_page_from_wire, update_to_wire,
 };
 pub(crate) use search_codec::{find_answer_from_wire, find_request_to_wire};
 

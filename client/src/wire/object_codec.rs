@@ -13,16 +13,25 @@ use super::{
     required,
 };
 use crate::object::{
-    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectPage, ObjectUpdate, Reset, UpAxis,
+    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectChange, ObjectNews, ObjectPage,
+    ObjectUpdate, Reset, UpAxis,
 };
 
 /// The request, with a new id if the object has none.
 pub(crate) fn new_object_to_wire(object: &NewObject) -> v1::CreateObjectRequest {
+    v1::CreateObjectRequest {
+        mesh: object.mesh.clone(),
+        ..described_object_to_wire(object)
+    }
+}
+
+/// The request without its mesh, with a new id if the object has none.
+pub(crate) fn described_object_to_wire(object: &NewObject) -> v1::CreateObjectRequest {
     let request_id = object.request_id.clone();
     v1::CreateObjectRequest {
         object_id: object.id.clone(),
         obj: Vec::new(),
-        mesh: object.mesh.clone(),
+        mesh: Vec::new(),
         up_axis: match object.up_axis {
             UpAxis::Y => v1::UpAxis::Y,
             UpAxis::Z => v1::UpAxis::Z,
@@ -142,6 +151,41 @@ pub(crate) fn object_page_from_wire(page: v1::ListObjectsResponse) -> Result<Obj
     })
 }
 
+pub(crate) fn news_from_wire(told: v1::WatchObjectsResponse) -> Result<ObjectNews, Malformed> {
+    let changes: Vec<ObjectChange> = told
+        .changes
+        .iter()
+        .map(|&change| change_from_wire(change))
+        .collect();
+    let is_gone = matches!(
+        changes.last(),
+        Some(ObjectChange::Deleted | ObjectChange::Evicted)
+    );
+    let name = told.object.as_ref().map(|object| object.name.clone());
+    let object = told.object.filter(|_| !is_gone).map(object_fields_from_wire);
+    Ok(ObjectNews {
+        changes,
+        name,
+        object: object
+            .transpose()
+            .map_err(|malformed| malformed.within("object"))?,
+    })
+}
+
+fn change_from_wire(change: i32) -> ObjectChange {
+    match v1::ObjectChange::try_from(change) {
+        Ok(v1::ObjectChange::Present) => ObjectChange::Present,
+        Ok(v1::ObjectChange::PresentEnd) => ObjectChange::PresentEnd,
+        Ok(v1::ObjectChange::Created) => ObjectChange::Created,
+        Ok(v1::ObjectChange::Updated) => ObjectChange::Updated,
+        Ok(v1::ObjectChange::AtlasUseful) => ObjectChange::AtlasUseful,
+        Ok(v1::ObjectChange::AtlasComplete) => ObjectChange::AtlasComplete,
+        Ok(v1::ObjectChange::Deleted) => ObjectChange::Deleted,
+        Ok(v1::ObjectChange::Evicted) => ObjectChange::Evicted,
+        Ok(v1::ObjectChange::Unspecified) | Err(_) => ObjectChange::Unrecognised,
+    }
+}
+
 pub(crate) fn health_from_wire(response: HealthCheckResponse) -> Health {
     match response.status() {
         ServingStatus::Serving => Health::Serving,
@@ -207,6 +251,30 @@ mod tests {
             SystemTime::UNIX_EPOCH + Duration::new(1_000_000_000, 5)
         );
         assert_eq!(object.update_time, SystemTime::UNIX_EPOCH);
+    }
+
+    #[test]
+    fn news_of_an_object_that_is_gone_has_its_name_only() {
+        let told = |changes: &[v1::ObjectChange], object: Option<v1::Object>| v1::WatchObjectsResponse {
+            changes: changes.iter().map(|&change| change.into()).collect(),
+            object,
+        };
+        let named = v1::Object {
+            name: "objects/mug".to_owned(),
+            ..Default::default()
+        };
+        let gone = news_from_wire(told(&[v1::ObjectChange::Deleted], Some(named.clone()))).unwrap();
+        assert_eq!((gone.name.as_deref(), gone.object), (Some("objects/mug"), None));
+        let replaced = told(
+            &[v1::ObjectChange::Deleted, v1::ObjectChange::Created],
+            Some(named),
+        );
+        assert_eq!(
+            news_from_wire(replaced).unwrap_err().path,
+            "object.centre_of_mass"
+        );
+        let end = news_from_wire(told(&[v1::ObjectChange::PresentEnd], None)).unwrap();
+        assert_eq!((end.changes, end.name), (vec![ObjectChange::PresentEnd], None));
     }
 
     #[test]

@@ -10,8 +10,8 @@ use grasp_proto::v1::{
     grasp_service_server::{GraspService, GraspServiceServer},
     object_service_server::{ObjectService, ObjectServiceServer},
 };
-use tokio_stream::wrappers::TcpListenerStream;
-use tonic::{Request, Response, Status, transport::Server};
+use tokio_stream::{Pending, wrappers::TcpListenerStream};
+use tonic::{Request, Response, Status, Streaming, transport::Server};
 
 /// Response to one call.
 pub(crate) enum Act {
@@ -172,5 +172,33 @@ impl ObjectService for Scripted {
     ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
         self.act(&request).await?;
         Ok(Response::new(v1::DeleteObjectResponse {}))
+    }
+
+    async fn upload_object(
+        &self,
+        request: Request<Streaming<v1::UploadObjectRequest>>,
+    ) -> Result<Response<v1::UploadObjectResponse>, Status> {
+        self.act(&request).await?;
+        Err(Status::unimplemented("no script uploads"))
+    }
+
+    type GetMeshStream = Pending<Result<v1::GetMeshResponse, Status>>;
+
+    async fn get_mesh(
+        &self,
+        request: Request<v1::GetMeshRequest>,
+    ) -> Result<Response<Self::GetMeshStream>, Status> {
+        self.act(&request).await?;
+        Ok(Response::new(tokio_stream::pending()))
+    }
+
+    type WatchObjectsStream = Pending<Result<v1::WatchObjectsResponse, Status>>;
+
+    async fn watch_objects(
+        &self,
+        request: Request<v1::WatchObjectsRequest>,
+    ) -> Result<Response<Self::WatchObjectsStream>, Status> {
+        self.act(&request).await?;
+        Ok(Response::new(tokio_stream::pending()))
     }
 }

@@ -32,9 +32,9 @@ use super::{
     remembered::RememberedGrips,
 };
 use crate::{
-    atlas_slots::Update,
+    atlas_slots::{BuildState, Update},
     executor::SearchExecutor,
-    objects::{StoredObject, store::ObjectStore},
+    objects::{StoredObject, changes::Event, store::ObjectStore},
 };
 
 /// Niceness of a builder thread: 19 is the lowest priority on Linux. A lower value takes more CPU time from searches.
@@ -70,6 +70,7 @@ pub(super) struct Builders {
     pub loaded: LoadedAtlases,
     /// Grips that searches found.
     pub remembered: RememberedGrips,
+    objects: Arc<ObjectStore>,
     executor: SearchExecutor,
     files: Option<AtlasFiles>,
     default_rig: String,
@@ -89,7 +90,8 @@ impl Builders {
     ) -> Self {
         Self {
             queue: BuildQueue::default(),
-            loaded: LoadedAtlases::new(objects),
+            loaded: LoadedAtlases::new(Arc::clone(&objects)),
+            objects,
             remembered: RememberedGrips::default(),
             executor,
             files,
@@ -191,6 +193,8 @@ fn work(builders: &Builders, job: BuildJob) {
     let Some(object) = job.object.upgrade() else {
         return;
     };
+    let hand = Arc::clone(&job.hand);
+    let before = Progress::of(&object, &hand);
     // A panic costs only this atlas: the state that it could leave inconsistent is local to the turn.
     let turn = catch_unwind(AssertUnwindSafe(|| turn(builders, &object, &job)));
     match turn {
@@ -207,6 +211,33 @@ fn work(builders: &Builders, job: BuildJob) {
         Err(_) => {
             tracing::error!(object = object.name(), hand = %hand_label(&job.hand), "building an atlas panicked");
             object.atlas_slots.finish(&job.hand);
+        }
+    }
+    // Only these hands' atlases are part of an object's state.
+    if builders.default_hand(Handedness::Right) == Some(&hand) {
+        let after = Progress::of(&object, &hand);
+        if after.is_useful && !before.is_useful {
+            builders.objects.tell_of_atlas(&object, Event::AtlasUseful);
+        }
+        if after.is_complete && !before.is_complete {
+            builders.objects.tell_of_atlas(&object, Event::AtlasComplete);
+        }
+    }
+}
+
+/// What watchers are told of an atlas.
+struct Progress {
+    is_useful: bool,
+    is_complete: bool,
+}
+
+impl Progress {
+    fn of(object: &StoredObject, hand: &Arc<Hand>) -> Self {
+        let slot = object.atlas_slots.get(hand).unwrap_or_default();
+        let entries = slot.grown.map_or(0, |grown| grown.atlas.entries().len());
+        Self {
+            is_useful: entries >= USEFUL,
+            is_complete: slot.state == BuildState::Finished,
         }
     }
 }

@@ -7,7 +7,7 @@ use grasp_assets::hands::RIG_NAMES;
 use super::{BadValue, Config, ConfigError, LogFormat, RawConfig};
 use crate::{
     budget::BudgetLimits,
-    limits::{LARGEST_RESPONSE, StoreLimits},
+    limits::{LARGEST_RESPONSE, StoreLimits, StreamLimits},
 };
 
 impl RawConfig {
@@ -21,6 +21,7 @@ impl RawConfig {
         let check = &mut Check(&mut bad);
         let budgets = self.budgets(check, defaults.budgets);
         let store = self.store(check, defaults.store);
+        let streams = self.streams(check, defaults.streams);
         let config = Config {
             listen: check.parsed(
                 "listen",
@@ -50,6 +51,7 @@ impl RawConfig {
                 1..=64,
                 defaults.maximum_uploads,
             ),
+            streams,
             maximum_object_bytes: check.count(
                 "maximum_object_bytes",
                 self.maximum_object_bytes,
@@ -145,6 +147,29 @@ impl RawConfig {
             );
         }
         budgets
+    }
+
+    fn streams(&self, check: &mut Check<'_>, defaults: StreamLimits) -> StreamLimits {
+        StreamLimits {
+            upload_bytes: check.count(
+                "maximum_upload_bytes",
+                self.maximum_upload_bytes,
+                1 << 20..=1 << 30,
+                defaults.upload_bytes,
+            ),
+            upload_idle: check.time(
+                "upload_idle_ms",
+                self.upload_idle_ms,
+                100..=600_000,
+                defaults.upload_idle,
+            ),
+            watchers: check.count(
+                "maximum_watchers",
+                self.maximum_watchers,
+                1..=10_000,
+                defaults.watchers,
+            ),
+        }
     }
 
     fn store(&self, check: &mut Check<'_>, defaults: StoreLimits) -> StoreLimits {
@@ -299,6 +324,9 @@ mod tests {
             improvement_ms: Some(1001),
             maximum_searches: Some(0),
             maximum_uploads: Some(0),
+            maximum_upload_bytes: Some(1),
+            upload_idle_ms: Some(1),
+            maximum_watchers: Some(0),
             maximum_object_bytes: Some(1),
             maximum_object_triangles: Some(0),
             cache_objects: Some(0),
@@ -316,7 +344,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 22, "{bad:?}");
+        assert_eq!(bad.len(), 25, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

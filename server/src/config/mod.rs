@@ -9,7 +9,10 @@ pub use raw::{RawConfig, read_file, unknown_variables};
 
 use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMENT};
 
-use crate::{budget::BudgetLimits, limits::StoreLimits};
+use crate::{
+    budget::BudgetLimits,
+    limits::{StoreLimits, StreamLimits},
+};
 
 /// Format of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +41,9 @@ pub struct Config {
     pub maximum_searches: NonZeroUsize,
     /// Largest number of objects received, built or changed at a time; others are rejected.
     pub maximum_uploads: NonZeroUsize,
-    /// Largest mesh file, in bytes.
+    /// Bounds on calls that stream; others are rejected.
+    pub streams: StreamLimits,
+    /// Largest mesh file in one message or in the objects directory, in bytes.
     pub maximum_object_bytes: NonZeroUsize,
     /// Largest number of triangles, and of vertices, in a mesh.
     pub maximum_object_triangles: NonZeroUsize,
@@ -84,6 +89,11 @@ impl Default for Config {
             improvement: IMPROVEMENT,
             maximum_searches: non_zero(64),
             maximum_uploads: non_zero(4),
+            streams: StreamLimits {
+                upload_bytes: non_zero(256 << 20),
+                upload_idle: Duration::from_secs(10),
+                watchers: non_zero(64),
+            },
             maximum_object_bytes: non_zero(8 << 20),
             maximum_object_triangles: non_zero(200_000),
             store: StoreLimits {

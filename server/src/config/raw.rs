@@ -53,7 +53,16 @@ pub struct RawConfig {
     /// Most objects received, built or changed at a time; others are rejected [default: 4].
     #[arg(long, env = "GRASP_MAXIMUM_UPLOADS", value_name = "COUNT")]
     pub maximum_uploads: Option<u64>,
-    /// Largest mesh file, in bytes [default: 8388608].
+    /// Bytes of meshes uploaded in pieces, of all uploads together and thus of one [default: 268435456].
+    #[arg(long, env = "GRASP_MAXIMUM_UPLOAD_BYTES", value_name = "BYTES")]
+    pub maximum_upload_bytes: Option<u64>,
+    /// Longest pause between the pieces of an upload, in milliseconds [default: 10000].
+    #[arg(long, env = "GRASP_UPLOAD_IDLE_MS", value_name = "MS")]
+    pub upload_idle_ms: Option<u64>,
+    /// Most watchers of objects; others are rejected [default: 64].
+    #[arg(long, env = "GRASP_MAXIMUM_WATCHERS", value_name = "COUNT")]
+    pub maximum_watchers: Option<u64>,
+    /// Largest mesh file in one message or in the objects directory, in bytes [default: 8388608].
     #[arg(long, env = "GRASP_MAXIMUM_OBJECT_BYTES", value_name = "BYTES")]
     pub maximum_object_bytes: Option<u64>,
     /// Most triangles, and most vertices, in a mesh [default: 200000].
@@ -150,6 +159,9 @@ impl RawConfig {
             improvement_ms: self.improvement_ms.or(fallback.improvement_ms),
             maximum_searches: self.maximum_searches.or(fallback.maximum_searches),
             maximum_uploads: self.maximum_uploads.or(fallback.maximum_uploads),
+            maximum_upload_bytes: self.maximum_upload_bytes.or(fallback.maximum_upload_bytes),
+            upload_idle_ms: self.upload_idle_ms.or(fallback.upload_idle_ms),
+            maximum_watchers: self.maximum_watchers.or(fallback.maximum_watchers),
             maximum_object_bytes: self.maximum_object_bytes.or(fallback.maximum_object_bytes),
             maximum_object_triangles: self
                 .maximum_object_triangles
@@ -183,6 +195,9 @@ impl From<&Config> for RawConfig {
             improvement_ms: time(config.improvement),
             maximum_searches: count(config.maximum_searches.get()),
             maximum_uploads: count(config.maximum_uploads.get()),
+            maximum_upload_bytes: count(config.streams.upload_bytes.get()),
+            upload_idle_ms: time(config.streams.upload_idle),
+            maximum_watchers: count(config.streams.watchers.get()),
             maximum_object_bytes: count(config.maximum_object_bytes.get()),
             maximum_object_triangles: count(config.maximum_object_triangles.get()),
             cache_objects: count(config.store.objects),

@@ -4,8 +4,10 @@
 pub(crate) mod build;
 mod centre_of_mass;
 pub(crate) mod change;
+pub(crate) mod changes;
 pub(crate) mod directory;
 mod extent;
+pub(crate) mod glb;
 mod mesh_file;
 mod revision;
 pub(crate) mod store;
@@ -198,7 +200,6 @@ fn count(n: usize) -> u32 {
 
 /// SHA-256 over the counts, the vertices, the triangles and the forbidden set, all little-endian.
 fn content_hash(object: &GraspObject) -> String {
-    use std::fmt::Write as _;
     let mesh = object.surface.mesh();
     let mut hash = Sha256::new();
     hash.update((mesh.positions().len() as u64).to_le_bytes());
@@ -214,12 +215,17 @@ fn content_hash(object: &GraspObject) -> String {
     for triangle in 0..count(mesh.triangles().len()) {
         hash.update([u8::from(object.is_forbidden(triangle))]);
     }
-    let mut text = String::with_capacity(64);
-    for byte in hash.finalize() {
+    hex(&hash.finalize())
+}
+
+/// Bytes in hexadecimal.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    use std::fmt::Write as _;
+    bytes.iter().fold(String::new(), |mut text, byte| {
         // Writing to a string cannot fail.
         let _ = write!(text, "{byte:02x}");
-    }
-    text
+        text
+    })
 }
 
 #[cfg(test)]

@@ -2,14 +2,19 @@
 
 mod grasp_service;
 mod object_service;
+mod object_streams;
+mod streaming;
+mod upload;
 
 use std::{sync::Arc, time::Duration};
 
 use grasp_import::MeshLimits;
 use grasp_synthesis::base::mechanisms::Mechanisms;
+use tokio_util::sync::CancellationToken;
 
 pub(crate) use grasp_service::GraspHandler;
 pub(crate) use object_service::ObjectHandler;
+pub(crate) use upload::Uploads;
 
 use crate::{
     atlases::Atlases, budget::BudgetLimits, executor::SearchExecutor, objects::store::ObjectStore,
@@ -33,6 +38,12 @@ pub(crate) struct Shared {
     pub reserve: Arc<DeadlineReserve>,
     /// Bounds on meshes.
     pub obj_limits: MeshLimits,
+    /// Uploads in pieces.
+    pub uploads: Uploads,
+    /// Largest number of watchers of objects.
+    pub maximum_watchers: usize,
+    /// Cancelled when the server begins to shut down, which ends streams without an end of their own.
+    pub shutdown: CancellationToken,
     /// Rig of the receiving hand if a request names none.
     pub default_rig: String,
     /// The mechanisms that searches run.

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use grasp_import::MeshLimits;
 use grasp_proto::v1::{self, object_service_server::ObjectService};
 use prost::Message as _;
-use tonic::{Request, Response, Status};
+use tonic::{Request, Response, Status, Streaming};
 
-use super::Shared;
+use super::{Shared, streaming::Messages};
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
@@ -31,7 +32,7 @@ const CHANGE_ATTEMPTS: usize = 8;
 /// Implements `ObjectService`.
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectHandler {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
 impl ObjectHandler {
@@ -50,7 +51,7 @@ impl ObjectHandler {
         let call = call.clone();
         let object = run_blocking(move || {
             let _permit = permit;
-            handler.create_blocking(request, &call)
+            handler.create_blocking(request, handler.shared.obj_limits, &call)
         })
         .await??;
         Ok(v1::CreateObjectResponse {
@@ -58,13 +59,14 @@ impl ObjectHandler {
         })
     }
 
-    fn create_blocking(
+    /// Builds an object and adds it to the others.
+    pub(super) fn create_blocking(
         &self,
         request: v1::CreateObjectRequest,
+        limits: MeshLimits,
         call: &CallContext,
     ) -> Result<Revision, ServiceError> {
         let shared = &self.shared;
-        let limits = shared.obj_limits;
         let mut violations = Violations::default();
         let mut fields = object_fields(request, limits.bytes, &mut violations);
         let origin = Origin {
@@ -181,7 +183,8 @@ impl ObjectHandler {
         Ok(v1::DeleteObjectResponse {})
     }
 
-    fn message(&self, revision: &Revision) -> v1::Object {
+    /// The message that describes an object.
+    pub(super) fn message(&self, revision: &Revision) -> v1::Object {
         revision.to_wire(self.shared.atlases.state(&revision.object))
     }
 }
@@ -201,7 +204,7 @@ fn fitting(objects: impl Iterator<Item = v1::Object>, mut room: usize) -> Vec<v1
 }
 
 /// The id in the field `name`, which is all that may be wrong with a request.
-fn checked_id(name: &str) -> Result<String, ServiceError> {
+pub(super) fn checked_id(name: &str) -> Result<String, ServiceError> {
     let mut violations = Violations::default();
     match object_id_of(Field::root("name"), name, &mut violations) {
         Some(id) => Ok(id),
@@ -254,6 +257,36 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
         let call = CallContext::of(&request);
         Ok(Response::new(self.delete(request.into_inner(), &call)?))
+    }
+
+    async fn upload_object(
+        &self,
+        mut request: Request<Streaming<v1::UploadObjectRequest>>,
+    ) -> Result<Response<v1::UploadObjectResponse>, Status> {
+        let call = CallContext::of(&request);
+        let permit = request.extensions_mut().remove::<UploadPermit>();
+        Ok(Response::new(
+            self.upload(request.into_inner(), permit, &call).await?,
+        ))
+    }
+
+    type GetMeshStream = Messages<v1::GetMeshResponse>;
+
+    async fn get_mesh(
+        &self,
+        request: Request<v1::GetMeshRequest>,
+    ) -> Result<Response<Self::GetMeshStream>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.mesh(&request.get_ref().name, &call).await?))
+    }
+
+    type WatchObjectsStream = Messages<v1::WatchObjectsResponse>;
+
+    async fn watch_objects(
+        &self,
+        request: Request<v1::WatchObjectsRequest>,
+    ) -> Result<Response<Self::WatchObjectsStream>, Status> {
+        Ok(Response::new(self.watch(request.get_ref())?))
     }
 }
 

@@ -14,6 +14,8 @@ mod page;
 mod receiver;
 mod search_limits;
 mod update;
+mod upload;
+mod watch;
 
 use std::fmt;
 
@@ -25,12 +27,14 @@ pub(crate) use find_grasp::{FindQuery, find_query};
 pub(crate) use hand::GiverHand;
 #[cfg(test)]
 pub(crate) use hand::fixtures;
-pub(crate) use labels::Labels;
+pub(crate) use labels::{LabelFilter, Labels};
 pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, object_id_of};
 #[cfg(test)]
 pub(crate) use obstacles::tests::any_obstacles;
 pub(crate) use page::{PageQuery, Place, page_query, page_token};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
+pub(crate) use upload::{UploadQuery, upload_query};
+pub(crate) use watch::{WatchQuery, watch_query};
 
 use crate::error::{ServiceError, Violation};
 
@@ -68,6 +72,14 @@ impl Violations {
         } else {
             self.unlisted += 1;
         }
+    }
+
+    /// Adds the violations of a message inside this one.
+    fn add_all_within(&mut self, parent: Field<'_>, inner: Self) {
+        for Violation { field, description } in inner.listed {
+            self.add(parent.child(&field), description);
+        }
+        self.unlisted += inner.unlisted;
     }
 
     /// True if there are none.

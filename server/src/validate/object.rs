@@ -105,15 +105,42 @@ pub(crate) fn object_fields(
         if mesh.is_empty() { &obj } else { &mesh },
         violations,
     );
-    if !is_object_id(&request.object_id) {
+    check_id(&request.object_id, violations);
+    let (mesh_field, mesh) = given_mesh(mesh, obj, maximum_bytes, violations);
+    ObjectFields {
+        mesh,
+        mesh_field,
+        request: request_key,
+        ..fields_beside_mesh(request, violations)
+    }
+}
+
+/// Checks everything in a request for a new object but its mesh.
+pub(super) fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &mut Violations) {
+    request_key(&mut request.clone(), &[], violations);
+    check_id(&request.object_id, violations);
+    fields_beside_mesh(request.clone(), violations);
+}
+
+fn check_id(id: &str, violations: &mut Violations) {
+    if !is_object_id(id) {
         violations.add(
             Field::root("object_id"),
             format_args!(
                 "is {}; it must be 1 to {LONGEST_ID} of a-z, 0-9 and -, starting with a letter",
-                quoted(&request.object_id)
+                quoted(id)
             ),
         );
     }
+}
+
+/// The mesh, from the one of two fields that has it.
+fn given_mesh(
+    mesh: Vec<u8>,
+    obj: Vec<u8>,
+    maximum_bytes: usize,
+    violations: &mut Violations,
+) -> (&'static str, Vec<u8>) {
     let (mesh_field, mesh) = match (mesh, obj) {
         (mesh, obj) if obj.is_empty() => ("mesh", mesh),
         (mesh, obj) if mesh.is_empty() => ("obj", obj),
@@ -136,6 +163,11 @@ pub(crate) fn object_fields(
             format_args!("has {} bytes; the limit is {maximum_bytes}", mesh.len()),
         );
     }
+    (mesh_field, mesh)
+}
+
+/// The fields of a new object without its mesh.
+fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violations) -> ObjectFields {
     let up_axis = match v1::UpAxis::try_from(request.up_axis) {
         Ok(v1::UpAxis::Unspecified | v1::UpAxis::Y) => UpAxis::Y,
         Ok(v1::UpAxis::Z) => UpAxis::Z,
@@ -173,15 +205,15 @@ pub(crate) fn object_fields(
     labels(Field::root("labels"), &request.labels, violations);
     ObjectFields {
         id: request.object_id,
-        mesh,
-        mesh_field,
+        mesh: Vec::new(),
+        mesh_field: "mesh",
         import: Import { unit_metres, up_axis },
         mass: request.mass_kg,
         centre_of_mass,
         friction,
         forbidden: request.forbidden.unwrap_or_default().into(),
         labels: request.labels,
-        request: request_key,
+        request: None,
     }
 }
 

@@ -14,6 +14,10 @@ use crate::{
     values::{TriangleRange, parse_label, parse_triangles, parse_vector},
 };
 
+/// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
+/// pieces.
+const LARGEST_MESSAGE: usize = 8 << 20;
+
 /// Create an object from a mesh: OBJ, STL, PLY, GLB or glTF.
 ///
 /// Shows the new object, like `grasp objects get`.
@@ -84,7 +88,12 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         labels: arguments.labels.into_iter().collect(),
         ..NewObject::new(id, mesh, arguments.mass)
     };
-    let object = arguments.server.connect().await?.create_object(&object).await?;
+    let client = arguments.server.connect().await?;
+    let object = if object.mesh.len() > LARGEST_MESSAGE {
+        client.upload_object(&object).await?
+    } else {
+        client.create_object(&object).await?
+    };
     output.write(&object, super::describe)?;
     Ok(Ending::Done)
 }

@@ -4,7 +4,9 @@ mod create;
 mod delete;
 mod get;
 mod list;
+mod mesh;
 mod update;
+mod watch;
 
 use std::collections::BTreeMap;
 
@@ -18,7 +20,7 @@ use crate::{
     output::{Output, pairs},
 };
 
-/// List, show, create, change and delete objects.
+/// List, show, create, change, delete and watch objects, and save their meshes.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     List(list::Arguments),
@@ -26,6 +28,8 @@ pub(crate) enum Command {
     Create(create::Arguments),
     Update(update::Arguments),
     Delete(delete::Arguments),
+    Watch(watch::Arguments),
+    Mesh(mesh::Arguments),
 }
 
 pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
@@ -35,6 +39,8 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Fail
         Command::Create(arguments) => create::run(arguments, output).await,
         Command::Update(arguments) => update::run(arguments, output).await,
         Command::Delete(arguments) => delete::run(arguments, output).await,
+        Command::Watch(arguments) => watch::run(arguments, output).await,
+        Command::Mesh(arguments) => mesh::run(arguments, output).await,
     }
 }
 

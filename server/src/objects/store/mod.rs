@@ -8,17 +8,22 @@
 
 #[cfg(test)]
 mod tests;
+mod watching;
 
 use std::{
     collections::{BTreeMap, HashMap, VecDeque},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
 use grasp_assets::objects::{object, objects};
 use uuid::Uuid;
 
-use super::{Record, Revision, StoredObject, name_of};
+use super::{
+    Record, Revision, StoredObject,
+    changes::{Event, Watcher},
+    name_of,
+};
 use crate::{
     error::{Limit, ServiceError},
     limits::StoreLimits,
@@ -50,6 +55,7 @@ struct Created {
     uses: u64,
     evicted: VecDeque<String>,
     etags: Etags,
+    watchers: Vec<Weak<Watcher>>,
 }
 
 #[derive(Debug)]
@@ -111,6 +117,7 @@ impl ObjectStore {
                 uses: 0,
                 evicted: VecDeque::new(),
                 etags,
+                watchers: Vec::new(),
             }),
             limits,
         }
@@ -211,6 +218,7 @@ impl ObjectStore {
             request: origin.request,
             last_used: created.uses,
         };
+        created.tell(&id, Event::Created, None, Some(&revision.record.labels));
         created.objects.insert(id, entry);
         Ok(revision)
     }
@@ -263,6 +271,8 @@ impl ObjectStore {
             }),
         };
         created.entry(id)?.revision = revision.clone();
+        let (before, after) = (&record.labels, &revision.record.labels);
+        created.tell(id, Event::Updated, Some(before), Some(after));
         Ok(revision)
     }
 
@@ -274,7 +284,7 @@ impl ObjectStore {
         self.check_changeable(id)?;
         let mut created = self.created();
         created.entry_with(id, etag)?;
-        created.take(id);
+        created.take(id, Event::Deleted);
         Ok(())
     }
 
@@ -388,8 +398,9 @@ impl Created {
     }
 
     /// Removes an object, if it exists.
-    fn take(&mut self, id: &str) {
+    fn take(&mut self, id: &str, event: Event) {
         if let Some(entry) = self.objects.remove(id) {
+            self.tell(id, event, Some(&entry.revision.record.labels), None);
             self.bytes -= entry.revision.object.bytes();
             if let Some(request) = entry.request {
                 self.requests.remove(&request.id);
@@ -408,7 +419,7 @@ impl Created {
         let Some(id) = oldest else {
             return false;
         };
-        self.take(&id);
+        self.take(&id, Event::Evicted);
         if self.evicted.len() == REMEMBERED_EVICTIONS {
             self.evicted.pop_front();
         }

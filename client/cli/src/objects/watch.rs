@@ -1,0 +1,95 @@
+//! `grasp objects watch`
+
+use clap::Args;
+use grasp_client::{ObjectChange, ObjectNews};
+
+use crate::{
+    Ending,
+    failure::Failure,
+    format::name_of,
+    output::{Output, write_json_line, write_line},
+    server_options::ServerOptions,
+};
+
+/// Widths of the columns, which cannot follow rows that are yet to come.
+const CHANGES_WIDTH: usize = 22;
+const NAME_WIDTH: usize = 28;
+
+/// Show what happens to objects, until interrupted or the server shuts down.
+///
+/// Of an object that changes faster than the news are read, several changes come at once, with its latest state.
+///
+/// With --json, one line per news: {"changes": […], "name": NAME or null, "object": … or null}, the object as in `grasp objects
+/// get --json`. Changes: present, `present_end`, created, updated, `atlas_useful`, `atlas_complete`, deleted, evicted.
+#[derive(Args, Debug)]
+pub(crate) struct Arguments {
+    /// Labels that the objects must have, such as "level=kitchen AND fragile".
+    #[arg(long, value_name = "FILTER", default_value = "", hide_default_value = true)]
+    filter: String,
+    /// Show the present objects first.
+    #[arg(long)]
+    present: bool,
+    /// End after so many news.
+    #[arg(long, value_name = "N")]
+    count: Option<u64>,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let client = arguments.server.connect().await?;
+    let mut watch = client.watch_objects(arguments.filter, arguments.present).await?;
+    if !output.is_json() {
+        write_line(&line("change", "object", "mass", "atlas", "labels"))?;
+    }
+    let mut left = arguments.count;
+    while left != Some(0)
+        && let Some(news) = watch.next().await?
+    {
+        if output.is_json() {
+            write_json_line(&news)?;
+        } else if !news.changes.contains(&ObjectChange::PresentEnd) {
+            write_line(&row(&news))?;
+        }
+        left = left.map(|left| left - 1);
+    }
+    Ok(Ending::Done)
+}
+
+/// A row of the table.
+fn row(news: &ObjectNews) -> String {
+    let changes: Vec<String> = news.changes.iter().map(name_of).collect();
+    let name = news.name.as_deref().unwrap_or_default();
+    match &news.object {
+        None => line(&changes.join(", "), name, "", "", ""),
+        Some(object) => line(
+            &changes.join(", "),
+            name,
+            &format!("{:.0} g", object.mass_kg * 1000.0),
+            &super::atlas(object.atlas.as_ref()),
+            &super::labels(&object.labels),
+        ),
+    }
+}
+
+fn line(changes: &str, name: &str, mass: &str, atlas: &str, labels: &str) -> String {
+    format!("{changes:CHANGES_WIDTH$}  {name:NAME_WIDTH$}  {mass:>7}  {atlas:18}  {labels}")
+        .trim_end()
+        .to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_aligned_and_name_what_is_gone() {
+        let news = ObjectNews {
+            changes: vec![ObjectChange::Evicted],
+            name: Some("objects/mug".to_owned()),
+            object: None,
+        };
+        assert_eq!(row(&news), "evicted                 objects/mug");
+        assert!(line("a", "b", "7 g", "", "x").starts_with("a                       b     "));
+    }
+}

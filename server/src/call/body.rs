@@ -1,0 +1,62 @@
+//! The body of an answer, which keeps its call in flight until all of it is handed to the transport.
+
+use std::{
+    pin::Pin,
+    task::{Context, Poll},
+};
+
+use http::HeaderMap;
+use http_body::{Body, Frame, SizeHint};
+use tonic::Code;
+
+use super::log_line::LogLine;
+
+/// Trailer, or header of an answer without a message, with the status.
+const STATUS: &str = "grpc-status";
+
+/// The status in headers or trailers; none if they have none.
+pub(super) fn code_in(headers: &HeaderMap) -> Option<Code> {
+    headers
+        .get(STATUS)
+        .map(|status| Code::from_bytes(status.as_bytes()))
+}
+
+/// A body whose end is the end of its call.
+#[derive(Debug)]
+pub(crate) struct AnswerBody<B> {
+    inner: B,
+    line: LogLine,
+}
+
+impl<B> AnswerBody<B> {
+    /// The body of the call with this line.
+    pub(super) fn new(inner: B, line: LogLine) -> Self {
+        Self { inner, line }
+    }
+}
+
+impl<B: Body + Unpin> Body for AnswerBody<B> {
+    type Data = B::Data;
+    type Error = B::Error;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<B::Data>, B::Error>>> {
+        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+        if let Poll::Ready(Some(Ok(frame))) = &polled
+            && let Some(code) = frame.trailers_ref().and_then(code_in)
+        {
+            self.line.set_code(code);
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.inner.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.inner.size_hint()
+    }
+}

@@ -1,0 +1,180 @@
+//! The layer itself: around every service, from a call's headers to the end of its answer.
+
+use std::{
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll},
+    time::{Duration, Instant},
+};
+
+use http::{Request, Response};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tonic::{Code, Status};
+use tower::{Layer, Service};
+
+use super::{
+    CallContext, SearchEnd,
+    body::{AnswerBody, code_in},
+    in_flight::CallsInFlight,
+    log_line::LogLine,
+};
+use crate::{
+    budget::parse_grpc_timeout,
+    error::{Limit, ServiceError, blame_malformed_messages},
+    reserve::DeadlineReserve,
+};
+
+/// Paths of the methods that build objects from large messages; their calls are admitted before the message is received.
+const UPLOAD_METHODS: [&str; 3] = [
+    "/grasp.v1.ObjectService/CreateObject",
+    "/grasp.v1.ObjectService/UpdateObject",
+    STREAMED_UPLOAD,
+];
+
+/// Path of the method whose request may take long to arrive. It limits its time itself.
+const STREAMED_UPLOAD: &str = "/grasp.v1.ObjectService/UploadObject";
+
+/// When a client whose upload was rejected should retry: after about the time of an upload.
+const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
+
+/// Wraps every service; see the module documentation.
+#[derive(Clone, Debug)]
+pub(crate) struct CallLayer {
+    /// Counter of calls.
+    pub in_flight: CallsInFlight,
+    /// One permit per concurrent upload.
+    pub uploads: Arc<Semaphore>,
+    /// Largest number of concurrent uploads.
+    pub maximum_uploads: usize,
+    /// Learns the delays of answers.
+    pub reserve: Arc<DeadlineReserve>,
+    /// Longest time from a call's headers to those of its answer.
+    pub longest_call: Duration,
+}
+
+impl<S> Layer<S> for CallLayer {
+    type Service = CallService<S>;
+
+    fn layer(&self, inner: S) -> Self::Service {
+        CallService {
+            inner,
+            layer: self.clone(),
+        }
+    }
+}
+
+/// A service in its [`CallLayer`].
+#[derive(Clone, Debug)]
+pub(crate) struct CallService<S> {
+    inner: S,
+    layer: CallLayer,
+}
+
+impl<S, B, R> Service<Request<B>> for CallService<S>
+where
+    S: Service<Request<B>, Response = Response<R>>,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+    R: Default + Send + 'static,
+{
+    type Response = Response<AnswerBody<R>>;
+    type Error = S::Error;
+    type Future = Pin<Box<dyn Future<Output = Result<Self::Response, S::Error>> + Send>>;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        self.inner.poll_ready(cx)
+    }
+
+    fn call(&mut self, mut request: Request<B>) -> Self::Future {
+        let timeout = request
+            .headers()
+            .get("grpc-timeout")
+            .and_then(|header| header.to_str().ok())
+            .and_then(parse_grpc_timeout);
+        let context = CallContext::arriving(timeout);
+        let path = request.uri().path();
+        let mut line = LogLine::new(path, context.clone(), self.layer.in_flight.enter());
+        let delay = AnswerDelay {
+            search_end: Arc::clone(&context.search_end),
+            reserve: Arc::clone(&self.layer.reserve),
+        };
+        let longest = (path != STREAMED_UPLOAD).then_some(self.layer.longest_call);
+        let upload = if UPLOAD_METHODS.contains(&path) {
+            let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
+                let error = ServiceError::Overloaded {
+                    limit: Limit::Uploads,
+                    maximum: self.layer.maximum_uploads,
+                    retry_after: RETRY_UPLOAD_AFTER,
+                };
+                return Box::pin(std::future::ready(Ok(refusal(error, line))));
+            };
+            Some(permit)
+        } else {
+            None
+        };
+        let extensions = request.extensions_mut();
+        extensions.insert(context);
+        if let Some(permit) = upload {
+            extensions.insert(UploadPermit {
+                _permit: Arc::new(permit),
+            });
+        }
+        let answer = self.inner.call(request);
+        Box::pin(async move {
+            let answer = match longest {
+                None => answer.await,
+                Some(longest) => match tokio::time::timeout(longest, answer).await {
+                    Ok(answer) => answer,
+                    Err(_) => return Ok(refusal(ServiceError::TookTooLong { limit: longest }, line)),
+                },
+            };
+            drop(delay);
+            match answer.map(blame_malformed_messages) {
+                Ok(answer) => {
+                    if let Some(code) = code_in(answer.headers()) {
+                        line.set_code(code);
+                    }
+                    Ok(answer.map(|body| AnswerBody::new(body, line)))
+                }
+                Err(error) => {
+                    line.set_code(Code::Internal);
+                    Err(error)
+                }
+            }
+        })
+    }
+}
+
+/// The answer to a call that no service answers.
+fn refusal<R: Default>(error: ServiceError, mut line: LogLine) -> Response<AnswerBody<R>> {
+    let status = Status::from(error);
+    line.set_code(status.code());
+    status.into_http().map(|body| AnswerBody::new(body, line))
+}
+
+/// The right to receive and build an object. The handler takes it from the request and holds it while it works.
+#[derive(Clone, Debug)]
+pub(crate) struct UploadPermit {
+    _permit: Arc<OwnedSemaphorePermit>,
+}
+
+/// Measures the delay from the end of a call's search to its answer. If the call is dropped first, which is what a
+/// client does at its deadline, the answer would have taken at least until then.
+struct AnswerDelay {
+    search_end: Arc<SearchEnd>,
+    reserve: Arc<DeadlineReserve>,
+}
+
+impl Drop for AnswerDelay {
+    fn drop(&mut self) {
+        let SearchEnd { due, actual } = &*self.search_end;
+        if let Some(&due) = due.get() {
+            let now = Instant::now();
+            let end = actual.get().map_or(due, |&actual| actual.min(due));
+            self.reserve.record(now.saturating_duration_since(end), now);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

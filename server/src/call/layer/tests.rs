@@ -1,0 +1,177 @@
+//! The layer around services that keep, answer or stream.
+
+use std::{convert::Infallible, sync::Mutex};
+
+use http::HeaderMap;
+use http_body::{Body, Frame};
+
+use super::*;
+
+/// A service that keeps every request and never answers.
+#[derive(Clone, Default)]
+struct Keeper(Arc<Mutex<Vec<Request<()>>>>);
+
+impl Service<Request<()>> for Keeper {
+    type Response = Response<()>;
+    type Error = Infallible;
+    type Future = std::future::Pending<Result<Response<()>, Infallible>>;
+
+    fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
+        Poll::Ready(Ok(()))
+    }
+
+    fn call(&mut self, request: Request<()>) -> Self::Future {
+        self.0.lock().unwrap().push(request);
+        std::future::pending()
+    }
+}
+
+/// A layer that admits one upload.
+fn layer() -> CallLayer {
+    CallLayer {
+        in_flight: CallsInFlight::default(),
+        uploads: Arc::new(Semaphore::new(1)),
+        maximum_uploads: 1,
+        reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
+        longest_call: Duration::from_mins(1),
+    }
+}
+
+fn request(path: &str) -> Request<()> {
+    Request::builder()
+        .uri(path)
+        .header("grpc-timeout", "3S")
+        .body(())
+        .unwrap()
+}
+
+#[tokio::test]
+async fn rejects_uploads_beyond_the_maximum_before_they_are_received() {
+    let layer = layer();
+    let keeper = Keeper::default();
+    let mut service = layer.layer(keeper.clone());
+    let first = service.call(request(UPLOAD_METHODS[0]));
+    let second = service.call(request(UPLOAD_METHODS[1])).await.unwrap();
+    assert_eq!(code_in(second.headers()), Some(Code::ResourceExhausted));
+    // Other methods need no permit.
+    let other = service.call(request("/grasp.v1.GraspService/FindGrasp"));
+    assert_eq!(layer.in_flight.count(), 2);
+    drop((first, other));
+    assert_eq!(layer.in_flight.count(), 0);
+    // The kept request still holds the permit.
+    assert_eq!(layer.uploads.available_permits(), 0);
+    assert_eq!(keeper.0.lock().unwrap().len(), 2);
+    keeper.0.lock().unwrap().clear();
+    assert_eq!(layer.uploads.available_permits(), 1);
+}
+
+#[tokio::test]
+async fn passes_arrival_and_deadline_to_the_handler() {
+    let keeper = Keeper::default();
+    let layer = layer();
+    let before = Instant::now();
+    let _call = layer
+        .layer(keeper.clone())
+        .call(request("/grasp.v1.GraspService/FindGrasp"));
+    let kept = keeper.0.lock().unwrap();
+    let context = kept[0].extensions().get::<CallContext>().unwrap();
+    assert!(before <= context.arrived && context.arrived <= Instant::now());
+    assert_eq!(context.deadline, Some(context.arrived + Duration::from_secs(3)));
+}
+
+/// The call of a request whose search is recorded with the given times, and the layer.
+fn call_with_search(due: Instant, ended: Option<Instant>) -> (CallLayer, impl Future) {
+    let (layer, keeper) = (layer(), Keeper::default());
+    let call = layer
+        .layer(keeper.clone())
+        .call(request("/grasp.v1.GraspService/FindGrasp"));
+    let kept = keeper.0.lock().unwrap();
+    let context: &CallContext = kept[0].extensions().get().unwrap();
+    context.search_is_due(due);
+    if let Some(ended) = ended {
+        context.search_ended(ended);
+    }
+    (layer, call)
+}
+
+/// The reserve that a call leaves behind when it is dropped.
+fn reserve_after(due: Instant, ended: Option<Instant>) -> Duration {
+    let (layer, call) = call_with_search(due, ended);
+    drop(call);
+    layer.reserve.at(Instant::now())
+}
+
+#[test]
+fn delay_of_an_answer_counts_from_the_end_of_its_search() {
+    let now = Instant::now();
+    let (hour, second) = (Duration::from_hours(1), Duration::from_secs(1));
+    let past = now.checked_sub(second).unwrap();
+    // A search that ended a second before, and had an hour left.
+    assert!(reserve_after(now + hour, Some(past)) > second);
+    // One that runs, dropped before it has to end.
+    assert!(reserve_after(now + hour, None) < second);
+    // A time before the start of the search counts as its start.
+    assert!(reserve_after(past, None) < second);
+}
+
+/// A body of one message and its trailers, as a stream that has ended has it.
+#[derive(Default)]
+struct Streamed(Vec<Frame<&'static [u8]>>);
+
+impl Body for Streamed {
+    type Data = &'static [u8];
+    type Error = Infallible;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Self::Data>, Infallible>>> {
+        Poll::Ready(self.0.pop().map(Ok))
+    }
+}
+
+#[tokio::test]
+async fn a_call_lasts_until_its_body_ends() {
+    let layer = layer();
+    let mut service = layer.layer(tower::service_fn(|_: Request<()>| async {
+        let mut trailers = HeaderMap::new();
+        trailers.insert("grpc-status", "14".parse().unwrap());
+        let frames = vec![Frame::trailers(trailers), Frame::data(&b"message"[..])];
+        Ok::<_, Infallible>(Response::new(Streamed(frames)))
+    }));
+    let mut body = service
+        .call(request("/grasp.v1.ObjectService/WatchObjects"))
+        .await
+        .unwrap()
+        .into_body();
+    let mut cx = Context::from_waker(std::task::Waker::noop());
+    let mut frames = 0;
+    while let Poll::Ready(Some(frame)) = Pin::new(&mut body).poll_frame(&mut cx) {
+        frame.unwrap();
+        frames += 1;
+        assert_eq!(layer.in_flight.count(), 1);
+    }
+    assert_eq!(frames, 2);
+    drop(body);
+    assert_eq!(layer.in_flight.count(), 0);
+}
+
+#[tokio::test]
+async fn calls_end_at_the_limit_but_streamed_uploads_do_not() {
+    let layer = CallLayer {
+        longest_call: Duration::from_millis(5),
+        ..layer()
+    };
+    let mut service = layer.layer(Keeper::default());
+    let answer = service
+        .call(request("/grasp.v1.GraspService/FindGrasp"))
+        .await
+        .unwrap();
+    assert_eq!(code_in(answer.headers()), Some(Code::DeadlineExceeded));
+    let upload = service.call(request(STREAMED_UPLOAD));
+    assert!(
+        tokio::time::timeout(Duration::from_millis(50), upload)
+            .await
+            .is_err()
+    );
+}

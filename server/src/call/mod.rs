@@ -1,0 +1,108 @@
+//! A layer around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
+//! their search, limits their time, and bounds uploads. A call lasts until its answer's body has been handed to the transport,
+//! which for streams may be long after its headers.
+
+mod body;
+mod in_flight;
+mod layer;
+mod log_line;
+
+use std::{
+    sync::{Arc, OnceLock},
+    time::{Duration, Instant},
+};
+
+pub(crate) use self::{
+    in_flight::CallsInFlight,
+    layer::{CallLayer, UploadPermit},
+};
+
+/// What a handler knows about its call, and adds to the call's log line.
+#[derive(Clone, Debug)]
+pub(crate) struct CallContext {
+    /// When the call's headers arrived.
+    pub arrived: Instant,
+    /// When the client stops waiting, if it set a deadline.
+    pub deadline: Option<Instant>,
+    log_fields: Arc<LogFields>,
+    search_end: Arc<SearchEnd>,
+}
+
+/// What a handler adds to the log line.
+#[derive(Debug, Default)]
+struct LogFields {
+    object: OnceLock<String>,
+    reserve: OnceLock<Duration>,
+    search: OnceLock<SearchSummary>,
+}
+
+/// The end of a call's search, from which the delay of its answer counts.
+#[derive(Debug, Default)]
+struct SearchEnd {
+    /// When it has to end.
+    due: OnceLock<Instant>,
+    /// When it ended.
+    actual: OnceLock<Instant>,
+}
+
+/// A search as it is logged.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SearchSummary {
+    /// Name of the outcome in the contract.
+    pub outcome: &'static str,
+    /// Number of attempts.
+    pub attempts: u64,
+    /// Its wall time.
+    pub time: Duration,
+}
+
+impl CallContext {
+    /// The context of a request; a new one without a deadline if the request did not pass [`CallLayer`].
+    pub(crate) fn of<T>(request: &tonic::Request<T>) -> Self {
+        request
+            .extensions()
+            .get()
+            .cloned()
+            .unwrap_or_else(|| Self::arriving(None))
+    }
+
+    fn arriving(timeout: Option<Duration>) -> Self {
+        let arrived = Instant::now();
+        Self {
+            arrived,
+            // A deadline beyond the clock's range counts as none.
+            deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
+            log_fields: Arc::default(),
+            search_end: Arc::default(),
+        }
+    }
+
+    /// Records when the search that starts now has to end. A time that has passed counts as now: what was waited before,
+    /// such as for the rest of a request, is no delay of the answer.
+    pub(crate) fn search_is_due(&self, due: Instant) {
+        let _ = self.search_end.due.set(due.max(Instant::now()));
+    }
+
+    /// Records when the search ended.
+    pub(crate) fn search_ended(&self, at: Instant) {
+        let _ = self.search_end.actual.set(at);
+    }
+
+    /// Adds the object's id to the log line.
+    pub(crate) fn log_object(&self, id: &str) {
+        // The first value stays.
+        let _ = self.log_fields.object.set(id.to_owned());
+    }
+
+    /// Adds the part of the deadline that is kept for the answer to the log line, if there is a deadline.
+    pub(crate) fn log_reserve(&self, reserve: Duration) {
+        if self.deadline.is_some() {
+            let _ = self.log_fields.reserve.set(reserve);
+        }
+    }
+
+    /// Adds the search to the log line.
+    pub(crate) fn log_search(&self, summary: SearchSummary) {
+        let _ = self.log_fields.search.set(summary);
+    }
+}

@@ -1,0 +1,122 @@
+//! Watchers of the store.
+//!
+//! Events are recorded, and told with the state that they led to, under the lock of the created objects: no watcher misses one
+//! or sees a state before its event.
+
+use std::{
+    ops::Bound,
+    sync::{Arc, Weak},
+};
+
+use super::{Created, Entry, ObjectStore};
+use crate::{
+    error::{Limit, ServiceError},
+    objects::{
+        Revision, StoredObject,
+        changes::{Cursor, Event, Told, Watcher},
+    },
+    validate::{Labels, WatchQuery},
+};
+
+use super::RETRY_AFTER;
+
+impl ObjectStore {
+    /// A watcher who is told of what happens from now on.
+    ///
+    /// # Errors
+    /// [`ServiceError::Overloaded`] if there are `most` already.
+    pub(crate) fn watch(&self, query: WatchQuery, most: usize) -> Result<Arc<Watcher>, ServiceError> {
+        let mut created = self.created();
+        created.watchers.retain(|watcher| watcher.strong_count() > 0);
+        if created.watchers.len() >= most {
+            return Err(ServiceError::Overloaded {
+                limit: Limit::Watchers,
+                maximum: most,
+                retry_after: RETRY_AFTER,
+            });
+        }
+        let watcher = Arc::new(Watcher::new(query.filter, query.wants_present));
+        created.watchers.push(Arc::downgrade(&watcher));
+        Ok(watcher)
+    }
+
+    /// What the watcher is told next; none if there is nothing yet.
+    ///
+    /// # Errors
+    /// [`ServiceError::WatcherTooSlow`].
+    pub(crate) fn next_told(&self, watcher: &Watcher) -> Result<Option<Told>, ServiceError> {
+        let created = self.created();
+        if watcher.has_overflown() {
+            return Err(ServiceError::WatcherTooSlow);
+        }
+        if let Some(cursor) = watcher.present() {
+            return Ok(Some(self.next_present(&created, watcher, &cursor)));
+        }
+        Ok(watcher.take().map(|(id, events)| Told::Object {
+            revision: self.revision_in(&created, &id).cloned(),
+            id,
+            events,
+        }))
+    }
+
+    /// The next present object, or the end of them.
+    fn next_present(&self, created: &Created, watcher: &Watcher, cursor: &Cursor) -> Told {
+        let start = match cursor {
+            Cursor::Start => Bound::Unbounded,
+            Cursor::After(id) => Bound::Excluded(id.as_str()),
+        };
+        let range = (start, Bound::Unbounded);
+        let matches = |revision: &&Revision| watcher.filter.matches(&revision.record.labels);
+        let pinned = self.pinned.range::<str, _>(range).map(|(_, revision)| revision);
+        let made = created
+            .objects
+            .range::<str, _>(range)
+            .map(|(_, entry)| &entry.revision);
+        let nearest = [pinned.clone().find(matches), made.clone().find(matches)];
+        match nearest
+            .into_iter()
+            .flatten()
+            .min_by_key(|revision| &revision.object.id)
+        {
+            None => {
+                watcher.end_present();
+                Told::PresentEnd
+            }
+            Some(revision) => {
+                let id = &revision.object.id;
+                watcher.told_present(id);
+                Told::Object {
+                    id: id.clone(),
+                    events: [Event::Present].into(),
+                    revision: Some(revision.clone()),
+                }
+            }
+        }
+    }
+
+    /// Tells watchers of an event of an object's atlas, unless the object was replaced or is gone.
+    pub(crate) fn tell_of_atlas(&self, object: &Arc<StoredObject>, event: Event) {
+        let mut created = self.created();
+        let current = self.revision_in(&created, &object.id);
+        let current = current.filter(|revision| Arc::ptr_eq(&revision.object, object));
+        if let Some(record) = current.map(|revision| Arc::clone(&revision.record)) {
+            let labels = Some(&record.labels);
+            created.tell(&object.id, event, labels, labels);
+        }
+    }
+
+    fn revision_in<'a>(&'a self, created: &'a Created, id: &str) -> Option<&'a Revision> {
+        let made = || created.objects.get(id).map(|Entry { revision, .. }| revision);
+        self.pinned.get(id).or_else(made)
+    }
+}
+
+impl Created {
+    /// Records an event for every watcher of the labels before or after it.
+    pub(super) fn tell(&mut self, id: &str, event: Event, before: Option<&Labels>, after: Option<&Labels>) {
+        self.watchers.retain(|watcher| watcher.strong_count() > 0);
+        for watcher in self.watchers.iter().filter_map(Weak::upgrade) {
+            watcher.record(id, event, before, after);
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The calls of `ObjectService` that stream: uploads, meshes and watches.
+
+use std::sync::Arc;
+
+use grasp_import::MeshLimits;
+use grasp_proto::v1::{self, get_mesh_response::Part};
+use tonic::Streaming;
+
+use super::{
+    object_service::{ObjectHandler, checked_id},
+    streaming::{Messages, endless_messages, messages},
+    upload::blame_parts,
+};
+use crate::{
+    call::{CallContext, UploadPermit},
+    error::ServiceError,
+    executor::run_blocking,
+    objects::{
+        changes::{Event, Told},
+        glb::MeshGlb,
+        hex, name_of,
+    },
+    validate::watch_query,
+};
+
+impl ObjectHandler {
+    /// Receives an object in pieces, and creates it.
+    pub(super) async fn upload(
+        &self,
+        parts: Streaming<v1::UploadObjectRequest>,
+        permit: Option<UploadPermit>,
+        call: &CallContext,
+    ) -> Result<v1::UploadObjectResponse, ServiceError> {
+        let uploads = &self.shared.uploads;
+        let received = uploads
+            .receive(parts, |query| {
+                let request = &query.request;
+                call.log_object(&request.object_id);
+                // A repeated request is recognised by its mesh, too.
+                if request.request_id.is_empty() {
+                    self.shared.objects.repeated(&request.object_id, None)?;
+                }
+                Ok(())
+            })
+            .await?;
+        let limits = MeshLimits {
+            bytes: uploads.maximum_bytes(),
+            ..self.shared.obj_limits
+        };
+        let (handler, call) = (self.clone(), call.clone());
+        let object = run_blocking(move || {
+            let _permit = permit;
+            let (request, _room) = received.into_parts();
+            handler.create_blocking(request, limits, &call)
+        })
+        .await?
+        .map_err(blame_parts)?;
+        Ok(v1::UploadObjectResponse {
+            object: Some(self.message(&object)),
+        })
+    }
+
+    /// Sends an object's mesh as a file.
+    pub(super) async fn mesh(
+        &self,
+        name: &str,
+        call: &CallContext,
+    ) -> Result<Messages<v1::GetMeshResponse>, ServiceError> {
+        let id = checked_id(name)?;
+        call.log_object(&id);
+        let revision = self.shared.objects.get(&id)?;
+        // Holding it keeps the object from being evicted, which would free nothing meanwhile.
+        let object = Arc::clone(&revision.object.object);
+        let hashed = Arc::clone(&object);
+        let mut header = run_blocking({
+            let id = id.clone();
+            move || {
+                let glb = MeshGlb::new(hashed.object(), &id);
+                v1::MeshHeader {
+                    total_bytes: glb.bytes() as u64,
+                    sha256: hex(&glb.sha256()),
+                    object: None,
+                }
+            }
+        })
+        .await?;
+        header.object = Some(self.message(&revision));
+        Ok(messages(|sender| async move {
+            let part = |part| v1::GetMeshResponse { part: Some(part) };
+            sender.send(part(Part::Header(header))).await?;
+            let glb = MeshGlb::new(object.object(), &id);
+            for piece in glb.pieces() {
+                sender.send(part(Part::Piece(piece))).await?;
+            }
+            Ok(())
+        }))
+    }
+
+    /// Tells what happens to objects.
+    pub(super) fn watch(
+        &self,
+        request: &v1::WatchObjectsRequest,
+    ) -> Result<Messages<v1::WatchObjectsResponse>, ServiceError> {
+        let query = watch_query(request)?;
+        let shared = &self.shared;
+        let watcher = shared.objects.watch(query, shared.maximum_watchers)?;
+        let handler = self.clone();
+        Ok(endless_messages(shared.shutdown.clone(), |sender| async move {
+            loop {
+                match handler.shared.objects.next_told(&watcher)? {
+                    Some(told) => sender.send(handler.told(told)).await?,
+                    None => watcher.news().await,
+                }
+            }
+        }))
+    }
+
+    /// The message that tells of an object.
+    fn told(&self, told: Told) -> v1::WatchObjectsResponse {
+        match told {
+            Told::PresentEnd => v1::WatchObjectsResponse {
+                changes: vec![v1::ObjectChange::PresentEnd.into()],
+                object: None,
+            },
+            Told::Object { id, events, revision } => v1::WatchObjectsResponse {
+                changes: events.into_iter().map(|event| change(event).into()).collect(),
+                object: Some(match revision {
+                    Some(revision) => self.message(&revision),
+                    None => v1::Object {
+                        name: name_of(&id),
+                        ..Default::default()
+                    },
+                }),
+            },
+        }
+    }
+}
+
+fn change(event: Event) -> v1::ObjectChange {
+    match event {
+        Event::Present => v1::ObjectChange::Present,
+        Event::Deleted => v1::ObjectChange::Deleted,
+        Event::Evicted => v1::ObjectChange::Evicted,
+        Event::Created => v1::ObjectChange::Created,
+        Event::Updated => v1::ObjectChange::Updated,
+        Event::AtlasUseful => v1::ObjectChange::AtlasUseful,
+        Event::AtlasComplete => v1::ObjectChange::AtlasComplete,
+    }
+}

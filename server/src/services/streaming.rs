@@ -1,0 +1,127 @@
+//! Answers of many messages: a task sends them into a short queue, from which the transport takes them as fast as the client
+//! reads.
+
+use std::{future::Future, time::Duration};
+
+use tokio::sync::mpsc::{self, error::SendTimeoutError};
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
+use tonic::Status;
+
+use crate::error::ServiceError;
+
+/// Messages that wait for the transport. More keep a quick client busier; each takes memory per stream.
+const QUEUED: usize = 2;
+
+/// How long a client may take no message: as long as its connection may stall.
+const LONGEST_STALL: Duration = Duration::from_secs(20);
+
+/// The messages of an answer.
+pub(crate) type Messages<T> = ReceiverStream<Result<T, Status>>;
+
+/// Sends the messages of an answer.
+#[derive(Debug)]
+pub(crate) struct MessageSender<T>(mpsc::Sender<Result<T, Status>>);
+
+impl<T> MessageSender<T> {
+    /// Waits until there is room for a message, and sends it.
+    ///
+    /// # Errors
+    /// [`ServiceError::ReaderStalled`] if there is none for too long, [`ServiceError::Cancelled`] if the client is gone.
+    pub(crate) async fn send(&self, message: T) -> Result<(), ServiceError> {
+        let sent = self.0.send_timeout(Ok(message), LONGEST_STALL).await;
+        sent.map_err(|error| match error {
+            SendTimeoutError::Timeout(_) => ServiceError::ReaderStalled { limit: LONGEST_STALL },
+            SendTimeoutError::Closed(_) => ServiceError::Cancelled,
+        })
+    }
+}
+
+/// Sends what `produce` produces, in a task that ends when the client is gone. An error becomes the status.
+pub(crate) fn messages<T, F>(produce: impl FnOnce(MessageSender<T>) -> F) -> Messages<T>
+where
+    T: Send + 'static,
+    F: Future<Output = Result<(), ServiceError>> + Send + 'static,
+{
+    let (sender, receiver) = mpsc::channel(QUEUED);
+    let producing = produce(MessageSender(sender.clone()));
+    tokio::spawn(async move {
+        let produced = tokio::select! {
+            () = sender.closed() => return,
+            produced = producing => produced,
+        };
+        if let Err(error) = produced {
+            // If the client is gone by now, nobody misses the status.
+            let _ = sender.send(Err(error.into())).await;
+        }
+    });
+    ReceiverStream::new(receiver)
+}
+
+/// Like [`messages`], for a stream without an end of its own: it ends with `UNAVAILABLE` when the server shuts down.
+pub(crate) fn endless_messages<T, F>(
+    shutdown: CancellationToken,
+    produce: impl FnOnce(MessageSender<T>) -> F,
+) -> Messages<T>
+where
+    T: Send + 'static,
+    F: Future<Output = Result<(), ServiceError>> + Send + 'static,
+{
+    messages(|sender| {
+        let producing = produce(sender);
+        async move {
+            tokio::select! {
+                () = shutdown.cancelled_owned() => Err(ServiceError::ShuttingDown),
+                produced = producing => produced,
+            }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio_stream::StreamExt as _;
+    use tonic::Code;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn an_error_ends_the_messages_with_its_status() {
+        let mut sent = messages(|sender| async move {
+            for number in 0..5 {
+                sender.send(number).await?;
+            }
+            Err(ServiceError::Panicked)
+        });
+        for number in 0..5 {
+            assert_eq!(sent.next().await.unwrap().unwrap(), number);
+        }
+        assert_eq!(sent.next().await.unwrap().unwrap_err().code(), Code::Internal);
+        assert!(sent.next().await.is_none());
+    }
+
+    #[tokio::test]
+    async fn the_producer_stops_when_the_client_is_gone() {
+        let (dropped, is_dropped) = tokio::sync::oneshot::channel::<()>();
+        let sent = messages::<u8, _>(|_| async move {
+            let _dropped = dropped;
+            std::future::pending().await
+        });
+        drop(sent);
+        // Fails because its other end was dropped.
+        is_dropped.await.unwrap_err();
+    }
+
+    #[tokio::test]
+    async fn shutdown_ends_endless_messages() {
+        let shutdown = CancellationToken::new();
+        let mut sent = endless_messages(shutdown.clone(), |sender| async move {
+            sender.send(7).await?;
+            std::future::pending().await
+        });
+        assert_eq!(sent.next().await.unwrap().unwrap(), 7);
+        shutdown.cancel();
+        assert_eq!(sent.next().await.unwrap().unwrap_err().code(), Code::Unavailable);
+        assert!(sent.next().await.is_none());
+    }
+}

@@ -1,0 +1,222 @@
+//! Receives the mesh of an object in pieces.
+
+use std::{sync::Arc, time::Duration};
+
+use grasp_proto::v1::{self, upload_object_request::Part};
+use sha2::{Digest as _, Sha256};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio_stream::{Stream, StreamExt as _};
+use tonic::Status;
+
+use crate::{
+    error::{Limit, ServiceError, Violation},
+    limits::LARGEST_PIECE,
+    objects::hex,
+    validate::{UploadQuery, quoted, upload_query},
+};
+
+/// Bytes per permit of the pool that uploads share.
+const BYTES_PER_PERMIT: usize = 1 << 10;
+
+/// Longest time of an upload: 256 MiB at half a megabyte per second.
+const LONGEST_UPLOAD: Duration = Duration::from_mins(10);
+
+/// When to retry if others upload as much as the server takes at a time.
+const RETRY_AFTER: Duration = Duration::from_secs(2);
+
+/// Bounds uploads in pieces.
+#[derive(Clone, Debug)]
+pub(crate) struct Uploads {
+    /// Permits for the bytes of all uploads together.
+    pool: Arc<Semaphore>,
+    /// Largest number of bytes of all uploads together, and thus of one.
+    maximum_bytes: usize,
+    /// Longest wait for the next message.
+    idle: Duration,
+}
+
+/// A request with its mesh, which takes its part of the pool until it is dropped.
+#[derive(Debug)]
+pub(super) struct Received {
+    request: v1::CreateObjectRequest,
+    room: OwnedSemaphorePermit,
+}
+
+impl Received {
+    /// The request, and the part of the pool to hold as long as its mesh is needed.
+    pub(super) fn into_parts(self) -> (v1::CreateObjectRequest, OwnedSemaphorePermit) {
+        (self.request, self.room)
+    }
+}
+
+impl Uploads {
+    /// No uploads yet.
+    pub(crate) fn new(maximum_bytes: usize, idle: Duration) -> Self {
+        Self {
+            pool: Arc::new(Semaphore::new(maximum_bytes.div_ceil(BYTES_PER_PERMIT))),
+            maximum_bytes,
+            idle,
+        }
+    }
+
+    /// Largest number of bytes of a mesh.
+    pub(super) fn maximum_bytes(&self) -> usize {
+        self.maximum_bytes
+    }
+
+    /// Receives a mesh. `admit` checks whether the object may be created, once its header is there.
+    ///
+    /// # Errors
+    /// - [`ServiceError::Invalid`] if the parts, their order, size or hash are wrong.
+    /// - [`ServiceError::Overloaded`] if the other uploads leave too little room.
+    /// - [`ServiceError::UploadStalled`] and [`ServiceError::TookTooLong`] if the client is too slow.
+    pub(super) async fn receive(
+        &self,
+        parts: impl Stream<Item = Result<v1::UploadObjectRequest, Status>>,
+        admit: impl FnOnce(&UploadQuery) -> Result<(), ServiceError>,
+    ) -> Result<Received, ServiceError> {
+        let mut parts = Parts {
+            stream: std::pin::pin!(parts),
+            idle: self.idle,
+        };
+        let receiving = async {
+            let Some(Part::Header(header)) = parts.next().await? else {
+                return Err(ServiceError::invalid(
+                    "header",
+                    "is missing; it must be the first part",
+                ));
+            };
+            let query = upload_query(header, self.maximum_bytes)?;
+            admit(&query)?;
+            let room = self.room(query.bytes)?;
+            let mut request = query.request;
+            request.mesh = received_mesh(&mut parts, query.bytes).await?;
+            Ok(Received { request, room })
+        };
+        tokio::time::timeout(LONGEST_UPLOAD, receiving)
+            .await
+            .unwrap_or(Err(ServiceError::TookTooLong {
+                limit: LONGEST_UPLOAD,
+            }))
+    }
+
+    /// Room for so many bytes.
+    fn room(&self, bytes: usize) -> Result<OwnedSemaphorePermit, ServiceError> {
+        let permits = u32::try_from(bytes.div_ceil(BYTES_PER_PERMIT)).unwrap_or(u32::MAX);
+        let room = Arc::clone(&self.pool).try_acquire_many_owned(permits);
+        room.map_err(|_| ServiceError::Overloaded {
+            limit: Limit::UploadBytes,
+            maximum: self.maximum_bytes,
+            retry_after: RETRY_AFTER,
+        })
+    }
+}
+
+/// The parts of an upload.
+struct Parts<'a, S> {
+    stream: std::pin::Pin<&'a mut S>,
+    idle: Duration,
+}
+
+impl<S: Stream<Item = Result<v1::UploadObjectRequest, Status>>> Parts<'_, S> {
+    /// The next part; none at the end.
+    async fn next(&mut self) -> Result<Option<Part>, ServiceError> {
+        match tokio::time::timeout(self.idle, self.stream.next()).await {
+            Err(_) => Err(ServiceError::UploadStalled { limit: self.idle }),
+            Ok(None) => Ok(None),
+            // What is no message of the contract, or too long for one.
+            Ok(Some(Err(status))) => Err(ServiceError::Malformed(status.message().to_owned())),
+            Ok(Some(Ok(request))) => match request.part {
+                Some(part) => Ok(Some(part)),
+                None => Err(ServiceError::invalid(
+                    "part",
+                    "is missing; it must be a piece or sha256",
+                )),
+            },
+        }
+    }
+}
+
+/// The pieces of a mesh of so many bytes, checked against the hash that follows them.
+async fn received_mesh<S>(parts: &mut Parts<'_, S>, bytes: usize) -> Result<Vec<u8>, ServiceError>
+where
+    S: Stream<Item = Result<v1::UploadObjectRequest, Status>>,
+{
+    let mut mesh: Vec<u8> = Vec::new();
+    // Untouched memory costs nothing; growing in steps would copy, and take up to twice as much.
+    if mesh.try_reserve_exact(bytes).is_err() {
+        return Err(ServiceError::Overloaded {
+            limit: Limit::UploadBytes,
+            maximum: bytes,
+            retry_after: RETRY_AFTER,
+        });
+    }
+    let mut hash = Sha256::new();
+    let expected = loop {
+        let received = mesh.len();
+        match parts.next().await? {
+            None => {
+                return Err(ServiceError::invalid(
+                    "sha256",
+                    format!("is missing; the stream ended after {received} of {bytes} bytes"),
+                ));
+            }
+            Some(Part::Header(_)) => {
+                return Err(ServiceError::invalid(
+                    "header",
+                    "comes again; it must be the first part only",
+                ));
+            }
+            Some(Part::Piece(piece)) => {
+                let length = piece.len();
+                if !(1..=LARGEST_PIECE).contains(&length) {
+                    return Err(ServiceError::invalid(
+                        "piece",
+                        format!("has {length} bytes; it must have 1 to {LARGEST_PIECE}"),
+                    ));
+                }
+                if length > bytes - received {
+                    return Err(ServiceError::invalid(
+                        "piece",
+                        format!("makes {} bytes; header.total_bytes is {bytes}", received + length),
+                    ));
+                }
+                hash.update(&piece);
+                mesh.extend_from_slice(&piece);
+            }
+            Some(Part::Sha256(_)) if received < bytes => {
+                return Err(ServiceError::invalid(
+                    "sha256",
+                    format!("comes after {received} bytes; header.total_bytes is {bytes}"),
+                ));
+            }
+            Some(Part::Sha256(expected)) => break expected,
+        }
+    };
+    let found = hex(&hash.finalize());
+    if expected.eq_ignore_ascii_case(&found) {
+        Ok(mesh)
+    } else {
+        let expected = quoted(&expected);
+        Err(ServiceError::invalid(
+            "sha256",
+            format!("is {expected}; the received bytes have {found}"),
+        ))
+    }
+}
+
+/// The errors of an object's fields as those of the parts that have them.
+pub(super) fn blame_parts(error: ServiceError) -> ServiceError {
+    let ServiceError::Invalid(violations) = error else {
+        return error;
+    };
+    let of_parts = violations.into_iter().map(|violation| Violation {
+        field: match violation.field.as_str() {
+            "mesh" => "piece".to_owned(),
+            "" => String::new(),
+            field => format!("header.object.{field}"),
+        },
+        ..violation
+    });
+    ServiceError::Invalid(of_parts.collect())
+}

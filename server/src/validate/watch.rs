@@ -1,0 +1,31 @@
+//! Checks requests to watch objects.
+
+use grasp_proto::v1;
+
+use super::{
+    Field, Violations,
+    labels::{LabelFilter, label_filter},
+};
+use crate::error::ServiceError;
+
+/// A checked request to watch objects.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct WatchQuery {
+    /// Which objects.
+    pub filter: LabelFilter,
+    /// True to be told of the present ones first.
+    pub wants_present: bool,
+}
+
+/// Checks a request to watch objects.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] if the filter is wrong.
+pub(crate) fn watch_query(request: &v1::WatchObjectsRequest) -> Result<WatchQuery, ServiceError> {
+    let mut violations = Violations::default();
+    let filter = label_filter(Field::root("filter"), &request.filter, &mut violations);
+    violations.finish(WatchQuery {
+        filter,
+        wants_present: request.include_present,
+    })
+}

@@ -1,0 +1,288 @@
+//! Objects that are uploaded in pieces.
+
+use std::{fmt::Write as _, time::Duration};
+
+use grasp_proto::v1::{self, upload_object_request::Part};
+use grasp_tests::TestServer;
+use sha2::{Digest as _, Sha256};
+use tokio_stream::{StreamExt as _, wrappers::ReceiverStream};
+use tonic::{Code, Status};
+
+use crate::fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, reason, until};
+
+fn part(part: Part) -> v1::UploadObjectRequest {
+    v1::UploadObjectRequest { part: Some(part) }
+}
+
+fn header(object: v1::CreateObjectRequest, bytes: usize) -> v1::UploadObjectRequest {
+    part(Part::Header(v1::UploadHeader {
+        object: Some(v1::CreateObjectRequest {
+            mesh: Vec::new(),
+            ..object
+        }),
+        total_bytes: bytes as u64,
+    }))
+}
+
+fn piece(bytes: &[u8]) -> v1::UploadObjectRequest {
+    part(Part::Piece(bytes.to_vec()))
+}
+
+fn hash(mesh: &[u8]) -> v1::UploadObjectRequest {
+    let digest = Sha256::digest(mesh);
+    part(Part::Sha256(
+        digest.iter().map(|byte| format!("{byte:02x}")).collect(),
+    ))
+}
+
+/// The parts of a right upload in pieces of this size.
+fn parts(id: &str, mesh: &[u8], size: usize) -> Vec<v1::UploadObjectRequest> {
+    let mut parts = vec![header(box_request(id), mesh.len())];
+    parts.extend(mesh.chunks(size).map(piece));
+    parts.push(hash(mesh));
+    parts
+}
+
+async fn upload(server: &TestServer, parts: Vec<v1::UploadObjectRequest>) -> Result<v1::Object, Status> {
+    let answer = server
+        .objects()
+        .await
+        .upload_object(tokio_stream::iter(parts))
+        .await?;
+    Ok(answer.into_inner().object.expect("an answer has the object"))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_uploaded_object_is_the_created_one() {
+    let server = TestServer::start().await;
+    let created = server.objects().await.create_object(box_request("created")).await;
+    let created = created.unwrap().into_inner().object.unwrap();
+    for (id, size) in [("bytes", 1), ("pieces", 50), ("whole", 1 << 20)] {
+        let uploaded = upload(&server, parts(id, BOX_OBJ.as_bytes(), size))
+            .await
+            .unwrap();
+        let expected = v1::Object {
+            name: format!("objects/{id}"),
+            etag: uploaded.etag.clone(),
+            create_time: uploaded.create_time,
+            update_time: uploaded.update_time,
+            ..created.clone()
+        };
+        assert_eq!(uploaded, expected);
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_mesh_larger_than_a_message_is_uploaded() {
+    let server = TestServer::start_with(|config| {
+        config.maximum_object_bytes = 4096.try_into().unwrap();
+    })
+    .await;
+    let mut mesh = BOX_OBJ.to_owned();
+    while mesh.len() < 12 << 20 {
+        let _ = writeln!(
+            mesh,
+            "# a comment as long as those of some exporters {}",
+            mesh.len()
+        );
+    }
+    let object = upload(&server, parts("large", mesh.as_bytes(), 1 << 20))
+        .await
+        .unwrap();
+    assert_eq!((object.triangle_count, object.vertex_count), (12, 8));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn wrong_uploads_are_refused_and_leave_nothing() {
+    let server = TestServer::start_with(|config| {
+        config.streams.upload_bytes = (1 << 20).try_into().unwrap();
+        config.maximum_object_triangles = 20.try_into().unwrap();
+    })
+    .await;
+    let mesh = BOX_OBJ.as_bytes();
+    let right = || parts("crate", mesh, 100);
+    let without = |place: usize| {
+        let mut parts = right();
+        parts.remove(place);
+        parts
+    };
+    let with = |place: usize, part: v1::UploadObjectRequest| {
+        let mut parts = right();
+        parts[place] = part;
+        parts
+    };
+    let last = right().len() - 1;
+    let heavy = v1::CreateObjectRequest {
+        mass_kg: -1.0,
+        mesh: Vec::new(),
+        ..box_request("Crate")
+    };
+    let many = {
+        let mut obj = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n");
+        for _ in 0..30 {
+            obj.push_str("f 1 2 3\n");
+        }
+        obj
+    };
+    for (name, parts, fields) in [
+        ("no parts", Vec::new(), &["header"][..]),
+        ("no header", without(0), &["header"]),
+        ("a second header", with(2, right().swap_remove(0)), &["header"]),
+        ("no hash", without(last), &["sha256"]),
+        ("a piece too few", without(2), &["sha256"]),
+        ("a wrong hash", with(last, hash(b"other")), &["sha256"]),
+        ("an empty piece", with(1, piece(b"")), &["piece"]),
+        ("a piece too many", with(last, piece(mesh)), &["piece"]),
+        (
+            "no part",
+            with(1, v1::UploadObjectRequest { part: None }),
+            &["part"],
+        ),
+        (
+            "a size too large",
+            with(0, header(box_request("crate"), 2 << 20)),
+            &["header.total_bytes"],
+        ),
+        (
+            "no size",
+            with(0, header(box_request("crate"), 0)),
+            &["header.total_bytes"],
+        ),
+        (
+            "wrong fields",
+            with(0, header(heavy, 10)),
+            &["header.object.object_id", "header.object.mass_kg"],
+        ),
+        (
+            "too many triangles",
+            self::parts("crate", many.as_bytes(), 100),
+            &["piece"],
+        ),
+        (
+            "no mesh",
+            self::parts("crate", b"once upon a time", 100),
+            &["piece"],
+        ),
+    ] {
+        let status = bounded(name, upload(&server, parts)).await.expect_err(name);
+        assert_eq!(status.code(), Code::InvalidArgument, "{name}: {status}");
+        assert_eq!(blamed_fields(&status), fields, "{name}: {status}");
+    }
+    upload(&server, right())
+        .await
+        .expect("nothing is left of the others");
+    let status = upload(&server, right()).await.unwrap_err();
+    assert_eq!(status.code(), Code::AlreadyExists);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_repeated_upload_answers_the_object_it_created() {
+    let server = TestServer::start().await;
+    let object = v1::CreateObjectRequest {
+        request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".to_owned(),
+        ..box_request("crate")
+    };
+    let mesh = BOX_OBJ.as_bytes();
+    let parts = || vec![header(object.clone(), mesh.len()), piece(mesh), hash(mesh)];
+    let first = upload(&server, parts()).await.unwrap();
+    assert_eq!(upload(&server, parts()).await.unwrap(), first);
+    // It does not matter which way the mesh came.
+    let unary = server.objects().await.create_object(object).await.unwrap();
+    assert_eq!(unary.into_inner().object.unwrap(), first);
+    server.stop().await;
+}
+
+/// An upload that has sent its header and some bytes, and sends no more until the sender is used or dropped.
+async fn unfinished(
+    server: &TestServer,
+    id: &str,
+    bytes: usize,
+) -> (
+    tokio::sync::mpsc::Sender<v1::UploadObjectRequest>,
+    tokio::task::JoinHandle<Result<v1::Object, Status>>,
+) {
+    let (sender, receiver) = tokio::sync::mpsc::channel(4);
+    sender.send(header(box_request(id), bytes)).await.unwrap();
+    sender.send(piece(b"v 0 0 0\n")).await.unwrap();
+    let mut client = server.objects().await;
+    let call = tokio::spawn(async move {
+        let answer = client.upload_object(ReceiverStream::new(receiver)).await?;
+        Ok(answer.into_inner().object.expect("an answer has the object"))
+    });
+    (sender, call)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stalled_upload_ends() {
+    let server =
+        TestServer::start_with(|config| config.streams.upload_idle = Duration::from_millis(200)).await;
+    let (_sender, call) = unfinished(&server, "slow", 1000).await;
+    let status = bounded("the end", call).await.unwrap().unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::DeadlineExceeded, "UPLOAD_STALLED".to_owned())
+    );
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn uploads_share_permits_and_bytes_until_they_end() {
+    let server = TestServer::start_with(|config| {
+        config.maximum_uploads = 2.try_into().unwrap();
+        config.streams.upload_bytes = (1 << 20).try_into().unwrap();
+    })
+    .await;
+    let (sender, call) = unfinished(&server, "first", 700 << 10).await;
+    until("the upload", || server.gauges().calls() == 1).await;
+    // Its header may not have arrived yet.
+    let status = bounded("a refusal", async {
+        loop {
+            match upload(&server, vec![header(box_request("other"), 700 << 10)]).await {
+                Err(status) if status.code() == Code::InvalidArgument => {}
+                result => return result.unwrap_err(),
+            }
+        }
+    })
+    .await;
+    assert_eq!(reason(&status), "TOO_MANY_UPLOAD_BYTES");
+    assert_eq!(status.code(), Code::ResourceExhausted);
+    let (_second, _second_call) = unfinished(&server, "second", 100 << 10).await;
+    until("both uploads", || server.gauges().calls() == 2).await;
+    let status = upload(&server, parts("third", b"v", 1)).await.unwrap_err();
+    assert_eq!(reason(&status), "TOO_MANY_UPLOADS");
+    // A client that goes away leaves its place and its bytes.
+    call.abort();
+    drop(sender);
+    until("the end", || server.gauges().calls() == 1).await;
+    let mesh = format!("{BOX_OBJ}{}", "#\n".repeat(350 << 10));
+    bounded("a place", async {
+        while upload(&server, parts("third", mesh.as_bytes(), 1 << 20))
+            .await
+            .is_err()
+        {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    })
+    .await;
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_refused_upload_is_answered_before_it_is_sent() {
+    let server = TestServer::start().await;
+    let (sender, receiver) = tokio::sync::mpsc::channel(1);
+    sender
+        .send(header(box_request("remote"), 200 << 20))
+        .await
+        .unwrap();
+    // The sender stays: the request never ends.
+    let parts = ReceiverStream::new(receiver).chain(tokio_stream::pending());
+    let status = bounded("the answer", server.objects().await.upload_object(parts))
+        .await
+        .unwrap_err();
+    assert_eq!(status.code(), Code::AlreadyExists);
+    server.stop().await;
+}
