@@ -1,6 +1,7 @@
 //! Fixtures: requests, and ways to wait for and check answers.
 
 use std::{
+    fmt::Write as _,
     fs,
     future::Future,
     path::{Path, PathBuf},
@@ -11,6 +12,7 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{TestServer, wire_pose};
+use sha2::{Digest as _, Sha256};
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
 
@@ -160,6 +162,16 @@ pub(crate) async fn assert_blamed(server: &TestServer, request: v1::FindGraspReq
             violation.description
         );
     }
+}
+
+/// SHA-256 in hexadecimal.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes)
+        .iter()
+        .fold(String::new(), |mut text, byte| {
+            let _ = write!(text, "{byte:02x}");
+            text
+        })
 }
 
 /// The reason in a status' `ErrorInfo`.

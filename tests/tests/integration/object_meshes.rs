@@ -4,10 +4,9 @@ use grasp_client::code_name;
 use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_proto::v1::{self, get_mesh_response::Part};
 use grasp_tests::TestServer;
-use sha2::{Digest as _, Sha256};
 use tonic::{Code, Status};
 
-use crate::fixtures::{blamed_fields, box_request};
+use crate::fixtures::{blamed_fields, box_request, sha256};
 
 /// The header and the file of an object's mesh.
 async fn mesh(server: &TestServer, name: &str) -> Result<(v1::MeshHeader, Vec<u8>), Status> {
@@ -29,16 +28,12 @@ async fn mesh(server: &TestServer, name: &str) -> Result<(v1::MeshHeader, Vec<u8
     Ok((header, file))
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_mesh_arrives_whole_and_can_be_created_again() {
     let server = TestServer::start().await;
     let (header, file) = mesh(&server, "objects/remote").await.unwrap();
     assert_eq!(header.total_bytes, file.len() as u64);
-    assert_eq!(header.sha256, hex(&Sha256::digest(&file)));
+    assert_eq!(header.sha256, sha256(&file));
     let original = header.object.unwrap();
     // Read by the server itself, the file is the same shape again.
     let copy = v1::CreateObjectRequest {

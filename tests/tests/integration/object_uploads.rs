@@ -4,11 +4,10 @@ use std::{fmt::Write as _, time::Duration};
 
 use grasp_proto::v1::{self, upload_object_request::Part};
 use grasp_tests::TestServer;
-use sha2::{Digest as _, Sha256};
 use tokio_stream::{StreamExt as _, wrappers::ReceiverStream};
 use tonic::{Code, Status};
 
-use crate::fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, reason, until};
+use crate::fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, reason, sha256, until};
 
 fn part(part: Part) -> v1::UploadObjectRequest {
     v1::UploadObjectRequest { part: Some(part) }
@@ -29,10 +28,7 @@ fn piece(bytes: &[u8]) -> v1::UploadObjectRequest {
 }
 
 fn hash(mesh: &[u8]) -> v1::UploadObjectRequest {
-    let digest = Sha256::digest(mesh);
-    part(Part::Sha256(
-        digest.iter().map(|byte| format!("{byte:02x}")).collect(),
-    ))
+    part(Part::Sha256(sha256(mesh)))
 }
 
 /// The parts of a right upload in pieces of this size.

@@ -2,6 +2,7 @@
 
 mod commands;
 mod experiments;
+mod objects;
 mod real_server;
 mod receiver_options;
 #[path = "../../../tests/client/scripted.rs"]

@@ -53,6 +53,7 @@ async fn rejects_uploads_beyond_the_maximum_before_they_are_received() {
     let first = service.call(request(UPLOAD_METHODS[0]));
     let second = service.call(request(UPLOAD_METHODS[1])).await.unwrap();
     assert_eq!(code_in(second.headers()), Some(Code::ResourceExhausted));
+    drop(second);
     // Other methods need no permit.
     let other = service.call(request("/grasp.v1.GraspService/FindGrasp"));
     assert_eq!(layer.in_flight.count(), 2);
