@@ -32,7 +32,19 @@ pub(crate) struct Revision {
     pub record: Arc<Record>,
 }
 
+/// Bytes that a label takes beside its characters.
+const LABEL_OVERHEAD: usize = 2 * size_of::<String>();
+
 impl Revision {
+    /// Its estimated size in bytes, without atlases.
+    pub(super) fn bytes(&self) -> usize {
+        let labels = self.record.labels.iter();
+        let of_labels: usize = labels
+            .map(|(key, value)| key.len() + value.len() + LABEL_OVERHEAD)
+            .sum();
+        self.object.bytes() + of_labels
+    }
+
     /// Where the object is in lists.
     pub(crate) fn place(&self) -> Place {
         Place {

@@ -203,12 +203,13 @@ impl ObjectStore {
         if let Some(revision) = self.repeated_in(&created, &object.id, origin.request.as_ref())? {
             return Ok(revision);
         }
-        self.make_room(&mut created, None, object.bytes())?;
         let etag = created.etags.next();
         let revision = new_revision(object, origin.labels, etag, SystemTime::now());
+        let bytes = revision.bytes();
+        self.make_room(&mut created, None, bytes)?;
         let id = revision.object.id.clone();
         created.uses += 1;
-        created.bytes += revision.object.bytes();
+        created.bytes += bytes;
         created.evicted.retain(|evicted| *evicted != id);
         if let Some(request) = &origin.request {
             created.requests.insert(request.id, id.clone());
@@ -251,17 +252,8 @@ impl ObjectStore {
         let id = &base.object.id;
         let mut created = self.created();
         let record = Arc::clone(&created.entry_with(id, Some(&base.record.etag))?.revision.record);
-        let old_bytes = base.object.bytes();
-        let object = match object {
-            None => Arc::clone(&base.object),
-            Some(object) => {
-                self.make_room(&mut created, Some(id), object.bytes().saturating_sub(old_bytes))?;
-                Arc::new(object)
-            }
-        };
-        created.bytes = created.bytes - old_bytes + object.bytes();
         let revision = Revision {
-            object,
+            object: object.map_or_else(|| Arc::clone(&base.object), Arc::new),
             record: Arc::new(Record {
                 labels,
                 etag: created.etags.next(),
@@ -270,6 +262,9 @@ impl ObjectStore {
                 updated: SystemTime::now().max(record.updated),
             }),
         };
+        let (old_bytes, bytes) = (base.bytes(), revision.bytes());
+        self.make_room(&mut created, Some(id), bytes.saturating_sub(old_bytes))?;
+        created.bytes = created.bytes - old_bytes + bytes;
         created.entry(id)?.revision = revision.clone();
         let (before, after) = (&record.labels, &revision.record.labels);
         created.tell(id, Event::Updated, Some(before), Some(after));
@@ -330,7 +325,7 @@ impl ObjectStore {
         bytes: usize,
     ) -> Result<(), ServiceError> {
         let kept = grows.and_then(|id| created.objects.get(id));
-        let whole = bytes + kept.map_or(0, |entry| entry.revision.object.bytes());
+        let whole = bytes + kept.map_or(0, |entry| entry.revision.bytes());
         if whole > self.limits.bytes {
             return Err(ServiceError::invalid(
                 if grows.is_some() { "forbidden" } else { "mesh" },
@@ -401,7 +396,7 @@ impl Created {
     fn take(&mut self, id: &str, event: Event) {
         if let Some(entry) = self.objects.remove(id) {
             self.tell(id, event, Some(&entry.revision.record.labels), None);
-            self.bytes -= entry.revision.object.bytes();
+            self.bytes -= entry.revision.bytes();
             if let Some(request) = entry.request {
                 self.requests.remove(&request.id);
             }

@@ -261,7 +261,7 @@ fn a_larger_state_evicts_others_but_not_its_own_object() {
         .created()
         .objects
         .values()
-        .map(|entry| entry.revision.object.bytes())
+        .map(|entry| entry.revision.bytes())
         .sum();
     assert_eq!(store.created().bytes, sum);
 }
@@ -389,7 +389,7 @@ proptest! {
                 }
             }
         }
-        let sum: usize = store.created().objects.values().map(|entry| entry.revision.object.bytes()).sum();
+        let sum: usize = store.created().objects.values().map(|entry| entry.revision.bytes()).sum();
         prop_assert_eq!(store.created().bytes, sum);
     }
 }
