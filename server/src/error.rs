@@ -97,6 +97,12 @@ pub enum ServiceError {
         /// When to retry.
         retry_after: Duration,
     },
+    /// A message is larger than its method takes.
+    #[error("the message has more than {limit} bytes, the limit of this method")]
+    MessageTooLarge {
+        /// The limit.
+        limit: usize,
+    },
     /// A client took none of the messages that wait for it.
     #[error("the client took no message for {} s", limit.as_secs())]
     ReaderStalled {
@@ -205,6 +211,10 @@ impl From<ServiceError> for Status {
                 status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
                 status
             }
+            // As the transport answers to messages beyond its own limit.
+            ServiceError::MessageTooLarge { .. } => {
+                Status::with_error_details(Code::OutOfRange, message, info("MESSAGE_TOO_LARGE", []))
+            }
             ServiceError::ReaderStalled { .. } => {
                 Status::with_error_details(Code::DeadlineExceeded, message, info("READER_STALLED", []))
             }
@@ -295,8 +305,13 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
 
     /// Errors of calls that stream, with their code and reason.
-    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 5] {
+    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 6] {
         [
+            (
+                ServiceError::MessageTooLarge { limit: 9 },
+                Code::OutOfRange,
+                "MESSAGE_TOO_LARGE",
+            ),
             (
                 ServiceError::ReaderStalled { limit: SECOND },
                 Code::DeadlineExceeded,

@@ -25,7 +25,7 @@ pub struct StreamLimits {
 /// Largest size in bytes of everything but the mesh in a `CreateObject` request, and of a manifest on disk.
 pub(crate) const BYTES_BESIDES_MESH: usize = 1 << 20;
 
-/// Largest request to `GraspService`, in bytes. A hand of 26 joints takes about 2 kB.
+/// Largest request to `GraspService`, and to methods of `ObjectService` that build no object, in bytes. A hand of 26 joints takes about 2 kB.
 pub(crate) const LARGEST_FIND_REQUEST: usize = 64 << 10;
 
 /// Largest response of either service, in bytes. A full page of objects takes less than 1 MiB.

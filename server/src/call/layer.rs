@@ -17,10 +17,12 @@ use super::{
     body::{AnswerBody, code_in},
     in_flight::CallsInFlight,
     log_line::LogLine,
+    request_body::RequestBody,
 };
 use crate::{
     budget::parse_grpc_timeout,
     error::{Limit, ServiceError, blame_malformed_messages},
+    limits::LARGEST_FIND_REQUEST,
     reserve::DeadlineReserve,
 };
 
@@ -33,6 +35,9 @@ const UPLOAD_METHODS: [&str; 3] = [
 
 /// Path of the method whose request may take long to arrive. It limits its time itself.
 const STREAMED_UPLOAD: &str = "/grasp.v1.ObjectService/UploadObject";
+
+/// Package and name of the service that takes large messages, by the methods above only.
+const OBJECT_SERVICE: &str = "/grasp.v1.ObjectService/";
 
 /// When a client whose upload was rejected should retry: after about the time of an upload.
 const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
@@ -72,7 +77,7 @@ pub(crate) struct CallService<S> {
 
 impl<S, B, R> Service<Request<B>> for CallService<S>
 where
-    S: Service<Request<B>, Response = Response<R>>,
+    S: Service<Request<RequestBody<B>>, Response = Response<R>>,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
     R: Default + Send + 'static,
@@ -98,6 +103,11 @@ where
             search_end: Arc::clone(&context.search_end),
             reserve: Arc::clone(&self.layer.reserve),
         };
+        let largest = if path.starts_with(OBJECT_SERVICE) && !UPLOAD_METHODS.contains(&path) {
+            LARGEST_FIND_REQUEST
+        } else {
+            usize::MAX
+        };
         let longest = (path != STREAMED_UPLOAD).then_some(self.layer.longest_call);
         let upload = if UPLOAD_METHODS.contains(&path) {
             let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
@@ -119,7 +129,9 @@ where
                 _permit: Arc::new(permit),
             });
         }
-        let answer = self.inner.call(request);
+        let answer = self
+            .inner
+            .call(request.map(|body| RequestBody::new(body, largest)));
         Box::pin(async move {
             let answer = match longest {
                 None => answer.await,

@@ -5,7 +5,7 @@ use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{blamed_fields, box_request};
+use crate::fixtures::{blamed_fields, box_request, reason};
 
 /// A box with labels.
 fn labelled(id: &str, labels: &[(&str, &str)]) -> v1::CreateObjectRequest {
@@ -127,5 +127,25 @@ async fn the_client_lists_with_a_query() {
     assert_eq!(objects.len(), 1);
     assert_eq!(objects[0].labels["level"], "kitchen");
     assert_eq!(objects[0].create_time, objects[0].update_time);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn only_methods_that_build_objects_take_large_messages() {
+    let server = TestServer::start().await;
+    let mut client = server.objects().await;
+    let large = "n".repeat(1 << 20);
+    let get = v1::GetObjectRequest { name: large.clone() };
+    let status = client.get_object(get).await.unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::OutOfRange, "MESSAGE_TOO_LARGE".to_owned())
+    );
+    let list = v1::ListObjectsRequest {
+        filter: large,
+        ..Default::default()
+    };
+    let status = client.list_objects(list).await.unwrap_err();
+    assert_eq!(status.code(), Code::OutOfRange);
     server.stop().await;
 }

@@ -9,9 +9,9 @@ use super::*;
 
 /// A service that keeps every request and never answers.
 #[derive(Clone, Default)]
-struct Keeper(Arc<Mutex<Vec<Request<()>>>>);
+struct Keeper(Arc<Mutex<Vec<Request<RequestBody<()>>>>>);
 
-impl Service<Request<()>> for Keeper {
+impl Service<Request<RequestBody<()>>> for Keeper {
     type Response = Response<()>;
     type Error = Infallible;
     type Future = std::future::Pending<Result<Response<()>, Infallible>>;
@@ -20,7 +20,7 @@ impl Service<Request<()>> for Keeper {
         Poll::Ready(Ok(()))
     }
 
-    fn call(&mut self, request: Request<()>) -> Self::Future {
+    fn call(&mut self, request: Request<RequestBody<()>>) -> Self::Future {
         self.0.lock().unwrap().push(request);
         std::future::pending()
     }
@@ -134,7 +134,7 @@ impl Body for Streamed {
 #[tokio::test]
 async fn a_call_lasts_until_its_body_ends() {
     let layer = layer();
-    let mut service = layer.layer(tower::service_fn(|_: Request<()>| async {
+    let mut service = layer.layer(tower::service_fn(|_: Request<RequestBody<()>>| async {
         let mut trailers = HeaderMap::new();
         trailers.insert("grpc-status", "14".parse().unwrap());
         let frames = vec![Frame::trailers(trailers), Frame::data(&b"message"[..])];
