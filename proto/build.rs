@@ -14,6 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "grasp/v1/object_service.proto",
         "grasp/v1/grasp_type.proto",
         "grasp/v1/grasp_service.proto",
+        "grasp/v1/hand_rig_service.proto",
     ];
     for file in files {
         println!("cargo::rerun-if-changed={file}");

@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use glam::Vec3;
+use grasp_import::Binding;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::{pose::Pose, rejection::Rejection, stopwatch::StepTimes},
@@ -13,6 +14,7 @@ use grasp_synthesis::{
         hand::{
             Digit, HandPose, Handedness, Phalanx,
             joints::{HandJoints, JOINT_COUNT, openxr_from_thesis_frame},
+            kinematics::{HandFrames, hand_frames},
             rig::Rig,
         },
         receiver::ArmPose,
@@ -26,7 +28,7 @@ use grasp_synthesis::{
     },
 };
 
-use crate::{convention::Convention, error::ServiceError};
+use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
 
 /// The frame and convention in which a client gets its answer.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +58,7 @@ pub(crate) struct Circumstances<'a> {
 /// [`ServiceError::Cancelled`] if the search was stopped.
 pub(crate) fn find_response(
     outcome: &SearchOutcome,
-    rig: &Rig,
+    (hand, other_hand): (&RigHand, Option<&RigHand>),
     frame: ClientFrame,
     settings: &SearchSettings,
     circumstances: Circumstances<'_>,
@@ -68,13 +70,18 @@ pub(crate) fn find_response(
     };
     let other_grasp = || {
         let grasp = outcome.grasp.as_ref()?.other_hand.as_ref()?;
-        let rig = settings.query.other_hand.as_ref()?;
-        Some(wire_grasp(grasp, rig, frame))
+        Some(wire_grasp(grasp, other_hand?, frame))
     };
     Ok(v1::FindGraspResponse {
         outcome: wire_outcome.into(),
-        grasp: outcome.grasp.as_ref().map(|grasp| wire_grasp(grasp, rig, frame)),
-        report: Some(report(&outcome.report, rig, frame, settings, circumstances)),
+        grasp: outcome.grasp.as_ref().map(|grasp| wire_grasp(grasp, hand, frame)),
+        report: Some(report(
+            &outcome.report,
+            &hand.hand.rig,
+            frame,
+            settings,
+            circumstances,
+        )),
         other_grasp: other_grasp(),
     })
 }
@@ -111,10 +118,12 @@ struct WireHand {
     client_from_wrist: v1::Pose,
     digits: Vec<v1::DigitAngles>,
     joints: Vec<v1::JointPose>,
+    model: Option<v1::PosedModel>,
 }
 
 impl WireHand {
-    fn new(pose: &HandPose, rig: &Rig, frame: ClientFrame) -> Self {
+    fn new(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> Self {
+        let rig: &Rig = &hand.hand.rig;
         let ClientFrame {
             convention,
             client_from_object,
@@ -142,12 +151,35 @@ impl WireHand {
                     }
                 })
                 .collect(),
+            model: hand
+                .binding
+                .as_deref()
+                .map(|binding| wire_model(binding, hand.scale, &hand_frames(rig, pose), frame)),
         }
     }
 }
 
-fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
-    let hand = WireHand::new(&grasp.pose, rig, frame);
+/// The nodes of a model that make its skin follow the rig.
+fn wire_model(binding: &Binding, scale: f32, frames: &HandFrames, frame: ClientFrame) -> v1::PosedModel {
+    let client_from_root = frame.client_from_object * binding.frame_from_root(frames, scale);
+    v1::PosedModel {
+        root_node: binding.root().to_owned(),
+        client_from_root: Some(wire_pose(frame.convention.pose_from_openxr(client_from_root))),
+        scale,
+        nodes: binding
+            .posed(frames, scale)
+            .map(|node| v1::NodePose {
+                node: node.name.to_owned(),
+                rotation: wire_pose(Pose::from_orientation(node.rotation)).orientation,
+                translation: node.translation.map(vector),
+            })
+            .collect(),
+    }
+}
+
+fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
+    let hand = WireHand::new(&grasp.pose, rig_hand, frame);
+    let rig: &Rig = &rig_hand.hand.rig;
     let object_from_wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
     v1::Grasp {
         rig: rig.name.clone(),
@@ -184,10 +216,11 @@ fn wire_grasp(grasp: &Grasp, rig: &Rig, frame: ClientFrame) -> v1::Grasp {
             .key_frames
             .iter()
             .flatten()
-            .map(|key_frame| wire_key_frame(key_frame, rig, frame))
+            .map(|key_frame| wire_key_frame(key_frame, rig_hand, frame))
             .collect(),
         hangs: grasp.hangs,
         arm: grasp.arm.as_ref().map(|arm| wire_arm(arm, frame)),
+        model: hand.model,
     }
 }
 
@@ -220,8 +253,8 @@ fn wire_score(score: &Score) -> v1::Score {
     }
 }
 
-fn wire_key_frame(key_frame: &KeyFrame, rig: &Rig, frame: ClientFrame) -> v1::KeyFrame {
-    let hand = WireHand::new(&key_frame.pose, rig, frame);
+fn wire_key_frame(key_frame: &KeyFrame, rig_hand: &RigHand, frame: ClientFrame) -> v1::KeyFrame {
+    let hand = WireHand::new(&key_frame.pose, rig_hand, frame);
     v1::KeyFrame {
         kind: match key_frame.stage {
             Stage::Approach => v1::KeyFrameKind::Approach,
@@ -232,6 +265,7 @@ fn wire_key_frame(key_frame: &KeyFrame, rig: &Rig, frame: ClientFrame) -> v1::Ke
         client_from_wrist: Some(hand.client_from_wrist),
         digits: hand.digits,
         joints: hand.joints,
+        model: hand.model,
     }
 }
 
@@ -372,7 +406,7 @@ fn wire_duration(duration: Duration) -> prost_types::Duration {
     }
 }
 
-fn wire_handedness(handedness: Handedness) -> v1::Handedness {
+pub(crate) fn wire_handedness(handedness: Handedness) -> v1::Handedness {
     match handedness {
         Handedness::Left => v1::Handedness::Left,
         Handedness::Right => v1::Handedness::Right,

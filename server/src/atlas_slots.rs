@@ -66,7 +66,11 @@ impl Update {
     }
 }
 
-/// The slots of one object, for each hand that was requested.
+/// Largest number of slots of an object. Hands come in as many sizes and shapes as clients create; more in turn than this
+/// lose their atlases to one another.
+const MOST_HANDS: usize = 16;
+
+/// The slots of one object, for each hand that was requested; beyond [`MOST_HANDS`], the least recently used is dropped.
 #[derive(Debug, Default)]
 pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 
@@ -80,6 +84,17 @@ impl AtlasSlots {
 
     /// Records a use at the time `now`. True if the atlas must be put in the build queue.
     pub(crate) fn request(&self, hand: &Arc<Hand>, now: u64) -> bool {
+        let mut slots = self.lock();
+        if slots.len() >= MOST_HANDS && slots.iter().all(|(other, _)| other != hand) {
+            let oldest = slots
+                .iter()
+                .enumerate()
+                .min_by_key(|(_, (_, slot))| slot.last_used);
+            if let Some((place, _)) = oldest {
+                slots.swap_remove(place);
+            }
+        }
+        drop(slots);
         self.with(hand, |slot| {
             slot.last_used = now;
             let is_new = slot.state == BuildState::Absent;
@@ -116,7 +131,9 @@ impl AtlasSlots {
 
     /// Drops the oldest recent grip.
     pub(crate) fn forget_oldest(&self, hand: &Arc<Hand>) {
-        self.with(hand, |slot| slot.recent = slot.recent.without_oldest());
+        if self.get(hand).is_some() {
+            self.with(hand, |slot| slot.recent = slot.recent.without_oldest());
+        }
     }
 
     /// Drops the atlas and keeps the recent grips. An atlas in the build queue stays there.
@@ -147,5 +164,37 @@ impl AtlasSlots {
     fn lock(&self) -> MutexGuard<'_, Vec<(Arc<Hand>, Slot)>> {
         // No code panics while it holds the lock; if some did, the slots would still be consistent.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use grasp_assets::hands::hand;
+    use grasp_synthesis::{model::hand::Handedness, propose::prepared::PreparedRig};
+
+    use super::*;
+
+    #[test]
+    fn drops_the_hand_used_longest_ago() {
+        let adult = hand("adult", Handedness::Right).expect("the rig is built in");
+        let hands: Vec<Arc<Hand>> = (0..=MOST_HANDS)
+            .map(|size| {
+                Arc::new(Hand {
+                    rig: PreparedRig::new(adult.rig.scaled(1.0 + 0.01 * size as f32)),
+                    skin: Arc::clone(&adult.skin),
+                })
+            })
+            .collect();
+        let slots = AtlasSlots::default();
+        for (now, hand) in hands[..MOST_HANDS].iter().enumerate() {
+            assert!(slots.request(hand, now as u64));
+        }
+        assert!(!slots.request(&hands[0], 100));
+        assert!(slots.request(&hands[MOST_HANDS], 101));
+        let is_there = |place: usize| slots.get(&hands[place]).is_some();
+        assert!(is_there(0) && !is_there(1) && is_there(2) && is_there(MOST_HANDS));
+        // The identity of a hand is its content.
+        let twin = Arc::new(Hand::clone(&hands[2]));
+        assert!(slots.get(&twin).is_some());
     }
 }

@@ -87,6 +87,30 @@ pub enum ServiceError {
         /// The etag of the object.
         current: String,
     },
+    /// No rig has the name.
+    #[error("{name} does not exist")]
+    RigNotFound {
+        /// The requested name.
+        name: String,
+    },
+    /// A rig with the name exists.
+    #[error("{name} already exists; choose another rig_id")]
+    RigExists {
+        /// The requested name.
+        name: String,
+    },
+    /// A built-in rig cannot be deleted.
+    #[error("{name} is built in and cannot be deleted")]
+    RigBuiltIn {
+        /// The requested name.
+        name: String,
+    },
+    /// There are as many created rigs as the server keeps.
+    #[error("the server keeps at most {maximum} created rigs; delete one first")]
+    RigsFull {
+        /// Their maximum.
+        maximum: usize,
+    },
     /// The server is at one of its limits.
     #[error("{} ({maximum}); try again", limit_text(*.limit))]
     Overloaded {
@@ -198,6 +222,23 @@ impl From<ServiceError> for Status {
                 details.set_resource_info("grasp.v1.Object", name, "", message.clone());
                 Status::with_error_details(Code::Aborted, message, details)
             }
+            ServiceError::RigNotFound { name } => {
+                let details = rig_details("RIG_NOT_FOUND", name, &message);
+                Status::with_error_details(Code::NotFound, message, details)
+            }
+            ServiceError::RigExists { name } => {
+                let details = rig_details("RIG_EXISTS", name, &message);
+                Status::with_error_details(Code::AlreadyExists, message, details)
+            }
+            ServiceError::RigBuiltIn { name } => {
+                let details = rig_details("RIG_BUILT_IN", name, &message);
+                Status::with_error_details(Code::FailedPrecondition, message, details)
+            }
+            ServiceError::RigsFull { maximum } => Status::with_error_details(
+                Code::ResourceExhausted,
+                message,
+                info("TOO_MANY_RIGS", [("maximum", maximum.to_string())]),
+            ),
             ServiceError::Overloaded {
                 limit,
                 maximum,
@@ -261,6 +302,13 @@ fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDet
         .map(|(key, value)| (key.to_owned(), value))
         .collect();
     ErrorDetails::with_error_info(reason, ERROR_DOMAIN, metadata)
+}
+
+/// Details of an error about one rig.
+fn rig_details(reason: &str, name: String, message: &str) -> ErrorDetails {
+    let mut details = info(reason, [("name", name.clone())]);
+    details.set_resource_info("grasp.v1.Rig", name, "", message);
+    details
 }
 
 fn limit_reason(limit: Limit) -> &'static str {
@@ -390,6 +438,32 @@ mod tests {
                 },
                 Code::Aborted,
                 "OBJECT_CHANGED",
+            ),
+            (
+                ServiceError::RigNotFound {
+                    name: "rigs/x".into(),
+                },
+                Code::NotFound,
+                "RIG_NOT_FOUND",
+            ),
+            (
+                ServiceError::RigExists {
+                    name: "rigs/x".into(),
+                },
+                Code::AlreadyExists,
+                "RIG_EXISTS",
+            ),
+            (
+                ServiceError::RigBuiltIn {
+                    name: "rigs/adult".into(),
+                },
+                Code::FailedPrecondition,
+                "RIG_BUILT_IN",
+            ),
+            (
+                ServiceError::RigsFull { maximum: 64 },
+                Code::ResourceExhausted,
+                "TOO_MANY_RIGS",
             ),
             (
                 ServiceError::Overloaded {

@@ -46,6 +46,7 @@ mod memory;
 mod net;
 mod objects;
 mod reserve;
+mod rigs;
 mod search;
 mod serve;
 mod services;

@@ -11,7 +11,10 @@ use std::{
 
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_import::MeshLimits;
-use grasp_proto::v1::{grasp_service_server::GraspServiceServer, object_service_server::ObjectServiceServer};
+use grasp_proto::v1::{
+    grasp_service_server::GraspServiceServer, hand_rig_service_server::HandRigServiceServer,
+    object_service_server::ObjectServiceServer,
+};
 use grasp_synthesis::model::hand::Handedness;
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
@@ -31,7 +34,8 @@ use crate::{
         store::ObjectStore,
     },
     reserve::DeadlineReserve,
-    services::{GraspHandler, ObjectHandler, Shared, Uploads},
+    rigs::store::RigStore,
+    services::{GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads},
 };
 
 /// Largest number of open streams per connection.
@@ -193,6 +197,7 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
+            rigs: RigStore::new(config.maximum_rigs.get()),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -247,6 +252,9 @@ impl Server {
         let objects = ObjectServiceServer::new(ObjectHandler::new(Arc::clone(&self.shared)))
             .max_decoding_message_size(self.shared.obj_limits.bytes + BYTES_BESIDES_MESH)
             .max_encoding_message_size(LARGEST_RESPONSE);
+        let rigs = HandRigServiceServer::new(HandRigHandler::new(Arc::clone(&self.shared)))
+            .max_decoding_message_size(self.shared.obj_limits.bytes + BYTES_BESIDES_MESH)
+            .max_encoding_message_size(LARGEST_RESPONSE);
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, ServingStatus::Serving).await;
 
@@ -279,6 +287,7 @@ impl Server {
             .layer(UnreadLayer)
             .add_service(grasps)
             .add_service(objects)
+            .add_service(rigs)
             .add_service(health_service)
             .add_service(reflection().build_v1()?)
             .add_service(reflection().build_v1alpha()?)
@@ -356,6 +365,7 @@ async fn set_health(health: &HealthReporter, status: ServingStatus) {
         "",
         GraspServiceServer::<GraspHandler>::NAME,
         ObjectServiceServer::<ObjectHandler>::NAME,
+        HandRigServiceServer::<HandRigHandler>::NAME,
     ] {
         health.set_service_status(service, status).await;
     }

@@ -148,7 +148,7 @@ pub(super) enum Turn {
     More(Duration),
     /// The atlas is complete or has no room to grow.
     Finished,
-    /// The object was evicted, or the server stops.
+    /// The object or the hand's slot was evicted, or the server stops.
     Dropped,
 }
 
@@ -246,7 +246,10 @@ impl Progress {
 pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
     let start = Instant::now();
     let hand = &job.hand;
-    let slot = object.atlas_slots.get(hand).unwrap_or_default();
+    // Without a slot, other hands have taken its place.
+    let Some(slot) = object.atlas_slots.get(hand) else {
+        return Turn::Dropped;
+    };
     if slot.grown.is_none()
         && let Some(read) = read(builders, object, hand)
     {

@@ -45,7 +45,12 @@ impl LoadedAtlases {
         let mut owners = self.owners();
         let is_same =
             |(other, its_hand): &Owner| std::ptr::eq(other.as_ptr(), Arc::as_ptr(object)) && its_hand == hand;
-        owners.retain(|owner| owner.0.strong_count() > 0 && !is_same(owner));
+        let has_slot = |(object, hand): &Owner| {
+            object
+                .upgrade()
+                .is_some_and(|object| object.atlas_slots.get(hand).is_some())
+        };
+        owners.retain(|owner| has_slot(owner) && !is_same(owner));
         let slot = object.atlas_slots.get(hand).unwrap_or_default();
         let room = self.objects.room();
         let fits = bytes <= room && make_room(&mut owners, room - bytes, slot.last_used);

@@ -206,6 +206,7 @@ fn complete_atlas_replaces_shipped_grips() {
     };
     let turn = || builders::turn(&atlases.0, &object, &job);
     let slot = || object.atlas_slots.get(adult()).unwrap();
+    object.atlas_slots.request(adult(), 1);
     // A builder drops the job if it holds the last reference.
     let _second_reference = Arc::clone(&object);
 

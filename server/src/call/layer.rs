@@ -26,11 +26,12 @@ use crate::{
     reserve::DeadlineReserve,
 };
 
-/// Paths of the methods that build objects from large messages; their calls are admitted before the message is received.
-const UPLOAD_METHODS: [&str; 3] = [
+/// Paths of the methods that build objects or rigs from large messages; their calls are admitted before the message is received.
+const UPLOAD_METHODS: [&str; 4] = [
     "/grasp.v1.ObjectService/CreateObject",
     "/grasp.v1.ObjectService/UpdateObject",
     STREAMED_UPLOAD,
+    "/grasp.v1.HandRigService/CreateRig",
 ];
 
 /// Path of the method whose request may take long to arrive. It limits its time itself.

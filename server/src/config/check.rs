@@ -65,6 +65,12 @@ impl RawConfig {
                 defaults.maximum_object_triangles,
             ),
             store,
+            maximum_rigs: check.count(
+                "maximum_rigs",
+                self.maximum_rigs,
+                1..=10_000,
+                defaults.maximum_rigs,
+            ),
             objects_directory: check.folder("objects_directory", self.objects_directory),
             builder_threads: check.within(
                 "builder_threads",
@@ -98,11 +104,7 @@ impl RawConfig {
                 self.log_format,
                 defaults.log_format,
                 "text or json",
-                |text| match text {
-                    "text" => Some(LogFormat::Text),
-                    "json" => Some(LogFormat::Json),
-                    _ => None,
-                },
+                log_format,
             ),
             mechanisms: defaults.mechanisms,
             log: check.parsed("log", self.log, defaults.log, "a filter such as info", |text| {
@@ -265,6 +267,14 @@ impl Check<'_> {
     }
 }
 
+fn log_format(text: &str) -> Option<LogFormat> {
+    match text {
+        "text" => Some(LogFormat::Text),
+        "json" => Some(LogFormat::Json),
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -331,6 +341,7 @@ mod tests {
             maximum_object_triangles: Some(0),
             cache_objects: Some(0),
             cache_bytes: Some(0),
+            maximum_rigs: Some(0),
             objects_directory: Some(PathBuf::new()),
             builder_threads: Some(65),
             atlas_directory: Some(PathBuf::new()),
@@ -344,7 +355,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 25, "{bad:?}");
+        assert_eq!(bad.len(), 26, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

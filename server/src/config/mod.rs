@@ -49,6 +49,8 @@ pub struct Config {
     pub maximum_object_triangles: NonZeroUsize,
     /// Bound on the created objects.
     pub store: StoreLimits,
+    /// Largest number of rigs created by clients; others are rejected.
+    pub maximum_rigs: NonZeroUsize,
     /// Folder of objects to start with; none for the built-in objects only.
     pub objects_directory: Option<PathBuf>,
     /// Number of background threads that build atlases; with 0 there are no atlases.
@@ -100,6 +102,7 @@ impl Default for Config {
                 objects: 1000,
                 bytes: 512 << 20,
             },
+            maximum_rigs: non_zero(64),
             objects_directory: None,
             builder_threads: 1,
             atlas_directory: None,

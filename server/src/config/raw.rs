@@ -74,6 +74,9 @@ pub struct RawConfig {
     /// Memory for created objects and atlases, in bytes, by estimate [default: 536870912].
     #[arg(long, env = "GRASP_CACHE_BYTES", value_name = "BYTES")]
     pub cache_bytes: Option<u64>,
+    /// Most rigs of hands that clients created; more are rejected [default: 64].
+    #[arg(long, env = "GRASP_MAXIMUM_RIGS", value_name = "COUNT")]
+    pub maximum_rigs: Option<u64>,
     /// Folder of objects to start with: a mesh NAME.obj, .stl, .ply, .glb or .gltf with NAME.toml becomes objects/NAME [default: none].
     ///
     /// The TOML file has the keys of a `CreateObject` request: `mass_kg` and optionally `unit_metres`,
@@ -168,6 +171,7 @@ impl RawConfig {
                 .or(fallback.maximum_object_triangles),
             cache_objects: self.cache_objects.or(fallback.cache_objects),
             cache_bytes: self.cache_bytes.or(fallback.cache_bytes),
+            maximum_rigs: self.maximum_rigs.or(fallback.maximum_rigs),
             objects_directory: self.objects_directory.or(fallback.objects_directory),
             builder_threads: self.builder_threads.or(fallback.builder_threads),
             atlas_directory: self.atlas_directory.or(fallback.atlas_directory),
@@ -202,6 +206,7 @@ impl From<&Config> for RawConfig {
             maximum_object_triangles: count(config.maximum_object_triangles.get()),
             cache_objects: count(config.store.objects),
             cache_bytes: count(config.store.bytes),
+            maximum_rigs: count(config.maximum_rigs.get()),
             objects_directory: config.objects_directory.clone(),
             builder_threads: count(config.builder_threads),
             atlas_directory: config.atlas_directory.clone(),

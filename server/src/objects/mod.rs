@@ -111,11 +111,13 @@ impl StoredObject {
         });
     }
 
-    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if there
-    /// are no primitives for the hand or none of their grips fits.
+    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if none fits.
+    /// There are such grips for one rig; hands of others start from those, too.
     pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
-        let mut all = held_primitives().iter().zip(&self.transferred_grips);
-        let ((_, held), grips) = all.find(|((of, _), _)| **of == *hand)?;
+        let all = || held_primitives().iter().zip(&self.transferred_grips);
+        let is_side = |of: &Hand| of.rig.handedness == hand.rig.handedness;
+        let own = all().find(|((of, _), _)| **of == *hand);
+        let ((_, held), grips) = own.or_else(|| all().find(|((of, _), _)| is_side(of)))?;
         let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
         (!grips.is_empty()).then(|| Arc::clone(grips))
     }

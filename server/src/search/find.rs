@@ -94,7 +94,7 @@ mod tests {
     use grasp_synthesis::base::mechanisms::Mechanisms;
 
     use super::*;
-    use crate::{objects::tests::tetrahedron, validate::find_query};
+    use crate::{objects::tests::tetrahedron, rigs::store::RigStore, validate::find_query};
 
     /// A search whose time has passed.
     fn late_job(has_deadline: bool) -> FindJob {
@@ -104,7 +104,7 @@ mod tests {
             ..Default::default()
         };
         FindJob {
-            query: find_query(request, "adult", |_| true).expect("the request is valid"),
+            query: find_query(request, ("adult", &RigStore::new(0)), |_| true).expect("the request is valid"),
             object: Arc::clone(&stored.object),
             stored,
             seed: 3,

@@ -36,6 +36,7 @@ use crate::{
     atlases::KnownGrips,
     error::ServiceError,
     objects::StoredObject,
+    rigs::RigHand,
     validate::FindQuery,
 };
 
@@ -82,7 +83,7 @@ pub(crate) struct Answered {
 /// One hand's search, ready to be run.
 #[derive(Debug)]
 struct HandSearch {
-    hand: Arc<Hand>,
+    hand: RigHand,
     /// The holdout, with the arm of this hand.
     holdout: Holdout,
     settings: SearchSettings,
@@ -138,11 +139,11 @@ impl FindJob {
     /// The giver's joints fold its skin.
     pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
-        let first = Arc::clone(&self.query.receiving_hand);
-        let stance = |hand: &Hand| self.query.stances.of(hand.rig.handedness);
+        let first = self.query.receiving_hand.clone();
+        let stance = |hand: &RigHand| self.query.stances.of(hand.hand.rig.handedness);
         let of_first = holdout(&self.query, self.object.object(), stance(&first))?;
         let object_from_client = self.query.client_from_object.inverse();
-        let of_other = |hand: &Hand| Holdout {
+        let of_other = |hand: &RigHand| Holdout {
             stance: stance(hand).transformed(object_from_client),
             ..of_first.clone()
         };
@@ -152,7 +153,7 @@ impl FindJob {
         });
         let hands = [(first, of_first)].into_iter().chain(alternative);
         let hands = hands.zip(&self.known).map(|((hand, holdout), known)| HandSearch {
-            settings: self.settings(&hand, known),
+            settings: self.settings(&hand.hand, known),
             hand,
             holdout,
         });
@@ -191,7 +192,7 @@ impl FindJob {
                 constraints: query.constraints.transformed(object_from_client),
                 choice: query.choice,
                 improvement: self.improvement,
-                other_hand: query.other_hand.as_ref().map(|hand| hand.rig.clone()),
+                other_hand: query.other_hand.as_ref().map(|hand| hand.hand.rig.clone()),
             },
             known: Known {
                 // A replay runs one attempt and tries no known grips.
@@ -276,7 +277,7 @@ impl PreparedJob {
         Task {
             holdout,
             object: &self.object,
-            rig: &hand.rig,
+            rig: &hand.hand.rig,
         }
     }
 
@@ -299,7 +300,7 @@ impl PreparedJob {
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
             let approach = settings.query.constraints.approach;
             let friction = settings.query.friction_on(&holdout.object);
-            plan_key_frames(holdout, &hand.rig, friction, approach, grasp);
+            plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
         }
         if matches!(
             outcome.end,
@@ -314,7 +315,7 @@ impl PreparedJob {
         };
         let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
         let warnings: Vec<String> = hands.flat_map(|hand| hand.warnings.iter().cloned()).collect();
-        let other = self.hands.iter().find(|other| other.hand != *hand);
+        let other = self.hands.iter().find(|other| other.hand.hand != hand.hand);
         let circumstances = Circumstances {
             search_time,
             budget: self.budget,
@@ -322,7 +323,13 @@ impl PreparedJob {
             other_atlas: other.and_then(|other| other.settings.known.seeds.atlas()),
         };
         Ok(Answered {
-            response: find_response(&outcome, &hand.rig, frame, settings, circumstances)?,
+            response: find_response(
+                &outcome,
+                (hand, self.query.other_hand.as_ref()),
+                frame,
+                settings,
+                circumstances,
+            )?,
             new_grip: self.new_grip(&outcome, place),
             ended,
         })
@@ -357,7 +364,7 @@ impl PreparedJob {
         let entry = (is_new && settings.query.friction_on(&holdout.object) == own_friction)
             .then(|| Entry::of_grasp(grasp))
             .flatten();
-        entry.map(|entry| (Arc::clone(hand), entry))
+        entry.map(|entry| (Arc::clone(&hand.hand), entry))
     }
 }
 

@@ -36,7 +36,9 @@ impl GraspHandler {
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &self.shared;
-        let query = find_query(request, &shared.default_rig, |id| shared.objects.contains(id))?;
+        let query = find_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
         call.log_object(&query.object_id);
         let stored = shared.objects.get(&query.object_id)?.object;
         let object = Arc::clone(&stored.object);
@@ -51,7 +53,8 @@ impl GraspHandler {
         let admission = shared.executor.admit()?;
         let uses_atlas = query.uses_atlas();
         let known = if uses_atlas {
-            let [first, alternative] = [Some(&query.receiving_hand), query.alternative_hand.as_ref()];
+            let [first, alternative] = [Some(&query.receiving_hand), query.alternative_hand.as_ref()]
+                .map(|hand| hand.map(|hand| &hand.hand));
             shared.atlases.get(&stored, [first, alternative])
         } else {
             Default::default()

@@ -1,6 +1,7 @@
 //! The handlers of the gRPC services.
 
 mod grasp_service;
+mod hand_rig_service;
 mod object_service;
 mod object_streams;
 mod streaming;
@@ -13,12 +14,13 @@ use grasp_synthesis::base::mechanisms::Mechanisms;
 use tokio_util::sync::CancellationToken;
 
 pub(crate) use grasp_service::GraspHandler;
+pub(crate) use hand_rig_service::HandRigHandler;
 pub(crate) use object_service::ObjectHandler;
 pub(crate) use upload::Uploads;
 
 use crate::{
     atlases::Atlases, budget::BudgetLimits, executor::SearchExecutor, objects::store::ObjectStore,
-    reserve::DeadlineReserve,
+    reserve::DeadlineReserve, rigs::store::RigStore,
 };
 
 /// State shared by the handlers.
@@ -26,6 +28,8 @@ use crate::{
 pub(crate) struct Shared {
     /// The objects by name.
     pub objects: Arc<ObjectStore>,
+    /// The rigs by name.
+    pub rigs: RigStore,
     /// The atlases of the objects.
     pub atlases: Atlases,
     /// The search pool.

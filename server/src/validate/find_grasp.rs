@@ -1,9 +1,6 @@
 //! Checks `FindGraspRequest`.
 
-use std::sync::Arc;
-
 use glam::Vec3;
-use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
@@ -22,7 +19,11 @@ use super::{
     receiver::{Stances, Surroundings, stances},
     search_limits::{SearchLimits, search_limits},
 };
-use crate::{convention::Convention, error::ServiceError};
+use crate::{
+    convention::Convention,
+    error::ServiceError,
+    rigs::{RigHand, store::RigStore},
+};
 
 /// A valid request.
 #[derive(Debug)]
@@ -44,11 +45,11 @@ pub(crate) struct FindQuery {
     /// Obstacles to keep clear of, in the client's frame and `OpenXR` axes.
     pub obstacles: Vec<Obstacle>,
     /// The hand to pose.
-    pub receiving_hand: Arc<Hand>,
+    pub receiving_hand: RigHand,
     /// The hand that may be posed in its place: the request leaves the choice to the search.
-    pub alternative_hand: Option<Arc<Hand>>,
+    pub alternative_hand: Option<RigHand>,
     /// The receiver's other hand, if both take the object.
-    pub other_hand: Option<Arc<Hand>>,
+    pub other_hand: Option<RigHand>,
     /// Where the receiver's arms may come from, in the client's frame and `OpenXR` axes.
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
@@ -143,7 +144,7 @@ fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut 
 /// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn find_query(
     request: v1::FindGraspRequest,
-    default_rig: &str,
+    (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<FindQuery, ServiceError> {
     let mut violations = Violations::default();
@@ -153,13 +154,13 @@ pub(crate) fn find_query(
     let (client_from_object, object_origin) = object_pose(request.client_from_object, convention, v);
     let presenting_hand = request
         .presenting_hand
-        .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, v));
+        .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, rigs, v));
     let validity = validity(known(Field::root("validity"), request.validity, v));
     let other_hands = obstacles::other_hands(
         Field::root("other_hands"),
         request.other_hands,
         validity,
-        convention,
+        (convention, rigs),
         v,
     );
     let obstacles = obstacles::obstacles(
@@ -169,10 +170,11 @@ pub(crate) fn find_query(
         convention,
         v,
     );
-    let (receiving_hand, is_named) = hand::receiving_hand(
+    let (receiving_hands, is_named) = hand::receiving_hand(
         Field::root("receiving_hand"),
         request.receiving_hand,
         (validity, default_rig),
+        rigs,
         v,
     );
     let up = hand::up(Field::root("up"), request.up, convention, v);
@@ -212,11 +214,11 @@ pub(crate) fn find_query(
     };
     let stances = stances(request.receiver, request.receiver_stance, &surroundings, v);
     check_exists(object_id.as_deref(), object_exists, v);
-    let (Some(object_id), Some(receiving_hand)) = (object_id, receiving_hand) else {
+    let (Some(object_id), Some(hands)) = (object_id, receiving_hands) else {
         // The function that returned none has added a violation.
         return Err(violations.into_error());
     };
-    let other_hand = |is_posed: bool| is_posed.then(|| hand::other_hand(&receiving_hand)).flatten();
+    let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
     violations.finish(FindQuery {
         object_id,
         convention,
@@ -226,7 +228,7 @@ pub(crate) fn find_query(
         obstacles,
         alternative_hand: other_hand(chooses_hand),
         other_hand: other_hand(takes_both_hands),
-        receiving_hand,
+        receiving_hand: hands.hand,
         stances,
         up,
         limits,

@@ -13,7 +13,7 @@ use super::{Field, Labels, Violations, friction, labels::labels, point, quoted};
 const COLLECTION: &str = "objects/";
 
 /// Largest number of characters in an object's id.
-const LONGEST_ID: usize = 63;
+pub(super) const LONGEST_ID: usize = 63;
 
 /// Largest mass of an object in kilograms: more than anyone can hold out.
 const LARGEST_MASS: f32 = 1000.0;
@@ -256,7 +256,8 @@ pub(super) fn check_mass(mass_kg: f32, violations: &mut Violations) {
     }
 }
 
-fn is_object_id(id: &str) -> bool {
+/// True for the last part of an object's or a rig's name.
+pub(super) fn is_object_id(id: &str) -> bool {
     id.len() <= LONGEST_ID
         && id.starts_with(|c: char| c.is_ascii_lowercase())
         && id

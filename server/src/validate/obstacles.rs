@@ -9,7 +9,7 @@ use grasp_synthesis::{
 };
 
 use super::{FARTHEST, Field, Violations, finite, hand, hand::GiverHand, point, pose};
-use crate::convention::Convention;
+use crate::{convention::Convention, rigs::store::RigStore};
 
 /// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
 const MAXIMUM_OTHER_HANDS: usize = 3;
@@ -22,14 +22,16 @@ pub(super) fn other_hands(
     field: Field<'_>,
     sent: Vec<v1::PresentingHand>,
     validity: Validity,
-    convention: Convention,
+    (convention, rigs): (Convention, &RigStore),
     violations: &mut Violations,
 ) -> Vec<GiverHand> {
     check_count(field, sent.len(), MAXIMUM_OTHER_HANDS, validity, violations);
     sent.into_iter()
         .take(MAXIMUM_OTHER_HANDS)
         .enumerate()
-        .filter_map(|(place, sent)| hand::presenting_hand(field.at(place), sent, convention, violations))
+        .filter_map(|(place, sent)| {
+            hand::presenting_hand(field.at(place), sent, convention, rigs, violations)
+        })
         .collect()
 }
 

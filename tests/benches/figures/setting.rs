@@ -353,6 +353,7 @@ async fn is_complete(server: &TestServer, name: &str, handedness: v1::Handedness
         receiving_hand: Some(v1::ReceivingHand {
             rig: String::new(),
             handedness: handedness.into(),
+            hand_scale: None,
         }),
         reproducible: true,
         max_attempts: Some(1),

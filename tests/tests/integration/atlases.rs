@@ -87,6 +87,7 @@ async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
         receiving_hand: Some(v1::ReceivingHand {
             rig: "adult".to_owned(),
             handedness: v1::Handedness::Right.into(),
+            hand_scale: None,
         }),
         ..Default::default()
     };
@@ -145,6 +146,7 @@ async fn a_recently_found_grip_answers_the_next_request() {
             receiving_hand: Some(v1::ReceivingHand {
                 rig: rig.to_owned(),
                 handedness: handedness.into(),
+                hand_scale: None,
             }),
             ..Default::default()
         };
@@ -197,6 +199,7 @@ async fn shipped_grips_answer_while_the_atlas_grows() {
             receiving_hand: Some(v1::ReceivingHand {
                 rig: String::new(),
                 handedness: handedness.into(),
+                hand_scale: None,
             }),
             ..Default::default()
         };

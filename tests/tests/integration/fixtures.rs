@@ -119,6 +119,7 @@ pub(crate) fn receiving(handedness: v1::Handedness) -> v1::ReceivingHand {
     v1::ReceivingHand {
         rig: String::new(),
         handedness: handedness.into(),
+        hand_scale: None,
     }
 }
 

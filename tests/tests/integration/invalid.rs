@@ -148,6 +148,7 @@ async fn every_field_of_a_search_is_validated() {
                 r.receiving_hand = Some(v1::ReceivingHand {
                     rig: "robot".into(),
                     handedness: 0,
+                    hand_scale: None,
                 });
             },
             "receiving_hand.rig",
@@ -157,6 +158,7 @@ async fn every_field_of_a_search_is_validated() {
                 r.receiving_hand = Some(v1::ReceivingHand {
                     rig: String::new(),
                     handedness: 3,
+                    hand_scale: None,
                 });
             },
             "receiving_hand.handedness",

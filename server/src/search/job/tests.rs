@@ -19,6 +19,7 @@ use crate::{
     config,
     convention::Convention,
     objects::{StoredObject, tests::tetrahedron},
+    rigs::store::RigStore,
     validate::{any_obstacles, find_query, fixtures},
 };
 
@@ -105,8 +106,9 @@ fn tracked_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
 /// Angles given as shares of their ranges.
 fn angled_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
     let shares = proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5);
-    (shares, pose(0.2), 1..=2_i32, 0..RIG_NAMES.len())
-        .prop_map(|(shares, client_from_wrist, handedness, rig)| {
+    let scale = proptest::option::weighted(0.3, number(0.5..2.0));
+    (shares, pose(0.2), 1..=2_i32, 0..RIG_NAMES.len(), scale)
+        .prop_map(|(shares, client_from_wrist, handedness, rig, hand_scale)| {
             let rig = RIG_NAMES[rig];
             let hand = hands::hand(rig, Handedness::Right).expect("the rig is built in");
             let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
@@ -115,6 +117,7 @@ fn angled_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
                 rig: rig.to_owned(),
                 handedness,
                 client_from_wrist,
+                hand_scale,
                 digits: digits
                     .map(|(digit, share)| v1::DigitAngles {
                         base_yaw: within(digit.limits.base_yaw, share[0]),
@@ -191,6 +194,7 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
                     receiving_hand: Some(v1::ReceivingHand {
                         rig: String::new(),
                         handedness,
+                        hand_scale: None,
                     }),
                     // Both hands have no body.
                     receiver: receiver.filter(|_| !both_hands),
@@ -234,7 +238,7 @@ fn answers_every_request_that_passes_validation() {
     let searched = Cell::new([0; 3]);
     let outcome = TestRunner::new(runs()).run(&(request(), objects()), |(request, object)| {
         let arrived = Instant::now();
-        let Ok(query) = find_query(request, "thesis", |_| true) else {
+        let Ok(query) = find_query(request, ("thesis", &RigStore::new(0)), |_| true) else {
             return Ok(());
         };
         let kind = match &query.presenting_hand {

@@ -9,9 +9,10 @@ use grasp_synthesis::model::hand::{
     rig::{AngleRange, DigitRig},
 };
 
-use super::{GiverHand, built_in, required_handedness};
+use super::{GiverHand, hand_scale, required_handedness, rig_named};
 use crate::{
     convention::Convention,
+    rigs::store::RigStore,
     validate::{Field, Violations, pose},
 };
 
@@ -24,16 +25,13 @@ pub(super) fn angled_hand(
     field: Field<'_>,
     angles: &v1::HandAngles,
     convention: Convention,
+    rigs: &RigStore,
     violations: &mut Violations,
 ) -> Option<GiverHand> {
     let handedness = required_handedness(field.child("handedness"), angles.handedness, violations);
     // Both hands have the same limits, which are checked even if the handedness is missing.
-    let hand = built_in(
-        field.child("rig"),
-        &angles.rig,
-        handedness.unwrap_or(Handedness::Right),
-        violations,
-    );
+    let rig = rig_named(field.child("rig"), &angles.rig, rigs, violations);
+    let scale = hand_scale(field.child("hand_scale"), angles.hand_scale, violations);
     let client_from_wrist = pose(
         field.child("client_from_wrist"),
         angles.client_from_wrist,
@@ -47,7 +45,8 @@ pub(super) fn angled_hand(
             format_args!("has {} digits; it must have 5, thumb first", angles.digits.len()),
         );
     }
-    let hand = hand?;
+    let rig = rig?;
+    let hand = &rig.hand(handedness.unwrap_or(Handedness::Right)).hand;
     let mut digits = [DigitAngles::default(); 5];
     for (place, (digit, sent)) in digits.iter_mut().zip(&angles.digits).enumerate() {
         *digit = digit_angles(digits_field.at(place), sent, &hand.rig.digits[place], violations);
@@ -58,7 +57,7 @@ pub(super) fn angled_hand(
         digits,
     };
     Some(GiverHand {
-        joints: HandJoints::of_pose(&hand.rig, &pose),
+        joints: HandJoints::of_pose(&hand.rig.scaled(scale), &pose),
         skin: Arc::clone(&hand.skin),
         field: "presenting_hand.angles",
         warnings: Vec::new(),

@@ -14,7 +14,7 @@ mod tracked;
 use std::sync::Arc;
 
 use glam::Vec3;
-use grasp_assets::hands::{self, Hand, RIG_NAMES};
+use grasp_assets::hands::RIG_NAMES;
 use grasp_proto::v1;
 use grasp_synthesis::model::{
     hand::{Handedness, joints::HandJoints, skin::Skin},
@@ -22,9 +22,15 @@ use grasp_synthesis::model::{
 };
 
 use super::{Field, Violations, direction, known, quoted};
-use crate::convention::Convention;
+use crate::{
+    convention::Convention,
+    rigs::{RigHand, StoredRig, store::RigStore},
+};
 use angles::angled_hand;
 use tracked::tracked_hand;
+
+/// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
+const HAND_SCALES: std::ops::RangeInclusive<f32> = 0.5..=2.0;
 
 /// The receiving hand's rig under THESIS validity: that of chapter 5.
 const THESIS_RIG: &str = "thesis";
@@ -47,6 +53,7 @@ pub(super) fn presenting_hand(
     field: Field<'_>,
     hand: v1::PresentingHand,
     convention: Convention,
+    rigs: &RigStore,
     violations: &mut Violations,
 ) -> Option<GiverHand> {
     match hand.form {
@@ -55,7 +62,7 @@ pub(super) fn presenting_hand(
             None
         }
         Some(v1::presenting_hand::Form::Angles(angles)) => {
-            angled_hand(field.child("angles"), &angles, convention, violations)
+            angled_hand(field.child("angles"), &angles, convention, rigs, violations)
         }
         Some(v1::presenting_hand::Form::Joints(joints)) => {
             tracked_hand(field.child("joints"), &joints, convention, violations)
@@ -68,8 +75,9 @@ pub(super) fn receiving_hand(
     field: Field<'_>,
     hand: Option<v1::ReceivingHand>,
     (validity, default_rig): (Validity, &str),
+    rigs: &RigStore,
     violations: &mut Violations,
-) -> (Option<Arc<Hand>>, bool) {
+) -> (Option<ReceivingHands>, bool) {
     let hand = hand.unwrap_or_default();
     let is_named = hand.handedness != i32::from(v1::Handedness::Unspecified);
     let handedness = match known(field.child("handedness"), hand.handedness, violations) {
@@ -81,33 +89,78 @@ pub(super) fn receiving_hand(
         ("", Validity::Physical) => default_rig,
         (named, _) => named,
     };
-    let hand = built_in(field.child("rig"), rig, handedness, violations);
-    (hand, is_named)
+    let scale = hand_scale(field.child("hand_scale"), hand.hand_scale, violations);
+    let hundredths = (100.0 * scale).round() as u16;
+    let rig = rig_named(field.child("rig"), rig, rigs, violations);
+    let hands = rig.map(|rig| {
+        let sized = |side| match hundredths {
+            100 => rig.hand(side).clone(),
+            _ => rigs.scaled(rig.hand(side), hundredths),
+        };
+        ReceivingHands {
+            hand: sized(handedness),
+            other: sized(handedness.other()),
+        }
+    });
+    (hands, is_named)
 }
 
-/// The same person's other hand.
-pub(super) fn other_hand(hand: &Hand) -> Option<Arc<Hand>> {
-    hands::hand(&hand.rig.name, hand.rig.handedness.other()).cloned()
+/// A receiver's hands of one rig.
+#[derive(Clone, Debug)]
+pub(super) struct ReceivingHands {
+    /// The hand to pose.
+    pub hand: RigHand,
+    /// The same person's other hand.
+    pub other: RigHand,
 }
 
-fn built_in(
+/// The size of a hand relative to its rig; 1 if it is wrong.
+fn hand_scale(field: Field<'_>, scale: Option<f32>, violations: &mut Violations) -> f32 {
+    let scale = scale.unwrap_or(1.0);
+    if HAND_SCALES.contains(&scale) {
+        return scale;
+    }
+    violations.add(
+        field,
+        format_args!(
+            "is {scale}; it must be {} to {}",
+            HAND_SCALES.start(),
+            HAND_SCALES.end()
+        ),
+    );
+    1.0
+}
+
+fn rig_named(
     field: Field<'_>,
-    rig: &str,
-    handedness: Handedness,
+    name: &str,
+    rigs: &RigStore,
     violations: &mut Violations,
-) -> Option<Arc<Hand>> {
-    let hand = hands::hand(rig, handedness);
-    if hand.is_none() {
+) -> Option<Arc<StoredRig>> {
+    let rig = rigs.named(name);
+    if rig.is_none() {
         violations.add(
             field,
             format_args!(
-                "is {}; the built-in rigs are {}",
-                quoted(rig),
+                "is {}; the built-in rigs are {}, and no such rig was created",
+                quoted(name),
                 RIG_NAMES.join(" and ")
             ),
         );
     }
-    hand.cloned()
+    rig
+}
+
+/// The joints of a hand at rest; none if they are wrong.
+pub(super) fn joints_at_rest(
+    field: Field<'_>,
+    hand: &v1::HandJoints,
+    warnings: &mut Vec<String>,
+    violations: &mut Violations,
+) -> Option<HandJoints> {
+    let hand = tracked_hand(field, hand, Convention::OpenXr, violations)?;
+    warnings.extend(hand.warnings);
+    Some(hand.joints)
 }
 
 /// A handedness without a default.

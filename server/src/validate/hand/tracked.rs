@@ -2,6 +2,7 @@
 
 use std::{fmt::Write as _, sync::Arc};
 
+use grasp_assets::hands;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
@@ -14,7 +15,6 @@ use grasp_synthesis::{
 use super::{
     GiverHand,
     axes::{Fault, Turned, axes},
-    built_in,
     proportions::{Stray, strays},
     radii::{LARGEST_RADIUS, replace_missing},
     reference::{REFERENCE, TRACKED_HAND_RIG},
@@ -100,7 +100,7 @@ pub(super) fn tracked_hand(
             handedness,
             joints: sent.joints,
         },
-        skin: Arc::clone(&built_in(field, TRACKED_HAND_RIG, handedness, violations)?.skin),
+        skin: Arc::clone(&hands::hand(TRACKED_HAND_RIG, handedness)?.skin),
         field: "presenting_hand.joints",
         warnings,
     })

@@ -140,6 +140,31 @@ impl Rig {
         })
     }
 
+    /// A hand of the same shape that is `scale` times as large.
+    #[must_use]
+    pub fn scaled(&self, scale: f32) -> Self {
+        Self {
+            name: self.name.clone(),
+            handedness: self.handedness,
+            palm: scale * self.palm,
+            reach: scale * self.reach,
+            digits: self.digits.map(|digit| DigitRig {
+                wrist_from_base: Pose {
+                    position: scale * digit.wrist_from_base.position,
+                    ..digit.wrist_from_base
+                },
+                lengths: digit.lengths.map(|length| scale * length),
+                diameters: digit.diameters.map(|diameter| scale * diameter),
+                ..digit
+            }),
+            finger_metacarpals: self.finger_metacarpals.map(|start| scale * start),
+            palm_segments: self
+                .palm_segments
+                .map(|segment| Segment::new(scale * segment.start, scale * segment.end)),
+            joint_radii: self.joint_radii.map(|radius| scale * radius),
+        }
+    }
+
     /// The same person's other hand: the mirror image in the plane x = 0.
     #[must_use]
     pub fn mirrored(&self) -> Self {

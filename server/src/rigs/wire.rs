@@ -1,0 +1,77 @@
+//! Converts rigs to messages.
+
+use grasp_import::Binding;
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        HandPose,
+        joints::{HandJoints, JOINT_NAMES, thesis_from_openxr_frame},
+        rig::{AngleRange, DigitLimits, Rig},
+    },
+};
+
+use super::{RigHand, StoredRig};
+use crate::answer::{wire_handedness, wire_pose};
+
+impl StoredRig {
+    /// The message that describes the rig.
+    pub(crate) fn to_wire(&self) -> v1::Rig {
+        v1::Rig {
+            name: self.name(),
+            built_in: self.built_in,
+            hands: self
+                .hands
+                .iter()
+                .zip(self.mirrored)
+                .map(|(hand, mirrored)| wire_hand(hand, mirrored))
+                .collect(),
+            warnings: self.warnings.clone(),
+        }
+    }
+}
+
+fn wire_hand(hand: &RigHand, mirrored: bool) -> v1::RigHand {
+    let rig: &Rig = &hand.hand.rig;
+    let stretched = HandPose {
+        frame_from_wrist: thesis_from_openxr_frame(Pose::IDENTITY),
+        digits: rig.stretched(),
+    };
+    let handedness = wire_handedness(rig.handedness).into();
+    let joints = hand.binding.iter().flat_map(|binding| binding.joints());
+    v1::RigHand {
+        handedness,
+        stretched_joints: HandJoints::of_pose(rig, &stretched)
+            .joints
+            .iter()
+            .map(|joint| v1::JointPose {
+                client_from_joint: Some(wire_pose(joint.pose)),
+                radius: joint.radius,
+            })
+            .collect(),
+        limits: rig
+            .digits
+            .iter()
+            .map(|digit| wire_limits(&digit.limits))
+            .collect(),
+        mirrored,
+        root_node: hand.binding.as_deref().map_or("", Binding::root).to_owned(),
+        nodes: joints
+            .map(|(node, joint)| v1::RigNode {
+                node: node.to_owned(),
+                joint: JOINT_NAMES[joint].to_owned(),
+                handedness,
+            })
+            .collect(),
+    }
+}
+
+fn wire_limits(limits: &DigitLimits) -> v1::DigitLimits {
+    let range = |AngleRange { min, max }| Some(v1::AngleRange { min, max });
+    v1::DigitLimits {
+        base_yaw: range(limits.base_yaw),
+        base_pitch: range(limits.base_pitch),
+        second_pitch: range(limits.second_pitch),
+        third_pitch: range(limits.third_pitch),
+    }
+}

@@ -1,0 +1,112 @@
+//! `HandRigService`.
+
+use std::sync::Arc;
+
+use grasp_proto::v1::{self, hand_rig_service_server::HandRigService};
+use tonic::{Request, Response, Status};
+
+use super::Shared;
+use crate::{
+    call::UploadPermit,
+    error::ServiceError,
+    executor::run_blocking,
+    rigs::build::build_rig,
+    validate::{Field, Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token},
+};
+
+/// Implements `HandRigService`.
+#[derive(Clone, Debug)]
+pub(crate) struct HandRigHandler {
+    shared: Arc<Shared>,
+}
+
+impl HandRigHandler {
+    /// A handler with the shared state.
+    pub(crate) fn new(shared: Arc<Shared>) -> Self {
+        Self { shared }
+    }
+
+    async fn create(
+        &self,
+        request: v1::CreateRigRequest,
+        permit: Option<UploadPermit>,
+    ) -> Result<v1::CreateRigResponse, ServiceError> {
+        let limits = self.shared.obj_limits;
+        let mut violations = Violations::default();
+        let fields = rig_fields(request, limits.bytes, &mut violations);
+        if violations.is_empty() {
+            self.shared.rigs.check_room(&fields.id)?;
+        }
+        let rig = run_blocking(move || {
+            let _permit = permit;
+            build_rig(fields, limits, violations)
+        })
+        .await??;
+        let rig = self.shared.rigs.insert(rig)?;
+        Ok(v1::CreateRigResponse {
+            rig: Some(rig.to_wire()),
+        })
+    }
+
+    fn get(&self, name: &str) -> Result<v1::GetRigResponse, ServiceError> {
+        let rig = self.shared.rigs.get(&checked_id(name)?)?;
+        Ok(v1::GetRigResponse {
+            rig: Some(rig.to_wire()),
+        })
+    }
+
+    fn list(&self, request: &v1::ListRigsRequest) -> Result<v1::ListRigsResponse, ServiceError> {
+        let query = rig_page_query(request)?;
+        let (rigs, more) = self.shared.rigs.page(query.after.as_deref(), query.size);
+        let last = rigs.last().filter(|_| more);
+        Ok(v1::ListRigsResponse {
+            next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
+            rigs: rigs.iter().map(|rig| rig.to_wire()).collect(),
+        })
+    }
+
+    fn delete(&self, name: &str) -> Result<v1::DeleteRigResponse, ServiceError> {
+        self.shared.rigs.delete(&checked_id(name)?)?;
+        Ok(v1::DeleteRigResponse {})
+    }
+}
+
+fn checked_id(name: &str) -> Result<String, ServiceError> {
+    let mut violations = Violations::default();
+    match rig_id_of(Field::root("name"), name, &mut violations) {
+        Some(id) => Ok(id),
+        None => Err(violations.into_error()),
+    }
+}
+
+#[tonic::async_trait]
+impl HandRigService for HandRigHandler {
+    async fn list_rigs(
+        &self,
+        request: Request<v1::ListRigsRequest>,
+    ) -> Result<Response<v1::ListRigsResponse>, Status> {
+        Ok(Response::new(self.list(request.get_ref())?))
+    }
+
+    async fn get_rig(
+        &self,
+        request: Request<v1::GetRigRequest>,
+    ) -> Result<Response<v1::GetRigResponse>, Status> {
+        Ok(Response::new(self.get(&request.get_ref().name)?))
+    }
+
+    async fn create_rig(
+        &self,
+        mut request: Request<v1::CreateRigRequest>,
+    ) -> Result<Response<v1::CreateRigResponse>, Status> {
+        let permit = request.extensions_mut().remove::<UploadPermit>();
+        Ok(Response::new(self.create(request.into_inner(), permit).await?))
+    }
+
+    async fn delete_rig(
+        &self,
+        request: Request<v1::DeleteRigRequest>,
+    ) -> Result<Response<v1::DeleteRigResponse>, Status> {
+        Ok(Response::new(self.delete(&request.get_ref().name)?))
+    }
+}
