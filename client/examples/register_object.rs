@@ -47,8 +47,8 @@ async fn main() -> Result<(), Box<dyn Error>> {
         client_from_object: Pose::IDENTITY,
         presenting_hand: Some(PresentingHand::Joints(giver)),
         receiving_hand: ReceivingHand {
-            rig: None,
             handedness: Some(Handedness::Right),
+            ..ReceivingHand::default()
         },
         // The first search on a new object may take longer: its atlas has only begun to grow.
         budget: Some(Duration::from_secs(5)),

@@ -19,6 +19,7 @@ pub fn request_for(holdout: &BuiltInHoldout) -> FindRequest {
                 second_pitch: angles.second_pitch,
                 third_pitch: Some(angles.third_pitch),
             }),
+            hand_scale: None,
         })),
         ..FindRequest::new(format!("objects/{}", holdout.object))
     }

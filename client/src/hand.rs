@@ -83,11 +83,11 @@ pub enum JointSet {
     WebXr25,
 }
 
-/// A hand as joint angles of a built-in rig.
+/// A hand as joint angles of a rig.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HandAngles {
-    /// Name of the rig: "thesis" or "adult".
+    /// Name of the rig: "thesis", "adult", or that of a created one, "rigs/{rig}".
     pub rig: String,
     /// Left or right.
     pub handedness: Handedness,
@@ -96,6 +96,9 @@ pub struct HandAngles {
     pub client_from_wrist: Pose,
     /// The digits, thumb first. Each angle must be within the rig's limits.
     pub digits: [DigitAngles; 5],
+    /// How many times as large as the rig the hand is, from 0.5 to 2; none: 1.
+    #[serde(default)]
+    pub hand_scale: Option<f32>,
 }
 
 /// A hand as joint poses tracked by a headset.
@@ -114,19 +117,21 @@ pub struct HandJoints {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PresentingHand {
-    /// Joint angles of a built-in rig.
+    /// Joint angles of a rig.
     Angles(HandAngles),
     /// Tracked joint poses with radii.
     Joints(HandJoints),
 }
 
 /// The hand to pose.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReceivingHand {
-    /// Name of the rig; none: the server's default.
+    /// Name of the rig: "thesis", "adult", or that of a created one, "rigs/{rig}"; none: the server's default.
     pub rig: Option<String>,
     /// Left or right; none: the better of both, as [`Grasp::handedness`](crate::Grasp::handedness) says. Then the right one under
     /// [`Validity::Thesis`](crate::Validity::Thesis).
     pub handedness: Option<Handedness>,
+    /// How many times as large as the rig the hand is, from 0.5 to 2, rounded to hundredths; none: 1.
+    pub hand_scale: Option<f32>,
 }

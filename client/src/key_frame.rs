@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     hand::{DigitAngles, JOINT_COUNT, JointPose},
     pose::Pose,
+    rig::PosedModel,
 };
 
 /// A stage of the motion to a grasp.
@@ -32,4 +33,7 @@ pub struct KeyFrame {
     pub digits: [DigitAngles; 5],
     /// The joints of `XR_EXT_hand_tracking`, in the convention's order, in the client's frame.
     pub joints: [JointPose; JOINT_COUNT],
+    /// The model of the rig; none if the rig's hand has none.
+    #[serde(default)]
+    pub model: Option<PosedModel>,
 }

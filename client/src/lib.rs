@@ -47,6 +47,8 @@ mod pose;
 mod query;
 mod receiver;
 mod retry;
+mod rig;
+mod rigs;
 mod score;
 mod search;
 mod wire;
@@ -71,6 +73,7 @@ pub use pose::Pose;
 pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};
 pub use receiver::{Arm, Receiver, ReceiverBody, ReceiverStance, StandingBody};
 pub use retry::RetryPolicy;
+pub use rig::{AngleRange, DigitLimits, NewRig, NodePose, PosedModel, Rig, RigHand, RigNode, RigSource};
 pub use score::{Score, ScoreTerm};
 pub use search::{
     Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,

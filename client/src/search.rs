@@ -15,6 +15,7 @@ use crate::{
     pose::Pose,
     query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity},
     receiver::{Arm, Receiver, ReceiverStance},
+    rig::PosedModel,
     score::Score,
 };
 
@@ -259,6 +260,9 @@ pub struct Grasp {
     /// from there; none under [`Validity::Thesis`].
     #[serde(default)]
     pub arm: Option<Arm>,
+    /// The model of the rig; none if the rig's hand has none.
+    #[serde(default)]
+    pub model: Option<PosedModel>,
 }
 
 /// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.

@@ -3,7 +3,10 @@
 use std::net::{Ipv6Addr, SocketAddr};
 
 use grasp_client::GraspClient;
-use grasp_proto::v1::{grasp_service_client::GraspServiceClient, object_service_client::ObjectServiceClient};
+use grasp_proto::v1::{
+    grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
+    object_service_client::ObjectServiceClient,
+};
 use grasp_server::{Config, Gauges, ServeError, Server};
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
@@ -90,6 +93,11 @@ impl TestServer {
     /// The generated client of `ObjectService`, on a new connection.
     pub async fn objects(&self) -> ObjectServiceClient<Channel> {
         ObjectServiceClient::new(self.channel().await)
+    }
+
+    /// The generated client of `HandRigService`, on a new connection.
+    pub async fn rigs(&self) -> HandRigServiceClient<Channel> {
+        HandRigServiceClient::new(self.channel().await)
     }
 
     /// The generated client of `ObjectService`, which connects on its first call.

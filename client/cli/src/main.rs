@@ -12,6 +12,7 @@ mod objects;
 mod output;
 mod picture;
 mod progress_bar;
+mod rigs;
 mod server_options;
 mod values;
 
@@ -51,6 +52,8 @@ enum Command {
     Find(Box<find::Arguments>),
     #[command(subcommand)]
     Objects(objects::Command),
+    #[command(subcommand)]
+    Rigs(rigs::Command),
     Experiment(experiment::Arguments),
     Health(health::Arguments),
     Completions(completions::Arguments),
@@ -116,6 +119,7 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Demo(arguments) => demo::run(arguments, output).await,
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Objects(command) => objects::run(command, output).await,
+        Command::Rigs(command) => rigs::run(command, output).await,
         Command::Experiment(arguments) => experiment::run(arguments, output).await,
         Command::Health(arguments) => health::run(arguments, output).await,
         Command::Completions(arguments) => completions::run(&arguments, output),

@@ -11,7 +11,7 @@ use crate::hand::{
     ReceivingHand,
 };
 
-fn handedness_to_wire(handedness: Handedness) -> v1::Handedness {
+pub(super) fn handedness_to_wire(handedness: Handedness) -> v1::Handedness {
     match handedness {
         Handedness::Left => v1::Handedness::Left,
         Handedness::Right => v1::Handedness::Right,
@@ -99,27 +99,29 @@ pub(super) fn presenting_hand_to_wire(hand: &PresentingHand) -> v1::PresentingHa
             handedness,
             client_from_wrist,
             digits,
+            hand_scale,
         }) => v1::presenting_hand::Form::Angles(v1::HandAngles {
             rig: rig.clone(),
             handedness: handedness_to_wire(*handedness).into(),
             client_from_wrist: Some(pose_to_wire(*client_from_wrist)),
             digits: digits.iter().map(digit_angles_to_wire).collect(),
+            hand_scale: *hand_scale,
         }),
-        PresentingHand::Joints(HandJoints {
-            handedness,
-            joint_set,
-            joints,
-        }) => v1::presenting_hand::Form::Joints(v1::HandJoints {
-            handedness: handedness_to_wire(*handedness).into(),
-            joint_set: match joint_set {
-                JointSet::OpenXr26 => v1::JointSet::Openxr26,
-                JointSet::WebXr25 => v1::JointSet::Webxr25,
-            }
-            .into(),
-            joints: joints.iter().map(joint_to_wire).collect(),
-        }),
+        PresentingHand::Joints(joints) => v1::presenting_hand::Form::Joints(hand_joints_to_wire(joints)),
     };
     v1::PresentingHand { form: Some(form) }
+}
+
+pub(super) fn hand_joints_to_wire(hand: &HandJoints) -> v1::HandJoints {
+    v1::HandJoints {
+        handedness: handedness_to_wire(hand.handedness).into(),
+        joint_set: match hand.joint_set {
+            JointSet::OpenXr26 => v1::JointSet::Openxr26,
+            JointSet::WebXr25 => v1::JointSet::Webxr25,
+        }
+        .into(),
+        joints: hand.joints.iter().map(joint_to_wire).collect(),
+    }
 }
 
 pub(super) fn receiving_hand_to_wire(hand: &ReceivingHand) -> v1::ReceivingHand {
@@ -129,6 +131,7 @@ pub(super) fn receiving_hand_to_wire(hand: &ReceivingHand) -> v1::ReceivingHand 
             .handedness
             .map_or(v1::Handedness::Unspecified, handedness_to_wire)
             .into(),
+        hand_scale: hand.hand_scale,
     }
 }
 
@@ -151,11 +154,12 @@ mod tests {
             handedness: Handedness::Left,
             client_from_wrist: Pose::IDENTITY,
             digits,
+            hand_scale: Some(1.25),
         }));
         let Some(v1::presenting_hand::Form::Angles(angles)) = angles.form else {
             panic!("{angles:?}")
         };
-        assert_eq!(angles.rig, "adult");
+        assert_eq!((angles.rig.as_str(), angles.hand_scale), ("adult", Some(1.25)));
         assert_eq!(angles.handedness(), v1::Handedness::Left);
         assert_eq!(angles.digits.len(), 5);
         assert_eq!(angles.digits[0].third_pitch, None);

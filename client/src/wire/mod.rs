@@ -9,12 +9,14 @@ mod hand_codec;
 mod object_codec;
 mod obstacle_codec;
 mod receiver_codec;
+mod rig_codec;
 mod search_codec;
 
 pub(crate) use object_codec::{
     described_object_to_wire, health_from_wire, new_object_to_wire, news_from_wire, object_from_wire,
     object_page_from_wire, update_to_wire,
 };
+pub(crate) use rig_codec::{new_rig_to_wire, rig_from_wire, rig_page_from_wire};
 pub(crate) use search_codec::{find_answer_from_wire, find_request_to_wire};
 
 use crate::error::ClientError;

@@ -16,11 +16,13 @@ use super::{
     obstacle_codec::obstacle_to_wire,
     receiver_codec::{arm_from_wire, receiver_to_wire, stance_to_wire},
     required,
+    rig_codec::model_from_wire,
 };
 use crate::{
     grasp_type::GraspType,
     key_frame::{KeyFrame, KeyFrameKind},
     query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity},
+    rig::PosedModel,
     score::{Score, ScoreTerm},
     search::{
         Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
@@ -243,7 +245,15 @@ fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
             .map(arm_from_wire)
             .transpose()
             .map_err(|malformed| malformed.within("arm"))?,
+        model: optional_model(grasp.model)?,
     })
+}
+
+fn optional_model(model: Option<v1::PosedModel>) -> Result<Option<PosedModel>, Malformed> {
+    model
+        .map(model_from_wire)
+        .transpose()
+        .map_err(|malformed| malformed.within("model"))
 }
 
 fn score_from_wire(score: v1::Score) -> Score {
@@ -272,6 +282,7 @@ fn key_frame_from_wire(frame: v1::KeyFrame) -> Result<KeyFrame, Malformed> {
         client_from_wrist: pose_from_wire(frame.client_from_wrist),
         digits: exactly("digits", frame.digits)?.map(digit_angles_from_wire),
         joints: exactly("joints", frame.joints)?.map(joint_from_wire),
+        model: optional_model(frame.model)?,
     })
 }
 

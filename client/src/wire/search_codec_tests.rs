@@ -68,6 +68,21 @@ fn wire_grasp() -> v1::Grasp {
         r#type: v1::GraspType::Quadpod.into(),
         type_confidence: 0.75,
         hangs: true,
+        model: Some(v1::PosedModel {
+            root_node: "hand_l".to_owned(),
+            client_from_root: None,
+            scale: 1.5,
+            nodes: vec![v1::NodePose {
+                node: "index_01_l".to_owned(),
+                rotation: Some(v1::Quaternion {
+                    x: 0.6,
+                    y: 0.0,
+                    z: 0.0,
+                    w: 0.8,
+                }),
+                translation: None,
+            }],
+        }),
         arm: Some(v1::Arm {
             client_shoulder: Some(wire_vector(0.41)),
             client_elbow: Some(wire_vector(0.42)),
@@ -156,6 +171,7 @@ fn wire_key_frame(kind: v1::KeyFrameKind) -> v1::KeyFrame {
         }),
         digits: vec![v1::DigitAngles::default(); 5],
         joints: vec![v1::JointPose::default(); JOINT_COUNT],
+        model: None,
     }
 }
 
@@ -212,6 +228,9 @@ fn converts_every_number_of_an_answer() {
         (score.total, term.name.as_str(), term.value, term.weight),
         (0.21, "comfort", 0.22, 0.23)
     );
+    let model = grasp.model.as_ref().expect("it has a model");
+    assert_eq!((model.root_node.as_str(), model.scale), ("hand_l", 1.5));
+    assert_eq!(model.nodes[0].rotation.x, 0.6);
     let kinds: Vec<_> = grasp.key_frames.iter().map(|frame| frame.kind).collect();
     assert_eq!(kinds, [KeyFrameKind::Approach, KeyFrameKind::Close]);
     assert_eq!(grasp.key_frames[1].client_from_wrist.position.x, 27.0);
@@ -368,6 +387,7 @@ fn hand(handedness: Handedness) -> PresentingHand {
         handedness,
         client_from_wrist: Pose::IDENTITY,
         digits: [DigitAngles::default(); 5],
+        hand_scale: None,
     })
 }
 

@@ -104,6 +104,7 @@ pub(crate) fn held_remote() -> v1::FindGraspRequest {
                 third_pitch: None,
             })
             .collect(),
+        hand_scale: None,
     };
     v1::FindGraspRequest {
         client_from_object: Some(pose(Vec3::new(0.3, 1.2, 0.0), Quat::from_rotation_y(0.4))),

@@ -24,6 +24,8 @@ mod object_uploads;
 mod object_watches;
 mod objects;
 mod objects_directory;
+mod own_hands;
+mod own_models;
 mod physical;
 mod real_input;
 mod receiver;

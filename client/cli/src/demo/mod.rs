@@ -204,8 +204,8 @@ async fn ask_all(
         progress.step(&format!("asking for {}", holdout.name));
         let request = FindRequest {
             receiving_hand: ReceivingHand {
-                rig: None,
                 handedness: Some(Handedness::Right),
+                ..ReceivingHand::default()
             },
             budget: Some(plan.budget),
             strategy: Some(arguments.strategy.into()),

@@ -126,6 +126,9 @@ pub(crate) struct Arguments {
     /// The rig of the hand to pose. Default: the server's.
     #[arg(long, value_name = "RIG")]
     receiving_rig: Option<String>,
+    /// How many times as large as its rig the hand is, from 0.5 to 2. Default: 1.
+    #[arg(long, value_name = "SCALE")]
+    receiving_scale: Option<f32>,
     /// How many hands take the object. Default: one.
     #[arg(long, value_name = "HOW_MANY", conflicts_with = "key_frames")]
     hands: Option<HandsName>,
@@ -259,6 +262,7 @@ impl Arguments {
         let hand = &mut request.receiving_hand;
         hand.handedness = self.receiving_hand.map_or(hand.handedness, Into::into);
         hand.rig = self.receiving_rig.clone().or(hand.rig.take());
+        hand.hand_scale = self.receiving_scale.or(hand.hand_scale);
         Ok(request)
     }
 }

@@ -99,7 +99,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 /// The file's name without its extension, in lower case, with hyphens for runs of other characters.
-fn id_from_file(path: &Path) -> String {
+pub(crate) fn id_from_file(path: &Path) -> String {
     let stem = path
         .file_stem()
         .unwrap_or_default()

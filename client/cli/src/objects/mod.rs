@@ -10,6 +10,8 @@ mod watch;
 
 use std::collections::BTreeMap;
 
+pub(crate) use create::id_from_file;
+
 use clap::Subcommand;
 use glam::Vec3;
 use grasp_client::{AtlasState, Object, rfc3339};

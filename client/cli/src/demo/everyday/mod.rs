@@ -83,8 +83,8 @@ async fn ask(object: EverydayObject, plan: &Plan, client: &GraspClient) -> Resul
     let created = client.create_object(&new_object(&object)).await?;
     let request = FindRequest {
         receiving_hand: ReceivingHand {
-            rig: None,
             handedness: Some(Handedness::Right),
+            ..ReceivingHand::default()
         },
         budget: Some(plan.budget),
         seed: Some(plan.seed),

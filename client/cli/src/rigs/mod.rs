@@ -1,0 +1,154 @@
+//! `grasp rigs`
+
+mod create;
+
+use std::fmt::Write as _;
+
+use clap::{Args, Subcommand};
+use grasp_client::{Handedness, Rig, RigHand};
+use serde::Serialize;
+
+use crate::{
+    Ending,
+    failure::Failure,
+    output::{Output, pairs, table},
+    server_options::ServerOptions,
+};
+
+const ABOUT: &str = r"Show everything about a rig except its model.
+
+With --json: name, built_in, hands (left, then right: handedness, stretched_joints, limits, mirrored, root_node, nodes),
+warnings; metres, radians, quaternions x y z w.";
+
+/// List, show, create and delete rigs of hands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    List(List),
+    Get(Named),
+    Create(create::Arguments),
+    Delete(Delete),
+}
+
+/// List all rigs of the server.
+///
+/// With --json: {"rigs": […]}, each like the output of `grasp rigs get --json`.
+#[derive(Args, Debug)]
+pub(crate) struct List {
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+/// Show everything about a rig except its model.
+#[derive(Args, Debug)]
+#[command(long_about = ABOUT)]
+pub(crate) struct Named {
+    /// The rig's name: "my-hand" or "rigs/my-hand".
+    name: String,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+/// Delete a created rig.
+///
+/// With --json: {"deleted": "rigs/…"}.
+#[derive(Args, Debug)]
+pub(crate) struct Delete {
+    #[command(flatten)]
+    rig: Named,
+}
+
+#[derive(Serialize)]
+struct Answer {
+    rigs: Vec<Rig>,
+}
+
+#[derive(Serialize)]
+struct Deleted {
+    deleted: String,
+}
+
+pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
+    match command {
+        Command::List(arguments) => {
+            let rigs = arguments.server.connect().await?.list_rigs().await?;
+            output.write(&Answer { rigs }, |answer| listed(&answer.rigs))?;
+        }
+        Command::Get(arguments) => {
+            let client = arguments.server.connect().await?;
+            output.write(&client.get_rig(full_name(&arguments.name)).await?, describe)?;
+        }
+        Command::Create(arguments) => create::run(arguments, output).await?,
+        Command::Delete(Delete { rig }) => {
+            let deleted = full_name(&rig.name);
+            rig.server.connect().await?.delete_rig(&deleted).await?;
+            output.write(&Deleted { deleted }, |answer| {
+                format!("deleted {}", answer.deleted)
+            })?;
+        }
+    }
+    Ok(Ending::Done)
+}
+
+/// The full name of a rig; "my-hand" is short for "rigs/my-hand".
+fn full_name(name: &str) -> String {
+    if name.starts_with("rigs/") {
+        name.to_owned()
+    } else {
+        format!("rigs/{name}")
+    }
+}
+
+fn listed(rigs: &[Rig]) -> String {
+    let mut table = table(&["rig", ">left", ">right", "built in", "model", "warnings"]);
+    for rig in rigs {
+        let [left, right] = &rig.hands;
+        table.add_row([
+            rig.name.clone(),
+            length(left),
+            length(right),
+            yes(rig.built_in).to_owned(),
+            yes(rig.hands.iter().any(|hand| !hand.root_node.is_empty())).to_owned(),
+            rig.warnings.len().to_string(),
+        ]);
+    }
+    table.to_string()
+}
+
+fn yes(is_so: bool) -> &'static str {
+    if is_so { "yes" } else { "no" }
+}
+
+/// From the wrist to the tip of the stretched middle finger, in millimetres.
+fn length(hand: &RigHand) -> String {
+    const WRIST: usize = 1;
+    const MIDDLE_TIP: usize = 15;
+    let at = |joint: usize| hand.stretched_joints[joint].client_from_joint.position;
+    format!("{:.0} mm", 1000.0 * at(WRIST).distance(at(MIDDLE_TIP)))
+}
+
+/// Everything about a rig, for people.
+fn describe(rig: &Rig) -> String {
+    let mut lines = vec![
+        ("name", rig.name.clone()),
+        ("built in", yes(rig.built_in).to_owned()),
+    ];
+    for hand in &rig.hands {
+        let mut text = length(hand);
+        if hand.mirrored {
+            text.push_str(", the other hand mirrored");
+        }
+        if !hand.root_node.is_empty() {
+            // Writing to a string cannot fail.
+            let _ = write!(text, ", {} nodes below {:?}", hand.nodes.len(), hand.root_node);
+        }
+        lines.push((
+            match hand.handedness {
+                Handedness::Left => "left hand",
+                Handedness::Right => "right hand",
+            },
+            text,
+        ));
+    }
+    lines.extend(rig.warnings.iter().map(|warning| ("warning", warning.clone())));
+    pairs(&lines)
+}

@@ -1,0 +1,225 @@
+//! Answers pose the nodes of a client's own model, judged by drawing its skin with code that the server does not use.
+
+use glam::{Mat4, Quat, Vec3};
+use gltf::{Document, scene::Transform};
+use grasp_assets::{
+    holdouts::{BuiltInHoldout, holdouts},
+    objects::object,
+};
+use grasp_client::{FindRequest, Grasp, Handedness, PosedModel, ReceivingHand, built_in::request_for};
+use grasp_synthesis::geometry::mesh::TriangleMesh;
+use grasp_tests::TestServer;
+
+use crate::own_hands::{model, new_rig};
+
+/// A skin in the client's frame.
+struct Drawn {
+    positions: Vec<Vec3>,
+    triangles: Vec<[usize; 3]>,
+}
+
+/// Draws a GLB's only skin with posed nodes, as a viewer that puts the root where the answer says.
+fn drawn(glb: &[u8], posed: &PosedModel) -> Drawn {
+    let file = gltf::Gltf::from_slice(glb).unwrap();
+    let blob = file.blob.as_deref();
+    let root = file
+        .nodes()
+        .find(|node| node.name() == Some(posed.root_node.as_str()))
+        .unwrap();
+    let (scale, ..) = global(&file.document, root.index(), None).to_scale_rotation_translation();
+    let client_from_root = Mat4::from_scale_rotation_translation(
+        posed.scale * scale,
+        posed.client_from_root.orientation,
+        posed.client_from_root.position,
+    );
+    let skin = file.skins().next().unwrap();
+    let inverse_binds = skin.reader(|_| blob).read_inverse_bind_matrices().unwrap();
+    let matrices: Vec<Mat4> = skin
+        .joints()
+        .zip(inverse_binds)
+        .map(|(joint, inverse)| {
+            let below = below_root(&file.document, joint.index(), root.index(), posed);
+            client_from_root * below * Mat4::from_cols_array_2d(&inverse)
+        })
+        .collect();
+    let primitive = file.meshes().next().unwrap().primitives().next().unwrap();
+    let reader = primitive.reader(|_| blob);
+    let joints = reader.read_joints(0).unwrap().into_u16();
+    let weights = reader.read_weights(0).unwrap().into_f32();
+    let vertices = reader.read_positions().unwrap().zip(joints.zip(weights));
+    let positions = vertices
+        .map(|(position, (joints, weights))| {
+            let moved = joints.iter().zip(weights).map(|(&joint, weight)| {
+                weight * matrices[usize::from(joint)].transform_point3(Vec3::from(position))
+            });
+            moved.sum()
+        })
+        .collect();
+    let corners: Vec<usize> = reader
+        .read_indices()
+        .unwrap()
+        .into_u32()
+        .map(|corner| corner as usize)
+        .collect();
+    Drawn {
+        positions,
+        triangles: corners
+            .chunks(3)
+            .map(|corners| [corners[0], corners[1], corners[2]])
+            .collect(),
+    }
+}
+
+fn local(node: &gltf::Node<'_>) -> Mat4 {
+    match node.transform() {
+        Transform::Matrix { matrix } => Mat4::from_cols_array_2d(&matrix),
+        Transform::Decomposed {
+            translation,
+            rotation,
+            scale,
+        } => Mat4::from_scale_rotation_translation(
+            Vec3::from(scale),
+            Quat::from_array(rotation),
+            Vec3::from(translation),
+        ),
+    }
+}
+
+fn parent(document: &Document, node: usize) -> Option<usize> {
+    let parent = document
+        .nodes()
+        .find(|parent| parent.children().any(|child| child.index() == node));
+    parent.map(|parent| parent.index())
+}
+
+/// The transform of a node in the scene, or in that of a node above it.
+fn global(document: &Document, node: usize, above: Option<usize>) -> Mat4 {
+    if Some(node) == above {
+        return Mat4::IDENTITY;
+    }
+    let own = local(&document.nodes().nth(node).unwrap());
+    parent(document, node).map_or(own, |parent| global(document, parent, above) * own)
+}
+
+fn below_root(document: &Document, node: usize, root: usize, posed: &PosedModel) -> Mat4 {
+    if node == root {
+        return Mat4::IDENTITY;
+    }
+    let described = document.nodes().nth(node).unwrap();
+    let mut own = local(&described);
+    if let Some(pose) = posed
+        .nodes
+        .iter()
+        .find(|pose| Some(pose.node.as_str()) == described.name())
+    {
+        let (scale, _, translation) = own.to_scale_rotation_translation();
+        let translation = pose.translation.unwrap_or(translation);
+        own = Mat4::from_scale_rotation_translation(scale, pose.rotation, translation);
+    }
+    below_root(document, parent(document, node).unwrap(), root, posed) * own
+}
+
+/// The nearest point of a triangle, by projection onto its plane and its edges.
+fn distance_to_triangle([a, b, c]: [Vec3; 3], point: Vec3) -> f32 {
+    let normal = (b - a).cross(c - a);
+    let inside = [(a, b), (b, c), (c, a)]
+        .iter()
+        .all(|&(from, to)| (to - from).cross(point - from).dot(normal) >= 0.0);
+    if inside && normal.length() > 0.0 {
+        return (point - a).dot(normal).abs() / normal.length();
+    }
+    let to_edge = |from: Vec3, to: Vec3| {
+        let along = ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
+        (from + (to - from) * along).distance(point)
+    };
+    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+}
+
+/// The winding number of a closed mesh around a point: 1 inside, 0 outside (van Oosterom and Strackee 1983).
+fn winding(mesh: &TriangleMesh, point: Vec3) -> f32 {
+    let solid_angle = |triangle: usize| {
+        let [a, b, c] = mesh.corners(triangle).map(|corner| (corner - point).as_dvec3());
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        2.0 * a.dot(b.cross(c)).atan2(below)
+    };
+    let total: f64 = (0..mesh.triangles().len()).map(solid_angle).sum();
+    (total / (4.0 * std::f64::consts::PI)) as f32
+}
+
+/// How far the drawn skin is from the contacts at most, and how deep it is in the object, in metres.
+fn measure(skin: &Drawn, grasp: &Grasp, holdout: &BuiltInHoldout) -> (Vec<f32>, f32) {
+    let from_contacts = grasp
+        .contacts
+        .iter()
+        .map(|contact| {
+            let to_triangle = |corners: &[usize; 3]| {
+                distance_to_triangle(
+                    corners.map(|corner| skin.positions[corner]),
+                    contact.client_position,
+                )
+            };
+            skin.triangles
+                .iter()
+                .map(to_triangle)
+                .fold(f32::INFINITY, f32::min)
+        })
+        .collect();
+    let mesh = object(&holdout.object).unwrap().object.surface.mesh();
+    let object_from_client = holdout.world_from_object.inverse();
+    let mut deepest = 0.0_f32;
+    for &position in &skin.positions {
+        let position = object_from_client.transform_point(position);
+        let near = |triangle: usize| distance_to_triangle(mesh.corners(triangle), position);
+        let distance = (0..mesh.triangles().len())
+            .map(near)
+            .fold(f32::INFINITY, f32::min);
+        if distance > deepest && distance < 0.03 && winding(mesh, position) > 0.5 {
+            deepest = distance;
+        }
+    }
+    (from_contacts, deepest)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_drawn_skin_touches_where_the_answer_says() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    for (id, scale, hand_scale) in [
+        ("twin", 1.0, None),
+        ("small", 0.85, None),
+        ("grown", 0.85, Some(1.2)),
+    ] {
+        client.create_rig(&new_rig(id, scale)).await.unwrap();
+        let glb = model(scale);
+        let (mut contacts, mut deepest): (Vec<f32>, Vec<f32>) = (Vec::new(), Vec::new());
+        for holdout in holdouts().iter().step_by(3) {
+            let request = FindRequest {
+                receiving_hand: ReceivingHand {
+                    rig: Some(format!("rigs/{id}")),
+                    handedness: Some(Handedness::Right),
+                    hand_scale,
+                },
+                budget: Some(std::time::Duration::from_secs(5)),
+                ..request_for(holdout)
+            };
+            let Some(grasp) = client.find_grasp(&request).await.unwrap().grasp else {
+                continue;
+            };
+            let posed = grasp.model.as_ref().expect("the hand has a model");
+            assert_eq!(posed.scale, hand_scale.unwrap_or(1.0));
+            let skin = drawn(&glb, posed);
+            let (from_contacts, depth) = measure(&skin, &grasp, holdout);
+            contacts.extend(from_contacts);
+            deepest.push(depth);
+        }
+        contacts.sort_by(f32::total_cmp);
+        deepest.sort_by(f32::total_cmp);
+        println!("{id}: contacts {contacts:?}, depths {deepest:?}");
+        let median = contacts[contacts.len() / 2];
+        assert!(median < 0.0015, "{id}: {contacts:?}");
+        assert!(contacts[contacts.len() - 1] < 0.006, "{id}: {contacts:?}");
+        assert!(deepest[deepest.len() - 1] < 0.006, "{id}: {deepest:?}");
+    }
+    server.stop().await;
+}
