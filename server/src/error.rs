@@ -352,6 +352,38 @@ mod tests {
 
     const SECOND: Duration = Duration::from_secs(1);
 
+    /// Errors about rigs, with their code and reason.
+    fn errors_of_rigs() -> [(ServiceError, Code, &'static str); 4] {
+        [
+            (
+                ServiceError::RigNotFound {
+                    name: "rigs/x".into(),
+                },
+                Code::NotFound,
+                "RIG_NOT_FOUND",
+            ),
+            (
+                ServiceError::RigExists {
+                    name: "rigs/x".into(),
+                },
+                Code::AlreadyExists,
+                "RIG_EXISTS",
+            ),
+            (
+                ServiceError::RigBuiltIn {
+                    name: "rigs/adult".into(),
+                },
+                Code::FailedPrecondition,
+                "RIG_BUILT_IN",
+            ),
+            (
+                ServiceError::RigsFull { maximum: 64 },
+                Code::ResourceExhausted,
+                "TOO_MANY_RIGS",
+            ),
+        ]
+    }
+
     /// Errors of calls that stream, with their code and reason.
     fn errors_of_streams() -> [(ServiceError, Code, &'static str); 6] {
         [
@@ -440,32 +472,6 @@ mod tests {
                 "OBJECT_CHANGED",
             ),
             (
-                ServiceError::RigNotFound {
-                    name: "rigs/x".into(),
-                },
-                Code::NotFound,
-                "RIG_NOT_FOUND",
-            ),
-            (
-                ServiceError::RigExists {
-                    name: "rigs/x".into(),
-                },
-                Code::AlreadyExists,
-                "RIG_EXISTS",
-            ),
-            (
-                ServiceError::RigBuiltIn {
-                    name: "rigs/adult".into(),
-                },
-                Code::FailedPrecondition,
-                "RIG_BUILT_IN",
-            ),
-            (
-                ServiceError::RigsFull { maximum: 64 },
-                Code::ResourceExhausted,
-                "TOO_MANY_RIGS",
-            ),
-            (
                 ServiceError::Overloaded {
                     limit: Limit::Searches,
                     maximum: 64,
@@ -487,7 +493,11 @@ mod tests {
             (ServiceError::Cancelled, Code::Cancelled, "CALL_CANCELLED"),
             (ServiceError::Panicked, Code::Internal, "JOB_PANICKED"),
         ];
-        for (error, code, reason) in errors.into_iter().chain(errors_of_streams()) {
+        for (error, code, reason) in errors
+            .into_iter()
+            .chain(errors_of_streams())
+            .chain(errors_of_rigs())
+        {
             let status = Status::from(error);
             assert_eq!(status.code(), code);
             let details = status.get_error_details();
