@@ -92,11 +92,13 @@ def test_default_memory_matches_the_page():
     mib = 1 << 20
     upload = 2 * value["maximum_object_bytes"] + 640 * value["maximum_object_triangles"] + 512 * 1024
     total = (
-        20 * mib
+        26 * mib
         + value["cache_bytes"]
         + value["maximum_uploads"] * upload
         + 20 * mib * value["builder_threads"]
         + 2 * mib * value["maximum_searches"]
+        + mib * value["maximum_rigs"]
+        + value["maximum_unread_bytes"]
         + 32 * 1024 * value["maximum_connections"]
         + 64 * 1024 * (30 + value["io_threads"])
     )

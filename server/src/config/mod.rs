@@ -102,7 +102,7 @@ impl Default for Config {
                 objects: 1000,
                 bytes: 512 << 20,
             },
-            maximum_rigs: non_zero(64),
+            maximum_rigs: non_zero(16),
             objects_directory: None,
             builder_threads: 1,
             atlas_directory: None,

@@ -74,7 +74,7 @@ pub struct RawConfig {
     /// Memory for created objects and atlases, in bytes, by estimate [default: 536870912].
     #[arg(long, env = "GRASP_CACHE_BYTES", value_name = "BYTES")]
     pub cache_bytes: Option<u64>,
-    /// Most rigs of hands that clients created; more are rejected [default: 64].
+    /// Most rigs of hands that clients created; more are rejected [default: 16].
     #[arg(long, env = "GRASP_MAXIMUM_RIGS", value_name = "COUNT")]
     pub maximum_rigs: Option<u64>,
     /// Folder of objects to start with: a mesh NAME.obj, .stl, .ply, .glb or .gltf with NAME.toml becomes objects/NAME [default: none].

@@ -10,9 +10,9 @@ use grasp_synthesis::propose::prepared::PreparedRig;
 
 use super::RigHand;
 
-/// Largest number of kept hands: some ten megabytes. A game has few sizes; with more in turn, each call derives a hand's
+/// Largest number of kept hands: some six megabytes. A game has few sizes; with more in turn, each call derives a hand's
 /// oppositions again, which takes tenths of a second.
-const CAPACITY: usize = 32;
+const CAPACITY: usize = 16;
 
 /// A hand with the one and the hundredths that it was made from.
 #[derive(Debug)]
