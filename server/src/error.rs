@@ -222,17 +222,10 @@ impl From<ServiceError> for Status {
                 details.set_resource_info("grasp.v1.Object", name, "", message.clone());
                 Status::with_error_details(Code::Aborted, message, details)
             }
-            ServiceError::RigNotFound { name } => {
-                let details = rig_details("RIG_NOT_FOUND", name, &message);
-                Status::with_error_details(Code::NotFound, message, details)
-            }
-            ServiceError::RigExists { name } => {
-                let details = rig_details("RIG_EXISTS", name, &message);
-                Status::with_error_details(Code::AlreadyExists, message, details)
-            }
+            ServiceError::RigNotFound { name } => rig_status(Code::NotFound, "RIG_NOT_FOUND", name, message),
+            ServiceError::RigExists { name } => rig_status(Code::AlreadyExists, "RIG_EXISTS", name, message),
             ServiceError::RigBuiltIn { name } => {
-                let details = rig_details("RIG_BUILT_IN", name, &message);
-                Status::with_error_details(Code::FailedPrecondition, message, details)
+                rig_status(Code::FailedPrecondition, "RIG_BUILT_IN", name, message)
             }
             ServiceError::RigsFull { maximum } => Status::with_error_details(
                 Code::ResourceExhausted,
@@ -304,11 +297,11 @@ fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDet
     ErrorDetails::with_error_info(reason, ERROR_DOMAIN, metadata)
 }
 
-/// Details of an error about one rig.
-fn rig_details(reason: &str, name: String, message: &str) -> ErrorDetails {
+/// The status of an error about one rig.
+fn rig_status(code: Code, reason: &str, name: String, message: String) -> Status {
     let mut details = info(reason, [("name", name.clone())]);
-    details.set_resource_info("grasp.v1.Rig", name, "", message);
-    details
+    details.set_resource_info("grasp.v1.Rig", name, "", message.clone());
+    Status::with_error_details(code, message, details)
 }
 
 fn limit_reason(limit: Limit) -> &'static str {

@@ -99,6 +99,8 @@ def test_default_memory_matches_the_page():
         + 2 * mib * value["maximum_searches"]
         + mib * value["maximum_rigs"]
         + value["maximum_unread_bytes"]
+        + 2 * value["maximum_upload_bytes"]
+        + 512 * 1024 * value["maximum_watchers"]
         + 32 * 1024 * value["maximum_connections"]
         + 64 * 1024 * (30 + value["io_threads"])
     )

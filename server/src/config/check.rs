@@ -107,11 +107,7 @@ impl RawConfig {
                 log_format,
             ),
             mechanisms: defaults.mechanisms,
-            log: check.parsed("log", self.log, defaults.log, "a filter such as info", |text| {
-                tracing_subscriber::EnvFilter::try_new(text)
-                    .ok()
-                    .map(|_| text.to_owned())
-            }),
+            log: check.parsed("log", self.log, defaults.log, "a filter such as info", log_filter),
         };
         if bad.is_empty() {
             Ok(config)
@@ -265,6 +261,11 @@ impl Check<'_> {
             default
         })
     }
+}
+
+fn log_filter(text: &str) -> Option<String> {
+    let filter = tracing_subscriber::EnvFilter::try_new(text);
+    filter.is_ok().then(|| text.to_owned())
 }
 
 fn log_format(text: &str) -> Option<LogFormat> {
