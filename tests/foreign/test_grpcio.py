@@ -44,7 +44,7 @@ def objects(channel):
 
 def test_health_reports_serving_overall_and_per_service(channel):
     health = health_pb2_grpc.HealthStub(channel)
-    for service in ["", "grasp.v1.GraspService", "grasp.v1.ObjectService"]:
+    for service in ["", "grasp.v1.GraspService", "grasp.v1.ObjectService", "grasp.v1.HandRigService"]:
         answer = health.Check(health_pb2.HealthCheckRequest(service=service))
         assert answer.status == health_pb2.HealthCheckResponse.SERVING
     with pytest.raises(grpc.RpcError) as rejected:

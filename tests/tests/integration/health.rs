@@ -12,7 +12,12 @@ use crate::fixtures::bounded;
 async fn the_server_and_each_service_report_serving() {
     let server = TestServer::start().await;
     let mut client = HealthClient::new(server.channel().await);
-    for service in ["", "grasp.v1.GraspService", "grasp.v1.ObjectService"] {
+    for service in [
+        "",
+        "grasp.v1.GraspService",
+        "grasp.v1.ObjectService",
+        "grasp.v1.HandRigService",
+    ] {
         let request = HealthCheckRequest {
             service: service.to_owned(),
         };

@@ -5,9 +5,10 @@ use prost::Message as _;
 use tokio_stream::once;
 
 /// Services that must be listed.
-const SERVICES: [&str; 3] = [
+const SERVICES: [&str; 4] = [
     "grasp.v1.GraspService",
     "grasp.v1.ObjectService",
+    "grasp.v1.HandRigService",
     "grpc.health.v1.Health",
 ];
 
