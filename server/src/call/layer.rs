@@ -37,8 +37,8 @@ const UPLOAD_METHODS: [&str; 4] = [
 /// Path of the method whose request may take long to arrive. It limits its time itself.
 const STREAMED_UPLOAD: &str = "/grasp.v1.ObjectService/UploadObject";
 
-/// Package and name of the service that takes large messages, by the methods above only.
-const OBJECT_SERVICE: &str = "/grasp.v1.ObjectService/";
+/// Packages and names of the services that take large messages, by the methods above only.
+const UPLOAD_SERVICES: [&str; 2] = ["/grasp.v1.ObjectService/", "/grasp.v1.HandRigService/"];
 
 /// When a client whose upload was rejected should retry: after about the time of an upload.
 const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
@@ -104,7 +104,9 @@ where
             search_end: Arc::clone(&context.search_end),
             reserve: Arc::clone(&self.layer.reserve),
         };
-        let largest = if path.starts_with(OBJECT_SERVICE) && !UPLOAD_METHODS.contains(&path) {
+        let largest = if UPLOAD_SERVICES.iter().any(|service| path.starts_with(service))
+            && !UPLOAD_METHODS.contains(&path)
+        {
             LARGEST_FIND_REQUEST
         } else {
             usize::MAX
