@@ -29,8 +29,7 @@ use crate::{
     limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
     net::{AcceptLimits, UnreadAnswers, UnreadLayer, accept},
     objects::{
-        StoredObject,
-        directory::{self, DirectoryError},
+        directory::{self, DirectoryError, PinnedObject},
         store::ObjectStore,
     },
     reserve::DeadlineReserve,
@@ -174,7 +173,7 @@ impl Server {
             Some(path) => logged(path, directory::load(path, obj_limits, config.store)?),
             None => Vec::new(),
         };
-        let directory_bytes = directory.iter().map(StoredObject::bytes).sum();
+        let directory_bytes = directory.iter().map(|pinned| pinned.object.bytes()).sum();
         let objects = Arc::new(ObjectStore::new(config.store, directory));
         for object in objects.pinned() {
             object.prepare(&config.default_rig);
@@ -326,8 +325,8 @@ impl Server {
 }
 
 /// Logs the objects of a folder and their warnings.
-fn logged(path: &Path, objects: Vec<StoredObject>) -> Vec<StoredObject> {
-    for object in &objects {
+fn logged(path: &Path, objects: Vec<PinnedObject>) -> Vec<PinnedObject> {
+    for PinnedObject { object, .. } in &objects {
         for warning in &object.warnings {
             tracing::warn!(
                 object = object.name(),

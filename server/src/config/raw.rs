@@ -80,7 +80,7 @@ pub struct RawConfig {
     /// Folder of objects to start with: a mesh NAME.obj, .stl, .ply, .glb or .gltf with NAME.toml becomes objects/NAME [default: none].
     ///
     /// The TOML file has the keys of a `CreateObject` request: `mass_kg` and optionally `unit_metres`,
-    /// `centre_of_mass`, `friction`, `forbidden.groups` and `forbidden.triangles`. Each file has the limits of an
+    /// `centre_of_mass`, `friction`, `forbidden.groups`, `forbidden.triangles` and `labels`. Each file has the limits of an
     /// upload; all objects together have the limits `cache_objects` and `cache_bytes`, in addition to those that
     /// clients create. They are never evicted.
     #[arg(long, env = "GRASP_OBJECTS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]

@@ -70,14 +70,14 @@ async fn a_built_in_object_from_the_folder_gets_the_same_grasp() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn objects_of_the_folder_are_never_evicted() {
+async fn objects_of_the_folder_are_never_evicted_changed_or_deleted() {
     let folder = Folder::empty("stay");
     let shelf = box_request("any");
     add(
         &folder,
         "shelf",
         std::str::from_utf8(&shelf.mesh).unwrap(),
-        "mass_kg = 0.1\n",
+        "mass_kg = 0.1\nlabels.level = \"cellar\"\n",
     );
     let server = TestServer::start_with(|config| {
         config.objects_directory = Some(folder.path().to_owned());
@@ -97,6 +97,26 @@ async fn objects_of_the_folder_are_never_evicted() {
     let names: Vec<String> = listed.into_inner().objects.into_iter().map(|o| o.name).collect();
     let expected = ["remote", "scalpel", "scissors", "second", "shelf"];
     assert_eq!(names, expected.map(|id| format!("objects/{id}")));
+    let filtered = v1::ListObjectsRequest {
+        filter: "level=cellar".to_owned(),
+        ..Default::default()
+    };
+    let filtered = client.list_objects(filtered).await.unwrap().into_inner().objects;
+    assert_eq!(filtered[0].name, "objects/shelf");
+    let name = || "objects/shelf".to_owned();
+    let update = v1::UpdateObjectRequest {
+        name: name(),
+        mass_kg: Some(1.0),
+        ..Default::default()
+    };
+    let status = client.update_object(update).await.unwrap_err();
+    assert_eq!(status.code(), Code::FailedPrecondition);
+    let delete = v1::DeleteObjectRequest {
+        name: name(),
+        ..Default::default()
+    };
+    let status = client.delete_object(delete).await.unwrap_err();
+    assert_eq!(status.code(), Code::FailedPrecondition);
     server.stop().await;
 }
 

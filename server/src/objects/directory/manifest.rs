@@ -3,16 +3,17 @@
 use grasp_proto::v1;
 use toml::{Table, Value};
 
-use crate::validate::{Field, Violations, quoted};
+use crate::validate::{Field, Labels, Violations, quoted};
 
 /// The keys of a manifest.
-const KEYS: [&str; 6] = [
+const KEYS: [&str; 7] = [
     "mass_kg",
     "unit_metres",
     "up_axis",
     "centre_of_mass",
     "friction",
     "forbidden",
+    "labels",
 ];
 
 /// The keys of `forbidden`.
@@ -30,6 +31,7 @@ pub(super) struct Manifest {
     centre_of_mass: Option<v1::Vector3>,
     friction: Option<f32>,
     forbidden: v1::ForbiddenSurfaces,
+    labels: Labels,
 }
 
 impl Manifest {
@@ -44,6 +46,7 @@ impl Manifest {
             centre_of_mass: self.centre_of_mass,
             friction: self.friction,
             forbidden: Some(self.forbidden),
+            labels: self.labels,
             ..Default::default()
         }
     }
@@ -99,7 +102,24 @@ pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option
             .get("forbidden")
             .map(|value| forbidden(Field::root("forbidden"), value, violations))
             .unwrap_or_default(),
+        labels: table
+            .get("labels")
+            .map(|value| labels(Field::root("labels"), value, violations))
+            .unwrap_or_default(),
     })
+}
+
+/// Labels: a table of texts.
+fn labels(field: Field<'_>, value: &Value, violations: &mut Violations) -> Labels {
+    let Some(table) = value.as_table() else {
+        return reject(field, value, "a table of texts", violations).unwrap_or_default();
+    };
+    let pairs = table.iter().filter_map(|(key, value)| {
+        let text = value.as_str().map(str::to_owned);
+        let text = text.or_else(|| reject(field.child(key), value, "a text", violations))?;
+        Some((key.clone(), text))
+    });
+    pairs.collect()
 }
 
 fn reject_unknown(table: &Table, parent: Option<Field<'_>>, known: &[&str], violations: &mut Violations) {

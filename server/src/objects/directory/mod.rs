@@ -20,13 +20,22 @@ use super::{StoredObject, build::build_object, store::is_built_in};
 use crate::{
     error::ServiceError,
     limits::{BYTES_BESIDES_MESH, StoreLimits},
-    validate::{Violations, object_fields, quoted},
+    validate::{Labels, Violations, object_fields, quoted},
 };
 use manifest::read_manifest;
 use pairs::{Pair, pairs};
 
 /// Largest number of listed problems; the others are only counted, to bound the log line.
 const LISTED_PROBLEMS: usize = 100;
+
+/// An object that the server starts with.
+#[derive(Debug)]
+pub(crate) struct PinnedObject {
+    /// The object.
+    pub object: StoredObject,
+    /// Its labels.
+    pub labels: Labels,
+}
 
 /// A problem of a folder of objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,14 +101,14 @@ pub(crate) fn load(
     path: &Path,
     limits: MeshLimits,
     store: StoreLimits,
-) -> Result<Vec<StoredObject>, DirectoryError> {
+) -> Result<Vec<PinnedObject>, DirectoryError> {
     let mut problems = Vec::new();
     let mut objects = Vec::new();
     let mut bytes = 0_usize;
     for pair in pairs(path, store.objects, &mut problems) {
         match read_pair(path, &pair, limits) {
             Ok(object) => {
-                bytes = bytes.saturating_add(object.bytes());
+                bytes = bytes.saturating_add(object.object.bytes());
                 if bytes > store.bytes {
                     problems.push(DirectoryProblem::of(
                         pair.mesh,
@@ -127,7 +136,7 @@ pub(crate) fn load(
 }
 
 /// Reads one object.
-fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<StoredObject, Vec<DirectoryProblem>> {
+fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObject, Vec<DirectoryProblem>> {
     let mut problems = Vec::new();
     let mut read = |name: &str, limit| match read_bounded(&path.join(name), limit) {
         Ok(bytes) => Some(bytes),
@@ -155,13 +164,14 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<StoredObjec
         problems.extend(problems_of(pair, violations.into_error()));
         return Err(problems);
     };
-    let fields = object_fields(
+    let mut fields = object_fields(
         manifest.into_request(&pair.id, mesh),
         limits.bytes,
         &mut violations,
     );
+    let labels = std::mem::take(&mut fields.labels);
     match build_object(fields, limits, violations) {
-        Ok(object) if problems.is_empty() => Ok(object),
+        Ok(object) if problems.is_empty() => Ok(PinnedObject { object, labels }),
         Ok(_) => Err(problems),
         Err(error) => {
             problems.extend(problems_of(pair, error));

@@ -31,7 +31,7 @@ impl Folder {
         Self(path)
     }
 
-    fn load(&self) -> Result<Vec<StoredObject>, DirectoryError> {
+    fn load(&self) -> Result<Vec<PinnedObject>, DirectoryError> {
         load(&self.0, LIMITS, STORE)
     }
 
@@ -52,7 +52,7 @@ impl Drop for Folder {
 #[test]
 fn pairs_become_objects_and_other_files_are_ignored() {
     let manifest = "mass_kg = 1\nunit_metres = 0.1\ncentre_of_mass = [0, 0.01, 2e-2]\nfriction = 0.5\n\
-                    [forbidden]\ngroups = [\"lid\"]\ntriangles = [3]\n";
+                    [forbidden]\ngroups = [\"lid\"]\ntriangles = [3]\n[labels]\nlevel = \"kitchen\"\n";
     let folder = Folder::new(
         "pairs",
         &[
@@ -66,20 +66,22 @@ fn pairs_become_objects_and_other_files_are_ignored() {
         ],
     );
     let objects = folder.load().unwrap();
-    let ids: Vec<&str> = objects.iter().map(|object| object.id.as_str()).collect();
+    let ids: Vec<&str> = objects.iter().map(|pinned| pinned.object.id.as_str()).collect();
     assert_eq!(ids, ["block-2", "mug"]);
-    let block = &objects[0].object;
+    let block = &objects[0].object.object;
     // The centroid of a tetrahedron is the mean of its corners; the friction is the contract's default.
     assert!((block.centre_of_mass - glam::Vec3::splat(0.25)).length() < 1e-6);
     assert_eq!((block.mass, block.friction), (0.2, None));
-    let mug = &objects[1].object;
+    let mug = &objects[1].object.object;
     assert_eq!((mug.mass, mug.friction), (1.0, Some(0.5)));
     assert_eq!(mug.centre_of_mass, glam::Vec3::new(0.0, 0.01, 0.02));
     let forbidden: Vec<bool> = (0..4).map(|t| mug.is_forbidden(t)).collect();
     assert_eq!(forbidden, [true, false, false, true]);
     let longest = mug.surface.mesh().positions().iter().map(|p| p.max_element());
     assert!((longest.fold(0.0, f32::max) - 0.1).abs() < 1e-6);
-    assert!(objects.iter().all(|object| !object.built_in));
+    assert!(objects.iter().all(|pinned| !pinned.object.built_in));
+    assert_eq!(objects[1].labels["level"], "kitchen");
+    assert!(objects[0].labels.is_empty());
 }
 
 #[test]
@@ -99,7 +101,7 @@ fn reports_all_problems_at_once() {
             (
                 "keys.toml",
                 "masskg = 1\nfriction = \"high\"\ncentre_of_mass = [0, 1]\n[forbidden]\ngroup = [\"lid\"]\n\
-                 triangles = [0, -1, \"two\"]\n",
+                 triangles = [0, -1, \"two\"]\n[labels]\nlevel = 3\n",
             ),
             ("lids.obj", TETRAHEDRON),
             (
@@ -123,13 +125,14 @@ fn reports_all_problems_at_once() {
         "heavy.toml: mass_kg: is 2000; it must be more than 0 and at most 1000",
         "heavy.toml: friction: is 0; it must be more than 0 and at most 5",
         "heavy.obj: line 2: vertex 2 does not exist; 1 are known, counted from 1 or backward from -1",
-        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, up_axis, centre_of_mass, friction, forbidden",
+        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, up_axis, centre_of_mass, friction, forbidden, labels",
         "keys.toml: mass_kg: is missing; it must be the mass in kilograms",
         "keys.toml: friction: is \"high\"; it must be a number",
         "keys.toml: centre_of_mass: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",
         "keys.toml: forbidden.group: is unknown; the keys are groups, triangles",
         "keys.toml: forbidden.triangles[1]: is -1; it must be a triangle's number, counted from 0",
         "keys.toml: forbidden.triangles[2]: is \"two\"; it must be a triangle's number, counted from 0",
+        "keys.toml: labels.level: is 3; it must be a text",
         "lids.toml: forbidden.groups[1]: is \"lit\"; the mesh has \"lid\", \"wall\"",
         "lids.toml: forbidden.triangles[0]: is 9; the mesh has 4 triangles, counted from 0",
         "long.obj: has more than 1000 bytes, the limit",
@@ -200,7 +203,7 @@ fn bounds_all_objects_together() {
             ("b.toml", MASS),
         ],
     );
-    let one = folder.load().unwrap()[0].bytes();
+    let one = folder.load().unwrap()[0].object.bytes();
     let load = |objects, bytes| load(&folder.0, LIMITS, StoreLimits { objects, bytes });
     assert_eq!(load(2, 2 * one).unwrap().len(), 2);
     let by_count = load(1, 2 * one).unwrap_err().to_string();

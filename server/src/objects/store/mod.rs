@@ -22,6 +22,7 @@ use uuid::Uuid;
 use super::{
     Record, Revision, StoredObject,
     changes::{Event, Watcher},
+    directory::PinnedObject,
     name_of,
 };
 use crate::{
@@ -95,17 +96,18 @@ pub(crate) fn is_built_in(id: &str) -> bool {
 
 impl ObjectStore {
     /// A store of the built-in objects and those of the objects directory, whose ids must all differ.
-    pub(crate) fn new(limits: StoreLimits, directory: Vec<StoredObject>) -> Self {
-        let built_in = objects()
-            .iter()
-            .map(|built_in| StoredObject::built_in(built_in.name.to_owned(), Arc::clone(&built_in.object)));
+    pub(crate) fn new(limits: StoreLimits, directory: Vec<PinnedObject>) -> Self {
+        let built_in = objects().iter().map(|built_in| PinnedObject {
+            object: StoredObject::built_in(built_in.name.to_owned(), Arc::clone(&built_in.object)),
+            labels: Labels::new(),
+        });
         let now = SystemTime::now();
         let mut etags = Etags {
             started: now.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos(),
             made: 0,
         };
-        let pinned = built_in.chain(directory).map(|object| {
-            let revision = new_revision(object, Labels::new(), etags.next(), now);
+        let pinned = built_in.chain(directory).map(|pinned| {
+            let revision = new_revision(pinned.object, pinned.labels, etags.next(), now);
             (revision.object.id.clone(), revision)
         });
         Self {

@@ -37,6 +37,14 @@ fn request_key(id: u128, content: u8) -> RequestKey {
     }
 }
 
+/// An object of the objects directory.
+fn stay() -> PinnedObject {
+    PinnedObject {
+        object: tetrahedron("stay", 1.0, &[]),
+        labels: labels(0),
+    }
+}
+
 fn insert(store: &ObjectStore, id: &str) -> Result<(), ServiceError> {
     store
         .insert(tetrahedron(id, 1.0, &[]), Origin::default())
@@ -110,7 +118,7 @@ fn directory_objects_stay_and_do_not_count() {
         objects: 1,
         bytes: tetrahedron("any", 1.0, &[]).bytes(),
     };
-    let store = ObjectStore::new(limits, vec![tetrahedron("stay", 1.0, &[])]);
+    let store = ObjectStore::new(limits, vec![stay()]);
     for id in ["a", "b"] {
         insert(&store, id).unwrap();
     }
@@ -273,7 +281,7 @@ fn objects_of_the_server_are_read_only() {
             objects: 1,
             bytes: 1 << 20,
         },
-        vec![tetrahedron("stay", 1.0, &[])],
+        vec![stay()],
     );
     for id in ["remote", "stay"] {
         assert!(matches!(
