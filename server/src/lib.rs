@@ -18,8 +18,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! atlas_slots  budget  convention  error  health_check  limits  net  reserve
-//! answer  call  config  executor  validate
+//! atlas_slots  budget  convention  error  health_check  limits  reserve
+//! answer  call  config  executor  net  validate
 //! memory  objects
 //! atlases
 //! search
