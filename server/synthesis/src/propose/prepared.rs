@@ -8,6 +8,7 @@ use std::{
 use sha2::{Digest as _, Sha256};
 
 use super::{
+    hand_span::hand_span,
     holdable::HoldableSurface,
     opposition::Oppositions,
     placement_cache::{PlacementCache, PlacementCaches},
@@ -29,6 +30,7 @@ struct RigParts {
     /// SHA-256 of the rig's content.
     hash: [u8; 32],
     oppositions: OnceLock<Oppositions>,
+    span: OnceLock<f32>,
 }
 
 impl PreparedRig {
@@ -38,12 +40,18 @@ impl PreparedRig {
             hash: Sha256::digest(rig.content()).into(),
             rig,
             oppositions: OnceLock::new(),
+            span: OnceLock::new(),
         }))
     }
 
     /// The rig's oppositions of thumb and fingers. The first call takes 0.1 to 0.2 s.
     pub fn oppositions(&self) -> &Oppositions {
         self.0.oppositions.get_or_init(|| Oppositions::of(&self.0.rig))
+    }
+
+    /// An upper bound on the distance of two contacts of the hand, in metres. The first call takes a millisecond.
+    pub fn span(&self) -> f32 {
+        *self.0.span.get_or_init(|| hand_span(&self.0.rig))
     }
 
     /// True once the oppositions have been sampled, so that [`Self::oppositions`] returns at once.

@@ -139,29 +139,51 @@ struct Grading<'a> {
     preference: Preference,
 }
 
+/// Whether a grip has a grade, as far as tells what is quickly looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fit {
+    No,
+    Yes,
+    /// If the receiver's arm reaches the wrist.
+    IfReached,
+    /// Unless it does.
+    UnlessReached,
+}
+
 impl Grading<'_> {
-    /// True if a grip with this forearm has a grade. What takes longest is looked at only if it matters.
-    fn has(&self, grade: Grade, forearm: Vec3, entry: &Entry) -> bool {
+    /// Whether a grip with this forearm has a grade.
+    fn fit(&self, grade: Grade, forearm: Vec3, entry: &Entry) -> Fit {
         let suits = self.receiver.suits_forearm(forearm);
         if suits < SUITABLE {
-            return grade
-                == if suits <= 0.0 {
-                    Grade::Valid
-                } else {
-                    Grade::Possible
-                };
+            let only = if suits <= 0.0 {
+                Grade::Valid
+            } else {
+                Grade::Possible
+            };
+            return if grade == only { Fit::Yes } else { Fit::No };
         }
         let preference = self.preference;
         let values = &entry.grip_values;
         let is_chosen = || preference.is_met_by_grip(values, entry.classification, false);
         let is_firm = || preference.is_firm(values, false);
-        let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
-        match grade {
-            Grade::Chosen => is_chosen() && is_reached(),
-            Grade::Firm => is_firm() && !is_chosen() && is_reached(),
-            Grade::Suitable => !is_firm() && is_reached(),
-            Grade::Possible => !is_reached(),
+        let fits = match grade {
+            Grade::Chosen => is_chosen(),
+            Grade::Firm => is_firm() && !is_chosen(),
+            Grade::Suitable => !is_firm(),
+            Grade::Possible => return Fit::UnlessReached,
             Grade::Valid => false,
+        };
+        if fits { Fit::IfReached } else { Fit::No }
+    }
+
+    /// True if a grip that may have a grade has it. Takes about a microsecond unless the fit tells.
+    fn has(&self, fit: Fit, entry: &Entry) -> bool {
+        let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
+        match fit {
+            Fit::No => false,
+            Fit::Yes => true,
+            Fit::IfReached => is_reached(),
+            Fit::UnlessReached => !is_reached(),
         }
     }
 
@@ -247,14 +269,14 @@ impl<'a> KnownGrips<'a> {
         self.grading.as_ref().map_or(1, |grading| grading.grades().len())
     }
 
-    /// True if a grip of the atlas is tried in a pass.
-    fn has_grade(&self, index: u16, pass: usize) -> bool {
+    /// Whether a grip of the atlas is tried in a pass.
+    fn fit(&self, index: u16, pass: usize) -> Fit {
         let (Some(grading), Some(atlas)) = (&self.grading, self.atlas) else {
-            return true;
+            return Fit::Yes;
         };
         let grade = grading.grades()[pass];
         let index = usize::from(index);
-        grading.has(grade, atlas.grips().forearms()[index], &atlas.entries()[index])
+        grading.fit(grade, atlas.grips().forearms()[index], &atlas.entries()[index])
     }
 
     /// The number of grips in the atlas.
@@ -289,11 +311,13 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// The grip at a place, unless it certainly collides with a barrier.
+    /// The grip at a place, unless it certainly collides with a barrier or has another grade than those tried there. What
+    /// takes longest is looked at last.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(place) = place.checked_sub(self.listed.len()) else {
             let place = usize::from(self.listed[place]);
-            if !self.has_grade(self.shortlist.entry(place), 0) {
+            let fit = self.fit(self.shortlist.entry(place), 0);
+            if fit == Fit::No {
                 return None;
             }
             let (index, solids) = if self.mechanisms.has(Mechanism::InnerSpheres) {
@@ -301,7 +325,7 @@ impl<'a> KnownGrips<'a> {
             } else {
                 self.shortlist.at(place)
             };
-            return self.of_atlas(index, Solids::Stored(solids));
+            return self.of_atlas(index, fit, || Some(Solids::Stored(solids)));
         };
         if place >= self.passes() * self.order.len() {
             return Some(self.recent_at(place - self.passes() * self.order.len()));
@@ -316,17 +340,26 @@ impl<'a> KnownGrips<'a> {
                 return None;
             }
         }
-        if !self.has_grade(index, pass) {
+        let fit = self.fit(index, pass);
+        if fit == Fit::No {
             return None;
         }
+        let place = usize::from(index);
         if self.barriers.is_empty() || !self.mechanisms.has(Mechanism::InnerSpheres) {
-            let solids = atlas.entries()[usize::from(index)].tracked_solids(self.rig);
-            return self.of_atlas(index, Solids::Computed(Box::new(solids)));
+            return self.of_atlas(index, fit, || {
+                let solids = atlas.entries()[place].tracked_solids(self.rig);
+                Some(Solids::Computed(Box::new(solids)))
+            });
         }
-        let solids = atlas
-            .grips()
-            .screen(usize::from(index), self.rig, self.barriers)?;
-        self.of_atlas(index, Solids::Computed(solids))
+        if !atlas.grips().may_be_clear(place, self.barriers) {
+            return None;
+        }
+        self.of_atlas(index, fit, || {
+            let screened = atlas
+                .grips()
+                .screen_by_second_spheres(place, self.rig, self.barriers);
+            screened.map(Solids::Computed)
+        })
     }
 
     /// A recent grip, which few look-ups reach.
@@ -340,12 +373,25 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// A grip of the atlas.
-    fn of_atlas(&self, index: u16, solids: Solids<'a>) -> Option<Candidate<'a>> {
+    /// A grip of the atlas that may have the grade tried, if it has and its hand may be clear of barriers.
+    fn of_atlas(
+        &self,
+        index: u16,
+        fit: Fit,
+        solids: impl FnOnce() -> Option<Solids<'a>>,
+    ) -> Option<Candidate<'a>> {
+        let entry = &self.atlas?.entries()[usize::from(index)];
+        if !self
+            .grading
+            .as_ref()
+            .is_none_or(|grading| grading.has(fit, entry))
+        {
+            return None;
+        }
         Some(Candidate {
             source: GraspSource::Atlas(index),
-            entry: &self.atlas?.entries()[usize::from(index)],
-            solids,
+            entry,
+            solids: solids()?,
         })
     }
 

@@ -10,16 +10,11 @@ use glam::Vec3;
 
 use super::{scene::Task, settings::Query};
 use crate::{
-    base::pose::Pose,
     geometry::oriented_box::OrientedBox,
     model::{
         constraints::Reach,
         forces::GRAVITY,
-        hand::{
-            Digit, DigitAngles, HandPose,
-            kinematics::DigitPlane,
-            rig::{AngleRange, Rig},
-        },
+        hand::{Digit, rig::Rig},
         holdout::Holdout,
         object::GraspObject,
         receiver::Stance,
@@ -29,7 +24,7 @@ use crate::{
         contacts::TORSION_LEVER,
         immobility::{BALANCE_TOLERANCE, HAND_LENGTHS, MAX_CONTACT_FORCE, MAX_CONTACTS},
         scene::Presented,
-        solids::{HandSolids, PreparedHand, link_radii},
+        solids::{PreparedHand, link_radii},
     },
     propose::{
         holdable::HoldableSurface,
@@ -49,11 +44,6 @@ const JUNG: f32 = 0.612_373;
 /// they lie within 55° of one direction, and nothing resists a pull along it while the friction cone is narrower than the
 /// other 35°; palm contacts, whose normals may be 10° off, take four of them.
 const MAX_FRICTION_OF_WIDTH: f32 = 0.6;
-
-/// Angles tried per joint range for a hand's span, and the factor that covers those between them: cos(7°) for a digit's
-/// widest range, and then some.
-const ANGLES: usize = 5;
-const BETWEEN_ANGLES: f32 = 1.03;
 
 /// How far apart palm and fingers may be that press against each other, over the widest opening of thumb and fingers: hands
 /// that hold in the palm reach a little farther.
@@ -105,7 +95,7 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     let Task { holdout, object, rig } = task;
     let holdable = object.holdable();
     let friction = query.friction_on(&holdout.object);
-    let span = hand_span(rig);
+    let span = rig.span();
     let of_region = |region: OrientedBox| {
         let reaches = query
             .constraints
@@ -260,61 +250,6 @@ fn horizontal_distance(region: &OrientedBox, point: Vec3, up: Vec3) -> f32 {
         gap(to_corner - up * to_corner.dot(up))
     });
     of_edges.chain(of_corners).fold(0.0, f32::max)
-}
-
-/// An upper bound on the distance of two contacts of a hand, in metres: from fingertip to fingertip or palm, over all poses.
-pub fn hand_span(rig: &Rig) -> f32 {
-    let stretched = HandPose {
-        frame_from_wrist: Pose::IDENTITY,
-        digits: rig.stretched(),
-    };
-    let palm = HandSolids::of_pose(rig, &stretched).palm;
-    let palm: Vec<(Vec3, f32)> = palm
-        .iter()
-        .flat_map(|solid| [(solid.start, solid.start_radius), (solid.end, solid.end_radius)])
-        .collect();
-    let tips = Digit::ALL.map(|digit| fingertips(rig, digit));
-    let mut span = 0.0_f32;
-    for (i, tips_of_digit) in tips.iter().enumerate() {
-        for &(tip, radius) in tips_of_digit {
-            let others = tips[i + 1..].iter().flatten().chain(&palm);
-            for &(other, other_radius) in others {
-                span = span.max(tip.distance(other) + radius + other_radius);
-            }
-        }
-    }
-    span * BETWEEN_ANGLES
-}
-
-/// The spheres at the tip of a digit over its range of poses, its outer joints straight or bent back, in the wrist's frame.
-fn fingertips(rig: &Rig, digit: Digit) -> Vec<(Vec3, f32)> {
-    let digit_rig = rig.digit(digit);
-    let [.., tip_radius] = link_radii(rig, digit);
-    let limits = &digit_rig.limits;
-    let over = |range: AngleRange| {
-        (0..ANGLES).map(move |i| range.min + (range.max - range.min) * i as f32 / (ANGLES - 1) as f32)
-    };
-    let straight = |range: AngleRange| [range.min, 0.0_f32.clamp(range.min, range.max)];
-    let mut tips = Vec::new();
-    for base_yaw in over(limits.base_yaw) {
-        let plane = DigitPlane::new(digit_rig, Pose::IDENTITY, base_yaw);
-        for base_pitch in over(limits.base_pitch) {
-            for second_pitch in straight(limits.second_pitch) {
-                for third_pitch in straight(limits.third_pitch) {
-                    let [.., joint, tip] = plane.joints(&DigitAngles {
-                        base_yaw,
-                        base_pitch,
-                        second_pitch,
-                        third_pitch,
-                    });
-                    // The tip lies on the skin.
-                    let inset = (joint - tip).normalize_or_zero() * tip_radius;
-                    tips.push((tip + inset, tip_radius));
-                }
-            }
-        }
-    }
-    tips
 }
 
 impl fmt::Display for Limit {

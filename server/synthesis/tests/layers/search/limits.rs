@@ -18,8 +18,9 @@ use grasp_synthesis::{
         immobility::{MAX_CONTACT_FORCE, MAX_CONTACTS},
         solids::HandSolids,
     },
+    propose::hand_span::hand_span,
     propose::prepared::PreparedRig,
-    search::limits::{Limit, LimitKind, hand_span},
+    search::limits::{Limit, LimitKind},
 };
 
 use crate::fixtures::{
