@@ -14,7 +14,7 @@ use grasp_tests::TestServer;
 use serde_json::{Value, json};
 use tonic::Code;
 
-use crate::fixtures::{assert_blamed, blamed_fields, floating_remote, reason};
+use crate::fixtures::{assert_blamed, blamed_fields, bounded, box_request, floating_remote, reason};
 
 /// The built-in right hand as a model, `scale` times as large by its armature.
 pub(crate) fn model(scale: f32) -> Vec<u8> {
@@ -285,5 +285,45 @@ async fn a_described_hand_is_its_twin_and_gives_like_it() {
             "{clearances:?}"
         );
     }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_own_hand_gets_an_atlas_which_a_rig_of_the_same_hand_shares() {
+    let server = TestServer::start_with(|config| config.builder_threads = 1).await;
+    let client = server.client().await;
+    server
+        .objects()
+        .await
+        .create_object(box_request("block"))
+        .await
+        .unwrap();
+    let ask = async |rig: &str| {
+        let request = FindRequest {
+            receiving_hand: ReceivingHand {
+                rig: Some(rig.to_owned()),
+                handedness: Some(Handedness::Right),
+                hand_scale: None,
+            },
+            budget: Some(std::time::Duration::from_secs(5)),
+            ..FindRequest::new("objects/block")
+        };
+        client.find_grasp(&request).await.unwrap().report.atlas_entries
+    };
+    client.create_rig(&new_rig("first", 0.9)).await.unwrap();
+    assert_eq!(ask("rigs/first").await, 0);
+    bounded("the growth of an own hand's atlas", async {
+        while ask("rigs/first").await == 0 {
+            // Builders hardly work while searches run.
+            tokio::time::sleep(std::time::Duration::from_millis(500)).await;
+        }
+    })
+    .await;
+    client.delete_rig("rigs/first").await.unwrap();
+    client.create_rig(&new_rig("second", 0.9)).await.unwrap();
+    assert!(ask("rigs/second").await > 0);
+    // A hand of another size is another hand.
+    client.create_rig(&new_rig("third", 0.91)).await.unwrap();
+    assert_eq!(ask("rigs/third").await, 0);
     server.stop().await;
 }
