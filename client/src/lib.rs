@@ -21,6 +21,8 @@
 //! - [`FindRequest`] describes the holdout and the search, [`FindAnswer`] the result. [`PresentingHand`] is the giver's
 //!   hand; [`Obstacle`]s are kept clear of like it; [`Receiver`] is the body whose arm has to reach; [`Constraints`] are
 //!   requirements on the grasp.
+//! - [`NewObject`] describes an object to create, [`ObjectUpdate`] a change, [`ObjectQuery`] a list, and [`ObjectWatch`] tells what
+//!   happens to objects.
 //! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
 //!
 //! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
