@@ -308,7 +308,8 @@ async fn an_own_hand_gets_an_atlas_which_a_rig_of_the_same_hand_shares() {
             budget: Some(std::time::Duration::from_secs(5)),
             ..FindRequest::new("objects/block")
         };
-        client.find_grasp(&request).await.unwrap().report.atlas_entries
+        let answer = Box::pin(client.find_grasp(&request)).await.unwrap();
+        answer.report.atlas_entries
     };
     client.create_rig(&new_rig("first", 0.9)).await.unwrap();
     assert_eq!(ask("rigs/first").await, 0);
