@@ -1,5 +1,6 @@
 //! Hands, objects, holdouts and constraints.
 
+mod changed_properties;
 mod constraints;
 mod forbidden_surfaces;
 mod holdout;
