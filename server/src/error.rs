@@ -2,6 +2,7 @@
 
 use std::{collections::HashMap, time::Duration};
 
+use grasp_synthesis::base::stop::Stopped;
 use http::Response;
 use tonic::{Code, Status, metadata::MetadataValue};
 use tonic_types::{ErrorDetails, FieldViolation, StatusExt as _};
@@ -151,10 +152,10 @@ pub enum ServiceError {
     /// The server shuts down.
     #[error("the server shuts down; call again")]
     ShuttingDown,
-    /// The call's deadline passed before a search could start.
-    #[error("the deadline passed before the search could start")]
+    /// The call's deadline passed before a search could start or an object was built.
+    #[error("the deadline passed before the work was done")]
     DeadlineExceeded,
-    /// The search was stopped before its end.
+    /// The work was stopped before its end.
     #[error("the call was cancelled")]
     Cancelled,
     /// A job panicked. The server's log contains the panic.
@@ -285,6 +286,12 @@ pub(crate) fn blame_malformed_messages<R: Default>(response: Response<R>) -> Res
             Status::from(ServiceError::Malformed(status.message().to_owned())).into_http()
         }
         _ => response,
+    }
+}
+
+impl From<Stopped> for ServiceError {
+    fn from(Stopped: Stopped) -> Self {
+        Self::Cancelled
     }
 }
 

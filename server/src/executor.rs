@@ -8,9 +8,10 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
+    time::{Duration, Instant},
 };
 
+use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
@@ -105,6 +106,29 @@ impl SearchExecutor {
             job(&pool, &stop)
         })
         .await
+    }
+}
+
+/// Runs work that can be stopped away from the threads of the async runtime. It is to stop when the returned future is dropped
+/// or its time is over.
+///
+/// # Errors
+/// [`ServiceError::DeadlineExceeded`] at the time when it is due, and those of [`run_blocking`].
+pub(crate) async fn run_stoppable<T: Send + 'static>(
+    due: Option<Instant>,
+    work: impl FnOnce(Stop<'_>) -> T + Send + 'static,
+) -> Result<T, ServiceError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
+    let end = run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed))));
+    let Some(due) = due else {
+        return end.await;
+    };
+    tokio::select! {
+        biased;
+        result = end => result,
+        // The work ends soon after; nobody waits for it.
+        () = tokio::time::sleep_until(due.into()) => Err(ServiceError::DeadlineExceeded),
     }
 }
 

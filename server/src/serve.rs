@@ -15,7 +15,7 @@ use grasp_proto::v1::{
     grasp_service_server::GraspServiceServer, hand_rig_service_server::HandRigServiceServer,
     object_service_server::ObjectServiceServer,
 };
-use grasp_synthesis::model::hand::Handedness;
+use grasp_synthesis::{base::stop::unstopped, model::hand::Handedness};
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
 use tonic::{server::NamedService, transport};
@@ -176,7 +176,7 @@ impl Server {
         let directory_bytes = directory.iter().map(|pinned| pinned.object.bytes()).sum();
         let objects = Arc::new(ObjectStore::new(config.store, directory));
         for object in objects.pinned() {
-            object.prepare(&config.default_rig);
+            unstopped(|stop| object.prepare(&config.default_rig, stop));
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let files = match config.atlas_directory {

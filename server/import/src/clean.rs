@@ -1,7 +1,7 @@
 //! Splits the polygons of a mesh from a file, welds it, checks it and repairs what is certain.
 
 use glam::DVec3;
-use grasp_synthesis::geometry::mesh::TriangleMesh;
+use grasp_synthesis::{base::stop::Stop, geometry::mesh::TriangleMesh};
 
 use crate::{
     Import, ImportedMesh,
@@ -11,6 +11,7 @@ use crate::{
     faces::triangles,
     polygon_twins::split_alike,
     raw::{Occurrences, Place, RawMesh},
+    stoppable::stopped,
     weld::{has_area, has_repeated_corner, weld},
     winding::{Turned, repair},
 };
@@ -21,13 +22,15 @@ pub(crate) fn clean(
     raw: &RawMesh,
     import: Import,
     origin_in_file: DVec3,
+    stop: Stop<'_>,
 ) -> Result<ImportedMesh, Vec<ImportError>> {
-    let mut split = triangles(raw)?;
-    let (positions, welded) = weld(raw.positions(), import);
+    let mut split = triangles(raw, stop)?;
+    let (positions, welded) = weld(raw.positions(), import, stop).map_err(stopped)?;
     for corner in split.corners.as_flattened_mut() {
         *corner = welded[*corner as usize];
     }
     split_alike(raw, &welded, &mut split.corners);
+    stop.check().map_err(stopped)?;
     let origins = raw
         .faces
         .iter()
@@ -49,8 +52,9 @@ pub(crate) fn clean(
         }
     }
     let place_of = |triangle: usize| Place(raw.places, raw.faces[faces[triangle] as usize].place);
-    let mut doubles = Doubles::of(&joined);
-    let turned = repair(&positions, &mut joined, &mut doubles.uses);
+    let mut doubles = Doubles::of(&joined, stop).map_err(stopped)?;
+    let turned = repair(&positions, &mut joined, &mut doubles.uses, stop).map_err(stopped)?;
+    stop.check().map_err(stopped)?;
     let edges = Edges::of(&doubles.uses, positions.len());
     let mut is_kept = vec![false; joined.len()];
     for triangle in (0..joined.len()).filter(|&triangle| !doubles.is_dropped[triangle]) {

@@ -1,5 +1,7 @@
 //! Triangles that occur more than once, with the same or with the opposite winding.
 
+use grasp_synthesis::base::stop::{Stop, Stopped};
+
 use crate::{
     edges::{EdgeUse, by_edge, edge_uses},
     raw::Occurrences,
@@ -32,19 +34,24 @@ impl Doubles {
     ///
     /// One side is kept of a patch of pairs that the rest of the surface needs to be closed, and of a sheet that touches nothing else.
     /// Which of the two it is does not matter: the winding is repaired later.
-    pub(crate) fn of(triangles: &[[u32; 3]]) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn of(triangles: &[[u32; 3]], stop: Stop<'_>) -> Result<Self, Stopped> {
         let mut doubles = Self {
             is_dropped: vec![false; triangles.len()],
             ..Self::default()
         };
         let pairs = doubles.drop_repeated(triangles);
+        stop.check()?;
         let kept = triangles.iter().copied().enumerate();
         let kept = kept.filter(|&(triangle, _)| !doubles.is_dropped[triangle]);
         doubles.uses = edge_uses(kept.map(|(triangle, corners)| (triangle as u32, corners)));
         if !pairs.is_empty() {
             doubles.drop_sides(&pairs);
         }
-        doubles
+        stop.check()?;
+        Ok(doubles)
     }
 
     /// Drops triangles that repeat earlier ones; returns the pairs among the rest.

@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 
 use glam::DVec2;
+use grasp_synthesis::base::stop::{Stop, Stopped};
 
 use crate::polygon::Outline;
 
@@ -27,21 +28,24 @@ enum Level {
 }
 
 /// Triples of corners that cover the polygon once; none if it intersects itself.
-pub(crate) fn clip(outline: &Outline) -> Option<Vec<[usize; 3]>> {
+///
+/// # Errors
+/// [`Stopped`].
+pub(crate) fn clip(outline: &Outline, stop: Stop<'_>) -> Result<Option<Vec<[usize; 3]>>, Stopped> {
     let mut rest = Rest::of(outline);
     for _ in 0..ROUNDS {
         let before = rest.count;
         for level in [Level::Clear, Level::Touching, Level::Flat] {
-            rest.clip(level);
+            rest.clip(level, stop)?;
             if rest.count == 3 {
-                return rest.finish();
+                return Ok(rest.finish());
             }
         }
         if rest.count == before {
             break;
         }
     }
-    None
+    Ok(None)
 }
 
 /// What is left of a polygon.
@@ -90,17 +94,19 @@ impl<'a> Rest<'a> {
     }
 
     /// Clips ears until none is left or one triangle remains.
-    fn clip(&mut self, level: Level) {
+    fn clip(&mut self, level: Level, stop: Stop<'_>) -> Result<(), Stopped> {
         let mut candidates: VecDeque<usize> = (0..self.is_left.len())
             .filter(|&corner| self.is_left[corner])
             .collect();
         while let Some(corner) = candidates.pop_front()
             && self.count > 3
         {
+            stop.check()?;
             if self.is_left[corner] && self.is_ear(corner, level) {
                 candidates.extend(self.remove(corner));
             }
         }
+        Ok(())
     }
 
     /// Makes a triangle of the corner and its neighbours; returns these.

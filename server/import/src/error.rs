@@ -166,6 +166,9 @@ pub enum ImportError {
     /// The resulting mesh cannot be used.
     #[error("the mesh cannot be used")]
     Unusable(#[source] MeshError),
+    /// The reader was stopped.
+    #[error("the mesh was not read to its end")]
+    Stopped,
     /// Violations beyond those listed.
     #[error("and {0} more violations")]
     More(usize),

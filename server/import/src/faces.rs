@@ -1,12 +1,17 @@
 //! Splits the faces of a mesh into triangles.
 
 use glam::DVec3;
+use grasp_synthesis::base::stop::Stop;
 
 use crate::{
     error::{ImportError, Violations},
     polygon::{Split, split},
     raw::{Occurrences, Place, RawMesh},
+    stoppable::stopped,
 };
+
+/// Faces split between two checks whether to stop.
+const FACES_PER_CHECK: usize = 256;
 
 /// The triangles of all faces.
 #[derive(Debug, Default)]
@@ -18,7 +23,7 @@ pub(crate) struct Triangles {
 }
 
 /// Splits every face; one of n corners becomes n - 2 triangles.
-pub(crate) fn triangles(raw: &RawMesh) -> Result<Triangles, Vec<ImportError>> {
+pub(crate) fn triangles(raw: &RawMesh, stop: Stop<'_>) -> Result<Triangles, Vec<ImportError>> {
     let mut triangles = Triangles {
         corners: Vec::with_capacity(raw.triangle_count()),
         ..Triangles::default()
@@ -26,7 +31,8 @@ pub(crate) fn triangles(raw: &RawMesh) -> Result<Triangles, Vec<ImportError>> {
     let mut violations = Violations::default();
     let mut rest = raw.corners.as_slice();
     let (mut positions, mut places) = (Vec::new(), Vec::new());
-    for face in &raw.faces {
+    for (number, face) in raw.faces.iter().enumerate() {
+        stop.check_every(FACES_PER_CHECK, number).map_err(stopped)?;
         let (corners, others) = rest.split_at(face.corners);
         rest = others;
         if let &[a, b, c] = corners {
@@ -39,7 +45,7 @@ pub(crate) fn triangles(raw: &RawMesh) -> Result<Triangles, Vec<ImportError>> {
             DVec3::from_slice(&raw.coordinates[start..start + 3])
         }));
         places.clear();
-        match split(&positions, &mut places) {
+        match split(&positions, &mut places, stop).map_err(stopped)? {
             Split::Exact => {}
             Split::Overlapping => triangles.overlapping.note(face.place),
             Split::TooManyCorners => violations.push(ImportError::TooManyCorners {

@@ -27,11 +27,12 @@ mod polygon_twins;
 mod raw;
 mod rig;
 mod stl;
+mod stoppable;
 mod weld;
 mod winding;
 
 use glam::DVec3;
-use grasp_synthesis::geometry::mesh::TriangleMesh;
+use grasp_synthesis::{base::stop::Stop, geometry::mesh::TriangleMesh};
 
 pub use error::ImportError;
 pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
@@ -112,6 +113,19 @@ pub struct ImportedMesh {
 /// # Errors
 /// Every violation; see [`ImportError`]. Beyond 16 they are only counted.
 pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<ImportedMesh, Vec<ImportError>> {
+    read_mesh_until(bytes, import, limits, Stop::NEVER)
+}
+
+/// As [`read_mesh`], unless it is stopped.
+///
+/// # Errors
+/// Those of [`read_mesh`]. A reader that is stopped returns [`ImportError::Stopped`] or what its parser makes of the end of its input.
+pub fn read_mesh_until(
+    bytes: &[u8],
+    import: Import,
+    limits: MeshLimits,
+    stop: Stop<'_>,
+) -> Result<ImportedMesh, Vec<ImportError>> {
     let unit = import.unit_metres;
     if !(unit.is_finite() && unit > 0.0) {
         return Err(vec![ImportError::Unit(unit)]);
@@ -124,15 +138,15 @@ pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<Imp
     }
     let format = Format::of(bytes);
     let mut raw = match format {
-        Format::Obj => obj::read(bytes, unit, limits)?,
-        Format::StlText => stl::read_text(bytes, limits)?,
-        Format::StlBinary => stl::read_binary(bytes, limits)?,
-        Format::Ply => ply::read(bytes, limits.unwelded())?,
-        Format::Gltf => gltf::read(bytes, limits.unwelded())?,
+        Format::Obj => obj::read(bytes, unit, limits, stop)?,
+        Format::StlText => stl::read_text(bytes, limits, stop)?,
+        Format::StlBinary => stl::read_binary(bytes, limits, stop)?,
+        Format::Ply => ply::read(bytes, limits.unwelded(), stop)?,
+        Format::Gltf => gltf::read(bytes, limits.unwelded(), stop)?,
     };
     raw.check_coordinates(f64::from(unit))?;
     let origin_in_file = placement::recentre(&mut raw, import);
-    let read = clean::clean(&raw, import, origin_in_file).map_err(|errors| format.named(errors))?;
+    let read = clean::clean(&raw, import, origin_in_file, stop).map_err(|errors| format.named(errors))?;
     check_counts(read.mesh.positions().len() as u64, 0, limits).map_err(|error| vec![error])?;
     Ok(read)
 }

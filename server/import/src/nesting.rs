@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec3};
+use grasp_synthesis::base::stop::{Stop, Stopped};
 
 use crate::winding::corners;
 
@@ -71,9 +72,17 @@ impl Closed {
 ///
 /// A part that faces inward inside another is the wall of a cavity. If there are too many parts to compare, all are turned if
 /// their volumes together are negative, and none otherwise.
-pub(crate) fn facing_inward(parts: &[Closed], positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<usize> {
+///
+/// # Errors
+/// [`Stopped`].
+pub(crate) fn facing_inward(
+    parts: &[Closed],
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    stop: Stop<'_>,
+) -> Result<Vec<usize>, Stopped> {
     if parts.iter().all(|part| part.volume >= 0.0) {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let mut by_volume: Vec<usize> = (0..parts.len())
         .filter(|&part| parts[part].volume != 0.0)
@@ -84,6 +93,7 @@ pub(crate) fn facing_inward(parts: &[Closed], positions: &[Vec3], triangles: &[[
     let mut inward = Vec::new();
     let mut is_inward = vec![false; parts.len()];
     for index in by_volume.iter().copied() {
+        stop.check()?;
         let part = &parts[index];
         let Some(point) = part.triangles.first().map(|&first| {
             let [a, _, _] = corners(positions, triangles[first as usize]);
@@ -98,7 +108,7 @@ pub(crate) fn facing_inward(parts: &[Closed], positions: &[Vec3], triangles: &[[
             let cost = if is_near { candidate.triangles.len() } else { 1 };
             let Some(left) = work.checked_sub(cost) else {
                 let sum: f64 = parts.iter().map(|part| part.volume).sum();
-                return if sum < 0.0 { by_volume } else { Vec::new() };
+                return Ok(if sum < 0.0 { by_volume } else { Vec::new() });
             };
             work = left;
             if is_near && candidate.encloses(point, positions, triangles) {
@@ -114,5 +124,5 @@ pub(crate) fn facing_inward(parts: &[Closed], positions: &[Vec3], triangles: &[[
             inward.push(index);
         }
     }
-    inward
+    Ok(inward)
 }

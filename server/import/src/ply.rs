@@ -3,6 +3,7 @@
 //! The numbers of elements in a header are checked before anything is read by them: the parser reads as many as a header
 //! claims.
 
+use grasp_synthesis::base::stop::Stop;
 use ply_rs_bw::{
     parser::{ParseError, Parser, Reader},
     ply::{
@@ -16,6 +17,7 @@ use crate::{
     format::without_mark,
     limits::MeshLimits,
     raw::{Places, RawFace, RawMesh, check_counts},
+    stoppable::Stoppable,
 };
 
 /// The names under which files list the vertices of a face.
@@ -34,9 +36,9 @@ struct Face(Option<Vec<u32>>);
 struct Ignored;
 
 /// Reads a file.
-pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
     let failed = |error: ParseError| vec![ImportError::at("the PLY file", brief(&error.to_string()))];
-    let mut reader = Reader::new(without_mark(bytes));
+    let mut reader = Reader::new(Stoppable::new(without_mark(bytes), stop));
     let header = Parser::<Ignored>::new()
         .read_header(&mut reader)
         .map_err(failed)?;

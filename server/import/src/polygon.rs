@@ -6,6 +6,7 @@
 //! face may have a corner there, and the surface must not open at it.
 
 use glam::{DVec2, DVec3};
+use grasp_synthesis::base::stop::{Stop, Stopped};
 
 use crate::ears;
 
@@ -31,34 +32,41 @@ pub(crate) enum Split {
 ///
 /// The positions are taken to be exact to single precision, at least as seen from the mesh's origin. A polygon that is not flat is split as its
 /// projection on the plane of its mean normal.
-pub(crate) fn split(corners: &[DVec3], triangles: &mut Vec<[usize; 3]>) -> Split {
+///
+/// # Errors
+/// [`Stopped`].
+pub(crate) fn split(
+    corners: &[DVec3],
+    triangles: &mut Vec<[usize; 3]>,
+    stop: Stop<'_>,
+) -> Result<Split, Stopped> {
     let mut fan = || triangles.extend((2..corners.len()).map(|k| [0, k - 1, k]));
     if corners.len() == 3 {
         fan();
-        return Split::Exact;
+        return Ok(Split::Exact);
     }
     let outline = match Outline::of(corners) {
         Ok(outline) => outline,
         Err(split) => {
             fan();
-            return split;
+            return Ok(split);
         }
     };
     if outline.first_sees_all() {
         fan();
-        return Split::Exact;
+        return Ok(Split::Exact);
     }
     if corners.len() > MAX_CLIPPED_CORNERS {
-        return Split::TooManyCorners;
+        return Ok(Split::TooManyCorners);
     }
-    if !outline.crosses_itself()
-        && let Some(clipped) = ears::clip(&outline)
+    if !outline.crosses_itself(stop)?
+        && let Some(clipped) = ears::clip(&outline, stop)?
     {
         triangles.extend(clipped);
-        return Split::Exact;
+        return Ok(Split::Exact);
     }
     fan();
-    Split::Overlapping
+    Ok(Split::Overlapping)
 }
 
 /// A polygon in its plane, counter-clockwise.
@@ -134,14 +142,15 @@ impl Outline {
     }
 
     /// Whether two sides cross at a point inside both.
-    fn crosses_itself(&self) -> bool {
+    fn crosses_itself(&self, stop: Stop<'_>) -> Result<bool, Stopped> {
         let ends = self.points.iter().copied().cycle().skip(1);
         let mut sides: Vec<[DVec2; 2]> = self.points.iter().copied().zip(ends).map(Into::into).collect();
         let left = |[a, b]: [DVec2; 2]| a.x.min(b.x);
         sides.sort_unstable_by(|&a, &b| left(a).total_cmp(&left(b)));
-        sides.iter().enumerate().any(|(place, &[a, b])| {
+        for (place, &[a, b]) in sides.iter().enumerate() {
+            stop.check()?;
             let right = a.x.max(b.x);
-            sides[place + 1..]
+            let crosses = sides[place + 1..]
                 .iter()
                 .take_while(|&&side| left(side) <= right)
                 .any(|&[c, d]| {
@@ -149,8 +158,12 @@ impl Outline {
                         && c.y.min(d.y) <= a.y.max(b.y)
                         && self.side(a, b, c) * self.side(a, b, d) < 0
                         && self.side(c, d, a) * self.side(c, d, b) < 0
-                })
-        })
+                });
+            if crosses {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 }
 
@@ -166,7 +179,7 @@ mod tests {
     fn split_areas(corners: &[(f64, f64)]) -> (Split, Vec<f64>) {
         let corners = flat(corners);
         let mut triangles = Vec::new();
-        let split = split(&corners, &mut triangles);
+        let split = split(&corners, &mut triangles, Stop::NEVER).unwrap();
         let areas = triangles
             .iter()
             .map(|triangle| {
@@ -238,7 +251,10 @@ mod tests {
         });
         for crossed in [&bow_tie[..], &uneven_bow_tie, &star] {
             let mut triangles = Vec::new();
-            assert_eq!(split(&flat(crossed), &mut triangles), Split::Overlapping);
+            assert_eq!(
+                split(&flat(crossed), &mut triangles, Stop::NEVER),
+                Ok(Split::Overlapping)
+            );
             let fan: Vec<_> = (2..crossed.len()).map(|k| [0, k - 1, k]).collect();
             assert_eq!(triangles, fan);
         }
@@ -261,10 +277,10 @@ mod tests {
         };
         let mut triangles = Vec::new();
         assert_eq!(
-            split(&teeth(MAX_CLIPPED_CORNERS + 1), &mut triangles),
-            Split::TooManyCorners
+            split(&teeth(MAX_CLIPPED_CORNERS + 1), &mut triangles, Stop::NEVER),
+            Ok(Split::TooManyCorners)
         );
-        assert_eq!(split(&teeth(1001), &mut triangles), Split::Exact);
+        assert_eq!(split(&teeth(1001), &mut triangles, Stop::NEVER), Ok(Split::Exact));
         assert_eq!(triangles.len(), 999);
     }
 }

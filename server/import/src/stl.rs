@@ -5,6 +5,7 @@
 
 use std::{io::Cursor, ops::RangeInclusive};
 
+use grasp_synthesis::base::stop::Stop;
 use stl_io::{Triangle, create_stl_reader};
 
 use crate::{
@@ -12,11 +13,15 @@ use crate::{
     format::without_mark,
     limits::MeshLimits,
     raw::{Place, Places, RawMesh, check_counts},
+    stoppable::stopped,
 };
 
 /// Bytes of a binary file before its triangles, and per triangle.
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
+
+/// Lines or triangles read between two checks whether to stop.
+const STEPS_PER_CHECK: usize = 1024;
 
 /// Sizes of numbers, other than 0, that a first triangle may have: those of other data, such as text in UTF-16, are mostly beyond.
 const USUAL_NUMBERS: RangeInclusive<f32> = 1e-12..=1e9;
@@ -49,7 +54,11 @@ fn claimed_triangles(bytes: &[u8]) -> Option<u64> {
 }
 
 /// Reads a binary file.
-pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read_binary(
+    bytes: &[u8],
+    limits: MeshLimits,
+    stop: Stop<'_>,
+) -> Result<RawMesh, Vec<ImportError>> {
     let claimed = claimed_triangles(bytes).unwrap_or_default();
     check_counts(0, claimed, limits).map_err(|error| vec![error])?;
     let present = (bytes.len() - HEADER_BYTES) / TRIANGLE_BYTES;
@@ -67,7 +76,7 @@ pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, V
         ..RawMesh::default()
     };
     let names = raw.names.add_named([]);
-    read_into(&mut raw, Cursor::new(blank), |triangle| (triangle, names))?;
+    read_into(&mut raw, Cursor::new(blank), stop, |triangle| (triangle, names))?;
     let spare = bytes.len() - HEADER_BYTES - raw.faces.len() * TRIANGLE_BYTES;
     if spare > 0 {
         raw.warnings
@@ -77,14 +86,18 @@ pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, V
 }
 
 /// Reads a text file.
-pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read_text(
+    bytes: &[u8],
+    limits: MeshLimits,
+    stop: Stop<'_>,
+) -> Result<RawMesh, Vec<ImportError>> {
     let mut raw = RawMesh {
         places: Places::Lines,
         ..RawMesh::default()
     };
-    let plain = PlainText::of(without_mark(bytes), &mut raw, limits).map_err(|error| vec![error])?;
+    let plain = PlainText::of(without_mark(bytes), &mut raw, limits, stop)?;
     let facets = &plain.facets;
-    read_into(&mut raw, Cursor::new(plain.text), |facet| {
+    read_into(&mut raw, Cursor::new(plain.text), stop, |facet| {
         facets.get(facet).copied().unwrap_or((plain.lines, 0))
     })?;
     // The parser has accepted every line, but reads in single precision.
@@ -98,6 +111,7 @@ pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec
 fn read_into(
     raw: &mut RawMesh,
     mut file: Cursor<Vec<u8>>,
+    stop: Stop<'_>,
     about: impl Fn(usize) -> (usize, usize),
 ) -> Result<(), Vec<ImportError>> {
     let places = raw.places;
@@ -107,6 +121,7 @@ fn read_into(
     };
     let triangles = create_stl_reader(&mut file).map_err(|error| failed(0, &error))?;
     for (number, triangle) in triangles.enumerate() {
+        stop.check_every(STEPS_PER_CHECK, number).map_err(stopped)?;
         let (place, names) = about(number);
         let Triangle { vertices, .. } = triangle.map_err(|error| failed(place, &error))?;
         let first = (raw.coordinates.len() / 3) as u32;
@@ -131,13 +146,19 @@ struct PlainText {
 }
 
 impl PlainText {
-    fn of(text: &[u8], raw: &mut RawMesh, limits: MeshLimits) -> Result<Self, ImportError> {
+    fn of(
+        text: &[u8],
+        raw: &mut RawMesh,
+        limits: MeshLimits,
+        stop: Stop<'_>,
+    ) -> Result<Self, Vec<ImportError>> {
         let mut plain = Self {
             text: b"solid all\n".to_vec(),
             ..Self::default()
         };
         let mut names = raw.names.add_named([]);
         for (index, line) in text.split(|&byte| byte == b'\n').enumerate() {
+            stop.check_every(STEPS_PER_CHECK, index).map_err(stopped)?;
             let number = index + 1;
             plain.lines = number;
             let line = line.trim_ascii();
@@ -154,7 +175,7 @@ impl PlainText {
                 }
                 b"facet" => {
                     plain.facets.push((number, names));
-                    check_counts(0, plain.facets.len() as u64, limits)?;
+                    check_counts(0, plain.facets.len() as u64, limits).map_err(|error| vec![error])?;
                     plain.text.extend(b"facet normal 0 0 0\n");
                 }
                 b"outer" | b"vertex" | b"endloop" | b"endfacet" => {

@@ -5,6 +5,7 @@
 //! turned with what encloses it, since it may be the wall of a cavity. Open patches keep the side that most of their area faces.
 
 use glam::{DVec3, Vec3};
+use grasp_synthesis::base::stop::{Stop, Stopped};
 
 use crate::{
     edges::{EdgeUse, by_edge},
@@ -49,10 +50,19 @@ struct Patches {
 }
 
 /// Turns triangles and the uses of their edges.
-pub(crate) fn repair(positions: &[Vec3], triangles: &mut [[u32; 3]], uses: &mut [EdgeUse]) -> Turned {
+///
+/// # Errors
+/// [`Stopped`].
+pub(crate) fn repair(
+    positions: &[Vec3],
+    triangles: &mut [[u32; 3]],
+    uses: &mut [EdgeUse],
+    stop: Stop<'_>,
+) -> Result<Turned, Stopped> {
     let mut patches = Patches::of(triangles.len(), uses);
     patches.keep_larger_side(positions, triangles);
     turn(triangles, uses, &patches.turns);
+    stop.check()?;
 
     let closed = patches.closed(uses);
     let mut is_inward = vec![false; patches.list.len()];
@@ -60,7 +70,8 @@ pub(crate) fn repair(positions: &[Vec3], triangles: &mut [[u32; 3]], uses: &mut 
         &patches.volumes(&closed, positions, triangles),
         positions,
         triangles,
-    ) {
+        stop,
+    )? {
         for &patch in &closed[part] {
             is_inward[patch as usize] = true;
         }
@@ -82,7 +93,7 @@ pub(crate) fn repair(positions: &[Vec3], triangles: &mut [[u32; 3]], uses: &mut 
             of_kind.note(triangle);
         }
     }
-    turned
+    Ok(turned)
 }
 
 /// Turns the chosen triangles.

@@ -19,6 +19,9 @@ pub(crate) use self::{
     layer::{CallLayer, UploadPermit},
 };
 
+/// How long before its deadline a call that is no search is answered: at the deadline, tonic would answer that it was cancelled.
+const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
+
 /// What a handler knows about its call, and adds to the call's log line.
 #[derive(Clone, Debug)]
 pub(crate) struct CallContext {
@@ -77,6 +80,12 @@ impl CallContext {
             log_fields: Arc::default(),
             search_end: Arc::default(),
         }
+    }
+
+    /// When a call that is no search has to be answered, if it has a deadline.
+    pub(crate) fn answer_due(&self) -> Option<Instant> {
+        let deadline = self.deadline?;
+        Some(deadline.checked_sub(BEFORE_DEADLINE).unwrap_or(deadline))
     }
 
     /// Records when the search that starts now has to end. A time that has passed counts as now: what was waited before,

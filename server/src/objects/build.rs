@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use grasp_import::{MeshLimits, read_mesh};
-use grasp_synthesis::model::object::GraspObject;
+use grasp_import::{MeshLimits, read_mesh_until};
+use grasp_synthesis::{base::stop::Stop, model::object::GraspObject};
 
 use super::{StoredObject, centre_of_mass::centre_or_computed, extent::check_extent, mesh_file::MeshFile};
 use crate::{
@@ -14,20 +14,22 @@ use crate::{
 /// Reads and checks the mesh and builds its search structures. Takes up to seconds for the largest meshes.
 ///
 /// # Errors
-/// [`ServiceError::Invalid`] with `violations` and everything else that is wrong.
+/// [`ServiceError::Invalid`] with `violations` and everything else that is wrong, [`ServiceError::Cancelled`] if it was stopped.
 pub(crate) fn build_object(
     fields: ObjectFields,
     limits: MeshLimits,
     mut violations: Violations,
+    stop: Stop<'_>,
 ) -> Result<StoredObject, ServiceError> {
     if fields.mesh.is_empty() || fields.mesh.len() > limits.bytes {
         // `object_fields` has added the violation.
         return Err(violations.into_error());
     }
     let mesh_field = Field::root(fields.mesh_field);
-    let read = match read_mesh(&fields.mesh, fields.import, limits) {
+    let read = match read_mesh_until(&fields.mesh, fields.import, limits, stop) {
         Ok(read) => read,
         Err(errors) => {
+            stop.check()?;
             for error in errors {
                 violations.add(mesh_field, error.to_string());
             }
@@ -50,19 +52,22 @@ pub(crate) fn build_object(
         return Err(violations.into_error());
     }
     let centre_of_mass = centre_or_computed(&read.mesh, fields.centre_of_mass, &mut warnings);
-    match GraspObject::new(
+    let object = GraspObject::new_until(
         read.mesh,
         fields.mass,
         centre_of_mass,
         fields.friction,
         &forbidden,
-    ) {
-        Ok(object) => Ok(StoredObject::from_file(
+        stop,
+    )?;
+    match object {
+        Ok(object) => Ok(StoredObject::from_file_until(
             fields.id,
             Arc::new(object),
             warnings,
             Arc::new(file),
-        )),
+            stop,
+        )?),
         Err(errors) => {
             for error in errors {
                 violations.add(mesh_field, error.to_string());
@@ -108,14 +113,14 @@ mod tests {
 
     #[test]
     fn counts_forbidden_triangles_as_in_the_file() {
-        let stored = build_object(fields(&[1, 2, 4]), LIMITS, Violations::default()).unwrap();
+        let stored = build_object(fields(&[1, 2, 4]), LIMITS, Violations::default(), Stop::NEVER).unwrap();
         let forbidden: Vec<bool> = (0..4).map(|t| stored.object.is_forbidden(t)).collect();
         assert_eq!(forbidden, [false, true, false, true]);
     }
 
     #[test]
     fn rejects_triangles_beyond_the_file() {
-        assert!(build_object(fields(&[5]), LIMITS, Violations::default()).is_err());
+        assert!(build_object(fields(&[5]), LIMITS, Violations::default(), Stop::NEVER).is_err());
     }
 
     const ROOMY: MeshLimits = MeshLimits {
@@ -154,6 +159,7 @@ mod tests {
                 text_fields(format!("{start}{lines}"), unit_metres),
                 ROOMY,
                 Violations::default(),
+                Stop::NEVER,
             ) {
                 Ok(stored) => {
                     built.set(built.get() + 1);
@@ -172,7 +178,7 @@ mod tests {
     #[test]
     fn warns_about_a_mesh_without_volume() {
         let sheet = "g lid\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
-        let stored = build_object(text_fields(sheet, 0.1), ROOMY, Violations::default())
+        let stored = build_object(text_fields(sheet, 0.1), ROOMY, Violations::default(), Stop::NEVER)
             .expect("a sheet is an object");
         assert!(
             stored

@@ -80,6 +80,7 @@ fn field_of(error: &ObjectError) -> &'static str {
 mod tests {
     use glam::Vec3;
     use grasp_import::{Import, MeshLimits};
+    use grasp_synthesis::base::stop::Stop;
 
     use super::*;
     use crate::{
@@ -99,7 +100,7 @@ mod tests {
             import: Import::with_unit(0.1),
             ..ObjectFields::named("tetrahedron", 0.1)
         };
-        build_object(fields, LIMITS, Violations::default()).unwrap()
+        build_object(fields, LIMITS, Violations::default(), Stop::NEVER).unwrap()
     }
 
     /// Its second face is dropped, and all later ones are the group "lid".
@@ -142,7 +143,7 @@ mod tests {
             },
             ..ObjectFields::named("other", 0.4)
         };
-        let created = build_object(fields, LIMITS, Violations::default()).unwrap();
+        let created = build_object(fields, LIMITS, Violations::default(), Stop::NEVER).unwrap();
         assert_eq!(created.content_hash, after.content_hash);
     }
 

@@ -24,8 +24,9 @@ use grasp_assets::{
 };
 use grasp_proto::v1;
 use grasp_synthesis::{
+    base::stop::{Stop, Stopped, unstopped},
     geometry::mesh::TriangleMesh,
-    known::transferred_grips::TransferredGrips,
+    known::{primitives::HeldPrimitive, transferred_grips::TransferredGrips},
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     propose::placement_cache::PlacementCaches,
     propose::prepared::PreparedObject,
@@ -81,45 +82,75 @@ impl StoredObject {
         warnings: Vec<String>,
         file: Arc<MeshFile>,
     ) -> Self {
-        Self {
+        unstopped(|stop| Self::from_file_until(id, object, warnings, file, stop))
+    }
+
+    /// As [`Self::from_file`], unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn from_file_until(
+        id: String,
+        object: Arc<GraspObject>,
+        warnings: Vec<String>,
+        file: Arc<MeshFile>,
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
+        Ok(Self {
             id,
             built_in: false,
             content_hash: content_hash(&object),
-            object: Arc::new(PreparedObject::new(object)),
+            object: Arc::new(PreparedObject::new_until(object, stop)?),
             warnings,
             file,
             atlas_slots: AtlasSlots::default(),
             transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
-        }
+        })
     }
 
     /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with
     /// each hand would have to do. Takes some ten milliseconds per hand, in parallel if the system has a thread for it.
-    pub(crate) fn prepare(&self, rig: &str) {
-        let prepare_hand = |handedness| {
-            if let Some(hand) = hand(rig, handedness) {
-                self.object.placement_cache(&hand.rig);
-                self.transferred_grips(hand);
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
+        let prepare_hand = |handedness| -> Result<(), Stopped> {
+            let Some(hand) = hand(rig, handedness) else {
+                return Ok(());
+            };
+            self.object.build_placement_cache(&hand.rig, stop)?;
+            if let Some((held, grips)) = self.transferred_grips_of(hand) {
+                let transferred = TransferredGrips::of_until(&self.object, held, stop)?;
+                grips.get_or_init(|| Arc::new(transferred));
             }
+            Ok(())
         };
         thread::scope(|scope| {
             let left = thread::Builder::new().spawn_scoped(scope, || prepare_hand(Handedness::Left));
-            prepare_hand(Handedness::Right);
-            if left.is_err() {
-                prepare_hand(Handedness::Left);
-            }
-        });
+            let right = prepare_hand(Handedness::Right);
+            let left = left.ok().and_then(|thread| thread.join().ok());
+            left.unwrap_or_else(|| prepare_hand(Handedness::Left)).and(right)
+        })
     }
 
     /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if none fits.
     /// There are such grips for one rig; hands of others start from those, too.
     pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
+        let (held, grips) = self.transferred_grips_of(hand)?;
+        let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
+        (!grips.is_empty()).then(|| Arc::clone(grips))
+    }
+
+    /// The primitives' grips for a hand, and the place of those transferred from them.
+    fn transferred_grips_of(
+        &self,
+        hand: &Hand,
+    ) -> Option<(&'static Arc<[HeldPrimitive]>, &OnceLock<Arc<TransferredGrips>>)> {
         let all = || held_primitives().iter().zip(&self.transferred_grips);
         let is_side = |of: &Hand| of.rig.handedness == hand.rig.handedness;
         let own = all().find(|((of, _), _)| **of == *hand);
         let ((_, held), grips) = own.or_else(|| all().find(|((of, _), _)| is_side(of)))?;
-        let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
-        (!grips.is_empty()).then(|| Arc::clone(grips))
+        Some((held, grips))
     }
 
     /// The triangles that must not be touched, ascending.

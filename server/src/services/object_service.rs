@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use grasp_import::MeshLimits;
 use grasp_proto::v1::{self, object_service_server::ObjectService};
+use grasp_synthesis::base::stop::{Stop, unstopped};
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
@@ -11,7 +12,7 @@ use super::{Shared, streaming::Messages};
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
-    executor::run_blocking,
+    executor::{run_blocking, run_stoppable},
     limits::LARGEST_RESPONSE,
     objects::{Revision, build::build_object, change::changed, store::Origin},
     validate::{
@@ -48,10 +49,10 @@ impl ObjectHandler {
         call: &CallContext,
     ) -> Result<v1::CreateObjectResponse, ServiceError> {
         let handler = self.clone();
-        let call = call.clone();
-        let object = run_blocking(move || {
+        let context = call.clone();
+        let object = run_stoppable(call.answer_due(), move |stop| {
             let _permit = permit;
-            handler.create_blocking(request, handler.shared.obj_limits, &call)
+            handler.create_blocking(request, handler.shared.obj_limits, &context, stop)
         })
         .await??;
         Ok(v1::CreateObjectResponse {
@@ -65,6 +66,7 @@ impl ObjectHandler {
         request: v1::CreateObjectRequest,
         limits: MeshLimits,
         call: &CallContext,
+        stop: Stop<'_>,
     ) -> Result<Revision, ServiceError> {
         let shared = &self.shared;
         let mut violations = Violations::default();
@@ -80,8 +82,8 @@ impl ObjectHandler {
                 return Ok(object);
             }
         }
-        let object = build_object(fields, limits, violations)?;
-        object.prepare(&shared.default_rig);
+        let object = build_object(fields, limits, violations, stop)?;
+        object.prepare(&shared.default_rig, stop)?;
         let revision = shared.objects.insert(object, origin)?;
         shared.atlases.register(&revision.object);
         Ok(revision)
@@ -162,7 +164,7 @@ impl ObjectHandler {
                 objects.replace(&base, labels.clone(), None)
             };
         };
-        object.prepare(default_rig);
+        unstopped(|stop| object.prepare(default_rig, stop));
         let revision = objects.replace(&base, labels.clone(), Some(object))?;
         atlases.register(&revision.object);
         Ok(revision)

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
-    executor::run_blocking,
+    executor::{run_blocking, run_stoppable},
     objects::{
         changes::{Event, Told},
         glb::MeshGlb,
@@ -47,11 +47,11 @@ impl ObjectHandler {
             bytes: uploads.maximum_bytes(),
             ..self.shared.obj_limits
         };
-        let (handler, call) = (self.clone(), call.clone());
-        let object = run_blocking(move || {
+        let (handler, context) = (self.clone(), call.clone());
+        let object = run_stoppable(call.answer_due(), move |stop| {
             let _permit = permit;
             let (request, _room) = received.into_parts();
-            handler.create_blocking(request, limits, &call)
+            handler.create_blocking(request, limits, &context, stop)
         })
         .await?
         .map_err(blame_parts)?;

@@ -30,6 +30,8 @@ mod physical;
 mod real_input;
 mod receiver;
 mod reflection;
+mod registration;
+
 mod reported;
 mod reported_grasps;
 mod reproducible;

@@ -11,14 +11,26 @@ use crate::fixtures::{bounded, reason};
 
 /// Sends bytes as the body of a unary call; returns the status.
 async fn status_of(server: &TestServer, method: &str, body: Vec<u8>) -> Status {
+    status_within(server, method, body, None).await
+}
+
+/// The same with a `grpc-timeout`, which this client does not enforce itself.
+pub(crate) async fn status_within(
+    server: &TestServer,
+    method: &str,
+    body: Vec<u8>,
+    timeout: Option<&str>,
+) -> Status {
     let stream = TcpStream::connect(server.address()).await.unwrap();
     let (sender, connection) = h2::client::handshake(stream).await.unwrap();
     let connection = tokio::spawn(connection);
-    let request = Request::post(format!("{}/grasp.v1.{method}", server.endpoint()))
+    let mut request = Request::post(format!("{}/grasp.v1.{method}", server.endpoint()))
         .header("content-type", "application/grpc")
-        .header("te", "trailers")
-        .body(())
-        .unwrap();
+        .header("te", "trailers");
+    if let Some(timeout) = timeout {
+        request = request.header("grpc-timeout", timeout);
+    }
+    let request = request.body(()).unwrap();
     let mut sender = sender.ready().await.unwrap();
     let (answer, mut stream) = sender.send_request(request, false).unwrap();
     stream.send_data(Bytes::from(body), true).unwrap();
@@ -34,7 +46,7 @@ async fn status_of(server: &TestServer, method: &str, body: Vec<u8>) -> Status {
 }
 
 /// A message as gRPC frames it.
-fn framed(message: &[u8]) -> Vec<u8> {
+pub(crate) fn framed(message: &[u8]) -> Vec<u8> {
     let length = u32::try_from(message.len()).unwrap().to_be_bytes();
     [&[0], &length[..], message].concat()
 }

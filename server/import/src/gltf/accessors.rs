@@ -8,6 +8,8 @@ use gltf::{
     buffer::View,
 };
 
+use grasp_synthesis::base::stop::{Stop, Stopped};
+
 use crate::{error::ImportError, limits::MeshLimits};
 
 /// How often, on average, each vertex and index of the largest mesh may be read: for morph targets, joints and weights.
@@ -19,19 +21,22 @@ pub(crate) struct Buffers<'a> {
     buffers: Vec<Cow<'a, [u8]>>,
     /// Elements that may still be read: scenes can ask for the same ones again and again.
     left: Cell<u64>,
+    stop: Stop<'a>,
 }
 
 impl<'a> Buffers<'a> {
-    pub(super) fn new(buffers: Vec<Cow<'a, [u8]>>, limits: MeshLimits) -> Self {
+    pub(super) fn new(buffers: Vec<Cow<'a, [u8]>>, limits: MeshLimits, stop: Stop<'a>) -> Self {
         let largest = limits.vertices as u64 + 3 * limits.triangles as u64;
         Self {
             buffers,
             left: Cell::new(READS.saturating_mul(largest)),
+            stop,
         }
     }
 
-    /// Counts elements that are about to be read.
+    /// Counts elements that are about to be read, and ends reading if it should.
     pub(crate) fn spend(&self, elements: u64) -> Result<(), ImportError> {
+        self.stop.check().map_err(|Stopped| ImportError::Stopped)?;
         let left = self.left.get().checked_sub(elements.saturating_add(1));
         self.left.set(left.ok_or_else(|| {
             ImportError::at(

@@ -17,12 +17,14 @@ use gltf::{
     buffer::Source,
     json::{Root, deserialize, validation},
 };
+use grasp_synthesis::base::stop::Stop;
 
 use crate::{
     error::ImportError,
     format::without_mark,
     limits::MeshLimits,
     raw::{Places, RawMesh},
+    stoppable::stopped,
 };
 pub(crate) use accessors::Buffers;
 pub(crate) use nodes::Scene;
@@ -43,10 +45,10 @@ const HARMLESS: &[&str] = &[
 ];
 
 /// Reads the default scene, or the first one; all nodes if there is none.
-pub(crate) fn read(bytes: &[u8], limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
     let Opened {
         document, buffers, ..
-    } = open(bytes, limits)?;
+    } = open(bytes, limits, stop)?;
     let mut raw = RawMesh {
         places: Places::Triangles,
         ..RawMesh::default()
@@ -68,7 +70,11 @@ pub(crate) struct Opened<'a> {
 }
 
 /// Opens and validates a document.
-pub(crate) fn open(bytes: &[u8], limits: MeshLimits) -> Result<Opened<'_>, Vec<ImportError>> {
+pub(crate) fn open<'a>(
+    bytes: &'a [u8],
+    limits: MeshLimits,
+    stop: Stop<'a>,
+) -> Result<Opened<'a>, Vec<ImportError>> {
     let Parts { json, binary } = parts(bytes).map_err(|error| vec![error])?;
     // Each object of the text takes some hundred bytes in memory, however short it is.
     let objects = json.split(|&byte| byte == b'{').count() - 1;
@@ -92,8 +98,9 @@ pub(crate) fn open(bytes: &[u8], limits: MeshLimits) -> Result<Opened<'_>, Vec<I
         return Err(refused);
     }
     strip(&mut root);
+    stop.check().map_err(stopped)?;
     let document = Document::from_json(root).map_err(|error| invalid(&error))?;
-    let buffers = decode(&document, binary, limits).map_err(|error| vec![error])?;
+    let buffers = decode(&document, binary, limits, stop).map_err(|error| vec![error])?;
     Ok(Opened {
         json,
         document,
@@ -195,6 +202,7 @@ fn decode<'a>(
     document: &Document,
     binary: Option<Cow<'a, [u8]>>,
     limits: MeshLimits,
+    stop: Stop<'a>,
 ) -> Result<Buffers<'a>, ImportError> {
     let mut binary = binary;
     let mut buffers = Vec::new();
@@ -227,5 +235,5 @@ fn decode<'a>(
         }
         buffers.push(bytes);
     }
-    Ok(Buffers::new(buffers, limits))
+    Ok(Buffers::new(buffers, limits, stop))
 }

@@ -10,6 +10,7 @@ pub(crate) mod lines;
 mod scan;
 mod seven_numbers;
 
+use crate::stoppable::Stoppable;
 use crate::{
     error::ImportError,
     foreign::foreign,
@@ -17,6 +18,7 @@ use crate::{
     raw::{Places, RawMesh},
 };
 use encoding::{Decoded, decode};
+use grasp_synthesis::base::stop::Stop;
 use scan::Scan;
 
 /// Largest number of names on one `g` line. Each face belongs to all of them, so this bounds the memory for groups.
@@ -25,21 +27,31 @@ pub const MAX_NAMES_PER_LINE: usize = 16;
 /// Reads OBJ text, in UTF-8 or UTF-16; `unit_metres` is the length of one unit.
 ///
 /// Colours, normals and texture coordinates are ignored, and no material file is opened.
-pub(crate) fn read(bytes: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read(
+    bytes: &[u8],
+    unit_metres: f32,
+    limits: MeshLimits,
+    stop: Stop<'_>,
+) -> Result<RawMesh, Vec<ImportError>> {
     let Decoded { text, warning } = decode(bytes);
-    let mut raw = read_text(&text, unit_metres, limits)
+    let mut raw = read_text(&text, unit_metres, limits, stop)
         .map_err(|errors| foreign(bytes, &text).map_or(errors, |error| vec![error]))?;
     raw.warnings.extend(warning);
     Ok(raw)
 }
 
-fn read_text(text: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<RawMesh, Vec<ImportError>> {
-    let scan = Scan::of(text, unit_metres, limits)?;
+fn read_text(
+    text: &[u8],
+    unit_metres: f32,
+    limits: MeshLimits,
+    stop: Stop<'_>,
+) -> Result<RawMesh, Vec<ImportError>> {
+    let scan = Scan::of(text, unit_metres, limits, stop)?;
     // tobj would split every polygon into a fan, convex or not.
     let options = tobj::LoadOptions::default();
     // The scan drops references to material libraries; if one got through, it would be rejected, not opened.
     let reject = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut scan.plain.as_bytes(), &options, reject)
+    let (models, _) = tobj::load_obj_buf(&mut Stoppable::new(scan.plain.as_bytes(), stop), &options, reject)
         .map_err(|error| vec![ImportError::Unreadable(error)])?;
     // Without groups in its input, tobj returns one model.
     let parsed = models.into_iter().next().map(|model| model.mesh);

@@ -9,7 +9,12 @@ use crate::{
     error::{ImportError, Violations},
     limits::{MAX_COORDINATE_METRES, MeshLimits},
     raw::{NameSets, Occurrences, RawFace},
+    stoppable::stopped,
 };
+use grasp_synthesis::base::stop::Stop;
+
+/// Lines read between two checks whether to stop.
+const LINES_PER_CHECK: usize = 1024;
 
 /// Result of the first pass.
 #[derive(Debug, Default)]
@@ -34,7 +39,12 @@ pub(super) struct Scan {
 
 impl Scan {
     /// Scans the text; allocates in proportion to what was read within the limits.
-    pub(super) fn of(text: &[u8], unit_metres: f32, limits: MeshLimits) -> Result<Self, Vec<ImportError>> {
+    pub(super) fn of(
+        text: &[u8],
+        unit_metres: f32,
+        limits: MeshLimits,
+        stop: Stop<'_>,
+    ) -> Result<Self, Vec<ImportError>> {
         let mut scanner = Scanner {
             text,
             unit_metres,
@@ -50,6 +60,7 @@ impl Scan {
             names_of_faces: 0,
         };
         for (number, line) in Lines::of(text) {
+            stop.check_every(LINES_PER_CHECK, number).map_err(stopped)?;
             scanner.line(number, &line);
             if scanner.over_limit {
                 break;

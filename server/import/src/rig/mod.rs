@@ -15,6 +15,7 @@ mod vrm;
 use std::collections::HashMap;
 
 use glam::{DMat4, DVec4, Vec3};
+use grasp_synthesis::base::stop::Stop;
 use grasp_synthesis::model::hand::{
     Handedness,
     joints::{HandJoints, JOINT_COUNT, index},
@@ -108,7 +109,7 @@ pub fn read_rig(
         )]);
     }
     let limits = limits.unwelded();
-    let opened = gltf::open(bytes, limits)?;
+    let opened = gltf::open(bytes, limits, Stop::NEVER)?;
     let nodes = opened.document.nodes().len();
     if nodes > MOST_NODES {
         return Err(vec![ImportError::TooMany {

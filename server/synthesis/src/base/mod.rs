@@ -1,4 +1,4 @@
-//! Shared by every layer and dependent on none: poses, the clock, random streams, the stopwatch, rejections, and the
+//! Shared by every layer and dependent on none: poses, the clock, stops, random streams, the stopwatch, rejections, and the
 //! switches of the default search's mechanisms.
 
 pub mod clock;
@@ -7,4 +7,5 @@ pub mod pose;
 pub mod ramp;
 pub mod random;
 pub mod rejection;
+pub mod stop;
 pub mod stopwatch;

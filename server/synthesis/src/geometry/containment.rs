@@ -21,6 +21,7 @@ use super::{
     topology,
     wide_bvh::WideBvh,
 };
+use crate::base::stop::{Stop, Stopped};
 
 /// Points whose winding number exceeds this in magnitude are inside: halfway between not enclosed and enclosed once.
 /// The magnitude makes a mesh that is inside out as a whole enclose its volume too.
@@ -55,12 +56,15 @@ pub(super) struct Containment {
 
 impl Containment {
     /// Finds the rims of a mesh's holes and closes them; O(n).
-    pub(super) fn of(mesh: &TriangleMesh, aabb: &Aabb) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn of(mesh: &TriangleMesh, aabb: &Aabb, stop: Stop<'_>) -> Result<Self, Stopped> {
         let mut boundary = topology::boundary_chain(mesh);
         let is_sheet = if boundary.is_empty() {
             Vec::new()
         } else {
-            topology::sheets(mesh, |point| winding_number(mesh, point, |_| true))
+            topology::sheets(mesh, stop, |point| winding_number(mesh, point, |_| true))?
         };
         if !is_sheet.is_empty() {
             let volumes = mesh.submesh(|triangle| !is_sheet[triangle]);
@@ -76,11 +80,11 @@ impl Containment {
                 count: f64::from(count),
             })
             .collect();
-        Self {
+        Ok(Self {
             caps,
             is_sheet,
             ray_length: 2.0 * aabb.diagonal(),
-        }
+        })
     }
 
     /// True if the volume contains the point, which must lie inside the mesh's box.

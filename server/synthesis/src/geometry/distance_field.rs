@@ -3,6 +3,7 @@
 use glam::{UVec3, Vec3};
 
 use super::{aabb::Aabb, tapered_capsule::TaperedCapsule};
+use crate::base::stop::{Stop, Stopped};
 
 /// Target number of grid nodes. More tighten the bounds (half the spacing takes eight times as many) at about 0.2 µs
 /// of preparation and 4 bytes per node.
@@ -18,6 +19,9 @@ const MARGIN: f32 = 0.04;
 
 /// By how much the spacing grows until the nodes are few enough.
 const COARSER: f32 = 1.25;
+
+/// Nodes between two checks whether to stop: few, because one of a crumpled surface takes up to a millisecond.
+const NODES_PER_CHECK: usize = 4;
 
 /// Number of spheres along the axis that cover a capsule. More tighten the bound and take longer.
 const SPHERES: usize = 3;
@@ -37,7 +41,14 @@ pub(super) struct DistanceField {
 impl DistanceField {
     /// Samples the field of a surface inside `aabb`. `distance(point, within)` returns the point's distance from the
     /// surface, or `within` if it is larger.
-    pub(super) fn new(aabb: &Aabb, distance: impl Fn(Vec3, f32) -> f32) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn new(
+        aabb: &Aabb,
+        stop: Stop<'_>,
+        distance: impl Fn(Vec3, f32) -> f32,
+    ) -> Result<Self, Stopped> {
         let size = aabb.max - aabb.min + 2.0 * MARGIN;
         let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
         let counts_at = |spacing: f32| (size / spacing).ceil() + 1.0;
@@ -57,17 +68,18 @@ impl DistanceField {
                     let found = distance(node, within);
                     distances.push(found);
                     within = (found + spacing) * 1.001;
+                    stop.check_every(NODES_PER_CHECK, x as usize)?;
                 }
             }
         }
-        Self {
+        Ok(Self {
             origin,
             spacing,
             inverse_spacing: spacing.recip(),
             counts,
             aabb: *aabb,
             distances,
-        }
+        })
     }
 
     /// A lower bound of the distance from a point to the surface, in metres.

@@ -9,7 +9,10 @@ use std::f32::consts::TAU;
 use glam::{DVec3, Vec3};
 
 use super::{Segment, mesh_bvh::MeshBvh, principal_axes::principal_axes, surface_samples::SurfaceSampler};
-use crate::base::random::AttemptStream;
+use crate::base::{
+    random::AttemptStream,
+    stop::{Stop, Stopped},
+};
 
 /// Points of the surface below which a part is sought, and the seed by which they are drawn. Fewer miss short handles of large
 /// objects.
@@ -92,14 +95,21 @@ pub struct Handles(Vec<Handle>);
 impl Handles {
     /// Probes the parts of a surface that are as thick as a handle, without the triangles for which `is_forbidden` returns
     /// true; takes about a millisecond.
-    pub fn of(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Self {
-        let middles = middles(surface, is_forbidden);
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of(
+        surface: &MeshBvh,
+        stop: Stop<'_>,
+        is_forbidden: impl Fn(u32) -> bool,
+    ) -> Result<Self, Stopped> {
+        let middles = middles(surface, stop, is_forbidden)?;
         let stride = middles.len().div_ceil(MAX_PROBED).max(1);
-        let probed = middles
-            .into_iter()
-            .step_by(stride)
-            .filter_map(|middle| Handle::probe(surface, middle));
-        let mut handles: Vec<Handle> = probed.collect();
+        let mut handles: Vec<Handle> = Vec::new();
+        for middle in middles.into_iter().step_by(stride) {
+            stop.check()?;
+            handles.extend(Handle::probe(surface, middle));
+        }
         let length_at = |at: &Handle| {
             let in_line = handles.iter().filter_map(|other| other.along(at));
             let (low, high) = in_line.fold((0.0_f32, 0.0_f32), |(low, high), along| {
@@ -113,7 +123,7 @@ impl Handles {
             handle.length = length;
             handle.is_main = length >= MAIN_SHARE * longest.min(FULL_LENGTH);
         }
-        Self(handles)
+        Ok(Self(handles))
     }
 
     /// The places, in the order of the surface's triangles.
@@ -207,7 +217,11 @@ const WITHIN: f32 = 1.3;
 const SLACK: f32 = 0.004;
 
 /// Points inside the parts of a surface that are as thick as a handle, in the order of its triangles.
-fn middles(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Vec<Vec3> {
+fn middles(
+    surface: &MeshBvh,
+    stop: Stop<'_>,
+    is_forbidden: impl Fn(u32) -> bool,
+) -> Result<Vec<Vec3>, Stopped> {
     let mesh = surface.mesh();
     let sampler = SurfaceSampler::new(mesh, |triangle| !is_forbidden(triangle));
     let middle = |sample| {
@@ -220,7 +234,12 @@ fn middles(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Vec<Vec3> {
         let is_thick = exit.distance >= THICKNESS[0] && !is_forbidden(exit.triangle) && faces_away;
         is_thick.then(|| start.midpoint(exit.position))
     };
-    (0..SAMPLES).filter_map(middle).collect()
+    let mut middles = Vec::new();
+    for sample in 0..SAMPLES {
+        stop.check()?;
+        middles.extend(middle(sample));
+    }
+    Ok(middles)
 }
 
 impl Sides {

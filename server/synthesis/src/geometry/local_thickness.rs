@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{principal_axes::principal_axes, surface_samples::SurfaceSample};
+use crate::base::stop::{Stop, Stopped};
 
 /// Radius of the part of the surface around a sample that counts as near, in metres: the reach of a hand's contacts.
 const REACH: f32 = 0.06;
@@ -18,12 +19,16 @@ pub struct LocalThickness {
 
 impl LocalThickness {
     /// Measures a mesh from points spread evenly over it; takes some milliseconds.
-    pub fn of(samples: &[SurfaceSample]) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of(samples: &[SurfaceSample], stop: Stop<'_>) -> Result<Self, Stopped> {
         let points: Vec<Vec3> = samples.iter().map(|sample| sample.position).collect();
         let mut by_distance = Vec::with_capacity(points.len());
         let samples = points
             .iter()
             .map(|&centre| {
+                stop.check()?;
                 by_distance.clear();
                 by_distance.extend(
                     points
@@ -42,10 +47,10 @@ impl LocalThickness {
                     .iter()
                     .map(|(_, point)| point.as_dvec3())
                     .collect();
-                (centre, thickness(&part))
+                Ok((centre, thickness(&part)))
             })
-            .collect();
-        Self { samples }
+            .collect::<Result<_, Stopped>>()?;
+        Ok(Self { samples })
     }
 
     /// Root mean square distance of the surface near a point from the axis along which it is longest, in metres: the radius

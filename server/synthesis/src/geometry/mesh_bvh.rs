@@ -14,6 +14,7 @@ use super::{
     tapered_capsule::TaperedCapsule,
     wide_bvh::{BuildQuality, WideBvh},
 };
+use crate::base::stop::{Stop, Stopped, unstopped};
 
 /// A point where a segment crosses a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,32 +53,40 @@ pub struct MeshBvh {
 impl MeshBvh {
     /// Builds the hierarchy for a mesh that is queried many times: a few milliseconds for 2,000 triangles.
     pub fn build(mesh: TriangleMesh) -> Self {
-        Self::with_quality(mesh, BuildQuality::Thorough)
+        unstopped(|stop| Self::build_until(mesh, stop))
+    }
+
+    /// As [`Self::build`], unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn build_until(mesh: TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
+        Self::with_quality(mesh, BuildQuality::Thorough, stop)
     }
 
     /// Builds the hierarchy for a mesh that serves one request: less than a millisecond for 5,000 triangles. Queries
     /// give the same answers but take longer.
     pub fn build_quick(mesh: TriangleMesh) -> Self {
-        Self::with_quality(mesh, BuildQuality::Quick)
+        unstopped(|stop| Self::with_quality(mesh, BuildQuality::Quick, stop))
     }
 
-    fn with_quality(mesh: TriangleMesh, quality: BuildQuality) -> Self {
+    fn with_quality(mesh: TriangleMesh, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
         let aabb = mesh.aabb();
-        let bvh = WideBvh::build(&mesh, quality);
+        let bvh = WideBvh::build(&mesh, quality, stop)?;
         let distance = |point: Vec3, within: f32| {
             closest::closest(&bvh, &mesh, point, within).map_or(within, |(_, _, distance)| distance)
         };
         let distance_field = match quality {
-            BuildQuality::Thorough => Some(DistanceField::new(&aabb, distance)),
+            BuildQuality::Thorough => Some(DistanceField::new(&aabb, stop, distance)?),
             BuildQuality::Quick => None,
         };
-        Self {
+        Ok(Self {
             distance_field,
             bvh,
-            containment: Containment::of(&mesh, &aabb),
+            containment: Containment::of(&mesh, &aabb, stop)?,
             aabb,
             mesh,
-        }
+        })
     }
 
     /// The mesh.

@@ -12,6 +12,7 @@ use super::{
     mesh::TriangleMesh,
     tapered_capsule::TaperedCapsule,
 };
+use crate::base::stop::{Stop, Stopped};
 
 /// Cosine of the angle from which two normals oppose each other: a right angle, to single precision. Larger values let
 /// the edges of a rotated box count as places to press.
@@ -27,6 +28,9 @@ const LEAF: usize = 4;
 /// curved objects need more; their distance counts as unknown.
 const MAX_PAIRS: usize = 400_000;
 
+/// Pairs compared between two checks whether to stop.
+const PAIRS_PER_CHECK: usize = 64;
+
 /// A distance between opposed triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OpposedDistance {
@@ -41,20 +45,25 @@ pub enum OpposedDistance {
 /// The distance between the closest two triangles, among those that `is_used` accepts, whose normals are more than a right
 /// angle apart. The search ends at the first pair within `enough` metres, and ignores pairs beyond `limit` metres.
 /// Meaningful for closed, consistently wound meshes.
+///
+/// # Errors
+/// [`Stopped`].
 pub fn opposed_distance(
     mesh: &TriangleMesh,
     is_used: impl Fn(u32) -> bool,
     enough: f32,
     limit: f32,
-) -> OpposedDistance {
+    stop: Stop<'_>,
+) -> Result<OpposedDistance, Stopped> {
     let triangles: Vec<Triangle> = (0..mesh.triangles().len())
         .filter(|&triangle| is_used(triangle as u32))
         .map(|triangle| Triangle::new(mesh.corners(triangle), mesh.normal(triangle)))
         .collect();
     if triangles.is_empty() {
-        return OpposedDistance::BeyondLimit;
+        return Ok(OpposedDistance::BeyondLimit);
     }
-    Tree::new(triangles).opposed_distance(enough, limit)
+    stop.check()?;
+    Tree::new(triangles).opposed_distance(enough, limit, stop)
 }
 
 /// A triangle with its normal.
@@ -173,7 +182,7 @@ impl Tree {
         self.nodes.len() - 1
     }
 
-    fn opposed_distance(&self, enough: f32, limit: f32) -> OpposedDistance {
+    fn opposed_distance(&self, enough: f32, limit: f32, stop: Stop<'_>) -> Result<OpposedDistance, Stopped> {
         let root = self.nodes.len() - 1;
         let mut best = limit;
         let mut pairs = vec![[root, root]];
@@ -186,13 +195,14 @@ impl Tree {
             }
             compared += 1;
             if compared > MAX_PAIRS {
-                return OpposedDistance::CloseOrUnknown;
+                return Ok(OpposedDistance::CloseOrUnknown);
             }
+            stop.check_every(PAIRS_PER_CHECK, compared)?;
             match (of_a.halves, of_b.halves) {
                 (None, None) => {
                     best = best.min(self.least_distance(of_a, of_b));
                     if best <= enough {
-                        return OpposedDistance::CloseOrUnknown;
+                        return Ok(OpposedDistance::CloseOrUnknown);
                     }
                 }
                 (Some([c, d]), _) if a == b => pairs.extend([[c, c], [d, d], [c, d]]),
@@ -203,11 +213,11 @@ impl Tree {
                 (_, Some([c, d])) => pairs.extend([[a, c], [a, d]]),
             }
         }
-        if best < limit {
+        Ok(if best < limit {
             OpposedDistance::Apart(best)
         } else {
             OpposedDistance::BeyondLimit
-        }
+        })
     }
 
     /// The least distance between opposed triangles of two leaves, in metres; infinite if none oppose.

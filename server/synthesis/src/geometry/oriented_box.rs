@@ -3,7 +3,10 @@
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
 
 use super::{mesh::TriangleMesh, principal_axes::principal_axes};
-use crate::base::pose::Pose;
+use crate::base::{
+    pose::Pose,
+    stop::{Stop, Stopped, unstopped},
+};
 
 /// Number of directions whose outermost vertices the box is fitted to, about 7° apart. More fit rounded objects
 /// better and take longer; the last step makes the box enclose every vertex in any case.
@@ -36,18 +39,27 @@ impl OrientedBox {
     /// cross-section, by rotating calipers, until no turn shrinks it: the local search of C.-T. Chang, B. Gorissen,
     /// S. Melchior, "Fast Oriented Bounding Box Optimization on the Rotation Group SO(3, R)", 2011.
     pub fn around(mesh: &TriangleMesh) -> Self {
+        unstopped(|stop| Self::around_until(mesh, stop))
+    }
+
+    /// As [`Self::around`], unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn around_until(mesh: &TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
         let vertices = || {
             mesh.triangles()
                 .iter()
                 .flatten()
                 .map(|&v| mesh.positions()[v as usize].as_dvec3())
         };
-        let points = outermost(vertices);
+        let points = outermost(vertices, stop)?;
         let thickness = COMPARED_THICKNESS * f64::from(mesh.aabb().diagonal());
         let size = |axes: DMat3| extents(&points, axes).map(|e| e + thickness).element_product();
 
         let mut best = DMat3::IDENTITY;
         for initial in initial_axes(&points) {
+            stop.check()?;
             let axes = refine(&points, initial, size);
             // Smaller by a thousandth, so that rounding does not choose between equals.
             if size(axes) < 0.999 * size(best) {
@@ -56,11 +68,11 @@ impl OrientedBox {
         }
         let fitted = Self::with_axes(vertices, best);
         let aligned = Self::with_axes(vertices, DMat3::IDENTITY);
-        if fitted.volume() <= aligned.volume() {
+        Ok(if fitted.volume() <= aligned.volume() {
             fitted
         } else {
             aligned
-        }
+        })
     }
 
     /// The tight box with the given axes.
@@ -114,16 +126,20 @@ impl OrientedBox {
 }
 
 /// The vertices that are outermost in at least one of [`SUPPORT_DIRECTIONS`] directions.
-fn outermost<I: Iterator<Item = DVec3>>(vertices: impl Fn() -> I) -> Vec<DVec3> {
+fn outermost<I: Iterator<Item = DVec3>>(
+    vertices: impl Fn() -> I,
+    stop: Stop<'_>,
+) -> Result<Vec<DVec3>, Stopped> {
     let all: Vec<DVec3> = vertices().collect();
-    let mut chosen: Vec<usize> = directions(SUPPORT_DIRECTIONS)
-        .filter_map(|direction| {
-            (0..all.len()).max_by(|&i, &j| direction.dot(all[i]).total_cmp(&direction.dot(all[j])))
-        })
-        .collect();
+    let mut chosen: Vec<usize> = Vec::new();
+    for direction in directions(SUPPORT_DIRECTIONS) {
+        stop.check()?;
+        let along = |i: &usize, j: &usize| direction.dot(all[*i]).total_cmp(&direction.dot(all[*j]));
+        chosen.extend((0..all.len()).max_by(along));
+    }
     chosen.sort_unstable();
     chosen.dedup();
-    chosen.into_iter().map(|index| all[index]).collect()
+    Ok(chosen.into_iter().map(|index| all[index]).collect())
 }
 
 /// Directions spread evenly over the sphere by a golden-angle spiral (R. Swinbank, R. J. Purser: Fibonacci grids,

@@ -10,6 +10,7 @@ use super::{
     topology::{DisjointSets, EdgeUse, sorted_edges},
     wedges::worn_edges,
 };
+use crate::base::stop::{Stop, Stopped};
 
 /// Cosine of the angle between the outward normals of two faces beyond which the edge between them is sharp: the faces enclose
 /// less than 30°.
@@ -43,7 +44,10 @@ pub struct SharpFeatures {
 
 impl SharpFeatures {
     /// Finds the sharp edges and points of a surface; O(n log n).
-    pub fn of(surface: &MeshBvh) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of(surface: &MeshBvh, stop: Stop<'_>) -> Result<Self, Stopped> {
         let mesh = surface.mesh();
         let mut sharp = Self::default();
         let edges = sorted_edges(mesh);
@@ -68,13 +72,15 @@ impl SharpFeatures {
                 .get(&chains.root(a))
                 .is_some_and(|&length| length >= LEAST_LENGTH)
             {
+                stop.check()?;
                 sharp.add(at(a), at(b), &mut marked);
             }
         }
-        for point in points(mesh, &edges).into_iter().chain(worn_edges(surface)) {
+        stop.check()?;
+        for point in points(mesh, &edges).into_iter().chain(worn_edges(surface, stop)?) {
             sharp.add(point, point, &mut marked);
         }
-        sharp
+        Ok(sharp)
     }
 
     /// True if nothing is sharp.

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec3};
 
 use super::mesh::TriangleMesh;
+use crate::base::stop::{Stop, Stopped};
 
 /// Largest mean [`enclosure`] of a sheet: halfway between a flat sheet and the face of a solid.
 const MAX_SHEET_ENCLOSURE: f64 = 0.75;
@@ -66,7 +67,14 @@ impl Topology {
 /// One flag per triangle: true if it belongs to a sheet, a connected part that is nearly flat and not a face of something
 /// that encloses a volume: a card without thickness, a leaf, a sail. Empty if there is none. `winding` gives the winding
 /// number of the whole mesh at a point; it is asked [`MAX_QUERIES`] times.
-pub(super) fn sheets(mesh: &TriangleMesh, winding: impl Fn(Vec3) -> f64) -> Vec<bool> {
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn sheets(
+    mesh: &TriangleMesh,
+    stop: Stop<'_>,
+    winding: impl Fn(Vec3) -> f64,
+) -> Result<Vec<bool>, Stopped> {
     let mut parts = connected_parts(mesh, &sorted_edges(mesh));
     let triangles = mesh.triangles().len();
     let mut sums = vec![(DVec3::ZERO, 0.0_f64); triangles];
@@ -86,7 +94,7 @@ pub(super) fn sheets(mesh: &TriangleMesh, winding: impl Fn(Vec3) -> f64) -> Vec<
         })
         .collect();
     if flat.is_empty() {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     // Of very many parts, such as the leaves of a plant, the largest decide for the others.
     flat.sort_by(|&a, &b| sums[b].1.total_cmp(&sums[a].1));
@@ -97,10 +105,11 @@ pub(super) fn sheets(mesh: &TriangleMesh, winding: impl Fn(Vec3) -> f64) -> Vec<
         let is_open = if place < MAX_QUERIES {
             members[part].sort_by(|a, b| b.0.total_cmp(&a.0));
             let largest = &members[part][..queries.min(members[part].len())];
-            let enclosed: f64 = largest
-                .iter()
-                .map(|&(_, triangle)| enclosure(mesh, triangle, &winding))
-                .sum();
+            let mut enclosed = 0.0;
+            for &(_, triangle) in largest {
+                stop.check()?;
+                enclosed += enclosure(mesh, triangle, &winding);
+            }
             let is_open = enclosed < MAX_SHEET_ENCLOSURE * largest.len() as f64;
             area_of_sheets[usize::from(is_open)] += sums[part].1;
             is_open
@@ -111,11 +120,11 @@ pub(super) fn sheets(mesh: &TriangleMesh, winding: impl Fn(Vec3) -> f64) -> Vec<
             is_sheet[triangle] = is_open;
         }
     }
-    if is_sheet.contains(&true) {
+    Ok(if is_sheet.contains(&true) {
         is_sheet
     } else {
         Vec::new()
-    }
+    })
 }
 
 /// The larger magnitude of the winding numbers on both sides of a triangle: 1 for a face of a solid, 0.5 for a flat sheet.

@@ -6,7 +6,10 @@
 use glam::Vec3;
 
 use super::{Segment, mesh_bvh::MeshBvh, surface_samples::SurfaceSampler, topology::DisjointSets};
-use crate::base::random::AttemptStream;
+use crate::base::{
+    random::AttemptStream,
+    stop::{Stop, Stopped},
+};
 
 /// Points of the surface at which a wedge is sought, and the seed by which they are drawn.
 const SAMPLES: u64 = 2048;
@@ -41,14 +44,19 @@ struct Section {
 }
 
 /// Points on worn edges that are at least a centimetre long; takes some milliseconds.
-pub(super) fn worn_edges(surface: &MeshBvh) -> Vec<Vec3> {
+///
+/// # Errors
+/// [`Stopped`].
+pub(super) fn worn_edges(surface: &MeshBvh, stop: Stop<'_>) -> Result<Vec<Vec3>, Stopped> {
     let sampler = SurfaceSampler::new(surface.mesh(), |_| true);
-    let ends = (0..SAMPLES).filter_map(|sample| {
+    let mut ends = Vec::new();
+    for sample in 0..SAMPLES {
+        stop.check()?;
         let mut stream = AttemptStream::new(SEED, sample);
-        let (triangle, position) = sampler.sample(sample, SAMPLES, &mut stream)?;
-        end_of_wedge(surface, triangle, position)
-    });
-    of_long_edges(&ends.collect::<Vec<Vec3>>())
+        let sampled = sampler.sample(sample, SAMPLES, &mut stream);
+        ends.extend(sampled.and_then(|(triangle, position)| end_of_wedge(surface, triangle, position)));
+    }
+    Ok(of_long_edges(&ends))
 }
 
 /// The end of the wedge with a face at this point, if there is one.

@@ -3,17 +3,16 @@
 //! and packs of up to four triangles, so that one `Vec4` operation tests four boxes or four triangles (H. Dammertz,
 //! J. Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays, 2008).
 
-use std::time::Duration;
-
 use glam::{DVec3, Vec3, Vec3A, Vec4};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb as BuilderAabb,
-    bvh2::{Bvh2, builder::build_bvh2},
-    ploc::{PlocSearchDistance, SortPrecision},
+    bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer},
+    ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
 };
 
 use super::mesh::TriangleMesh;
+use crate::base::stop::{Stop, Stopped};
 
 /// Children per node and triangles per pack.
 pub(super) const WIDTH: usize = 4;
@@ -32,6 +31,9 @@ const NO_TRIANGLE: u32 = u32::MAX;
 /// 90. Reinsertion takes time with the square of the overlap: a higher bound lets hostile uploads occupy the builder
 /// for seconds to minutes, a lower one slows queries on crumpled surfaces.
 const MAX_OVERLAP: f32 = 100.0;
+
+/// Passes of reinsertion, the builder's usual number: the n-th moves an n-th odd share of the nodes.
+const REINSERTION_PASSES: usize = 16;
 
 /// How much time to spend on building.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -209,7 +211,10 @@ pub(super) struct WideBvh {
 
 impl WideBvh {
     /// Builds the hierarchy of a mesh; O(n log n).
-    pub(super) fn build(mesh: &TriangleMesh, quality: BuildQuality) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn build(mesh: &TriangleMesh, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
         let boxes: Vec<BuilderAabb> = (0..mesh.triangles().len())
             .map(|triangle| {
                 let [a, b, c] = mesh.corners(triangle).map(Vec3A::from);
@@ -221,9 +226,8 @@ impl WideBvh {
         } else {
             quality
         };
-        let mut build_time = Duration::ZERO;
-        let binary = build_bvh2(&boxes, quality.params(), &mut build_time);
-        Self::collapse(&binary, mesh)
+        let binary = build_binary(&boxes, quality.params(), stop)?;
+        Ok(Self::collapse(&binary, mesh))
     }
 
     /// Collapses a binary tree to four children per node: of the children gathered so far, the one with the largest
@@ -275,6 +279,37 @@ impl WideBvh {
             query(&mut vec![T::default(); self.stack_bound])
         }
     }
+}
+
+/// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, with checks between its steps.
+fn build_binary(boxes: &[BuilderAabb], params: BvhBuildParams, stop: Stop<'_>) -> Result<Bvh2, Stopped> {
+    stop.check()?;
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        params.ploc_search_distance,
+        boxes,
+        (0..boxes.len() as u32).collect(),
+        params.sort_precision,
+        params.search_depth_threshold,
+    );
+    reinsert(&mut tree, params.reinsertion_batch_ratio, stop)?;
+    collapse(
+        &mut tree,
+        params.max_prims_per_leaf,
+        params.collapse_traversal_cost,
+    );
+    let ratio = params.reinsertion_batch_ratio * params.post_collapse_reinsertion_batch_ratio_multiplier;
+    reinsert(&mut tree, ratio, stop)?;
+    Ok(tree)
+}
+
+/// Moves subtrees to better places, in passes over fewer and fewer of them.
+fn reinsert(tree: &mut Bvh2, ratio: f32, stop: Stop<'_>) -> Result<(), Stopped> {
+    let mut optimizer = ReinsertionOptimizer::default();
+    for pass in 0..REINSERTION_PASSES {
+        stop.check()?;
+        optimizer.run(tree, ratio, Some(vec![1.0 / (2 * pass + 1) as f32]));
+    }
+    Ok(())
 }
 
 /// The summed surface of the boxes, as a multiple of the surface of the box around them all.

@@ -8,7 +8,10 @@ use super::{
     closure_screen::ClosureScreen, entry::Entry, grips::Grips, primitives::HeldPrimitive, seeds::nanometres,
 };
 use crate::{
-    base::pose::Pose,
+    base::{
+        pose::Pose,
+        stop::{Stop, Stopped, unstopped},
+    },
     geometry::oriented_box::OrientedBox,
     model::{constraints::Constraints, grasp::Contact, hand::rig::Rig, object::GraspObject},
     physical::{barriers::Barriers, grip::GIVER_CLEARANCE},
@@ -33,7 +36,7 @@ const MAX_SELECTED: usize = 96;
 /// Grips compared with one giver by inner spheres between two clock checks.
 const BOUNDS_PER_CHECK: usize = 128;
 
-/// Grips transferred to the object between two clock checks.
+/// Grips transferred to the object between two checks of clock or stop.
 const MOVES_PER_CHECK: usize = 32;
 
 /// Smallest size in comparisons, in metres: logarithms need a positive one.
@@ -85,6 +88,18 @@ impl TransferredGrips {
 
     /// Transfers grips of up to 256 boxes to an object: some milliseconds of work.
     pub fn of(object: &GraspObject, known: &Arc<[HeldPrimitive]>) -> Self {
+        unstopped(|stop| Self::of_until(object, known, stop))
+    }
+
+    /// As [`Self::of`], unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of_until(
+        object: &GraspObject,
+        known: &Arc<[HeldPrimitive]>,
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
         let bounds = SortedBox::of(&object.bounding_box);
         let mut by_similarity: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
         by_similarity.sort_by(|(_, a), (_, b)| bounds.dissimilarity(a).total_cmp(&bounds.dissimilarity(b)));
@@ -92,6 +107,7 @@ impl TransferredGrips {
         for (primitive, held) in by_similarity.into_iter().take(NEAREST_BOXES) {
             for turn in 0..TURNS.len() {
                 for (grip, entry) in held.grips.entries().iter().enumerate() {
+                    stop.check_every(MOVES_PER_CHECK, grip)?;
                     let transferred = Transferred {
                         primitive: primitive as u8,
                         turn: turn as u8,
@@ -116,11 +132,12 @@ impl TransferredGrips {
                 ..transferred
             }
         };
-        Self {
+        stop.check()?;
+        Ok(Self {
             known: Arc::clone(known),
             bounds,
             transferred: fitting.into_iter().map(screened).collect(),
-        }
+        })
     }
 
     /// The number of grips.

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::Vec3;
 
 use super::{parts::Parts, strategy::Validity};
+use crate::base::stop::{Stop, Stopped, unstopped};
 use crate::geometry::{
     handles::Handles, local_shape::LocalShape, local_thickness::LocalThickness, mesh::TriangleMesh,
     mesh_bvh::MeshBvh, oriented_box::OrientedBox, surface_samples::even_samples,
@@ -91,15 +92,34 @@ impl GraspObject {
         friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
+        unstopped(|stop| Self::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop))
+    }
+
+    /// As [`Self::new`], unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`]; within, those of [`Self::new`].
+    pub fn new_until(
+        mesh: TriangleMesh,
+        mass: f32,
+        centre_of_mass: Vec3,
+        friction: Option<f32>,
+        forbidden_triangles: &[u32],
+        stop: Stop<'_>,
+    ) -> Result<Result<Self, Vec<ObjectError>>, Stopped> {
         let checked = CheckedProperties::new(
             mesh.triangles().len(),
             mass,
             centre_of_mass,
             friction,
             forbidden_triangles,
-        )?;
-        let (measures, surface) = measures_and_surface(mesh);
-        Ok(Self::of_parts(measures, Arc::new(surface), checked))
+        );
+        let checked = match checked {
+            Ok(checked) => checked,
+            Err(errors) => return Ok(Err(errors)),
+        };
+        let (measures, surface) = measures_and_surface(mesh, stop)?;
+        Ok(Ok(Self::of_parts(measures, Arc::new(surface), checked)))
     }
 
     /// The same shape with other physical properties. Shares the mesh and its search structure, and repeats none of its
@@ -173,7 +193,21 @@ impl GraspObject {
 
     /// What its parts are for, as the mesh shows. The first call takes some milliseconds.
     pub fn parts(&self) -> &Parts {
-        self.parts.get_or_init(|| Parts::of(self))
+        unstopped(|stop| self.parts_until(stop))
+    }
+
+    /// As [`Self::parts`], unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn parts_until(&self, stop: Stop<'_>) -> Result<&Parts, Stopped> {
+        match self.parts.get() {
+            Some(parts) => Ok(parts),
+            None => {
+                let parts = Parts::of(self, stop)?;
+                Ok(self.parts.get_or_init(|| parts))
+            }
+        }
     }
 
     /// Where it can be wrapped. The first call takes as long as that of [`Self::parts`].
@@ -267,24 +301,24 @@ struct Measures {
 }
 
 impl Measures {
-    fn of(mesh: &TriangleMesh) -> Self {
+    fn of(mesh: &TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
         let samples = even_samples(mesh);
-        Self {
-            bounding_box: OrientedBox::around(mesh),
-            local_thickness: LocalThickness::of(&samples),
+        Ok(Self {
+            bounding_box: OrientedBox::around_until(mesh, stop)?,
+            local_thickness: LocalThickness::of(&samples, stop)?,
             local_shape: LocalShape::of(&samples),
-        }
+        })
     }
 }
 
 /// Measures a mesh and builds its search structure in parallel, or in sequence if no thread can be spawned. The former
 /// takes a fifth of the work.
-fn measures_and_surface(mesh: TriangleMesh) -> (Measures, MeshBvh) {
+fn measures_and_surface(mesh: TriangleMesh, stop: Stop<'_>) -> Result<(Measures, MeshBvh), Stopped> {
     let copy = mesh.clone();
     std::thread::scope(|scope| {
-        let parallel = std::thread::Builder::new().spawn_scoped(scope, || Measures::of(&copy));
-        let surface = MeshBvh::build(mesh);
+        let parallel = std::thread::Builder::new().spawn_scoped(scope, || Measures::of(&copy, stop));
+        let surface = MeshBvh::build_until(mesh, stop);
         let of_copy = parallel.ok().and_then(|thread| thread.join().ok());
-        (of_copy.unwrap_or_else(|| Measures::of(&copy)), surface)
+        Ok((of_copy.unwrap_or_else(|| Measures::of(&copy, stop))?, surface?))
     })
 }

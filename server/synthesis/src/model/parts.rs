@@ -4,7 +4,10 @@ use glam::Vec3;
 
 use super::object::GraspObject;
 use crate::{
-    base::random::AttemptStream,
+    base::{
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+    },
     geometry::{handles::Handles, sharp::SharpFeatures, surface_samples::SurfaceSampler},
 };
 
@@ -51,9 +54,12 @@ pub struct Parts {
 
 impl Parts {
     /// Finds the parts; takes some milliseconds.
-    pub(super) fn of(object: &GraspObject) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn of(object: &GraspObject, stop: Stop<'_>) -> Result<Self, Stopped> {
         let is_forbidden = |triangle: u32| object.is_forbidden(triangle);
-        let handles = Handles::of(&object.surface, is_forbidden);
+        let handles = Handles::of(&object.surface, stop, is_forbidden)?;
         let share = share_on(&handles, object);
         let [least, most] = HANDLE_SHARES;
         let half = object.bounding_box.half_extents;
@@ -67,19 +73,19 @@ impl Parts {
             .transform_vector(Vec3::AXES[longest]);
         let main = handles.main().count();
         let radii: f32 = handles.main().map(|handle| handle.radius).sum();
-        Self {
+        Ok(Self {
             is_handled: object.mass >= HANDLED_MASS
                 && (least..=most).contains(&share)
                 && main >= LEAST_PLACES
                 && radii >= LEAST_RADIUS * main as f32,
-            sharp: SharpFeatures::of(&object.surface),
+            sharp: SharpFeatures::of(&object.surface, stop)?,
             handles,
             long_axis: axis.normalize_or(Vec3::Y),
             is_long: ((ratio - LONG[0]) / (LONG[1] - LONG[0])).clamp(0.0, 1.0),
             middle: object.bounding_box.object_from_box.position,
             half_length: sides[2],
             smallest: 2.0 * sides[0],
-        }
+        })
     }
 
     /// Memory use in bytes.

@@ -1,6 +1,7 @@
 //! Where an object may be held at all, as outer bounds: what lies beyond them is impossible.
 
 use crate::{
+    base::stop::{Stop, Stopped},
     geometry::{
         opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance},
         oriented_box::OrientedBox,
@@ -35,7 +36,10 @@ pub struct HoldableSurface {
 impl HoldableSurface {
     /// The bounds of an object with these pairs. Objects that a hand spans take microseconds, others some milliseconds;
     /// forbidden surfaces add the time of a bounding box.
-    pub fn of(object: &GraspObject, pairs: &SurfacePairs) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of(object: &GraspObject, pairs: &SurfacePairs, stop: Stop<'_>) -> Result<Self, Stopped> {
         let mesh = object.surface.mesh();
         let is_allowed = |triangle: u32| !object.is_forbidden(triangle);
         let forbidden_area = object
@@ -45,7 +49,8 @@ impl HoldableSurface {
             Some(object.bounding_box)
         } else {
             mesh.submesh(|triangle| is_allowed(triangle as u32))
-                .map(|allowed| OrientedBox::around(&allowed))
+                .map(|allowed| OrientedBox::around_until(&allowed, stop))
+                .transpose()?
         };
         let mut holdable = Self {
             region,
@@ -55,14 +60,14 @@ impl HoldableSurface {
         };
         // Every pair of surface points opposes, and most objects have close ones.
         if pairs.pairs().is_empty() && is_oriented(object) {
-            holdable.width = lower_bound(opposed_distance(mesh, is_allowed, CLOSE, FAR));
+            holdable.width = lower_bound(opposed_distance(mesh, is_allowed, CLOSE, FAR, stop)?);
             holdable.width_of_all = if object.forbidden_count() == 0 {
                 holdable.width
             } else {
-                lower_bound(opposed_distance(mesh, |_| true, CLOSE, FAR))
+                lower_bound(opposed_distance(mesh, |_| true, CLOSE, FAR, stop)?)
             };
         }
-        holdable
+        Ok(holdable)
     }
 }
 

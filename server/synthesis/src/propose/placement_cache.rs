@@ -16,6 +16,7 @@ use crate::{
         mechanisms::{Mechanism, Mechanisms},
         pose::Pose,
         random::AttemptStream,
+        stop::{Stop, Stopped, unstopped},
     },
     physical::barriers::Barriers,
 };
@@ -57,10 +58,15 @@ pub struct PlacementCache {
 impl PlacementCache {
     /// Samples the placements: about five milliseconds.
     pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
-        Self::with_mechanisms(Mechanisms::ALL, object, rig)
+        unstopped(|stop| Self::with_mechanisms(Mechanisms::ALL, object, rig, stop))
     }
 
-    fn with_mechanisms(mechanisms: Mechanisms, object: &PreparedObject, rig: &PreparedRig) -> Self {
+    fn with_mechanisms(
+        mechanisms: Mechanisms,
+        object: &PreparedObject,
+        rig: &PreparedRig,
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
         let context = ProposalContext {
             object,
             surface: object.surface_pairs(),
@@ -72,6 +78,7 @@ impl PlacementCache {
         };
         let features = ObjectFeatures::of(object);
         let row = |row| {
+            stop.check()?;
             let mut stream = AttemptStream::new(SEED, row);
             let sampled = context.sample_candidates(SAMPLED, &mut stream);
             let ordered = context.order_by_success_prior(&features, PREFERENCE, sampled, &mut stream);
@@ -81,11 +88,11 @@ impl PlacementCache {
                 pair: candidate.pair,
                 object_from_wrist: candidate.object_from_wrist,
             });
-            kept.collect()
+            Ok(kept.collect())
         };
-        Self {
-            rows: (0..ROWS).map(row).collect(),
-        }
+        Ok(Self {
+            rows: (0..ROWS).map(row).collect::<Result<_, Stopped>>()?,
+        })
     }
 
     /// The candidates for an attempt; none from attempt [`ROWS`] on. `rig` must be the one the cache was built for.
@@ -120,25 +127,43 @@ impl PlacementCaches {
         rig: &PreparedRig,
         mechanisms: Mechanisms,
     ) -> Arc<PlacementCache> {
-        let mechanisms = mechanisms.restricted_to(&RELEVANT_MECHANISMS);
-        let slot = {
-            let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            let found = slots
-                .iter()
-                .find(|(slot_rig, by, _)| *by == mechanisms && slot_rig == rig);
-            if let Some((_, _, slot)) = found {
-                Arc::clone(slot)
-            } else {
-                if slots.len() == MAX_RIGS {
-                    slots.remove(0);
-                }
-                let slot = Arc::default();
-                slots.push((rig.clone(), mechanisms, Arc::clone(&slot)));
-                slot
-            }
-        };
         // Built outside the lock, so that searches with other hands are not blocked.
-        Arc::clone(slot.get_or_init(|| Arc::new(PlacementCache::with_mechanisms(mechanisms, object, rig))))
+        let build = |stop| PlacementCache::with_mechanisms(mechanisms, object, rig, stop);
+        let slot = self.slot(rig, mechanisms);
+        Arc::clone(slot.get_or_init(|| Arc::new(unstopped(build))))
+    }
+
+    /// Builds the cache of a rig, unless it is stopped. While it is built, others may build it, too.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn build_until(
+        &self,
+        object: &PreparedObject,
+        rig: &PreparedRig,
+        stop: Stop<'_>,
+    ) -> Result<(), Stopped> {
+        let cache = PlacementCache::with_mechanisms(Mechanisms::ALL, object, rig, stop)?;
+        self.slot(rig, Mechanisms::ALL).get_or_init(|| Arc::new(cache));
+        Ok(())
+    }
+
+    /// The place of the cache of a rig.
+    fn slot(&self, rig: &PreparedRig, mechanisms: Mechanisms) -> Arc<OnceLock<Arc<PlacementCache>>> {
+        let mechanisms = mechanisms.restricted_to(&RELEVANT_MECHANISMS);
+        let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = slots
+            .iter()
+            .find(|(slot_rig, by, _)| *by == mechanisms && slot_rig == rig);
+        if let Some((_, _, slot)) = found {
+            return Arc::clone(slot);
+        }
+        if slots.len() == MAX_RIGS {
+            slots.remove(0);
+        }
+        let slot = Arc::default();
+        slots.push((rig.clone(), mechanisms, Arc::clone(&slot)));
+        slot
     }
 }
 

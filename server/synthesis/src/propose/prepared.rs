@@ -15,7 +15,10 @@ use super::{
     surface_pairs::SurfacePairs,
 };
 use crate::{
-    base::mechanisms::Mechanisms,
+    base::{
+        mechanisms::Mechanisms,
+        stop::{Stop, Stopped, unstopped},
+    },
     model::{hand::rig::Rig, object::GraspObject},
 };
 
@@ -88,16 +91,25 @@ pub struct PreparedObject {
 impl PreparedObject {
     /// Samples the object's surface for opposed points and handles, which takes some milliseconds.
     pub fn new(object: Arc<GraspObject>) -> Self {
-        let surface_pairs = SurfacePairs::of(&object.surface, |triangle| object.is_forbidden(triangle));
-        let holdable = HoldableSurface::of(&object, &surface_pairs);
+        unstopped(|stop| Self::new_until(object, stop))
+    }
+
+    /// As [`Self::new`], unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn new_until(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Self, Stopped> {
+        let surface_pairs =
+            SurfacePairs::of(&object.surface, stop, |triangle| object.is_forbidden(triangle))?;
+        let holdable = HoldableSurface::of(&object, &surface_pairs, stop)?;
         // Found here rather than by the first search.
-        let _ = object.parts();
-        Self {
+        object.parts_until(stop)?;
+        Ok(Self {
             object,
             surface_pairs,
             holdable,
             placements: PlacementCaches::default(),
-        }
+        })
     }
 
     /// The object itself.
@@ -119,6 +131,14 @@ impl PreparedObject {
     /// milliseconds.
     pub fn placement_cache(&self, rig: &PreparedRig) -> Arc<PlacementCache> {
         self.placement_cache_with(Mechanisms::ALL, rig)
+    }
+
+    /// Builds what [`Self::placement_cache`] returns, unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn build_placement_cache(&self, rig: &PreparedRig, stop: Stop<'_>) -> Result<(), Stopped> {
+        self.placements.build_until(self, rig, stop)
     }
 
     /// [`Self::placement_cache`] with only some mechanisms enabled.

@@ -3,7 +3,10 @@
 use glam::Vec3;
 
 use crate::{
-    base::random::AttemptStream,
+    base::{
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+    },
     geometry::{Segment, mesh_bvh::MeshBvh, surface_samples::SurfaceSampler},
     physical::barriers::Barriers,
 };
@@ -93,14 +96,22 @@ pub struct SurfacePairs {
 
 impl SurfacePairs {
     /// Samples a surface, without the triangles for which `is_forbidden` returns true.
-    pub fn of(surface: &MeshBvh, is_forbidden: impl Fn(u32) -> bool) -> Self {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of(
+        surface: &MeshBvh,
+        stop: Stop<'_>,
+        is_forbidden: impl Fn(u32) -> bool,
+    ) -> Result<Self, Stopped> {
         let mesh = surface.mesh();
         let sampler = SurfaceSampler::new(mesh, |triangle| !is_forbidden(triangle));
         let mut sampled = Self::default();
         for sample in 0..SAMPLES {
+            stop.check()?;
             let mut stream = AttemptStream::new(SEED, sample);
             let Some((triangle, position)) = sampler.sample(sample, SAMPLES, &mut stream) else {
-                return sampled;
+                return Ok(sampled);
             };
             let point = SurfacePoint {
                 position,
@@ -137,7 +148,7 @@ impl SurfacePairs {
                 thickness: exit.distance + START_DEPTH,
             });
         }
-        sampled
+        Ok(sampled)
     }
 
     /// The pairs and points that are not too close to a barrier. Filtering pays off only if many draws follow.

@@ -1,16 +1,19 @@
 //! The distance between opposed places against closed forms and all pairs of triangles.
 
 use glam::{Quat, Vec3};
-use grasp_synthesis::geometry::{
-    mesh::TriangleMesh,
-    opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance},
+use grasp_synthesis::{
+    base::stop::unstopped,
+    geometry::{
+        mesh::TriangleMesh,
+        opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance},
+    },
 };
 
 use crate::fixtures::meshes::{cuboid, cylinder_mesh, moved, sphere, torus};
 
 /// Distance of a mesh's opposed places, which must be neither close nor beyond a metre.
 fn apart(mesh: &TriangleMesh) -> f32 {
-    match opposed_distance(mesh, |_| true, 0.0, 1.0) {
+    match unstopped(|stop| opposed_distance(mesh, |_| true, 0.0, 1.0, stop)) {
         OpposedDistance::Apart(metres) => metres,
         other => panic!("{other:?}"),
     }
@@ -81,16 +84,16 @@ fn agrees_with_all_pairs_of_triangles() {
 fn one_thin_place_of_a_large_surface_is_enough() {
     let mesh = cuboid(Vec3::new(0.3, 0.3, 0.04), 8);
     assert_eq!(
-        opposed_distance(&mesh, |_| true, 0.1, 0.5),
+        unstopped(|stop| opposed_distance(&mesh, |_| true, 0.1, 0.5, stop)),
         OpposedDistance::CloseOrUnknown
     );
     let is_edge = |triangle: u32| mesh.normal(triangle as usize).z.abs() < 0.5;
     assert_eq!(
-        opposed_distance(&mesh, is_edge, 0.1, 0.5),
+        unstopped(|stop| opposed_distance(&mesh, is_edge, 0.1, 0.5, stop)),
         OpposedDistance::BeyondLimit
     );
     assert_eq!(
-        opposed_distance(&mesh, |_| false, 0.1, 0.5),
+        unstopped(|stop| opposed_distance(&mesh, |_| false, 0.1, 0.5, stop)),
         OpposedDistance::BeyondLimit
     );
 }

@@ -1,7 +1,10 @@
 //! Sharp edges and points.
 
 use glam::Vec3;
-use grasp_synthesis::geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, sharp::SharpFeatures};
+use grasp_synthesis::{
+    base::stop::unstopped,
+    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, sharp::SharpFeatures},
+};
 
 use crate::fixtures::meshes::{cuboid, sphere};
 
@@ -76,7 +79,7 @@ fn blade(angle: f32, end_thickness: f32, rounding: u32) -> TriangleMesh {
 }
 
 fn sharp_features(mesh: &TriangleMesh) -> SharpFeatures {
-    SharpFeatures::of(&MeshBvh::build(mesh.clone()))
+    unstopped(|stop| SharpFeatures::of(&MeshBvh::build(mesh.clone()), stop))
 }
 
 #[test]
