@@ -31,13 +31,44 @@ pub(super) fn closest(
     point: Vec3,
     max_distance: f32,
 ) -> Option<(u32, Vec3, f32)> {
+    search(bvh, mesh, point, max_distance, || true).unwrap_or(None)
+}
+
+/// As [`closest`], but gives up once `may_go_on` returns false, which is asked for each node and each pack of triangles.
+///
+/// # Errors
+/// [`GivenUp`].
+#[inline(never)]
+pub(super) fn closest_if_cheap(
+    bvh: &WideBvh,
+    mesh: &TriangleMesh,
+    point: Vec3,
+    max_distance: f32,
+    may_go_on: impl FnMut() -> bool,
+) -> Result<Option<(u32, Vec3, f32)>, GivenUp> {
+    search(bvh, mesh, point, max_distance, may_go_on)
+}
+
+/// A search that took too long.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GivenUp;
+
+#[inline]
+fn search(
+    bvh: &WideBvh,
+    mesh: &TriangleMesh,
+    point: Vec3,
+    max_distance: f32,
+    mut may_go_on: impl FnMut() -> bool,
+) -> Result<Option<(u32, Vec3, f32)>, GivenUp> {
     if !(point.is_finite() && max_distance >= 0.0) {
-        return None;
+        return Ok(None);
     }
     let splat = [Vec4::splat(point.x), Vec4::splat(point.y), Vec4::splat(point.z)];
     // Slightly above the limit; the last step compares exactly.
     let mut best = (max_distance * max_distance).max(f32::MIN_POSITIVE) / (BOX_SLACK * BOX_SLACK);
     let mut winner = None;
+    let mut is_given_up = false;
     bvh.with_stack(|stack: &mut [StackEntry]| {
         let mut height = 1;
         while height > 0 {
@@ -45,6 +76,10 @@ pub(super) fn closest(
             let entry = stack[height];
             if entry.bound() > best {
                 continue;
+            }
+            if !may_go_on() {
+                is_given_up = true;
+                break;
             }
             match entry.child() {
                 Child::Node(index) => {
@@ -79,10 +114,14 @@ pub(super) fn closest(
             }
         }
     });
-    let triangle = winner?;
+    if is_given_up {
+        return Err(GivenUp);
+    }
+    let Some(triangle) = winner else { return Ok(None) };
     let exact = closest_on_triangle(mesh.corners(triangle as usize), point.as_dvec3());
     let distance = exact.distance(point.as_dvec3());
-    (distance <= f64::from(max_distance)).then_some((triangle, exact.as_vec3(), distance as f32))
+    let is_within = distance <= f64::from(max_distance);
+    Ok(is_within.then_some((triangle, exact.as_vec3(), distance as f32)))
 }
 
 /// Squared distances to the boxes of a node's children, reduced by [`BOX_SLACK`]; 0 inside, ∞ for unused children.

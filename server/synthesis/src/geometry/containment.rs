@@ -118,6 +118,11 @@ impl Containment {
         Some(winding)
     }
 
+    /// Number of edges of the holes' rims, in proportion to which each test takes time.
+    pub(super) fn rim_edges(&self) -> usize {
+        self.caps.len()
+    }
+
     /// True if the triangle belongs to a sheet.
     pub(super) fn is_sheet(&self, triangle: usize) -> bool {
         self.is_sheet.get(triangle).is_some_and(|&is_sheet| is_sheet)

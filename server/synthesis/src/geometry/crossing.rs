@@ -265,6 +265,29 @@ pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Opt
     best
 }
 
+/// Number of packs of triangles whose boxes a segment enters.
+pub(super) fn packs_along(bvh: &WideBvh, segment: Segment) -> usize {
+    let query = Query::new(segment);
+    let mut packs = 0;
+    bvh.with_stack(|stack: &mut [ChildRef]| {
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            match stack[height].child() {
+                Child::Node(index) => {
+                    let node = &bvh.nodes[index];
+                    for lane in lanes(query.entered(node, Vec4::ONE)) {
+                        stack[height] = node.children[lane];
+                        height += 1;
+                    }
+                }
+                Child::Pack(_) => packs += 1,
+            }
+        }
+    });
+    packs
+}
+
 /// Passes every candidate triangle and its exact outcome to `visit`, in no particular order, until it returns false.
 pub(super) fn visit_all(
     bvh: &WideBvh,

@@ -2,7 +2,7 @@
 
 use glam::{UVec3, Vec3};
 
-use super::{aabb::Aabb, tapered_capsule::TaperedCapsule};
+use super::{aabb::Aabb, closest::GivenUp, tapered_capsule::TaperedCapsule};
 use crate::base::stop::{Stop, Stopped};
 
 /// Target number of grid nodes. More tighten the bounds (half the spacing takes eight times as many) at about 0.2 µs
@@ -23,6 +23,11 @@ const COARSER: f32 = 1.25;
 /// Nodes between two checks whether to stop: few, because one of a crumpled surface takes up to a millisecond.
 const NODES_PER_CHECK: usize = 4;
 
+/// Steps of the search for the closest triangle that each node adds to what the nodes may take, and what they have to begin with.
+/// Ordinary objects take a tenth; thousands of needles through one place would take all of their triangles for each node.
+const STEPS_PER_NODE: usize = 128;
+const SPARE_STEPS: usize = 1 << 18;
+
 /// Number of spheres along the axis that cover a capsule. More tighten the bound and take longer.
 const SPHERES: usize = 3;
 
@@ -36,18 +41,20 @@ pub(super) struct DistanceField {
     /// The box around the surface, which gives the better bound beyond the grid.
     aabb: Aabb,
     distances: Vec<f32>,
+    /// Whether some of the distances are only lower bounds, because finding them would have taken too long.
+    is_cut_short: bool,
 }
 
 impl DistanceField {
-    /// Samples the field of a surface inside `aabb`. `distance(point, within)` returns the point's distance from the
-    /// surface, or `within` if it is larger.
+    /// Samples the field of a surface inside `aabb`. `distance(point, within, may_go_on)` returns the point's distance from the surface,
+    /// or `within` if it is larger; it gives up once `may_go_on` returns false, which it asks at each step.
     ///
     /// # Errors
     /// [`Stopped`].
     pub(super) fn new(
         aabb: &Aabb,
         stop: Stop<'_>,
-        distance: impl Fn(Vec3, f32) -> f32,
+        distance: impl Fn(Vec3, f32, &mut dyn FnMut() -> bool) -> Result<f32, GivenUp>,
     ) -> Result<Self, Stopped> {
         let size = aabb.max - aabb.min + 2.0 * MARGIN;
         let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
@@ -59,16 +66,28 @@ impl DistanceField {
         let origin = aabb.min - MARGIN;
         let diagonal = size.length();
         let mut distances = Vec::with_capacity((counts.x * counts.y * counts.z) as usize);
+        let mut steps_left = SPARE_STEPS;
+        let mut is_cut_short = false;
         for z in 0..counts.z {
             for y in 0..counts.y {
                 // Distances of neighbouring nodes differ by at most the spacing, which bounds the next search.
-                let mut within = diagonal;
+                let (mut least, mut most) = (0.0_f32, diagonal);
                 for x in 0..counts.x {
-                    let node = origin + UVec3::new(x, y, z).as_vec3() * spacing;
-                    let found = distance(node, within);
-                    distances.push(found);
-                    within = (found + spacing) * 1.001;
                     stop.check_every(NODES_PER_CHECK, x as usize)?;
+                    let node = origin + UVec3::new(x, y, z).as_vec3() * spacing;
+                    steps_left += STEPS_PER_NODE;
+                    let mut may_go_on = || {
+                        steps_left = steps_left.saturating_sub(1);
+                        steps_left > 0
+                    };
+                    if let Ok(found) = distance(node, most, &mut may_go_on) {
+                        (least, most) = (found, (found + spacing) * 1.001);
+                    } else {
+                        is_cut_short = true;
+                        // Where so much overlaps, what is known of the neighbour has to do.
+                        (least, most) = ((least - spacing * 1.001).max(0.0), (most + spacing) * 1.001);
+                    }
+                    distances.push(least);
                 }
             }
         }
@@ -79,6 +98,7 @@ impl DistanceField {
             counts,
             aabb: *aabb,
             distances,
+            is_cut_short,
         })
     }
 
@@ -105,6 +125,11 @@ impl DistanceField {
             bound = bound.min(self.distance_lower_bound(capsule.at(along)) - capsule.radius_at(along));
         }
         bound - overhang
+    }
+
+    /// True if the surface is so crowded that finding all distances would have taken too long.
+    pub(super) fn is_cut_short(&self) -> bool {
+        self.is_cut_short
     }
 
     /// Memory of the samples, in bytes.

@@ -8,7 +8,12 @@ use std::f32::consts::TAU;
 
 use glam::{DVec3, Vec3};
 
-use super::{Segment, mesh_bvh::MeshBvh, principal_axes::principal_axes, surface_samples::SurfaceSampler};
+use super::{
+    Segment,
+    mesh_bvh::MeshBvh,
+    principal_axes::principal_axes,
+    surface_samples::{SurfaceSampler, ray_stride},
+};
 use crate::base::{
     random::AttemptStream,
     stop::{Stop, Stopped},
@@ -30,6 +35,11 @@ const THICKNESS: [f32; 2] = [0.008, 0.06];
 
 /// Largest number of points that are probed, evenly spread over the surface. Each takes about 10 µs.
 const MAX_PROBED: usize = 128;
+
+/// Tests for containment per probe, at most, and edges of holes that all of them together may have to look at: probes of a surface
+/// with thousands of such edges are fewer.
+const TESTS_PER_PROBE: usize = 2 + 2 * DIRECTIONS;
+const MOST_RIM_EDGES: usize = 1 << 21;
 
 /// Rays from the middle of a part, in all directions, and their length in metres.
 const RAYS: usize = 32;
@@ -104,7 +114,8 @@ impl Handles {
         is_forbidden: impl Fn(u32) -> bool,
     ) -> Result<Self, Stopped> {
         let middles = middles(surface, stop, is_forbidden)?;
-        let stride = middles.len().div_ceil(MAX_PROBED).max(1);
+        let most = (MOST_RIM_EDGES / (TESTS_PER_PROBE * surface.rim_edges()).max(1)).clamp(1, MAX_PROBED);
+        let stride = middles.len().div_ceil(most).max(1);
         let mut handles: Vec<Handle> = Vec::new();
         for middle in middles.into_iter().step_by(stride) {
             stop.check()?;
@@ -235,7 +246,8 @@ fn middles(
         is_thick.then(|| start.midpoint(exit.position))
     };
     let mut middles = Vec::new();
-    for sample in 0..SAMPLES {
+    let stride = ray_stride(surface, &sampler, SAMPLES, SEED, THICKNESS[1]);
+    for sample in (0..SAMPLES).step_by(stride) {
         stop.check()?;
         middles.extend(middle(sample));
     }

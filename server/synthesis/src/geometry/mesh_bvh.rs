@@ -16,6 +16,9 @@ use super::{
 };
 use crate::base::stop::{Stop, Stopped, unstopped};
 
+/// Edges of holes beyond which a surface is crowded: a test for containment takes half a millisecond then.
+const CROWDED_RIM: usize = 8192;
+
 /// A point where a segment crosses a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SegmentHit {
@@ -73,8 +76,9 @@ impl MeshBvh {
     fn with_quality(mesh: TriangleMesh, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
         let aabb = mesh.aabb();
         let bvh = WideBvh::build(&mesh, quality, stop)?;
-        let distance = |point: Vec3, within: f32| {
-            closest::closest(&bvh, &mesh, point, within).map_or(within, |(_, _, distance)| distance)
+        let distance = |point: Vec3, within: f32, may_go_on: &mut dyn FnMut() -> bool| {
+            let found = closest::closest_if_cheap(&bvh, &mesh, point, within, may_go_on)?;
+            Ok(found.map_or(within, |(_, _, distance)| distance))
         };
         let distance_field = match quality {
             BuildQuality::Thorough => Some(DistanceField::new(&aabb, stop, distance)?),
@@ -120,6 +124,30 @@ impl MeshBvh {
             distance: offset.length() as f32,
             triangle,
         })
+    }
+
+    /// True if each query takes about as long as looking at all triangles: if so many overlap, such as thousands of needles through
+    /// one place, or if holes have so many edges. Of a quick hierarchy, only the holes count.
+    pub fn is_crowded(&self) -> bool {
+        let overlaps = self
+            .distance_field
+            .as_ref()
+            .is_some_and(DistanceField::is_cut_short);
+        overlaps || self.rim_edges() > CROWDED_RIM
+    }
+
+    /// Number of edges of holes, in proportion to which [`Self::contains`] takes time.
+    pub fn rim_edges(&self) -> usize {
+        self.containment.rim_edges()
+    }
+
+    /// How many packs of up to four triangles a search along a segment has to look at, at most.
+    pub fn packs_along(&self, segment: Segment) -> usize {
+        if self.aabb.may_intersect(segment) {
+            crossing::packs_along(&self.bvh, segment)
+        } else {
+            0
+        }
     }
 
     /// The closest point of the surface, if it is at most `max_distance` metres away. If several triangles are

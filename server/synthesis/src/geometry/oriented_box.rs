@@ -47,12 +47,8 @@ impl OrientedBox {
     /// # Errors
     /// [`Stopped`].
     pub fn around_until(mesh: &TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
-        let vertices = || {
-            mesh.triangles()
-                .iter()
-                .flatten()
-                .map(|&v| mesh.positions()[v as usize].as_dvec3())
-        };
+        let used = used_vertices(mesh);
+        let vertices = || used.iter().map(|&v| mesh.positions()[v as usize].as_dvec3());
         let points = outermost(vertices, stop)?;
         let thickness = COMPARED_THICKNESS * f64::from(mesh.aabb().diagonal());
         let size = |axes: DMat3| extents(&points, axes).map(|e| e + thickness).element_product();
@@ -123,6 +119,17 @@ impl OrientedBox {
     fn local(&self, point: Vec3) -> Vec3 {
         self.object_from_box.inverse().transform_point(point)
     }
+}
+
+/// The vertices of the triangles, each where it occurs last.
+fn used_vertices(mesh: &TriangleMesh) -> Vec<u32> {
+    let mut is_met = vec![false; mesh.positions().len()];
+    let corners = mesh.triangles().as_flattened().iter().rev().copied();
+    let mut used: Vec<u32> = corners
+        .filter(|&vertex| !std::mem::replace(&mut is_met[vertex as usize], true))
+        .collect();
+    used.reverse();
+    used
 }
 
 /// The vertices that are outermost in at least one of [`SUPPORT_DIRECTIONS`] directions.

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::mesh::TriangleMesh;
+use super::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh};
 use crate::base::random::AttemptStream;
 
 /// Draws points from some triangles of a mesh, each part of their area with the same probability.
@@ -48,6 +48,38 @@ impl<'a> SurfaceSampler<'a> {
         }
         Some((triangle, a + (b - a) * u + (c - a) * v))
     }
+}
+
+/// Samples from which the cost of all is estimated.
+const PROBES: u64 = 32;
+
+/// Packs of triangles that all rays from a set of samples may have to look at.
+const MOST_PACKS: usize = 1 << 19;
+
+/// Edges of holes that all those rays may have to look at, if each end has to be told inside from outside.
+const MOST_RIM_EDGES: usize = 1 << 21;
+
+/// Of how many samples one is to be used if a ray starts at each and goes into the surface for a length in metres: 1, unless
+/// thousands of triangles overlap along every ray or holes have thousands of edges.
+pub(crate) fn ray_stride(
+    surface: &MeshBvh,
+    sampler: &SurfaceSampler<'_>,
+    samples: u64,
+    seed: u64,
+    length: f32,
+) -> usize {
+    let step = (samples / PROBES).max(1);
+    let packs: usize = (0..samples)
+        .step_by(step as usize)
+        .filter_map(|sample| sampler.sample(sample, samples, &mut AttemptStream::new(seed, sample)))
+        .map(|(triangle, position)| {
+            let inward = -surface.mesh().normal(triangle);
+            surface.packs_along(Segment::new(position, position + inward * length))
+        })
+        .sum();
+    let for_packs = (packs * step as usize).div_ceil(MOST_PACKS);
+    let for_rims = (surface.rim_edges() * samples as usize).div_ceil(MOST_RIM_EDGES);
+    for_packs.max(for_rims).max(1)
 }
 
 /// Points drawn from a mesh to learn the shape of its parts. Fewer miss thin parts next to large ones; the time to compare

@@ -13,6 +13,12 @@ const MAX_SHEET_ENCLOSURE: f64 = 0.75;
 /// Bound on the triangles that winding numbers are computed at, each in time proportional to the mesh.
 const MAX_QUERIES: usize = 64;
 
+/// Bound on the triangles of all those queries together, unless they are at least [`MIN_QUERIES`].
+const MAX_VISITS: usize = MAX_QUERIES * 8_000;
+
+/// Queries that even the largest meshes get.
+const MIN_QUERIES: usize = 8;
+
 /// Minimum length of a connected part's summed area vectors, as a share of its area, for it to be a sheet. The sum is 0 for a
 /// closed surface and 1 for a flat sheet; a hemisphere, 0.5, still counts as a solid with a hole, a filled sail does not.
 const MIN_SHEET_FLATNESS: f64 = 0.6;
@@ -98,11 +104,12 @@ pub(super) fn sheets(
     }
     // Of very many parts, such as the leaves of a plant, the largest decide for the others.
     flat.sort_by(|&a, &b| sums[b].1.total_cmp(&sums[a].1));
-    let queries = (MAX_QUERIES / flat.len()).max(1);
+    let most = MAX_QUERIES.min((MAX_VISITS / triangles).max(MIN_QUERIES));
+    let queries = (most / flat.len()).max(1);
     let mut is_sheet = vec![false; triangles];
     let mut area_of_sheets = [0.0, 0.0];
     for (place, &part) in flat.iter().enumerate() {
-        let is_open = if place < MAX_QUERIES {
+        let is_open = if place < most {
             members[part].sort_by(|a, b| b.0.total_cmp(&a.0));
             let largest = &members[part][..queries.min(members[part].len())];
             let mut enclosed = 0.0;

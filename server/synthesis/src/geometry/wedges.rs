@@ -5,7 +5,12 @@
 
 use glam::Vec3;
 
-use super::{Segment, mesh_bvh::MeshBvh, surface_samples::SurfaceSampler, topology::DisjointSets};
+use super::{
+    Segment,
+    mesh_bvh::MeshBvh,
+    surface_samples::{SurfaceSampler, ray_stride},
+    topology::DisjointSets,
+};
 use crate::base::{
     random::AttemptStream,
     stop::{Stop, Stopped},
@@ -50,7 +55,8 @@ struct Section {
 pub(super) fn worn_edges(surface: &MeshBvh, stop: Stop<'_>) -> Result<Vec<Vec3>, Stopped> {
     let sampler = SurfaceSampler::new(surface.mesh(), |_| true);
     let mut ends = Vec::new();
-    for sample in 0..SAMPLES {
+    let stride = ray_stride(surface, &sampler, SAMPLES, SEED, THIN);
+    for sample in (0..SAMPLES).step_by(stride) {
         stop.check()?;
         let mut stream = AttemptStream::new(SEED, sample);
         let sampled = sampler.sample(sample, SAMPLES, &mut stream);

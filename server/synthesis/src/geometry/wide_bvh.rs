@@ -32,6 +32,12 @@ const NO_TRIANGLE: u32 = u32::MAX;
 /// for seconds to minutes, a lower one slows queries on crumpled surfaces.
 const MAX_OVERLAP: f32 = 100.0;
 
+/// Overlap at which every tree is improved.
+const ORDINARY_OVERLAP: f32 = 10.0;
+
+/// Number of triangles from which that overlap is smaller, in inverse proportion: so is the time per triangle that is worth its while.
+const OVERLAPPING_TRIANGLES: f32 = 3_000.0;
+
 /// Passes of reinsertion, the builder's usual number: the n-th moves an n-th odd share of the nodes.
 const REINSERTION_PASSES: usize = 16;
 
@@ -221,7 +227,8 @@ impl WideBvh {
                 BuilderAabb::new(a.min(b).min(c), a.max(b).max(c))
             })
             .collect();
-        let quality = if overlap(&boxes) > MAX_OVERLAP {
+        let share = (OVERLAPPING_TRIANGLES / boxes.len() as f32).min(1.0);
+        let quality = if overlap(&boxes) > (MAX_OVERLAP * share).max(ORDINARY_OVERLAP) {
             BuildQuality::Quick
         } else {
             quality

@@ -104,7 +104,13 @@ impl TransferredGrips {
         let mut by_similarity: Vec<(usize, &HeldPrimitive)> = known.iter().enumerate().collect();
         by_similarity.sort_by(|(_, a), (_, b)| bounds.dissimilarity(a).total_cmp(&bounds.dissimilarity(b)));
         let mut fitting: Vec<(f32, Transferred)> = Vec::new();
-        for (primitive, held) in by_similarity.into_iter().take(NEAREST_BOXES) {
+        // On a crowded surface, nothing that held a box holds, and finding that out takes seconds.
+        let boxes = if object.surface.is_crowded() {
+            0
+        } else {
+            NEAREST_BOXES
+        };
+        for (primitive, held) in by_similarity.into_iter().take(boxes) {
             for turn in 0..TURNS.len() {
                 for (grip, entry) in held.grips.entries().iter().enumerate() {
                     stop.check_every(MOVES_PER_CHECK, grip)?;

@@ -7,7 +7,11 @@ use crate::{
         random::AttemptStream,
         stop::{Stop, Stopped},
     },
-    geometry::{Segment, mesh_bvh::MeshBvh, surface_samples::SurfaceSampler},
+    geometry::{
+        Segment,
+        mesh_bvh::MeshBvh,
+        surface_samples::{SurfaceSampler, ray_stride},
+    },
     physical::barriers::Barriers,
 };
 
@@ -107,7 +111,8 @@ impl SurfacePairs {
         let mesh = surface.mesh();
         let sampler = SurfaceSampler::new(mesh, |triangle| !is_forbidden(triangle));
         let mut sampled = Self::default();
-        for sample in 0..SAMPLES {
+        let stride = ray_stride(surface, &sampler, SAMPLES, SEED, MAX_THICKNESS);
+        for sample in (0..SAMPLES).step_by(stride) {
             stop.check()?;
             let mut stream = AttemptStream::new(SEED, sample);
             let Some((triangle, position)) = sampler.sample(sample, SAMPLES, &mut stream) else {
