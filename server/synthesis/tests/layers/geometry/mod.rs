@@ -4,6 +4,7 @@ mod capsule;
 mod closest_point;
 mod containment;
 mod crossing;
+mod crowded;
 mod local_shape;
 mod local_thickness;
 mod opposed;
