@@ -32,7 +32,8 @@ struct Pair {
 impl Doubles {
     /// Finds repeated triangles, and decides of which two-sided ones only the earlier side is kept.
     ///
-    /// One side is kept of a patch of pairs that the rest of the surface needs to be closed, and of a sheet that touches nothing else.
+    /// One side is kept of a patch of pairs that the rest of the surface needs to be closed, and of a sheet that touches
+    /// nothing else.
     /// Which of the two it is does not matter: the winding is repaired later.
     ///
     /// # Errors

@@ -108,7 +108,8 @@ pub struct ImportedMesh {
 ///
 /// Polygons are split into triangles that cover them once; only one that intersects itself becomes a fan that overlaps, with
 /// a warning. Coordinates are in double precision until unit, axes and origin are applied: a mesh whose box is centred more than
-/// 10 m from the file's origin is moved there, with a warning. Vertices at equal positions are welded. A closed mesh that is inside out is turned, with a warning.
+/// 10 m from the file's origin is moved there, with a warning. Vertices at equal positions are welded. Triangles that face the
+/// wrong way are turned and those that are there twice dropped, where that is certain, with warnings.
 ///
 /// # Errors
 /// Every violation; see [`ImportError`]. Beyond 16 they are only counted.
@@ -119,7 +120,8 @@ pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<Imp
 /// As [`read_mesh`], unless it is stopped.
 ///
 /// # Errors
-/// Those of [`read_mesh`]. A reader that is stopped returns [`ImportError::Stopped`] or what its parser makes of the end of its input.
+/// Those of [`read_mesh`]. A reader that is stopped returns [`ImportError::Stopped`], or what its parser makes of the end of its
+/// input.
 pub fn read_mesh_until(
     bytes: &[u8],
     import: Import,

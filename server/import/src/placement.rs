@@ -28,8 +28,8 @@ pub(crate) fn recentre(raw: &mut RawMesh, import: Import) -> DVec3 {
     }
     let [x, y, z] = centre.to_array();
     raw.warnings.push(format!(
-        "the mesh is {:.3} m from the file's origin: the object's origin is the centre of the mesh's box, about ({x:.3}, {y:.3}, {z:.3}) in the \
-         file",
+        "the mesh is {:.3} m from the file's origin: the object's origin is the centre of the mesh's box, about ({x:.3}, {y:.3}, \
+         {z:.3}) in the file",
         moved.length()
     ));
     centre

@@ -30,8 +30,8 @@ pub(crate) enum Split {
 
 /// Splits a polygon of at least three corners; appends triples of corners, wound as the polygon.
 ///
-/// The positions are taken to be exact to single precision, at least as seen from the mesh's origin. A polygon that is not flat is split as its
-/// projection on the plane of its mean normal.
+/// The positions are taken to be exact to single precision, at least as seen from the mesh's origin. A polygon that is not flat is
+/// split as its projection on the plane of its mean normal.
 ///
 /// # Errors
 /// [`Stopped`].

@@ -1,8 +1,9 @@
 //! Makes triangles face outward where it is certain which way that is.
 //!
-//! A patch is a set of triangles joined across edges of exactly two. Within a patch, neighbours are made to agree, unless it is one-sided
-//! like a Möbius strip. Patches that are closed, alone or together, then face outward if nothing encloses them; what is enclosed is
-//! turned with what encloses it, since it may be the wall of a cavity. Open patches keep the side that most of their area faces.
+//! A patch is a set of triangles joined across edges of exactly two. Within a patch, neighbours are made to agree, unless it is
+//! one-sided like a Möbius strip. Patches that are closed, alone or together, then face outward if nothing encloses them; what is
+//! enclosed is turned with what encloses it, since it may be the wall of a cavity. Open patches keep the side that most of their
+//! area faces.
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::base::stop::{Stop, Stopped};

@@ -46,8 +46,8 @@ pub(super) struct DistanceField {
 }
 
 impl DistanceField {
-    /// Samples the field of a surface inside `aabb`. `distance(point, within, may_go_on)` returns the point's distance from the surface,
-    /// or `within` if it is larger; it gives up once `may_go_on` returns false, which it asks at each step.
+    /// Samples the field of a surface inside `aabb`. `distance(point, within, may_go_on)` returns the point's distance from the
+    /// surface, or `within` if it is larger; it gives up once `may_go_on` returns false, which it asks at each step.
     ///
     /// # Errors
     /// [`Stopped`].

@@ -35,7 +35,7 @@ const MAX_OVERLAP: f32 = 100.0;
 /// Overlap at which every tree is improved.
 const ORDINARY_OVERLAP: f32 = 10.0;
 
-/// Number of triangles from which that overlap is smaller, in inverse proportion: so is the time per triangle that is worth its while.
+/// Number of triangles from which that overlap is smaller, in inverse proportion, so that the time per triangle does not grow.
 const OVERLAPPING_TRIANGLES: f32 = 3_000.0;
 
 /// Passes of reinsertion, the builder's usual number: the n-th moves an n-th odd share of the nodes.
