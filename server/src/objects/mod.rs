@@ -44,6 +44,9 @@ use crate::{
 /// and the forbidden flag. A generous estimate, because it bounds the cache.
 const SEARCH_BYTES_PER_TRIANGLE: usize = 192;
 
+/// Where grips transferred to an object are kept once they are made.
+type GripsSlot = OnceLock<Arc<TransferredGrips>>;
+
 /// An object as the server keeps it.
 #[derive(Debug)]
 pub(crate) struct StoredObject {
@@ -62,7 +65,7 @@ pub(crate) struct StoredObject {
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
     /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
-    transferred_grips: Vec<OnceLock<Arc<TransferredGrips>>>,
+    transferred_grips: Vec<GripsSlot>,
 }
 
 impl StoredObject {
@@ -142,10 +145,7 @@ impl StoredObject {
     }
 
     /// The primitives' grips for a hand, and the place of those transferred from them.
-    fn transferred_grips_of(
-        &self,
-        hand: &Hand,
-    ) -> Option<(&'static Arc<[HeldPrimitive]>, &OnceLock<Arc<TransferredGrips>>)> {
+    fn transferred_grips_of(&self, hand: &Hand) -> Option<(&'static Arc<[HeldPrimitive]>, &GripsSlot)> {
         let all = || held_primitives().iter().zip(&self.transferred_grips);
         let is_side = |of: &Hand| of.rig.handedness == hand.rig.handedness;
         let own = all().find(|((of, _), _)| **of == *hand);

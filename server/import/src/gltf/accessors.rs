@@ -18,7 +18,7 @@ const READS: u64 = 16;
 /// The bytes of a document's buffers.
 #[derive(Debug)]
 pub(crate) struct Buffers<'a> {
-    buffers: Vec<Cow<'a, [u8]>>,
+    contents: Vec<Cow<'a, [u8]>>,
     /// Elements that may still be read: scenes can ask for the same ones again and again.
     left: Cell<u64>,
     stop: Stop<'a>,
@@ -28,7 +28,7 @@ impl<'a> Buffers<'a> {
     pub(super) fn new(buffers: Vec<Cow<'a, [u8]>>, limits: MeshLimits, stop: Stop<'a>) -> Self {
         let largest = limits.vertices as u64 + 3 * limits.triangles as u64;
         Self {
-            buffers,
+            contents: buffers,
             left: Cell::new(READS.saturating_mul(largest)),
             stop,
         }
@@ -133,7 +133,7 @@ impl<'a> Buffers<'a> {
         size: usize,
         count: usize,
     ) -> Option<impl Iterator<Item = &[u8]> + use<'_, 'a>> {
-        let buffer = self.buffers.get(view.buffer().index())?;
+        let buffer = self.contents.get(view.buffer().index())?;
         let end = view.offset().checked_add(view.length())?;
         let bytes = buffer.get(view.offset()..end)?;
         let last = count.checked_sub(1)?.checked_mul(stride)?.checked_add(offset)?;

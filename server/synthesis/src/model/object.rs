@@ -201,13 +201,11 @@ impl GraspObject {
     /// # Errors
     /// [`Stopped`].
     pub fn parts_until(&self, stop: Stop<'_>) -> Result<&Parts, Stopped> {
-        match self.parts.get() {
-            Some(parts) => Ok(parts),
-            None => {
-                let parts = Parts::of(self, stop)?;
-                Ok(self.parts.get_or_init(|| parts))
-            }
+        if let Some(parts) = self.parts.get() {
+            return Ok(parts);
         }
+        let parts = Parts::of(self, stop)?;
+        Ok(self.parts.get_or_init(|| parts))
     }
 
     /// Where it can be wrapped. The first call takes as long as that of [`Self::parts`].
