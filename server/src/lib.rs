@@ -4,7 +4,7 @@
 //!
 //! A request passes these modules: `call` records its arrival and deadline; `services` handles it; `validate` turns the
 //! message into checked values or a list of everything that is wrong; `objects` finds the object with its search
-//! structures, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
+//! structures, `rigs` the hands, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
 //! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages
 //! go through `services::streaming`.
 //! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
@@ -19,6 +19,7 @@
 //!
 //! ```text
 //! atlas_slots  budget  convention  error  health_check  limits  reserve
+//! rigs
 //! answer  call  config  executor  net  validate
 //! memory  objects
 //! atlases

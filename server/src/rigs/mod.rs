@@ -1,9 +1,7 @@
 //! The rigs that hands can have: built-in ones, and those that clients created.
 
-pub(crate) mod build;
 mod scaled;
 pub(crate) mod store;
-mod wire;
 
 use std::sync::Arc;
 

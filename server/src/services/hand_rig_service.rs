@@ -5,12 +5,11 @@ use std::sync::Arc;
 use grasp_proto::v1::{self, hand_rig_service_server::HandRigService};
 use tonic::{Request, Response, Status};
 
-use super::Shared;
+use super::{Shared, rig_builder::build_rig, rig_message::rig_message};
 use crate::{
     call::UploadPermit,
     error::ServiceError,
     executor::run_blocking,
-    rigs::build::build_rig,
     validate::{Field, Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token},
 };
 
@@ -44,14 +43,14 @@ impl HandRigHandler {
         .await??;
         let rig = self.shared.rigs.insert(rig)?;
         Ok(v1::CreateRigResponse {
-            rig: Some(rig.to_wire()),
+            rig: Some(rig_message(&rig)),
         })
     }
 
     fn get(&self, name: &str) -> Result<v1::GetRigResponse, ServiceError> {
         let rig = self.shared.rigs.get(&checked_id(name)?)?;
         Ok(v1::GetRigResponse {
-            rig: Some(rig.to_wire()),
+            rig: Some(rig_message(&rig)),
         })
     }
 
@@ -61,7 +60,7 @@ impl HandRigHandler {
         let last = rigs.last().filter(|_| more);
         Ok(v1::ListRigsResponse {
             next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
-            rigs: rigs.iter().map(|rig| rig.to_wire()).collect(),
+            rigs: rigs.iter().map(|rig| rig_message(rig)).collect(),
         })
     }
 

@@ -4,6 +4,8 @@ mod grasp_service;
 mod hand_rig_service;
 mod object_service;
 mod object_streams;
+mod rig_builder;
+mod rig_message;
 mod streaming;
 mod upload;
 

@@ -33,7 +33,7 @@ pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, obje
 #[cfg(test)]
 pub(crate) use obstacles::tests::any_obstacles;
 pub(crate) use page::{PageQuery, Place, page_query, page_token};
-pub(crate) use rig::{rig_fields, rig_id_of, rig_page_query, rig_page_token};
+pub(crate) use rig::{RigFields, RigOrigin, rig_fields, rig_id_of, rig_page_query, rig_page_token};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
 pub(crate) use upload::{UploadQuery, upload_query};
 pub(crate) use watch::{WatchQuery, watch_query};

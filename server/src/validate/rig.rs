@@ -15,13 +15,7 @@ use super::{
     object::{LONGEST_ID, is_object_id},
     quoted,
 };
-use crate::{
-    error::ServiceError,
-    rigs::{
-        COLLECTION,
-        build::{RigFields, Source},
-    },
-};
+use crate::{error::ServiceError, rigs::COLLECTION};
 
 /// Number of rigs on a page if the request gives no size.
 const DEFAULT_PAGE_SIZE: usize = 50;
@@ -54,6 +48,32 @@ pub(crate) fn rig_id_of(field: Field<'_>, name: &str, violations: &mut Violation
             None
         }
     }
+}
+
+/// What a rig is made from.
+#[derive(Debug)]
+pub(crate) enum RigOrigin {
+    /// The content of a file.
+    Model(Vec<u8>),
+    /// Joints at rest of one or both hands.
+    Joints(Vec<HandJoints>),
+}
+
+/// The checked fields of a new rig.
+#[derive(Debug)]
+pub(crate) struct RigFields {
+    /// The last part of its name.
+    pub id: String,
+    /// What it is made from; none if the request has none, or a wrong one.
+    pub source: Option<RigOrigin>,
+    /// Joints of the model by node.
+    pub joint_map: Vec<MappedJoint>,
+    /// The limits of the digits, if given.
+    pub limits: Option<[DigitLimits; 5]>,
+    /// The hand that a model shows if its names do not say.
+    pub side: Option<Handedness>,
+    /// What was repaired.
+    pub warnings: Vec<String>,
 }
 
 /// A page of rigs to list.
@@ -152,7 +172,7 @@ fn source(
     maximum_bytes: usize,
     warnings: &mut Vec<String>,
     violations: &mut Violations,
-) -> Option<Source> {
+) -> Option<RigOrigin> {
     match source {
         None => {
             violations.add(Field::root("source"), "is required: model or joints");
@@ -166,7 +186,7 @@ fn source(
                 );
                 return None;
             }
-            Some(Source::Model(model))
+            Some(RigOrigin::Model(model))
         }
         Some(v1::create_rig_request::Source::Joints(joints)) => {
             let root = Field::root("joints");
@@ -183,7 +203,7 @@ fn source(
                 .enumerate()
                 .map(|(place, hand)| joints_at_rest(field.at(place), hand, warnings, violations))
                 .collect();
-            hands.map(Source::Joints)
+            hands.map(RigOrigin::Joints)
         }
     }
 }

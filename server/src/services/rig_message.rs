@@ -11,23 +11,23 @@ use grasp_synthesis::{
     },
 };
 
-use super::{RigHand, StoredRig};
-use crate::answer::{wire_handedness, wire_pose};
+use crate::{
+    answer::{wire_handedness, wire_pose},
+    rigs::{RigHand, StoredRig},
+};
 
-impl StoredRig {
-    /// The message that describes the rig.
-    pub(crate) fn to_wire(&self) -> v1::Rig {
-        v1::Rig {
-            name: self.name(),
-            built_in: self.built_in,
-            hands: self
-                .hands
-                .iter()
-                .zip(self.mirrored)
-                .map(|(hand, mirrored)| wire_hand(hand, mirrored))
-                .collect(),
-            warnings: self.warnings.clone(),
-        }
+/// The message that describes a rig.
+pub(super) fn rig_message(rig: &StoredRig) -> v1::Rig {
+    v1::Rig {
+        name: rig.name(),
+        built_in: rig.built_in,
+        hands: rig
+            .hands
+            .iter()
+            .zip(rig.mirrored)
+            .map(|(hand, mirrored)| wire_hand(hand, mirrored))
+            .collect(),
+        warnings: rig.warnings.clone(),
     }
 }
 

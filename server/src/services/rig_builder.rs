@@ -3,52 +3,23 @@
 use std::sync::Arc;
 
 use grasp_assets::hands::{self, Hand};
-use grasp_import::{ImportError, ImportedHand, MappedJoint, MeshLimits, RigSource, read_rig, rig_at_rest};
-use grasp_synthesis::{
-    model::hand::{Handedness, joints::HandJoints, rig::DigitLimits},
-    propose::prepared::PreparedRig,
-};
+use grasp_import::{ImportError, ImportedHand, MeshLimits, RigSource, read_rig, rig_at_rest};
+use grasp_synthesis::{model::hand::Handedness, propose::prepared::PreparedRig};
 
-use super::{RigHand, StoredRig, name_of};
 use crate::{
     error::ServiceError,
-    validate::{Field, Violations},
+    rigs::{RigHand, StoredRig, name_of},
+    validate::{Field, RigFields, RigOrigin, Violations},
 };
 
 /// The built-in rig that gives others their axes, limits and, where nothing else is known, widths.
 const REFERENCE: &str = "adult";
 
-/// What a rig is made from.
-#[derive(Debug)]
-pub(crate) enum Source {
-    /// The content of a file.
-    Model(Vec<u8>),
-    /// Joints at rest of one or both hands.
-    Joints(Vec<HandJoints>),
-}
-
-/// The checked fields of a new rig.
-#[derive(Debug)]
-pub(crate) struct RigFields {
-    /// The last part of its name.
-    pub id: String,
-    /// What it is made from; none if the request has none, or a wrong one.
-    pub source: Option<Source>,
-    /// Joints of the model by node.
-    pub joint_map: Vec<MappedJoint>,
-    /// The limits of the digits, if given.
-    pub limits: Option<[DigitLimits; 5]>,
-    /// The hand that a model shows if its names do not say.
-    pub side: Option<Handedness>,
-    /// What was repaired.
-    pub warnings: Vec<String>,
-}
-
 /// Makes a rig and derives what searches need. Takes some tenths of a second.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with `violations` and everything else that is wrong.
-pub(crate) fn build_rig(
+pub(super) fn build_rig(
     fields: RigFields,
     limits: MeshLimits,
     mut violations: Violations,
@@ -66,8 +37,8 @@ pub(crate) fn build_rig(
         limits: fields.limits,
     };
     let (field, made) = match source {
-        Source::Model(bytes) => ("model", read_rig(bytes, about, limits)),
-        Source::Joints(joints) => ("joints", rig_at_rest(joints, about)),
+        RigOrigin::Model(bytes) => ("model", read_rig(bytes, about, limits)),
+        RigOrigin::Joints(joints) => ("joints", rig_at_rest(joints, about)),
     };
     let made = match made {
         Ok(made) => made,
