@@ -198,7 +198,7 @@ pub struct ObjectMesh {
 pub enum ObjectChange {
     /// It was there when the watch began.
     Present,
-    /// All objects that were there were told; about no object.
+    /// All objects that were there have been reported; about no object.
     PresentEnd,
     /// A client created it, or changed its labels so that they match.
     Created,

@@ -32,12 +32,12 @@ impl ObjectWatch {
     /// Any except those of connecting; [`ClientError::Unavailable`] when the server shuts down,
     /// [`ClientError::ResourceExhausted`] if this client reads too slowly. Watch again then, with the present objects.
     pub async fn next(&mut self) -> Result<Option<ObjectNews>, ClientError> {
-        let told = self
+        let news = self
             .0
             .message()
             .await
             .map_err(|status| ClientError::from_status(&status, 1))?;
-        Ok(told.map(wire::news_from_wire).transpose()?)
+        Ok(news.map(wire::news_from_wire).transpose()?)
     }
 }
 

@@ -146,7 +146,7 @@ pub enum ServiceError {
         /// The longest allowed time.
         limit: Duration,
     },
-    /// A watcher has too many objects to be told about.
+    /// Too many objects have yet to be reported to a watcher.
     #[error("the watcher reads too slowly: it is too many objects behind; watch again")]
     WatcherTooSlow,
     /// The server shuts down.

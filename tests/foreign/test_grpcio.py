@@ -182,9 +182,9 @@ def test_watches_objects(objects):
         object_id="watched", mesh=BOX_OBJ.encode(), unit_metres=0.01, mass_kg=0.1, labels={"watched": ""}
     )
     objects.CreateObject(request)
-    told = next(watch)
-    assert told.object.name == "objects/watched"
-    assert object_service_pb2.OBJECT_CHANGE_CREATED in told.changes
+    news = next(watch)
+    assert news.object.name == "objects/watched"
+    assert object_service_pb2.OBJECT_CHANGE_CREATED in news.changes
     watch.cancel()
 
 

@@ -151,8 +151,8 @@ pub(crate) fn object_page_from_wire(page: v1::ListObjectsResponse) -> Result<Obj
     })
 }
 
-pub(crate) fn news_from_wire(told: v1::WatchObjectsResponse) -> Result<ObjectNews, Malformed> {
-    let changes: Vec<ObjectChange> = told
+pub(crate) fn news_from_wire(news: v1::WatchObjectsResponse) -> Result<ObjectNews, Malformed> {
+    let changes: Vec<ObjectChange> = news
         .changes
         .iter()
         .map(|&change| change_from_wire(change))
@@ -161,8 +161,8 @@ pub(crate) fn news_from_wire(told: v1::WatchObjectsResponse) -> Result<ObjectNew
         changes.last(),
         Some(ObjectChange::Deleted | ObjectChange::Evicted)
     );
-    let name = told.object.as_ref().map(|object| object.name.clone());
-    let object = told.object.filter(|_| !is_gone).map(object_fields_from_wire);
+    let name = news.object.as_ref().map(|object| object.name.clone());
+    let object = news.object.filter(|_| !is_gone).map(object_fields_from_wire);
     Ok(ObjectNews {
         changes,
         name,
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn news_of_an_object_that_is_gone_has_its_name_only() {
-        let told = |changes: &[v1::ObjectChange], object: Option<v1::Object>| v1::WatchObjectsResponse {
+        let news = |changes: &[v1::ObjectChange], object: Option<v1::Object>| v1::WatchObjectsResponse {
             changes: changes.iter().map(|&change| change.into()).collect(),
             object,
         };
@@ -263,9 +263,9 @@ mod tests {
             name: "objects/mug".to_owned(),
             ..Default::default()
         };
-        let gone = news_from_wire(told(&[v1::ObjectChange::Deleted], Some(named.clone()))).unwrap();
+        let gone = news_from_wire(news(&[v1::ObjectChange::Deleted], Some(named.clone()))).unwrap();
         assert_eq!((gone.name.as_deref(), gone.object), (Some("objects/mug"), None));
-        let replaced = told(
+        let replaced = news(
             &[v1::ObjectChange::Deleted, v1::ObjectChange::Created],
             Some(named),
         );
@@ -273,7 +273,7 @@ mod tests {
             news_from_wire(replaced).unwrap_err().path,
             "object.centre_of_mass"
         );
-        let end = news_from_wire(told(&[v1::ObjectChange::PresentEnd], None)).unwrap();
+        let end = news_from_wire(news(&[v1::ObjectChange::PresentEnd], None)).unwrap();
         assert_eq!((end.changes, end.name), (vec![ObjectChange::PresentEnd], None));
     }
 

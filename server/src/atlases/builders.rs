@@ -225,7 +225,7 @@ fn work(builders: &Builders, job: BuildJob) {
     }
 }
 
-/// What watchers are told of an atlas.
+/// What is reported of an atlas.
 struct Progress {
     is_useful: bool,
     is_complete: bool,

@@ -1,6 +1,6 @@
-//! Who watches the objects, and what each watcher has yet to be told.
+//! Who watches the objects, and what has yet to be reported to each watcher.
 //!
-//! A watcher has no queue of messages but, per object, the set of what happened since it was last told: however slowly it
+//! A watcher has no queue of messages but, per object, the set of what happened since the last report: however slowly it
 //! reads, it gets every object's latest state, and takes no more memory than its limit allows.
 
 use std::{
@@ -13,11 +13,11 @@ use tokio::sync::Notify;
 use super::Revision;
 use crate::validate::{LabelFilter, Labels};
 
-/// Largest number of objects that a watcher has yet to be told about. One that falls behind further is ended.
+/// Largest number of objects that have yet to be reported to a watcher. One that falls behind further is ended.
 const MOST_PENDING: usize = 2048;
 
-/// What happened to an object, in the order in which it is told: what was deleted may be created again before the watcher is
-/// told.
+/// What happened to an object, in the order in which it is reported: what was deleted may be created again before the next
+/// report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Event {
     /// It was there when the watch began.
@@ -36,10 +36,10 @@ pub(crate) enum Event {
     AtlasComplete,
 }
 
-/// What a watcher is told next.
+/// What is reported to a watcher next.
 #[derive(Debug)]
-pub(crate) enum Told {
-    /// All objects that were present were told.
+pub(crate) enum Report {
+    /// All objects that were present have been reported.
     PresentEnd,
     /// What happened to an object.
     Object {
@@ -65,9 +65,9 @@ pub(crate) struct Watcher {
 struct State {
     /// Where the list of present objects goes on; none if it has ended or was not asked for.
     present: Option<Cursor>,
-    /// Ids in the order in which they are told, each once.
+    /// Ids in the order in which they are reported, each once.
     order: VecDeque<String>,
-    /// Untold events of the ids in `order`; none are left if they cancelled each other out.
+    /// Unreported events of the ids in `order`; none are left if they cancelled each other out.
     events: BTreeMap<String, BTreeSet<Event>>,
     has_overflown: bool,
 }
@@ -85,13 +85,13 @@ impl Cursor {
     fn is_before(&self, id: &str) -> bool {
         match self {
             Self::Start => true,
-            Self::After(told) => told.as_str() < id,
+            Self::After(report) => report.as_str() < id,
         }
     }
 }
 
 impl Watcher {
-    /// A watcher that is told from now on, and first of the present objects if it asks for them.
+    /// A watcher of what happens from now on, and first of the present objects if it asks for them.
     pub(super) fn new(filter: LabelFilter, wants_present: bool) -> Self {
         Self {
             filter,
@@ -123,7 +123,7 @@ impl Watcher {
         self.news.notify_one();
     }
 
-    /// True if it was told too little for too long.
+    /// True if it fell too far behind.
     pub(super) fn has_overflown(&self) -> bool {
         self.state().has_overflown
     }
@@ -134,7 +134,7 @@ impl Watcher {
     }
 
     /// Goes on in the list of present objects after this one.
-    pub(super) fn told_present(&self, id: &str) {
+    pub(super) fn reported_present(&self, id: &str) {
         self.state().present = Some(Cursor::After(id.to_owned()));
     }
 
@@ -143,7 +143,7 @@ impl Watcher {
         self.state().present = None;
     }
 
-    /// The oldest untold events.
+    /// The oldest unreported events.
     pub(super) fn take(&self) -> Option<(String, BTreeSet<Event>)> {
         let mut state = self.state();
         loop {
@@ -163,7 +163,7 @@ impl Watcher {
 
 impl State {
     fn record(&mut self, id: &str, event: Event) {
-        // What the list of present objects has yet to come to will be told as it is then.
+        // What the list of present objects has yet to come to will be reported as it is then.
         let is_ahead = self.present.as_ref().is_some_and(|cursor| cursor.is_before(id));
         if self.has_overflown || is_ahead {
             return;
@@ -186,7 +186,7 @@ impl State {
 /// Adds an event to those before it.
 fn combine(events: &mut BTreeSet<Event>, event: Event) {
     if matches!(event, Event::Deleted | Event::Evicted) {
-        // The watcher need not know what it was not told of, unless another object had the name before.
+        // What was not reported need not be, unless another object had the name before.
         let is_new = events.contains(&Event::Created);
         let before = events
             .iter()
@@ -207,7 +207,7 @@ mod tests {
         [("value".to_owned(), value.to_owned())].into()
     }
 
-    fn told(watcher: &Watcher) -> Vec<(String, Vec<Event>)> {
+    fn report(watcher: &Watcher) -> Vec<(String, Vec<Event>)> {
         let taken = std::iter::from_fn(|| watcher.take());
         taken
             .map(|(id, events)| (id, events.into_iter().collect()))
@@ -240,8 +240,8 @@ mod tests {
             ("d", &[Event::Deleted]),
         ];
         let expected = expected.map(|(id, events)| (id.to_owned(), events.to_vec()));
-        assert_eq!(told(&watcher), expected);
-        assert_eq!(told(&watcher), []);
+        assert_eq!(report(&watcher), expected);
+        assert_eq!(report(&watcher), []);
     }
 
     #[test]
@@ -269,13 +269,13 @@ mod tests {
         let all = labels("");
         let watcher = Watcher::new(LabelFilter::default(), true);
         watcher.record("b", Event::Updated, Some(&all), Some(&all));
-        watcher.told_present("b");
+        watcher.reported_present("b");
         for id in ["a", "b", "c"] {
             watcher.record(id, Event::Deleted, Some(&all), None);
         }
         watcher.end_present();
-        let told: Vec<String> = told(&watcher).into_iter().map(|(id, _)| id).collect();
-        assert_eq!(told, ["a", "b"]);
+        let report: Vec<String> = report(&watcher).into_iter().map(|(id, _)| id).collect();
+        assert_eq!(report, ["a", "b"]);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::{
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
     objects::{
-        changes::{Event, Told},
+        changes::{Event, Report},
         glb::MeshGlb,
         hex, name_of,
     },
@@ -96,7 +96,7 @@ impl ObjectHandler {
         }))
     }
 
-    /// Tells what happens to objects.
+    /// Reports what happens to objects.
     pub(super) fn watch(
         &self,
         request: &v1::WatchObjectsRequest,
@@ -107,22 +107,22 @@ impl ObjectHandler {
         let handler = self.clone();
         Ok(endless_messages(shared.shutdown.clone(), |sender| async move {
             loop {
-                match handler.shared.objects.next_told(&watcher)? {
-                    Some(told) => sender.send(handler.told(told)).await?,
+                match handler.shared.objects.next_report(&watcher)? {
+                    Some(report) => sender.send(handler.report(report)).await?,
                     None => watcher.news().await,
                 }
             }
         }))
     }
 
-    /// The message that tells of an object.
-    fn told(&self, told: Told) -> v1::WatchObjectsResponse {
-        match told {
-            Told::PresentEnd => v1::WatchObjectsResponse {
+    /// The message that reports on an object.
+    fn report(&self, report: Report) -> v1::WatchObjectsResponse {
+        match report {
+            Report::PresentEnd => v1::WatchObjectsResponse {
                 changes: vec![v1::ObjectChange::PresentEnd.into()],
                 object: None,
             },
-            Told::Object { id, events, revision } => v1::WatchObjectsResponse {
+            Report::Object { id, events, revision } => v1::WatchObjectsResponse {
                 changes: events.into_iter().map(|event| change(event).into()).collect(),
                 object: Some(match revision {
                     Some(revision) => self.message(&revision),

@@ -13,7 +13,7 @@ use crate::error::ServiceError;
 pub(crate) struct WatchQuery {
     /// Which objects.
     pub filter: LabelFilter,
-    /// True to be told of the present ones first.
+    /// True to report the present ones first.
     pub wants_present: bool,
 }
 

@@ -22,10 +22,10 @@ async fn watch(
 
 /// The next message as changes and the id of the object, and the object.
 async fn next(stream: &mut Streaming<v1::WatchObjectsResponse>) -> (Vec<ObjectChange>, String, v1::Object) {
-    let told = bounded("a message", stream.message()).await;
-    let told = told.unwrap().expect("the stream goes on");
-    let changes = told.changes().collect();
-    let object = told.object.unwrap_or_default();
+    let news = bounded("a message", stream.message()).await;
+    let news = news.unwrap().expect("the stream goes on");
+    let changes = news.changes().collect();
+    let object = news.object.unwrap_or_default();
     let id = object
         .name
         .strip_prefix("objects/")
@@ -263,7 +263,7 @@ async fn what_a_watcher_is_told_adds_up_to_the_list_however_clients_interleave()
         let (changes, _, object) = next(&mut stream).await;
         match changes.last() {
             Some(ObjectChange::Deleted) => {
-                view.remove(&object.name).expect("it was told of before");
+                view.remove(&object.name).expect("it was reported before");
             }
             Some(ObjectChange::PresentEnd) => {}
             _ => {

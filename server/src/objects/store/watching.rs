@@ -1,6 +1,6 @@
 //! Watchers of the store.
 //!
-//! Events are recorded, and told with the state that they led to, under the lock of the created objects: no watcher misses one
+//! Events are recorded, and reported with the state that they led to, under the lock of the created objects: no watcher misses one
 //! or sees a state before its event.
 
 use std::{
@@ -13,7 +13,7 @@ use crate::{
     error::{Limit, ServiceError},
     objects::{
         Revision, StoredObject,
-        changes::{Cursor, Event, Told, Watcher},
+        changes::{Cursor, Event, Report, Watcher},
     },
     validate::{Labels, WatchQuery},
 };
@@ -21,7 +21,7 @@ use crate::{
 use super::RETRY_AFTER;
 
 impl ObjectStore {
-    /// A watcher who is told of what happens from now on.
+    /// A watcher of what happens from now on.
     ///
     /// # Errors
     /// [`ServiceError::Overloaded`] if there are `most` already.
@@ -40,11 +40,11 @@ impl ObjectStore {
         Ok(watcher)
     }
 
-    /// What the watcher is told next; none if there is nothing yet.
+    /// What is reported to the watcher next; none if there is nothing yet.
     ///
     /// # Errors
     /// [`ServiceError::WatcherTooSlow`].
-    pub(crate) fn next_told(&self, watcher: &Watcher) -> Result<Option<Told>, ServiceError> {
+    pub(crate) fn next_report(&self, watcher: &Watcher) -> Result<Option<Report>, ServiceError> {
         let created = self.created();
         if watcher.has_overflown() {
             return Err(ServiceError::WatcherTooSlow);
@@ -52,7 +52,7 @@ impl ObjectStore {
         if let Some(cursor) = watcher.present() {
             return Ok(Some(self.next_present(&created, watcher, &cursor)));
         }
-        Ok(watcher.take().map(|(id, events)| Told::Object {
+        Ok(watcher.take().map(|(id, events)| Report::Object {
             revision: self.revision_in(&created, &id).cloned(),
             id,
             events,
@@ -60,7 +60,7 @@ impl ObjectStore {
     }
 
     /// The next present object, or the end of them.
-    fn next_present(&self, created: &Created, watcher: &Watcher, cursor: &Cursor) -> Told {
+    fn next_present(&self, created: &Created, watcher: &Watcher, cursor: &Cursor) -> Report {
         let start = match cursor {
             Cursor::Start => Bound::Unbounded,
             Cursor::After(id) => Bound::Excluded(id.as_str()),
@@ -80,12 +80,12 @@ impl ObjectStore {
         {
             None => {
                 watcher.end_present();
-                Told::PresentEnd
+                Report::PresentEnd
             }
             Some(revision) => {
                 let id = &revision.object.id;
-                watcher.told_present(id);
-                Told::Object {
+                watcher.reported_present(id);
+                Report::Object {
                     id: id.clone(),
                     events: [Event::Present].into(),
                     revision: Some(revision.clone()),

@@ -56,7 +56,7 @@ const PROBES: u64 = 32;
 /// Packs of triangles that all rays from a set of samples may have to look at.
 const MOST_PACKS: usize = 1 << 19;
 
-/// Edges of holes that all those rays may have to look at, if each end has to be told inside from outside.
+/// Edges of holes that all those rays may have to look at, if it has to be found for each end whether it is inside.
 const MOST_RIM_EDGES: usize = 1 << 21;
 
 /// Of how many samples one is to be used if a ray starts at each and goes into the surface for a length in metres: 1, unless
