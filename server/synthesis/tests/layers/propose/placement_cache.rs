@@ -87,9 +87,8 @@ fn placements_are_drawn_once_per_object_and_hand() {
 #[test]
 fn evicts_the_first_of_too_many_hands() {
     let remote = object("remote");
-    let hands: Vec<PreparedRig> = (0..5)
-        .map(|_| PreparedRig::new(adult(Handedness::Left).mirrored()))
-        .collect();
+    let scales = [1.0, 1.01, 1.02, 1.03, 1.04];
+    let hands = scales.map(|scale| PreparedRig::new(adult(Handedness::Left).mirrored().scaled(scale)));
     let first = placement_cache(remote, &hands[0]);
     for hand in &hands[1..4] {
         placement_cache(remote, hand);

@@ -1,177 +1,18 @@
-//! Errors of calls, and their gRPC status.
+//! The gRPC status of every error.
 
-use std::{collections::HashMap, time::Duration};
+use std::collections::HashMap;
 
-use grasp_synthesis::base::stop::Stopped;
 use http::Response;
 use tonic::{Code, Status, metadata::MetadataValue};
 use tonic_types::{ErrorDetails, FieldViolation, StatusExt as _};
 
+use super::{Limit, ServiceError};
+
 /// Domain of every `ErrorInfo`: the package of the contract.
-pub(crate) const ERROR_DOMAIN: &str = "grasp.v1";
+const ERROR_DOMAIN: &str = "grasp.v1";
 
 /// Trailer with the delay of a gRPC client's retry policy, in milliseconds.
 const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
-
-/// One violation of the contract by a request.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Violation {
-    /// Path of the field, as in `presenting_hand.angles.digits[2].base_pitch`.
-    pub field: String,
-    /// The value, and what a valid one is.
-    pub description: String,
-}
-
-/// A limit that was reached.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Limit {
-    /// Running and waiting searches.
-    Searches,
-    /// Objects being received, built or changed.
-    Uploads,
-    /// Created objects, all of which are in use.
-    ObjectCache,
-    /// Bytes of answers that wait on a connection.
-    UnreadAnswers,
-    /// Bytes of meshes that are uploaded in pieces.
-    UploadBytes,
-    /// Watchers of objects.
-    Watchers,
-}
-
-/// Why a call failed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ServiceError {
-    /// The request violates the contract; with all violations.
-    #[error("{}", summary(.0))]
-    Invalid(Vec<Violation>),
-    /// The request is no message of the contract.
-    #[error("the request is not a valid message: {0}")]
-    Malformed(String),
-    /// No object has the name.
-    #[error("{name} does not exist{}", if *.evicted { ": it was evicted from the cache; create it again" } else { "" })]
-    ObjectNotFound {
-        /// The requested name.
-        name: String,
-        /// True if it existed and was evicted.
-        evicted: bool,
-    },
-    /// An object with the name exists.
-    #[error("{name} already exists; choose another object_id")]
-    ObjectExists {
-        /// The requested name.
-        name: String,
-    },
-    /// A request with the same id and other content created an object.
-    #[error("request_id {request_id} created {name} from other content; a new request needs a new id")]
-    RequestIdReused {
-        /// The id.
-        request_id: String,
-        /// The object that it created.
-        name: String,
-    },
-    /// The object came with the server.
-    #[error(
-        "{name} came with the server, which neither changes nor deletes it; create an object of your own"
-    )]
-    ObjectReadOnly {
-        /// The requested name.
-        name: String,
-    },
-    /// The object is not in the state that the request is about.
-    #[error("{name} was changed: its etag is {current:?}, not {etag:?}; get it, and decide again")]
-    ObjectChanged {
-        /// The requested name.
-        name: String,
-        /// The etag of the request.
-        etag: String,
-        /// The etag of the object.
-        current: String,
-    },
-    /// No rig has the name.
-    #[error("{name} does not exist")]
-    RigNotFound {
-        /// The requested name.
-        name: String,
-    },
-    /// A rig with the name exists.
-    #[error("{name} already exists; choose another rig_id")]
-    RigExists {
-        /// The requested name.
-        name: String,
-    },
-    /// A built-in rig cannot be deleted.
-    #[error("{name} is built in and cannot be deleted")]
-    RigBuiltIn {
-        /// The requested name.
-        name: String,
-    },
-    /// There are as many created rigs as the server keeps.
-    #[error("the server keeps at most {maximum} created rigs; delete one first")]
-    RigsFull {
-        /// Their maximum.
-        maximum: usize,
-    },
-    /// The server is at one of its limits.
-    #[error("{} ({maximum}); try again", limit_text(*.limit))]
-    Overloaded {
-        /// The limit.
-        limit: Limit,
-        /// Its value.
-        maximum: usize,
-        /// When to retry.
-        retry_after: Duration,
-    },
-    /// A message is larger than its method takes.
-    #[error("the message has more than {limit} bytes, the limit of this method")]
-    MessageTooLarge {
-        /// The limit.
-        limit: usize,
-    },
-    /// A client took none of the messages that wait for it.
-    #[error("the client took no message for {} s", limit.as_secs())]
-    ReaderStalled {
-        /// The longest allowed time.
-        limit: Duration,
-    },
-    /// A client sent nothing of what it has to send.
-    #[error("nothing arrived for {} ms; send the parts of an upload without pauses", limit.as_millis())]
-    UploadStalled {
-        /// The longest allowed time.
-        limit: Duration,
-    },
-    /// The call took longer than the server allows.
-    #[error("the call took more than {} s, the server's limit", limit.as_secs())]
-    TookTooLong {
-        /// The longest allowed time.
-        limit: Duration,
-    },
-    /// Too many objects have yet to be reported to a watcher.
-    #[error("the watcher reads too slowly: it is too many objects behind; watch again")]
-    WatcherTooSlow,
-    /// The server shuts down.
-    #[error("the server shuts down; call again")]
-    ShuttingDown,
-    /// The call's deadline passed before a search could start or an object was built.
-    #[error("the deadline passed before the work was done")]
-    DeadlineExceeded,
-    /// The work was stopped before its end.
-    #[error("the call was cancelled")]
-    Cancelled,
-    /// A job panicked. The server's log contains the panic.
-    #[error("the server failed on this call; its log says why")]
-    Panicked,
-}
-
-impl ServiceError {
-    /// The error of a request with a single violation.
-    pub fn invalid(field: impl Into<String>, description: impl Into<String>) -> Self {
-        Self::Invalid(vec![Violation {
-            field: field.into(),
-            description: description.into(),
-        }])
-    }
-}
 
 impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
@@ -289,12 +130,6 @@ pub(crate) fn blame_malformed_messages<R: Default>(response: Response<R>) -> Res
     }
 }
 
-impl From<Stopped> for ServiceError {
-    fn from(Stopped: Stopped) -> Self {
-        Self::Cancelled
-    }
-}
-
 /// Details with the `ErrorInfo` that every status carries.
 fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDetails {
     let metadata: HashMap<String, String> = metadata
@@ -322,33 +157,12 @@ fn limit_reason(limit: Limit) -> &'static str {
     }
 }
 
-fn limit_text(limit: Limit) -> &'static str {
-    match limit {
-        Limit::Searches => "the server is at its limit of concurrent searches",
-        Limit::Uploads => "the server is at its limit of concurrent uploads",
-        Limit::ObjectCache => "every object in the full cache is in use",
-        Limit::UploadBytes => "the uploads that run leave too little of the bytes that they share",
-        Limit::Watchers => "the server is at its limit of watchers",
-        Limit::UnreadAnswers => {
-            "this connection is at its limit of bytes that wait for the client to read them"
-        }
-    }
-}
-
-/// The first violation and the number of others, for the status message.
-fn summary(violations: &[Violation]) -> String {
-    match violations {
-        [] => "the request is invalid".to_owned(),
-        [only] => format!("{}: {}", only.field, only.description),
-        [first, rest @ ..] => {
-            format!("{}: {} (and {} more)", first.field, first.description, rest.len())
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
+    use crate::error::Violation;
 
     const SECOND: Duration = Duration::from_secs(1);
 
