@@ -9,7 +9,7 @@ use grasp_synthesis::{
     physical::solids::HandSolids,
     propose::{
         placement_cache::{PlacementCache, ROWS},
-        prepared::PreparedRig,
+        prepared::{PreparedObject, PreparedRig},
         proposal::{Candidate, propose},
     },
     search::physical_attempt::PhysicalAttempt,
@@ -86,16 +86,17 @@ fn placements_are_drawn_once_per_object_and_hand() {
 
 #[test]
 fn evicts_the_first_of_too_many_hands() {
-    let remote = object("remote");
+    // Other tests use the shared one with other hands.
+    let remote = PreparedObject::new(Arc::clone(object("remote")));
     let scales = [1.0, 1.01, 1.02, 1.03, 1.04];
     let hands = scales.map(|scale| PreparedRig::new(adult(Handedness::Left).mirrored().scaled(scale)));
-    let first = placement_cache(remote, &hands[0]);
+    let first = remote.placement_cache(&hands[0]);
     for hand in &hands[1..4] {
-        placement_cache(remote, hand);
+        remote.placement_cache(hand);
     }
-    assert!(Arc::ptr_eq(&first, &placement_cache(remote, &hands[0])));
-    placement_cache(remote, &hands[4]);
-    let again = placement_cache(remote, &hands[0]);
+    assert!(Arc::ptr_eq(&first, &remote.placement_cache(&hands[0])));
+    remote.placement_cache(&hands[4]);
+    let again = remote.placement_cache(&hands[0]);
     assert!(!Arc::ptr_eq(&first, &again));
     assert_eq!(first, again);
 }
