@@ -44,6 +44,11 @@ pub fn hand(rig: &str, handedness: Handedness) -> Option<&'static Arc<Hand>> {
     place(rig, handedness).map(|place| &HANDS[place])
 }
 
+/// True if a hand makes the same grips as one that is built in.
+pub fn is_built_in(hand: &Hand) -> bool {
+    HANDS.iter().any(|built_in| **built_in == *hand)
+}
+
 /// A built-in hand as a GLB file with `WebXR` joint names, in the `OpenXR` frame of the wrist.
 pub fn glb(rig: &str, handedness: Handedness) -> Option<&'static [u8]> {
     place(rig, handedness).map(|place| FILES[place].1)

@@ -19,7 +19,7 @@ use std::{
 
 use glam::DVec3;
 use grasp_assets::{
-    hands::{Hand, hand},
+    hands::{Hand, hand, is_built_in},
     primitives::held_primitives,
 };
 use grasp_proto::v1;
@@ -137,7 +137,7 @@ impl StoredObject {
     }
 
     /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if none fits.
-    /// There are such grips for one rig; hands of others start from those, too.
+    /// There are such grips for one rig; hands of the clients' own rigs start from those, too.
     pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
         let (held, grips) = self.transferred_grips_of(hand)?;
         let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
@@ -149,7 +149,8 @@ impl StoredObject {
         let all = || held_primitives().iter().zip(&self.transferred_grips);
         let is_side = |of: &Hand| of.rig.handedness == hand.rig.handedness;
         let own = all().find(|((of, _), _)| **of == *hand);
-        let ((_, held), grips) = own.or_else(|| all().find(|((of, _), _)| is_side(of)))?;
+        let of_other = || all().find(|((of, _), _)| !is_built_in(hand) && is_side(of));
+        let ((_, held), grips) = own.or_else(of_other)?;
         Some((held, grips))
     }
 
