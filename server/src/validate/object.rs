@@ -73,20 +73,29 @@ pub(crate) struct RequestKey {
 
 /// The id of a name like `objects/remote`.
 pub(crate) fn object_id_of(field: Field<'_>, name: &str, violations: &mut Violations) -> Option<String> {
-    match name.strip_prefix(COLLECTION) {
-        Some(id) if is_object_id(id) => Some(id.to_owned()),
-        _ => {
-            violations.add(
-                field,
-                if name.is_empty() {
-                    "is required: objects/ and the object's id".to_owned()
-                } else {
-                    format!("is {}; it must be objects/ and the object's id", quoted(name))
-                },
-            );
-            None
-        }
+    id_in(COLLECTION, "the object's id", field, name, violations)
+}
+
+/// The id, described by `what`, of a name in a collection.
+pub(super) fn id_in(
+    collection: &str,
+    what: &str,
+    field: Field<'_>,
+    name: &str,
+    violations: &mut Violations,
+) -> Option<String> {
+    let id = name.strip_prefix(collection).filter(|id| is_object_id(id));
+    if id.is_none() {
+        violations.add(
+            field,
+            if name.is_empty() {
+                format!("is required: {collection} and {what}")
+            } else {
+                format!("is {}; it must be {collection} and {what}", quoted(name))
+            },
+        );
     }
+    id.map(str::to_owned)
 }
 
 /// Checks the fields of a new object. Reading the mesh adds its own violations later. If the request may be repeated, this

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::error::ServiceError;
 
-/// Number of objects on a page if the request gives no size.
+/// Number of elements on a page if the request gives no size.
 const DEFAULT_PAGE_SIZE: usize = 50;
 
 /// Largest number of objects on a page.
@@ -96,23 +96,28 @@ impl ObjectOrder {
     }
 }
 
+/// The number of elements on a page of at most `largest`.
+pub(super) fn page_size(given: i32, largest: usize, violations: &mut Violations) -> usize {
+    match usize::try_from(given) {
+        Ok(0) => DEFAULT_PAGE_SIZE,
+        Ok(size) => size.min(largest),
+        Err(_) => {
+            violations.add(
+                Field::root("page_size"),
+                format_args!("is {given}; it must not be negative"),
+            );
+            DEFAULT_PAGE_SIZE
+        }
+    }
+}
+
 /// Checks a list request.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, ServiceError> {
     let mut violations = Violations::default();
-    let size = match usize::try_from(request.page_size) {
-        Ok(0) => DEFAULT_PAGE_SIZE,
-        Ok(size) => size.min(LARGEST_PAGE_SIZE),
-        Err(_) => {
-            violations.add(
-                Field::root("page_size"),
-                format_args!("is {}; it must not be negative", request.page_size),
-            );
-            DEFAULT_PAGE_SIZE
-        }
-    };
+    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &mut violations);
     let list = list_of(request);
     let after = if request.page_token.is_empty() {
         None

@@ -12,13 +12,11 @@ use super::{
     Field, Violations,
     hand::joints_at_rest,
     known,
-    object::{LONGEST_ID, is_object_id},
+    object::{LONGEST_ID, id_in, is_object_id},
+    page::page_size,
     quoted,
 };
 use crate::{error::ServiceError, rigs::COLLECTION};
-
-/// Number of rigs on a page if the request gives no size.
-const DEFAULT_PAGE_SIZE: usize = 50;
 
 /// Most rigs on a page: a rig takes some ten kilobytes.
 const LARGEST_PAGE_SIZE: usize = 100;
@@ -34,20 +32,7 @@ const LONGEST_NAME: usize = 1024;
 
 /// The id of a name like `rigs/my-hand`.
 pub(crate) fn rig_id_of(field: Field<'_>, name: &str, violations: &mut Violations) -> Option<String> {
-    match name.strip_prefix(COLLECTION) {
-        Some(id) if is_object_id(id) => Some(id.to_owned()),
-        _ => {
-            violations.add(
-                field,
-                if name.is_empty() {
-                    "is required: rigs/ and the rig's id".to_owned()
-                } else {
-                    format!("is {}; it must be rigs/ and the rig's id", quoted(name))
-                },
-            );
-            None
-        }
-    }
+    id_in(COLLECTION, "the rig's id", field, name, violations)
 }
 
 /// What a rig is made from.
@@ -91,17 +76,7 @@ pub(crate) struct RigPageQuery {
 /// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQuery, ServiceError> {
     let mut violations = Violations::default();
-    let size = match usize::try_from(request.page_size) {
-        Ok(0) => DEFAULT_PAGE_SIZE,
-        Ok(size) => size.min(LARGEST_PAGE_SIZE),
-        Err(_) => {
-            violations.add(
-                Field::root("page_size"),
-                format_args!("is {}; it must not be negative", request.page_size),
-            );
-            DEFAULT_PAGE_SIZE
-        }
-    };
+    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &mut violations);
     let after = request.page_token.strip_prefix(TOKEN_PREFIX);
     let after = after.filter(|id| is_object_id(id)).map(str::to_owned);
     if after.is_none() && !request.page_token.is_empty() {

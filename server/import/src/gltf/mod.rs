@@ -28,6 +28,7 @@ use crate::{
 };
 pub(crate) use accessors::Buffers;
 pub(crate) use nodes::Scene;
+pub(crate) use primitives::in_primitive;
 
 /// Largest number of validation errors that are listed.
 const LISTED_ERRORS: usize = 16;

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, hash_map::Entry};
 
 use glam::{DMat4, DVec3};
-use gltf::{Document, Node, Primitive, Semantic, Skin, mesh::Mode};
+use gltf::{Document, Mesh, Node, Primitive, Semantic, Skin, mesh::Mode};
 
 use super::{accessors::Buffers, nodes::Scene};
 use crate::{
@@ -54,15 +54,7 @@ pub(super) fn read_into(
                 skipped += 1;
                 continue;
             }
-            let place = |error: ImportError| {
-                let mesh = mesh
-                    .name()
-                    .map_or_else(|| mesh.index().to_string(), |name| format!("{name:?}"));
-                ImportError::at(
-                    format!("mesh {mesh}, primitive {}", primitive.index()),
-                    error.to_string(),
-                )
-            };
+            let place = |error: ImportError| in_primitive(&mesh, &primitive, &error);
             let own = [
                 nodes_by_name[index],
                 meshes_by_name[mesh.index()],
@@ -241,4 +233,15 @@ fn skinned(
     Ok(moved
         .map(|((sum, total), &position)| if total > 0.0 { sum / total } else { position })
         .collect())
+}
+
+/// An error in a primitive of a mesh, with its place.
+pub(crate) fn in_primitive(mesh: &Mesh<'_>, primitive: &Primitive<'_>, error: &ImportError) -> ImportError {
+    let mesh = mesh
+        .name()
+        .map_or_else(|| mesh.index().to_string(), |name| format!("{name:?}"));
+    ImportError::at(
+        format!("mesh {mesh}, primitive {}", primitive.index()),
+        error.to_string(),
+    )
 }

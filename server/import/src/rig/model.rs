@@ -7,7 +7,7 @@ use gltf::{Document, Semantic};
 
 use crate::{
     error::ImportError,
-    gltf::{Buffers, Opened, Scene},
+    gltf::{Buffers, Opened, Scene, in_primitive},
     limits::MeshLimits,
     raw::check_counts,
 };
@@ -135,15 +135,7 @@ pub(super) fn vertices(
         let joints: Vec<usize> = skin.joints().map(|joint| joint.index()).collect();
         buffers.spend(joints.len() as u64)?;
         for primitive in mesh.primitives() {
-            let place = |error: ImportError| {
-                let mesh = mesh
-                    .name()
-                    .map_or_else(|| mesh.index().to_string(), |name| format!("{name:?}"));
-                ImportError::at(
-                    format!("mesh {mesh}, primitive {}", primitive.index()),
-                    error.to_string(),
-                )
-            };
+            let place = |error: ImportError| in_primitive(&mesh, &primitive, &error);
             buffers.spend(0)?;
             let Some(accessor) = primitive.get(&Semantic::Positions) else {
                 continue;
