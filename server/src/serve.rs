@@ -30,7 +30,11 @@ use crate::{
     net::{AcceptLimits, UnreadAnswers, UnreadLayer, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
-        store::ObjectStore,
+        saved::{SavedObjects, StoreError},
+        store::{
+            ObjectStore,
+            loading::{Durability, Loading},
+        },
     },
     reserve::DeadlineReserve,
     rigs::store::RigStore,
@@ -82,6 +86,9 @@ pub enum ServeError {
     /// The objects directory cannot be used.
     #[error(transparent)]
     Objects(#[from] DirectoryError),
+    /// The place where objects are saved cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
     /// The atlas directory cannot be used.
     #[error("atlas_directory is {}; it must be a folder or the name of a new one: {source}", path.display())]
     AtlasDirectory {
@@ -160,7 +167,8 @@ impl Server {
     /// Loads the built-in objects and hands and the objects directory, and starts the search and builder threads.
     ///
     /// # Errors
-    /// [`ServeError::Workers`], [`ServeError::Objects`], [`ServeError::AtlasDirectory`], [`ServeError::Builders`].
+    /// [`ServeError::Workers`], [`ServeError::Objects`], [`ServeError::Store`], [`ServeError::AtlasDirectory`],
+    /// [`ServeError::Builders`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
         prepare_hands();
         let triangles = config.maximum_object_triangles.get();
@@ -174,7 +182,20 @@ impl Server {
             None => Vec::new(),
         };
         let directory_bytes = directory.iter().map(|pinned| pinned.object.bytes()).sum();
-        let objects = Arc::new(ObjectStore::new(config.store, directory));
+        let loading_limits = MeshLimits {
+            bytes: config.largest_mesh(),
+            ..obj_limits
+        };
+        let saved = SavedObjects::open(&config.place, config.maximum_saved_objects)?;
+        let durability = saved.map(|saved| Durability {
+            saved,
+            loading: Loading::new(
+                loading_limits,
+                config.maximum_uploads.get(),
+                config.default_rig.clone(),
+            ),
+        });
+        let objects = Arc::new(ObjectStore::new(config.store, directory, durability));
         for object in objects.pinned() {
             unstopped(|stop| object.prepare(&config.default_rig, stop));
         }
@@ -245,6 +266,12 @@ impl Server {
         listener: TcpListener,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
+        let start = Instant::now();
+        let saved = self.shared.objects.read_saved().await?;
+        if saved > 0 {
+            let milliseconds = start.elapsed().as_millis();
+            tracing::info!(objects = saved, milliseconds, "read the records of saved objects");
+        }
         let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
             .max_decoding_message_size(LARGEST_FIND_REQUEST)
             .max_encoding_message_size(LARGEST_RESPONSE);

@@ -117,13 +117,15 @@ impl Atlases {
         }
     }
 
-    /// The state of an object's atlas for the default rig's right hand; none if there are no atlases.
-    pub(crate) fn state(&self, object: &StoredObject) -> Option<v1::AtlasState> {
+    /// The state of an object's atlas for the default rig's right hand; none if there are no atlases. That of an object at rest
+    /// is empty.
+    pub(crate) fn state(&self, object: Option<&StoredObject>) -> Option<v1::AtlasState> {
         if !self.0.are_running() {
             return None;
         }
         let hand = self.0.default_hand(Handedness::Right)?;
-        let slot = object.atlas_slots.get(hand).unwrap_or_default();
+        let slot = object.and_then(|object| object.atlas_slots.get(hand));
+        let slot = slot.unwrap_or_default();
         let atlas = slot
             .grown
             .map(|grown| Arc::clone(&grown.atlas))

@@ -52,7 +52,7 @@ fn moved(grip: &Entry, by: usize) -> Entry {
 }
 
 fn store(objects: usize, bytes: usize) -> Arc<ObjectStore> {
-    Arc::new(ObjectStore::new(StoreLimits { objects, bytes }, Vec::new()))
+    Arc::new(ObjectStore::new(StoreLimits { objects, bytes }, Vec::new(), None))
 }
 
 fn start(threads: usize, store: &Arc<ObjectStore>) -> Atlases {
@@ -257,16 +257,18 @@ fn complete_file_is_used_instead_of_shipped_grips() {
     assert_eq!(*object.atlas_slots.get(adult()).unwrap().grown.unwrap(), complete);
 }
 
+fn insert(store: &ObjectStore, object: StoredObject) -> Arc<StoredObject> {
+    let state = store.insert(object, Origin::default()).unwrap();
+    Arc::clone(state.object().unwrap())
+}
+
 #[test]
 fn stops_building_for_an_evicted_object() {
     // Too large for a hand: its atlas would grow for minutes.
     let store = store(1, 1 << 30);
     let atlases = start(1, &store);
     let first = {
-        let first = store
-            .insert(cuboid("first", Vec3::splat(0.2)), Origin::default())
-            .unwrap()
-            .object;
+        let first = insert(&store, cuboid("first", Vec3::splat(0.2)));
         atlases.register(&first);
         Arc::downgrade(&first)
     };
@@ -276,7 +278,7 @@ fn stops_building_for_an_evicted_object() {
             slot.is_some_and(|slot| slot.build_time > Duration::ZERO)
         })
     });
-    let second = store.insert(small("second"), Origin::default()).unwrap().object;
+    let second = insert(&store, small("second"));
     atlases.register(&second);
     until("the end of the first", || first.strong_count() == 0);
 }
@@ -294,7 +296,7 @@ fn entries(object: &StoredObject) -> [usize; 2] {
 fn both_hands_of_every_new_object_become_useful_before_any_grows_on() {
     const USEFUL: usize = 100;
     let store = store(10, 1 << 30);
-    let objects = ["a", "b"].map(|id| store.insert(small(id), Origin::default()).unwrap().object);
+    let objects = ["a", "b"].map(|id| insert(&store, small(id)));
     let atlases = start(1, &store);
     for object in &objects {
         atlases.register(object);
@@ -327,10 +329,7 @@ fn hands_requested_together_do_not_evict_each_other() {
 #[test]
 fn builders_end_when_stopped_or_dropped() {
     let store = store(10, 1 << 30);
-    let object = store
-        .insert(cuboid("large", Vec3::splat(0.2)), Origin::default())
-        .unwrap()
-        .object;
+    let object = insert(&store, cuboid("large", Vec3::splat(0.2)));
     for stop in [|atlases: &Atlases| drop(atlases.stopper()), |_: &Atlases| {}] {
         let atlases = start(2, &store);
         atlases.register(&object);

@@ -4,7 +4,10 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, path::Pa
 
 use grasp_assets::hands::RIG_NAMES;
 
-use super::{BadValue, Config, ConfigError, LogFormat, RawConfig};
+use super::{
+    BadValue, Config, ConfigError, LogFormat, RawConfig,
+    store_place::{self, StorePlace},
+};
 use crate::{
     budget::BudgetLimits,
     limits::{LARGEST_RESPONSE, StoreLimits, StreamLimits},
@@ -20,7 +23,7 @@ impl RawConfig {
         let mut bad = Vec::new();
         let check = &mut Check(&mut bad);
         let budgets = self.budgets(check, defaults.budgets);
-        let store = self.store(check, defaults.store);
+        let store = self.cache(check, defaults.store);
         let streams = self.streams(check, defaults.streams);
         let config = Config {
             listen: check.parsed(
@@ -63,6 +66,19 @@ impl RawConfig {
                 self.maximum_object_triangles,
                 4..=10_000_000,
                 defaults.maximum_object_triangles,
+            ),
+            place: check.parsed(
+                "store",
+                self.store,
+                defaults.place,
+                store_place::NEEDED,
+                StorePlace::parse,
+            ),
+            maximum_saved_objects: check.count(
+                "maximum_saved_objects",
+                self.maximum_saved_objects,
+                1..=1_000_000,
+                defaults.maximum_saved_objects,
             ),
             store,
             maximum_rigs: check.count(
@@ -170,7 +186,7 @@ impl RawConfig {
         }
     }
 
-    fn store(&self, check: &mut Check<'_>, defaults: StoreLimits) -> StoreLimits {
+    fn cache(&self, check: &mut Check<'_>, defaults: StoreLimits) -> StoreLimits {
         StoreLimits {
             objects: check.within("cache_objects", self.cache_objects, 1..=100_000, defaults.objects),
             bytes: check.within("cache_bytes", self.cache_bytes, 1 << 20..=1 << 40, defaults.bytes),
@@ -292,6 +308,7 @@ mod tests {
             log_format: LogFormat::Json,
             drain: Duration::from_millis(77),
             improvement: Duration::from_millis(9),
+            place: StorePlace::Folder("/saved".into()),
             objects_directory: Some("/objects".into()),
             atlas_directory: Some("/atlases".into()),
             builder_threads: 0,
@@ -340,6 +357,8 @@ mod tests {
             maximum_watchers: Some(0),
             maximum_object_bytes: Some(1),
             maximum_object_triangles: Some(0),
+            store: Some(String::new()),
+            maximum_saved_objects: Some(0),
             cache_objects: Some(0),
             cache_bytes: Some(0),
             maximum_rigs: Some(0),
@@ -356,7 +375,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 26, "{bad:?}");
+        assert_eq!(bad.len(), 28, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

@@ -2,10 +2,12 @@
 
 mod check;
 mod raw;
+mod store_place;
 
 use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration};
 
 pub use raw::{RawConfig, read_file, unknown_variables};
+pub use store_place::StorePlace;
 
 use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMENT};
 
@@ -47,7 +49,11 @@ pub struct Config {
     pub maximum_object_bytes: NonZeroUsize,
     /// Largest number of triangles, and of vertices, in a mesh.
     pub maximum_object_triangles: NonZeroUsize,
-    /// Bound on the created objects.
+    /// Where created objects are kept.
+    pub place: StorePlace,
+    /// Largest number of objects kept in a folder or bucket; others are rejected.
+    pub maximum_saved_objects: NonZeroUsize,
+    /// Bound on the created objects in memory.
     pub store: StoreLimits,
     /// Largest number of rigs created by clients; others are rejected.
     pub maximum_rigs: NonZeroUsize,
@@ -98,6 +104,8 @@ impl Default for Config {
             },
             maximum_object_bytes: non_zero(8 << 20),
             maximum_object_triangles: non_zero(200_000),
+            place: StorePlace::Memory,
+            maximum_saved_objects: non_zero(10_000),
             store: StoreLimits {
                 objects: 1000,
                 bytes: 512 << 20,
@@ -114,6 +122,13 @@ impl Default for Config {
             log: "info".to_owned(),
             mechanisms: Mechanisms::ALL,
         }
+    }
+}
+
+impl Config {
+    /// Largest mesh file in bytes, in one message or in pieces.
+    pub(crate) fn largest_mesh(&self) -> usize {
+        self.maximum_object_bytes.max(self.streams.upload_bytes).get()
     }
 }
 

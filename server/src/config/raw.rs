@@ -68,7 +68,16 @@ pub struct RawConfig {
     /// Most triangles, and most vertices, in a mesh [default: 200000].
     #[arg(long, env = "GRASP_MAXIMUM_OBJECT_TRIANGLES", value_name = "COUNT")]
     pub maximum_object_triangles: Option<u64>,
-    /// Most created objects kept [default: 1000].
+    /// Where created objects are kept: memory, or a folder or s3://BUCKET/PREFIX, where they outlast the server [default: memory].
+    ///
+    /// A folder is created if necessary, and used by one server at a time. S3 needs a server built with the feature s3; its
+    /// region and credentials come from the variables AWS_*.
+    #[arg(long, env = "GRASP_STORE", value_name = "PLACE")]
+    pub store: Option<String>,
+    /// Most objects kept in a folder or bucket; more are rejected [default: 10000].
+    #[arg(long, env = "GRASP_MAXIMUM_SAVED_OBJECTS", value_name = "COUNT")]
+    pub maximum_saved_objects: Option<u64>,
+    /// Most created objects in memory [default: 1000].
     #[arg(long, env = "GRASP_CACHE_OBJECTS", value_name = "COUNT")]
     pub cache_objects: Option<u64>,
     /// Memory for created objects and atlases, in bytes, by estimate [default: 536870912].
@@ -169,6 +178,8 @@ impl RawConfig {
             maximum_object_triangles: self
                 .maximum_object_triangles
                 .or(fallback.maximum_object_triangles),
+            store: self.store.or(fallback.store),
+            maximum_saved_objects: self.maximum_saved_objects.or(fallback.maximum_saved_objects),
             cache_objects: self.cache_objects.or(fallback.cache_objects),
             cache_bytes: self.cache_bytes.or(fallback.cache_bytes),
             maximum_rigs: self.maximum_rigs.or(fallback.maximum_rigs),
@@ -204,6 +215,8 @@ impl From<&Config> for RawConfig {
             maximum_watchers: count(config.streams.watchers.get()),
             maximum_object_bytes: count(config.maximum_object_bytes.get()),
             maximum_object_triangles: count(config.maximum_object_triangles.get()),
+            store: Some(config.place.to_string()),
+            maximum_saved_objects: count(config.maximum_saved_objects.get()),
             cache_objects: count(config.store.objects),
             cache_bytes: count(config.store.bytes),
             maximum_rigs: count(config.maximum_rigs.get()),

@@ -107,6 +107,29 @@ pub enum ServiceError {
         /// Their maximum.
         maximum: usize,
     },
+    /// As many created objects are saved as the server keeps.
+    #[error("the server keeps at most {maximum} created objects; delete one first")]
+    ObjectsFull {
+        /// Their maximum.
+        maximum: usize,
+    },
+    /// What was saved of an object is damaged.
+    #[error("what was saved of {name} is damaged; delete it and create it again")]
+    ObjectDamaged {
+        /// The requested name.
+        name: String,
+    },
+    /// A saved object is beyond the limits of this server.
+    #[error("{name} was saved, but this server cannot load it: {reason}; raise its limits")]
+    ObjectUnloadable {
+        /// The requested name.
+        name: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Created objects cannot be written or read where they are saved. The server's log says why.
+    #[error("the server cannot reach the place where it saves objects; its log says why")]
+    StoreFailed,
     /// The server is at one of its limits.
     #[error("{} ({maximum}); try again", limit_text(*.limit))]
     Overloaded {

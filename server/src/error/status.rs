@@ -37,14 +37,10 @@ impl From<ServiceError> for Status {
                 } else {
                     "OBJECT_NOT_FOUND"
                 };
-                let mut details = info(reason, [("name", name.clone())]);
-                details.set_resource_info("grasp.v1.Object", name, "", message.clone());
-                Status::with_error_details(Code::NotFound, message, details)
+                object_status(Code::NotFound, reason, name, message)
             }
             ServiceError::ObjectExists { name } => {
-                let mut details = info("OBJECT_EXISTS", [("name", name.clone())]);
-                details.set_resource_info("grasp.v1.Object", name, "", message.clone());
-                Status::with_error_details(Code::AlreadyExists, message, details)
+                object_status(Code::AlreadyExists, "OBJECT_EXISTS", name, message)
             }
             ServiceError::RequestIdReused { request_id, name } => {
                 let mut details = info(
@@ -74,6 +70,20 @@ impl From<ServiceError> for Status {
                 message,
                 info("TOO_MANY_RIGS", [("maximum", maximum.to_string())]),
             ),
+            ServiceError::ObjectsFull { maximum } => Status::with_error_details(
+                Code::ResourceExhausted,
+                message,
+                info("TOO_MANY_OBJECTS", [("maximum", maximum.to_string())]),
+            ),
+            ServiceError::ObjectDamaged { name } => {
+                object_status(Code::DataLoss, "OBJECT_DAMAGED", name, message)
+            }
+            ServiceError::ObjectUnloadable { name, .. } => {
+                object_status(Code::FailedPrecondition, "OBJECT_UNLOADABLE", name, message)
+            }
+            ServiceError::StoreFailed => {
+                Status::with_error_details(Code::Unavailable, message, info("STORE_FAILED", []))
+            }
             ServiceError::Overloaded {
                 limit,
                 maximum,
@@ -139,6 +149,13 @@ fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDet
     ErrorDetails::with_error_info(reason, ERROR_DOMAIN, metadata)
 }
 
+/// The status of an error about one object.
+fn object_status(code: Code, reason: &str, name: String, message: String) -> Status {
+    let mut details = info(reason, [("name", name.clone())]);
+    details.set_resource_info("grasp.v1.Object", name, "", message.clone());
+    Status::with_error_details(code, message, details)
+}
+
 /// The status of an error about one rig.
 fn rig_status(code: Code, reason: &str, name: String, message: String) -> Status {
     let mut details = info(reason, [("name", name.clone())]);
@@ -195,6 +212,32 @@ mod tests {
                 Code::ResourceExhausted,
                 "TOO_MANY_RIGS",
             ),
+        ]
+    }
+
+    /// Errors of saved objects, with their code and reason.
+    fn errors_of_the_store() -> [(ServiceError, Code, &'static str); 4] {
+        let name = || "objects/x".to_owned();
+        [
+            (
+                ServiceError::ObjectsFull { maximum: 9 },
+                Code::ResourceExhausted,
+                "TOO_MANY_OBJECTS",
+            ),
+            (
+                ServiceError::ObjectDamaged { name: name() },
+                Code::DataLoss,
+                "OBJECT_DAMAGED",
+            ),
+            (
+                ServiceError::ObjectUnloadable {
+                    name: name(),
+                    reason: "mesh: is too large".to_owned(),
+                },
+                Code::FailedPrecondition,
+                "OBJECT_UNLOADABLE",
+            ),
+            (ServiceError::StoreFailed, Code::Unavailable, "STORE_FAILED"),
         ]
     }
 
@@ -311,6 +354,7 @@ mod tests {
             .into_iter()
             .chain(errors_of_streams())
             .chain(errors_of_rigs())
+            .chain(errors_of_the_store())
         {
             let status = Status::from(error);
             assert_eq!(status.code(), code);

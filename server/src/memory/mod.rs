@@ -11,7 +11,7 @@ use std::fmt;
 
 pub use process_limits::memory_limits;
 
-use crate::config::Config;
+use crate::config::{Config, StorePlace};
 
 /// Bytes in a mebibyte, the unit of error messages.
 const MIB: u64 = 1 << 20;
@@ -46,6 +46,9 @@ const PER_BUILT_OBJECT: u64 = 512 << 10;
 
 /// Bytes per watcher that is as far behind as it may be: 2048 objects with their ids and events. Estimated: 0.4 MiB.
 const PER_WATCHER: u64 = 512 << 10;
+
+/// Bytes per saved object: what describes it, its labels, and its places in maps. Estimated: 1.5 KiB with a few labels and warnings.
+const PER_SAVED_OBJECT: u64 = 4 << 10;
 
 /// Bytes per growing atlas, excluding its published form: its grips twice during publication, and their encoding for
 /// the disk. A complete atlas takes 10 MB.
@@ -223,6 +226,22 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
             format!("for answers that wait for their readers (maximum_unread_bytes is {unread})"),
         ),
     ];
+    if config.place != StorePlace::Memory {
+        let saved = config.maximum_saved_objects.get() as u64;
+        shares.push(share(
+            saved.saturating_mul(PER_SAVED_OBJECT),
+            format!("for what describes saved objects (maximum_saved_objects is {saved})"),
+        ));
+        let building = uploads.saturating_mul(upload.saturating_sub(text.saturating_mul(PER_TEXT_BYTE)));
+        let meshes = (config.largest_mesh() as u64).saturating_mul(PER_TEXT_BYTE);
+        shares.push(share(
+            building.saturating_add(meshes),
+            format!(
+                "to load saved objects (maximum_uploads is {uploads}, maximum_object_triangles is {triangles}, \
+                 maximum_upload_bytes is {upload_bytes})"
+            ),
+        ));
+    }
     if let Some(path) = &config.objects_directory {
         shares.push(share(
             directory_bytes as u64,

@@ -16,7 +16,7 @@ use crate::{
 /// # Errors
 /// [`ServiceError::Invalid`] with `violations` and everything else that is wrong, [`ServiceError::Cancelled`] if it was stopped.
 pub(crate) fn build_object(
-    fields: ObjectFields,
+    fields: &ObjectFields,
     limits: MeshLimits,
     mut violations: Violations,
     stop: Stop<'_>,
@@ -62,7 +62,7 @@ pub(crate) fn build_object(
     )?;
     match object {
         Ok(object) => Ok(StoredObject::from_file_until(
-            fields.id,
+            fields.id.clone(),
             Arc::new(object),
             warnings,
             Arc::new(file),
@@ -113,14 +113,14 @@ mod tests {
 
     #[test]
     fn counts_forbidden_triangles_as_in_the_file() {
-        let stored = build_object(fields(&[1, 2, 4]), LIMITS, Violations::default(), Stop::NEVER).unwrap();
+        let stored = build_object(&fields(&[1, 2, 4]), LIMITS, Violations::default(), Stop::NEVER).unwrap();
         let forbidden: Vec<bool> = (0..4).map(|t| stored.object.is_forbidden(t)).collect();
         assert_eq!(forbidden, [false, true, false, true]);
     }
 
     #[test]
     fn rejects_triangles_beyond_the_file() {
-        assert!(build_object(fields(&[5]), LIMITS, Violations::default(), Stop::NEVER).is_err());
+        assert!(build_object(&fields(&[5]), LIMITS, Violations::default(), Stop::NEVER).is_err());
     }
 
     const ROOMY: MeshLimits = MeshLimits {
@@ -156,7 +156,7 @@ mod tests {
         let outcome = TestRunner::new(config).run(&(lines, units), |(lines, unit_metres)| {
             let start = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\ng lid\nf 1 2 3\n";
             match build_object(
-                text_fields(format!("{start}{lines}"), unit_metres),
+                &text_fields(format!("{start}{lines}"), unit_metres),
                 ROOMY,
                 Violations::default(),
                 Stop::NEVER,
@@ -178,8 +178,13 @@ mod tests {
     #[test]
     fn warns_about_a_mesh_without_volume() {
         let sheet = "g lid\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
-        let stored = build_object(text_fields(sheet, 0.1), ROOMY, Violations::default(), Stop::NEVER)
-            .expect("a sheet is an object");
+        let stored = build_object(
+            &text_fields(sheet, 0.1),
+            ROOMY,
+            Violations::default(),
+            Stop::NEVER,
+        )
+        .expect("a sheet is an object");
         assert!(
             stored
                 .warnings

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
+use grasp_proto::v1;
 use grasp_synthesis::model::object::ObjectError;
 
 use super::{StoredObject, centre_of_mass::centre_or_computed};
 use crate::{
+    answer::vector,
     error::ServiceError,
-    validate::{ObjectChange, Setting, Violations},
+    validate::{Forbidden, ObjectChange, Setting, Violations},
 };
 
 /// The object after a change; none if the change leaves it as it is. Takes some ten milliseconds, more for large meshes.
@@ -66,6 +69,20 @@ pub(crate) fn changed(
     }
 }
 
+/// Changes the request that would create an object to one that would create the changed object.
+pub(crate) fn change_request(request: &mut v1::CreateObjectRequest, change: &ObjectChange) {
+    if let Some(mass) = change.mass {
+        request.mass_kg = mass;
+    }
+    change.friction.apply(&mut request.friction);
+    let mut centre_of_mass = request.centre_of_mass.map(|v| Vec3::new(v.x, v.y, v.z));
+    change.centre_of_mass.apply(&mut centre_of_mass);
+    request.centre_of_mass = centre_of_mass.map(vector);
+    if let Some(Forbidden { groups, triangles }) = change.forbidden.clone() {
+        request.forbidden = Some(v1::ForbiddenSurfaces { groups, triangles });
+    }
+}
+
 /// The field that an error is about.
 fn field_of(error: &ObjectError) -> &'static str {
     match error {
@@ -78,15 +95,11 @@ fn field_of(error: &ObjectError) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
     use grasp_import::{Import, MeshLimits};
     use grasp_synthesis::base::stop::Stop;
 
     use super::*;
-    use crate::{
-        objects::build::build_object,
-        validate::{Forbidden, ObjectFields},
-    };
+    use crate::{objects::build::build_object, validate::ObjectFields};
 
     const LIMITS: MeshLimits = MeshLimits {
         bytes: 1000,
@@ -100,7 +113,7 @@ mod tests {
             import: Import::with_unit(0.1),
             ..ObjectFields::named("tetrahedron", 0.1)
         };
-        build_object(fields, LIMITS, Violations::default(), Stop::NEVER).unwrap()
+        build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap()
     }
 
     /// Its second face is dropped, and all later ones are the group "lid".
@@ -143,7 +156,7 @@ mod tests {
             },
             ..ObjectFields::named("other", 0.4)
         };
-        let created = build_object(fields, LIMITS, Violations::default(), Stop::NEVER).unwrap();
+        let created = build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap();
         assert_eq!(created.content_hash, after.content_hash);
     }
 

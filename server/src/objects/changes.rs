@@ -10,7 +10,7 @@ use std::{
 
 use tokio::sync::Notify;
 
-use super::Revision;
+use super::Listed;
 use crate::validate::{LabelFilter, Labels};
 
 /// Largest number of objects that have yet to be reported to a watcher. One that falls behind further is ended.
@@ -48,7 +48,7 @@ pub(crate) enum Report {
         /// What happened, at least one event.
         events: BTreeSet<Event>,
         /// Its state; none if it is gone.
-        revision: Option<Revision>,
+        state: Option<Listed>,
     },
 }
 

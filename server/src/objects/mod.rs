@@ -1,5 +1,5 @@
 //! The objects that can be held out: built-in ones, those of the objects directory, and those that clients created, in
-//! a cache of bounded size.
+//! a cache of bounded size. Those that clients created may also be [`saved`] in a folder or bucket.
 
 pub(crate) mod build;
 mod centre_of_mass;
@@ -10,6 +10,7 @@ mod extent;
 pub(crate) mod glb;
 mod mesh_file;
 mod revision;
+pub(crate) mod saved;
 pub(crate) mod store;
 
 use std::{
@@ -34,7 +35,7 @@ use grasp_synthesis::{
 use sha2::{Digest as _, Sha256};
 
 use self::mesh_file::MeshFile;
-pub(crate) use self::revision::{Record, Revision};
+pub(crate) use self::revision::{Body, Listed, Record, Resting, Revision};
 use crate::{
     answer::{vector, wire_pose},
     atlas_slots::AtlasSlots,
@@ -194,8 +195,8 @@ impl StoredObject {
             + self.file.bytes()
     }
 
-    /// The message that describes the object but for its labels, etag and times, with the state of its atlas.
-    fn to_wire(&self, atlas: Option<v1::AtlasState>) -> v1::Object {
+    /// The message that describes the object but for its labels, etag, times and atlas.
+    fn description(&self) -> v1::Object {
         let mesh = self.object.surface.mesh();
         let bounding_box = &self.object.bounding_box;
         v1::Object {
@@ -211,7 +212,6 @@ impl StoredObject {
             box_half_extents: Some(vector(bounding_box.half_extents)),
             content_hash: self.content_hash.clone(),
             warnings: self.warnings.clone(),
-            atlas,
             origin_in_file: (self.file.origin != DVec3::ZERO).then_some(v1::DoubleVector3 {
                 x: self.file.origin.x,
                 y: self.file.origin.y,

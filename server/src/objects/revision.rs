@@ -23,7 +23,7 @@ pub(crate) struct Record {
     pub updated: SystemTime,
 }
 
-/// An object in one of its states.
+/// An object in one of its states, ready for searches.
 #[derive(Clone, Debug)]
 pub(crate) struct Revision {
     /// The object.
@@ -32,17 +32,79 @@ pub(crate) struct Revision {
     pub record: Arc<Record>,
 }
 
+/// What is in memory of an object that was saved and is not needed now.
+#[derive(Debug)]
+pub(crate) struct Resting {
+    /// The last part of its name.
+    pub id: String,
+    /// What describes it, without labels, etag, times and atlas.
+    pub description: v1::Object,
+}
+
+/// An object or what is in memory of it.
+#[derive(Clone, Debug)]
+pub(crate) enum Body {
+    /// Ready for searches.
+    Loaded(Arc<StoredObject>),
+    /// To be loaded when it is needed.
+    AtRest(Arc<Resting>),
+}
+
+/// An object in one of its states, as lists show it: ready for searches or not.
+#[derive(Clone, Debug)]
+pub(crate) struct Listed {
+    /// The object.
+    pub body: Body,
+    /// Its labels, etag and times.
+    pub record: Arc<Record>,
+}
+
 /// Bytes that a label takes beside its characters.
 const LABEL_OVERHEAD: usize = 2 * size_of::<String>();
 
-impl Revision {
-    /// Its estimated size in bytes, without atlases.
+impl From<Revision> for Listed {
+    fn from(Revision { object, record }: Revision) -> Self {
+        Self {
+            body: Body::Loaded(object),
+            record,
+        }
+    }
+}
+
+impl Listed {
+    /// The last part of the object's name.
+    pub(crate) fn id(&self) -> &str {
+        match &self.body {
+            Body::Loaded(object) => &object.id,
+            Body::AtRest(resting) => &resting.id,
+        }
+    }
+
+    /// The object, if it is ready for searches.
+    pub(crate) fn object(&self) -> Option<&Arc<StoredObject>> {
+        match &self.body {
+            Body::Loaded(object) => Some(object),
+            Body::AtRest(_) => None,
+        }
+    }
+
+    /// The state with its object, if that is ready for searches.
+    pub(crate) fn loaded(&self) -> Option<Revision> {
+        Some(Revision {
+            object: Arc::clone(self.object()?),
+            record: Arc::clone(&self.record),
+        })
+    }
+
+    /// Its estimated size in bytes in the cache, without atlases.
     pub(super) fn bytes(&self) -> usize {
         let labels = self.record.labels.iter();
-        let of_labels: usize = labels
-            .map(|(key, value)| key.len() + value.len() + LABEL_OVERHEAD)
-            .sum();
-        self.object.bytes() + of_labels
+        let of_labels = || -> usize {
+            labels
+                .map(|(key, value)| key.len() + value.len() + LABEL_OVERHEAD)
+                .sum()
+        };
+        self.object().map_or(0, |object| object.bytes() + of_labels())
     }
 
     /// Where the object is in lists.
@@ -50,19 +112,24 @@ impl Revision {
         Place {
             created: nanoseconds(self.record.created),
             updated: nanoseconds(self.record.updated),
-            id: self.object.id.clone(),
+            id: self.id().to_owned(),
         }
     }
 
     /// The message that describes the object, with the state of its atlas.
     pub(crate) fn to_wire(&self, atlas: Option<v1::AtlasState>) -> v1::Object {
         let record = &*self.record;
+        let described = match &self.body {
+            Body::Loaded(object) => object.description(),
+            Body::AtRest(resting) => resting.description.clone(),
+        };
         v1::Object {
             labels: record.labels.clone(),
             etag: record.etag.clone(),
             create_time: Some(record.created.into()),
             update_time: Some(record.updated.into()),
-            ..self.object.to_wire(atlas)
+            atlas,
+            ..described
         }
     }
 }

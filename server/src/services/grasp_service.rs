@@ -40,7 +40,7 @@ impl GraspHandler {
             shared.objects.contains(id)
         })?;
         call.log_object(&query.object_id);
-        let stored = shared.objects.get(&query.object_id)?.object;
+        let stored = shared.object(&query.object_id, call).await?.object;
         let object = Arc::clone(&stored.object);
         let reserve = shared.reserve.at(Instant::now());
         call.log_reserve(reserve);

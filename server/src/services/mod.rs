@@ -21,8 +21,14 @@ pub(crate) use object_service::ObjectHandler;
 pub(crate) use upload::Uploads;
 
 use crate::{
-    atlases::Atlases, budget::BudgetLimits, executor::SearchExecutor, objects::store::ObjectStore,
-    reserve::DeadlineReserve, rigs::store::RigStore,
+    atlases::Atlases,
+    budget::BudgetLimits,
+    call::CallContext,
+    error::ServiceError,
+    executor::SearchExecutor,
+    objects::{Revision, store::ObjectStore},
+    reserve::DeadlineReserve,
+    rigs::store::RigStore,
 };
 
 /// State shared by the handlers.
@@ -54,4 +60,25 @@ pub(crate) struct Shared {
     pub default_rig: String,
     /// The mechanisms that searches run.
     pub mechanisms: Mechanisms,
+}
+
+impl Shared {
+    /// The object with this id, ready for searches: loaded, if it was at rest, before the call's deadline.
+    ///
+    /// # Errors
+    /// [`ServiceError::DeadlineExceeded`], and those of [`ObjectStore::loaded`].
+    pub(crate) async fn object(&self, id: &str, call: &CallContext) -> Result<Revision, ServiceError> {
+        if let Some(revision) = self.objects.get(id)?.loaded() {
+            return Ok(revision);
+        }
+        let loading = self.objects.loaded(id);
+        let revision = match call.answer_due() {
+            None => loading.await,
+            Some(due) => tokio::time::timeout_at(due.into(), loading)
+                .await
+                .unwrap_or(Err(ServiceError::DeadlineExceeded)),
+        }?;
+        self.atlases.register(&revision.object);
+        Ok(revision)
+    }
 }

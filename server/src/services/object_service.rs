@@ -14,7 +14,12 @@ use crate::{
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
     limits::LARGEST_RESPONSE,
-    objects::{Revision, build::build_object, change::changed, store::Origin},
+    objects::{
+        Listed, StoredObject,
+        build::build_object,
+        change::changed,
+        store::{Origin, Source},
+    },
     validate::{
         Field, UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token,
         update_query,
@@ -63,17 +68,19 @@ impl ObjectHandler {
     /// Builds an object and adds it to the others.
     pub(super) fn create_blocking(
         &self,
-        request: v1::CreateObjectRequest,
+        mut request: v1::CreateObjectRequest,
         limits: MeshLimits,
         call: &CallContext,
         stop: Stop<'_>,
-    ) -> Result<Revision, ServiceError> {
+    ) -> Result<Listed, ServiceError> {
         let shared = &self.shared;
         let mut violations = Violations::default();
+        let source = beside_mesh(&mut request);
         let mut fields = object_fields(request, limits.bytes, &mut violations);
-        let origin = Origin {
+        let mut origin = Origin {
             labels: std::mem::take(&mut fields.labels),
             request: fields.request,
+            source: Source::default(),
         };
         if violations.is_empty() {
             call.log_object(&fields.id);
@@ -82,11 +89,17 @@ impl ObjectHandler {
                 return Ok(object);
             }
         }
-        let object = build_object(fields, limits, violations, stop)?;
+        let object = build_object(&fields, limits, violations, stop)?;
         object.prepare(&shared.default_rig, stop)?;
-        let revision = shared.objects.insert(object, origin)?;
-        shared.atlases.register(&revision.object);
-        Ok(revision)
+        origin.source = Source {
+            request: source,
+            mesh: fields.mesh.into(),
+        };
+        let state = shared.objects.insert(object, origin)?;
+        if let Some(object) = state.object() {
+            shared.atlases.register(object);
+        }
+        Ok(state)
     }
 
     fn get(&self, name: &str, call: &CallContext) -> Result<v1::GetObjectResponse, ServiceError> {
@@ -99,12 +112,12 @@ impl ObjectHandler {
 
     fn list(&self, request: &v1::ListObjectsRequest) -> Result<v1::ListObjectsResponse, ServiceError> {
         let query = page_query(request)?;
-        let (revisions, more) = self.shared.objects.page(&query);
-        let all = revisions.iter().map(|revision| self.message(revision));
+        let (states, more) = self.shared.objects.page(&query);
+        let all = states.iter().map(|state| self.message(state));
         let objects = fitting(all, LARGEST_RESPONSE - TOKEN_ROOM);
         let last = objects.len().checked_sub(1);
-        let last = last.filter(|_| more || objects.len() < revisions.len());
-        let token = last.map(|last| page_token(&query, &revisions[last].place()));
+        let last = last.filter(|_| more || objects.len() < states.len());
+        let token = last.map(|last| page_token(&query, &states[last].place()));
         Ok(v1::ListObjectsResponse {
             next_page_token: token.unwrap_or_default(),
             objects,
@@ -117,44 +130,60 @@ impl ObjectHandler {
         permit: Option<UploadPermit>,
         call: &CallContext,
     ) -> Result<v1::UpdateObjectResponse, ServiceError> {
-        let query = update_query(request)?;
+        let query = Arc::new(update_query(request)?);
         call.log_object(&query.id);
-        let handler = self.clone();
-        let object = run_blocking(move || {
-            let _permit = permit;
-            handler.update_blocking(&query)
-        })
-        .await??;
+        let mut attempts = 0;
+        let object = loop {
+            attempts += 1;
+            match self.try_update(&query, permit.clone(), call).await {
+                // Without an etag, the change applies to whatever others made of the object meanwhile.
+                Err(ServiceError::ObjectChanged { .. })
+                    if query.etag.is_none() && attempts < CHANGE_ATTEMPTS => {}
+                result => break result?,
+            }
+        };
         Ok(v1::UpdateObjectResponse {
             object: Some(self.message(&object)),
         })
     }
 
-    fn update_blocking(&self, query: &UpdateQuery) -> Result<Revision, ServiceError> {
-        let mut attempts = 0;
-        loop {
-            attempts += 1;
-            match self.try_update(query) {
-                // Without an etag, the change applies to whatever others made of the object meanwhile.
-                Err(ServiceError::ObjectChanged { .. })
-                    if query.etag.is_none() && attempts < CHANGE_ATTEMPTS => {}
-                result => return result,
-            }
-        }
+    async fn try_update(
+        &self,
+        query: &Arc<UpdateQuery>,
+        permit: Option<UploadPermit>,
+        call: &CallContext,
+    ) -> Result<Listed, ServiceError> {
+        let objects = &self.shared.objects;
+        let base = objects.changeable(&query.id, query.etag.as_deref())?;
+        // Labels change without the object.
+        let object = if query.change.is_empty() {
+            None
+        } else {
+            Some(self.shared.object(&query.id, call).await?.object)
+        };
+        let (handler, query) = (self.clone(), Arc::clone(query));
+        run_blocking(move || {
+            let _permit = permit;
+            handler.apply_update(&query, base, object.as_deref())
+        })
+        .await?
     }
 
-    fn try_update(&self, query: &UpdateQuery) -> Result<Revision, ServiceError> {
+    fn apply_update(
+        &self,
+        query: &UpdateQuery,
+        base: Listed,
+        object: Option<&StoredObject>,
+    ) -> Result<Listed, ServiceError> {
         let Shared {
             objects,
             atlases,
             default_rig,
             ..
         } = &*self.shared;
-        let base = objects.changeable(&query.id, query.etag.as_deref())?;
-        let object = if query.change.is_empty() {
-            None
-        } else {
-            changed(&base.object, &query.change)?
+        let object = match object {
+            Some(object) => changed(object, &query.change)?,
+            None => None,
         };
         let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
         let Some(object) = object else {
@@ -165,12 +194,14 @@ impl ObjectHandler {
             };
         };
         unstopped(|stop| object.prepare(default_rig, stop));
-        let revision = objects.replace(&base, labels.clone(), Some(object))?;
-        atlases.register(&revision.object);
-        Ok(revision)
+        let state = objects.replace(&base, labels.clone(), Some((object, &query.change)))?;
+        if let Some(object) = state.object() {
+            atlases.register(object);
+        }
+        Ok(state)
     }
 
-    fn delete(
+    async fn delete(
         &self,
         request: v1::DeleteObjectRequest,
         call: &CallContext,
@@ -178,7 +209,8 @@ impl ObjectHandler {
         let id = checked_id(&request.name)?;
         call.log_object(&id);
         let etag = given_etag(request.etag);
-        match self.shared.objects.remove(&id, etag.as_deref()) {
+        let shared = Arc::clone(&self.shared);
+        match run_blocking(move || shared.objects.remove(&id, etag.as_deref())).await? {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,
         }
@@ -186,9 +218,21 @@ impl ObjectHandler {
     }
 
     /// The message that describes an object.
-    pub(super) fn message(&self, revision: &Revision) -> v1::Object {
-        revision.to_wire(self.shared.atlases.state(&revision.object))
+    pub(super) fn message(&self, state: &Listed) -> v1::Object {
+        let object = state.object().map(AsRef::as_ref);
+        state.to_wire(self.shared.atlases.state(object))
     }
+}
+
+/// A request without its mesh and id, which this copies.
+fn beside_mesh(request: &mut v1::CreateObjectRequest) -> v1::CreateObjectRequest {
+    let [mesh, obj] = [&mut request.mesh, &mut request.obj].map(std::mem::take);
+    let beside = v1::CreateObjectRequest {
+        request_id: String::new(),
+        ..request.clone()
+    };
+    (request.mesh, request.obj) = (mesh, obj);
+    beside
 }
 
 /// The first objects whose messages take no more than `room` bytes together; at least one, if there is any.
@@ -258,7 +302,7 @@ impl ObjectService for ObjectHandler {
         request: Request<v1::DeleteObjectRequest>,
     ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.delete(request.into_inner(), &call)?))
+        Ok(Response::new(self.delete(request.into_inner(), &call).await?))
     }
 
     async fn upload_object(

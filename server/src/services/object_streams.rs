@@ -68,7 +68,7 @@ impl ObjectHandler {
     ) -> Result<Messages<v1::GetMeshResponse>, ServiceError> {
         let id = checked_id(name)?;
         call.log_object(&id);
-        let revision = self.shared.objects.get(&id)?;
+        let revision = self.shared.object(&id, call).await?;
         // Holding it keeps the object from being evicted, which would free nothing meanwhile.
         let object = Arc::clone(&revision.object.object);
         let hashed = Arc::clone(&object);
@@ -84,7 +84,7 @@ impl ObjectHandler {
             }
         })
         .await?;
-        header.object = Some(self.message(&revision));
+        header.object = Some(self.message(&revision.into()));
         Ok(messages(|sender| async move {
             let part = |part| v1::GetMeshResponse { part: Some(part) };
             sender.send(part(Part::Header(header))).await?;
@@ -122,10 +122,10 @@ impl ObjectHandler {
                 changes: vec![v1::ObjectChange::PresentEnd.into()],
                 object: None,
             },
-            Report::Object { id, events, revision } => v1::WatchObjectsResponse {
+            Report::Object { id, events, state } => v1::WatchObjectsResponse {
                 changes: events.into_iter().map(|event| change(event).into()).collect(),
-                object: Some(match revision {
-                    Some(revision) => self.message(&revision),
+                object: Some(match state {
+                    Some(state) => self.message(&state),
                     None => v1::Object {
                         name: name_of(&id),
                         ..Default::default()

@@ -58,6 +58,17 @@ impl<T> From<Option<T>> for Setting<T> {
     }
 }
 
+impl<T: Copy> Setting<T> {
+    /// Changes a property that is absent if it has the default.
+    pub(crate) fn apply(self, property: &mut Option<T>) {
+        match self {
+            Self::Kept => {}
+            Self::Default => *property = None,
+            Self::To(value) => *property = Some(value),
+        }
+    }
+}
+
 impl ObjectChange {
     /// True if it changes nothing.
     pub(crate) fn is_empty(&self) -> bool {

@@ -171,7 +171,7 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
         &mut violations,
     );
     let labels = std::mem::take(&mut fields.labels);
-    match build_object(fields, limits, violations, Stop::NEVER) {
+    match build_object(&fields, limits, violations, Stop::NEVER) {
         Ok(object) if problems.is_empty() => Ok(PinnedObject { object, labels }),
         Ok(_) => Err(problems),
         Err(error) => {

@@ -1,83 +1,65 @@
 //! Objects by name. Built-in ones and those of the objects directory stay as they are; created ones can be changed and
-//! deleted, and stay while they fit.
+//! deleted.
 //!
-//! When a new object does not fit, created objects that no call uses are evicted, the least recently used first. The
-//! error for an evicted object says that it was evicted, so that its client creates it again.
+//! When a new object does not fit, created objects that no call uses make room, the least recently used first. If objects
+//! are saved, those are put to rest: only what describes them stays in memory, and they are loaded again when a call needs
+//! them. Otherwise they are evicted, and the error for an evicted object says so, so that its client creates it again.
 //!
 //! Labels and times are kept here, not in the object: a change of them leaves its atlases and its searches alone.
 
+mod created;
+pub(crate) mod loading;
 #[cfg(test)]
 mod tests;
 mod watching;
 
 use std::{
-    collections::{BTreeMap, HashMap, VecDeque},
-    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
-    time::{Duration, SystemTime, UNIX_EPOCH},
+    collections::BTreeMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, SystemTime},
 };
 
+use bytes::Bytes;
 use grasp_assets::objects::{object, objects};
-use uuid::Uuid;
+use grasp_proto::v1;
+use sha2::{Digest as _, Sha256};
 
+use self::{
+    created::{Created, Entry, Etags},
+    loading::Durability,
+};
 use super::{
-    Record, Revision, StoredObject,
-    changes::{Event, Watcher},
+    Listed, Record, Revision, StoredObject,
+    change::change_request,
+    changes::Event,
     directory::PinnedObject,
     name_of,
+    saved::{MeshHash, MeshUses, SavedObject},
 };
 use crate::{
     error::{Limit, ServiceError},
+    executor::wait_for,
     limits::StoreLimits,
-    validate::{Labels, PageQuery, RequestKey},
+    validate::{Labels, ObjectChange, PageQuery, RequestKey},
 };
-
-/// Number of evicted ids that are remembered for error messages.
-const REMEMBERED_EVICTIONS: usize = 1024;
 
 /// When to retry if every object in the full cache is in use: searches end within seconds.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// All objects.
+///
+/// If objects are saved, the methods that add, change or delete one wait for the disk or network. They are for threads that
+/// may block, in the context of the async runtime.
 #[derive(Debug)]
 pub(crate) struct ObjectStore {
     /// Objects that the server started with; never changed or evicted.
-    pinned: BTreeMap<String, Revision>,
+    pinned: BTreeMap<String, Listed>,
+    /// Held while an object is added, changed or deleted, so that what is saved and what is in memory agree.
+    mesh_uses: Mutex<MeshUses>,
     created: Mutex<Created>,
     limits: StoreLimits,
-}
-
-#[derive(Debug)]
-struct Created {
-    objects: BTreeMap<String, Entry>,
-    /// Ids of objects by the ids of the requests that created them.
-    requests: HashMap<Uuid, String>,
-    bytes: usize,
-    /// Number of uses so far: the clock of `last_used`.
-    uses: u64,
-    evicted: VecDeque<String>,
-    etags: Etags,
-    watchers: Vec<Weak<Watcher>>,
-}
-
-#[derive(Debug)]
-struct Entry {
-    revision: Revision,
-    request: Option<RequestKey>,
-    last_used: u64,
-}
-
-/// Makes etags: none is made twice, not even by another run of the server.
-#[derive(Debug)]
-struct Etags {
-    started: u128,
-    made: u64,
-}
-
-impl Etags {
-    fn next(&mut self) -> String {
-        self.made += 1;
-        format!("{:x}-{:x}", self.started, self.made)
-    }
+    /// None if objects are in memory only.
+    durability: Option<Durability>,
 }
 
 /// What a client gives a new object beside its mesh and physical properties.
@@ -87,6 +69,17 @@ pub(crate) struct Origin {
     pub labels: Labels,
     /// What identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,
+    /// What is saved, so that the object can be built again.
+    pub source: Source,
+}
+
+/// What an object is built from.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Source {
+    /// The request without mesh and request id.
+    pub request: v1::CreateObjectRequest,
+    /// The mesh file.
+    pub mesh: Bytes,
 }
 
 /// True if a built-in object has this id.
@@ -95,39 +88,35 @@ pub(crate) fn is_built_in(id: &str) -> bool {
 }
 
 impl ObjectStore {
-    /// A store of the built-in objects and those of the objects directory, whose ids must all differ.
-    pub(crate) fn new(limits: StoreLimits, directory: Vec<PinnedObject>) -> Self {
+    /// A store of the built-in objects and those of the objects directory, whose ids must all differ. Created objects
+    /// outlast it with `durability`.
+    pub(crate) fn new(
+        limits: StoreLimits,
+        directory: Vec<PinnedObject>,
+        durability: Option<Durability>,
+    ) -> Self {
         let built_in = objects().iter().map(|built_in| PinnedObject {
             object: StoredObject::built_in(built_in.name.to_owned(), Arc::clone(&built_in.object)),
             labels: Labels::new(),
         });
         let now = SystemTime::now();
-        let mut etags = Etags {
-            started: now.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos(),
-            made: 0,
-        };
+        let mut etags = Etags::starting(now);
         let pinned = built_in.chain(directory).map(|pinned| {
-            let revision = new_revision(pinned.object, pinned.labels, etags.next(), now);
-            (revision.object.id.clone(), revision)
+            let state = new_state(pinned.object, pinned.labels, etags.next(), now);
+            (state.id().to_owned(), state)
         });
         Self {
             pinned: pinned.collect(),
-            created: Mutex::new(Created {
-                objects: BTreeMap::new(),
-                requests: HashMap::new(),
-                bytes: 0,
-                uses: 0,
-                evicted: VecDeque::new(),
-                etags,
-                watchers: Vec::new(),
-            }),
+            mesh_uses: Mutex::default(),
+            created: Mutex::new(Created::new(etags)),
             limits,
+            durability,
         }
     }
 
     /// The objects that the server started with.
     pub(crate) fn pinned(&self) -> impl Iterator<Item = &Arc<StoredObject>> {
-        self.pinned.values().map(|revision| &revision.object)
+        self.pinned.values().filter_map(Listed::object)
     }
 
     /// Bytes of the limit that created objects do not use.
@@ -140,20 +129,15 @@ impl ObjectStore {
         self.pinned.contains_key(id) || self.created().objects.contains_key(id)
     }
 
-    /// The object with this id. It is not evicted while its `object` is held.
+    /// The object with this id, loaded or at rest.
     ///
     /// # Errors
     /// [`ServiceError::ObjectNotFound`].
-    pub(crate) fn get(&self, id: &str) -> Result<Revision, ServiceError> {
-        if let Some(revision) = self.pinned.get(id) {
-            return Ok(revision.clone());
+    pub(crate) fn get(&self, id: &str) -> Result<Listed, ServiceError> {
+        match self.pinned.get(id) {
+            Some(state) => Ok(state.clone()),
+            None => Ok(self.created().used_entry(id)?.state.clone()),
         }
-        let mut created = self.created();
-        created.uses += 1;
-        let now = created.uses;
-        let entry = created.entry(id)?;
-        entry.last_used = now;
-        Ok(entry.revision.clone())
     }
 
     /// The object that an earlier request with this key created; none if the id is free.
@@ -165,7 +149,7 @@ impl ObjectStore {
         &self,
         id: &str,
         request: Option<&RequestKey>,
-    ) -> Result<Option<Revision>, ServiceError> {
+    ) -> Result<Option<Listed>, ServiceError> {
         self.repeated_in(&self.created(), id, request)
     }
 
@@ -174,13 +158,13 @@ impl ObjectStore {
         created: &Created,
         id: &str,
         request: Option<&RequestKey>,
-    ) -> Result<Option<Revision>, ServiceError> {
+    ) -> Result<Option<Listed>, ServiceError> {
         if let Some(request) = request
             && let Some(of) = created.requests.get(&request.id)
         {
             let entry = created.objects.get(of);
             return match entry.filter(|entry| entry.request.as_ref() == Some(request)) {
-                Some(entry) => Ok(Some(entry.revision.clone())),
+                Some(entry) => Ok(Some(entry.state.clone())),
                 None => Err(ServiceError::RequestIdReused {
                     request_id: request.id.to_string(),
                     name: name_of(of),
@@ -193,37 +177,101 @@ impl ObjectStore {
         Ok(None)
     }
 
-    /// Adds an object, evicting others if necessary. If the request was repeated meanwhile, this returns the object that
-    /// the other created.
+    /// Saves and adds an object, making room if necessary. If the request was repeated meanwhile, this returns the object
+    /// that the other created.
     ///
     /// # Errors
     /// - Those of [`Self::repeated`].
     /// - [`ServiceError::Invalid`] if it is larger than the whole cache.
     /// - [`ServiceError::Overloaded`] if the objects that would have to be evicted are in use.
-    pub(crate) fn insert(&self, object: StoredObject, origin: Origin) -> Result<Revision, ServiceError> {
-        let mut created = self.created();
-        if let Some(revision) = self.repeated_in(&created, &object.id, origin.request.as_ref())? {
-            return Ok(revision);
-        }
-        let etag = created.etags.next();
-        let revision = new_revision(object, origin.labels, etag, SystemTime::now());
-        let bytes = revision.bytes();
-        self.make_room(&mut created, None, bytes)?;
-        let id = revision.object.id.clone();
-        created.uses += 1;
-        created.bytes += bytes;
-        created.evicted.retain(|evicted| *evicted != id);
-        if let Some(request) = &origin.request {
-            created.requests.insert(request.id, id.clone());
-        }
-        let entry = Entry {
-            revision: revision.clone(),
-            request: origin.request,
-            last_used: created.uses,
+    /// - [`ServiceError::ObjectsFull`] if as many objects are saved as may be.
+    /// - [`ServiceError::StoreFailed`] if it cannot be saved.
+    pub(crate) fn insert(&self, object: StoredObject, origin: Origin) -> Result<Listed, ServiceError> {
+        let mut mesh_uses = self.changing();
+        let reserved;
+        let state = {
+            let mut created = self.created();
+            if let Some(state) = self.repeated_in(&created, &object.id, origin.request.as_ref())? {
+                return Ok(state);
+            }
+            self.check_count(&created)?;
+            let etag = created.etags.next();
+            let state = new_state(object, origin.labels, etag, SystemTime::now());
+            reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
+            state
         };
-        created.tell(&id, Event::Created, None, Some(&revision.record.labels));
-        created.objects.insert(id, entry);
-        Ok(revision)
+        let saved = self.save_new(&mut mesh_uses, &state, origin.request, origin.source);
+        let mut created = self.created();
+        reserved.release(&mut created);
+        let mesh = saved?;
+        created.uses += 1;
+        let last_used = created.uses;
+        created.tell(state.id(), Event::Created, None, Some(&state.record.labels));
+        created.add(Entry {
+            state: state.clone(),
+            request: origin.request,
+            mesh,
+            last_used,
+        });
+        Ok(state)
+    }
+
+    fn check_count(&self, created: &Created) -> Result<(), ServiceError> {
+        match &self.durability {
+            Some(Durability { saved, .. }) if created.objects.len() >= saved.maximum() => {
+                Err(ServiceError::ObjectsFull {
+                    maximum: saved.maximum(),
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Saves a new object if objects are saved; gives the hash of its mesh then.
+    fn save_new(
+        &self,
+        mesh_uses: &mut MeshUses,
+        state: &Listed,
+        request: Option<RequestKey>,
+        source: Source,
+    ) -> Result<Option<MeshHash>, ServiceError> {
+        let (Some(Durability { saved, .. }), Some(object)) = (&self.durability, state.object()) else {
+            return Ok(None);
+        };
+        let mesh = source.mesh;
+        let hash: MeshHash = Sha256::digest(&mesh).into();
+        let record = SavedObject::new(
+            source.request,
+            (hash, mesh.len() as u64),
+            request,
+            &state.record,
+            object.description(),
+        );
+        let uses = mesh_uses.entry(hash).or_default();
+        *uses += 1;
+        if let Err(error) = wait_for(saved.write(&record, Some(mesh))) {
+            // What was written before the failure must not come back at the next start.
+            let undone = wait_for(saved.delete_record(state.id()));
+            if undone.is_ok() {
+                self.forget_mesh(mesh_uses, &hash);
+            }
+            return Err(error);
+        }
+        Ok(Some(hash))
+    }
+
+    /// Ends a record's use of a mesh, and deletes the mesh if it was the last.
+    fn forget_mesh(&self, mesh_uses: &mut MeshUses, hash: &MeshHash) {
+        let Some(uses) = mesh_uses.get_mut(hash) else {
+            return;
+        };
+        *uses -= 1;
+        if *uses == 0 {
+            mesh_uses.remove(hash);
+            if let Some(Durability { saved, .. }) = &self.durability {
+                wait_for(saved.delete_mesh(hash));
+            }
+        }
     }
 
     /// The object with this id if a client may change it and it has the given etag.
@@ -232,69 +280,104 @@ impl ObjectStore {
     /// - [`ServiceError::ObjectNotFound`].
     /// - [`ServiceError::ObjectReadOnly`] if the server started with it.
     /// - [`ServiceError::ObjectChanged`] if the etag is another one.
-    pub(crate) fn changeable(&self, id: &str, etag: Option<&str>) -> Result<Revision, ServiceError> {
+    pub(crate) fn changeable(&self, id: &str, etag: Option<&str>) -> Result<Listed, ServiceError> {
         self.check_changeable(id)?;
         let mut created = self.created();
-        Ok(created.entry_with(id, etag)?.revision.clone())
+        Ok(created.entry_with(id, etag)?.state.clone())
     }
 
-    /// Replaces the labels, and the object if there is a new one, of a state that [`Self::changeable`] returned. Evicts
-    /// others if necessary.
+    /// Replaces the labels of a state that [`Self::changeable`] returned, and the object if there is a changed one. Makes
+    /// room if necessary.
     ///
     /// # Errors
     /// - [`ServiceError::ObjectNotFound`] if it was deleted or evicted meanwhile.
     /// - [`ServiceError::ObjectChanged`] if it was changed meanwhile.
-    /// - The errors of [`Self::insert`] about room.
+    /// - [`ServiceError::ObjectDamaged`] if what was saved of it is damaged.
+    /// - The errors of [`Self::insert`] about room and saving.
     pub(crate) fn replace(
         &self,
-        base: &Revision,
+        base: &Listed,
         labels: Labels,
-        object: Option<StoredObject>,
-    ) -> Result<Revision, ServiceError> {
-        let id = &base.object.id;
-        let mut created = self.created();
-        let record = Arc::clone(&created.entry_with(id, Some(&base.record.etag))?.revision.record);
-        let revision = Revision {
-            object: object.map_or_else(|| Arc::clone(&base.object), Arc::new),
-            record: Arc::new(Record {
+        changed: Option<(StoredObject, &ObjectChange)>,
+    ) -> Result<Listed, ServiceError> {
+        let id = base.id();
+        let _changing = self.changing();
+        let (changed, change) = changed.unzip();
+        let changed = changed.map(Arc::new);
+        let reserved;
+        let (before, record) = {
+            let mut created = self.created();
+            let etag = created.etags.next();
+            let before = created.entry_with(id, Some(&base.record.etag))?.state.clone();
+            let record = Arc::new(Record {
                 labels,
-                etag: created.etags.next(),
-                created: record.created,
+                etag,
+                created: before.record.created,
                 // The system's clock may have been set back.
-                updated: SystemTime::now().max(record.updated),
-            }),
+                updated: SystemTime::now().max(before.record.updated),
+            });
+            let after = with(&before, changed.as_ref(), &record);
+            let more = after.bytes().saturating_sub(before.bytes());
+            let more_objects = usize::from(before.object().is_none() && changed.is_some());
+            reserved = self.reserve(&mut created, Some(id), more, more_objects)?;
+            (before.record, record)
         };
-        let (old_bytes, bytes) = (base.bytes(), revision.bytes());
-        self.make_room(&mut created, Some(id), bytes.saturating_sub(old_bytes))?;
-        created.bytes = created.bytes - old_bytes + bytes;
-        created.entry(id)?.revision = revision.clone();
-        let (before, after) = (&record.labels, &revision.record.labels);
-        created.tell(id, Event::Updated, Some(before), Some(after));
-        Ok(revision)
+        let saved = self.save_change(id, &record, changed.as_deref().zip(change));
+        let mut created = self.created();
+        reserved.release(&mut created);
+        saved?;
+        // It may have been loaded or put to rest meanwhile.
+        let after = with(&created.used_entry(id)?.state, changed.as_ref(), &record);
+        created.set_state(id, after.clone());
+        created.tell(id, Event::Updated, Some(&before.labels), Some(&record.labels));
+        Ok(after)
+    }
+
+    /// Saves a change if objects are saved.
+    fn save_change(
+        &self,
+        id: &str,
+        record: &Record,
+        changed: Option<(&StoredObject, &ObjectChange)>,
+    ) -> Result<(), ServiceError> {
+        let Some(Durability { saved, .. }) = &self.durability else {
+            return Ok(());
+        };
+        let mut object = wait_for(saved.record(id))?;
+        object.set_record(record);
+        if let Some((changed, change)) = changed {
+            change_request(&mut object.request, change);
+            object.description = changed.description();
+        }
+        wait_for(saved.write(&object, None))
     }
 
     /// Deletes an object.
     ///
     /// # Errors
-    /// Those of [`Self::changeable`].
+    /// Those of [`Self::changeable`], and [`ServiceError::StoreFailed`] if what was saved cannot be deleted.
     pub(crate) fn remove(&self, id: &str, etag: Option<&str>) -> Result<(), ServiceError> {
         self.check_changeable(id)?;
-        let mut created = self.created();
-        created.entry_with(id, etag)?;
-        created.take(id, Event::Deleted);
+        let mut mesh_uses = self.changing();
+        let mesh = self.created().entry_with(id, etag)?.mesh;
+        if let (Some(Durability { saved, .. }), Some(hash)) = (&self.durability, mesh) {
+            wait_for(saved.delete_record(id))?;
+            self.forget_mesh(&mut mesh_uses, &hash);
+        }
+        self.created().take(id, Event::Deleted);
         Ok(())
     }
 
     /// Up to `query.size` objects, and whether there are more.
-    pub(crate) fn page(&self, query: &PageQuery) -> (Vec<Revision>, bool) {
+    pub(crate) fn page(&self, query: &PageQuery) -> (Vec<Listed>, bool) {
         let created = self.created();
         let all = self
             .pinned
             .values()
-            .chain(created.objects.values().map(|entry| &entry.revision));
+            .chain(created.objects.values().map(|entry| &entry.state));
         let mut listed: Vec<_> = all
-            .filter(|revision| query.filter.matches(&revision.record.labels))
-            .map(|revision| (revision.place(), revision))
+            .filter(|state| query.filter.matches(&state.record.labels))
+            .map(|state| (state.place(), state))
             .filter(|(place, _)| {
                 let after = query.after.as_ref();
                 after.is_none_or(|after| query.order.compare(after, place).is_lt())
@@ -306,28 +389,41 @@ impl ObjectStore {
             listed.truncate(query.size);
         }
         listed.sort_unstable_by(|(a, _), (b, _)| query.order.compare(a, b));
-        let page = listed.into_iter().map(|(_, revision)| revision.clone());
+        let page = listed.into_iter().map(|(_, state)| state.clone());
         (page.collect(), more)
     }
 
     fn check_changeable(&self, id: &str) -> Result<(), ServiceError> {
-        match self.pinned.get(id) {
-            Some(pinned) => Err(ServiceError::ObjectReadOnly {
-                name: pinned.object.name(),
-            }),
-            None => Ok(()),
+        if self.pinned.contains_key(id) {
+            return Err(ServiceError::ObjectReadOnly { name: name_of(id) });
         }
+        Ok(())
     }
 
-    /// Evicts objects until so many more bytes fit: for a new object or, if there is one, for that which `grows`.
+    /// Makes room for a new object or, if there is one, for that which `grows`, and keeps it until it is released.
+    fn reserve(
+        &self,
+        created: &mut Created,
+        grows: Option<&str>,
+        bytes: usize,
+        objects: usize,
+    ) -> Result<Reserved, ServiceError> {
+        self.make_room(created, grows, bytes, objects)?;
+        created.bytes += bytes;
+        created.loaded += objects;
+        Ok(Reserved { bytes, objects })
+    }
+
+    /// Puts objects to rest or evicts them until so many more bytes and objects fit.
     fn make_room(
         &self,
         created: &mut Created,
         grows: Option<&str>,
         bytes: usize,
+        objects: usize,
     ) -> Result<(), ServiceError> {
         let kept = grows.and_then(|id| created.objects.get(id));
-        let whole = bytes + kept.map_or(0, |entry| entry.revision.bytes());
+        let whole = bytes + kept.map_or(0, |entry| entry.state.bytes());
         if whole > self.limits.bytes {
             return Err(ServiceError::invalid(
                 if grows.is_some() { "forbidden" } else { "mesh" },
@@ -337,8 +433,7 @@ impl ObjectStore {
                 ),
             ));
         }
-        let most = self.limits.objects - usize::from(grows.is_none());
-        while created.objects.len() > most || created.bytes + bytes > self.limits.bytes {
+        while created.loaded + objects > self.limits.objects || created.bytes + bytes > self.limits.bytes {
             if !created.evict_one(grows) {
                 return Err(ServiceError::Overloaded {
                     limit: Limit::ObjectCache,
@@ -354,11 +449,31 @@ impl ObjectStore {
         // No code panics while it holds the lock; if some did, the map would still be consistent.
         self.created.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    /// Waits until no other call adds, changes or deletes an object, and keeps them waiting.
+    fn changing(&self) -> MutexGuard<'_, MeshUses> {
+        // No code panics while it holds the lock; if some did, a mesh might be kept in vain.
+        self.mesh_uses.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Room in the cache for what is about to be added.
+#[must_use = "reserved room is lost until it is released"]
+struct Reserved {
+    bytes: usize,
+    objects: usize,
+}
+
+impl Reserved {
+    fn release(self, created: &mut Created) {
+        created.bytes -= self.bytes;
+        created.loaded -= self.objects;
+    }
 }
 
 /// The first state of an object.
-fn new_revision(object: StoredObject, labels: Labels, etag: String, now: SystemTime) -> Revision {
-    Revision {
+fn new_state(object: StoredObject, labels: Labels, etag: String, now: SystemTime) -> Listed {
+    Listed::from(Revision {
         object: Arc::new(object),
         record: Arc::new(Record {
             labels,
@@ -366,61 +481,20 @@ fn new_revision(object: StoredObject, labels: Labels, etag: String, now: SystemT
             created: now,
             updated: now,
         }),
-    }
+    })
 }
 
-impl Created {
-    fn entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
-        let evicted = &self.evicted;
-        self.objects
-            .get_mut(id)
-            .ok_or_else(|| ServiceError::ObjectNotFound {
-                name: name_of(id),
-                evicted: evicted.iter().any(|evicted| evicted == id),
-            })
-    }
-
-    /// The entry if it has the etag, or any if none is given.
-    fn entry_with(&mut self, id: &str, etag: Option<&str>) -> Result<&mut Entry, ServiceError> {
-        let entry = self.entry(id)?;
-        let current = &entry.revision.record.etag;
-        if let Some(etag) = etag.filter(|etag| etag != current) {
-            return Err(ServiceError::ObjectChanged {
-                name: name_of(id),
-                etag: etag.to_owned(),
-                current: current.clone(),
-            });
-        }
-        Ok(entry)
-    }
-
-    /// Removes an object, if it exists.
-    fn take(&mut self, id: &str, event: Event) {
-        if let Some(entry) = self.objects.remove(id) {
-            self.tell(id, event, Some(&entry.revision.record.labels), None);
-            self.bytes -= entry.revision.bytes();
-            if let Some(request) = entry.request {
-                self.requests.remove(&request.id);
-            }
-        }
-    }
-
-    /// Evicts the least recently used object that no call uses, but not `kept`. False if there is none.
-    fn evict_one(&mut self, kept: Option<&str>) -> bool {
-        let oldest = self
-            .objects
-            .iter()
-            .filter(|(id, entry)| kept != Some(id.as_str()) && !entry.revision.object.is_in_use())
-            .min_by_key(|(_, entry)| entry.last_used)
-            .map(|(id, _)| id.clone());
-        let Some(id) = oldest else {
-            return false;
-        };
-        self.take(&id, Event::Evicted);
-        if self.evicted.len() == REMEMBERED_EVICTIONS {
-            self.evicted.pop_front();
-        }
-        self.evicted.push_back(id);
-        true
+/// A state with another record, and another object if there is one.
+fn with(state: &Listed, object: Option<&Arc<StoredObject>>, record: &Arc<Record>) -> Listed {
+    let record = Arc::clone(record);
+    match object.or(state.object()) {
+        Some(object) => Listed::from(Revision {
+            object: Arc::clone(object),
+            record,
+        }),
+        None => Listed {
+            body: state.body.clone(),
+            record,
+        },
     }
 }

@@ -2,13 +2,14 @@
 
 use grasp_proto::v1;
 use proptest::prelude::*;
+use uuid::Uuid;
 
 use super::*;
 use crate::{objects::tests::tetrahedron, validate::page_query};
 
 fn store(objects: usize, tetrahedra: usize) -> ObjectStore {
     let bytes = tetrahedra * tetrahedron("any", 1.0, &[]).bytes();
-    ObjectStore::new(StoreLimits { objects, bytes }, Vec::new())
+    ObjectStore::new(StoreLimits { objects, bytes }, Vec::new(), None)
 }
 
 fn list(size: i32, order_by: &str) -> PageQuery {
@@ -23,7 +24,7 @@ fn list(size: i32, order_by: &str) -> PageQuery {
 fn all_ids(store: &ObjectStore) -> Vec<String> {
     let (page, more) = store.page(&list(1000, ""));
     assert!(!more);
-    page.iter().map(|revision| revision.object.id.clone()).collect()
+    page.iter().map(|state| state.id().to_owned()).collect()
 }
 
 fn labels(value: u8) -> Labels {
@@ -43,6 +44,10 @@ fn stay() -> PinnedObject {
         object: tetrahedron("stay", 1.0, &[]),
         labels: labels(0),
     }
+}
+
+fn same_object(a: &Listed, b: &Listed) -> bool {
+    Arc::ptr_eq(a.object().unwrap(), b.object().unwrap())
 }
 
 fn insert(store: &ObjectStore, id: &str) -> Result<(), ServiceError> {
@@ -84,8 +89,8 @@ fn keeps_objects_in_use() {
     let store = store(2, 100);
     insert(&store, "a").unwrap();
     insert(&store, "b").unwrap();
-    let a = Arc::clone(&store.get("a").unwrap().object.object);
-    let b = Arc::clone(&store.get("b").unwrap().object.object);
+    let a = Arc::clone(&store.get("a").unwrap().loaded().unwrap().object.object);
+    let b = Arc::clone(&store.get("b").unwrap().loaded().unwrap().object.object);
     // Listing an object does not use it.
     let looked_at = store.page(&list(10, ""));
     assert!(matches!(
@@ -108,7 +113,7 @@ fn rejects_objects_larger_than_the_cache() {
         objects: 10,
         bytes: 10,
     };
-    let store = ObjectStore::new(limits, Vec::new());
+    let store = ObjectStore::new(limits, Vec::new(), None);
     assert!(matches!(insert(&store, "a"), Err(ServiceError::Invalid(_))));
 }
 
@@ -118,7 +123,7 @@ fn directory_objects_stay_and_do_not_count() {
         objects: 1,
         bytes: tetrahedron("any", 1.0, &[]).bytes(),
     };
-    let store = ObjectStore::new(limits, vec![stay()]);
+    let store = ObjectStore::new(limits, vec![stay()], None);
     for id in ["a", "b"] {
         insert(&store, id).unwrap();
     }
@@ -153,9 +158,9 @@ fn pages_list_every_object_once_in_any_order() {
     for order_by in ["", "name desc", "create_time", "update_time desc, name desc"] {
         for size in 1..=everything.len() + 1 {
             let mut query = list(i32::try_from(size).unwrap(), order_by);
-            let mut seen: Vec<Revision> = Vec::new();
+            let mut seen: Vec<Listed> = Vec::new();
             loop {
-                query.after = seen.last().map(Revision::place);
+                query.after = seen.last().map(Listed::place);
                 let (page, more) = store.page(&query);
                 assert!(page.len() <= size && (page.len() == size || !more));
                 seen.extend(page);
@@ -163,7 +168,7 @@ fn pages_list_every_object_once_in_any_order() {
                     break;
                 }
             }
-            let mut places: Vec<_> = seen.iter().map(Revision::place).collect();
+            let mut places: Vec<_> = seen.iter().map(Listed::place).collect();
             assert!(
                 places.is_sorted_by(|a, b| query.order.compare(a, b).is_lt()),
                 "{order_by}"
@@ -182,10 +187,10 @@ fn pages_go_on_after_an_object_that_was_deleted() {
     }
     let mut query = list(2, "");
     let (first, _) = store.page(&query);
-    query.after = first.last().map(Revision::place);
+    query.after = first.last().map(Listed::place);
     store.remove("b", None).unwrap();
     let (second, _) = store.page(&query);
-    assert_eq!(second[0].object.id, "c");
+    assert_eq!(second[0].id(), "c");
 }
 
 #[test]
@@ -195,12 +200,13 @@ fn a_repeated_request_finds_its_object() {
         let origin = Origin {
             labels: labels(1),
             request: Some(request),
+            source: Source::default(),
         };
         store.insert(tetrahedron(id, 1.0, &[]), origin)
     };
     let first = create("a", request_key(1, 1)).unwrap();
     let again = create("a", request_key(1, 1)).unwrap();
-    assert!(Arc::ptr_eq(&first.object, &again.object) && first.record == again.record);
+    assert!(same_object(&first, &again) && first.record == again.record);
     for (id, content) in [("a", 2), ("b", 2)] {
         assert!(matches!(
             create(id, request_key(1, content)),
@@ -227,7 +233,7 @@ fn labels_change_without_the_object() {
     insert(&store, "a").unwrap();
     let base = store.changeable("a", None).unwrap();
     let after = store.replace(&base, labels(7), None).unwrap();
-    assert!(Arc::ptr_eq(&base.object, &after.object));
+    assert!(same_object(&base, &after));
     assert_ne!(base.record.etag, after.record.etag);
     assert_eq!(base.record.created, after.record.created);
     assert!(after.record.updated >= base.record.updated);
@@ -263,13 +269,15 @@ fn a_larger_state_evicts_others_but_not_its_own_object() {
         warnings: vec!["long".repeat(100)],
         ..tetrahedron("a", 1.0, &[])
     };
-    store.replace(&base, labels(1), Some(larger)).unwrap();
+    store
+        .replace(&base, labels(1), Some((larger, &ObjectChange::default())))
+        .unwrap();
     assert!(store.contains("a") && !store.contains("b"));
     let sum: usize = store
         .created()
         .objects
         .values()
-        .map(|entry| entry.revision.bytes())
+        .map(|entry| entry.state.bytes())
         .sum();
     assert_eq!(store.created().bytes, sum);
 }
@@ -282,6 +290,7 @@ fn objects_of_the_server_are_read_only() {
             bytes: 1 << 20,
         },
         vec![stay()],
+        None,
     );
     for id in ["remote", "stay"] {
         assert!(matches!(
@@ -328,12 +337,12 @@ proptest! {
         let store = store(100, 100);
         let mut model: BTreeMap<String, (u8, f32)> = BTreeMap::new();
         let mut etags = std::collections::HashSet::new();
-        let edge = |revision: &Revision| revision.object.object.bounding_box.half_extents.max_element();
+        let edge = |state: &Listed| state.object().unwrap().object.bounding_box.half_extents.max_element();
         for step in steps {
             match step {
                 Step::Create(id, value) => {
                     let id = format!("o{id}");
-                    let origin = Origin { labels: labels(value), request: None };
+                    let origin = Origin { labels: labels(value), request: None, source: Source::default() };
                     let result = store.insert(tetrahedron(&id, 1.0, &[]), origin);
                     prop_assert_eq!(result.is_ok(), !model.contains_key(&id));
                     if let Ok(created) = result {
@@ -355,7 +364,7 @@ proptest! {
                     let id = format!("o{id}");
                     if let Ok(base) = store.changeable(&id, None) {
                         let object = tetrahedron(&id, new_edge, &[]);
-                        let after = store.replace(&base, base.record.labels.clone(), Some(object)).unwrap();
+                        let after = store.replace(&base, base.record.labels.clone(), Some((object, &ObjectChange::default()))).unwrap();
                         model.get_mut(&id).unwrap().1 = edge(&after);
                         prop_assert!(store.replace(&base, labels(0), None).is_err());
                     } else {
@@ -381,8 +390,8 @@ proptest! {
                     let mut seen = Vec::new();
                     loop {
                         let (page, more) = store.page(&query);
-                        query.after = page.last().map(Revision::place);
-                        seen.extend(page.into_iter().map(|revision| revision.object.id.clone()));
+                        query.after = page.last().map(Listed::place);
+                        seen.extend(page.into_iter().map(|state| state.id().to_owned()));
                         if !more {
                             break;
                         }
@@ -397,7 +406,7 @@ proptest! {
                 }
             }
         }
-        let sum: usize = store.created().objects.values().map(|entry| entry.revision.bytes()).sum();
+        let sum: usize = store.created().objects.values().map(|entry| entry.state.bytes()).sum();
         prop_assert_eq!(store.created().bytes, sum);
     }
 }

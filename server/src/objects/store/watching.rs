@@ -8,11 +8,11 @@ use std::{
     sync::{Arc, Weak},
 };
 
-use super::{Created, Entry, ObjectStore};
+use super::{Created, ObjectStore};
 use crate::{
     error::{Limit, ServiceError},
     objects::{
-        Revision, StoredObject,
+        Listed, StoredObject,
         changes::{Cursor, Event, Report, Watcher},
     },
     validate::{Labels, WatchQuery},
@@ -53,7 +53,7 @@ impl ObjectStore {
             return Ok(Some(self.next_present(&created, watcher, &cursor)));
         }
         Ok(watcher.take().map(|(id, events)| Report::Object {
-            revision: self.revision_in(&created, &id).cloned(),
+            state: self.state_in(&created, &id).cloned(),
             id,
             events,
         }))
@@ -66,29 +66,25 @@ impl ObjectStore {
             Cursor::After(id) => Bound::Excluded(id.as_str()),
         };
         let range = (start, Bound::Unbounded);
-        let matches = |revision: &&Revision| watcher.filter.matches(&revision.record.labels);
-        let pinned = self.pinned.range::<str, _>(range).map(|(_, revision)| revision);
+        let matches = |state: &&Listed| watcher.filter.matches(&state.record.labels);
+        let pinned = self.pinned.range::<str, _>(range).map(|(_, state)| state);
         let made = created
             .objects
             .range::<str, _>(range)
-            .map(|(_, entry)| &entry.revision);
+            .map(|(_, entry)| &entry.state);
         let nearest = [pinned.clone().find(matches), made.clone().find(matches)];
-        match nearest
-            .into_iter()
-            .flatten()
-            .min_by_key(|revision| &revision.object.id)
-        {
+        match nearest.into_iter().flatten().min_by_key(|state| state.id()) {
             None => {
                 watcher.end_present();
                 Report::PresentEnd
             }
-            Some(revision) => {
-                let id = &revision.object.id;
+            Some(state) => {
+                let id = state.id();
                 watcher.reported_present(id);
                 Report::Object {
-                    id: id.clone(),
+                    id: id.to_owned(),
                     events: [Event::Present].into(),
-                    revision: Some(revision.clone()),
+                    state: Some(state.clone()),
                 }
             }
         }
@@ -97,16 +93,16 @@ impl ObjectStore {
     /// Tells watchers of an event of an object's atlas, unless the object was replaced or is gone.
     pub(crate) fn tell_of_atlas(&self, object: &Arc<StoredObject>, event: Event) {
         let mut created = self.created();
-        let current = self.revision_in(&created, &object.id);
-        let current = current.filter(|revision| Arc::ptr_eq(&revision.object, object));
-        if let Some(record) = current.map(|revision| Arc::clone(&revision.record)) {
+        let current = self.state_in(&created, &object.id);
+        let is_same = |state: &&Listed| state.object().is_some_and(|now| Arc::ptr_eq(now, object));
+        if let Some(record) = current.filter(is_same).map(|state| Arc::clone(&state.record)) {
             let labels = Some(&record.labels);
             created.tell(&object.id, event, labels, labels);
         }
     }
 
-    fn revision_in<'a>(&'a self, created: &'a Created, id: &str) -> Option<&'a Revision> {
-        let made = || created.objects.get(id).map(|Entry { revision, .. }| revision);
+    fn state_in<'a>(&'a self, created: &'a Created, id: &str) -> Option<&'a Listed> {
+        let made = || created.objects.get(id).map(|entry| &entry.state);
         self.pinned.get(id).or_else(made)
     }
 }

@@ -1,0 +1,86 @@
+//! Where created objects are kept.
+
+use std::{fmt, path::PathBuf};
+
+/// What the setting must be.
+pub(super) const NEEDED: &str = if cfg!(feature = "s3") {
+    "memory, a folder, or s3://BUCKET/PREFIX"
+} else {
+    "memory or a folder (s3:// needs a server built with the feature s3)"
+};
+
+/// Where created objects are kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StorePlace {
+    /// Nowhere but in memory: they end with the server, or when they are evicted.
+    Memory,
+    /// In a folder of this server's own.
+    Folder(PathBuf),
+    /// In a bucket of S3, under a prefix of this server's own.
+    #[cfg(feature = "s3")]
+    S3 {
+        /// The bucket.
+        bucket: String,
+        /// The prefix, without slashes around it; may be empty.
+        prefix: String,
+    },
+}
+
+impl StorePlace {
+    /// Reads `memory`, a folder, or `s3://bucket/prefix`; none if it is none of them.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        match text.split_once("://") {
+            None if text.is_empty() => None,
+            None if text == "memory" => Some(Self::Memory),
+            None => Some(Self::Folder(text.into())),
+            #[cfg(feature = "s3")]
+            Some(("s3", place)) => {
+                let (bucket, prefix) = place.split_once('/').unwrap_or((place, ""));
+                let prefix = prefix.trim_matches('/').to_owned();
+                (!bucket.is_empty()).then(|| Self::S3 {
+                    bucket: bucket.to_owned(),
+                    prefix,
+                })
+            }
+            Some(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for StorePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Memory => f.write_str("memory"),
+            Self::Folder(path) => path.display().fmt(f),
+            #[cfg(feature = "s3")]
+            Self::S3 { bucket, prefix } => write!(f, "s3://{bucket}/{prefix}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn printed_places_can_be_read() {
+        for text in ["memory", "/var/lib/grasp", "./memory"] {
+            assert_eq!(StorePlace::parse(text).unwrap().to_string(), text);
+        }
+        assert_eq!(
+            StorePlace::parse("./memory"),
+            Some(StorePlace::Folder("./memory".into()))
+        );
+    }
+
+    #[test]
+    fn other_schemes_and_nothing_are_no_places() {
+        for text in ["", "http://bucket", "s3://"] {
+            assert_eq!(StorePlace::parse(text), None, "{text}");
+        }
+        assert_eq!(
+            StorePlace::parse("s3://bucket/a/b/").is_some(),
+            cfg!(feature = "s3")
+        );
+    }
+}

@@ -1,0 +1,406 @@
+//! Saved objects in a folder, whole and damaged, and the objects in memory against a plain map across restarts.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::PathBuf,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use grasp_import::MeshLimits;
+use grasp_proto::v1;
+use grasp_synthesis::base::stop::Stop;
+use proptest::prelude::*;
+use tokio::runtime::Runtime;
+use uuid::Uuid;
+
+use super::*;
+use crate::executor::wait_for;
+use crate::{
+    limits::StoreLimits,
+    objects::{
+        Listed, StoredObject,
+        build::build_object,
+        change::changed,
+        store::{
+            ObjectStore as Objects, Origin, Source,
+            loading::{Durability, Loading},
+        },
+    },
+    validate::{Labels, ObjectChange, RequestKey, Violations, object_fields},
+};
+
+const LIMITS: MeshLimits = MeshLimits {
+    bytes: 10_000,
+    vertices: 100,
+    triangles: 100,
+};
+
+/// A folder of its own, removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        static MADE: AtomicUsize = AtomicUsize::new(0);
+        let number = MADE.fetch_add(1, Ordering::Relaxed);
+        let name = format!("grasp-saved-{}-{number}", std::process::id());
+        Self(std::env::temp_dir().join(name))
+    }
+
+    fn open(&self, maximum: usize) -> SavedObjects {
+        let maximum = maximum.try_into().unwrap();
+        let place = StorePlace::Folder(self.0.clone());
+        SavedObjects::open(&place, maximum).unwrap().unwrap()
+    }
+
+    /// The objects of a server that starts now, with room for so many in memory.
+    fn objects(&self, in_memory: usize, maximum: usize) -> Arc<Objects> {
+        let limits = StoreLimits {
+            objects: in_memory,
+            bytes: 1 << 30,
+        };
+        let durability = Durability {
+            saved: self.open(maximum),
+            loading: Loading::new(LIMITS, 2, "adult".to_owned()),
+        };
+        let objects = Arc::new(Objects::new(limits, Vec::new(), Some(durability)));
+        wait_for(objects.read_saved()).unwrap();
+        objects
+    }
+
+    fn names(&self, folder: &str) -> Vec<String> {
+        let files = fs::read_dir(self.0.join(folder)).unwrap();
+        let mut names: Vec<String> = files
+            .map(|file| file.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn runtime() -> Runtime {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .unwrap()
+}
+
+fn mesh(edge: u8) -> Vec<u8> {
+    format!("v 0 0 0\nv {edge} 0 0\nv 0 {edge} 0\nv 0 0 {edge}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+        .into_bytes()
+}
+
+fn labels(value: u8) -> Labels {
+    [("value".to_owned(), value.to_string())].into()
+}
+
+/// A tetrahedron of so many centimetres, as a client creates it.
+fn create(
+    objects: &Objects,
+    id: &str,
+    edge: u8,
+    request: Option<RequestKey>,
+) -> Result<Listed, ServiceError> {
+    let request_beside = v1::CreateObjectRequest {
+        object_id: id.to_owned(),
+        unit_metres: Some(0.01),
+        mass_kg: 0.1,
+        ..Default::default()
+    };
+    let with_mesh = v1::CreateObjectRequest {
+        mesh: mesh(edge),
+        ..request_beside.clone()
+    };
+    let mut violations = Violations::default();
+    let fields = object_fields(with_mesh, LIMITS.bytes, &mut violations);
+    let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
+    let origin = Origin {
+        labels: labels(edge),
+        request,
+        source: Source {
+            request: request_beside,
+            mesh: fields.mesh.into(),
+        },
+    };
+    objects.insert(object, origin)
+}
+
+#[test]
+fn a_restart_finds_objects_as_they_were_and_requests_again() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let key = RequestKey {
+        id: Uuid::from_u128(5),
+        content: [1; 32],
+    };
+    let objects = folder.objects(10, 10);
+    let before = create(&objects, "a", 4, Some(key)).unwrap();
+    drop(objects);
+    let objects = folder.objects(10, 10);
+    let at_rest = objects.get("a").unwrap();
+    assert!(at_rest.object().is_none());
+    assert_eq!(at_rest.record, before.record);
+    assert_eq!(at_rest.to_wire(None), before.to_wire(None));
+    let again = objects.repeated("a", Some(&key)).unwrap().unwrap();
+    assert_eq!(again.record, before.record);
+    let loaded = wait_for(objects.loaded("a")).unwrap();
+    assert_eq!(Listed::from(loaded).to_wire(None), before.to_wire(None));
+}
+
+#[test]
+fn a_mesh_is_kept_as_long_as_an_object_has_it() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let objects = folder.objects(10, 10);
+    for (id, edge) in [("a", 1), ("b", 1), ("c", 2)] {
+        create(&objects, id, edge, None).unwrap();
+    }
+    assert_eq!(folder.names(MESHES).len(), 2);
+    objects.remove("a", None).unwrap();
+    objects.remove("c", None).unwrap();
+    drop(objects);
+    let objects = folder.objects(10, 10);
+    assert_eq!((folder.names(RECORDS).len(), folder.names(MESHES).len()), (1, 1));
+    wait_for(objects.loaded("b")).unwrap();
+    objects.remove("b", None).unwrap();
+    assert_eq!(folder.names(MESHES), [""; 0]);
+}
+
+#[test]
+fn remains_of_interrupted_writes_are_removed_at_the_start() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    // A mesh whose record was not written yet, and files that were not moved to their places yet.
+    fs::write(folder.0.join(MESHES).join("0".repeat(64)), "v").unwrap();
+    fs::write(folder.0.join(MESHES).join("1#1"), "v").unwrap();
+    fs::write(folder.0.join(RECORDS).join("b#1"), "r").unwrap();
+    drop(folder.objects(10, 10));
+    assert_eq!((folder.names(RECORDS).len(), folder.names(MESHES).len()), (1, 1));
+}
+
+#[test]
+fn a_damaged_record_is_moved_aside_and_its_mesh_kept() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    let path = folder.0.join(RECORDS).join("a");
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[40] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    let objects = folder.objects(10, 10);
+    assert!(matches!(
+        objects.get("a"),
+        Err(ServiceError::ObjectNotFound { .. })
+    ));
+    assert_eq!(folder.names("damaged/objects"), ["a"]);
+    assert_eq!(folder.names(MESHES).len(), 1);
+}
+
+#[test]
+fn a_damaged_mesh_is_data_loss_until_its_object_is_created_again() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    let path = folder.0.join(MESHES).join(&folder.names(MESHES)[0]);
+    let whole = fs::read(&path).unwrap();
+    for place in 0..whole.len() {
+        let mut bytes = whole.clone();
+        bytes[place] ^= 0x20;
+        fs::write(&path, bytes).unwrap();
+        let objects = folder.objects(10, 10);
+        for _ in 0..2 {
+            let loaded = wait_for(objects.loaded("a"));
+            assert!(
+                matches!(loaded, Err(ServiceError::ObjectDamaged { .. })),
+                "byte {place}"
+            );
+        }
+        assert_eq!(folder.names("damaged/meshes").len(), 1);
+        objects.remove("a", None).unwrap();
+        create(&objects, "a", 1, None).unwrap();
+    }
+    wait_for(folder.objects(10, 10).loaded("a")).unwrap();
+}
+
+#[test]
+fn more_than_the_maximum_is_refused() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let objects = folder.objects(1, 2);
+    for id in ["a", "b"] {
+        create(&objects, id, 1, None).unwrap();
+    }
+    let full = create(&objects, "c", 1, None).map(|_| ());
+    assert_eq!(full, Err(ServiceError::ObjectsFull { maximum: 2 }));
+    objects.remove("a", None).unwrap();
+    create(&objects, "c", 1, None).unwrap();
+}
+
+#[test]
+fn a_failed_write_leaves_nothing() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let objects = folder.objects(10, 10);
+    create(&objects, "a", 1, None).unwrap();
+    // A folder in place of the record cannot be replaced by a file.
+    fs::create_dir_all(folder.0.join(RECORDS).join("b").join("c")).unwrap();
+    let failed = create(&objects, "b", 2, None).map(|_| ());
+    assert_eq!(failed, Err(ServiceError::StoreFailed));
+    assert!(!objects.contains("b"));
+    fs::remove_dir_all(folder.0.join(RECORDS).join("b")).unwrap();
+    create(&objects, "b", 2, None).unwrap();
+    drop(objects);
+    assert_eq!(folder.objects(10, 10).get("b").unwrap().id(), "b");
+}
+
+#[test]
+fn calls_that_wait_for_an_object_share_its_loading() {
+    let runtime = runtime();
+    let folder = Folder::new();
+    let objects = {
+        let _context = runtime.enter();
+        create(&folder.objects(10, 10), "a", 1, None).unwrap();
+        folder.objects(10, 10)
+    };
+    runtime.block_on(async {
+        let calls = (0..20).map(|_| objects.loaded("a"));
+        let loaded = futures_util::future::join_all(calls).await;
+        let first = loaded[0].as_ref().unwrap();
+        for revision in &loaded {
+            assert!(Arc::ptr_eq(&first.object, &revision.as_ref().unwrap().object));
+        }
+    });
+}
+
+/// An operation on one of a few objects.
+#[derive(Clone, Debug)]
+enum Step {
+    Create(u8, u8),
+    Label(u8, u8),
+    Change(u8, u8),
+    Delete(u8),
+    Load(u8),
+    Restart,
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let id = 0_u8..4;
+    let step = prop_oneof![
+        4 => (id.clone(), 1_u8..4).prop_map(|(id, edge)| Step::Create(id, edge)),
+        2 => (id.clone(), 0_u8..3).prop_map(|(id, value)| Step::Label(id, value)),
+        2 => (id.clone(), 1_u8..9).prop_map(|(id, mass)| Step::Change(id, mass)),
+        1 => id.clone().prop_map(Step::Delete),
+        2 => id.prop_map(Step::Load),
+        1 => Just(Step::Restart),
+    ];
+    prop::collection::vec(step, 1..25)
+}
+
+/// What the map knows of an object: its description, and the etag.
+type Model = BTreeMap<String, v1::Object>;
+
+fn check(objects: &Objects, model: &Model) -> Result<(), TestCaseError> {
+    for id in 0..4 {
+        let id = format!("o{id}");
+        let found = objects.get(&id).ok().map(|state| state.to_wire(None));
+        prop_assert_eq!(found.as_ref(), model.get(&id));
+    }
+    Ok(())
+}
+
+/// A change of the mass, of an object that has to be loaded for it.
+fn change(objects: &Arc<Objects>, id: &str, mass: u8) -> Result<Listed, ServiceError> {
+    let base = objects.changeable(id, None)?;
+    let object: Arc<StoredObject> = wait_for(objects.loaded(id))?.object;
+    let change = ObjectChange {
+        mass: Some(f32::from(mass) / 16.0),
+        ..ObjectChange::default()
+    };
+    match changed(&object, &change)? {
+        Some(object) => objects.replace(&base, base.record.labels.clone(), Some((object, &change))),
+        None => Ok(base),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// However operations, restarts and rests follow one another, the objects agree with a map of their descriptions.
+    #[test]
+    fn agrees_with_a_plain_map(steps in steps()) {
+        let runtime = runtime();
+        let _context = runtime.enter();
+        let folder = Folder::new();
+        // Two in memory at most: the others rest.
+        let mut objects = folder.objects(2, 100);
+        let mut model = Model::new();
+        for step in steps {
+            match step {
+                Step::Create(id, edge) => {
+                    let id = format!("o{id}");
+                    let created = create(&objects, &id, edge, None);
+                    prop_assert_eq!(created.is_ok(), !model.contains_key(&id));
+                    if let Ok(created) = created {
+                        model.insert(id, created.to_wire(None));
+                    }
+                }
+                Step::Label(id, value) => {
+                    let id = format!("o{id}");
+                    if let Ok(base) = objects.changeable(&id, None) {
+                        let state = objects.replace(&base, labels(value), None).unwrap();
+                        prop_assert_eq!(&state.record.labels, &labels(value));
+                        let before = model.insert(id, state.to_wire(None)).unwrap();
+                        prop_assert_eq!(before.content_hash, state.to_wire(None).content_hash);
+                    }
+                }
+                Step::Change(id, mass) => {
+                    let id = format!("o{id}");
+                    let changed = change(&objects, &id, mass);
+                    prop_assert_eq!(changed.is_ok(), model.contains_key(&id));
+                    if let Ok(state) = changed {
+                        let after = state.to_wire(None);
+                        prop_assert_eq!(after.mass_kg, f32::from(mass) / 16.0);
+                        model.insert(id, after);
+                    }
+                }
+                Step::Delete(id) => {
+                    let id = format!("o{id}");
+                    prop_assert_eq!(objects.remove(&id, None).is_ok(), model.remove(&id).is_some());
+                }
+                Step::Load(id) => {
+                    let id = format!("o{id}");
+                    let loaded = wait_for(objects.loaded(&id)).ok();
+                    let loaded = loaded.map(|revision| Listed::from(revision).to_wire(None));
+                    prop_assert_eq!(loaded.as_ref(), model.get(&id));
+                }
+                Step::Restart => {
+                    drop(objects);
+                    objects = folder.objects(2, 100);
+                }
+            }
+            check(&objects, &model)?;
+        }
+        drop(objects);
+        check(&folder.objects(2, 100), &model)?;
+        prop_assert_eq!(folder.names(RECORDS).len(), model.len());
+        prop_assert_eq!(folder.names(DAMAGED).len(), 0);
+    }
+}

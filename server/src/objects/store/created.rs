@@ -1,0 +1,199 @@
+//! The objects that clients created, and what is in memory of them.
+
+use std::{
+    collections::{BTreeMap, HashMap, VecDeque},
+    sync::{Arc, Weak},
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use uuid::Uuid;
+
+use super::loading::Load;
+use crate::{
+    error::ServiceError,
+    objects::{
+        Body, Listed, Resting,
+        changes::{Event, Watcher},
+        name_of,
+        saved::MeshHash,
+    },
+    validate::RequestKey,
+};
+
+/// Number of evicted ids that are remembered for error messages.
+const REMEMBERED_EVICTIONS: usize = 1024;
+
+/// The created objects.
+#[derive(Debug)]
+pub(super) struct Created {
+    pub objects: BTreeMap<String, Entry>,
+    /// Ids of objects by the ids of the requests that created them.
+    pub requests: HashMap<Uuid, String>,
+    /// Number of objects that are not at rest, and of those about to be added.
+    pub loaded: usize,
+    /// Size of the same in bytes.
+    pub bytes: usize,
+    /// Number of uses so far: the clock of `last_used`.
+    pub uses: u64,
+    pub evicted: VecDeque<String>,
+    pub etags: Etags,
+    pub watchers: Vec<Weak<Watcher>>,
+    /// The objects that are being loaded.
+    pub loads: Vec<Load>,
+}
+
+/// A created object.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub state: Listed,
+    pub request: Option<RequestKey>,
+    /// SHA-256 of its mesh file, if it is saved.
+    pub mesh: Option<MeshHash>,
+    pub last_used: u64,
+}
+
+/// Makes etags: none is made twice, not even by another run of the server.
+#[derive(Debug)]
+pub(super) struct Etags {
+    started: u128,
+    made: u64,
+}
+
+impl Etags {
+    /// Those of a run that starts now.
+    pub(super) fn starting(now: SystemTime) -> Self {
+        Self {
+            started: now.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos(),
+            made: 0,
+        }
+    }
+
+    pub(super) fn next(&mut self) -> String {
+        self.made += 1;
+        format!("{:x}-{:x}", self.started, self.made)
+    }
+}
+
+impl Created {
+    /// None yet.
+    pub(super) fn new(etags: Etags) -> Self {
+        Self {
+            objects: BTreeMap::new(),
+            requests: HashMap::new(),
+            loaded: 0,
+            bytes: 0,
+            uses: 0,
+            evicted: VecDeque::new(),
+            etags,
+            watchers: Vec::new(),
+            loads: Vec::new(),
+        }
+    }
+
+    pub(super) fn entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
+        let evicted = &self.evicted;
+        self.objects
+            .get_mut(id)
+            .ok_or_else(|| ServiceError::ObjectNotFound {
+                name: name_of(id),
+                evicted: evicted.iter().any(|evicted| evicted == id),
+            })
+    }
+
+    /// The entry, which is used now.
+    pub(super) fn used_entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
+        self.uses += 1;
+        let now = self.uses;
+        let entry = self.entry(id)?;
+        entry.last_used = now;
+        Ok(entry)
+    }
+
+    /// The entry if it has the etag, or any if none is given.
+    pub(super) fn entry_with(&mut self, id: &str, etag: Option<&str>) -> Result<&mut Entry, ServiceError> {
+        let entry = self.entry(id)?;
+        let current = &entry.state.record.etag;
+        if let Some(etag) = etag.filter(|etag| etag != current) {
+            return Err(ServiceError::ObjectChanged {
+                name: name_of(id),
+                etag: etag.to_owned(),
+                current: current.clone(),
+            });
+        }
+        Ok(entry)
+    }
+
+    /// Adds an object that was not there.
+    pub(super) fn add(&mut self, entry: Entry) {
+        let id = entry.state.id().to_owned();
+        self.count(&entry.state);
+        if let Some(request) = &entry.request {
+            self.requests.insert(request.id, id.clone());
+        }
+        self.evicted.retain(|evicted| *evicted != id);
+        self.objects.insert(id, entry);
+    }
+
+    /// Replaces the state of an object, if it exists.
+    pub(super) fn set_state(&mut self, id: &str, state: Listed) {
+        let Some(entry) = self.objects.get_mut(id) else {
+            return;
+        };
+        let before = std::mem::replace(&mut entry.state, state.clone());
+        self.uncount(&before);
+        self.count(&state);
+    }
+
+    /// Removes an object, if it exists.
+    pub(super) fn take(&mut self, id: &str, event: Event) {
+        if let Some(entry) = self.objects.remove(id) {
+            self.tell(id, event, Some(&entry.state.record.labels), None);
+            self.uncount(&entry.state);
+            if let Some(request) = entry.request {
+                self.requests.remove(&request.id);
+            }
+        }
+    }
+
+    /// Makes room by the least recently used object that no call uses, but not `kept`: a saved one is put to rest, any
+    /// other removed. False if there is none.
+    pub(super) fn evict_one(&mut self, kept: Option<&str>) -> bool {
+        let unused = self.objects.iter().filter_map(|(id, entry)| {
+            let object = entry.state.object()?;
+            let is_unused = kept != Some(id.as_str()) && !object.is_in_use();
+            is_unused.then_some((id, entry, object))
+        });
+        let Some((id, entry, object)) = unused.min_by_key(|(_, entry, _)| entry.last_used) else {
+            return false;
+        };
+        let id = id.clone();
+        if entry.mesh.is_some() {
+            let resting = Resting {
+                id: id.clone(),
+                description: object.description(),
+            };
+            let state = Listed {
+                body: Body::AtRest(Arc::new(resting)),
+                record: Arc::clone(&entry.state.record),
+            };
+            self.set_state(&id, state);
+            return true;
+        }
+        self.take(&id, Event::Evicted);
+        if self.evicted.len() == REMEMBERED_EVICTIONS {
+            self.evicted.pop_front();
+        }
+        self.evicted.push_back(id);
+        true
+    }
+
+    fn count(&mut self, state: &Listed) {
+        self.bytes += state.bytes();
+        self.loaded += usize::from(state.object().is_some());
+    }
+
+    fn uncount(&mut self, state: &Listed) {
+        self.bytes -= state.bytes();
+        self.loaded -= usize::from(state.object().is_some());
+    }
+}
