@@ -35,6 +35,7 @@ mod registration;
 mod reported;
 mod reported_grasps;
 mod reproducible;
+mod saved_objects;
 mod shutdown;
 mod tracked_hands;
 mod unread;

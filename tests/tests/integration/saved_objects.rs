@@ -1,0 +1,410 @@
+//! Objects that are saved outlast the server, however it ends, and their time in memory.
+
+use std::{
+    env, fs,
+    io::{BufRead as _, BufReader},
+    path::Path,
+    process::{Child, Command, Stdio},
+    time::Duration,
+};
+
+use grasp_proto::v1::{self, get_mesh_response::Part, object_service_client::ObjectServiceClient};
+use grasp_server::{Config, ServeError, Server, config::StorePlace};
+use grasp_tests::TestServer;
+use tonic::{Code, Status, transport::Channel};
+
+use crate::fixtures::{BOX_OBJ, Folder, bounded, box_request, reason, seconds, sha256};
+
+/// The variable that has the folder of a server in a process of its own.
+const FOLDER_VARIABLE: &str = "GRASP_TEST_SAVED_OBJECTS";
+
+/// What precedes the address that such a server prints.
+const ADDRESS: &str = "address ";
+
+fn save_in(folder: &Path) -> impl FnOnce(&mut Config) {
+    let place = StorePlace::Folder(folder.to_owned());
+    move |config| config.place = place
+}
+
+async fn start(folder: &Folder, in_memory: usize) -> TestServer {
+    TestServer::start_with(|config| {
+        save_in(folder.path())(config);
+        config.store.objects = in_memory;
+    })
+    .await
+}
+
+async fn create(server: &TestServer, request: v1::CreateObjectRequest) -> Result<v1::Object, Status> {
+    let answer = server.objects().await.create_object(request).await?;
+    Ok(answer.into_inner().object.expect("an answer has the object"))
+}
+
+async fn get(server: &TestServer, name: &str) -> Result<v1::Object, Status> {
+    let name = name.to_owned();
+    let answer = server
+        .objects()
+        .await
+        .get_object(v1::GetObjectRequest { name })
+        .await?;
+    Ok(answer.into_inner().object.expect("an answer has the object"))
+}
+
+async fn all(server: &TestServer) -> Vec<v1::Object> {
+    let request = v1::ListObjectsRequest {
+        page_size: 1000,
+        ..Default::default()
+    };
+    let page = server.objects().await.list_objects(request).await.unwrap();
+    page.into_inner().objects
+}
+
+/// The mesh of an object, and the SHA-256 that its header has.
+async fn mesh(client: &mut ObjectServiceClient<Channel>, name: &str) -> Result<(Vec<u8>, String), Status> {
+    let name = name.to_owned();
+    let mut parts = client.get_mesh(v1::GetMeshRequest { name }).await?.into_inner();
+    let (mut bytes, mut hash) = (Vec::new(), String::new());
+    while let Some(answer) = parts.message().await? {
+        match answer.part {
+            Some(Part::Header(header)) => hash = header.sha256,
+            Some(Part::Piece(piece)) => bytes.extend(piece),
+            None => panic!("a message without its part"),
+        }
+    }
+    Ok((bytes, hash))
+}
+
+fn find(name: &str) -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
+        object: name.to_owned(),
+        seed: Some(7),
+        reproducible: true,
+        budget: Some(seconds(10)),
+        ..Default::default()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_restart_keeps_objects_labels_etags_and_request_ids() {
+    let folder = Folder::absent("saved-restart");
+    let server = start(&folder, 10).await;
+    let request = v1::CreateObjectRequest {
+        labels: [("level".to_owned(), "kitchen".to_owned())].into(),
+        request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".to_owned(),
+        ..box_request("crate")
+    };
+    create(&server, request.clone()).await.unwrap();
+    create(&server, box_request("gone")).await.unwrap();
+    let update = v1::UpdateObjectRequest {
+        name: "objects/crate".to_owned(),
+        mass_kg: Some(0.4),
+        forbidden: Some(v1::ForbiddenSurfaces {
+            groups: Vec::new(),
+            triangles: vec![0, 1],
+        }),
+        ..Default::default()
+    };
+    server.objects().await.update_object(update).await.unwrap();
+    let name = "objects/gone".to_owned();
+    let delete = v1::DeleteObjectRequest {
+        name,
+        ..Default::default()
+    };
+    server.objects().await.delete_object(delete).await.unwrap();
+    let before = all(&server).await;
+    let grasp_before = server.grasps().await.find_grasp(find("objects/crate")).await;
+    server.stop().await;
+
+    let server = start(&folder, 10).await;
+    let after = all(&server).await;
+    let created = |objects: &[v1::Object]| -> Vec<v1::Object> {
+        let created = objects.iter().filter(|object| !object.built_in);
+        created.cloned().collect()
+    };
+    assert_eq!(created(&after), created(&before));
+    assert_eq!(
+        create(&server, request.clone()).await.unwrap(),
+        created(&before)[0]
+    );
+    let other = v1::CreateObjectRequest {
+        mass_kg: 3.0,
+        ..request
+    };
+    let status = create(&server, other).await.unwrap_err();
+    assert_eq!(reason(&status), "REQUEST_ID_REUSED");
+    // The object built again is the object that was saved: the same grasp, and the same mesh.
+    let grasp_after = server.grasps().await.find_grasp(find("objects/crate")).await;
+    let [before, after] = [grasp_before, grasp_after].map(|answer| answer.unwrap().into_inner());
+    assert!(before.grasp.is_some());
+    assert_eq!(before.grasp, after.grasp);
+    let stale = v1::UpdateObjectRequest {
+        name: "objects/crate".to_owned(),
+        etag: "stale".to_owned(),
+        mass_kg: Some(1.0),
+        ..Default::default()
+    };
+    let status = server.objects().await.update_object(stale).await.unwrap_err();
+    assert_eq!(status.code(), Code::Aborted);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_object_out_of_memory_is_found_again_by_its_name() {
+    let folder = Folder::absent("saved-rest");
+    // Two in memory, because the call before may not have ended everywhere when its answer is here.
+    let server = start(&folder, 2).await;
+    let names = ["a", "b", "c", "d"].map(|id| format!("objects/{id}"));
+    let mut created = Vec::new();
+    for id in ["a", "b", "c", "d"] {
+        created.push(create(&server, box_request(id)).await.unwrap());
+    }
+    let mut changes = server
+        .objects()
+        .await
+        .watch_objects(v1::WatchObjectsRequest::default())
+        .await
+        .unwrap()
+        .into_inner();
+    for (name, created) in names.iter().zip(&created) {
+        assert_eq!(&get(&server, name).await.unwrap(), created);
+        let answer = server.grasps().await.find_grasp(find(name)).await.unwrap();
+        assert!(answer.into_inner().grasp.is_some(), "{name}");
+    }
+    for name in &names {
+        let (bytes, hash) = mesh(&mut server.objects().await, name).await.unwrap();
+        assert_eq!(sha256(&bytes), hash);
+    }
+    // Calls at the same time do not get into each other's way.
+    let calls = [(); 8].map(|()| {
+        let (mut client, name) = (server.objects_lazily(), names[0].clone());
+        tokio::spawn(async move { mesh(&mut client, &name).await.map(|(bytes, _)| bytes.len()) })
+    });
+    for call in calls {
+        assert!(call.await.unwrap().unwrap() > 0);
+    }
+    let label = v1::UpdateObjectRequest {
+        name: names[1].clone(),
+        labels: [("level".to_owned(), "hall".to_owned())].into(),
+        ..Default::default()
+    };
+    server.objects().await.update_object(label).await.unwrap();
+    let heavier = v1::UpdateObjectRequest {
+        name: names[2].clone(),
+        mass_kg: Some(0.4),
+        ..Default::default()
+    };
+    server.objects().await.update_object(heavier).await.unwrap();
+    assert_eq!(get(&server, &names[2]).await.unwrap().mass_kg, 0.4);
+    // Of all this, watchers hear of the changes only.
+    for expected in [&names[1], &names[2]] {
+        let report = bounded("a report", changes.message()).await.unwrap().unwrap();
+        assert_eq!(report.changes, [i32::from(v1::ObjectChange::Updated)]);
+        assert_eq!(&report.object.unwrap().name, expected);
+    }
+    let silence = tokio::time::timeout(Duration::from_millis(50), changes.message()).await;
+    assert!(silence.is_err(), "{silence:?}");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_object_is_reported_and_can_be_created_again() {
+    let folder = Folder::absent("saved-damage");
+    let server = start(&folder, 10).await;
+    create(&server, box_request("crate")).await.unwrap();
+    server.stop().await;
+    let meshes = fs::read_dir(folder.path().join("meshes")).unwrap();
+    for file in meshes {
+        fs::write(file.unwrap().path(), BOX_OBJ.replace("0.015", "0.025")).unwrap();
+    }
+    let server = start(&folder, 10).await;
+    let status = server
+        .grasps()
+        .await
+        .find_grasp(find("objects/crate"))
+        .await
+        .unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::DataLoss, "OBJECT_DAMAGED".to_owned())
+    );
+    let delete = v1::DeleteObjectRequest {
+        name: "objects/crate".to_owned(),
+        ..Default::default()
+    };
+    server.objects().await.delete_object(delete).await.unwrap();
+    create(&server, box_request("crate")).await.unwrap();
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_failing_disk_fails_the_call_and_leaves_nothing() {
+    let folder = Folder::absent("saved-failure");
+    let server = start(&folder, 10).await;
+    // A folder in place of the record cannot be replaced by a file.
+    let obstacle = folder.path().join("objects/crate/x");
+    fs::create_dir_all(&obstacle).unwrap();
+    let status = create(&server, box_request("crate")).await.unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::Unavailable, "STORE_FAILED".to_owned())
+    );
+    assert_eq!(
+        get(&server, "objects/crate").await.unwrap_err().code(),
+        Code::NotFound
+    );
+    fs::remove_dir_all(folder.path().join("objects/crate")).unwrap();
+    create(&server, box_request("crate")).await.unwrap();
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_store_refuses_new_objects() {
+    let folder = Folder::absent("saved-full");
+    let server = TestServer::start_with(|config| {
+        save_in(folder.path())(config);
+        config.maximum_saved_objects = 1.try_into().unwrap();
+    })
+    .await;
+    create(&server, box_request("a")).await.unwrap();
+    let status = create(&server, box_request("b")).await.unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::ResourceExhausted, "TOO_MANY_OBJECTS".to_owned())
+    );
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_second_server_does_not_start_on_the_same_folder() {
+    let folder = Folder::absent("saved-twice");
+    let server = start(&folder, 10).await;
+    let mut config = Config {
+        builder_threads: 0,
+        ..Config::default()
+    };
+    save_in(folder.path())(&mut config);
+    let second = tokio::task::spawn_blocking(|| Server::new(config)).await.unwrap();
+    let Err(ServeError::Store(error)) = second else {
+        panic!("two servers would overwrite each other's objects");
+    };
+    assert!(error.to_string().contains("another server"), "{error}");
+    server.stop().await;
+}
+
+/// A server in a process of its own; killed when dropped.
+struct ServerProcess {
+    child: Child,
+    endpoint: String,
+}
+
+impl ServerProcess {
+    fn start(folder: &Path) -> Self {
+        let program = env::current_exe().expect("the test has a path");
+        let mut child = Command::new(program)
+            .args([
+                "saved_objects::serves_in_a_process",
+                "--exact",
+                "--ignored",
+                "--nocapture",
+            ])
+            .env(FOLDER_VARIABLE, folder)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the test can be started again");
+        let output = child.stdout.take().expect("its output is a pipe");
+        let mut lines = BufReader::new(output).lines().map_while(Result::ok);
+        let address = lines.find_map(|line| line.split_once(ADDRESS).map(|(_, address)| address.to_owned()));
+        Self {
+            child,
+            endpoint: address.expect("it prints its address"),
+        }
+    }
+
+    fn kill(&mut self) {
+        // SIGKILL on Unix: the process has no time for anything. Fails only if it has ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for ServerProcess {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "is the process of another test"]
+async fn serves_in_a_process() {
+    let Some(folder) = env::var_os(FOLDER_VARIABLE) else {
+        return;
+    };
+    let server = TestServer::start_with(save_in(Path::new(&folder))).await;
+    println!("\n{ADDRESS}{}", server.endpoint());
+    // Until the other process ends.
+    let wait = || std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+    tokio::task::spawn_blocking(wait).await.unwrap().unwrap();
+    server.stop().await;
+}
+
+/// A box with a mesh of its own.
+fn numbered(round: u64, task: usize, number: usize) -> v1::CreateObjectRequest {
+    let id = format!("r{round}-{task}-{number}");
+    v1::CreateObjectRequest {
+        mesh: format!("{BOX_OBJ}# {id}\n").into_bytes(),
+        ..box_request(&id)
+    }
+}
+
+/// Creates objects one after the other until the server is gone; returns those that it confirmed.
+async fn create_until_gone(endpoint: String, round: u64, task: usize) -> Vec<v1::Object> {
+    let mut client = ObjectServiceClient::connect(endpoint)
+        .await
+        .expect("the server accepts connections");
+    let mut confirmed = Vec::new();
+    loop {
+        let request = numbered(round, task, confirmed.len());
+        match client.create_object(request).await {
+            Ok(answer) => confirmed.extend(answer.into_inner().object),
+            Err(_) => return confirmed,
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn killing_the_server_leaves_every_object_whole_or_absent() {
+    let folder = Folder::absent("saved-killed");
+    let mut confirmed: Vec<v1::Object> = Vec::new();
+    for round in 0..3 {
+        let path = folder.path().to_owned();
+        let mut process = tokio::task::spawn_blocking(move || ServerProcess::start(&path))
+            .await
+            .unwrap();
+        let tasks = [0, 1, 2].map(|task| {
+            let endpoint = process.endpoint.clone();
+            tokio::spawn(create_until_gone(endpoint, round, task))
+        });
+        tokio::time::sleep(Duration::from_millis(400 + 137 * round)).await;
+        process.kill();
+        for task in tasks {
+            confirmed.extend(bounded("the end of a client", task).await.unwrap());
+        }
+    }
+    assert!(
+        confirmed.len() > 3,
+        "the server was killed before it did anything"
+    );
+    let server = start(&folder, 10).await;
+    let mut found = all(&server).await;
+    found.retain(|object| !object.built_in);
+    for object in &confirmed {
+        assert!(found.contains(object), "{} is lost or changed", object.name);
+    }
+    let mut client = server.objects().await;
+    for object in &found {
+        let (bytes, hash) = mesh(&mut client, &object.name).await.expect("it is whole");
+        assert_eq!(sha256(&bytes), hash, "{}", object.name);
+    }
+    assert_eq!(fs::read_dir(folder.path().join("damaged")).unwrap().count(), 0);
+    server.stop().await;
+}
