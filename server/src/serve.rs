@@ -226,6 +226,7 @@ impl Server {
             budgets: config.budgets,
             improvement: config.improvement,
             obj_limits,
+            deletions: Arc::new(Semaphore::new(1)),
             uploads: Uploads::new(config.streams.upload_bytes.get(), config.streams.upload_idle),
             maximum_watchers: config.streams.watchers.get(),
             shutdown: CancellationToken::new(),

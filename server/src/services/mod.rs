@@ -13,6 +13,7 @@ use std::{sync::Arc, time::Duration};
 
 use grasp_import::MeshLimits;
 use grasp_synthesis::base::mechanisms::Mechanisms;
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 pub(crate) use grasp_service::GraspHandler;
@@ -50,6 +51,9 @@ pub(crate) struct Shared {
     pub reserve: Arc<DeadlineReserve>,
     /// Bounds on meshes.
     pub obj_limits: MeshLimits,
+    /// One permit: deletions wait for their turn here, where they take no thread. Threads that wait for the disk could otherwise
+    /// be all that there are, and the disk needs some, too.
+    pub deletions: Arc<Semaphore>,
     /// Uploads in pieces.
     pub uploads: Uploads,
     /// Largest number of watchers of objects.

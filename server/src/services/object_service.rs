@@ -210,7 +210,13 @@ impl ObjectHandler {
         call.log_object(&id);
         let etag = given_etag(request.etag);
         let shared = Arc::clone(&self.shared);
-        match run_blocking(move || shared.objects.remove(&id, etag.as_deref())).await? {
+        let turn = Arc::clone(&shared.deletions).acquire_owned().await;
+        let turn = turn.map_err(|_| ServiceError::ShuttingDown)?;
+        let removed = run_blocking(move || {
+            let _turn = turn;
+            shared.objects.remove(&id, etag.as_deref())
+        });
+        match removed.await? {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,
         }

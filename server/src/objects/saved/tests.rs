@@ -8,8 +8,10 @@ use std::{
         Arc,
         atomic::{AtomicUsize, Ordering},
     },
+    time::{Duration, Instant},
 };
 
+use futures_util::FutureExt as _;
 use grasp_import::MeshLimits;
 use grasp_proto::v1;
 use grasp_synthesis::base::stop::Stop;
@@ -288,6 +290,66 @@ fn calls_that_wait_for_an_object_share_its_loading() {
             assert!(Arc::ptr_eq(&first.object, &revision.as_ref().unwrap().object));
         }
     });
+}
+
+#[test]
+fn an_object_that_no_call_waits_for_any_more_stays_at_rest() {
+    let runtime = runtime();
+    let folder = Folder::new();
+    let objects = {
+        let _context = runtime.enter();
+        create(&folder.objects(10, 10), "a", 1, None).unwrap();
+        folder.objects(10, 10)
+    };
+    runtime.block_on(async {
+        // The first poll does not finish: it waits for the disk.
+        assert!(objects.loaded("a").now_or_never().is_none());
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        assert!(objects.get("a").unwrap().object().is_none());
+        objects.loaded("a").await.unwrap();
+        assert!(objects.get("a").unwrap().object().is_some());
+    });
+}
+
+#[test]
+fn a_failed_change_leaves_the_object_as_it_was() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let objects = folder.objects(10, 10);
+    let base = create(&objects, "a", 1, None).unwrap();
+    let path = folder.0.join(RECORDS).join("a");
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, "not a record").unwrap();
+    let failed = objects.replace(&base, labels(9), None);
+    assert!(matches!(failed, Err(ServiceError::ObjectDamaged { .. })));
+    assert_eq!(objects.get("a").unwrap().record, base.record);
+    fs::write(&path, bytes).unwrap();
+    objects.replace(&base, labels(9), None).unwrap();
+}
+
+/// Shows how long the start takes; see the output with `--nocapture`.
+#[test]
+fn ten_thousand_records_are_read_at_the_start() {
+    const RECORDS_SAVED: usize = 10_000;
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    let first = fs::read(folder.0.join(RECORDS).join("a")).unwrap();
+    let first = SavedObject::from_bytes("a", &first).unwrap();
+    for number in 1..RECORDS_SAVED {
+        let id = format!("a{number}");
+        let mut saved = first.clone();
+        saved.description.name = name_of(&id);
+        saved.request.object_id.clone_from(&id);
+        fs::write(folder.0.join(RECORDS).join(&id), saved.to_bytes()).unwrap();
+    }
+    let start = Instant::now();
+    let found = wait_for(folder.open(RECORDS_SAVED).read_all()).unwrap();
+    println!("read {RECORDS_SAVED} records in {:?}", start.elapsed());
+    assert_eq!(found.objects.len(), RECORDS_SAVED);
+    assert_eq!(found.mesh_uses.into_values().collect::<Vec<_>>(), [RECORDS_SAVED]);
 }
 
 /// An operation on one of a few objects.

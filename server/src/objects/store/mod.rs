@@ -9,6 +9,7 @@
 
 mod created;
 pub(crate) mod loading;
+mod room;
 #[cfg(test)]
 mod tests;
 mod watching;
@@ -37,7 +38,7 @@ use super::{
     saved::{MeshHash, MeshUses, SavedObject},
 };
 use crate::{
-    error::{Limit, ServiceError},
+    error::ServiceError,
     executor::wait_for,
     limits::StoreLimits,
     validate::{Labels, ObjectChange, PageQuery, RequestKey},
@@ -343,13 +344,17 @@ impl ObjectStore {
         let Some(Durability { saved, .. }) = &self.durability else {
             return Ok(());
         };
-        let mut object = wait_for(saved.record(id))?;
+        let before = wait_for(saved.record(id))?;
+        let mut object = before.clone();
         object.set_record(record);
         if let Some((changed, change)) = changed {
             change_request(&mut object.request, change);
             object.description = changed.description();
         }
-        wait_for(saved.write(&object, None))
+        wait_for(saved.write(&object, None)).inspect_err(|_| {
+            // A write that failed late may have changed the record. If this fails too, the log says so.
+            let _ = wait_for(saved.write(&before, None));
+        })
     }
 
     /// Deletes an object.
@@ -400,51 +405,6 @@ impl ObjectStore {
         Ok(())
     }
 
-    /// Makes room for a new object or, if there is one, for that which `grows`, and keeps it until it is released.
-    fn reserve(
-        &self,
-        created: &mut Created,
-        grows: Option<&str>,
-        bytes: usize,
-        objects: usize,
-    ) -> Result<Reserved, ServiceError> {
-        self.make_room(created, grows, bytes, objects)?;
-        created.bytes += bytes;
-        created.loaded += objects;
-        Ok(Reserved { bytes, objects })
-    }
-
-    /// Puts objects to rest or evicts them until so many more bytes and objects fit.
-    fn make_room(
-        &self,
-        created: &mut Created,
-        grows: Option<&str>,
-        bytes: usize,
-        objects: usize,
-    ) -> Result<(), ServiceError> {
-        let kept = grows.and_then(|id| created.objects.get(id));
-        let whole = bytes + kept.map_or(0, |entry| entry.state.bytes());
-        if whole > self.limits.bytes {
-            return Err(ServiceError::invalid(
-                if grows.is_some() { "forbidden" } else { "mesh" },
-                format!(
-                    "takes about {whole} bytes with the object's search structures; the cache holds {}",
-                    self.limits.bytes
-                ),
-            ));
-        }
-        while created.loaded + objects > self.limits.objects || created.bytes + bytes > self.limits.bytes {
-            if !created.evict_one(grows) {
-                return Err(ServiceError::Overloaded {
-                    limit: Limit::ObjectCache,
-                    maximum: self.limits.objects,
-                    retry_after: RETRY_AFTER,
-                });
-            }
-        }
-        Ok(())
-    }
-
     fn created(&self) -> MutexGuard<'_, Created> {
         // No code panics while it holds the lock; if some did, the map would still be consistent.
         self.created.lock().unwrap_or_else(PoisonError::into_inner)
@@ -454,20 +414,6 @@ impl ObjectStore {
     fn changing(&self) -> MutexGuard<'_, MeshUses> {
         // No code panics while it holds the lock; if some did, a mesh might be kept in vain.
         self.mesh_uses.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Room in the cache for what is about to be added.
-#[must_use = "reserved room is lost until it is released"]
-struct Reserved {
-    bytes: usize,
-    objects: usize,
-}
-
-impl Reserved {
-    fn release(self, created: &mut Created) {
-        created.bytes -= self.bytes;
-        created.loaded -= self.objects;
     }
 }
 

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use uuid::Uuid;
 
 use super::*;
-use crate::{objects::tests::tetrahedron, validate::page_query};
+use crate::{error::Limit, objects::tests::tetrahedron, validate::page_query};
 
 fn store(objects: usize, tetrahedra: usize) -> ObjectStore {
     let bytes = tetrahedra * tetrahedron("any", 1.0, &[]).bytes();
