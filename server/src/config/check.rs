@@ -18,21 +18,18 @@ impl RawConfig {
     ///
     /// # Errors
     /// [`ConfigError::BadValues`] with every invalid value.
-    pub fn validate(self) -> Result<Config, ConfigError> {
+    pub fn validate(mut self) -> Result<Config, ConfigError> {
         let defaults = Config::default();
         let mut bad = Vec::new();
         let check = &mut Check(&mut bad);
         let budgets = self.budgets(check, defaults.budgets);
         let store = self.cache(check, defaults.store);
+        let (place, maximum_saved_objects) =
+            self.saving(check, defaults.place, defaults.maximum_saved_objects);
         let streams = self.streams(check, defaults.streams);
+        let listen = listen_address(check, self.listen.take(), defaults.listen);
         let config = Config {
-            listen: check.parsed(
-                "listen",
-                self.listen,
-                defaults.listen,
-                "an address like [::1]:50051",
-                |text| text.parse::<SocketAddr>().ok(),
-            ),
+            listen,
             workers: check.count("workers", self.workers, 1..=1024, defaults.workers),
             io_threads: check.count("io_threads", self.io_threads, 1..=1024, defaults.io_threads),
             budgets,
@@ -67,19 +64,8 @@ impl RawConfig {
                 4..=10_000_000,
                 defaults.maximum_object_triangles,
             ),
-            place: check.parsed(
-                "store",
-                self.store,
-                defaults.place,
-                store_place::NEEDED,
-                StorePlace::parse,
-            ),
-            maximum_saved_objects: check.count(
-                "maximum_saved_objects",
-                self.maximum_saved_objects,
-                1..=1_000_000,
-                defaults.maximum_saved_objects,
-            ),
+            place,
+            maximum_saved_objects,
             store,
             maximum_rigs: check.count(
                 "maximum_rigs",
@@ -186,6 +172,19 @@ impl RawConfig {
         }
     }
 
+    fn saving(
+        &mut self,
+        check: &mut Check<'_>,
+        place: StorePlace,
+        maximum: NonZeroUsize,
+    ) -> (StorePlace, NonZeroUsize) {
+        let key = "maximum_saved_objects";
+        let maximum = check.count(key, self.maximum_saved_objects, 1..=1_000_000, maximum);
+        let store = self.store.take();
+        let place = check.parsed("store", store, place, store_place::NEEDED, StorePlace::parse);
+        (place, maximum)
+    }
+
     fn cache(&self, check: &mut Check<'_>, defaults: StoreLimits) -> StoreLimits {
         StoreLimits {
             objects: check.within("cache_objects", self.cache_objects, 1..=100_000, defaults.objects),
@@ -277,6 +276,11 @@ impl Check<'_> {
             default
         })
     }
+}
+
+fn listen_address(check: &mut Check<'_>, value: Option<String>, default: SocketAddr) -> SocketAddr {
+    let needed = "an address like [::1]:50051";
+    check.parsed("listen", value, default, needed, |text| text.parse().ok())
 }
 
 fn log_filter(text: &str) -> Option<String> {

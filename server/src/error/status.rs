@@ -28,9 +28,7 @@ impl From<ServiceError> for Status {
                 );
                 Status::with_error_details(Code::InvalidArgument, message, details)
             }
-            ServiceError::Malformed(_) => {
-                Status::with_error_details(Code::InvalidArgument, message, info("MALFORMED_MESSAGE", []))
-            }
+            ServiceError::Malformed(_) => plain_status(Code::InvalidArgument, "MALFORMED_MESSAGE", message),
             ServiceError::ObjectNotFound { name, evicted } => {
                 let reason = if evicted {
                     "OBJECT_EVICTED"
@@ -81,9 +79,7 @@ impl From<ServiceError> for Status {
             ServiceError::ObjectUnloadable { name, .. } => {
                 object_status(Code::FailedPrecondition, "OBJECT_UNLOADABLE", name, message)
             }
-            ServiceError::StoreFailed => {
-                Status::with_error_details(Code::Unavailable, message, info("STORE_FAILED", []))
-            }
+            ServiceError::StoreFailed => plain_status(Code::Unavailable, "STORE_FAILED", message),
             ServiceError::Overloaded {
                 limit,
                 maximum,
@@ -99,32 +95,26 @@ impl From<ServiceError> for Status {
             }
             // As the transport answers to messages beyond its own limit.
             ServiceError::MessageTooLarge { .. } => {
-                Status::with_error_details(Code::OutOfRange, message, info("MESSAGE_TOO_LARGE", []))
+                plain_status(Code::OutOfRange, "MESSAGE_TOO_LARGE", message)
             }
             ServiceError::ReaderStalled { .. } => {
-                Status::with_error_details(Code::DeadlineExceeded, message, info("READER_STALLED", []))
+                plain_status(Code::DeadlineExceeded, "READER_STALLED", message)
             }
             ServiceError::UploadStalled { .. } => {
-                Status::with_error_details(Code::DeadlineExceeded, message, info("UPLOAD_STALLED", []))
+                plain_status(Code::DeadlineExceeded, "UPLOAD_STALLED", message)
             }
             ServiceError::TookTooLong { .. } => {
-                Status::with_error_details(Code::DeadlineExceeded, message, info("CALL_TOOK_TOO_LONG", []))
+                plain_status(Code::DeadlineExceeded, "CALL_TOOK_TOO_LONG", message)
             }
             ServiceError::WatcherTooSlow => {
-                Status::with_error_details(Code::ResourceExhausted, message, info("WATCHER_TOO_SLOW", []))
+                plain_status(Code::ResourceExhausted, "WATCHER_TOO_SLOW", message)
             }
-            ServiceError::ShuttingDown => {
-                Status::with_error_details(Code::Unavailable, message, info("SHUTTING_DOWN", []))
-            }
+            ServiceError::ShuttingDown => plain_status(Code::Unavailable, "SHUTTING_DOWN", message),
             ServiceError::DeadlineExceeded => {
-                Status::with_error_details(Code::DeadlineExceeded, message, info("DEADLINE_EXCEEDED", []))
+                plain_status(Code::DeadlineExceeded, "DEADLINE_EXCEEDED", message)
             }
-            ServiceError::Cancelled => {
-                Status::with_error_details(Code::Cancelled, message, info("CALL_CANCELLED", []))
-            }
-            ServiceError::Panicked => {
-                Status::with_error_details(Code::Internal, message, info("JOB_PANICKED", []))
-            }
+            ServiceError::Cancelled => plain_status(Code::Cancelled, "CALL_CANCELLED", message),
+            ServiceError::Panicked => plain_status(Code::Internal, "JOB_PANICKED", message),
         }
     }
 }
@@ -147,6 +137,11 @@ fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDet
         .map(|(key, value)| (key.to_owned(), value))
         .collect();
     ErrorDetails::with_error_info(reason, ERROR_DOMAIN, metadata)
+}
+
+/// The status of an error that its reason and message describe.
+fn plain_status(code: Code, reason: &str, message: String) -> Status {
+    Status::with_error_details(code, message, info(reason, []))
 }
 
 /// The status of an error about one object.

@@ -139,9 +139,11 @@ impl Created {
         let Some(entry) = self.objects.get_mut(id) else {
             return;
         };
-        let before = std::mem::replace(&mut entry.state, state.clone());
+        let (bytes, loaded) = (state.bytes(), usize::from(state.object().is_some()));
+        let before = std::mem::replace(&mut entry.state, state);
         self.uncount(&before);
-        self.count(&state);
+        self.bytes += bytes;
+        self.loaded += loaded;
     }
 
     /// Removes an object, if it exists.
