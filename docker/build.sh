@@ -5,5 +5,5 @@ set -eu
 target=$(rustc --version --verbose | sed -n 's/^host: //p')
 export RUSTFLAGS="-C target-feature=+crt-static -C target-cpu=$1"
 cargo build --locked --release --target "$target" --package grasp-server --package grasp-cli
-mkdir -p /out/objects
+mkdir -p /out/objects /out/saved
 cp "target/$target/release/grasp-server" "target/$target/release/grasp" /out/

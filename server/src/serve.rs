@@ -24,7 +24,7 @@ use tonic_health::{ServingStatus, server::HealthReporter};
 use crate::{
     atlases::{Atlases, files::AtlasFiles},
     call::{CallLayer, CallsInFlight},
-    config::Config,
+    config::{Config, StorePlace},
     executor::SearchExecutor,
     limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
     net::{AcceptLimits, UnreadAnswers, UnreadLayer, accept},
@@ -118,6 +118,7 @@ pub struct Server {
     unread: Arc<UnreadAnswers>,
     drain: Duration,
     directory_bytes: usize,
+    place: StorePlace,
 }
 
 /// The server's activity, for tests and monitoring.
@@ -200,7 +201,7 @@ impl Server {
             unstopped(|stop| object.prepare(&config.default_rig, stop));
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
-        let files = match config.atlas_directory {
+        let files = match config.kept_atlases() {
             Some(path) => Some(
                 AtlasFiles::open(path.clone())
                     .map_err(|source| ServeError::AtlasDirectory { path, source })?,
@@ -241,7 +242,21 @@ impl Server {
             unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
             drain: config.drain,
             directory_bytes,
+            place: config.place,
         })
+    }
+
+    /// Reads what was saved, and logs where that is.
+    async fn read_saved(&self) -> Result<(), StoreError> {
+        let start = Instant::now();
+        let objects = self.shared.objects.read_saved().await?;
+        let (store, milliseconds) = (&self.place, start.elapsed().as_millis());
+        if *store == StorePlace::Memory {
+            tracing::info!("created objects end with the server: store is memory");
+        } else {
+            tracing::info!(%store, objects, milliseconds, "created objects are saved");
+        }
+        Ok(())
     }
 
     /// Estimated size in bytes of the objects of the objects directory.
@@ -267,12 +282,7 @@ impl Server {
         listener: TcpListener,
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
-        let start = Instant::now();
-        let saved = self.shared.objects.read_saved().await?;
-        if saved > 0 {
-            let milliseconds = start.elapsed().as_millis();
-            tracing::info!(objects = saved, milliseconds, "read the records of saved objects");
-        }
+        self.read_saved().await?;
         let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
             .max_decoding_message_size(LARGEST_FIND_REQUEST)
             .max_encoding_message_size(LARGEST_RESPONSE);

@@ -154,7 +154,7 @@ def host_server():
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env={"NO_COLOR": "1"},
+        env={"NO_COLOR": "1", "GRASP_STORE": "memory"},
     )
     for line in process.stderr:
         if match := re.search(r"127\.0\.0\.1:\d+", line):

@@ -17,7 +17,7 @@ README = ROOT / "docker" / "README.md"
 
 # The host port that the page publishes, and the containers that its commands start.
 PUBLISHED = "127.0.0.1:50051"
-CONTAINERS = ("grasp", "grasp-objects")
+CONTAINERS = ("grasp", "grasp-objects", "grasp-saved")
 
 
 def commands():

@@ -22,7 +22,7 @@ def start_server(*arguments):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "NO_COLOR": "1", "GRASP_LOG": "info"},
+        env={**os.environ, "NO_COLOR": "1", "GRASP_LOG": "info", "GRASP_STORE": "memory"},
     )
     for line in process.stderr:
         if match := re.search(r"(?:127\.0\.0\.1|\[::1\]):\d+", line):

@@ -39,8 +39,9 @@ def test_the_server_page_has_the_defaults_in_force():
     ).stdout
     in_force = dict(re.findall(r"^(\w+) = \"?([^\"\n]*)\"?$", config, flags=re.MULTILINE))
     rows = re.findall(r"^\| `(\w+)` \| `?([^`|]+?)`? \|", SERVER_PAGE.read_text(), flags=re.MULTILINE)
-    # The numbers of threads depend on the machine, and folders have no default.
-    listed = {key: value for key, value in rows if key not in ("workers", "io_threads") and value != "none"}
+    # The numbers of threads depend on the machine, the store on the user, and other folders have no default.
+    of_the_machine = ("workers", "io_threads", "store")
+    listed = {key: value for key, value in rows if key not in of_the_machine and value != "none"}
     assert len(listed) > 10
     for key, value in listed.items():
         assert in_force[key] == printed(value), key

@@ -29,7 +29,7 @@ class Service:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "NO_COLOR": "1"},
+            env={**os.environ, "NO_COLOR": "1", "GRASP_STORE": "memory"},
         )
         for line in self.process.stderr:
             if match := re.search(r"127\.0\.0\.1:\d+", line):

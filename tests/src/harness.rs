@@ -7,7 +7,7 @@ use grasp_proto::v1::{
     grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
     object_service_client::ObjectServiceClient,
 };
-use grasp_server::{Config, Gauges, ServeError, Server};
+use grasp_server::{Config, Gauges, ServeError, Server, config::StorePlace};
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tonic::transport::{Channel, Endpoint};
@@ -25,7 +25,7 @@ pub struct TestServer {
 }
 
 impl TestServer {
-    /// Starts a server with the default configuration, but two workers and no atlases.
+    /// Starts a server with the default configuration, but two workers, no atlases, and objects in memory only.
     pub async fn start() -> Self {
         Self::start_with(|_| {}).await
     }
@@ -35,6 +35,7 @@ impl TestServer {
         let mut config = Config {
             workers: WORKERS.try_into().expect("there are workers"),
             builder_threads: 0,
+            place: StorePlace::Memory,
             ..Config::default()
         };
         adapt(&mut config);

@@ -37,12 +37,11 @@ async fn run(name: &str, arguments: &[&str]) -> String {
 async fn real_server() -> String {
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
-    let forever = std::future::pending();
-    tokio::spawn(grasp_server::run(
-        listener,
-        grasp_server::Config::default(),
-        forever,
-    ));
+    let config = grasp_server::Config {
+        place: grasp_server::config::StorePlace::Memory,
+        ..grasp_server::Config::default()
+    };
+    tokio::spawn(grasp_server::run(listener, config, std::future::pending()));
     url
 }
 

@@ -61,7 +61,7 @@ pub struct Config {
     pub objects_directory: Option<PathBuf>,
     /// Number of background threads that build atlases; with 0 there are no atlases.
     pub builder_threads: usize,
-    /// Folder that keeps atlases; none to keep them in memory only.
+    /// Folder that keeps atlases; none for that of [`Self::kept_atlases`].
     pub atlas_directory: Option<PathBuf>,
     /// Largest number of connections; others wait.
     pub maximum_connections: NonZeroUsize,
@@ -104,7 +104,7 @@ impl Default for Config {
             },
             maximum_object_bytes: non_zero(8 << 20),
             maximum_object_triangles: non_zero(200_000),
-            place: StorePlace::Memory,
+            place: StorePlace::default(),
             maximum_saved_objects: non_zero(10_000),
             store: StoreLimits {
                 objects: 1000,
@@ -126,6 +126,12 @@ impl Default for Config {
 }
 
 impl Config {
+    /// Folder that keeps atlases: the given one, else `atlases` where objects are saved. None to keep them in memory only.
+    pub fn kept_atlases(&self) -> Option<PathBuf> {
+        let beside_objects = || Some(self.place.folder()?.join("atlases"));
+        self.atlas_directory.clone().or_else(beside_objects)
+    }
+
     /// Largest mesh file in bytes, in one message or in pieces.
     pub(crate) fn largest_mesh(&self) -> usize {
         self.maximum_object_bytes.max(self.streams.upload_bytes).get()

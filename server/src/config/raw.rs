@@ -68,7 +68,8 @@ pub struct RawConfig {
     /// Most triangles, and most vertices, in a mesh [default: 200000].
     #[arg(long, env = "GRASP_MAXIMUM_OBJECT_TRIANGLES", value_name = "COUNT")]
     pub maximum_object_triangles: Option<u64>,
-    /// Where created objects are kept: memory, or a folder or `s3://BUCKET/PREFIX`, where they outlast the server [default: memory].
+    /// Where created objects are kept: a folder or `s3://BUCKET/PREFIX`, where they outlast the server, or memory [default: grasp in
+    /// the folder of the user's data].
     ///
     /// A folder is created if necessary, and used by one server at a time. S3 needs a server built with the feature s3; its
     /// region and credentials come from the variables AWS_*.

@@ -1,6 +1,14 @@
 //! Where created objects are kept.
 
-use std::{fmt, path::PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use etcetera::BaseStrategy as _;
+
+/// The folder of the default, in that of the user's data.
+const DEFAULT_FOLDER: &str = "grasp";
 
 /// What the setting must be.
 pub(super) const NEEDED: &str = if cfg!(feature = "s3") {
@@ -26,7 +34,24 @@ pub enum StorePlace {
     },
 }
 
+impl Default for StorePlace {
+    /// The folder `grasp` where the system keeps the user's data (`XDG_DATA_HOME`, by default `~/.local/share`), or in the
+    /// working folder for a user without a home.
+    fn default() -> Self {
+        let folder = etcetera::choose_base_strategy().map(|user| user.data_dir());
+        Self::Folder(folder.unwrap_or_default().join(DEFAULT_FOLDER))
+    }
+}
+
 impl StorePlace {
+    /// The folder; none if objects are elsewhere.
+    pub(super) fn folder(&self) -> Option<&Path> {
+        match self {
+            Self::Folder(path) => Some(path),
+            _ => None,
+        }
+    }
+
     /// Reads `memory`, a folder, or `s3://bucket/prefix`; none if it is none of them.
     pub(super) fn parse(text: &str) -> Option<Self> {
         match text.split_once("://") {
@@ -71,6 +96,13 @@ mod tests {
             StorePlace::parse("./memory"),
             Some(StorePlace::Folder("./memory".into()))
         );
+    }
+
+    #[test]
+    fn the_default_is_a_folder_of_that_name() {
+        let place = StorePlace::default();
+        assert!(place.folder().unwrap().ends_with(DEFAULT_FOLDER), "{place}");
+        assert_eq!(StorePlace::parse(&place.to_string()), Some(place));
     }
 
     #[test]

@@ -47,8 +47,9 @@ const PER_BUILT_OBJECT: u64 = 512 << 10;
 /// Bytes per watcher that is as far behind as it may be: 2048 objects with their ids and events. Estimated: 0.4 MiB.
 const PER_WATCHER: u64 = 512 << 10;
 
-/// Bytes per saved object: what describes it, its labels, and its places in maps. Estimated: 1.5 KiB with a few labels and warnings.
-const PER_SAVED_OBJECT: u64 = 4 << 10;
+/// Bytes per saved object: what describes it, its labels, and its places in maps. Estimated: 1.5 KiB with a few labels and warnings,
+/// 7 KiB with as many and as long ones as can be.
+const PER_SAVED_OBJECT: u64 = 8 << 10;
 
 /// Bytes per growing atlas, excluding its published form: its grips twice during publication, and their encoding for
 /// the disk. A complete atlas takes 10 MB.
@@ -237,7 +238,7 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
         shares.push(share(
             building.saturating_add(meshes),
             format!(
-                "to load saved objects (maximum_uploads is {uploads}, maximum_object_triangles is {triangles}, \
+                "to load saved objects, unless store is memory (maximum_uploads is {uploads}, maximum_object_triangles is {triangles}, \
                  maximum_upload_bytes is {upload_bytes})"
             ),
         ));
@@ -298,6 +299,7 @@ mod tests {
                 objects: 1,
                 bytes: 100 << 20,
             },
+            place: StorePlace::Memory,
             maximum_uploads: count(3),
             streams: StreamLimits {
                 upload_bytes: count(4 << 20),
@@ -349,6 +351,20 @@ mod tests {
         let limits = [limit(NEEDED + 10, LimitKind::Used)];
         assert_eq!(check_memory(&config, 10, &limits), Ok(()));
         assert!(check_memory(&config, 11, &limits).is_err());
+    }
+
+    #[test]
+    fn saved_objects_count() {
+        let config = Config {
+            place: StorePlace::Folder("/saved".into()),
+            maximum_saved_objects: 1000.try_into().unwrap(),
+            ..config()
+        };
+        let needed = NEEDED + 1000 * (8 << 10) + 2 * (4 << 20) + 3 * (640_000 + (512 << 10));
+        let check = |bytes| check_memory(&config, 0, &[limit(bytes, LimitKind::Used)]);
+        assert_eq!(check(needed), Ok(()));
+        let text = check(needed - 1).unwrap_err().to_string();
+        assert!(text.contains("unless store is memory"), "{text}");
     }
 
     #[test]
@@ -405,6 +421,8 @@ mod tests {
         // docker/README.md gives this figure for four cores.
         let config = Config {
             workers: 4.try_into().unwrap(),
+            // As in the image.
+            place: StorePlace::Memory,
             ..Config::default()
         };
         let check = |mib| check_memory(&config, 0, &[limit(mib * MIB, LimitKind::Used)]);

@@ -100,6 +100,38 @@ fn start_removes_unfinished_atlas_files() {
     fs::remove_dir_all(&folder).expect("it is still there");
 }
 
+/// A command that has no setting of the store, but a home.
+const DEFAULT_STORE: &str = "unset GRASP_STORE; exec grasp-server";
+
+#[test]
+fn objects_are_saved_in_the_users_folder_by_default() {
+    let home = std::env::temp_dir().join(format!("grasp-home-{}", std::process::id()));
+    let path = home.to_str().expect("the path is text");
+    let server = Running::start_command(
+        DEFAULT_STORE,
+        &[("HOME", path), ("GRASP_LISTEN", "127.0.0.1:0")],
+    );
+    let log = server.start_log().to_owned() + &server.terminate().join("\n");
+    let folder = home.join(".local/share/grasp");
+    for part in ["objects", "meshes", "atlases"] {
+        assert!(folder.join(part).is_dir(), "{part}: {log}");
+    }
+    let place = format!("store={}", folder.display());
+    assert!(log.contains(&place), "{place} in {log}");
+    fs::remove_dir_all(&home).expect("it is there");
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_reported_with_the_setting() {
+    // Not even root can make a folder there.
+    let variables = [("HOME", "/proc"), ("GRASP_LISTEN", "127.0.0.1:0")];
+    let result = output(DEFAULT_STORE, &variables);
+    assert_eq!(result.code, 1);
+    for part in ["error: store is /proc/.local/share/grasp; ", "or memory, with which"] {
+        assert!(result.text.contains(part), "{part} in {}", result.text);
+    }
+}
+
 #[test]
 fn reports_every_invalid_setting() {
     let result = output(

@@ -14,13 +14,14 @@ pub(crate) struct Ended {
     pub text: String,
 }
 
-/// A shell command in which `grasp-server` is the binary under test, with these environment variables only.
+/// A shell command in which `grasp-server` is the binary under test, with these environment variables only. Objects are in
+/// memory only, unless a variable says otherwise.
 fn command(line: &str, variables: &[(&str, &str)]) -> Command {
     let binary = Path::new(env!("CARGO_BIN_EXE_grasp-server"));
     let folder = binary.parent().expect("a binary lies in a folder");
     let mut command = Command::new("/bin/sh");
     command.arg("-c").arg(line).env_clear().env("PATH", folder);
-    command.envs(variables.iter().copied());
+    command.env("GRASP_STORE", "memory").envs(variables.iter().copied());
     command.stdin(Stdio::null()).stderr(Stdio::piped());
     command
 }

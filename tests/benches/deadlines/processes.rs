@@ -9,7 +9,7 @@ use std::{
 };
 
 use clap::ValueEnum as _;
-use grasp_server::{Config, Server};
+use grasp_server::{Config, Server, config::StorePlace};
 use tokio::net::TcpListener;
 
 use crate::Role;
@@ -48,9 +48,12 @@ impl Drop for Helper {
     }
 }
 
-/// Serves with the binary's defaults on a free port until the input ends. Prints the URL.
+/// Serves with the binary's defaults, but with objects in memory only, on a free port until the input ends. Prints the URL.
 pub(crate) fn serve() {
-    let config = Config::default();
+    let config = Config {
+        place: StorePlace::Memory,
+        ..Config::default()
+    };
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(config.io_threads.get())
         .enable_all()

@@ -318,6 +318,7 @@ fn an_atlas_directory_that_cannot_be_made_is_reported() {
     let config = grasp_server::Config {
         builder_threads: 1,
         atlas_directory: Some(folder.path().join("below")),
+        place: grasp_server::config::StorePlace::Memory,
         ..Default::default()
     };
     let text = grasp_server::Server::new(config)

@@ -4,7 +4,7 @@ use std::fs;
 
 use grasp_assets::objects::{BuiltInObject, Manifest, object};
 use grasp_proto::v1;
-use grasp_server::{Config, Server};
+use grasp_server::{Config, Server, config::StorePlace};
 use grasp_tests::TestServer;
 use tonic::Code;
 
@@ -127,6 +127,7 @@ fn a_broken_folder_keeps_the_server_from_starting() {
     add(&folder, "scissors", "v 0 0 0\n", "mass_kg = 1\n");
     let config = Config {
         objects_directory: Some(folder.path().to_owned()),
+        place: StorePlace::Memory,
         ..Config::default()
     };
     let text = Server::new(config).expect_err("the folder is broken").to_string();

@@ -3,7 +3,7 @@
 use std::{net::Ipv4Addr, net::Ipv6Addr, net::SocketAddr, time::Duration};
 
 use grasp_client::GraspClient;
-use grasp_server::{Config, ServeError};
+use grasp_server::{Config, ServeError, config::StorePlace};
 use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
 use crate::failure::Failure;
@@ -24,7 +24,10 @@ pub(super) async fn start(budget: Duration) -> Result<LocalServer, Failure> {
     let address = listener
         .local_addr()
         .map_err(|error| Failure::other("cannot determine the server's port", error))?;
-    let mut config = Config::default();
+    let mut config = Config {
+        place: StorePlace::Memory,
+        ..Config::default()
+    };
     config.budgets.maximum = config.budgets.maximum.max(budget);
     let (stop, stopped) = oneshot::channel();
     let serving = tokio::spawn(grasp_server::run(listener, config, async {

@@ -33,6 +33,7 @@ async fn server() -> String {
     let address = listener.local_addr().unwrap();
     let config = Config {
         builder_threads: 0,
+        place: grasp_server::config::StorePlace::Memory,
         ..Config::default()
     };
     tokio::spawn(grasp_server::run(listener, config, std::future::pending()));

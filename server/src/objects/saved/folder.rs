@@ -43,7 +43,7 @@ impl OwnedFolder {
             match error {
                 TryLockError::WouldBlock if start.elapsed() < LOCK_WAIT => thread::sleep(LOCK_RETRY),
                 TryLockError::WouldBlock => {
-                    return Err(io::Error::other("another server uses it; give each its own"));
+                    return Err(io::Error::other("another server uses it"));
                 }
                 TryLockError::Error(error) => return Err(error),
             }

@@ -31,6 +31,9 @@ pub(crate) use self::record::{MeshHash, SavedObject};
 use super::{hex, name_of};
 use crate::{config::StorePlace, error::ServiceError, limits::BYTES_BESIDES_MESH};
 
+/// What a folder must be.
+const NEEDED: &str = "it must be a folder that only this server writes to, or memory, with which created objects end with the server";
+
 /// Where records are.
 const RECORDS: &str = "objects";
 
@@ -44,7 +47,7 @@ const DAMAGED: &str = "damaged";
 const LARGEST_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
 
 /// Records that are read at a time at the start.
-const READ_AT_A_TIME: usize = 64;
+const READ_AT_A_TIME: usize = 16;
 
 /// The folder or bucket of saved objects. Every method that is async must run on the async runtime.
 #[derive(Debug)]
@@ -69,7 +72,7 @@ pub struct StoreError {
 /// What was found at the start.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
-    /// The records by id.
+    /// The records by id, of whose requests only ids and labels are kept.
     pub objects: Vec<(String, SavedObject)>,
     /// How many records name each mesh.
     pub mesh_uses: MeshUses,
@@ -92,8 +95,8 @@ impl SavedObjects {
         let (files, folder): (Arc<dyn ObjectStore>, _) = match place {
             StorePlace::Memory => return Ok(None),
             StorePlace::Folder(path) => {
-                let folder =
-                    OwnedFolder::open(path, &[RECORDS, MESHES, DAMAGED]).map_err(|source| error(&source))?;
+                let folder = OwnedFolder::open(path, &[RECORDS, MESHES, DAMAGED]);
+                let folder = folder.map_err(|source| error(&format!("{NEEDED}: {source}")))?;
                 let files = LocalFileSystem::new_with_prefix(path).map_err(|source| error(&source))?;
                 (Arc::new(files.with_fsync(true)), Some(folder))
             }
@@ -148,7 +151,7 @@ impl SavedObjects {
                 continue;
             }
             *found.mesh_uses.entry(hash).or_default() += 1;
-            found.objects.push((id, saved));
+            found.objects.push((id, saved.without_request()));
         }
         let used: HashSet<String> = found.mesh_uses.keys().map(|hash| hex(hash)).collect();
         let has_damage = self.files.list(Some(&Path::from(DAMAGED))).next().await.is_some();

@@ -104,6 +104,16 @@ impl SavedObject {
         })
     }
 
+    /// What is kept of it while its object is at rest: of the request, whose lists may be long, only id and labels.
+    pub(crate) fn without_request(self) -> Self {
+        let request = v1::CreateObjectRequest {
+            object_id: self.request.object_id,
+            labels: self.request.labels,
+            ..Default::default()
+        };
+        Self { request, ..self }
+    }
+
     /// What identifies the request that created it, if it had an id.
     pub(crate) fn request_key(&self) -> Option<RequestKey> {
         Some(RequestKey {
