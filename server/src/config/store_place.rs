@@ -48,7 +48,9 @@ impl StorePlace {
     pub(super) fn folder(&self) -> Option<&Path> {
         match self {
             Self::Folder(path) => Some(path),
-            _ => None,
+            Self::Memory => None,
+            #[cfg(feature = "s3")]
+            Self::S3 { .. } => None,
         }
     }
 

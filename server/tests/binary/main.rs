@@ -107,10 +107,7 @@ const DEFAULT_STORE: &str = "unset GRASP_STORE; exec grasp-server";
 fn objects_are_saved_in_the_users_folder_by_default() {
     let home = std::env::temp_dir().join(format!("grasp-home-{}", std::process::id()));
     let path = home.to_str().expect("the path is text");
-    let server = Running::start_command(
-        DEFAULT_STORE,
-        &[("HOME", path), ("GRASP_LISTEN", "127.0.0.1:0")],
-    );
+    let server = Running::start_command(DEFAULT_STORE, &[("HOME", path), ("GRASP_LISTEN", "127.0.0.1:0")]);
     let log = server.start_log().to_owned() + &server.terminate().join("\n");
     let folder = home.join(".local/share/grasp");
     for part in ["objects", "meshes", "atlases"] {
@@ -127,7 +124,10 @@ fn a_folder_that_cannot_be_written_is_reported_with_the_setting() {
     let variables = [("HOME", "/proc"), ("GRASP_LISTEN", "127.0.0.1:0")];
     let result = output(DEFAULT_STORE, &variables);
     assert_eq!(result.code, 1);
-    for part in ["error: store is /proc/.local/share/grasp; ", "or memory, with which"] {
+    for part in [
+        "error: store is /proc/.local/share/grasp; ",
+        "or memory, with which",
+    ] {
         assert!(result.text.contains(part), "{part} in {}", result.text);
     }
 }

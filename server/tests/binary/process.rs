@@ -21,7 +21,9 @@ fn command(line: &str, variables: &[(&str, &str)]) -> Command {
     let folder = binary.parent().expect("a binary lies in a folder");
     let mut command = Command::new("/bin/sh");
     command.arg("-c").arg(line).env_clear().env("PATH", folder);
-    command.env("GRASP_STORE", "memory").envs(variables.iter().copied());
+    command
+        .env("GRASP_STORE", "memory")
+        .envs(variables.iter().copied());
     command.stdin(Stdio::null()).stderr(Stdio::piped());
     command
 }
