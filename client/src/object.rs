@@ -37,9 +37,12 @@ pub struct Object {
     pub content_hash: String,
     /// Defects of the mesh that do not prevent its use.
     pub warnings: Vec<String>,
-    /// The object's atlas; none if the server keeps no atlases.
+    /// The object's atlas for the right hand; none if the server keeps no atlases.
     #[serde(default)]
     pub atlas: Option<AtlasState>,
+    /// The object's atlas for the left hand; none if the server keeps no atlases.
+    #[serde(default)]
+    pub left_atlas: Option<AtlasState>,
     /// Where the origin of the object's frame is in the mesh file, in the file's units and axes; none: at the file's origin.
     #[serde(default)]
     pub origin_in_file: Option<DVec3>,
@@ -204,10 +207,12 @@ pub enum ObjectChange {
     Created,
     /// A client changed it.
     Updated,
-    /// Its atlas answers most requests.
+    /// Its atlas for the right hand answers most requests.
     AtlasUseful,
-    /// Its atlas is complete.
+    /// Its atlas for the right hand is complete.
     AtlasComplete,
+    /// Its atlas for the left hand is complete.
+    LeftAtlasComplete,
     /// A client deleted it, or changed its labels so that they no longer match.
     Deleted,
     /// The server dropped it to make room for others.

@@ -149,14 +149,6 @@ pub(crate) async fn run_blocking<T: Send + 'static>(
     })
 }
 
-/// Waits for a future, on a thread that may block.
-///
-/// # Panics
-/// Outside the context of an async runtime, or on a thread that runs its tasks.
-pub(crate) fn wait_for<T>(future: impl Future<Output = T>) -> T {
-    tokio::runtime::Handle::current().block_on(future)
-}
-
 #[cfg(test)]
 mod tests {
     use std::{sync::mpsc, thread};

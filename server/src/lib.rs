@@ -9,6 +9,8 @@
 //! go through `services::streaming`.
 //! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
 //!
+//! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
+//!
 //! Before serving, `memory` compares what the configuration may use with the limits of the process, and
 //! `objects::directory` loads the folder of objects. Between calls, `atlases` builds atlases in the background.
 //! `health_check` is a client: it asks a running server for its health.
@@ -19,6 +21,7 @@
 //!
 //! ```text
 //! atlas_slots  budget  convention  error  health_check  limits  reserve
+//! saved
 //! rigs
 //! answer  call  config  executor  net  validate
 //! memory  objects
@@ -48,6 +51,7 @@ mod net;
 mod objects;
 mod reserve;
 mod rigs;
+mod saved;
 mod search;
 mod serve;
 mod services;
@@ -58,8 +62,6 @@ pub use config::{Config, ConfigError};
 pub use health_check::{HealthCheckError, check_health};
 pub use limits::{StoreLimits, StreamLimits};
 pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory, memory_limits};
-pub use objects::{
-    directory::{DirectoryError, DirectoryProblem},
-    saved::StoreError,
-};
+pub use objects::directory::{DirectoryError, DirectoryProblem};
+pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};

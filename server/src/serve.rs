@@ -30,15 +30,16 @@ use crate::{
     net::{AcceptLimits, UnreadAnswers, UnreadLayer, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
-        saved::{SavedObjects, StoreError},
+        saved::SavedObjects,
         store::{
             ObjectStore,
             loading::{Durability, Loading},
         },
     },
     reserve::DeadlineReserve,
-    rigs::store::RigStore,
-    services::{GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads},
+    rigs::{saved::SavedRigs, store::RigStore},
+    saved::{SavedFiles, StoreError},
+    services::{GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads, load_saved_rigs},
 };
 
 /// Largest number of open streams per connection.
@@ -187,9 +188,9 @@ impl Server {
             bytes: config.largest_mesh(),
             ..obj_limits
         };
-        let saved = SavedObjects::open(&config.place, config.maximum_saved_objects)?;
-        let durability = saved.map(|saved| Durability {
-            saved,
+        let files = SavedFiles::open(&config.place)?.map(Arc::new);
+        let durability = files.clone().map(|files| Durability {
+            saved: SavedObjects::new(files, config.maximum_saved_objects),
             loading: Loading::new(
                 loading_limits,
                 config.maximum_uploads.get(),
@@ -201,7 +202,7 @@ impl Server {
             unstopped(|stop| object.prepare(&config.default_rig, stop));
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
-        let files = match config.kept_atlases() {
+        let atlas_files = match config.kept_atlases() {
             Some(path) => Some(
                 AtlasFiles::open(path.clone())
                     .map_err(|source| ServeError::AtlasDirectory { path, source })?,
@@ -213,12 +214,12 @@ impl Server {
                 config.builder_threads,
                 &objects,
                 executor.clone(),
-                files,
+                atlas_files,
                 config.default_rig.clone(),
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: RigStore::new(config.maximum_rigs.get()),
+            rigs: RigStore::new(config.maximum_rigs.get(), files.map(SavedRigs::new)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -250,11 +251,12 @@ impl Server {
     async fn read_saved(&self) -> Result<(), StoreError> {
         let start = Instant::now();
         let objects = self.shared.objects.read_saved().await?;
+        let rigs = load_saved_rigs(&self.shared.rigs, self.shared.obj_limits).await?;
         let (store, milliseconds) = (&self.place, start.elapsed().as_millis());
         if *store == StorePlace::Memory {
-            tracing::info!("created objects end with the server: store is memory");
+            tracing::info!("created objects and rigs end with the server: store is memory");
         } else {
-            tracing::info!(%store, objects, milliseconds, "created objects are saved");
+            tracing::info!(%store, objects, rigs, milliseconds, "created objects and rigs are saved");
         }
         Ok(())
     }

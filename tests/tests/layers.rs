@@ -21,6 +21,7 @@ const SERVER: &[&[&str]] = &[
         "limits",
         "reserve",
     ],
+    &["saved"],
     &["rigs"],
     &["answer", "call", "config", "executor", "net", "validate"],
     &["memory", "objects"],

@@ -115,6 +115,11 @@ fn object_fields_from_wire(object: v1::Object) -> Result<Object, Malformed> {
             .map(atlas_from_wire)
             .transpose()
             .map_err(|malformed| malformed.within("atlas"))?,
+        left_atlas: object
+            .left_atlas
+            .map(atlas_from_wire)
+            .transpose()
+            .map_err(|malformed| malformed.within("left_atlas"))?,
         origin_in_file: object
             .origin_in_file
             .map(|origin| DVec3::new(origin.x, origin.y, origin.z)),
@@ -180,6 +185,7 @@ fn change_from_wire(change: i32) -> ObjectChange {
         Ok(v1::ObjectChange::Updated) => ObjectChange::Updated,
         Ok(v1::ObjectChange::AtlasUseful) => ObjectChange::AtlasUseful,
         Ok(v1::ObjectChange::AtlasComplete) => ObjectChange::AtlasComplete,
+        Ok(v1::ObjectChange::LeftAtlasComplete) => ObjectChange::LeftAtlasComplete,
         Ok(v1::ObjectChange::Deleted) => ObjectChange::Deleted,
         Ok(v1::ObjectChange::Evicted) => ObjectChange::Evicted,
         Ok(v1::ObjectChange::Unspecified) | Err(_) => ObjectChange::Unrecognised,

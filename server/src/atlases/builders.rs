@@ -214,14 +214,23 @@ fn work(builders: &Builders, job: BuildJob) {
         }
     }
     // Only these hands' atlases are part of an object's state.
-    if builders.default_hand(Handedness::Right) == Some(&hand) {
-        let after = Progress::of(&object, &hand);
-        if after.is_useful && !before.is_useful {
-            builders.objects.tell_of_atlas(&object, Event::AtlasUseful);
-        }
-        if after.is_complete && !before.is_complete {
-            builders.objects.tell_of_atlas(&object, Event::AtlasComplete);
-        }
+    let is_default = |side| builders.default_hand(side) == Some(&hand);
+    let (useful, complete) = if is_default(Handedness::Right) {
+        (Some(Event::AtlasUseful), Event::AtlasComplete)
+    } else if is_default(Handedness::Left) {
+        (None, Event::LeftAtlasComplete)
+    } else {
+        return;
+    };
+    let after = Progress::of(&object, &hand);
+    let became_useful = after.is_useful && !before.is_useful;
+    let became_complete = after.is_complete && !before.is_complete;
+    let events = [
+        useful.filter(|_| became_useful),
+        became_complete.then_some(complete),
+    ];
+    for event in events.into_iter().flatten() {
+        builders.objects.tell_of_atlas(&object, event);
     }
 }
 

@@ -117,13 +117,17 @@ impl Atlases {
         }
     }
 
-    /// The state of an object's atlas for the default rig's right hand; none if there are no atlases. That of an object at rest
-    /// is empty.
-    pub(crate) fn state(&self, object: Option<&StoredObject>) -> Option<v1::AtlasState> {
+    /// The state of an object's atlas for a hand of the default rig; none if there are no atlases. That of an object at rest is
+    /// empty.
+    pub(crate) fn state(
+        &self,
+        object: Option<&StoredObject>,
+        handedness: Handedness,
+    ) -> Option<v1::AtlasState> {
         if !self.0.are_running() {
             return None;
         }
-        let hand = self.0.default_hand(Handedness::Right)?;
+        let hand = self.0.default_hand(handedness)?;
         let slot = object.and_then(|object| object.atlas_slots.get(hand));
         let slot = slot.unwrap_or_default();
         let atlas = slot

@@ -4,13 +4,11 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, path::Pa
 
 use grasp_assets::hands::RIG_NAMES;
 
-use super::{
-    BadValue, Config, ConfigError, LogFormat, RawConfig,
-    store_place::{self, StorePlace},
-};
+use super::{BadValue, Config, ConfigError, LogFormat, RawConfig, StorePlace};
 use crate::{
     budget::BudgetLimits,
     limits::{LARGEST_RESPONSE, StoreLimits, StreamLimits},
+    saved::NEEDED_PLACE,
 };
 
 impl RawConfig {
@@ -181,7 +179,7 @@ impl RawConfig {
         let key = "maximum_saved_objects";
         let maximum = check.count(key, self.maximum_saved_objects, 1..=1_000_000, maximum);
         let store = self.store.take();
-        let place = check.parsed("store", store, place, store_place::NEEDED, StorePlace::parse);
+        let place = check.parsed("store", store, place, NEEDED_PLACE, StorePlace::parse);
         (place, maximum)
     }
 

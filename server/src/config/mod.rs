@@ -2,12 +2,11 @@
 
 mod check;
 mod raw;
-mod store_place;
 
 use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration};
 
+pub use crate::saved::StorePlace;
 pub use raw::{RawConfig, read_file, unknown_variables};
-pub use store_place::StorePlace;
 
 use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMENT};
 

@@ -30,10 +30,12 @@ pub(crate) enum Event {
     Created,
     /// A client changed it.
     Updated,
-    /// Its atlas became large enough to answer most requests.
+    /// Its atlas for the right hand became large enough to answer most requests.
     AtlasUseful,
-    /// Its atlas is complete.
+    /// Its atlas for the right hand is complete.
     AtlasComplete,
+    /// Its atlas for the left hand is complete.
+    LeftAtlasComplete,
 }
 
 /// What is reported to a watcher next.

@@ -1,5 +1,6 @@
 //! The rigs that hands can have: built-in ones, and those that clients created.
 
+pub(crate) mod saved;
 mod scaled;
 pub(crate) mod store;
 

@@ -1,4 +1,5 @@
-//! Rigs by name. Created ones stay until they are deleted; beyond their maximum, more are refused.
+//! Rigs by name. Created ones stay until they are deleted, and outlast the server if they are saved; beyond their maximum, more
+//! are refused.
 
 use std::{
     collections::BTreeMap,
@@ -6,31 +7,45 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
+use bytes::Bytes;
 use grasp_assets::hands::{self, RIG_NAMES};
+use grasp_proto::v1;
 use grasp_synthesis::model::hand::Handedness;
 
-use super::{COLLECTION, RigHand, StoredRig, name_of, scaled::ScaledHands};
-use crate::error::ServiceError;
+use super::{COLLECTION, RigHand, StoredRig, name_of, saved::SavedRigs, scaled::ScaledHands};
+use crate::{
+    error::ServiceError,
+    saved::{seal, wait_for},
+};
 
 /// All rigs.
+///
+/// If rigs are saved, the methods that add or delete one wait for the disk or network. They are for threads that may block, in
+/// the context of the async runtime.
 #[derive(Debug)]
 pub(crate) struct RigStore {
     built_in: BTreeMap<String, Arc<StoredRig>>,
     created: Mutex<BTreeMap<String, Arc<StoredRig>>>,
+    /// Held while a rig is added or deleted, so that what is saved and what is in memory agree.
+    changing: Mutex<()>,
     maximum: usize,
+    /// None if rigs are in memory only.
+    saved: Option<SavedRigs>,
     scaled: ScaledHands,
 }
 
 impl RigStore {
-    /// A store of the built-in rigs that keeps up to `maximum` created ones.
-    pub(crate) fn new(maximum: usize) -> Self {
+    /// A store of the built-in rigs that keeps up to `maximum` created ones, which outlast it if they are saved.
+    pub(crate) fn new(maximum: usize, saved: Option<SavedRigs>) -> Self {
         Self {
             built_in: RIG_NAMES
                 .into_iter()
                 .filter_map(|name| Some((name.to_owned(), Arc::new(built_in(name)?))))
                 .collect(),
             created: Mutex::default(),
+            changing: Mutex::default(),
             maximum,
+            saved,
             scaled: ScaledHands::default(),
         }
     }
@@ -66,30 +81,53 @@ impl RigStore {
         self.check(&self.created(), id)
     }
 
-    /// Adds a rig.
+    /// The saved rigs; none if rigs are in memory only.
+    pub(crate) fn saved(&self) -> Option<&SavedRigs> {
+        self.saved.as_ref()
+    }
+
+    /// What is saved of a rig that this request makes; nothing if rigs are in memory only.
+    pub(crate) fn record(&self, request: &v1::CreateRigRequest) -> Option<Bytes> {
+        self.saved.as_ref().map(|_| seal(request))
+    }
+
+    /// Adds a rig, and saves its record if there is one.
     ///
     /// # Errors
-    /// [`ServiceError::RigExists`], [`ServiceError::RigsFull`].
-    pub(crate) fn insert(&self, rig: StoredRig) -> Result<Arc<StoredRig>, ServiceError> {
-        let mut created = self.created();
-        self.check(&created, &rig.id)?;
+    /// [`ServiceError::RigExists`], [`ServiceError::RigsFull`], and [`ServiceError::StoreFailed`] if it cannot be saved.
+    pub(crate) fn insert(
+        &self,
+        rig: StoredRig,
+        record: Option<Bytes>,
+    ) -> Result<Arc<StoredRig>, ServiceError> {
+        let _changing = self.changing();
+        self.check_room(&rig.id)?;
+        if let Some((saved, record)) = self.saved.as_ref().zip(record) {
+            wait_for(saved.write(&rig.id, record))?;
+        }
         let rig = Arc::new(rig);
-        created.insert(rig.id.clone(), Arc::clone(&rig));
+        self.created().insert(rig.id.clone(), Arc::clone(&rig));
         Ok(rig)
     }
 
     /// Removes a created rig.
     ///
     /// # Errors
-    /// [`ServiceError::RigNotFound`], [`ServiceError::RigBuiltIn`].
+    /// [`ServiceError::RigNotFound`], [`ServiceError::RigBuiltIn`], and [`ServiceError::StoreFailed`] if what was saved cannot be
+    /// deleted.
     pub(crate) fn delete(&self, id: &str) -> Result<(), ServiceError> {
         if self.built_in.contains_key(id) {
             return Err(ServiceError::RigBuiltIn { name: name_of(id) });
         }
-        match self.created().remove(id) {
-            Some(_) => Ok(()),
-            None => Err(ServiceError::RigNotFound { name: name_of(id) }),
+        let _changing = self.changing();
+        if !self.created().contains_key(id) {
+            return Err(ServiceError::RigNotFound { name: name_of(id) });
         }
+        if let Some(saved) = &self.saved {
+            wait_for(saved.delete(id))?;
+        }
+        self.created().remove(id);
+        Ok(())
     }
 
     /// Up to `size` rigs ordered by name, starting after `after`, and whether there are more.
@@ -120,6 +158,10 @@ impl RigStore {
             });
         }
         Ok(())
+    }
+
+    fn changing(&self) -> MutexGuard<'_, ()> {
+        self.changing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn created(&self) -> MutexGuard<'_, BTreeMap<String, Arc<StoredRig>>> {
@@ -153,25 +195,25 @@ mod tests {
 
     #[test]
     fn refuses_more_than_the_maximum_until_one_is_deleted() {
-        let store = RigStore::new(2);
-        store.insert(rig("a")).unwrap();
-        store.insert(rig("b")).unwrap();
+        let store = RigStore::new(2, None);
+        store.insert(rig("a"), None).unwrap();
+        store.insert(rig("b"), None).unwrap();
         let full = ServiceError::RigsFull { maximum: 2 };
         assert_eq!(store.check_room("c"), Err(full.clone()));
-        assert_eq!(store.insert(rig("c")).unwrap_err(), full);
+        assert_eq!(store.insert(rig("c"), None).unwrap_err(), full);
         store.delete("a").unwrap();
-        store.insert(rig("c")).unwrap();
+        store.insert(rig("c"), None).unwrap();
         let listed: Vec<String> = store.page(None, 10).0.iter().map(|rig| rig.id.clone()).collect();
         assert_eq!(listed, ["adult", "b", "c", "thesis"]);
     }
 
     #[test]
     fn built_in_rigs_have_two_names_and_stay() {
-        let store = RigStore::new(1);
+        let store = RigStore::new(1, None);
         for name in ["adult", "rigs/adult"] {
             assert_eq!(store.named(name).expect("it is built in").id, "adult");
         }
-        store.insert(rig("own")).unwrap();
+        store.insert(rig("own"), None).unwrap();
         assert!(store.named("rigs/own").is_some() && store.named("own").is_none());
         let name = "rigs/adult".to_owned();
         assert_eq!(
@@ -179,7 +221,7 @@ mod tests {
             Err(ServiceError::RigBuiltIn { name: name.clone() })
         );
         assert_eq!(
-            store.insert(rig("adult")).unwrap_err(),
+            store.insert(rig("adult"), None).unwrap_err(),
             ServiceError::RigExists { name }
         );
         let name = "rigs/none".to_owned();

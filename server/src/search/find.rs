@@ -104,7 +104,8 @@ mod tests {
             ..Default::default()
         };
         FindJob {
-            query: find_query(request, ("adult", &RigStore::new(0)), |_| true).expect("the request is valid"),
+            query: find_query(request, ("adult", &RigStore::new(0, None)), |_| true)
+                .expect("the request is valid"),
             object: Arc::clone(&stored.object),
             stored,
             seed: 3,

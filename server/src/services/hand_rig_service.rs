@@ -5,11 +5,16 @@ use std::sync::Arc;
 use grasp_proto::v1::{self, hand_rig_service_server::HandRigService};
 use tonic::{Request, Response, Status};
 
-use super::{Shared, rig_builder::build_rig, rig_message::rig_message};
+use super::{
+    Shared,
+    rig_builder::{build_rig, prepare_rig},
+    rig_message::rig_message,
+};
 use crate::{
     call::UploadPermit,
     error::ServiceError,
     executor::run_blocking,
+    rigs::StoredRig,
     validate::{Field, Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token},
 };
 
@@ -30,20 +35,13 @@ impl HandRigHandler {
         request: v1::CreateRigRequest,
         permit: Option<UploadPermit>,
     ) -> Result<v1::CreateRigResponse, ServiceError> {
-        let limits = self.shared.obj_limits;
-        let mut violations = Violations::default();
-        let fields = rig_fields(request, limits.bytes, &mut violations);
-        if violations.is_empty() {
-            self.shared.rigs.check_room(&fields.id)?;
-        }
+        let shared = Arc::clone(&self.shared);
         let rig = run_blocking(move || {
             let _permit = permit;
-            build_rig(fields, limits, violations)
-        })
-        .await??;
-        let rig = self.shared.rigs.insert(rig)?;
+            create_blocking(&shared, request)
+        });
         Ok(v1::CreateRigResponse {
-            rig: Some(rig_message(&rig)),
+            rig: Some(rig_message(&*rig.await??)),
         })
     }
 
@@ -64,10 +62,27 @@ impl HandRigHandler {
         })
     }
 
-    fn delete(&self, name: &str) -> Result<v1::DeleteRigResponse, ServiceError> {
-        self.shared.rigs.delete(&checked_id(name)?)?;
+    async fn delete(&self, name: &str) -> Result<v1::DeleteRigResponse, ServiceError> {
+        let id = checked_id(name)?;
+        self.shared
+            .delete_in_turn(move |shared| shared.rigs.delete(&id))
+            .await?;
         Ok(v1::DeleteRigResponse {})
     }
+}
+
+/// Makes a rig, and adds it to the others.
+fn create_blocking(shared: &Shared, request: v1::CreateRigRequest) -> Result<Arc<StoredRig>, ServiceError> {
+    let limits = shared.obj_limits;
+    let mut violations = Violations::default();
+    let record = shared.rigs.record(&request);
+    let fields = rig_fields(request, limits.bytes, &mut violations);
+    if violations.is_empty() {
+        shared.rigs.check_room(&fields.id)?;
+    }
+    let rig = build_rig(fields, limits, violations)?;
+    prepare_rig(&rig);
+    shared.rigs.insert(rig, record)
 }
 
 fn checked_id(name: &str) -> Result<String, ServiceError> {
@@ -106,6 +121,6 @@ impl HandRigService for HandRigHandler {
         &self,
         request: Request<v1::DeleteRigRequest>,
     ) -> Result<Response<v1::DeleteRigResponse>, Status> {
-        Ok(Response::new(self.delete(&request.get_ref().name)?))
+        Ok(Response::new(self.delete(&request.get_ref().name).await?))
     }
 }

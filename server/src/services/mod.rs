@@ -19,6 +19,7 @@ use tokio_util::sync::CancellationToken;
 pub(crate) use grasp_service::GraspHandler;
 pub(crate) use hand_rig_service::HandRigHandler;
 pub(crate) use object_service::ObjectHandler;
+pub(crate) use rig_builder::load_saved_rigs;
 pub(crate) use upload::Uploads;
 
 use crate::{
@@ -26,7 +27,7 @@ use crate::{
     budget::BudgetLimits,
     call::CallContext,
     error::ServiceError,
-    executor::SearchExecutor,
+    executor::{SearchExecutor, run_blocking},
     objects::{Revision, store::ObjectStore},
     reserve::DeadlineReserve,
     rigs::store::RigStore,
@@ -67,6 +68,24 @@ pub(crate) struct Shared {
 }
 
 impl Shared {
+    /// Deletes something when it is this deletion's turn.
+    ///
+    /// # Errors
+    /// Those of `delete`.
+    async fn delete_in_turn(
+        self: &Arc<Self>,
+        delete: impl FnOnce(&Self) -> Result<(), ServiceError> + Send + 'static,
+    ) -> Result<(), ServiceError> {
+        let turn = Arc::clone(&self.deletions).acquire_owned().await;
+        let turn = turn.map_err(|_| ServiceError::ShuttingDown)?;
+        let shared = Arc::clone(self);
+        run_blocking(move || {
+            let _turn = turn;
+            delete(&shared)
+        })
+        .await?
+    }
+
     /// The object with this id, ready for searches: loaded, if it was at rest, before the call's deadline.
     ///
     /// # Errors

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use grasp_import::MeshLimits;
 use grasp_proto::v1::{self, object_service_server::ObjectService};
-use grasp_synthesis::base::stop::{Stop, unstopped};
+use grasp_synthesis::{
+    base::stop::{Stop, unstopped},
+    model::hand::Handedness,
+};
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
@@ -209,14 +212,8 @@ impl ObjectHandler {
         let id = checked_id(&request.name)?;
         call.log_object(&id);
         let etag = given_etag(request.etag);
-        let shared = Arc::clone(&self.shared);
-        let turn = Arc::clone(&shared.deletions).acquire_owned().await;
-        let turn = turn.map_err(|_| ServiceError::ShuttingDown)?;
-        let removed = run_blocking(move || {
-            let _turn = turn;
-            shared.objects.remove(&id, etag.as_deref())
-        });
-        match removed.await? {
+        let remove = move |shared: &Shared| shared.objects.remove(&id, etag.as_deref());
+        match self.shared.delete_in_turn(remove).await {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,
         }
@@ -226,7 +223,11 @@ impl ObjectHandler {
     /// The message that describes an object.
     pub(super) fn message(&self, state: &Listed) -> v1::Object {
         let object = state.object().map(AsRef::as_ref);
-        state.to_wire(self.shared.atlases.state(object))
+        let atlas = |handedness| self.shared.atlases.state(object, handedness);
+        v1::Object {
+            left_atlas: atlas(Handedness::Left),
+            ..state.to_wire(atlas(Handedness::Right))
+        }
     }
 }
 

@@ -145,5 +145,6 @@ fn change(event: Event) -> v1::ObjectChange {
         Event::Updated => v1::ObjectChange::Updated,
         Event::AtlasUseful => v1::ObjectChange::AtlasUseful,
         Event::AtlasComplete => v1::ObjectChange::AtlasComplete,
+        Event::LeftAtlasComplete => v1::ObjectChange::LeftAtlasComplete,
     }
 }

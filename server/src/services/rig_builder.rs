@@ -8,14 +8,16 @@ use grasp_synthesis::{model::hand::Handedness, propose::prepared::PreparedRig};
 
 use crate::{
     error::ServiceError,
-    rigs::{RigHand, StoredRig, name_of},
-    validate::{Field, RigFields, RigOrigin, Violations},
+    executor::run_blocking,
+    rigs::{RigHand, StoredRig, name_of, store::RigStore},
+    saved::StoreError,
+    validate::{Field, RigFields, RigOrigin, Violations, rig_fields},
 };
 
 /// The built-in rig that gives others their axes, limits and, where nothing else is known, widths.
 const REFERENCE: &str = "adult";
 
-/// Makes a rig and derives what searches need. Takes some tenths of a second.
+/// Makes a rig.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with `violations` and everything else that is wrong.
@@ -65,15 +67,50 @@ pub(super) fn build_rig(
     })
 }
 
-/// The hand with what searches need. Its skin, which only a giver under THESIS validity shows, is the reference's, stretched.
+/// Derives what searches need, which otherwise the first search would do, outside its budget. Takes some tenths of a second.
+pub(super) fn prepare_rig(rig: &StoredRig) {
+    for hand in &rig.hands {
+        hand.hand.rig.oppositions();
+    }
+}
+
+/// Makes the saved rigs again. What searches need is derived in the background. Gives their number.
+///
+/// # Errors
+/// They cannot be read, or they are beyond the limits of this server.
+pub(crate) async fn load_saved_rigs(rigs: &RigStore, limits: MeshLimits) -> Result<usize, StoreError> {
+    let Some(saved) = rigs.saved() else {
+        return Ok(0);
+    };
+    let mut loaded = Vec::new();
+    for id in saved.ids().await? {
+        let Some(request) = saved.request(&id).await? else {
+            continue;
+        };
+        let made = run_blocking(move || {
+            let mut violations = Violations::default();
+            let fields = rig_fields(request, limits.bytes, &mut violations);
+            build_rig(fields, limits, violations)
+        });
+        let added = made.await.flatten().and_then(|rig| rigs.insert(rig, None));
+        loaded.push(added.map_err(|error| {
+            let name = name_of(&id);
+            saved.error(&format_args!(
+                "{name} was saved, but this server cannot load it: {error}; raise its limits"
+            ))
+        })?);
+    }
+    let count = loaded.len();
+    tokio::task::spawn_blocking(move || loaded.iter().for_each(|rig| prepare_rig(rig)));
+    Ok(count)
+}
+
+/// The hand of a rig. Its skin, which only a giver under THESIS validity shows, is the reference's, stretched.
 fn rig_hand(made: ImportedHand) -> RigHand {
     let reference = hands::hand(REFERENCE, made.rig.handedness).expect("the rig is built in");
-    let rig = PreparedRig::new(made.rig);
-    // The first search would do it, outside its budget.
-    rig.oppositions();
     RigHand {
         hand: Arc::new(Hand {
-            rig,
+            rig: PreparedRig::new(made.rig),
             skin: Arc::clone(&reference.skin),
         }),
         binding: made.binding.map(Arc::new),

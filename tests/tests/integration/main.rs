@@ -36,6 +36,7 @@ mod reported;
 mod reported_grasps;
 mod reproducible;
 mod saved_objects;
+mod saved_rigs;
 mod shutdown;
 mod tracked_hands;
 mod unread;

@@ -20,7 +20,7 @@ const NAME_WIDTH: usize = 28;
 /// Of an object that changes faster than the news are read, several changes come at once, with its latest state.
 ///
 /// With --json, one line per news: {"changes": […], "name": NAME or null, "object": … or null}, the object as in `grasp objects
-/// get --json`. Changes: present, `present_end`, created, updated, `atlas_useful`, `atlas_complete`, deleted, evicted.
+/// get --json`. Changes: present, `present_end`, created, updated, `atlas_useful`, `atlas_complete`, `left_atlas_complete`, deleted, evicted.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// Labels that the objects must have, such as "level=kitchen AND fragile".

@@ -1,4 +1,4 @@
-//! Created objects in a folder or bucket, where they outlast the server.
+//! Saved objects.
 //!
 //! Each object is a record `objects/{id}` and a mesh file `meshes/{SHA-256}`, which objects with the same mesh share. A mesh
 //! is written before the first record that names it, and deleted after the last; each write replaces a file as a
@@ -7,41 +7,32 @@
 //! What is read is compared with its SHA-256. What does not match is moved to `damaged/`, for people to look at, and never
 //! served.
 
-mod folder;
 mod record;
 #[cfg(test)]
 mod tests;
 
 use std::{
     collections::{HashMap, HashSet},
-    fmt,
     num::NonZeroUsize,
     sync::Arc,
 };
 
 use bytes::Bytes;
 use futures_util::{StreamExt as _, TryStreamExt as _};
-use object_store::{
-    Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutPayload, local::LocalFileSystem, path::Path,
-};
+use object_store::{Error, path::Path};
 use sha2::{Digest as _, Sha256};
 
-use self::folder::OwnedFolder;
 pub(crate) use self::record::{MeshHash, SavedObject};
 use super::{hex, name_of};
-use crate::{config::StorePlace, error::ServiceError, limits::BYTES_BESIDES_MESH};
-
-/// What a folder must be.
-const NEEDED: &str = "it must be a folder that only this server writes to, or memory, with which created objects end with the server";
-
-/// Where records are.
-const RECORDS: &str = "objects";
-
-/// Where mesh files are.
-const MESHES: &str = "meshes";
-
-/// Where damaged files are moved.
-const DAMAGED: &str = "damaged";
+use crate::{
+    error::ServiceError,
+    limits::BYTES_BESIDES_MESH,
+    saved::{
+        SavedFiles, StoreError, failed,
+        folders::{MESHES, OBJECTS},
+        seal,
+    },
+};
 
 /// Largest record in bytes: a request without its mesh, and the description, which repeats none of its lists but the warnings.
 const LARGEST_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
@@ -49,24 +40,11 @@ const LARGEST_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
 /// Records that are read at a time at the start.
 const READ_AT_A_TIME: usize = 16;
 
-/// The folder or bucket of saved objects. Every method that is async must run on the async runtime.
+/// The saved objects. Every method that is async must run on the async runtime.
 #[derive(Debug)]
 pub(crate) struct SavedObjects {
-    files: Arc<dyn ObjectStore>,
-    folder: Option<OwnedFolder>,
-    /// As in the configuration, for messages.
-    place: String,
+    files: Arc<SavedFiles>,
     maximum: usize,
-}
-
-/// Saved objects cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[error("store is {place}; {reason}")]
-pub struct StoreError {
-    /// The folder or bucket.
-    pub place: String,
-    /// What is wrong.
-    pub reason: String,
 }
 
 /// What was found at the start.
@@ -82,40 +60,12 @@ pub(crate) struct Found {
 pub(crate) type MeshUses = HashMap<MeshHash, usize>;
 
 impl SavedObjects {
-    /// Opens the place that the configuration names; none if objects are in memory only. `maximum` is the largest
-    /// number of objects.
-    ///
-    /// # Errors
-    /// The place cannot be used.
-    pub(crate) fn open(place: &StorePlace, maximum: NonZeroUsize) -> Result<Option<Self>, StoreError> {
-        let error = |reason: &dyn fmt::Display| StoreError {
-            place: place.to_string(),
-            reason: reason.to_string(),
-        };
-        let (files, folder): (Arc<dyn ObjectStore>, _) = match place {
-            StorePlace::Memory => return Ok(None),
-            StorePlace::Folder(path) => {
-                let folder = OwnedFolder::open(path, &[RECORDS, MESHES, DAMAGED]);
-                let folder = folder.map_err(|source| error(&format!("{NEEDED}: {source}")))?;
-                let files = LocalFileSystem::new_with_prefix(path).map_err(|source| error(&source))?;
-                (Arc::new(files.with_fsync(true)), Some(folder))
-            }
-            #[cfg(feature = "s3")]
-            StorePlace::S3 { bucket, prefix } => {
-                let files = object_store::aws::AmazonS3Builder::from_env()
-                    .with_bucket_name(bucket)
-                    .build()
-                    .map_err(|source| error(&source))?;
-                let files = object_store::prefix::PrefixStore::new(files, prefix.as_str());
-                (Arc::new(files), None)
-            }
-        };
-        Ok(Some(Self {
+    /// The objects of these files, at most `maximum`.
+    pub(crate) fn new(files: Arc<SavedFiles>, maximum: NonZeroUsize) -> Self {
+        Self {
             files,
-            folder,
-            place: place.to_string(),
             maximum: maximum.get(),
-        }))
+        }
     }
 
     /// Largest number of objects.
@@ -128,15 +78,13 @@ impl SavedObjects {
     /// # Errors
     /// Something cannot be read.
     pub(crate) async fn read_all(&self) -> Result<Found, StoreError> {
-        self.try_read_all().await.map_err(|error| StoreError {
-            place: self.place.clone(),
-            reason: error.to_string(),
-        })
+        let read = self.try_read_all().await;
+        read.map_err(|error| self.files.error(&error))
     }
 
     async fn try_read_all(&self) -> Result<Found, Error> {
-        let meshes: HashMap<String, u64> = self.list(MESHES).await?;
-        let records = self.list(RECORDS).await?;
+        let meshes: HashMap<String, u64> = self.files.list(MESHES).await?;
+        let records = self.files.list(OBJECTS).await?;
         let read = records
             .into_keys()
             .map(|id| async move { Ok::<_, Error>((self.readable_record(&id).await?, id)) });
@@ -146,7 +94,8 @@ impl SavedObjects {
             let Some(saved) = saved else { continue };
             let hash = saved.mesh_hash().unwrap_or_default();
             if meshes.get(&hex(&hash)) != Some(&saved.mesh_bytes) {
-                self.move_aside(&record_path(&id), "its mesh is missing or has another size")
+                self.files
+                    .move_aside(&record_path(&id), "its mesh is missing or has another size")
                     .await?;
                 continue;
             }
@@ -154,25 +103,16 @@ impl SavedObjects {
             found.objects.push((id, saved.without_request()));
         }
         let used: HashSet<String> = found.mesh_uses.keys().map(|hash| hex(hash)).collect();
-        let has_damage = self.files.list(Some(&Path::from(DAMAGED))).next().await.is_some();
+        let has_damage = self.files.has_damage().await;
         let unused = meshes.keys().filter(|mesh| !used.contains(*mesh));
         for mesh in unused {
             // With the mesh, a damaged record may still be repaired.
             if !has_damage {
-                self.delete(&Path::from_iter([MESHES, mesh.as_str()])).await?;
+                let path = Path::from_iter([MESHES, mesh.as_str()]);
+                self.files.delete(&path).await?;
             }
         }
         Ok(found)
-    }
-
-    /// The names of the files in a folder, with their sizes.
-    async fn list(&self, folder: &str) -> Result<HashMap<String, u64>, Error> {
-        let files = self.files.list(Some(&Path::from(folder)));
-        let names = files.map_ok(|ObjectMeta { location, size, .. }| {
-            let name = location.filename().unwrap_or_default().to_owned();
-            (name, size)
-        });
-        names.try_collect().await
     }
 
     /// Writes an object: its mesh, if it is new here, then its record.
@@ -183,14 +123,12 @@ impl SavedObjects {
         let written = async {
             if let Some(mesh) = mesh {
                 let hash = saved.mesh_hash().unwrap_or_default();
-                self.files.put(&mesh_path(&hash), mesh.into()).await?;
+                self.files.write(&mesh_path(&hash), mesh).await?;
             }
-            let record = PutPayload::from(saved.to_bytes());
-            self.files
-                .put(&record_path(&saved.request.object_id), record)
-                .await
+            let path = record_path(&saved.request.object_id);
+            self.files.write(&path, seal(saved)).await
         };
-        written.await.map(|_| ()).map_err(|error| failed(&error))
+        written.await.map_err(|error| failed(&error))
     }
 
     /// Deletes a record.
@@ -198,32 +136,15 @@ impl SavedObjects {
     /// # Errors
     /// [`ServiceError::StoreFailed`].
     pub(crate) async fn delete_record(&self, id: &str) -> Result<(), ServiceError> {
-        self.delete(&record_path(id))
-            .await
-            .map_err(|error| failed(&error))
+        let deleted = self.files.delete(&record_path(id)).await;
+        deleted.map_err(|error| failed(&error))
     }
 
     /// Deletes a mesh that no record names any more. If that fails, the next start does it.
     pub(crate) async fn delete_mesh(&self, hash: &MeshHash) {
-        if let Err(error) = self.delete(&mesh_path(hash)).await {
+        if let Err(error) = self.files.delete(&mesh_path(hash)).await {
             tracing::warn!(mesh = hex(hash), %error, "cannot delete the mesh of a deleted object");
         }
-    }
-
-    /// Deletes a file; one that is missing counts as deleted.
-    async fn delete(&self, path: &Path) -> Result<(), Error> {
-        match self.files.delete(path).await {
-            Err(Error::NotFound { .. }) => {}
-            result => result?,
-        }
-        let synced = self.folder.as_ref().map_or(Ok(()), |folder| {
-            let parent = path.parts().next();
-            folder.sync(parent.as_ref().map_or("", AsRef::as_ref))
-        });
-        synced.map_err(|source| Error::Generic {
-            store: "folder",
-            source: source.into(),
-        })
     }
 
     /// The record of an object.
@@ -242,7 +163,7 @@ impl SavedObjects {
     /// [`ServiceError::StoreFailed`].
     pub(crate) async fn mesh(&self, saved: &SavedObject) -> Result<Option<Bytes>, ServiceError> {
         let path = mesh_path(&saved.mesh_hash().unwrap_or_default());
-        let read = self.read(&path, saved.mesh_bytes).await;
+        let read = self.files.read(&path, saved.mesh_bytes).await;
         read.map_err(|error| failed(&error))
     }
 
@@ -256,7 +177,8 @@ impl SavedObjects {
     /// # Errors
     /// [`ServiceError::StoreFailed`].
     pub(crate) async fn move_mesh_aside(&self, hash: &MeshHash) -> Result<(), ServiceError> {
-        match self.move_aside(&mesh_path(hash), "its SHA-256 is wrong").await {
+        let path = mesh_path(hash);
+        match self.files.move_aside(&path, "its SHA-256 is wrong").await {
             Err(Error::NotFound { .. }) => Ok(()),
             moved => moved.map_err(|error| failed(&error)),
         }
@@ -264,48 +186,17 @@ impl SavedObjects {
 
     /// Reads a record; none if it is missing or damaged, in which case it is moved aside.
     async fn readable_record(&self, id: &str) -> Result<Option<SavedObject>, Error> {
-        let path = record_path(id);
-        let Some(bytes) = self.read(&path, LARGEST_RECORD).await? else {
-            return Ok(None);
-        };
-        match SavedObject::from_bytes(id, &bytes) {
-            Ok(saved) => Ok(Some(saved)),
-            Err(damage) => {
-                self.move_aside(&path, &damage.to_string()).await?;
-                Ok(None)
-            }
-        }
-    }
-
-    /// Reads a file; nothing of it if it has more than `most` bytes. None if there is no such file.
-    async fn read(&self, path: &Path, most: u64) -> Result<Option<Bytes>, Error> {
-        let file = match self.files.get(path).await {
-            Err(Error::NotFound { .. }) => return Ok(None),
-            file => file?,
-        };
-        if file.meta.size > most {
-            return Ok(Some(Bytes::new()));
-        }
-        file.bytes().await.map(Some)
-    }
-
-    async fn move_aside(&self, path: &Path, reason: &str) -> Result<(), Error> {
-        tracing::error!(file = %path, reason, "moved a damaged file of the store to damaged/");
-        let aside = Path::from(format!("{DAMAGED}/{path}"));
-        self.files.rename(path, &aside).await
+        let parse = |message: &[u8]| SavedObject::from_message(id, message);
+        self.files
+            .read_sealed(&record_path(id), LARGEST_RECORD, parse)
+            .await
     }
 }
 
 fn record_path(id: &str) -> Path {
-    Path::from_iter([RECORDS, id])
+    Path::from_iter([OBJECTS, id])
 }
 
 fn mesh_path(hash: &MeshHash) -> Path {
     Path::from_iter([MESHES, hex(hash).as_str()])
-}
-
-/// The error of a call for one of the store, whose details only the log has.
-fn failed(error: &Error) -> ServiceError {
-    tracing::error!(%error, "the store failed");
-    ServiceError::StoreFailed
 }

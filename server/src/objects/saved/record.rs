@@ -1,22 +1,19 @@
-//! The record of a saved object as bytes: SHA-256 of a message, then the message.
+//! The record of a saved object.
 
 use std::time::SystemTime;
 
 use grasp_proto::v1;
 use prost::Message;
-use sha2::{Digest as _, Sha256};
 use uuid::Uuid;
 
 use crate::{
     objects::{Record, name_of},
+    saved::Unreadable,
     validate::RequestKey,
 };
 
 /// SHA-256 of a mesh.
 pub(crate) type MeshHash = [u8; 32];
-
-/// Length of the hash before the message.
-const HASH_BYTES: usize = 32;
 
 /// Everything about a saved object but its mesh.
 #[derive(Clone, PartialEq, Message)]
@@ -48,20 +45,6 @@ pub(crate) struct SavedObject {
     /// What describes the object while its mesh is not in memory: without labels, etag, times and atlas.
     #[prost(message, required, tag = "9")]
     pub description: v1::Object,
-}
-
-/// What is wrong with bytes that should be a record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum RecordDamage {
-    /// They do not have the hash before them.
-    #[error("its SHA-256 does not match its content")]
-    Hash,
-    /// They are no record of this version.
-    #[error("its content is not a record of this version")]
-    Message,
-    /// They are the record of another object.
-    #[error("it describes another object")]
-    Name,
 }
 
 impl SavedObject {
@@ -127,33 +110,21 @@ impl SavedObject {
         self.mesh_sha256.as_slice().try_into().ok()
     }
 
-    /// The record as bytes.
-    pub(crate) fn to_bytes(&self) -> Vec<u8> {
-        let message = self.encode_to_vec();
-        let mut bytes = Sha256::digest(&message).to_vec();
-        bytes.extend(message);
-        bytes
-    }
-
     /// The record of the object with this id.
     ///
     /// # Errors
-    /// What is wrong with the bytes.
-    pub(crate) fn from_bytes(id: &str, bytes: &[u8]) -> Result<Self, RecordDamage> {
-        let (hash, message) = bytes.split_at_checked(HASH_BYTES).ok_or(RecordDamage::Hash)?;
-        if Sha256::digest(message).as_slice() != hash {
-            return Err(RecordDamage::Hash);
-        }
-        let saved = Self::decode(message).map_err(|_| RecordDamage::Message)?;
+    /// What is wrong with the message.
+    pub(crate) fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
+        let saved = Self::decode(message).map_err(|_| Unreadable::Message)?;
         let is_complete = saved.mesh_hash().is_some()
             && saved.record().is_some()
             && !saved.etag.is_empty()
             && saved.request_id.is_empty() == saved.request_key().is_none();
         if !is_complete {
-            return Err(RecordDamage::Message);
+            return Err(Unreadable::Message);
         }
         if saved.description.name != name_of(id) || saved.request.object_id != id {
-            return Err(RecordDamage::Name);
+            return Err(Unreadable::Name);
         }
         Ok(saved)
     }
@@ -164,6 +135,11 @@ mod tests {
     use std::time::{Duration, UNIX_EPOCH};
 
     use super::*;
+    use crate::saved::{seal, unsealed};
+
+    fn read(id: &str, bytes: &[u8]) -> Result<SavedObject, Unreadable> {
+        SavedObject::from_message(id, unsealed(bytes)?)
+    }
 
     fn saved() -> SavedObject {
         let request = v1::CreateObjectRequest {
@@ -191,7 +167,7 @@ mod tests {
     #[test]
     fn a_record_is_read_as_it_was_written() {
         let before = saved();
-        let after = SavedObject::from_bytes("mug", &before.to_bytes()).unwrap();
+        let after = read("mug", &seal(&before)).unwrap();
         assert_eq!(before, after);
         let record = after.record().unwrap();
         assert_eq!(record.created, UNIX_EPOCH + Duration::from_nanos(1_234_567_891));
@@ -202,37 +178,30 @@ mod tests {
 
     #[test]
     fn every_changed_byte_is_found() {
-        let bytes = saved().to_bytes();
+        let bytes = seal(&saved());
         for place in 0..bytes.len() {
             for flipped in [0x01, 0x80, 0xff] {
-                let mut damaged = bytes.clone();
+                let mut damaged = bytes.to_vec();
                 damaged[place] ^= flipped;
-                assert_eq!(
-                    SavedObject::from_bytes("mug", &damaged),
-                    Err(RecordDamage::Hash),
-                    "byte {place}"
-                );
+                assert_eq!(read("mug", &damaged), Err(Unreadable::Hash), "byte {place}");
             }
         }
     }
 
     #[test]
     fn every_cut_is_found() {
-        let bytes = saved().to_bytes();
+        let bytes = seal(&saved());
         for length in 0..bytes.len() {
-            assert!(
-                SavedObject::from_bytes("mug", &bytes[..length]).is_err(),
-                "{length}"
-            );
+            assert!(read("mug", &bytes[..length]).is_err(), "{length}");
         }
         let longer: Vec<u8> = bytes.iter().copied().chain([0]).collect();
-        assert!(SavedObject::from_bytes("mug", &longer).is_err());
+        assert!(read("mug", &longer).is_err());
     }
 
     #[test]
     fn a_record_of_another_object_or_version_is_found() {
-        let bytes = saved().to_bytes();
-        assert_eq!(SavedObject::from_bytes("cup", &bytes), Err(RecordDamage::Name));
+        let bytes = seal(&saved());
+        assert_eq!(read("cup", &bytes), Err(Unreadable::Name));
         for incomplete in [
             SavedObject {
                 mesh_sha256: vec![9; 31],
@@ -247,8 +216,8 @@ mod tests {
                 ..saved()
             },
         ] {
-            let bytes = incomplete.to_bytes();
-            assert_eq!(SavedObject::from_bytes("mug", &bytes), Err(RecordDamage::Message));
+            let bytes = seal(&incomplete);
+            assert_eq!(read("mug", &bytes), Err(Unreadable::Message));
         }
     }
 }

@@ -20,7 +20,7 @@ use tokio::runtime::Runtime;
 use uuid::Uuid;
 
 use super::*;
-use crate::executor::wait_for;
+use crate::saved::{StorePlace, folders::DAMAGED, unsealed, wait_for};
 use crate::{
     limits::StoreLimits,
     objects::{
@@ -53,9 +53,9 @@ impl Folder {
     }
 
     fn open(&self, maximum: usize) -> SavedObjects {
-        let maximum = maximum.try_into().unwrap();
         let place = StorePlace::Folder(self.0.clone());
-        SavedObjects::open(&place, maximum).unwrap().unwrap()
+        let files = SavedFiles::open(&place).unwrap().unwrap();
+        SavedObjects::new(Arc::new(files), maximum.try_into().unwrap())
     }
 
     /// The objects of a server that starts now, with room for so many in memory.
@@ -174,7 +174,7 @@ fn a_mesh_is_kept_as_long_as_an_object_has_it() {
     objects.remove("c", None).unwrap();
     drop(objects);
     let objects = folder.objects(10, 10);
-    assert_eq!((folder.names(RECORDS).len(), folder.names(MESHES).len()), (1, 1));
+    assert_eq!((folder.names(OBJECTS).len(), folder.names(MESHES).len()), (1, 1));
     wait_for(objects.loaded("b")).unwrap();
     objects.remove("b", None).unwrap();
     assert_eq!(folder.names(MESHES), [""; 0]);
@@ -189,9 +189,9 @@ fn remains_of_interrupted_writes_are_removed_at_the_start() {
     // A mesh whose record was not written yet, and files that were not moved to their places yet.
     fs::write(folder.0.join(MESHES).join("0".repeat(64)), "v").unwrap();
     fs::write(folder.0.join(MESHES).join("1#1"), "v").unwrap();
-    fs::write(folder.0.join(RECORDS).join("b#1"), "r").unwrap();
+    fs::write(folder.0.join(OBJECTS).join("b#1"), "r").unwrap();
     drop(folder.objects(10, 10));
-    assert_eq!((folder.names(RECORDS).len(), folder.names(MESHES).len()), (1, 1));
+    assert_eq!((folder.names(OBJECTS).len(), folder.names(MESHES).len()), (1, 1));
 }
 
 #[test]
@@ -200,7 +200,7 @@ fn a_damaged_record_is_moved_aside_and_its_mesh_kept() {
     let _context = runtime.enter();
     let folder = Folder::new();
     create(&folder.objects(10, 10), "a", 1, None).unwrap();
-    let path = folder.0.join(RECORDS).join("a");
+    let path = folder.0.join(OBJECTS).join("a");
     let mut bytes = fs::read(&path).unwrap();
     bytes[40] ^= 1;
     fs::write(&path, bytes).unwrap();
@@ -263,11 +263,11 @@ fn a_failed_write_leaves_nothing() {
     let objects = folder.objects(10, 10);
     create(&objects, "a", 1, None).unwrap();
     // A folder in place of the record cannot be replaced by a file.
-    fs::create_dir_all(folder.0.join(RECORDS).join("b").join("c")).unwrap();
+    fs::create_dir_all(folder.0.join(OBJECTS).join("b").join("c")).unwrap();
     let failed = create(&objects, "b", 2, None).map(|_| ());
     assert_eq!(failed, Err(ServiceError::StoreFailed));
     assert!(!objects.contains("b"));
-    fs::remove_dir_all(folder.0.join(RECORDS).join("b")).unwrap();
+    fs::remove_dir_all(folder.0.join(OBJECTS).join("b")).unwrap();
     create(&objects, "b", 2, None).unwrap();
     drop(objects);
     assert_eq!(folder.objects(10, 10).get("b").unwrap().id(), "b");
@@ -318,7 +318,7 @@ fn a_failed_change_leaves_the_object_as_it_was() {
     let folder = Folder::new();
     let objects = folder.objects(10, 10);
     let base = create(&objects, "a", 1, None).unwrap();
-    let path = folder.0.join(RECORDS).join("a");
+    let path = folder.0.join(OBJECTS).join("a");
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, "not a record").unwrap();
     let failed = objects.replace(&base, labels(9), None);
@@ -336,14 +336,14 @@ fn ten_thousand_records_are_read_at_the_start() {
     let _context = runtime.enter();
     let folder = Folder::new();
     create(&folder.objects(10, 10), "a", 1, None).unwrap();
-    let first = fs::read(folder.0.join(RECORDS).join("a")).unwrap();
-    let first = SavedObject::from_bytes("a", &first).unwrap();
+    let first = fs::read(folder.0.join(OBJECTS).join("a")).unwrap();
+    let first = SavedObject::from_message("a", unsealed(&first).unwrap()).unwrap();
     for number in 1..RECORDS_SAVED {
         let id = format!("a{number}");
         let mut saved = first.clone();
         saved.description.name = name_of(&id);
         saved.request.object_id.clone_from(&id);
-        fs::write(folder.0.join(RECORDS).join(&id), saved.to_bytes()).unwrap();
+        fs::write(folder.0.join(OBJECTS).join(&id), seal(&saved)).unwrap();
     }
     let start = Instant::now();
     let found = wait_for(folder.open(RECORDS_SAVED).read_all()).unwrap();
@@ -462,7 +462,7 @@ proptest! {
         }
         drop(objects);
         check(&folder.objects(2, 100), &model)?;
-        prop_assert_eq!(folder.names(RECORDS).len(), model.len());
+        prop_assert_eq!(folder.names(OBJECTS).len(), model.len());
         prop_assert_eq!(folder.names(DAMAGED).len(), 0);
     }
 }

@@ -19,8 +19,9 @@ use crate::{
         Body, Listed, Resting, Revision, StoredObject,
         build::build_object,
         name_of,
-        saved::{SavedObject, SavedObjects, StoreError},
+        saved::{SavedObject, SavedObjects},
     },
+    saved::StoreError,
     validate::{Violations, object_fields},
 };
 

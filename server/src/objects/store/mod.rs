@@ -39,8 +39,8 @@ use super::{
 };
 use crate::{
     error::ServiceError,
-    executor::wait_for,
     limits::StoreLimits,
+    saved::wait_for,
     validate::{Labels, ObjectChange, PageQuery, RequestKey},
 };
 

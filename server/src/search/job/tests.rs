@@ -238,7 +238,7 @@ fn answers_every_request_that_passes_validation() {
     let searched = Cell::new([0; 3]);
     let outcome = TestRunner::new(runs()).run(&(request(), objects()), |(request, object)| {
         let arrived = Instant::now();
-        let Ok(query) = find_query(request, ("thesis", &RigStore::new(0)), |_| true) else {
+        let Ok(query) = find_query(request, ("thesis", &RigStore::new(0, None)), |_| true) else {
             return Ok(());
         };
         let kind = match &query.presenting_hand {

@@ -1,4 +1,4 @@
-//! Where created objects are kept.
+//! Where what clients create is kept.
 
 use std::{
     fmt,
@@ -11,13 +11,13 @@ use etcetera::BaseStrategy as _;
 const DEFAULT_FOLDER: &str = "grasp";
 
 /// What the setting must be.
-pub(super) const NEEDED: &str = if cfg!(feature = "s3") {
+pub(crate) const NEEDED_PLACE: &str = if cfg!(feature = "s3") {
     "memory, a folder, or s3://BUCKET/PREFIX"
 } else {
     "memory or a folder (s3:// needs a server built with the feature s3)"
 };
 
-/// Where created objects are kept.
+/// Where created objects and rigs are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum StorePlace {
     /// Nowhere but in memory: they end with the server, or when they are evicted.
@@ -45,7 +45,7 @@ impl Default for StorePlace {
 
 impl StorePlace {
     /// The folder; none if objects are elsewhere.
-    pub(super) fn folder(&self) -> Option<&Path> {
+    pub(crate) fn folder(&self) -> Option<&Path> {
         match self {
             Self::Folder(path) => Some(path),
             Self::Memory => None,
@@ -55,7 +55,7 @@ impl StorePlace {
     }
 
     /// Reads `memory`, a folder, or `s3://bucket/prefix`; none if it is none of them.
-    pub(super) fn parse(text: &str) -> Option<Self> {
+    pub(crate) fn parse(text: &str) -> Option<Self> {
         match text.split_once("://") {
             None if text.is_empty() => None,
             None if text == "memory" => Some(Self::Memory),

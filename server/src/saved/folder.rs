@@ -1,4 +1,4 @@
-//! What a folder of saved objects needs beyond what `object_store` does: one server at a time, no remains of interrupted writes, and
+//! What a folder needs beyond what `object_store` does: one server at a time, no remains of interrupted writes, and
 //! deletions that last.
 
 use std::{

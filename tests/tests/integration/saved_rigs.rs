@@ -1,0 +1,161 @@
+//! Created rigs outlast the server.
+
+use std::{fs, path::Path};
+
+use grasp_client::{FindRequest, Handedness, ReceivingHand};
+use grasp_proto::v1;
+use grasp_server::{Config, ServeError, Server, config::StorePlace};
+use grasp_tests::TestServer;
+use tonic::{Code, Status};
+
+use crate::{
+    fixtures::{Folder, bounded, reason},
+    own_hands::{model, new_rig},
+};
+
+fn save_in(folder: &Path) -> impl FnOnce(&mut Config) {
+    let place = StorePlace::Folder(folder.to_owned());
+    move |config| config.place = place
+}
+
+async fn start(folder: &Folder) -> TestServer {
+    TestServer::start_with(save_in(folder.path())).await
+}
+
+async fn all(server: &TestServer) -> Vec<v1::Rig> {
+    let page = server
+        .rigs()
+        .await
+        .list_rigs(v1::ListRigsRequest::default())
+        .await
+        .unwrap();
+    page.into_inner().rigs
+}
+
+async fn create(server: &TestServer, id: &str) -> Result<v1::Rig, Status> {
+    let request = v1::CreateRigRequest {
+        rig_id: id.to_owned(),
+        source: Some(v1::create_rig_request::Source::Model(model(1.0))),
+        handedness: v1::Handedness::Right.into(),
+        ..Default::default()
+    };
+    let answer = server.rigs().await.create_rig(request).await?;
+    Ok(answer.into_inner().rig.expect("an answer has the rig"))
+}
+
+async fn delete(server: &TestServer, id: &str) -> Result<(), Status> {
+    let name = format!("rigs/{id}");
+    let mut client = server.rigs().await;
+    client.delete_rig(v1::DeleteRigRequest { name }).await.map(|_| ())
+}
+
+/// A search with a rig that always has the same answer.
+fn find(rig: &str) -> FindRequest {
+    FindRequest {
+        receiving_hand: ReceivingHand {
+            rig: Some(rig.to_owned()),
+            handedness: Some(Handedness::Right),
+            ..ReceivingHand::default()
+        },
+        seed: Some(7),
+        reproducible: true,
+        budget: Some(std::time::Duration::from_secs(10)),
+        ..FindRequest::new("objects/remote")
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_restart_keeps_rigs_and_their_grasps() {
+    let folder = Folder::absent("saved-rigs");
+    let server = start(&folder).await;
+    let client = server.client().await;
+    client.create_rig(&new_rig("large", 1.1)).await.unwrap();
+    create(&server, "gone").await.unwrap();
+    delete(&server, "gone").await.unwrap();
+    let before = all(&server).await;
+    let grasp_before = client.find_grasp(&find("rigs/large")).await.unwrap().grasp;
+    assert!(grasp_before.is_some());
+    drop(client);
+    server.stop().await;
+
+    let server = start(&folder).await;
+    assert_eq!(all(&server).await, before);
+    let client = server.client().await;
+    let grasp_after = client.find_grasp(&find("rigs/large")).await.unwrap().grasp;
+    assert_eq!(grasp_before, grasp_after);
+    let again = create(&server, "large").await.unwrap_err();
+    assert_eq!(again.code(), Code::AlreadyExists);
+    delete(&server, "large").await.unwrap();
+    drop(client);
+    server.stop().await;
+
+    let server = start(&folder).await;
+    assert_eq!(all(&server).await.len(), before.len() - 1);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_rig_is_moved_aside_and_can_be_created_again() {
+    let folder = Folder::absent("saved-rigs-damage");
+    let server = start(&folder).await;
+    create(&server, "mine").await.unwrap();
+    server.stop().await;
+    let path = folder.path().join("rigs/mine");
+    let mut bytes = fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&path, bytes).unwrap();
+
+    let server = start(&folder).await;
+    assert!(all(&server).await.iter().all(|rig| rig.built_in));
+    assert!(folder.path().join("damaged/rigs/mine").exists());
+    create(&server, "mine").await.unwrap();
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_failing_disk_fails_the_call_and_leaves_no_rig() {
+    let folder = Folder::absent("saved-rigs-failure");
+    let server = start(&folder).await;
+    // A folder in place of the record cannot be replaced by a file.
+    fs::create_dir_all(folder.path().join("rigs/mine/x")).unwrap();
+    let status = create(&server, "mine").await.unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::Unavailable, "STORE_FAILED".to_owned())
+    );
+    assert!(all(&server).await.iter().all(|rig| rig.built_in));
+    fs::remove_dir_all(folder.path().join("rigs/mine")).unwrap();
+    create(&server, "mine").await.unwrap();
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_with_too_low_limits_for_saved_rigs_does_not_start() {
+    let folder = Folder::absent("saved-rigs-limits");
+    let server = start(&folder).await;
+    create(&server, "mine").await.unwrap();
+    server.stop().await;
+    let mut config = Config {
+        builder_threads: 0,
+        ..Config::default()
+    };
+    save_in(folder.path())(&mut config);
+    config.maximum_object_bytes = 1024.try_into().unwrap();
+    let server = tokio::task::spawn_blocking(|| Server::new(config))
+        .await
+        .unwrap()
+        .unwrap();
+    let listener = tokio::net::TcpListener::bind("[::1]:0").await.unwrap();
+    let ended = bounded(
+        "the end of the start",
+        server.serve(listener, std::future::pending()),
+    )
+    .await;
+    let Err(ServeError::Store(error)) = ended else {
+        panic!("the rig would be lost to its clients without a word: {ended:?}");
+    };
+    let text = error.to_string();
+    assert!(text.contains("rigs/mine") && text.contains("1 to 1024"), "{text}");
+    assert!(folder.path().join("rigs/mine").exists());
+}
