@@ -83,6 +83,15 @@ impl TriangleMesh {
         })
     }
 
+    /// The same mesh, `scale` times as large about its origin.
+    ///
+    /// # Errors
+    /// The first violation found: at the new size, a coordinate may overflow, or an area vanish.
+    pub fn scaled(&self, scale: f32) -> Result<Self, MeshError> {
+        let positions = self.positions.iter().map(|&position| position * scale);
+        Self::new(positions.collect(), self.triangles.clone())
+    }
+
     /// The triangles whose index `is_chosen` accepts, with the vertices they use; none if it accepts none.
     pub fn submesh(&self, is_chosen: impl Fn(usize) -> bool) -> Option<Self> {
         let mut submesh = Self {

@@ -42,6 +42,19 @@ impl OrientedBox {
         unstopped(|stop| Self::around_until(mesh, stop))
     }
 
+    /// The box of what it encloses, `scale` times as large about the origin of the object's frame.
+    #[must_use]
+    pub fn scaled(&self, scale: f32) -> Self {
+        let Pose {
+            position,
+            orientation,
+        } = self.object_from_box;
+        Self {
+            object_from_box: Pose::new(position * scale, orientation),
+            half_extents: self.half_extents * scale,
+        }
+    }
+
     /// As [`Self::around`], unless it is stopped.
     ///
     /// # Errors

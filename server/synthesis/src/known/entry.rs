@@ -13,7 +13,7 @@ use crate::{
         constraints::Constraints,
         grasp::{Contact, Grasp},
         grasp_type::Classification,
-        hand::rig::Rig,
+        hand::{HandPart, rig::Rig},
         score::{Score, Term, Values},
     },
     physical::{
@@ -160,6 +160,36 @@ impl Entry {
             contact.normal = displacement.transform_vector(contact.normal);
         }
         moved
+    }
+
+    /// The grip on its object at another size, `scale` times the original: contacts stay where they are on the surface, and the
+    /// hand, still closed as before, moves with those of the palm or, without any, of all digits. Scores stay as they were.
+    #[must_use]
+    pub fn on_resized(&self, scale: f32) -> Self {
+        let mut resized = self.clone();
+        let wrist = &mut resized.grip.pose.frame_from_wrist;
+        *wrist = self.way_on_resized(scale) * *wrist;
+        for contact in &mut resized.contacts {
+            contact.position *= scale;
+        }
+        resized
+    }
+
+    /// How the hand moves in [`Self::on_resized`].
+    pub fn way_on_resized(&self, scale: f32) -> Pose {
+        let middle = |of: &dyn Fn(&Contact) -> bool| {
+            let (sum, count) = self
+                .contacts
+                .iter()
+                .filter(|contact| of(contact))
+                .fold((Vec3::ZERO, 0.0_f32), |(sum, count), contact| {
+                    (sum + contact.position, count + 1.0)
+                });
+            (count > 0.0).then_some(sum / count)
+        };
+        let of_palm = middle(&|contact| contact.part == HandPart::Palm);
+        let carried = of_palm.or_else(|| middle(&|_| true)).unwrap_or_default();
+        Pose::from_position(carried * (scale - 1.0))
     }
 
     /// The solids of the hand in the object's frame. Storing them would triple the size of an entry.

@@ -8,12 +8,14 @@
 //! Hence the atlas never answers alone: a fresh search runs in parallel.
 //!
 //! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]). An object without
-//! an atlas takes its seeds from similar boxes ([`primitives`], [`transferred_grips`]).
+//! an atlas takes its seeds from similar boxes ([`primitives`], [`transferred_grips`]), one held out at another
+//! size from its atlas ([`resized_grips`]).
 
 pub mod atlas;
 mod closure_screen;
 pub mod codec;
 pub mod entry;
+mod farthest;
 pub mod finger_subsets;
 pub mod friction_uses;
 pub mod gravity;
@@ -26,6 +28,7 @@ mod occupancy;
 pub mod primitives;
 pub mod recent_grips;
 pub mod recheck;
+pub mod resized_grips;
 pub mod seed_source;
 pub mod seeds;
 mod shortlist;

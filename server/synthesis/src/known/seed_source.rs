@@ -6,6 +6,7 @@ use super::{
     atlas::Atlas,
     entry::Entry,
     grips::Grips,
+    resized_grips::ResizedGrips,
     seeds::Seeds,
     transferred_grips::{Candidates, TransferredGrips},
 };
@@ -29,6 +30,8 @@ pub enum SeedSource {
     Atlas(Arc<Atlas>),
     /// Grips transferred from similar boxes, for an object without an atlas.
     Transferred(Arc<TransferredGrips>),
+    /// Known grips of the object at another size.
+    Resized(ResizedGrips),
 }
 
 impl SeedSource {
@@ -36,6 +39,7 @@ impl SeedSource {
     pub fn atlas(&self) -> Option<&Arc<Atlas>> {
         match self {
             Self::Atlas(atlas) => Some(atlas),
+            Self::Resized(grips) => Some(grips.atlas()),
             Self::Nothing | Self::Transferred(_) => None,
         }
     }
@@ -62,10 +66,11 @@ pub struct SeedSets {
     /// receiver stands, and of all.
     suitable: OnceLock<Seeds>,
     nearest: OnceLock<Seeds>,
-    /// From the transferred grips that pass the closure screen.
-    passing: OnceLock<(Grips, Seeds)>,
-    /// From all transferred grips.
-    fitting: OnceLock<(Grips, Seeds)>,
+    /// From grips that are moved to the object: of transferred ones, those that pass the closure screen; of resized ones,
+    /// those whose forearms come from where the receiver stands.
+    preferred: OnceLock<(Grips, Seeds)>,
+    /// From all of them.
+    moved: OnceLock<(Grips, Seeds)>,
 }
 
 impl SeedSets {
@@ -93,10 +98,13 @@ impl SeedSets {
         match &self.source {
             SeedSource::Nothing => None,
             SeedSource::Atlas(atlas) => {
-                let is_anywhere = attempt.is_multiple_of(ANYWHERE_EVERY);
-                let receiver = (!is_anywhere).then_some(&context.presented.receiver);
+                let receiver = expected_receiver(attempt, context);
                 let seeds = self.of_atlas(atlas, receiver, context, interrupted)?;
                 Some((seeds, atlas.entries()))
+            }
+            SeedSource::Resized(resized) => {
+                let (grips, seeds) = self.of_resized(resized, attempt, context, interrupted)?;
+                Some((seeds, grips.entries()))
             }
             SeedSource::Transferred(transferred) => {
                 let (grips, seeds) = self.of_transferred(transferred, attempt, context, interrupted)?;
@@ -114,7 +122,6 @@ impl SeedSets {
     ) -> Option<&Seeds> {
         let barriers = context.presented.barriers();
         let mechanisms = context.mechanisms;
-        let receiver = receiver.filter(|receiver| receiver.is_expected());
         let set = if receiver.is_some() {
             &self.suitable
         } else {
@@ -123,19 +130,8 @@ impl SeedSets {
         if let Some(seeds) = set.get() {
             return Some(seeds);
         }
-        let forearms = atlas.grips().forearms();
-        let suits = |entry: u16| {
-            receiver.is_none_or(|receiver| receiver.suits_forearm(forearms[usize::from(entry)]) >= SUITABLE)
-        };
-        let (holding, unordered) = if mechanisms.has(Mechanism::GravityOrder) {
-            (atlas.holding_under(context.presented.up), 0)
-        } else {
-            (&[][..], atlas.entries().len() as u16)
-        };
-        let candidates =
-            holding.iter().copied().chain(0..unordered).filter(|&entry| {
-                suits(entry) && atlas.entries()[usize::from(entry)].meets(context.constraints)
-            });
+        let candidates = candidates(atlas, receiver, context)
+            .filter(|&entry| atlas.entries()[usize::from(entry)].meets(context.constraints));
         let new_seeds = Seeds::of_with(
             mechanisms,
             atlas.grips(),
@@ -160,9 +156,9 @@ impl SeedSets {
     ) -> Option<&(Grips, Seeds)> {
         let screens = context.mechanisms.has(Mechanism::ClosureScreen);
         let (candidates, seeds) = if screens && attempt.is_multiple_of(2) {
-            (Candidates::Passing, &self.passing)
+            (Candidates::Passing, &self.preferred)
         } else {
-            (Candidates::All, &self.fitting)
+            (Candidates::All, &self.moved)
         };
         if let Some(new_seeds) = seeds.get() {
             return Some(new_seeds);
@@ -175,15 +171,70 @@ impl SeedSets {
             context.constraints,
             interrupted,
         )?;
-        let all = 0..grips.entries().len() as u16;
-        let new_seeds = Seeds::of_with(
-            context.mechanisms,
-            &grips,
-            context.rig,
-            all,
-            barriers,
-            interrupted,
-        )?;
+        let new_seeds = of_all(&grips, context, interrupted)?;
         Some(seeds.get_or_init(|| (grips, new_seeds)))
     }
+
+    fn of_resized(
+        &self,
+        resized: &ResizedGrips,
+        attempt: u64,
+        context: &SeedContext<'_>,
+        interrupted: &impl Fn() -> bool,
+    ) -> Option<&(Grips, Seeds)> {
+        let receiver = expected_receiver(attempt, context);
+        let seeds = if receiver.is_some() {
+            &self.preferred
+        } else {
+            &self.moved
+        };
+        if let Some(new_seeds) = seeds.get() {
+            return Some(new_seeds);
+        }
+        let grips = resized.away_from(
+            candidates(resized.atlas(), receiver, context),
+            context.rig,
+            context.presented.barriers(),
+            context.constraints,
+            interrupted,
+        )?;
+        let new_seeds = of_all(&grips, context, interrupted)?;
+        Some(seeds.get_or_init(|| (grips, new_seeds)))
+    }
+}
+
+/// The receiver that an attempt's seeds should suit, if one is expected; some attempts take any.
+fn expected_receiver<'a>(attempt: u64, context: &SeedContext<'a>) -> Option<&'a Receiver> {
+    let receiver = &context.presented.receiver;
+    (!attempt.is_multiple_of(ANYWHERE_EVERY) && receiver.is_expected()).then_some(receiver)
+}
+
+/// The entries of an atlas that hold under this gravity, by falling score, and suit the receiver, if one is given.
+fn candidates<'a>(
+    atlas: &'a Atlas,
+    receiver: Option<&'a Receiver>,
+    context: &SeedContext<'_>,
+) -> impl Iterator<Item = u16> + 'a {
+    let forearms = atlas.grips().forearms();
+    let (holding, unordered) = if context.mechanisms.has(Mechanism::GravityOrder) {
+        (atlas.holding_under(context.presented.up), 0)
+    } else {
+        (&[][..], atlas.entries().len() as u16)
+    };
+    let all = holding.iter().copied().chain(0..unordered);
+    all.filter(move |&entry| {
+        receiver.is_none_or(|receiver| receiver.suits_forearm(forearms[usize::from(entry)]) >= SUITABLE)
+    })
+}
+
+/// Seeds from all grips, which were selected for the holdout.
+fn of_all(grips: &Grips, context: &SeedContext<'_>, interrupted: &impl Fn() -> bool) -> Option<Seeds> {
+    Seeds::of_with(
+        context.mechanisms,
+        grips,
+        context.rig,
+        0..grips.entries().len() as u16,
+        context.presented.barriers(),
+        interrupted,
+    )
 }

@@ -1,11 +1,11 @@
 //! Grips of similar boxes, transferred to an object.
 
-use std::{cmp::Reverse, sync::Arc};
+use std::sync::Arc;
 
 use glam::{Mat3, Quat, Vec3};
 
 use super::{
-    closure_screen::ClosureScreen, entry::Entry, grips::Grips, primitives::HeldPrimitive, seeds::nanometres,
+    closure_screen::ClosureScreen, entry::Entry, farthest::farthest, grips::Grips, primitives::HeldPrimitive,
 };
 use crate::{
     base::{
@@ -14,7 +14,7 @@ use crate::{
     },
     geometry::oriented_box::OrientedBox,
     model::{constraints::Constraints, grasp::Contact, hand::rig::Rig, object::GraspObject},
-    physical::{barriers::Barriers, grip::GIVER_CLEARANCE},
+    physical::barriers::Barriers,
 };
 
 /// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty
@@ -29,14 +29,7 @@ const NEAREST_BOXES: usize = 5;
 /// leaves so few that answers come later.
 const MAX_CONTACT_OFFSET: f32 = 0.002;
 
-/// Largest number of grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer
-/// answer fewer givers, more delay answers.
-const MAX_SELECTED: usize = 96;
-
-/// Grips compared with one giver by inner spheres between two clock checks.
-const BOUNDS_PER_CHECK: usize = 128;
-
-/// Grips transferred to the object between two checks of clock or stop.
+/// Grips transferred to the object between two checks of the stop.
 const MOVES_PER_CHECK: usize = 32;
 
 /// Smallest size in comparisons, in metres: logarithms need a positive one.
@@ -176,36 +169,14 @@ impl TransferredGrips {
     ) -> Option<Grips> {
         // An object unlike all boxes may have no passing grip and still be held by one that fits.
         let only_passing = candidates == Candidates::Passing && self.passing() > 0;
-        let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
-        let mut by_clearance: Vec<(Reverse<i32>, usize)> = Vec::with_capacity(self.transferred.len());
-        for (place, &transferred) in self.transferred.iter().enumerate() {
-            if place.is_multiple_of(bounds_per_check) && interrupted() {
-                return None;
-            }
-            if only_passing && !transferred.passes_screen {
-                continue;
-            }
-            let clearance = if barriers.is_empty() {
-                GIVER_CLEARANCE
-            } else {
-                self.clearance_upper_bound(transferred, barriers)
-            };
-            by_clearance.push((Reverse(nanometres(clearance.min(GIVER_CLEARANCE))), place));
-        }
-        by_clearance.sort_unstable();
-        let mut entries = Vec::with_capacity(MAX_SELECTED);
-        for (count, (_, place)) in by_clearance.into_iter().enumerate() {
-            if entries.len() == MAX_SELECTED {
-                break;
-            }
-            if count.is_multiple_of(MOVES_PER_CHECK) && interrupted() {
-                return None;
-            }
-            let entry = self.entry(self.transferred[place]);
-            if entry.meets(constraints) {
-                entries.push(entry);
-            }
-        }
+        let candidates = self.transferred.iter().copied();
+        let entries = farthest(
+            candidates.filter(|transferred| !only_passing || transferred.passes_screen),
+            |transferred| self.clearance_upper_bound(transferred, barriers),
+            |transferred| self.entry(transferred),
+            (barriers, constraints),
+            interrupted,
+        )?;
         Some(Grips::new(rig, entries))
     }
 

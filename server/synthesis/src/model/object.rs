@@ -7,8 +7,13 @@ use glam::Vec3;
 use super::{parts::Parts, strategy::Validity};
 use crate::base::stop::{Stop, Stopped, unstopped};
 use crate::geometry::{
-    handles::Handles, local_shape::LocalShape, local_thickness::LocalThickness, mesh::TriangleMesh,
-    mesh_bvh::MeshBvh, oriented_box::OrientedBox, surface_samples::even_samples,
+    handles::Handles,
+    local_shape::LocalShape,
+    local_thickness::LocalThickness,
+    mesh::{MeshError, TriangleMesh},
+    mesh_bvh::MeshBvh,
+    oriented_box::OrientedBox,
+    surface_samples::even_samples,
     tapered_capsule::TaperedCapsule,
 };
 
@@ -79,6 +84,17 @@ pub enum ObjectError {
     },
 }
 
+/// Why an object cannot have another size.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ResizeError {
+    /// Its mass is not a positive number.
+    #[error("the mass would be {0} kg; it must be finite and more than 0")]
+    Mass(f32),
+    /// Its mesh is no mesh any more.
+    #[error("at this size, {0}")]
+    Mesh(#[from] MeshError),
+}
+
 impl GraspObject {
     /// Builds the search structures of an object.
     ///
@@ -118,7 +134,7 @@ impl GraspObject {
             Ok(checked) => checked,
             Err(errors) => return Ok(Err(errors)),
         };
-        let (measures, surface) = measures_and_surface(mesh, stop)?;
+        let (measures, surface) = measures_and_surface(mesh, None, stop)?;
         Ok(Ok(Self::of_parts(measures, Arc::new(surface), checked)))
     }
 
@@ -141,12 +157,48 @@ impl GraspObject {
             friction,
             forbidden_triangles,
         )?;
+        Ok(self.with_checked_properties(checked))
+    }
+
+    fn with_checked_properties(&self, checked: CheckedProperties) -> Self {
         let measures = Measures {
             bounding_box: self.bounding_box,
             local_thickness: self.local_thickness.clone(),
             local_shape: self.local_shape.clone(),
         };
-        Ok(Self::of_parts(measures, Arc::clone(&self.surface), checked))
+        Self::of_parts(measures, Arc::clone(&self.surface), checked)
+    }
+
+    /// The same object, `scale` times as large about the origin of its frame, with the given mass in kilograms. Its bounding
+    /// box is scaled; its surface and what is measured in terms of a hand's size are prepared again, unless the scale is 1.
+    ///
+    /// # Errors
+    /// [`Stopped`]; within, why it cannot have this size.
+    pub fn resized_until(
+        &self,
+        scale: f32,
+        mass: f32,
+        stop: Stop<'_>,
+    ) -> Result<Result<Self, ResizeError>, Stopped> {
+        if !(mass.is_finite() && mass > 0.0) {
+            return Ok(Err(ResizeError::Mass(mass)));
+        }
+        let properties = CheckedProperties {
+            mass,
+            centre_of_mass: self.centre_of_mass * scale,
+            friction: self.friction,
+            forbidden: self.forbidden.clone(),
+        };
+        if scale == 1.0 {
+            return Ok(Ok(self.with_checked_properties(properties)));
+        }
+        let mesh = match self.surface.mesh().scaled(scale) {
+            Ok(mesh) => mesh,
+            Err(error) => return Ok(Err(error.into())),
+        };
+        let bounding_box = self.bounding_box.scaled(scale);
+        let (measures, surface) = measures_and_surface(mesh, Some(bounding_box), stop)?;
+        Ok(Ok(Self::of_parts(measures, Arc::new(surface), properties)))
     }
 
     fn of_parts(measures: Measures, surface: Arc<MeshBvh>, properties: CheckedProperties) -> Self {
@@ -299,10 +351,17 @@ struct Measures {
 }
 
 impl Measures {
-    fn of(mesh: &TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
+    fn of(
+        mesh: &TriangleMesh,
+        bounding_box: Option<OrientedBox>,
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
         let samples = even_samples(mesh);
         Ok(Self {
-            bounding_box: OrientedBox::around_until(mesh, stop)?,
+            bounding_box: match bounding_box {
+                Some(known) => known,
+                None => OrientedBox::around_until(mesh, stop)?,
+            },
             local_thickness: LocalThickness::of(&samples, stop)?,
             local_shape: LocalShape::of(&samples),
         })
@@ -310,13 +369,18 @@ impl Measures {
 }
 
 /// Measures a mesh and builds its search structure in parallel, or in sequence if no thread can be spawned. The former
-/// takes a fifth of the work.
-fn measures_and_surface(mesh: TriangleMesh, stop: Stop<'_>) -> Result<(Measures, MeshBvh), Stopped> {
+/// takes a fifth of the work, less if the bounding box is known.
+fn measures_and_surface(
+    mesh: TriangleMesh,
+    bounding_box: Option<OrientedBox>,
+    stop: Stop<'_>,
+) -> Result<(Measures, MeshBvh), Stopped> {
+    let measure = |mesh: &TriangleMesh| Measures::of(mesh, bounding_box, stop);
     let copy = mesh.clone();
     std::thread::scope(|scope| {
-        let parallel = std::thread::Builder::new().spawn_scoped(scope, || Measures::of(&copy, stop));
+        let parallel = std::thread::Builder::new().spawn_scoped(scope, || measure(&copy));
         let surface = MeshBvh::build_until(mesh, stop);
         let of_copy = parallel.ok().and_then(|thread| thread.join().ok());
-        Ok((of_copy.unwrap_or_else(|| Measures::of(&copy, stop))?, surface?))
+        Ok((of_copy.unwrap_or_else(|| measure(&copy))?, surface?))
     })
 }

@@ -94,7 +94,7 @@ impl<'a> Scene<'a> {
         let mechanisms = settings.run.mechanisms;
         let seeds_are_used = match &settings.known.seeds {
             SeedSource::Nothing => false,
-            SeedSource::Atlas(_) => mechanisms.has(Mechanism::Seeds),
+            SeedSource::Atlas(_) | SeedSource::Resized(_) => mechanisms.has(Mechanism::Seeds),
             SeedSource::Transferred(_) => mechanisms.has(Mechanism::TransferredGrips),
         };
         let seeds = if seeds_are_used && query.uses_known_grips() {
