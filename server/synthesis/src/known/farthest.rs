@@ -38,7 +38,11 @@ pub(super) fn farthest<T: Copy>(
         } else {
             clearance(candidate)
         };
-        by_clearance.push((Reverse(nanometres(clearance.min(GIVER_CLEARANCE))), place, candidate));
+        by_clearance.push((
+            Reverse(nanometres(clearance.min(GIVER_CLEARANCE))),
+            place,
+            candidate,
+        ));
     }
     by_clearance.sort_unstable_by_key(|&(clearance, place, _)| (clearance, place));
     let mut entries = Vec::with_capacity(MAX_SELECTED);

@@ -351,11 +351,7 @@ struct Measures {
 }
 
 impl Measures {
-    fn of(
-        mesh: &TriangleMesh,
-        bounding_box: Option<OrientedBox>,
-        stop: Stop<'_>,
-    ) -> Result<Self, Stopped> {
+    fn of(mesh: &TriangleMesh, bounding_box: Option<OrientedBox>, stop: Stop<'_>) -> Result<Self, Stopped> {
         let samples = even_samples(mesh);
         Ok(Self {
             bounding_box: match bounding_box {
