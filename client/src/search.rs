@@ -110,6 +110,13 @@ pub struct FindRequest {
     /// most 1 s and the budget; none: the server's default.
     #[serde(default, rename = "improvement_seconds", with = "json::optional_seconds")]
     pub improvement: Option<Duration>,
+    /// How many times as large as it was created the object is held out, from 0.25 to 4; none: 1. The first call for a size takes
+    /// longer.
+    #[serde(default)]
+    pub object_scale: Option<f32>,
+    /// The object's mass in this request, in kilograms; none: its own, times the cube of `object_scale`.
+    #[serde(default)]
+    pub object_mass_kg: Option<f32>,
 }
 
 impl FindRequest {
@@ -142,6 +149,8 @@ impl FindRequest {
             receiver: None,
             receiver_stance: None,
             improvement: None,
+            object_scale: None,
+            object_mass_kg: None,
         }
     }
 

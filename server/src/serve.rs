@@ -30,6 +30,7 @@ use crate::{
     net::{AcceptLimits, UnreadAnswers, UnreadLayer, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
+        resized::Resizer,
         saved::SavedObjects,
         store::{
             ObjectStore,
@@ -114,6 +115,8 @@ pub enum ServeError {
 pub struct Server {
     shared: Arc<Shared>,
     calls: CallsInFlight,
+    /// Permits to build objects, as many as `maximum_uploads`.
+    builds: Arc<Semaphore>,
     maximum_uploads: NonZeroUsize,
     maximum_connections: NonZeroUsize,
     unread: Arc<UnreadAnswers>,
@@ -209,6 +212,7 @@ impl Server {
             ),
             None => None,
         };
+        let builds = Arc::new(Semaphore::new(config.maximum_uploads.get()));
         let shared = Shared {
             atlases: Atlases::start(
                 config.builder_threads,
@@ -220,6 +224,7 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: RigStore::new(config.maximum_rigs.get(), files.map(SavedRigs::new)),
+            resizer: Resizer::new(Arc::clone(&builds)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -238,6 +243,7 @@ impl Server {
         Ok(Self {
             shared: Arc::new(shared),
             calls: CallsInFlight::default(),
+            builds,
             maximum_uploads: config.maximum_uploads,
             maximum_connections: config.maximum_connections,
             unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
@@ -318,7 +324,7 @@ impl Server {
             .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
             .layer(CallLayer {
                 in_flight: self.calls.clone(),
-                uploads: Arc::new(Semaphore::new(self.maximum_uploads.get())),
+                uploads: self.builds,
                 maximum_uploads: self.maximum_uploads.get(),
                 reserve: Arc::clone(&self.shared.reserve),
                 longest_call: self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET,

@@ -88,6 +88,8 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         receiver: request.receiver.map(receiver_to_wire),
         receiver_stance: stance_to_wire(request.receiver_stance).into(),
         improvement: request.improvement.map(duration_to_wire),
+        object_scale: request.object_scale,
+        object_mass_kg: request.object_mass_kg,
     }
 }
 

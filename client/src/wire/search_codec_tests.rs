@@ -430,6 +430,8 @@ fn converts_every_field_of_a_request() {
         receiver: Some(Receiver::with_shoulder(Vec3::X)),
         receiver_stance: Some(ReceiverStance::Any),
         improvement: Some(Duration::from_millis(2)),
+        object_scale: Some(1.25),
+        object_mass_kg: Some(0.3),
         ..FindRequest::new("objects/remote")
     };
     let wire = find_request_to_wire(&request);
@@ -464,5 +466,6 @@ fn converts_every_field_of_a_request() {
     assert_eq!(wire.receiver.unwrap().body, Some(body));
     assert_eq!(wire.receiver_stance(), v1::ReceiverStance::Any);
     assert_eq!(wire.improvement.unwrap().nanos, 2_000_000);
+    assert_eq!((wire.object_scale, wire.object_mass_kg), (Some(1.25), Some(0.3)));
     assert_eq!(wire.constraints.unwrap().max_comfort_e, Some(0.25));
 }

@@ -83,10 +83,17 @@ impl Atlases {
         Ok(atlases)
     }
 
-    /// Makes room for a new object and requests the atlases of the default rig's hands.
-    pub(crate) fn register(&self, object: &Arc<StoredObject>) {
+    /// Evicts atlases if objects need their room.
+    pub(crate) fn make_room(&self) {
         if self.0.are_running() {
             self.0.loaded.make_room_for_objects();
+        }
+    }
+
+    /// Makes room for a new object and requests the atlases of the default rig's hands.
+    pub(crate) fn register(&self, object: &Arc<StoredObject>) {
+        self.make_room();
+        if self.0.are_running() {
             let hands = [Handedness::Right, Handedness::Left].map(|side| self.0.default_hand(side));
             self.0.request(object, hands);
         }

@@ -41,6 +41,22 @@ pub(super) fn check_extent(mesh: &TriangleMesh) -> Result<Option<String>, String
     }))
 }
 
+/// Checks the size of an object that was created at a usable one.
+///
+/// # Errors
+/// Why an object of this size cannot be used.
+pub(super) fn check_resized(mesh: &TriangleMesh) -> Result<(), String> {
+    let extent = mesh.aabb().extents().max_element();
+    if within(USABLE, extent) {
+        return Ok(());
+    }
+    let [smallest, largest] = USABLE;
+    Err(format!(
+        "makes the object {} m long; it must be {smallest} m to {largest} m",
+        rounded(extent)
+    ))
+}
+
 /// A length to four digits.
 fn rounded(metres: f32) -> f64 {
     let metres = f64::from(metres);

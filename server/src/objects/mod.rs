@@ -9,6 +9,7 @@ pub(crate) mod directory;
 mod extent;
 pub(crate) mod glb;
 mod mesh_file;
+pub(crate) mod resized;
 mod revision;
 pub(crate) mod saved;
 pub(crate) mod store;

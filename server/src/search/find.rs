@@ -108,6 +108,7 @@ mod tests {
                 .expect("the request is valid"),
             object: Arc::clone(&stored.object),
             stored,
+            resized: None,
             seed: 3,
             arrived: Instant::now(),
             budget: Duration::ZERO,

@@ -9,7 +9,7 @@ use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
-    known::{entry::Entry, recent_grips::RecentGrips, seed_source::SeedSource},
+    known::{entry::Entry, recent_grips::RecentGrips, resized_grips::ResizedGrips, seed_source::SeedSource},
     model::{
         holdout::Holdout,
         strategy::{Choice, Validity},
@@ -49,6 +49,9 @@ pub(crate) struct FindJob {
     pub object: Arc<PreparedObject>,
     /// The same object as stored, for its transferred grips.
     pub stored: Arc<StoredObject>,
+    /// How many times as large the object is as that of `known`, if its size or mass is another one: known grips are starts
+    /// then.
+    pub resized: Option<f32>,
     /// The request's seed, or a drawn one.
     pub seed: u64,
     /// When the call arrived; times count from here.
@@ -100,6 +103,8 @@ pub(super) struct PreparedJob {
     start: Instant,
     budget: Duration,
     patience: Duration,
+    /// Whether later searches may use what this one finds.
+    learns: bool,
 }
 
 /// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
@@ -122,6 +127,7 @@ impl FindJob {
     pub(super) fn is_quick_if_known(&self) -> bool {
         let is_known = |known: &KnownGrips| known.atlas.is_some() || !known.recent.is_empty();
         self.known.iter().any(is_known)
+            && self.resized.is_none()
             && !self.query.is_replay
             && self.query.choice == Choice::FirstValid
             && !self.query.reproducible
@@ -159,6 +165,8 @@ impl FindJob {
         });
         Ok(PreparedJob {
             hands: hands.collect(),
+            // What holds an object at another size says little about it at its own.
+            learns: self.query.uses_atlas() && self.resized.is_none(),
             query: self.query,
             object: self.object,
             clock: SinceArrival(self.arrived),
@@ -175,14 +183,17 @@ impl FindJob {
         // Reproducible answers need a complete atlas: a growing one would change them.
         let atlas = known.atlas.as_ref();
         let atlas = atlas.filter(|atlas| !query.reproducible || atlas.is_complete());
-        let seeds = match atlas {
-            Some(atlas) => SeedSource::Atlas(Arc::clone(atlas)),
-            None if query.uses_seeds() => {
+        let seeds = match (atlas, self.resized) {
+            (Some(atlas), None) => SeedSource::Atlas(Arc::clone(atlas)),
+            (Some(atlas), Some(scale)) => SeedSource::Resized(ResizedGrips::new(Arc::clone(atlas), scale)),
+            (None, _) if query.uses_seeds() => {
                 let transferred = self.stored.transferred_grips(hand);
                 transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)
             }
-            None => SeedSource::Nothing,
+            (None, _) => SeedSource::Nothing,
         };
+        // A replay runs one attempt and tries no known grips.
+        let is_answered_by_known = !query.is_replay && self.resized.is_none();
         SearchSettings {
             query: Query {
                 strategy: query.strategy,
@@ -195,13 +206,12 @@ impl FindJob {
                 other_hand: query.other_hand.as_ref().map(|hand| hand.hand.rig.clone()),
             },
             known: Known {
-                // A replay runs one attempt and tries no known grips.
-                atlas: atlas.filter(|_| !query.is_replay).cloned(),
+                atlas: atlas.filter(|_| is_answered_by_known).cloned(),
                 seeds,
-                recent: if query.is_replay {
-                    RecentGrips::default()
-                } else {
+                recent: if is_answered_by_known {
                     known.recent.clone()
+                } else {
+                    RecentGrips::default()
                 },
                 tried: 0,
             },
@@ -359,7 +369,7 @@ impl PreparedJob {
             settings,
         } = &self.hands[place];
         let own_friction = holdout.object.friction_under(Validity::Physical);
-        let is_new = matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
+        let is_new = self.learns && matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
         let grasp = outcome.grasp.as_ref()?;
         let entry = (is_new && settings.query.friction_on(&holdout.object) == own_friction)
             .then(|| Entry::of_grasp(grasp))

@@ -14,8 +14,9 @@ use crate::{
     budget::effective_budget,
     call::{CallContext, SearchSummary},
     error::ServiceError,
+    objects::{StoredObject, resized::ObjectSize},
     search::{self, FindJob},
-    validate::find_query,
+    validate::{FindQuery, RequestedSize, find_query},
 };
 
 /// Implements `GraspService`.
@@ -41,29 +42,88 @@ impl GraspHandler {
         })?;
         call.log_object(&query.object_id);
         let stored = shared.object(&query.object_id, call).await?.object;
-        let object = Arc::clone(&stored.object);
+        // Held while the call lasts, so that the object is not evicted.
+        let _object = Arc::clone(&stored.object);
+        let admission = shared.executor.admit()?;
+        let held_out = self.held_out(&stored, query.object_size, call).await?;
+        let job = self.job(query, &stored, held_out, call)?;
+        call.search_is_due(job.due());
+        let answered = search::find(job, &shared.executor, admission).await?;
+        call.search_ended(answered.ended);
+        if let Some((hand, grip)) = answered.new_grip {
+            shared.atlases.remember(&stored, &hand, grip);
+        }
+        call.log_search(summary(&answered.response));
+        Ok(answered.response)
+    }
+
+    /// The object as the request holds it out.
+    async fn held_out(
+        &self,
+        stored: &Arc<StoredObject>,
+        size: RequestedSize,
+        call: &CallContext,
+    ) -> Result<HeldOut, ServiceError> {
+        let Shared {
+            objects,
+            atlases,
+            resizer,
+            ..
+        } = &*self.shared;
+        let Some(size) = ObjectSize::of(size, stored) else {
+            return Ok(HeldOut {
+                object: Arc::clone(stored),
+                resized: None,
+                since: call.arrived,
+            });
+        };
+        let slot = objects.resized(stored, size)?;
+        atlases.make_room();
+        Ok(HeldOut {
+            object: resizer.fill(slot, stored, size, call.answer_due()).await?,
+            resized: Some(size.scale()),
+            since: Instant::now(),
+        })
+    }
+
+    /// The search for a grasp of an object.
+    ///
+    /// # Errors
+    /// [`ServiceError::DeadlineExceeded`] if the deadline leaves no time for it.
+    fn job(
+        &self,
+        query: FindQuery,
+        stored: &Arc<StoredObject>,
+        held_out: HeldOut,
+        call: &CallContext,
+    ) -> Result<FindJob, ServiceError> {
+        let shared = &self.shared;
         let reserve = shared.reserve.at(Instant::now());
         call.log_reserve(reserve);
+        let HeldOut {
+            object,
+            resized,
+            since,
+        } = held_out;
         let effective =
-            |requested| effective_budget(requested, shared.budgets, reserve, call.arrived, call.deadline);
+            |requested| effective_budget(requested, shared.budgets, reserve, since, call.deadline);
         let budget = effective(query.limits.budget);
         if budget.is_zero() {
             return Err(ServiceError::DeadlineExceeded);
         }
-        let admission = shared.executor.admit()?;
-        let uses_atlas = query.uses_atlas();
-        let known = if uses_atlas {
+        let known = if query.uses_atlas() {
             let [first, alternative] = [Some(&query.receiving_hand), query.alternative_hand.as_ref()]
                 .map(|hand| hand.map(|hand| &hand.hand));
-            shared.atlases.get(&stored, [first, alternative])
+            shared.atlases.get(stored, [first, alternative])
         } else {
             Default::default()
         };
-        let job = FindJob {
-            object,
-            stored: Arc::clone(&stored),
+        Ok(FindJob {
+            object: Arc::clone(&object.object),
+            stored: object,
+            resized,
             seed: query.seed.unwrap_or_else(drawn_seed),
-            arrived: call.arrived,
+            arrived: since,
             budget,
             patience: if query.limits.is_patient {
                 effective(None).max(budget)
@@ -76,16 +136,18 @@ impl GraspHandler {
             improvement: query.limits.improvement.unwrap_or(shared.improvement),
             known,
             query,
-        };
-        call.search_is_due(job.due());
-        let answered = search::find(job, &shared.executor, admission).await?;
-        call.search_ended(answered.ended);
-        if let Some((hand, grip)) = answered.new_grip.filter(|_| uses_atlas) {
-            shared.atlases.remember(&stored, &hand, grip);
-        }
-        call.log_search(summary(&answered.response));
-        Ok(answered.response)
+        })
     }
+}
+
+/// An object as a request holds it out.
+struct HeldOut {
+    /// The object at its size.
+    object: Arc<StoredObject>,
+    /// How many times as large it is, if size or mass are not its own.
+    resized: Option<f32>,
+    /// From when the budget counts: preparing the object does not.
+    since: Instant,
 }
 
 #[tonic::async_trait]

@@ -28,7 +28,7 @@ use crate::{
     call::CallContext,
     error::ServiceError,
     executor::{SearchExecutor, run_blocking},
-    objects::{Revision, store::ObjectStore},
+    objects::{Revision, resized::Resizer, store::ObjectStore},
     reserve::DeadlineReserve,
     rigs::store::RigStore,
 };
@@ -44,6 +44,8 @@ pub(crate) struct Shared {
     pub atlases: Atlases,
     /// The search pool.
     pub executor: SearchExecutor,
+    /// Prepares objects at other sizes.
+    pub resizer: Resizer,
     /// Bounds on search times.
     pub budgets: BudgetLimits,
     /// How much longer searches go on after a first grasp that a person would not choose.

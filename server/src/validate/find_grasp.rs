@@ -15,7 +15,9 @@ use grasp_synthesis::{
 use super::{
     Field, GiverHand, Violations,
     constraints::constraints,
-    friction, hand, known, object_id_of, obstacles, pose,
+    friction, hand, known, object_id_of,
+    object_size::{RequestedSize, object_size},
+    obstacles, pose,
     receiver::{Stances, Surroundings, stances},
     search_limits::{SearchLimits, search_limits},
 };
@@ -34,6 +36,8 @@ use crate::{
 pub(crate) struct FindQuery {
     /// The last part of the object's name.
     pub object_id: String,
+    /// The size and mass at which the object is held out.
+    pub object_size: RequestedSize,
     /// Convention of the request and the response.
     pub convention: Convention,
     /// Pose of the object in the client's frame, in `OpenXR` axes.
@@ -151,6 +155,7 @@ pub(crate) fn find_query(
     let v = &mut violations;
     let convention = Convention::from_wire(known(Field::root("convention"), request.convention, v));
     let object_id = object_id_of(Field::root("object"), &request.object, v);
+    let object_size = object_size(request.object_scale, request.object_mass_kg, v);
     let (client_from_object, object_origin) = object_pose(request.client_from_object, convention, v);
     let presenting_hand = request
         .presenting_hand
@@ -221,6 +226,7 @@ pub(crate) fn find_query(
     let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
     violations.finish(FindQuery {
         object_id,
+        object_size,
         convention,
         client_from_object,
         presenting_hand,

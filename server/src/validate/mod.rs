@@ -9,6 +9,7 @@ mod find_grasp;
 mod hand;
 mod labels;
 mod object;
+mod object_size;
 mod obstacles;
 mod page;
 mod receiver;
@@ -30,6 +31,7 @@ pub(crate) use hand::GiverHand;
 pub(crate) use hand::fixtures;
 pub(crate) use labels::{LabelFilter, Labels};
 pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, object_id_of};
+pub(crate) use object_size::RequestedSize;
 #[cfg(test)]
 pub(crate) use obstacles::tests::any_obstacles;
 pub(crate) use page::{PageQuery, Place, page_query, page_token};

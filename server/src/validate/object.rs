@@ -204,7 +204,7 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
             1.0
         }
     };
-    check_mass(request.mass_kg, violations);
+    check_mass(Field::root("mass_kg"), request.mass_kg, violations);
     let centre_of_mass = request
         .centre_of_mass
         .map(|v| point(Field::root("centre_of_mass"), v, 1.0, violations));
@@ -256,10 +256,10 @@ fn request_key(
 }
 
 /// Checks a mass.
-pub(super) fn check_mass(mass_kg: f32, violations: &mut Violations) {
+pub(super) fn check_mass(field: Field<'_>, mass_kg: f32, violations: &mut Violations) {
     if !(mass_kg > 0.0 && mass_kg <= LARGEST_MASS) {
         violations.add(
-            Field::root("mass_kg"),
+            field,
             format_args!("is {mass_kg}; it must be more than 0 and at most {LARGEST_MASS}"),
         );
     }

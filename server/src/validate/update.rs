@@ -109,7 +109,7 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
     if is_changed("mass_kg", request.mass_kg.is_some()) {
         // Like a new object, a changed one must have a mass.
         let mass = request.mass_kg.unwrap_or_default();
-        check_mass(mass, &mut violations);
+        check_mass(Field::root("mass_kg"), mass, &mut violations);
         change.mass = Some(mass);
     }
     if is_changed("centre_of_mass", request.centre_of_mass.is_some()) {

@@ -18,6 +18,7 @@ mod graspit;
 mod registration;
 mod requests;
 mod setting;
+mod sizes;
 mod table;
 mod warm;
 mod wire;
@@ -48,6 +49,8 @@ enum Row {
     Wire,
     /// The best grasp within the default budget.
     Best,
+    /// At other sizes than the objects' own.
+    Sizes,
     /// Without an atlas.
     Cold,
     /// Everyday objects that nobody holds out, without an atlas.
@@ -66,6 +69,7 @@ impl Row {
             Self::Warm => "warm",
             Self::Wire => "wire",
             Self::Best => "best",
+            Self::Sizes => "sizes",
             Self::Cold => "cold",
             Self::Everyday => "everyday",
             Self::Registration => "registration",
@@ -170,7 +174,10 @@ fn main() {
 fn measure(setting: &Setting, minutes: Option<u32>, is_selected: impl Fn(Row) -> bool) -> Vec<Line> {
     let test_objects = setting.built_in_test_objects();
     let mut lines = Vec::new();
-    if [Row::Warm, Row::Wire, Row::Best].into_iter().any(&is_selected) {
+    if [Row::Warm, Row::Wire, Row::Best, Row::Sizes]
+        .into_iter()
+        .any(&is_selected)
+    {
         let server = setting.server_with_atlases(&test_objects.iter().collect::<Vec<_>>());
         if is_selected(Row::Warm) {
             lines.extend(warm::measure(setting, &server, &test_objects));
@@ -180,6 +187,9 @@ fn measure(setting: &Setting, minutes: Option<u32>, is_selected: impl Fn(Row) ->
         }
         if is_selected(Row::Best) {
             lines.extend(best::measure(setting, &server, &test_objects));
+        }
+        if is_selected(Row::Sizes) {
+            lines.extend(sizes::measure(setting, &server));
         }
         setting.serving.block_on(server.stop());
     }

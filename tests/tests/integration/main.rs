@@ -20,6 +20,7 @@ mod mesh_formats;
 mod object_changes;
 mod object_lists;
 mod object_meshes;
+mod object_sizes;
 mod object_uploads;
 mod object_watches;
 mod objects;

@@ -47,6 +47,7 @@ API's FindGraspRequest; only "object" is required:
     "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
     "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
     "record_step_times": false, "convention": "openxr", "friction": null,
+    "object_scale": 1, "object_mass_kg": null,
     "choice": "first_valid", "improvement_seconds": 0.005, "atlas": "allowed", "plan_key_frames": false, "hands": "one",
     "receiver": {"standing": {"client_from_root": {"position": [0, 0, 1]}, "height": 1.7},
       "upper_arm_length": null, "forearm_length": null}, "receiver_stance": null,
@@ -129,6 +130,12 @@ pub(crate) struct Arguments {
     /// How many times as large as its rig the hand is, from 0.5 to 2. Default: 1.
     #[arg(long, value_name = "SCALE")]
     receiving_scale: Option<f32>,
+    /// How many times as large as it was created the object is, from 0.25 to 4. Default: 1.
+    #[arg(long, value_name = "SCALE")]
+    object_scale: Option<f32>,
+    /// The object's mass in kilograms. Default: its own, times the cube of --object-scale.
+    #[arg(long, value_name = "KG")]
+    object_mass: Option<f32>,
     /// How many hands take the object. Default: one.
     #[arg(long, value_name = "HOW_MANY", conflicts_with = "key_frames")]
     hands: Option<HandsName>,
@@ -220,7 +227,11 @@ impl Arguments {
                 ))
             })?,
         };
-        Picture::new(model, request.clone()).map(Some)
+        Picture::new(
+            model.scaled(request.object_scale.unwrap_or(1.0))?,
+            request.clone(),
+        )
+        .map(Some)
     }
 
     /// The request of the holdout or the file, overridden by the options.
@@ -257,6 +268,8 @@ impl Arguments {
         request.plan_key_frames |= self.key_frames;
         request.hands = self.hands.map(Into::into).or(request.hands);
         request.friction = self.friction.or(request.friction);
+        request.object_scale = self.object_scale.or(request.object_scale);
+        request.object_mass_kg = self.object_mass.or(request.object_mass_kg);
         self.constraints.override_in(&mut request.constraints);
         self.receiver.override_in(&mut request)?;
         let hand = &mut request.receiving_hand;

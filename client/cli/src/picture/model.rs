@@ -79,6 +79,20 @@ impl Model {
         })
     }
 
+    /// The object at another size. The server rounds sizes to hundredths.
+    pub(crate) fn scaled(self, scale: f32) -> Result<Self, Failure> {
+        let scale = (100.0 * scale).round() / 100.0;
+        if scale == 1.0 {
+            return Ok(self);
+        }
+        let mesh = self.mesh().scaled(scale);
+        let mesh = mesh.map_err(|error| Failure::other("cannot draw the object at this size", error))?;
+        Ok(Self {
+            surface: Surface::File(mesh),
+            ..self
+        })
+    }
+
     pub(super) fn mesh(&self) -> &TriangleMesh {
         match &self.surface {
             Surface::BuiltIn(object) => object.surface.mesh(),

@@ -8,7 +8,7 @@ use std::{
 
 use uuid::Uuid;
 
-use super::loading::Load;
+use super::{loading::Load, sizes::Sizes};
 use crate::{
     error::ServiceError,
     objects::{
@@ -29,9 +29,11 @@ pub(super) struct Created {
     pub objects: BTreeMap<String, Entry>,
     /// Ids of objects by the ids of the requests that created them.
     pub requests: HashMap<Uuid, String>,
+    /// The objects at other sizes.
+    pub sizes: Sizes,
     /// Number of objects that are not at rest, and of those about to be added.
     pub loaded: usize,
-    /// Size of the same in bytes.
+    /// Size of the same, and of objects at other sizes, in bytes.
     pub bytes: usize,
     /// Number of uses so far: the clock of `last_used`.
     pub uses: u64,
@@ -80,6 +82,7 @@ impl Created {
         Self {
             objects: BTreeMap::new(),
             requests: HashMap::new(),
+            sizes: Sizes::default(),
             loaded: 0,
             bytes: 0,
             uses: 0,
@@ -141,7 +144,11 @@ impl Created {
         };
         let (bytes, loaded) = (state.bytes(), usize::from(state.object().is_some()));
         let before = std::mem::replace(&mut entry.state, state);
+        let is_same_object = before.object().map(Arc::as_ptr) == entry.state.object().map(Arc::as_ptr);
         self.uncount(&before);
+        if !is_same_object {
+            self.drop_sizes(id);
+        }
         self.bytes += bytes;
         self.loaded += loaded;
     }
@@ -151,6 +158,7 @@ impl Created {
         if let Some(entry) = self.objects.remove(id) {
             self.tell(id, event, Some(&entry.state.record.labels), None);
             self.uncount(&entry.state);
+            self.drop_sizes(id);
             if let Some(request) = entry.request {
                 self.requests.remove(&request.id);
             }

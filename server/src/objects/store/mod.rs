@@ -10,6 +10,7 @@
 mod created;
 pub(crate) mod loading;
 mod room;
+mod sizes;
 #[cfg(test)]
 mod tests;
 mod watching;
@@ -25,6 +26,7 @@ use grasp_assets::objects::{object, objects};
 use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
 
+pub(crate) use self::sizes::SizeSlot;
 use self::{
     created::{Created, Entry, Etags},
     loading::Durability,

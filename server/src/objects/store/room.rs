@@ -33,7 +33,7 @@ impl ObjectStore {
         Ok(Reserved { bytes, objects })
     }
 
-    /// Puts objects to rest or evicts them until so many more bytes and objects fit.
+    /// Drops objects at other sizes, and puts objects to rest or evicts them, until so many more bytes and objects fit.
     pub(super) fn make_room(
         &self,
         created: &mut Created,
@@ -53,7 +53,8 @@ impl ObjectStore {
             ));
         }
         while created.loaded + objects > self.limits.objects || created.bytes + bytes > self.limits.bytes {
-            if !created.evict_one(grows) {
+            let frees_bytes = created.bytes + bytes > self.limits.bytes && created.evict_size(|_| true);
+            if !frees_bytes && !created.evict_one(grows) {
                 return Err(ServiceError::Overloaded {
                     limit: Limit::ObjectCache,
                     maximum: self.limits.objects,

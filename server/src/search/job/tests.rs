@@ -264,6 +264,7 @@ fn answers_every_request_that_passes_validation() {
             query,
             object: Arc::clone(&object.object),
             stored: Arc::new(object),
+            resized: None,
             seed: 3,
             arrived,
             workers: 1,
