@@ -66,8 +66,8 @@ pub use hand::{
 pub use json::rfc3339;
 pub use key_frame::{KeyFrame, KeyFrameKind};
 pub use object::{
-    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectChange, ObjectMesh, ObjectNews,
-    ObjectPage, ObjectQuery, ObjectUpdate, Reset, UpAxis,
+    AtlasGrowth, AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectChange, ObjectMesh,
+    ObjectNews, ObjectPage, ObjectQuery, ObjectUpdate, Reset, UpAxis,
 };
 pub use object_streams::ObjectWatch;
 pub use obstacle::{Capsule, Obstacle, SolidBox};

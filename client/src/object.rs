@@ -64,13 +64,37 @@ pub struct Object {
 pub struct AtlasState {
     /// Number of grasps.
     pub entries: u32,
-    /// True once the atlas no longer grows.
+    /// True once the atlas is complete. It may have no entries then, if nothing was found.
     pub complete: bool,
     /// Identifies this state, in hexadecimal; the same for the same entries.
     pub stamp: String,
-    /// Time the server has spent on the atlas since it started.
+    /// Processor time the server has spent on the atlas since it started.
     #[serde(rename = "build_time_seconds", with = "json::seconds")]
     pub build_time: Duration,
+    /// Whether it grows and, if not, why.
+    pub growth: AtlasGrowth,
+}
+
+/// Whether an atlas grows. Atlases of the objects that are asked for most come first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AtlasGrowth {
+    /// It has no entries yet, and waits for its turn or is being grown.
+    Waiting,
+    /// It has entries that answer requests, and grows on when its turn comes.
+    Growing,
+    /// It is complete.
+    Complete,
+    /// It is complete without entries: of thousands of hands tried, none holds the object.
+    NothingFound,
+    /// It is not in memory; the next request for the object reads or grows it again.
+    AtRest,
+    /// Objects, and atlases that are asked for more, take all the memory; the next request tries again.
+    NoMemory,
+    /// The server failed to grow it; its log says how.
+    Failed,
+    /// Of a newer or older server.
+    Unrecognised,
 }
 
 /// Surfaces that must not be touched.

@@ -8,16 +8,22 @@ use std::{
 use grasp_assets::hands::Hand;
 use grasp_synthesis::known::{entry::Entry, growth::Grown, recent_grips::RecentGrips};
 
+use crate::demand::Demand;
+
 /// How far the building of an atlas has got.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum BuildState {
-    /// Never requested, or evicted.
+    /// Never requested, or dropped from memory.
     #[default]
     Absent,
     /// In the build queue, or being built.
     Growing,
-    /// Nothing is added any more.
+    /// Complete.
     Finished,
+    /// Nothing is added, because others that are asked for more take all the memory.
+    NoRoom,
+    /// Nothing is added, because building it panicked.
+    Failed,
 }
 
 /// One hand's atlas and recent grips.
@@ -25,52 +31,23 @@ pub(crate) enum BuildState {
 pub(crate) struct Slot {
     /// State of the build.
     pub state: BuildState,
-    /// The grips that requests are answered from.
+    /// The grips that requests are answered from, and from which growth resumes.
     pub grown: Option<Arc<Grown>>,
-    /// The atlas from which growth resumes. It is `grown` itself, unless `grown` holds shipped grips: those stay until
-    /// this atlas is complete.
-    pub growing: Option<Arc<Grown>>,
     /// Grips that searches found recently.
     pub recent: RecentGrips,
-    /// Size of `grown` and `growing` in bytes.
+    /// Size of `grown` in bytes.
     pub bytes: usize,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
-    /// Time of the last request, counted in requests for any atlas.
-    pub last_used: u64,
-}
-
-/// What replaces the atlas in a slot.
-#[derive(Clone, Debug)]
-pub(crate) struct Update {
-    /// The new [`Slot::grown`].
-    pub grown: Arc<Grown>,
-    /// The new [`Slot::growing`]; none if growth has yet to start.
-    pub growing: Option<Arc<Grown>>,
-}
-
-impl Update {
-    /// An atlas that answers requests while it grows.
-    pub(crate) fn of(grown: Arc<Grown>) -> Self {
-        Self {
-            growing: Some(Arc::clone(&grown)),
-            grown,
-        }
-    }
-
-    /// Its size in bytes.
-    pub(crate) fn bytes(&self) -> usize {
-        let separate = self.growing.as_ref();
-        let separate = separate.filter(|growing| !Arc::ptr_eq(growing, &self.grown));
-        self.grown.bytes() + separate.map_or(0, |growing| growing.bytes())
-    }
+    /// How much it is asked for.
+    pub demand: Demand,
 }
 
 /// Largest number of slots of an object. Hands come in as many sizes and shapes as clients create; more in turn than this
 /// lose their atlases to one another.
 const MOST_HANDS: usize = 16;
 
-/// The slots of one object, for each hand that was requested; beyond [`MOST_HANDS`], the least recently used is dropped.
+/// The slots of one object, for each hand that was requested; beyond [`MOST_HANDS`], the one asked for least is dropped.
 #[derive(Debug, Default)]
 pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 
@@ -82,42 +59,53 @@ impl AtlasSlots {
         slot.map(|(_, slot)| slot.clone())
     }
 
-    /// Records a use at the time `now`. True if the atlas must be put in the build queue.
-    pub(crate) fn request(&self, hand: &Arc<Hand>, now: u64) -> bool {
+    /// How much a hand's atlas is asked for; none if the hand was never requested.
+    pub(crate) fn demand(&self, hand: &Arc<Hand>) -> Option<Demand> {
+        self.demand_and_bytes(hand).map(|(demand, _)| demand)
+    }
+
+    /// How much a hand's atlas is asked for, and its size in bytes; none if the hand was never requested.
+    pub(crate) fn demand_and_bytes(&self, hand: &Arc<Hand>) -> Option<(Demand, usize)> {
+        let slots = self.lock();
+        let slot = slots.iter().find(|(other, _)| other == hand);
+        slot.map(|(_, slot)| (slot.demand, slot.bytes))
+    }
+
+    /// Records a call at a time since the server's start. True if the atlas must be put in the build queue.
+    pub(crate) fn request(&self, hand: &Arc<Hand>, at: Duration) -> bool {
         let mut slots = self.lock();
         if slots.len() >= MOST_HANDS && slots.iter().all(|(other, _)| other != hand) {
-            let oldest = slots
+            let least = slots
                 .iter()
                 .enumerate()
-                .min_by_key(|(_, (_, slot))| slot.last_used);
-            if let Some((place, _)) = oldest {
+                .min_by(|(_, (_, a)), (_, (_, b))| a.demand.cmp(b.demand));
+            if let Some((place, _)) = least {
                 slots.swap_remove(place);
             }
         }
         drop(slots);
         self.with(hand, |slot| {
-            slot.last_used = now;
-            let is_new = slot.state == BuildState::Absent;
-            if is_new {
+            slot.demand = slot.demand.with_call(at);
+            let is_needed = matches!(slot.state, BuildState::Absent | BuildState::NoRoom);
+            if is_needed {
                 slot.state = BuildState::Growing;
             }
-            is_new
+            is_needed
         })
     }
 
     /// Replaces the atlas; `spent` is the work done on it since the last time.
-    pub(crate) fn publish(&self, hand: &Arc<Hand>, update: Update, spent: Duration) {
+    pub(crate) fn publish(&self, hand: &Arc<Hand>, grown: Arc<Grown>, spent: Duration) {
         self.with(hand, |slot| {
-            slot.bytes = update.bytes();
-            slot.grown = Some(update.grown);
-            slot.growing = update.growing;
+            slot.bytes = grown.bytes();
+            slot.grown = Some(grown);
             slot.build_time += spent;
         });
     }
 
     /// Ends the growth of an atlas.
-    pub(crate) fn finish(&self, hand: &Arc<Hand>) {
-        self.with(hand, |slot| slot.state = BuildState::Finished);
+    pub(crate) fn end(&self, hand: &Arc<Hand>, state: BuildState) {
+        self.with(hand, |slot| slot.state = state);
     }
 
     /// Keeps a grip that a search found. True if the number of kept grips grew: false if the grip replaced another.
@@ -142,9 +130,10 @@ impl AtlasSlots {
             *slot = Slot {
                 state: match slot.state {
                     BuildState::Growing => BuildState::Growing,
-                    BuildState::Absent | BuildState::Finished => BuildState::Absent,
+                    _ => BuildState::Absent,
                 },
-                last_used: slot.last_used,
+                demand: slot.demand,
+                build_time: slot.build_time,
                 recent: std::mem::take(&mut slot.recent),
                 ..Slot::default()
             };
@@ -175,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn drops_the_hand_used_longest_ago() {
+    fn drops_the_hand_asked_for_least() {
         let adult = hand("adult", Handedness::Right).expect("the rig is built in");
         let hands: Vec<Arc<Hand>> = (0..=MOST_HANDS)
             .map(|size| {
@@ -187,10 +176,10 @@ mod tests {
             .collect();
         let slots = AtlasSlots::default();
         for (now, hand) in hands[..MOST_HANDS].iter().enumerate() {
-            assert!(slots.request(hand, now as u64));
+            assert!(slots.request(hand, Duration::from_secs(now as u64)));
         }
-        assert!(!slots.request(&hands[0], 100));
-        assert!(slots.request(&hands[MOST_HANDS], 101));
+        assert!(!slots.request(&hands[0], Duration::from_secs(100)));
+        assert!(slots.request(&hands[MOST_HANDS], Duration::from_secs(101)));
         let is_there = |place: usize| slots.get(&hands[place]).is_some();
         assert!(is_there(0) && !is_there(1) && is_there(2) && is_there(MOST_HANDS));
         // The identity of a hand is its content.

@@ -20,8 +20,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! atlas_slots  budget  convention  error  health_check  limits  reserve
-//! saved
+//! budget  convention  demand  error  health_check  limits  reserve
+//! atlas_slots  saved
 //! rigs
 //! answer  call  config  executor  net  validate
 //! memory  objects
@@ -42,6 +42,7 @@ mod budget;
 mod call;
 pub mod config;
 mod convention;
+mod demand;
 mod error;
 mod executor;
 mod health_check;

@@ -13,15 +13,15 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 /// The server's top-level modules, as documented in its `lib.rs`.
 const SERVER: &[&[&str]] = &[
     &[
-        "atlas_slots",
         "budget",
         "convention",
+        "demand",
         "error",
         "health_check",
         "limits",
         "reserve",
     ],
-    &["saved"],
+    &["atlas_slots", "saved"],
     &["rigs"],
     &["answer", "call", "config", "executor", "net", "validate"],
     &["memory", "objects"],

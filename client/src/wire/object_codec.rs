@@ -142,6 +142,16 @@ fn atlas_from_wire(atlas: v1::AtlasState) -> Result<AtlasState, Malformed> {
         complete: atlas.complete,
         stamp: atlas.stamp,
         build_time: duration_from_wire("build_time", build_time)?,
+        growth: match v1::AtlasGrowth::try_from(atlas.growth) {
+            Ok(v1::AtlasGrowth::Waiting) => AtlasGrowth::Waiting,
+            Ok(v1::AtlasGrowth::Growing) => AtlasGrowth::Growing,
+            Ok(v1::AtlasGrowth::Complete) => AtlasGrowth::Complete,
+            Ok(v1::AtlasGrowth::NothingFound) => AtlasGrowth::NothingFound,
+            Ok(v1::AtlasGrowth::AtRest) => AtlasGrowth::AtRest,
+            Ok(v1::AtlasGrowth::NoMemory) => AtlasGrowth::NoMemory,
+            Ok(v1::AtlasGrowth::Failed) => AtlasGrowth::Failed,
+            Ok(v1::AtlasGrowth::Unspecified) | Err(_) => AtlasGrowth::Unrecognised,
+        },
     })
 }
 
@@ -323,6 +333,7 @@ mod tests {
                 seconds: 2,
                 nanos: 500_000_000,
             }),
+            growth: v1::AtlasGrowth::Complete.into(),
         });
         let atlas = object_from_wire(Some(wire.clone())).unwrap().atlas.unwrap();
         let expected = AtlasState {
@@ -330,8 +341,13 @@ mod tests {
             complete: true,
             stamp: "a7".to_owned(),
             build_time: Duration::from_millis(2500),
+            growth: AtlasGrowth::Complete,
         };
         assert_eq!(atlas, expected);
+        // A later server may know more.
+        wire.atlas.as_mut().unwrap().growth = 99;
+        let atlas = object_from_wire(Some(wire.clone())).unwrap().atlas.unwrap();
+        assert_eq!(atlas.growth, AtlasGrowth::Unrecognised);
         wire.atlas.as_mut().unwrap().build_time = None;
         let error = object_from_wire(Some(wire)).unwrap_err();
         assert_eq!(error.path, "object.atlas.build_time");

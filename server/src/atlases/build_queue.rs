@@ -1,20 +1,32 @@
 //! The queue of atlases to build.
 
 use std::{
+    cmp::Ordering as Order,
     collections::VecDeque,
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak,
         atomic::{AtomicBool, Ordering},
     },
-    time::Duration,
 };
 
 use grasp_assets::hands::Hand;
 
-use crate::objects::StoredObject;
+use crate::{demand::Demand, objects::StoredObject};
 
-/// Length from which the queue drops jobs of evicted objects.
-const MANY_JOBS: usize = 1024;
+/// What completing a useful atlas is worth per time of a builder, of what making another useful is: the former answers one
+/// call in ten more and takes six times as long, the latter answers nine in ten.
+const WORTH_OF_COMPLETING: f64 = 1.0 / 64.0;
+
+/// How far an atlas in the queue has got.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// It was not looked for among files and shipped grips.
+    Unread,
+    /// It has to become useful.
+    Starting,
+    /// It had its first slice of work.
+    Completing,
+}
 
 /// An atlas to build.
 #[derive(Debug)]
@@ -23,8 +35,37 @@ pub(super) struct BuildJob {
     pub object: Weak<StoredObject>,
     /// The hand that holds it.
     pub hand: Arc<Hand>,
-    /// Work done since the atlas was requested.
-    pub worked: Duration,
+    /// What comes next.
+    pub stage: Stage,
+}
+
+/// The place of a job in the queue; the greatest comes first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rank {
+    /// Reading takes no time, so it precedes all growth.
+    is_unread: bool,
+    demand: Demand,
+}
+
+impl Rank {
+    fn cmp(self, other: Self) -> Order {
+        let by_stage = self.is_unread.cmp(&other.is_unread);
+        by_stage.then_with(|| self.demand.cmp(other.demand))
+    }
+}
+
+impl BuildJob {
+    /// Its place, by how much it is asked for now; none if its object or slot is gone.
+    pub(super) fn rank(&self) -> Option<Rank> {
+        let demand = self.object.upgrade()?.atlas_slots.demand(&self.hand)?;
+        Some(Rank {
+            is_unread: self.stage == Stage::Unread,
+            demand: match self.stage {
+                Stage::Completing => demand.share(WORTH_OF_COMPLETING),
+                Stage::Unread | Stage::Starting => demand,
+            },
+        })
+    }
 }
 
 /// Jobs for the builder threads, and the flag that stops them.
@@ -38,33 +79,35 @@ pub(super) struct BuildQueue {
 impl BuildQueue {
     /// Adds a job.
     pub(super) fn push(&self, job: BuildJob) {
-        let mut jobs = self.jobs();
-        if jobs.len() >= MANY_JOBS {
-            jobs.retain(|job| job.object.strong_count() > 0);
-        }
-        jobs.push_back(job);
+        self.jobs().push_back(job);
         self.has_jobs.notify_one();
     }
 
-    /// Waits for a job; none once the queue was stopped. The job with the least work done comes first, so that a new
-    /// atlas is soon useful however long others can still grow; of several, the oldest.
+    /// Waits for a job; none once the queue was stopped. What is asked for most comes first, the oldest of several; all
+    /// others are useful before an atlas is completed, unless it is asked for far more.
     pub(super) fn next(&self) -> Option<BuildJob> {
         let mut jobs = self.jobs();
         loop {
             if self.is_stopped() {
                 return None;
             }
-            let least = (0..jobs.len()).min_by_key(|&place| jobs[place].worked);
-            match least.and_then(|place| jobs.remove(place)) {
-                Some(job) => return Some(job),
+            match first(&mut jobs, |_| true) {
+                Some((place, _)) => return jobs.remove(place),
                 None => jobs = self.has_jobs.wait(jobs).unwrap_or_else(PoisonError::into_inner),
             }
         }
     }
 
-    /// True if an atlas waits that was never worked on.
-    pub(super) fn has_new_job(&self) -> bool {
-        self.jobs().iter().any(|job| job.worked.is_zero())
+    /// The first job that precedes the completion of `other` and takes at most a slice of work; none if there is none.
+    pub(super) fn next_before(&self, other: &BuildJob) -> Option<BuildJob> {
+        let rank = other.rank()?;
+        let mut jobs = self.jobs();
+        let (place, first) = first(&mut jobs, |job| job.stage != Stage::Completing)?;
+        if first.cmp(rank).is_gt() {
+            jobs.remove(place)
+        } else {
+            None
+        }
     }
 
     /// Ends every wait for a job, now and later.
@@ -86,46 +129,127 @@ impl BuildQueue {
     }
 }
 
+/// The place and rank of the first of the jobs that count. Drops those whose objects are gone.
+fn first(jobs: &mut VecDeque<BuildJob>, counts: impl Fn(&BuildJob) -> bool) -> Option<(usize, Rank)> {
+    let mut first: Option<(usize, Rank)> = None;
+    let mut place = 0;
+    jobs.retain(|job| {
+        let Some(rank) = job.rank() else {
+            return false;
+        };
+        if counts(job) && first.is_none_or(|(_, best)| rank.cmp(best).is_gt()) {
+            first = Some((place, rank));
+        }
+        place += 1;
+        true
+    });
+    first
+}
+
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use grasp_assets::hands::hand;
     use grasp_synthesis::model::hand::Handedness;
 
     use super::*;
     use crate::objects::tests::tetrahedron;
 
-    #[test]
-    fn serves_new_jobs_first_then_the_least_worked_on() {
-        let queue = BuildQueue::default();
-        let objects = ["a", "b", "c", "d"].map(|id| Arc::new(tetrahedron(id, 0.1, &[])));
-        let milliseconds = [300, 0, 20, 0];
-        for (object, worked) in objects.iter().zip(milliseconds) {
-            queue.push(BuildJob {
-                object: Arc::downgrade(object),
-                hand: Arc::clone(hand("adult", Handedness::Right).expect("it is built in")),
-                worked: Duration::from_millis(worked),
-            });
+    fn adult() -> &'static Arc<Hand> {
+        hand("adult", Handedness::Right).expect("it is built in")
+    }
+
+    /// An object that was asked for so often.
+    fn asked_for(id: &str, calls: usize) -> Arc<StoredObject> {
+        let object = Arc::new(tetrahedron(id, 0.1, &[]));
+        for _ in 0..calls {
+            object.atlas_slots.request(adult(), Duration::ZERO);
         }
-        let next = || {
-            let is_new = queue.has_new_job();
-            let job = queue.next().expect("a job is left");
-            let object = job.object.upgrade().expect("the test holds it");
-            (object.id.clone(), is_new)
-        };
-        let order = [next(), next(), next(), next()];
-        let expected = [("b", true), ("d", true), ("c", false), ("a", false)];
-        assert_eq!(order, expected.map(|(id, is_new)| (id.to_owned(), is_new)));
+        object
+    }
+
+    fn job(object: &Arc<StoredObject>, stage: Stage) -> BuildJob {
+        BuildJob {
+            object: Arc::downgrade(object),
+            hand: Arc::clone(adult()),
+            stage,
+        }
+    }
+
+    fn id(job: &BuildJob) -> String {
+        job.object.upgrade().expect("the test holds it").id.clone()
+    }
+
+    #[test]
+    fn serves_what_is_asked_for_most_and_useful_slices_before_completions() {
+        let queue = BuildQueue::default();
+        let calls = [
+            ("once", 1),
+            ("often", 20),
+            ("complete", 30),
+            ("twice", 2),
+            ("very often", 200),
+            ("unread", 1),
+        ];
+        let objects = calls.map(|(id, calls)| asked_for(id, calls));
+        for object in &objects {
+            let stage = match object.id.as_str() {
+                "complete" | "very often" => Stage::Completing,
+                "unread" => Stage::Unread,
+                _ => Stage::Starting,
+            };
+            queue.push(job(object, stage));
+        }
+        // 200 calls are worth as much as three for an atlas that is not useful yet.
+        let order: Vec<String> = objects
+            .iter()
+            .map(|_| id(&queue.next().expect("a job is left")))
+            .collect();
+        assert_eq!(
+            order,
+            ["unread", "often", "very often", "twice", "once", "complete"]
+        );
+    }
+
+    #[test]
+    fn serves_the_oldest_of_equals_and_drops_jobs_of_objects_that_are_gone() {
+        let queue = BuildQueue::default();
+        let [a, gone, b] = ["a", "gone", "b"].map(|id| asked_for(id, 1));
+        for object in [&a, &gone, &b] {
+            queue.push(job(object, Stage::Starting));
+        }
+        drop(gone);
+        assert_eq!(
+            [(); 2].map(|()| id(&queue.next().expect("two are left"))),
+            ["a", "b"]
+        );
+        assert!(queue.jobs().is_empty());
+    }
+
+    #[test]
+    fn a_completion_lets_only_slices_go_first_that_are_worth_more() {
+        let queue = BuildQueue::default();
+        let object = asked_for("completing", 100);
+        let completing = job(&object, Stage::Completing);
+        let others = [
+            ("once", 1, Stage::Starting),
+            ("twice", 2, Stage::Starting),
+            ("as well", 900, Stage::Completing),
+        ];
+        let objects = others.map(|(id, calls, stage)| (asked_for(id, calls), stage));
+        for (object, stage) in &objects {
+            queue.push(job(object, *stage));
+        }
+        let next = || queue.next_before(&completing).map(|job| id(&job));
+        assert_eq!([next(), next()], [Some("twice".to_owned()), None]);
     }
 
     #[test]
     fn gives_no_job_after_stop() {
         let queue = BuildQueue::default();
-        let object = Arc::new(tetrahedron("a", 0.1, &[]));
-        queue.push(BuildJob {
-            object: Arc::downgrade(&object),
-            hand: Arc::clone(hand("adult", Handedness::Right).expect("it is built in")),
-            worked: Duration::ZERO,
-        });
+        let object = asked_for("a", 1);
+        queue.push(job(&object, Stage::Unread));
         queue.stop();
         assert!(queue.next().is_none());
     }

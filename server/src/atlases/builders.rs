@@ -5,7 +5,7 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
+        atomic::{AtomicUsize, Ordering},
     },
     thread,
     time::{Duration, Instant},
@@ -18,21 +18,21 @@ use grasp_assets::{
 use grasp_synthesis::{
     known::{
         codec::decode,
-        growth::{Grown, Growth},
+        growth::{CHOSEN, Grown, Growth},
     },
     model::hand::Handedness,
     physical::grip::Gripper,
 };
 
 use super::{
-    build_queue::{BuildJob, BuildQueue},
+    build_queue::{BuildJob, BuildQueue, Stage},
     files::AtlasFiles,
     hand_label,
     loaded::LoadedAtlases,
     remembered::RememberedGrips,
 };
 use crate::{
-    atlas_slots::{BuildState, Update},
+    atlas_slots::{BuildState, Slot},
     executor::SearchExecutor,
     objects::{StoredObject, changes::Event, store::ObjectStore},
 };
@@ -41,22 +41,23 @@ use crate::{
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 19;
 
-/// Grips in an atlas when it is first published: enough for most holdouts, which leave one grip in a hundred free. With
-/// fewer, an atlas is published sooner and answers fewer requests.
-const USEFUL: usize = 100;
+/// Grips in an atlas that is useful: most givers leave one of them free.
+const USEFUL: usize = 256;
 
-/// An atlas is published again once it grew by one part in this many. Publishing sorts and copies all of it.
-const GROWTH_PER_PUBLISH: usize = 4;
+/// Longest work on an atlas until it waits for its turn to be completed, useful or not.
+const SLICE: Duration = Duration::from_secs(1);
 
-/// Longest work on one atlas before the next in the queue has its turn. Longer turns delay new atlases; shorter ones
-/// spend more time on resuming.
-const TURN: Duration = Duration::from_secs(2);
+/// Grips in an atlas when it is first published. With fewer, it answers few requests.
+const FIRST: usize = 64;
+
+/// During its first slice, an atlas is published again once it grew by one part in this many.
+const GROWTH_PER_PUBLISH: usize = 2;
+
+/// Memory that must be free, or held for what is asked for less, before an atlas is grown: about that of a complete one.
+const EXPECTED_BYTES: usize = 1 << 20;
 
 /// Pause while searches run, in multiples of the time just worked: with 9, a builder works a tenth of the time.
 const PAUSE_PER_WORK: u32 = 9;
-
-/// Work that reading an atlas counts as. It is not zero, so that builders read all new atlases before they grow any.
-const READ_WORK: Duration = Duration::from_millis(1);
 
 /// How often a pausing builder checks whether searches still run.
 const PAUSE_CHECK: Duration = Duration::from_millis(1);
@@ -76,8 +77,8 @@ pub(super) struct Builders {
     default_rig: String,
     /// Number of running threads.
     running: AtomicUsize,
-    /// Requests for any atlas so far: the clock of [`Slot::last_used`](crate::atlas_slots::Slot::last_used).
-    requests: AtomicU64,
+    /// The start of the clock of demands.
+    started: Instant,
 }
 
 impl Builders {
@@ -97,7 +98,7 @@ impl Builders {
             files,
             default_rig,
             running: AtomicUsize::new(0),
-            requests: AtomicU64::new(0),
+            started: Instant::now(),
         }
     }
 
@@ -116,16 +117,16 @@ impl Builders {
         hand(&self.default_rig, handedness)
     }
 
-    /// Records a use of the atlases of one or two hands at the same time, so that neither evicts the other, and puts those that
-    /// are absent in the queue.
+    /// Records a call for the atlases of one or two hands, as if at the same time, so that neither drops the other, and puts
+    /// those that are absent in the queue.
     pub(super) fn request(&self, object: &Arc<StoredObject>, hands: [Option<&Arc<Hand>>; 2]) {
-        let now = self.requests.fetch_add(1, Ordering::Relaxed) + 1;
+        let now = self.started.elapsed();
         let hands = hands.into_iter().flatten();
         for hand in hands.filter(|hand| object.atlas_slots.request(hand, now)) {
             self.queue.push(BuildJob {
                 object: Arc::downgrade(object),
                 hand: Arc::clone(hand),
-                worked: Duration::ZERO,
+                stage: Stage::Unread,
             });
         }
     }
@@ -141,13 +142,12 @@ impl Drop for RunningThread<'_> {
 }
 
 /// How a turn ended.
+#[derive(Debug, PartialEq, Eq)]
 pub(super) enum Turn {
-    /// Grips were read that requests can use, and the atlas can still grow.
-    Read,
-    /// The atlas can still grow; with the work done in this turn.
-    More(Duration),
-    /// The atlas is complete or has no room to grow.
-    Finished,
+    /// The atlas can still grow.
+    Next(Stage),
+    /// The atlas does not grow.
+    Ended(BuildState),
     /// The object or the hand's slot was evicted, or the server stops.
     Dropped,
 }
@@ -198,19 +198,12 @@ fn work(builders: &Builders, job: BuildJob) {
     // A panic costs only this atlas: the state that it could leave inconsistent is local to the turn.
     let turn = catch_unwind(AssertUnwindSafe(|| turn(builders, &object, &job)));
     match turn {
-        Ok(Turn::Read) => builders.queue.push(BuildJob {
-            worked: job.worked + READ_WORK,
-            ..job
-        }),
-        Ok(Turn::More(worked)) => builders.queue.push(BuildJob {
-            worked: job.worked + worked,
-            ..job
-        }),
+        Ok(Turn::Next(stage)) => builders.queue.push(BuildJob { stage, ..job }),
         Ok(Turn::Dropped) => {}
-        Ok(Turn::Finished) => object.atlas_slots.finish(&job.hand),
+        Ok(Turn::Ended(state)) => object.atlas_slots.end(&hand, state),
         Err(_) => {
-            tracing::error!(object = object.name(), hand = %hand_label(&job.hand), "building an atlas panicked");
-            object.atlas_slots.finish(&job.hand);
+            tracing::error!(object = object.name(), hand = %hand_label(&hand), "building an atlas panicked");
+            object.atlas_slots.end(&hand, BuildState::Failed);
         }
     }
     // Only these hands' atlases are part of an object's state.
@@ -251,134 +244,183 @@ impl Progress {
     }
 }
 
-/// Reads an atlas or grows it, and publishes it.
+/// Reads an atlas or grows it by a stage, and publishes it.
 pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
-    let start = Instant::now();
-    let hand = &job.hand;
     // Without a slot, other hands have taken its place.
-    let Some(slot) = object.atlas_slots.get(hand) else {
+    let Some(slot) = object.atlas_slots.get(&job.hand) else {
         return Turn::Dropped;
     };
-    if slot.grown.is_none()
-        && let Some(read) = read(builders, object, hand)
-    {
-        let is_complete = read.grown.atlas.is_complete();
-        let has_room = builders.loaded.publish(object, hand, read, start.elapsed());
-        return if is_complete || !has_room {
-            Turn::Finished
-        } else {
-            Turn::Read
-        };
+    if job.stage == Stage::Unread {
+        return read_turn(builders, object, &job.hand);
     }
-    let shipped = slot.grown.filter(|grown| is_shipped(grown));
-    let mut growth = match &slot.growing {
-        Some(growing) => Growth::resume(&object.object, &hand.rig, growing),
-        None => Growth::new(&object.object, &hand.rig),
-    };
-    let published = growth.len();
-    if growth.is_complete() {
-        return Turn::Finished;
+    if !builders.loaded.has_room(object, &job.hand, EXPECTED_BYTES) {
+        return Turn::Ended(BuildState::NoRoom);
     }
     // Not before reading: shipped grips must be there soon after the start, however busy the machine is.
     lower_priority();
-    let enough = USEFUL.max(published + published / GROWTH_PER_PUBLISH);
-    let mut gripper = Gripper::default();
-    let mut worked = Duration::ZERO;
-    while !growth.is_complete() && growth.len() < enough && worked < TURN {
-        // If this thread holds the last reference, the object was evicted.
-        if builders.queue.is_stopped() || Arc::strong_count(object) == 1 {
-            return Turn::Dropped;
-        }
-        let round = Instant::now();
-        growth.round(&mut gripper);
-        let took = round.elapsed();
-        worked += took;
-        pause_for_searches(builders, took);
-        // A new atlas goes before one that already had a turn.
-        if !job.worked.is_zero() && builders.queue.has_new_job() {
-            break;
-        }
+    let growth = match &slot.grown {
+        Some(grown) => Growth::resume(&object.object, &job.hand.rig, grown),
+        None => Growth::new(&object.object, &job.hand.rig),
+    };
+    let growing = Growing {
+        builders,
+        object,
+        job,
+        growth,
+        gripper: Gripper::default(),
+        unpublished_work: Duration::ZERO,
+    };
+    match job.stage {
+        Stage::Unread | Stage::Starting => growing.become_useful(),
+        Stage::Completing => growing.complete(),
     }
-    let grown = Arc::new(growth.grown());
-    if let Some(files) = &builders.files
-        && (growth.len() > published || growth.is_complete())
+}
+
+/// Publishes the atlas on disk or the shipped grips, if there are any.
+fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Turn {
+    let start = thread_time();
+    let on_disk = || read_file(builders, object, hand);
+    let Some(read) = shipped_grips(object, hand).or_else(on_disk).map(Arc::new) else {
+        return Turn::Next(Stage::Starting);
+    };
+    let entries = read.atlas.entries().len();
+    let complete = read.atlas.is_complete();
+    if !builders
+        .loaded
+        .publish(object, hand, read, thread_time().saturating_sub(start))
     {
-        files.write(object, hand, &grown);
+        return Turn::Ended(BuildState::NoRoom);
     }
-    let update = match shipped {
-        Some(shipped) if !grown.atlas.is_complete() => Update {
-            grown: shipped,
-            growing: Some(Arc::clone(&grown)),
-        },
-        _ => Update::of(Arc::clone(&grown)),
-    };
-    let is_used = Arc::ptr_eq(&update.grown, &grown);
-    let has_room = builders.loaded.publish(object, hand, update, worked);
-    if has_room && is_used {
-        log_progress(object, hand, &grown, published);
-    } else if has_room {
-        tracing::debug!(
-            object = object.name(),
-            hand = %hand_label(hand),
-            entries = growth.len(),
-            "an atlas grows while shipped grips answer"
-        );
-    } else {
-        tracing::debug!(
-            object = object.name(),
-            hand = %hand_label(hand),
-            entries = published,
-            "an atlas cannot grow: cache_bytes has no room"
-        );
-    }
-    if growth.is_complete() || !has_room {
-        Turn::Finished
-    } else {
-        Turn::More(worked)
+    tracing::info!(object = object.name(), hand = %hand_label(hand), entries, complete, "read an atlas");
+    match () {
+        () if complete => Turn::Ended(BuildState::Finished),
+        () if entries >= USEFUL => Turn::Next(Stage::Completing),
+        () => Turn::Next(Stage::Starting),
     }
 }
 
-/// The atlas on disk. Unless it is complete, shipped grips answer requests and growth resumes from it.
-fn read(builders: &Builders, object: &StoredObject, hand: &Arc<Hand>) -> Option<Update> {
-    let on_disk = builders.files.as_ref().and_then(|files| files.read(object, hand));
-    let on_disk = on_disk.map(Arc::new);
-    let is_complete = on_disk.as_ref().is_some_and(|read| read.atlas.is_complete());
-    let shipped = if is_complete {
-        None
-    } else {
-        shipped_grips(object, hand)
-    };
-    let read = match (shipped, on_disk) {
-        (Some(shipped), growing) => Update {
-            grown: Arc::new(shipped),
-            growing,
-        },
-        (None, Some(on_disk)) => Update::of(on_disk),
-        (None, None) => return None,
-    };
-    tracing::info!(
-        object = object.name(),
-        hand = %hand_label(hand),
-        entries = read.grown.atlas.entries().len(),
-        complete = read.grown.atlas.is_complete(),
-        "read an atlas"
-    );
-    Some(read)
+/// The atlas on disk. If another server has grown more than is kept, the file is replaced by an excerpt.
+fn read_file(builders: &Builders, object: &StoredObject, hand: &Arc<Hand>) -> Option<Grown> {
+    let files = builders.files.as_ref()?;
+    let read = files.read(object, hand)?;
+    if !read.atlas.is_complete() || read.atlas.entries().len() <= CHOSEN {
+        return Some(read);
+    }
+    let chosen = Growth::resume(&object.object, &hand.rig, &read).chosen();
+    files.write(object, hand, &chosen);
+    Some(chosen)
 }
 
-/// True for shipped grips: no proposals were tried for them, and no atlas can grow from them.
-fn is_shipped(grown: &Grown) -> bool {
-    grown.proposed() == 0
+/// An atlas that a thread is growing.
+struct Growing<'a> {
+    builders: &'a Builders,
+    object: &'a Arc<StoredObject>,
+    job: &'a BuildJob,
+    growth: Growth<'a>,
+    gripper: Gripper,
+    unpublished_work: Duration,
 }
 
-/// The grips that ship with the server for an object and a hand.
+impl Growing<'_> {
+    /// Grows until the atlas is useful or has had its slice of work.
+    fn become_useful(mut self) -> Turn {
+        let mut worked = Duration::ZERO;
+        let mut next_publish = FIRST;
+        while !self.growth.is_enough() && self.growth.len() < USEFUL && worked < SLICE {
+            let Some(took) = self.round() else {
+                return Turn::Dropped;
+            };
+            worked += took;
+            let len = self.growth.len();
+            if (next_publish..USEFUL).contains(&len) {
+                next_publish = len + len / GROWTH_PER_PUBLISH;
+                if !self.keep(self.growth.grown()) {
+                    return Turn::Ended(BuildState::NoRoom);
+                }
+            }
+        }
+        if self.growth.is_enough() {
+            return self.complete();
+        }
+        self.end(self.growth.grown(), Turn::Next(Stage::Completing))
+    }
+
+    /// Grows until there is enough to choose from. What is more urgent comes in between, so that no growth is given up.
+    fn complete(mut self) -> Turn {
+        while !self.growth.is_enough() {
+            if self.round().is_none() {
+                return Turn::Dropped;
+            }
+            while let Some(urgent) = self.builders.queue.next_before(self.job) {
+                work(self.builders, urgent);
+            }
+        }
+        self.end(self.growth.chosen(), Turn::Ended(BuildState::Finished))
+    }
+
+    /// Runs a round; the processor time that it took, or none if nobody needs the atlas any more.
+    fn round(&mut self) -> Option<Duration> {
+        // If this thread holds the last reference, the object was evicted.
+        if self.builders.queue.is_stopped() || Arc::strong_count(self.object) == 1 {
+            return None;
+        }
+        let (start, start_of_work) = (Instant::now(), thread_time());
+        self.growth.round(&mut self.gripper);
+        let worked = thread_time().saturating_sub(start_of_work);
+        self.unpublished_work += worked;
+        pause_for_searches(self.builders, start.elapsed());
+        Some(worked)
+    }
+
+    /// Keeps an atlas, after which the turn ends.
+    fn end(&mut self, grown: Grown, turn: Turn) -> Turn {
+        if self.keep(grown) {
+            turn
+        } else {
+            Turn::Ended(BuildState::NoRoom)
+        }
+    }
+
+    /// Writes and publishes an atlas. False if there is no room.
+    fn keep(&mut self, grown: Grown) -> bool {
+        if let Some(files) = &self.builders.files {
+            files.write(self.object, &self.job.hand, &grown);
+        }
+        let (object, hand) = (self.object, &self.job.hand);
+        let before = object.atlas_slots.get(hand).unwrap_or_default();
+        let work = std::mem::take(&mut self.unpublished_work);
+        let has_room = self.builders.loaded.publish(object, hand, Arc::new(grown), work);
+        if has_room {
+            log_progress(object, hand, &before);
+        } else {
+            tracing::debug!(object = object.name(), hand = %hand_label(hand), "no room for an atlas in cache_bytes");
+        }
+        has_room
+    }
+}
+
+/// Processor time of this thread.
+#[cfg(target_os = "linux")]
+fn thread_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    Duration::try_from(time).unwrap_or_default()
+}
+
+/// Wall time, on systems without a clock per thread.
+#[cfg(not(target_os = "linux"))]
+fn thread_time() -> Duration {
+    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    START.elapsed()
+}
+
+/// The grips that ship with the server for an object and a hand: chosen from more than a server grows, hence complete.
 fn shipped_grips(object: &StoredObject, hand: &Arc<Hand>) -> Option<Grown> {
     let bytes = object
         .built_in
         .then(|| shipped_atlas(&object.id, &hand.rig))
         .flatten()?;
     match decode(bytes, &object.object, &hand.rig) {
-        Ok(grown) => Some(grown),
+        Ok(grown) => Some(grown.completed()),
         Err(error) => {
             tracing::warn!(
                 object = object.name(),
@@ -400,16 +442,21 @@ fn pause_for_searches(builders: &Builders, worked: Duration) {
 }
 
 /// Logs when an atlas becomes useful and when it is complete.
-fn log_progress(object: &StoredObject, hand: &Arc<Hand>, grown: &Grown, published: usize) {
+fn log_progress(object: &StoredObject, hand: &Arc<Hand>, before: &Slot) {
+    let slot = object.atlas_slots.get(hand).unwrap_or_default();
+    let Some(grown) = &slot.grown else { return };
     let entries = grown.atlas.entries().len();
+    let before = before
+        .grown
+        .as_ref()
+        .map_or(0, |grown| grown.atlas.entries().len());
     let message = if grown.atlas.is_complete() {
         "an atlas is complete"
-    } else if published < USEFUL && entries >= USEFUL {
+    } else if before < USEFUL && entries >= USEFUL {
         "an atlas is useful"
     } else {
         return;
     };
-    let slot = object.atlas_slots.get(hand).unwrap_or_default();
     tracing::info!(
         object = object.name(),
         hand = %hand_label(hand),

@@ -26,11 +26,11 @@ use grasp_synthesis::known::{
 use super::hand_label;
 use crate::objects::StoredObject;
 
-/// Largest total size of all files, in bytes: 800 complete atlases. It keeps clients that create ever more objects from
+/// Largest total size of all files, in bytes: 15,000 complete atlases. It keeps clients that create ever more objects from
 /// filling the disk.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Largest file that is read, in bytes: three times a complete atlas.
+/// Largest file that is read, in bytes: twice that of an atlas grown for hours, from which the server keeps the best part.
 const LARGEST_FILE: u64 = 4 << 20;
 
 /// Extension of a finished file.

@@ -1,15 +1,17 @@
 //! Which atlases are in memory, and which are evicted when memory is short.
 
 use std::{
+    collections::HashSet,
     sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
     time::Duration,
 };
 
 use grasp_assets::hands::Hand;
+use grasp_synthesis::known::growth::Grown;
 
 use super::hand_label;
 use crate::{
-    atlas_slots::Update,
+    demand::Demand,
     objects::{StoredObject, store::ObjectStore},
 };
 
@@ -33,34 +35,49 @@ impl LoadedAtlases {
         }
     }
 
-    /// Puts an atlas in its slot, evicting less recently used ones if there is no room. False if there still is none.
+    /// Puts an atlas in its slot, evicting others that are asked for less if there is no room. False if there still is none.
     pub(super) fn publish(
         &self,
         object: &Arc<StoredObject>,
         hand: &Arc<Hand>,
-        update: Update,
+        grown: Arc<Grown>,
         spent: Duration,
     ) -> bool {
-        let bytes = update.bytes();
         let mut owners = self.owners();
-        let is_same =
-            |(other, its_hand): &Owner| std::ptr::eq(other.as_ptr(), Arc::as_ptr(object)) && its_hand == hand;
-        let has_slot = |(object, hand): &Owner| {
-            object
-                .upgrade()
-                .is_some_and(|object| object.atlas_slots.get(hand).is_some())
-        };
-        owners.retain(|owner| has_slot(owner) && !is_same(owner));
-        let slot = object.atlas_slots.get(hand).unwrap_or_default();
-        let room = self.objects.room();
-        let fits = bytes <= room && make_room(&mut owners, room - bytes, slot.last_used);
+        let was_loaded = drop_owner(&mut owners, object, hand);
+        let fits = self.make_room(&mut owners, object, hand, grown.bytes());
         if fits {
-            object.atlas_slots.publish(hand, update, spent);
+            object.atlas_slots.publish(hand, grown, spent);
         }
-        if fits || slot.grown.is_some() {
+        if fits || was_loaded {
             owners.push((Arc::downgrade(object), Arc::clone(hand)));
         }
         fits
+    }
+
+    /// True if an atlas of so many bytes would fit, after evicting others that are asked for less.
+    pub(super) fn has_room(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, bytes: usize) -> bool {
+        let others: Vec<Owner> = self
+            .owners()
+            .iter()
+            .filter(|owner| !is(owner, object, hand))
+            .cloned()
+            .collect();
+        let demand = object.atlas_slots.demand(hand).unwrap_or_default();
+        let room = self.objects.room();
+        bytes <= room && evictable(&others, room - bytes, demand).is_some()
+    }
+
+    fn make_room(
+        &self,
+        owners: &mut Vec<Owner>,
+        object: &StoredObject,
+        hand: &Arc<Hand>,
+        bytes: usize,
+    ) -> bool {
+        let demand = object.atlas_slots.demand(hand).unwrap_or_default();
+        let room = self.objects.room();
+        bytes <= room && make_room(owners, room - bytes, demand)
     }
 
     /// Evicts atlases until the others fit in the room that created objects leave.
@@ -70,7 +87,7 @@ impl LoadedAtlases {
 
     /// Evicts atlases until the others take no more than `bytes`.
     pub(super) fn shrink_to(&self, bytes: usize) {
-        make_room(&mut self.owners(), bytes, u64::MAX);
+        make_room(&mut self.owners(), bytes, Demand::MOST);
     }
 
     fn owners(&self) -> MutexGuard<'_, Vec<Owner>> {
@@ -79,31 +96,32 @@ impl LoadedAtlases {
     }
 }
 
-/// Evicts the least recently used atlases, of those last used before `before`, until the others take no more than
-/// `room` bytes. False, and nothing is evicted, if that is not enough.
-fn make_room(owners: &mut Vec<Owner>, room: usize, before: u64) -> bool {
-    let mut slots: Vec<(u64, usize, usize)> = owners
-        .iter()
-        .enumerate()
-        .filter_map(|(place, (object, hand))| {
-            let slot = object.upgrade()?.atlas_slots.get(hand)?;
-            Some((slot.last_used, slot.bytes, place))
-        })
-        .collect();
-    slots.sort_unstable();
-    let mut taken: usize = slots.iter().map(|(_, bytes, _)| bytes).sum();
-    let evicted: Vec<usize> = slots
-        .into_iter()
-        .take_while(|(last_used, bytes, _)| {
-            let is_evicted = taken > room && *last_used < before;
-            taken -= if is_evicted { *bytes } else { 0 };
-            is_evicted
-        })
-        .map(|(_, _, place)| place)
-        .collect();
-    if taken > room {
+/// True for the owner that an object and a hand are.
+fn is((of, with): &Owner, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> bool {
+    std::ptr::eq(of.as_ptr(), Arc::as_ptr(object)) && with == hand
+}
+
+/// Drops an owner and those that are gone. True if the owner had an atlas.
+fn drop_owner(owners: &mut Vec<Owner>, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> bool {
+    owners.retain(|owner| {
+        let (of, with) = owner;
+        let has_slot = of
+            .upgrade()
+            .is_some_and(|of| of.atlas_slots.demand(with).is_some());
+        has_slot && !is(owner, object, hand)
+    });
+    object
+        .atlas_slots
+        .get(hand)
+        .is_some_and(|slot| slot.grown.is_some())
+}
+
+/// Evicts what is asked for least, of what is asked for less than `before`, until the others take no more than `room` bytes.
+/// False, and nothing is evicted, if that is not enough.
+fn make_room(owners: &mut Vec<Owner>, room: usize, before: Demand) -> bool {
+    let Some(evicted) = evictable(owners, room, before) else {
         return false;
-    }
+    };
     for place in &evicted {
         let (object, hand) = &owners[*place];
         if let Some(object) = object.upgrade() {
@@ -117,4 +135,30 @@ fn make_room(owners: &mut Vec<Owner>, room: usize, before: u64) -> bool {
         !evicted.contains(&(place - 1))
     });
     true
+}
+
+/// The places of the owners whose atlases [`make_room`] evicts; none if that is not enough.
+fn evictable(owners: &[Owner], room: usize, before: Demand) -> Option<HashSet<usize>> {
+    let mut slots: Vec<(Demand, usize, usize)> = owners
+        .iter()
+        .enumerate()
+        .filter_map(|(place, (object, hand))| {
+            let (demand, bytes) = object.upgrade()?.atlas_slots.demand_and_bytes(hand)?;
+            Some((demand, bytes, place))
+        })
+        .collect();
+    let mut taken: usize = slots.iter().map(|(_, bytes, _)| bytes).sum();
+    if taken <= room {
+        return Some(HashSet::new());
+    }
+    slots.sort_unstable_by(|(a, ..), (b, ..)| a.cmp(*b));
+    let mut evicted = HashSet::new();
+    for (demand, bytes, place) in slots {
+        if taken <= room || demand.cmp(before).is_ge() {
+            break;
+        }
+        taken -= bytes;
+        evicted.insert(place);
+    }
+    (taken <= room).then_some(evicted)
 }

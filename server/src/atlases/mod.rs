@@ -2,13 +2,13 @@
 //!
 //! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
-//! [`build_queue`] and grow them on low-priority threads, at a tenth of the time while searches run: those of both hands
-//! alternately, so that both are useful at about the same time. [`files`] keeps them on disk if there is a folder for them.
+//! [`build_queue`] and grow them on low-priority threads, at a tenth of the time while searches run. What is asked for most
+//! comes first ([`demand`](crate::demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
+//! [`files`] keeps them on disk if there is a folder for them.
 //!
-//! For the built-in objects, a few hundred grips per hand ship with the server and answer requests from its start. The
-//! full atlas grows meanwhile and replaces them once it is complete: it then has the same grips and more.
+//! For the built-in objects, a few hundred grips per hand ship with the server, and nothing grows.
 //!
-//! Atlases take what created objects leave of `cache_bytes`: [`loaded`] evicts the least recently used ones, which are
+//! Atlases take what created objects leave of `cache_bytes`: [`loaded`] drops those that are asked for least, which are
 //! built or read again when they are requested. [`remembered`] keeps grips that searches found.
 
 mod build_queue;
@@ -31,7 +31,7 @@ use grasp_synthesis::{
 use self::{builders::Builders, files::AtlasFiles};
 use crate::{
     answer::atlas_stamp,
-    atlas_slots::BuildState,
+    atlas_slots::{BuildState, Slot},
     executor::SearchExecutor,
     objects::{StoredObject, store::ObjectStore},
 };
@@ -137,6 +137,7 @@ impl Atlases {
         let hand = self.0.default_hand(handedness)?;
         let slot = object.and_then(|object| object.atlas_slots.get(hand));
         let slot = slot.unwrap_or_default();
+        let growth = growth_of(&slot);
         let atlas = slot
             .grown
             .map(|grown| Arc::clone(&grown.atlas))
@@ -146,6 +147,7 @@ impl Atlases {
             complete: slot.state == BuildState::Finished,
             stamp: atlas_stamp(&atlas),
             build_time: prost_types::Duration::try_from(slot.build_time).ok(),
+            growth: growth.into(),
         })
     }
 
@@ -163,6 +165,23 @@ impl Atlases {
 impl Drop for Atlases {
     fn drop(&mut self) {
         self.0.queue.stop();
+    }
+}
+
+/// Whether an atlas grows, and why not.
+fn growth_of(slot: &Slot) -> v1::AtlasGrowth {
+    let is_empty = slot
+        .grown
+        .as_ref()
+        .is_none_or(|grown| grown.atlas.entries().is_empty());
+    match slot.state {
+        BuildState::Growing if is_empty => v1::AtlasGrowth::Waiting,
+        BuildState::Growing => v1::AtlasGrowth::Growing,
+        BuildState::Finished if is_empty => v1::AtlasGrowth::NothingFound,
+        BuildState::Finished => v1::AtlasGrowth::Complete,
+        BuildState::Absent => v1::AtlasGrowth::AtRest,
+        BuildState::NoRoom => v1::AtlasGrowth::NoMemory,
+        BuildState::Failed => v1::AtlasGrowth::Failed,
     }
 }
 

@@ -1,4 +1,4 @@
-//! Atlases without a server: eviction, remembered grips, shipped grips, and the end of builders.
+//! Atlases without a server: eviction, remembered grips, shipped grips, files, states, and the end of builders.
 
 use std::time::{Duration, Instant};
 
@@ -6,16 +6,19 @@ use glam::Vec3;
 use grasp_assets::hands::hand;
 use grasp_synthesis::{
     known::{
-        codec::{decode, encode},
-        growth::{Grown, Growth, MAX_PROPOSALS, ROUND},
+        growth::{CHOSEN, Grown, Growth},
         primitives::Primitive,
     },
     physical::grip::Gripper,
 };
-use sha2::{Digest as _, Sha256};
 
-use super::{build_queue::BuildJob, builders::Turn, files::tests::Folder, *};
-use crate::{atlas_slots::Update, limits::StoreLimits, objects::store::Origin};
+use super::{
+    build_queue::{BuildJob, Stage},
+    builders::Turn,
+    files::tests::Folder,
+    *,
+};
+use crate::{limits::StoreLimits, objects::store::Origin};
 
 /// Longest wait for any event; reached only if something hangs.
 const HANGS_AFTER: Duration = Duration::from_mins(1);
@@ -36,12 +39,16 @@ pub(super) fn adult() -> &'static Arc<Hand> {
 
 /// The first grips of an object.
 pub(super) fn grown(object: &StoredObject) -> Arc<Grown> {
+    Arc::new(grown_to(10, object))
+}
+
+fn grown_to(grips: usize, object: &StoredObject) -> Grown {
     let mut growth = Growth::new(&object.object, &adult().rig);
     let mut gripper = Gripper::default();
-    while growth.len() < 10 {
+    while growth.len() < grips {
         growth.round(&mut gripper);
     }
-    Arc::new(growth.grown())
+    growth.grown()
 }
 
 /// The grip with its hand moved `by` millimetres along x, so that it counts as another grip.
@@ -75,25 +82,28 @@ fn until(what: &str, condition: impl Fn() -> bool) {
 }
 
 #[test]
-fn evicts_least_recently_used() {
+fn evicts_what_is_asked_for_least() {
     let [a, b, c] = ["a", "b", "c"].map(|id| Arc::new(small(id)));
     let grown = grown(&a);
     // Without threads, only this test publishes.
     let atlases = start(0, &store(10, 2 * grown.bytes() + 10));
     let publish = |object: &Arc<StoredObject>| {
-        let update = Update::of(Arc::clone(&grown));
-        atlases.0.loaded.publish(object, adult(), update, Duration::ZERO)
+        let loaded = &atlases.0.loaded;
+        loaded.publish(object, adult(), Arc::clone(&grown), Duration::ZERO)
     };
     let is_there = |object: &Arc<StoredObject>| object.atlas_slots.get(adult()).unwrap().grown.is_some();
     for object in [&a, &b, &c] {
         atlases.0.request(object, [Some(adult()), None]);
     }
     atlases.0.request(&a, [Some(adult()), None]);
-    // From the least to the most recently used: b, c, a.
+    // From the one asked for least: b, c, which was asked for later, and a.
     assert!(publish(&b) && publish(&a));
     assert!(publish(&c), "b is evicted");
     assert_eq!([&a, &b, &c].map(is_there), [true, false, true]);
-    assert!(!publish(&b), "b would have to evict atlases used after it");
+    assert!(
+        !publish(&b),
+        "b would have to evict atlases that are asked for more"
+    );
     assert_eq!([&a, &b, &c].map(is_there), [true, false, true]);
     // Publishing again takes no more room than publishing once.
     assert!(publish(&a) && publish(&c));
@@ -175,86 +185,80 @@ fn rebuilds_an_evicted_atlas_on_request() {
     assert!(known(&atlases, &object, adult()).atlas.is_none());
     let is_there = || known(&atlases, &object, adult()).atlas.is_some();
     until("the first atlas", is_there);
-    object.atlas_slots.finish(adult());
+    object.atlas_slots.end(adult(), BuildState::Finished);
     atlases.0.loaded.shrink_to(0);
     let slot = object.atlas_slots.get(adult()).unwrap();
     assert_eq!((slot.state, slot.bytes), (BuildState::Absent, 0));
     until("the second atlas", is_there);
 }
 
-/// An atlas whose next round is its last: the number of proposals in its encoding is set to one round below the bound.
-fn nearly_complete(object: &StoredObject) -> Grown {
-    const PROPOSED: std::ops::Range<usize> = 47..55;
-    const CHECKSUM_BYTES: usize = 32;
-    let mut bytes = encode(&grown(object), &object.object, &adult().rig);
-    bytes[PROPOSED].copy_from_slice(&(MAX_PROPOSALS - ROUND).to_be_bytes());
-    let content = bytes.len() - CHECKSUM_BYTES;
-    let checksum = Sha256::digest(&bytes[..content]);
-    bytes[content..].copy_from_slice(&checksum);
-    decode(&bytes, &object.object, &adult().rig).expect("the checksum is right")
-}
-
 #[test]
-fn complete_atlas_replaces_shipped_grips() {
+fn shipped_grips_are_complete_and_nothing_grows() {
     let remote = Arc::clone(&grasp_assets::objects::object("remote").unwrap().object);
     let object = Arc::new(StoredObject::built_in("remote".to_owned(), remote));
     let atlases = start(0, &store(10, 1 << 30));
+    object.atlas_slots.request(adult(), Duration::ZERO);
     let job = BuildJob {
         object: Arc::downgrade(&object),
         hand: Arc::clone(adult()),
-        worked: Duration::ZERO,
+        stage: Stage::Unread,
     };
-    let turn = || builders::turn(&atlases.0, &object, &job);
-    let slot = || object.atlas_slots.get(adult()).unwrap();
-    object.atlas_slots.request(adult(), 1);
-    // A builder drops the job if it holds the last reference.
-    let _second_reference = Arc::clone(&object);
-
-    assert!(matches!(turn(), Turn::Read));
-    let shipped = slot().grown.expect("grips ship with the server");
-    assert!(!shipped.atlas.is_complete() && shipped.atlas.entries().len() >= 50);
-    assert!(slot().growing.is_none());
-
-    // The growing atlas is kept, but requests still get the shipped grips.
-    assert!(matches!(turn(), Turn::More(_)));
-    let growing = slot().growing.expect("it grows");
-    assert!(growing.proposed() > 0 && !growing.atlas.entries().is_empty());
-    assert!(Arc::ptr_eq(&slot().grown.unwrap(), &shipped));
-    assert_eq!(slot().bytes, shipped.bytes() + growing.bytes());
-    assert!(matches!(turn(), Turn::More(_)));
-    assert!(slot().growing.unwrap().proposed() > growing.proposed());
-
-    let update = Update {
-        grown: shipped,
-        growing: Some(Arc::new(nearly_complete(&object))),
-    };
-    object.atlas_slots.publish(adult(), update, Duration::ZERO);
-    assert!(matches!(turn(), Turn::Finished));
-    let complete = slot().grown.expect("it is complete");
-    assert!(complete.atlas.is_complete());
-    assert!(Arc::ptr_eq(&complete, &slot().growing.unwrap()));
-    assert_eq!(slot().bytes, complete.bytes());
+    let turn = builders::turn(&atlases.0, &object, &job);
+    assert_eq!(turn, Turn::Ended(BuildState::Finished));
+    let shipped = object.atlas_slots.get(adult()).unwrap().grown;
+    let shipped = shipped.expect("grips ship with the server");
+    assert!(shipped.atlas.is_complete() && shipped.atlas.entries().len() >= 50);
 }
 
-#[test]
-fn complete_file_is_used_instead_of_shipped_grips() {
-    let folder = Folder::new("complete");
-    let store = store(10, 1 << 30);
-    let remote = store.pinned().find(|object| object.id == "remote");
-    let object = Arc::clone(remote.expect("it is built in"));
+/// What a server reads from the file of an atlas, and how many grips the file has afterwards.
+fn read_back(test: &str, written: &Grown) -> (Arc<Grown>, usize) {
+    let folder = Folder::new(test);
     let files = folder.open();
-    let mut growth = Growth::resume(&object.object, &adult().rig, &nearly_complete(&object));
-    growth.round(&mut Gripper::default());
-    let complete = growth.grown();
-    assert!(complete.atlas.is_complete());
-    files.write(&object, adult(), &complete);
+    let object = Arc::new(small("a"));
+    files.write(&object, adult(), written);
     let executor = SearchExecutor::new(1, 1).unwrap();
-    let _atlases = Atlases::start(1, &store, executor, Some(files), "adult".to_owned()).unwrap();
+    let store = store(10, 1 << 30);
+    let atlases = Atlases::start(1, &store, executor, Some(files), "adult".to_owned()).unwrap();
+    atlases.0.request(&object, [Some(adult()), None]);
     until("reading the file", || {
         let slot = object.atlas_slots.get(adult());
         slot.is_some_and(|slot| slot.state == BuildState::Finished)
     });
-    assert_eq!(*object.atlas_slots.get(adult()).unwrap().grown.unwrap(), complete);
+    let slot = object.atlas_slots.get(adult()).unwrap();
+    let read = folder.open().read(&object, adult()).expect("the file is there");
+    (slot.grown.expect("it was read"), read.atlas.entries().len())
+}
+
+#[test]
+fn a_complete_file_is_read_as_it_is_and_a_longer_one_is_cut_to_what_is_kept() {
+    let longer = grown_to(CHOSEN + 40, &small("a")).completed();
+    let (read, in_file) = read_back("longer", &longer);
+    assert!(read.atlas.is_complete());
+    assert_eq!((read.atlas.entries().len(), in_file), (CHOSEN, CHOSEN));
+    let kept = longer.atlas.entries();
+    assert!(read.atlas.entries().iter().all(|entry| kept.contains(entry)));
+    let (again, _) = read_back("complete", &read);
+    assert_eq!(again, read);
+}
+
+#[test]
+fn tells_why_an_atlas_has_no_grips() {
+    let object = Arc::new(cuboid("large", Vec3::splat(0.2)));
+    let state = |atlases: &Atlases| atlases.state(&object).expect("there are builders");
+    let full = start(1, &store(10, 0));
+    full.register(&object);
+    until("the end of the memory", || {
+        state(&full).growth() == v1::AtlasGrowth::NoMemory
+    });
+    assert!(!state(&full).complete);
+    drop(full);
+    // Too large for a hand. The next call tries again.
+    let atlases = start(1, &store(10, 1 << 30));
+    atlases.register(&object);
+    assert_eq!(state(&atlases).growth(), v1::AtlasGrowth::Waiting);
+    until("the end of the search for grips", || state(&atlases).complete);
+    assert_eq!(state(&atlases).growth(), v1::AtlasGrowth::NothingFound);
+    assert_eq!(state(&atlases).entries, 0);
 }
 
 fn insert(store: &ObjectStore, object: StoredObject) -> Arc<StoredObject> {
@@ -305,9 +309,9 @@ fn both_hands_of_every_new_object_become_useful_before_any_grows_on() {
     until("useful atlases", || {
         all().as_flattened().iter().all(|&count| count >= USEFUL)
     });
-    // By then an atlas had a turn or two more, each of a quarter of its grips.
-    let most = all().into_iter().flatten().max().unwrap();
-    assert!(most < 4 * USEFUL, "{:?}", all());
+    let is_complete =
+        |object: &StoredObject| object.atlas_slots.get(adult()).unwrap().state == BuildState::Finished;
+    assert!(!objects.iter().any(|object| is_complete(object)), "{:?}", all());
 }
 
 #[test]
@@ -318,8 +322,8 @@ fn hands_requested_together_do_not_evict_each_other() {
     let left = hand("adult", Handedness::Left).unwrap();
     atlases.0.request(&object, [Some(adult()), Some(left)]);
     let publish = |hand| {
-        let update = Update::of(Arc::clone(&grown));
-        atlases.0.loaded.publish(&object, hand, update, Duration::ZERO)
+        let loaded = &atlases.0.loaded;
+        loaded.publish(&object, hand, Arc::clone(&grown), Duration::ZERO)
     };
     assert!(publish(adult()));
     assert!(!publish(left), "there is room for one of them");

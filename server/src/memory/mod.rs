@@ -51,8 +51,8 @@ const PER_WATCHER: u64 = 512 << 10;
 /// 7 KiB with as many and as long ones as can be.
 const PER_SAVED_OBJECT: u64 = 8 << 10;
 
-/// Bytes per growing atlas, excluding its published form: its grips twice during publication, and their encoding for
-/// the disk. A complete atlas takes 10 MB.
+/// Bytes per growing atlas, excluding its published form: its grips twice while some are chosen, and their encoding for the
+/// disk. One that is read from a file of thousands of grips takes 10 MB.
 const PER_BUILDER: u64 = 20 * MIB;
 
 /// Bytes of address space reserved per thread: Rust's default stack, which the async runtime uses too.

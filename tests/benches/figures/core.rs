@@ -58,14 +58,13 @@ impl CoreSearcher {
         }
     }
 
-    /// The atlas a server used: the one saved in a folder, else the shipped grips. `None` if there is none for this
-    /// object and hand.
+    /// The atlas a server uses: the shipped grips, else the one saved in a folder. `None` if there is none for this object and
+    /// hand.
     pub(crate) fn atlas(&self, id: &str, folder: &AtlasFolder, object: &GraspObject) -> Option<Arc<Atlas>> {
         let decoded = |bytes: &[u8]| decode(bytes, object, self.rig).ok();
-        let kept = fs::read(folder.file(object, self.rig)).ok();
-        let kept = kept.and_then(|bytes| decoded(&bytes));
-        let grown = kept.or_else(|| shipped_atlas(id, self.rig).and_then(decoded))?;
-        Some(grown.atlas)
+        let shipped = shipped_atlas(id, self.rig).and_then(decoded);
+        let kept = || decoded(&fs::read(folder.file(object, self.rig)).ok()?);
+        Some(shipped.or_else(kept)?.completed().atlas)
     }
 
     /// Wall time of a search as the server runs it: a look-up on the calling thread, then a race of the workers.

@@ -2,17 +2,9 @@
 
 use std::{fs, path::PathBuf};
 
-use grasp_assets::{
-    atlas_folder::{AtlasFolder, complete_atlas},
-    atlases::shipped_atlas,
-    hands::hand,
-    objects::object,
-};
+use grasp_assets::{atlases::shipped_atlas, hands::hand, objects::object};
 use grasp_proto::v1;
-use grasp_synthesis::{
-    known::{codec::decode, key::file_name},
-    model::hand::Handedness,
-};
+use grasp_synthesis::{known::codec::decode, model::hand::Handedness};
 use grasp_tests::TestServer;
 
 use crate::fixtures::{Folder, bounded, box_request, seconds, until};
@@ -29,18 +21,12 @@ async fn start(folder: &Folder) -> TestServer {
     .await
 }
 
-/// A server whose atlas of a built-in object is complete for the default rig's right hand from its start, and its folder.
+/// A server whose atlas of a built-in object is complete for the default rig's right hand, and its folder.
 pub(crate) async fn with_complete_atlas(object_name: &str) -> (TestServer, Folder) {
-    let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
-    let object = &object(object_name).expect("it is built in").object;
-    let complete = complete_atlas(object_name, rig);
     let folder = Folder::empty(&format!("complete-{object_name}"));
-    let kept = AtlasFolder::in_target().file(object, rig);
-    fs::copy(kept, folder.path().join(file_name(object, rig))).expect("it was just read");
     let server = start(&folder).await;
-    let entries = complete.entries().len() as u32;
-    let state = state(&server, &format!("objects/{object_name}"), entries).await;
-    assert_eq!(state.entries, entries);
+    let state = state(&server, &format!("objects/{object_name}"), 1).await;
+    assert!(state.complete);
     (server, folder)
 }
 
@@ -181,7 +167,7 @@ async fn a_recently_found_grip_answers_the_next_request() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn shipped_grips_answer_while_the_atlas_grows() {
+async fn shipped_grips_are_a_complete_atlas() {
     let folder = Folder::absent("shipped");
     let server = start(&folder).await;
     for (side, handedness) in [
@@ -192,7 +178,6 @@ async fn shipped_grips_answer_while_the_atlas_grows() {
         let remote = &object("remote").expect("it is built in").object;
         let bytes = shipped_atlas("remote", rig).expect("it is shipped");
         let shipped = decode(bytes, remote, rig).expect("it is current").atlas;
-        assert!(!shipped.is_complete());
         let request = v1::FindGraspRequest {
             object: "objects/remote".to_owned(),
             budget: Some(seconds(10)),
@@ -220,19 +205,19 @@ async fn shipped_grips_answer_while_the_atlas_grows() {
             }
         })
         .await;
-        // Nothing that grows meanwhile is seen.
-        assert_eq!(report.atlas_entries as usize, shipped.entries().len());
-        assert_eq!(report.atlas_stamp, format!("{:016x}", shipped.stamp()));
-        // Reproducible answers wait for the complete atlas.
+        let of_shipped = (shipped.entries().len(), format!("{:016x}", shipped.stamp()));
+        assert_eq!((report.atlas_entries as usize, report.atlas_stamp), of_shipped);
+        // Reproducible answers depend on complete atlases only.
         let report = ask(v1::FindGraspRequest {
             reproducible: true,
             ..request
         })
         .await;
-        assert_eq!((report.atlas_entries, report.atlas_stamp.as_str()), (0, ""));
+        assert_eq!((report.atlas_entries as usize, report.atlas_stamp), of_shipped);
     }
     let state = state(&server, "objects/remote", 1).await;
-    assert!(!state.complete);
+    assert!(state.complete);
+    assert_eq!(state.growth(), v1::AtlasGrowth::Complete);
     server.stop().await;
 }
 

@@ -14,7 +14,7 @@ pub(crate) use create::id_from_file;
 
 use clap::Subcommand;
 use glam::Vec3;
-use grasp_client::{AtlasState, Object, rfc3339};
+use grasp_client::{AtlasGrowth, AtlasState, Object, rfc3339};
 
 use crate::{
     Ending,
@@ -63,12 +63,20 @@ fn size(half_extents: Vec3) -> String {
     format!("{long:.0} × {middle:.0} × {short:.0} mm")
 }
 
-/// The state of an atlas: its number of grasps, and whether it still grows.
+/// The state of an atlas: its number of grasps, whether it still grows, and why not.
 fn atlas(atlas: Option<&AtlasState>) -> String {
-    match atlas {
-        None => "none".to_owned(),
-        Some(atlas) if atlas.complete => format!("{} grips", atlas.entries),
-        Some(atlas) => format!("{} grips so far", atlas.entries),
+    let Some(atlas) = atlas else {
+        return "none".to_owned();
+    };
+    match atlas.growth {
+        AtlasGrowth::Waiting => "waiting".to_owned(),
+        AtlasGrowth::NothingFound => "no grip found".to_owned(),
+        AtlasGrowth::AtRest => "at rest".to_owned(),
+        AtlasGrowth::NoMemory if atlas.entries == 0 => "no memory".to_owned(),
+        AtlasGrowth::Failed if atlas.entries == 0 => "failed".to_owned(),
+        AtlasGrowth::Unrecognised if !atlas.complete => format!("{} grips so far", atlas.entries),
+        AtlasGrowth::Growing => format!("{} grips so far", atlas.entries),
+        _ => format!("{} grips", atlas.entries),
     }
 }
 
@@ -136,15 +144,27 @@ mod tests {
 
     #[test]
     fn atlas_state_shows_growth() {
-        let state = |complete| AtlasState {
-            entries: 120,
-            complete,
+        let state = |entries, growth| AtlasState {
+            entries,
+            complete: matches!(growth, AtlasGrowth::Complete | AtlasGrowth::NothingFound),
             stamp: "a7".to_owned(),
             build_time: Duration::ZERO,
+            growth,
         };
         assert_eq!(atlas(None), "none");
-        assert_eq!(atlas(Some(&state(false))), "120 grips so far");
-        assert_eq!(atlas(Some(&state(true))), "120 grips");
+        for (entries, growth, expected) in [
+            (120, AtlasGrowth::Growing, "120 grips so far"),
+            (120, AtlasGrowth::Unrecognised, "120 grips so far"),
+            (120, AtlasGrowth::Complete, "120 grips"),
+            (120, AtlasGrowth::NoMemory, "120 grips"),
+            (0, AtlasGrowth::Waiting, "waiting"),
+            (0, AtlasGrowth::NothingFound, "no grip found"),
+            (0, AtlasGrowth::AtRest, "at rest"),
+            (0, AtlasGrowth::NoMemory, "no memory"),
+            (0, AtlasGrowth::Failed, "failed"),
+        ] {
+            assert_eq!(atlas(Some(&state(entries, growth))), expected);
+        }
     }
 
     #[test]

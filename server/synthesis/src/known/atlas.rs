@@ -55,6 +55,15 @@ impl Atlas {
         self.complete
     }
 
+    /// The same grips as an atlas that does not grow any further.
+    #[must_use]
+    pub(super) fn completed(self) -> Self {
+        Self {
+            complete: true,
+            ..self
+        }
+    }
+
     /// Identifies the grips: equal for the same grips in the same order.
     pub fn stamp(&self) -> u64 {
         self.stamp

@@ -14,7 +14,9 @@ use glam::Vec3;
 use super::{
     atlas::{Atlas, stamp},
     entry::Entry,
+    excerpt::excerpt,
     grips::Grips,
+    occupancy::Occupancy,
     seeds::Seeds,
     spread::{Admission, Cell, Spread, base_score},
 };
@@ -46,6 +48,14 @@ use crate::{
 
 /// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
 pub const ENTRIES: usize = 8192;
+
+/// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work. Four times as many
+/// raise the scores of the chosen grips by a twentieth, and answer a giver in twenty more of very thin objects.
+const ENOUGH_GRIPS: usize = 1024;
+const ENOUGH_PROPOSALS: u64 = 16_384;
+
+/// Grips that are kept of a growth that is enough.
+pub const CHOSEN: usize = 256;
 
 /// Proposals per round.
 pub const ROUND: u64 = 64;
@@ -126,6 +136,15 @@ impl Grown {
         let mut places: Vec<usize> = most.map(|(entry, _)| usize::from(entry)).collect();
         places.sort_unstable();
         self.only(object, rig, &places)
+    }
+
+    /// The same grips as a complete atlas.
+    #[must_use]
+    pub fn completed(self) -> Self {
+        Self {
+            atlas: Arc::new(Arc::unwrap_or_clone(self.atlas).completed()),
+            ..self
+        }
     }
 
     /// Some of the grips as an incomplete atlas.
@@ -223,6 +242,30 @@ impl<'a> Growth<'a> {
     /// True if the growth has ended.
     pub fn is_complete(&self) -> bool {
         self.len() >= ENTRIES || self.proposed >= MAX_PROPOSALS
+    }
+
+    /// True if the growth has so many grips that few more givers would be served by those that are chosen of more, or if it is
+    /// unlikely to find many more.
+    pub fn is_enough(&self) -> bool {
+        self.len() >= ENOUGH_GRIPS || self.proposed >= ENOUGH_PROPOSALS || self.is_complete()
+    }
+
+    /// The grips that together serve givers best, up to [`CHOSEN`], as a complete atlas from which nothing grows.
+    pub fn chosen(&self) -> Grown {
+        let (grips, shapes) = self.by_score();
+        let (object, rig) = (self.scene.object, self.rig);
+        let places = excerpt(
+            grips.entries(),
+            &Occupancy::of(object, rig, grips.entries()),
+            CHOSEN,
+        );
+        let entries = places.iter().map(|&place| grips.entries()[place].clone());
+        Grown {
+            atlas: Arc::new(Atlas::new(object, rig, Grips::new(rig, entries.collect()), true)),
+            shapes: places.iter().map(|&place| shapes[place]).collect(),
+            proposed: self.proposed,
+            early_stamp: self.early_stamp,
+        }
     }
 
     /// The atlas grown so far.

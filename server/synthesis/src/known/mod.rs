@@ -15,6 +15,7 @@ pub mod atlas;
 mod closure_screen;
 pub mod codec;
 pub mod entry;
+mod excerpt;
 mod farthest;
 pub mod finger_subsets;
 pub mod friction_uses;

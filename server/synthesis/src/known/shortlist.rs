@@ -57,13 +57,16 @@ const FOREARMS: usize = 16;
 const PLACES: usize = SAMPLED_GIVERS + FOREARMS * LANES;
 
 /// For each place, all bits set if a giver there is clear of a grip, else 0.
-type ClearOf = [u8; PLACES];
+pub(super) type ClearOf = [u8; PLACES];
 
 /// The value of a grip for givers by the direction of their forearms; 0 if it lets the object slip.
-type Row = [u8; FOREARMS];
+pub(super) type Row = [u8; FOREARMS];
 
 /// The direction of the forearms of the givers of each chunk.
-type Chunks = [usize; PLACES / LANES];
+pub(super) type Chunks = [usize; PLACES / LANES];
+
+/// The value that the giver at each place is served with.
+pub(super) type Served = [u8; PLACES];
 
 /// A grip on a list. There are a few hundred in all, and nearly every look-up starts with them, so their
 /// solids are kept.
@@ -245,7 +248,7 @@ impl Shortlists {
 
 /// For each grip, which givers are clear of it, and the forearms of the givers. Grips of the same atlas serve as givers: hands
 /// that hold an object out hold it like others do.
-fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<ClearOf>, Chunks) {
+pub(super) fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<ClearOf>, Chunks) {
     let count = entries.len();
     let givers = count.min(SAMPLED_GIVERS);
     let mut by_forearm: [Vec<usize>; FOREARMS] = std::array::from_fn(|_| Vec::new());
@@ -288,7 +291,7 @@ fn nearest_forearm(along: Vec3) -> usize {
 }
 
 /// The values of all grips for one direction against gravity.
-fn values(entries: &[Entry], up: usize) -> Vec<Row> {
+pub(super) fn values(entries: &[Entry], up: usize) -> Vec<Row> {
     let receivers: [Receiver; FOREARMS] =
         std::array::from_fn(|giver| Receiver::facing(forearm(giver), Vec3::ZERO, direction(up)));
     let of_stance = QUANTA * Term::Stance.share();
@@ -303,19 +306,19 @@ fn values(entries: &[Entry], up: usize) -> Vec<Row> {
     entries.iter().map(row).collect()
 }
 
-/// The list for one direction: the grips that serve the givers best.
-fn shortlist(values: &[Row], chunks: &Chunks, clear_of: &[ClearOf]) -> Vec<u16> {
-    // The value that each giver is served with so far. The initial one is what does not count next to its
-    // best clear grip.
+/// What each giver counts as served with before any grip is listed: the value that does not count next to its best clear grip.
+pub(super) fn least_served(values: &[Row], chunks: &Chunks, clear_of: &[ClearOf]) -> Served {
     let mut served = [SLIPS; PLACES];
     for (row, clear_of) in values.iter().zip(clear_of) {
         serve(&mut served, row, chunks, clear_of);
     }
-    for best in &mut served {
-        *best = best.saturating_sub(VALUE_MARGIN);
-    }
-    let gain_of =
-        |entry: usize, served: &[u8; PLACES]| gain(&values[entry], chunks, &clear_of[entry], served);
+    served.map(|best| best.saturating_sub(VALUE_MARGIN))
+}
+
+/// The list for one direction: the grips that serve the givers best.
+fn shortlist(values: &[Row], chunks: &Chunks, clear_of: &[ClearOf]) -> Vec<u16> {
+    let mut served = least_served(values, chunks, clear_of);
+    let gain_of = |entry: usize, served: &Served| gain(&values[entry], chunks, &clear_of[entry], served);
     let mut gains: BinaryHeap<(u32, Reverse<u16>)> = (0..clear_of.len())
         .map(|entry| (gain_of(entry, &served), Reverse(entry as u16)))
         .filter(|&(gain, _)| gain > 0)
@@ -340,7 +343,7 @@ fn shortlist(values: &[Row], chunks: &Chunks, clear_of: &[ClearOf]) -> Vec<u16> 
 }
 
 /// Serves the givers that are clear of a grip, if it is better than what they have.
-fn serve(served: &mut [u8; PLACES], row: &Row, chunks: &Chunks, clear_of: &ClearOf) {
+pub(super) fn serve(served: &mut Served, row: &Row, chunks: &Chunks, clear_of: &ClearOf) {
     let (served, clear_of) = (served.as_chunks_mut::<LANES>().0, clear_of.as_chunks::<LANES>().0);
     for ((served, clear_of), &forearm) in served.iter_mut().zip(clear_of).zip(chunks) {
         let value = row[forearm];
@@ -351,7 +354,7 @@ fn serve(served: &mut [u8; PLACES], row: &Row, chunks: &Chunks, clear_of: &Clear
 }
 
 /// The sum of the improvements that a grip brings to the givers that are clear of it.
-fn gain(row: &Row, chunks: &Chunks, clear_of: &ClearOf, served: &[u8; PLACES]) -> u32 {
+pub(super) fn gain(row: &Row, chunks: &Chunks, clear_of: &ClearOf, served: &Served) -> u32 {
     const { assert!(PLACES / LANES * u8::MAX as usize <= u16::MAX as usize) };
     let (clear_of, served) = (clear_of.as_chunks::<LANES>().0, served.as_chunks::<LANES>().0);
     let mut gains = [0_u16; LANES];
