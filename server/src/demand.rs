@@ -49,7 +49,7 @@ mod tests {
 
     /// The count itself, with each call halved as often as half-lives have passed by `now`.
     fn count(calls: &[Duration], now: Duration) -> f64 {
-        let age = |at: &Duration| (now - *at).as_secs_f64() / HALF_LIFE.as_secs_f64();
+        let age = |at: &Duration| (now.as_secs_f64() - at.as_secs_f64()) / HALF_LIFE.as_secs_f64();
         calls.iter().map(|at| (-age(at)).exp2()).sum()
     }
 

@@ -13,8 +13,8 @@ use super::{
     required,
 };
 use crate::object::{
-    AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectChange, ObjectNews, ObjectPage,
-    ObjectUpdate, Reset, UpAxis,
+    AtlasGrowth, AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectChange, ObjectNews,
+    ObjectPage, ObjectUpdate, Reset, UpAxis,
 };
 
 /// The request, with a new id if the object has none.

@@ -17,7 +17,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     known::{
-        codec::decode,
+        codec::decode_compact,
         growth::{CHOSEN, Grown, Growth},
     },
     model::hand::Handedness,
@@ -42,7 +42,7 @@ use crate::{
 const NICENESS: i32 = 19;
 
 /// Grips in an atlas that is useful: most givers leave one of them free.
-const USEFUL: usize = 256;
+const USEFUL: usize = 224;
 
 /// Longest work on an atlas until it waits for its turn to be completed, useful or not.
 const SLICE: Duration = Duration::from_secs(1);
@@ -53,8 +53,8 @@ const FIRST: usize = 64;
 /// During its first slice, an atlas is published again once it grew by one part in this many.
 const GROWTH_PER_PUBLISH: usize = 2;
 
-/// Memory that must be free, or held for what is asked for less, before an atlas is grown: about that of a complete one.
-const EXPECTED_BYTES: usize = 1 << 20;
+/// Memory that must be free, or held for what is asked for less, before an atlas is grown: that of a complete one.
+const EXPECTED_BYTES: usize = 300_000;
 
 /// Pause while searches run, in multiples of the time just worked: with 9, a builder works a tenth of the time.
 const PAUSE_PER_WORK: u32 = 9;
@@ -250,7 +250,9 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
     let Some(slot) = object.atlas_slots.get(&job.hand) else {
         return Turn::Dropped;
     };
-    if job.stage == Stage::Unread {
+    // What was dropped from memory since its first slice is read again.
+    let was_dropped = job.stage == Stage::Completing && slot.grown.is_none();
+    if job.stage == Stage::Unread || was_dropped {
         return read_turn(builders, object, &job.hand);
     }
     if !builders.loaded.has_room(object, &job.hand, EXPECTED_BYTES) {
@@ -292,10 +294,12 @@ fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) 
         return Turn::Ended(BuildState::NoRoom);
     }
     tracing::info!(object = object.name(), hand = %hand_label(hand), entries, complete, "read an atlas");
-    match () {
-        () if complete => Turn::Ended(BuildState::Finished),
-        () if entries >= USEFUL => Turn::Next(Stage::Completing),
-        () => Turn::Next(Stage::Starting),
+    if complete {
+        Turn::Ended(BuildState::Finished)
+    } else if entries >= USEFUL {
+        Turn::Next(Stage::Completing)
+    } else {
+        Turn::Next(Stage::Starting)
     }
 }
 
@@ -306,9 +310,9 @@ fn read_file(builders: &Builders, object: &StoredObject, hand: &Arc<Hand>) -> Op
     if !read.atlas.is_complete() || read.atlas.entries().len() <= CHOSEN {
         return Some(read);
     }
-    let chosen = Growth::resume(&object.object, &hand.rig, &read).chosen();
-    files.write(object, hand, &chosen);
-    Some(chosen)
+    let kept = Growth::resume(&object.object, &hand.rig, &read).kept();
+    files.write(object, hand, &kept);
+    Some(kept)
 }
 
 /// An atlas that a thread is growing.
@@ -334,7 +338,7 @@ impl Growing<'_> {
             let len = self.growth.len();
             if (next_publish..USEFUL).contains(&len) {
                 next_publish = len + len / GROWTH_PER_PUBLISH;
-                if !self.keep(self.growth.grown()) {
+                if !self.keep(self.growth.kept()) {
                     return Turn::Ended(BuildState::NoRoom);
                 }
             }
@@ -342,7 +346,7 @@ impl Growing<'_> {
         if self.growth.is_enough() {
             return self.complete();
         }
-        self.end(self.growth.grown(), Turn::Next(Stage::Completing))
+        self.end(self.growth.kept(), Turn::Next(Stage::Completing))
     }
 
     /// Grows until there is enough to choose from. What is more urgent comes in between, so that no growth is given up.
@@ -355,7 +359,7 @@ impl Growing<'_> {
                 work(self.builders, urgent);
             }
         }
-        self.end(self.growth.chosen(), Turn::Ended(BuildState::Finished))
+        self.end(self.growth.kept(), Turn::Ended(BuildState::Finished))
     }
 
     /// Runs a round; the processor time that it took, or none if nobody needs the atlas any more.
@@ -419,7 +423,7 @@ fn shipped_grips(object: &StoredObject, hand: &Arc<Hand>) -> Option<Grown> {
         .built_in
         .then(|| shipped_atlas(&object.id, &hand.rig))
         .flatten()?;
-    match decode(bytes, &object.object, &hand.rig) {
+    match decode_compact(bytes, &object.object, &hand.rig) {
         Ok(grown) => Some(grown.completed()),
         Err(error) => {
             tracing::warn!(

@@ -18,7 +18,7 @@ use std::{
 
 use grasp_assets::hands::Hand;
 use grasp_synthesis::known::{
-    codec::{decode, encode},
+    codec::{decode_compact, encode},
     growth::Grown,
     key::file_name,
 };
@@ -76,7 +76,7 @@ impl AtlasFiles {
     pub(super) fn read(&self, object: &StoredObject, hand: &Hand) -> Option<Grown> {
         let path = self.path(object, hand);
         let read = read_bounded(&path).and_then(|bytes| {
-            decode(&bytes, &object.object, &hand.rig)
+            decode_compact(&bytes, &object.object, &hand.rig)
                 .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
         });
         match read {

@@ -4,7 +4,12 @@ use glam::Vec3;
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    entry::Entry, gravity_order::GravityOrder, grips::Grips, occupancy::Occupancy, shortlist::Shortlists,
+    entry::Entry,
+    gravity::nearest_direction,
+    gravity_order::GravityOrder,
+    grips::Grips,
+    occupancy::Occupancy,
+    shortlist::{Shortlists, rank},
 };
 use crate::{
     model::{hand::rig::Rig, object::GraspObject},
@@ -38,6 +43,38 @@ impl Atlas {
             grips,
             complete,
         }
+    }
+
+    /// An atlas of a few grips, without what makes look-ups in thousands quick: all are tried one by one. Takes a third of the
+    /// memory, and no time to build.
+    pub fn compact(grips: Grips, complete: bool) -> Self {
+        let entries = grips.entries();
+        Self {
+            order: GravityOrder::of(entries),
+            stamp: stamp(entries),
+            grips,
+            complete,
+            ..Self::default()
+        }
+    }
+
+    /// True if it has no shortlists, because it has few grips.
+    pub fn is_compact(&self) -> bool {
+        self.shortlists.is_empty()
+    }
+
+    /// The grips that hold under this gravity by falling value, with `stance` the value of a forearm's direction for where the
+    /// receiver stands, 0 to 1. Takes some microseconds for hundreds of grips.
+    pub fn by_value(&self, up: Vec3, stance: impl Fn(Vec3) -> f32) -> Vec<u16> {
+        let direction = nearest_direction(up);
+        let value = |&entry: &u16| {
+            let place = usize::from(entry);
+            let score = self.entries()[place].scores[direction];
+            (rank(score, stance(self.grips.forearms()[place])), entry)
+        };
+        let mut order: Vec<u16> = self.holding_under(up).to_vec();
+        order.sort_by_cached_key(value);
+        order
     }
 
     /// The grips, in the order found; once complete, by falling score.

@@ -250,19 +250,22 @@ impl<'a> Growth<'a> {
         self.len() >= ENOUGH_GRIPS || self.proposed >= ENOUGH_PROPOSALS || self.is_complete()
     }
 
-    /// The grips that together serve givers best, up to [`CHOSEN`], as a complete atlas from which nothing grows.
-    pub fn chosen(&self) -> Grown {
-        let (grips, shapes) = self.by_score();
-        let (object, rig) = (self.scene.object, self.rig);
-        let places = excerpt(
-            grips.entries(),
-            &Occupancy::of(object, rig, grips.entries()),
-            CHOSEN,
-        );
-        let entries = places.iter().map(|&place| grips.entries()[place].clone());
+    /// What a server keeps: of a growth that is [enough](Self::is_enough), the grips that together serve givers best, up to
+    /// [`CHOSEN`], as a complete atlas from which nothing grows; until then all grips, from which growth resumes.
+    pub fn kept(&self) -> Grown {
+        let (grips, shapes) = if self.is_enough() {
+            let (grips, shapes) = self.by_score();
+            let occupancy = Occupancy::of(self.scene.object, self.rig, grips.entries());
+            let places = excerpt(grips.entries(), &occupancy, CHOSEN);
+            let entries = places.iter().map(|&place| grips.entries()[place].clone());
+            let shapes = places.iter().map(|&place| shapes[place]).collect();
+            (Grips::new(self.rig, entries.collect()), shapes)
+        } else {
+            (self.grips.clone(), self.shapes.clone())
+        };
         Grown {
-            atlas: Arc::new(Atlas::new(object, rig, Grips::new(rig, entries.collect()), true)),
-            shapes: places.iter().map(|&place| shapes[place]).collect(),
+            atlas: Arc::new(Atlas::compact(grips, self.is_enough())),
+            shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
         }

@@ -128,8 +128,7 @@ impl<'a> Shortlist<'a> {
             .zip(self.places)
             .map(|(index, place)| {
                 let stance = stance(self.forearms[usize::from(place.grip)]);
-                let value = f32::from(place.score) / QUANTA + Term::Stance.share() * stance;
-                (u32::MAX - (value * VALUE_STEPS) as u32, index)
+                (rank(place.score, stance), index)
             })
             .collect();
         order.sort_unstable();
@@ -169,6 +168,12 @@ impl<'a> Shortlist<'a> {
         let grip = &self.grips[place];
         (!collides(&grip.second_spheres)).then_some((grip.entry, &grip.solids))
     }
+}
+
+/// The place of a grip by falling value: lower for a higher score and a forearm that better suits where the receiver stands.
+pub(super) fn rank(score: u8, stance: f32) -> u32 {
+    let value = f32::from(score) / QUANTA + Term::Stance.share() * stance;
+    u32::MAX - (value * VALUE_STEPS) as u32
 }
 
 impl Shortlists {
@@ -219,6 +224,11 @@ impl Shortlists {
                 .get(nearest_direction(up))
                 .map_or(&[], Vec::as_slice),
         }
+    }
+
+    /// True if there are no lists, not even empty ones.
+    pub(super) fn is_empty(&self) -> bool {
+        self.by_direction.is_empty()
     }
 
     /// The grips of all lists, in the order of the entries.

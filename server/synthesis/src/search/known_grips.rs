@@ -44,7 +44,7 @@ pub(super) struct KnownGrips<'a> {
     /// The atlas' shortlist for givers. These are screened one by one, because excluding grips of the whole
     /// atlas at once takes as long.
     shortlist: Shortlist<'a>,
-    /// Its places in the order in which they are tried.
+    /// Its places in the order in which they are tried; of a compact atlas, the indices of its entries.
     listed: Vec<u16>,
     /// All grips of the atlas.
     order: &'a [u16],
@@ -238,9 +238,15 @@ impl<'a> KnownGrips<'a> {
                 &STORED_ORDER[..atlas.entries().len()]
             }
         };
+        let stance = |forearm| presented.receiver.suits_forearm(forearm);
+        let compact =
+            atlas.filter(|atlas| is_listed && mechanisms.has(Mechanism::Shortlists) && atlas.is_compact());
         Some(Self {
             atlas,
-            listed: shortlist.by_value(|forearm| presented.receiver.suits_forearm(forearm)),
+            listed: match compact {
+                Some(atlas) => atlas.by_value(presented.up, stance),
+                None => shortlist.by_value(stance),
+            },
             shortlist,
             grading: is_first_valid.then_some(Grading {
                 receiver,
@@ -315,6 +321,9 @@ impl<'a> KnownGrips<'a> {
     /// takes longest is looked at last.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(place) = place.checked_sub(self.listed.len()) else {
+            if self.shortlist.is_empty() {
+                return self.screened(self.listed[place], 0);
+            }
             let place = usize::from(self.listed[place]);
             let fit = self.fit(self.shortlist.entry(place), 0);
             if fit == Fit::No {
@@ -340,6 +349,12 @@ impl<'a> KnownGrips<'a> {
                 return None;
             }
         }
+        self.screened(index, pass)
+    }
+
+    /// A grip of the atlas, unless it certainly collides with a barrier or is not tried in a pass.
+    fn screened(&self, index: u16, pass: usize) -> Option<Candidate<'a>> {
+        let atlas = self.atlas?;
         let fit = self.fit(index, pass);
         if fit == Fit::No {
             return None;
