@@ -1,7 +1,6 @@
 //! The queue of atlases to build.
 
 use std::{
-    cmp::Ordering as Order,
     collections::VecDeque,
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak,
@@ -39,31 +38,13 @@ pub(super) struct BuildJob {
     pub stage: Stage,
 }
 
-/// The place of a job in the queue; the greatest comes first.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rank {
-    /// Reading takes no time, so it precedes all growth.
-    is_unread: bool,
-    demand: Demand,
-}
-
-impl Rank {
-    fn cmp(self, other: Self) -> Order {
-        let by_stage = self.is_unread.cmp(&other.is_unread);
-        by_stage.then_with(|| self.demand.cmp(other.demand))
-    }
-}
-
 impl BuildJob {
-    /// Its place, by how much it is asked for now; none if its object or slot is gone.
-    pub(super) fn rank(&self) -> Option<Rank> {
+    /// What it is worth per time of a builder, as if it were a demand; none if its object or slot is gone.
+    fn worth(&self) -> Option<Demand> {
         let demand = self.object.upgrade()?.atlas_slots.demand(&self.hand)?;
-        Some(Rank {
-            is_unread: self.stage == Stage::Unread,
-            demand: match self.stage {
-                Stage::Completing => demand.share(WORTH_OF_COMPLETING),
-                Stage::Unread | Stage::Starting => demand,
-            },
+        Some(match self.stage {
+            Stage::Completing => demand.share(WORTH_OF_COMPLETING),
+            Stage::Unread | Stage::Starting => demand,
         })
     }
 }
@@ -80,33 +61,43 @@ impl BuildQueue {
     /// Adds a job.
     pub(super) fn push(&self, job: BuildJob) {
         self.jobs().push_back(job);
-        self.has_jobs.notify_one();
+        // Not each waits for jobs of any stage.
+        self.has_jobs.notify_all();
     }
 
-    /// Waits for a job; none once the queue was stopped. What is asked for most comes first, the oldest of several; all
-    /// others are useful before an atlas is completed, unless it is asked for far more.
-    pub(super) fn next(&self) -> Option<BuildJob> {
+    /// Waits for an atlas to read; none once the queue was stopped. What is asked for most comes first.
+    pub(super) fn next_to_read(&self) -> Option<BuildJob> {
+        self.wait_for(|job| job.stage == Stage::Unread)
+    }
+
+    /// Waits for an atlas to grow; none once the queue was stopped. What is asked for most comes first, the oldest of several;
+    /// all others are useful before an atlas is completed, unless it is asked for far more.
+    pub(super) fn next_to_grow(&self) -> Option<BuildJob> {
+        self.wait_for(|job| job.stage != Stage::Unread)
+    }
+
+    /// The first atlas to be made useful before `other` is completed; none if there is none.
+    pub(super) fn next_before(&self, other: &BuildJob) -> Option<BuildJob> {
+        let worth = other.worth()?;
+        let mut jobs = self.jobs();
+        let (place, first) = first(&mut jobs, |job| job.stage == Stage::Starting)?;
+        if first.cmp(worth).is_gt() {
+            jobs.remove(place)
+        } else {
+            None
+        }
+    }
+
+    fn wait_for(&self, counts: impl Fn(&BuildJob) -> bool) -> Option<BuildJob> {
         let mut jobs = self.jobs();
         loop {
             if self.is_stopped() {
                 return None;
             }
-            match first(&mut jobs, |_| true) {
+            match first(&mut jobs, &counts) {
                 Some((place, _)) => return jobs.remove(place),
                 None => jobs = self.has_jobs.wait(jobs).unwrap_or_else(PoisonError::into_inner),
             }
-        }
-    }
-
-    /// The first job that precedes the completion of `other` and takes at most a slice of work; none if there is none.
-    pub(super) fn next_before(&self, other: &BuildJob) -> Option<BuildJob> {
-        let rank = other.rank()?;
-        let mut jobs = self.jobs();
-        let (place, first) = first(&mut jobs, |job| job.stage != Stage::Completing)?;
-        if first.cmp(rank).is_gt() {
-            jobs.remove(place)
-        } else {
-            None
         }
     }
 
@@ -129,16 +120,16 @@ impl BuildQueue {
     }
 }
 
-/// The place and rank of the first of the jobs that count. Drops those whose objects are gone.
-fn first(jobs: &mut VecDeque<BuildJob>, counts: impl Fn(&BuildJob) -> bool) -> Option<(usize, Rank)> {
-    let mut first: Option<(usize, Rank)> = None;
+/// The place and worth of the first of the jobs that count. Drops those whose objects are gone.
+fn first(jobs: &mut VecDeque<BuildJob>, counts: impl Fn(&BuildJob) -> bool) -> Option<(usize, Demand)> {
+    let mut first: Option<(usize, Demand)> = None;
     let mut place = 0;
     jobs.retain(|job| {
-        let Some(rank) = job.rank() else {
+        let Some(worth) = job.worth() else {
             return false;
         };
-        if counts(job) && first.is_none_or(|(_, best)| rank.cmp(best).is_gt()) {
-            first = Some((place, rank));
+        if counts(job) && first.is_none_or(|(_, best)| worth.cmp(best).is_gt()) {
+            first = Some((place, worth));
         }
         place += 1;
         true
@@ -201,15 +192,13 @@ mod tests {
             };
             queue.push(job(object, stage));
         }
+        assert_eq!(id(&queue.next_to_read().expect("one is left")), "unread");
         // 200 calls are worth as much as three for an atlas that is not useful yet.
-        let order: Vec<String> = objects
+        let order: Vec<String> = objects[1..]
             .iter()
-            .map(|_| id(&queue.next().expect("a job is left")))
+            .map(|_| id(&queue.next_to_grow().expect("a job is left")))
             .collect();
-        assert_eq!(
-            order,
-            ["unread", "often", "very often", "twice", "once", "complete"]
-        );
+        assert_eq!(order, ["often", "very often", "twice", "once", "complete"]);
     }
 
     #[test]
@@ -221,7 +210,7 @@ mod tests {
         }
         drop(gone);
         assert_eq!(
-            [(); 2].map(|()| id(&queue.next().expect("two are left"))),
+            [(); 2].map(|()| id(&queue.next_to_grow().expect("two are left"))),
             ["a", "b"]
         );
         assert!(queue.jobs().is_empty());
@@ -251,6 +240,6 @@ mod tests {
         let object = asked_for("a", 1);
         queue.push(job(&object, Stage::Unread));
         queue.stop();
-        assert!(queue.next().is_none());
+        assert!(queue.next_to_grow().is_none());
     }
 }

@@ -1,7 +1,6 @@
 //! The threads that build atlases, one turn after the other.
 
 use std::{
-    cell::Cell,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc,
@@ -164,7 +163,8 @@ pub(super) fn start_thread(number: usize, builders: &Arc<Builders>) -> std::io::
         .name(format!("grasp-atlas-{number}"))
         .spawn(move || {
             let _running = RunningThread(&of_thread);
-            while let Some(job) = of_thread.queue.next() {
+            lower_priority();
+            while let Some(job) = of_thread.queue.next_to_grow() {
                 work(&of_thread, job);
             }
         });
@@ -174,14 +174,25 @@ pub(super) fn start_thread(number: usize, builders: &Arc<Builders>) -> std::io::
     thread.map(|_| ())
 }
 
+/// Starts the thread that reads atlases, at the priority of other threads: reading takes a millisecond, and requests wait for
+/// what was dropped from memory.
+///
+/// # Errors
+/// The thread cannot be started.
+pub(super) fn start_reader(builders: &Arc<Builders>) -> std::io::Result<()> {
+    let of_thread = Arc::clone(builders);
+    let thread = thread::Builder::new()
+        .name("grasp-atlas-read".to_owned())
+        .spawn(move || {
+            while let Some(job) = of_thread.queue.next_to_read() {
+                work(&of_thread, job);
+            }
+        });
+    thread.map(|_| ())
+}
+
 /// Lowers the priority of this thread, where the system supports that. Raising it again would need privileges.
 fn lower_priority() {
-    thread_local! {
-        static IS_LOWERED: Cell<bool> = const { Cell::new(false) };
-    }
-    if IS_LOWERED.replace(true) {
-        return;
-    }
     #[cfg(target_os = "linux")]
     if let Err(error) = rustix::process::nice(NICENESS) {
         tracing::warn!(%error, "atlases are built at the priority of searches");
@@ -251,15 +262,15 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
         return Turn::Dropped;
     };
     // What was dropped from memory since its first slice is read again.
-    let was_dropped = job.stage == Stage::Completing && slot.grown.is_none();
-    if job.stage == Stage::Unread || was_dropped {
+    if job.stage == Stage::Completing && slot.grown.is_none() {
+        return Turn::Next(Stage::Unread);
+    }
+    if job.stage == Stage::Unread {
         return read_turn(builders, object, &job.hand);
     }
     if !builders.loaded.has_room(object, &job.hand, EXPECTED_BYTES) {
         return Turn::Ended(BuildState::NoRoom);
     }
-    // Not before reading: shipped grips must be there soon after the start, however busy the machine is.
-    lower_priority();
     let growth = match &slot.grown {
         Some(grown) => Growth::resume(&object.object, &job.hand.rig, grown),
         None => Growth::new(&object.object, &job.hand.rig),

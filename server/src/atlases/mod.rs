@@ -2,7 +2,7 @@
 //!
 //! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
-//! [`build_queue`] and grow them on low-priority threads, at a tenth of the time while searches run. What is asked for most
+//! [`build_queue`], read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is asked for most
 //! comes first ([`demand`](crate::demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
 //! [`files`] keeps them on disk if there is a folder for them.
 //!
@@ -76,6 +76,9 @@ impl Atlases {
         let atlases = Self(Arc::clone(&builders));
         for number in 0..threads {
             builders::start_thread(number, &builders)?;
+        }
+        if threads > 0 {
+            builders::start_reader(&builders)?;
         }
         for object in objects.pinned() {
             atlases.register(object);

@@ -247,7 +247,10 @@ fn a_complete_file_is_read_as_it_is_and_a_longer_one_is_cut_to_what_is_kept() {
 #[test]
 fn tells_why_an_atlas_has_no_grips() {
     let object = Arc::new(cuboid("large", Vec3::splat(0.2)));
-    let state = |atlases: &Atlases| atlases.state(&object).expect("there are builders");
+    let state = |atlases: &Atlases| {
+        let state = atlases.state(Some(&object), Handedness::Right);
+        state.expect("there are builders")
+    };
     let full = start(1, &store(10, 0));
     full.register(&object);
     until("the end of the memory", || {

@@ -3,6 +3,7 @@
 mod codec;
 mod exclusion;
 mod finger_subsets;
+mod kept;
 mod palm_contacts;
 mod recent_grips;
 mod resized_grips;

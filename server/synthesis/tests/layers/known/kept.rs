@@ -1,0 +1,122 @@
+//! What a server keeps of a growth: few grips, tried one by one.
+
+use std::sync::{Arc, LazyLock};
+
+use grasp_synthesis::{
+    known::{
+        atlas::Atlas,
+        codec::{decode, decode_compact, encode},
+        entry::{Entry, SLIPS},
+        gravity::DIRECTIONS,
+        grips::Grips,
+        growth::{CHOSEN, Grown},
+    },
+    model::strategy::Choice,
+    physical::{
+        grip::{GIVER_CLEARANCE, Gripper},
+        scene::Presented,
+    },
+};
+
+use crate::fixtures::{
+    atlases::{growth, scissors_held_by},
+    hands::right,
+    objects::object,
+    searches::Search,
+};
+
+/// All that grew on the scissors, and what is kept of it.
+static SCISSORS: LazyLock<(Grown, Grown)> = LazyLock::new(|| {
+    let mut growth = growth(object("scissors"), right());
+    let mut gripper = Gripper::default();
+    while !growth.is_enough() {
+        growth.round(&mut gripper);
+    }
+    (growth.grown(), growth.kept())
+});
+
+/// Of givers and directions of gravity, how many leave one of the grips free that holds.
+fn served(givers: &Atlas, grips: &[Entry]) -> usize {
+    let of_giver = |giver: usize| {
+        let holdout = scissors_held_by(givers, giver);
+        let giver = Presented::of(&holdout).giver.expect("there is a giver");
+        let is_clear = |grip: &&Entry| {
+            giver
+                .clearance(&grip.tracked_solids(right()), GIVER_CLEARANCE)
+                .is_some()
+        };
+        let clear: Vec<&Entry> = grips.iter().filter(is_clear).collect();
+        let is_served = |up: &usize| clear.iter().any(|grip| grip.scores[*up] != SLIPS);
+        (0..DIRECTIONS).step_by(3).filter(is_served).count()
+    };
+    (0..givers.entries().len()).step_by(11).map(of_giver).sum()
+}
+
+#[test]
+fn few_grips_serve_nearly_all_givers_that_all_serve() {
+    let (all, kept) = &*SCISSORS;
+    let (few, many) = (kept.atlas.entries(), all.atlas.entries());
+    assert!(kept.atlas.is_complete() && few.len() == CHOSEN && many.len() > 2 * CHOSEN);
+    assert!(few.iter().all(|grip| many.contains(grip)));
+    let of_all = served(&all.atlas, many);
+    let of_kept = served(&all.atlas, few);
+    assert!(100 * of_kept >= 98 * of_all, "{of_kept} of {of_all}");
+    // As many that were found first serve fewer.
+    let of_first = served(&all.atlas, &many[..CHOSEN]);
+    assert!(
+        of_all - of_kept < (of_all - of_first) / 2,
+        "{of_kept} and {of_first} of {of_all}"
+    );
+}
+
+#[test]
+fn what_is_kept_takes_less_than_300_kilobytes_and_is_read_as_it_was() {
+    let (_, kept) = &*SCISSORS;
+    assert!(kept.bytes() < 300_000, "{}", kept.bytes());
+    let (object, rig) = (object("scissors"), right());
+    let bytes = encode(kept, object, rig);
+    assert_eq!(decode_compact(&bytes, object, rig).as_ref(), Ok(kept));
+    let whole = decode(&bytes, object, rig).expect("it is sound");
+    assert_eq!(whole.atlas.entries(), kept.atlas.entries());
+    assert!(!whole.atlas.is_compact() && kept.atlas.is_compact());
+}
+
+#[test]
+fn a_compact_atlas_answers_whenever_one_with_shortlists_does() {
+    let (all, kept) = &*SCISSORS;
+    let grips = Grips::new(right(), kept.atlas.entries().to_vec());
+    let listed = Arc::new(Atlas::new(object("scissors"), right(), grips, true));
+    let (mut found, mut missed) = (0, 0);
+    for giver in (0..all.atlas.entries().len()).step_by(17) {
+        let holdout = scissors_held_by(&all.atlas, giver);
+        for choice in [Choice::FirstValid, Choice::BestWithinBudget] {
+            let [compact, listed] = [&kept.atlas, &listed].map(|atlas| {
+                let search = Search {
+                    choice,
+                    atlas: Some(Arc::clone(atlas)),
+                    ..Search::guided(&holdout, right())
+                };
+                search.run()
+            });
+            assert_eq!(compact.grasp.is_some(), listed.grasp.is_some(), "giver {giver}");
+            if choice == Choice::BestWithinBudget {
+                assert_eq!(compact.grasp, listed.grasp, "giver {giver}");
+            }
+            found += usize::from(compact.grasp.is_some());
+            missed += usize::from(compact.grasp.is_none());
+        }
+    }
+    assert!(found > 50 && missed > 0, "{found} found, {missed} missed");
+}
+
+#[test]
+fn a_growth_that_is_not_enough_keeps_all() {
+    let mut growth = growth(object("remote"), right());
+    let mut gripper = Gripper::default();
+    while growth.len() < 20 {
+        growth.round(&mut gripper);
+    }
+    let (grown, kept) = (growth.grown(), growth.kept());
+    assert_eq!(kept.atlas.entries(), grown.atlas.entries());
+    assert!(!kept.atlas.is_complete() && kept.proposed() == grown.proposed());
+}
