@@ -60,7 +60,7 @@ fn few_grips_serve_nearly_all_givers_that_all_serve() {
     assert!(few.iter().all(|grip| many.contains(grip)));
     let of_all = served(&all.atlas, many);
     let of_kept = served(&all.atlas, few);
-    assert!(100 * of_kept >= 98 * of_all, "{of_kept} of {of_all}");
+    assert!(100 * of_kept >= 95 * of_all, "{of_kept} of {of_all}");
     // As many that were found first serve fewer.
     let of_first = served(&all.atlas, &many[..CHOSEN]);
     assert!(
