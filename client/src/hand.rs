@@ -1,5 +1,6 @@
 //! Hands: the giver's in requests, and the parts of the receiver's in answers.
 
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::pose::Pose;
@@ -113,7 +114,21 @@ pub struct HandJoints {
     pub joints: Vec<JointPose>,
 }
 
-/// The giver's hand, or another one to keep clear of. In JSON: `{"angles": {…}}` or `{"joints": {…}}`.
+/// A hand as the mesh that a client draws. It may be open, as at the wrist: what it surrounds is inside.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HandMesh {
+    /// The vertices in the client's frame, up to 6,000 of all hands of a request together.
+    pub positions: Vec<Vec3>,
+    /// The vertices of each triangle, counted from 0; up to 6,000 triangles of all hands of a request together.
+    pub triangles: Vec<[u32; 3]>,
+    /// The wrist's `OpenXR` joint frame in the client's frame; none: unknown, so that nothing is expected of where the receiver
+    /// stands.
+    #[serde(default)]
+    pub client_from_wrist: Option<Pose>,
+}
+
+/// The giver's hand, or another one to keep clear of. In JSON: `{"angles": {…}}`, `{"joints": {…}}` or `{"mesh": {…}}`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PresentingHand {
@@ -121,6 +136,8 @@ pub enum PresentingHand {
     Angles(HandAngles),
     /// Tracked joint poses with radii.
     Joints(HandJoints),
+    /// A mesh.
+    Mesh(HandMesh),
 }
 
 /// The hand to pose.

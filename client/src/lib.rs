@@ -60,8 +60,8 @@ pub use constraints::{ApproachCone, Constraints, Reach};
 pub use error::{BoxError, CallError, ClientError, ErrorDetails, FieldViolation, Resource, code_name};
 pub use grasp_type::GraspType;
 pub use hand::{
-    Digit, DigitAngles, HandAngles, HandJoints, Handedness, JOINT_COUNT, JointPose, JointSet, Phalanx,
-    PresentingHand, ReceivingHand,
+    Digit, DigitAngles, HandAngles, HandJoints, HandMesh, Handedness, JOINT_COUNT, JointPose, JointSet,
+    Phalanx, PresentingHand, ReceivingHand,
 };
 pub use json::rfc3339;
 pub use key_frame::{KeyFrame, KeyFrameKind};

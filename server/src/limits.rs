@@ -25,8 +25,9 @@ pub struct StreamLimits {
 /// Largest size in bytes of everything but the mesh in a `CreateObject` request, and of a manifest on disk.
 pub(crate) const BYTES_BESIDES_MESH: usize = 1 << 20;
 
-/// Largest request to `GraspService`, and to methods of `ObjectService` that build no object, in bytes. A hand of 26 joints takes about 2 kB.
-pub(crate) const LARGEST_FIND_REQUEST: usize = 64 << 10;
+/// Largest request to `GraspService`, and to methods of `ObjectService` that build no object, in bytes. A hand of 26 joints takes
+/// about 2 kB, one of a mesh up to 110 kB.
+pub(crate) const LARGEST_FIND_REQUEST: usize = 160 << 10;
 
 /// Largest response of either service, in bytes. A full page of objects takes less than 1 MiB.
 pub(crate) const LARGEST_RESPONSE: usize = 4 << 20;

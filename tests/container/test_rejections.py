@@ -6,7 +6,7 @@ from conftest import grasp, limits_memory, skip
 
 # The settings that docker/README.md gives for a container of 256 MiB.
 SMALL = {
-    "GRASP_CACHE_BYTES": str(48 << 20),
+    "GRASP_CACHE_BYTES": str(40 << 20),
     "GRASP_MAXIMUM_UPLOADS": "1",
     "GRASP_MAXIMUM_UPLOAD_BYTES": str(1 << 20),
     "GRASP_MAXIMUM_WATCHERS": "4",

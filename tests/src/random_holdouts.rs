@@ -367,8 +367,10 @@ mod tests {
             assert!(in_object.distance(Vec3::new(0.1, 0.2, 0.3)) < 1e-5);
             let giver = holdout.presenting_hand.expect("there is a giver");
             assert!(
-                giver.joints.joints[index::WRIST]
-                    .pose
+                giver
+                    .shape
+                    .wrist()
+                    .expect("its joints are known")
                     .position
                     .distance(in_object)
                     < 1e-5

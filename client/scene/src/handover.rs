@@ -109,6 +109,8 @@ pub struct HandoverScene<'a> {
     pub arm: Option<ArmJoints>,
     /// Contacts of the receiver's hands.
     pub contacts: Vec<ContactMark>,
+    /// What else is there, in the client's frame, such as a giver's hand of which only the mesh is known.
+    pub others: Vec<Part>,
 }
 
 impl<'a> HandoverScene<'a> {
@@ -125,11 +127,13 @@ impl<'a> HandoverScene<'a> {
             other_receiver: None,
             arm: None,
             contacts: Vec::new(),
+            others: Vec::new(),
         }
     }
 
     /// The scene: parts `object`; `_hand`, `_nails` and `_sleeve` of `giver`, `receiver` and `other_receiver`;
-    /// `receiver_forearm` and `receiver_upper_arm` in place of the receiver's sleeve if its arm is known; for each contact, `contact_thumb_third` and `force_thumb_third` or the like, with the force in newtons as extras.
+    /// `receiver_forearm` and `receiver_upper_arm` in place of the receiver's sleeve if its arm is known; for each contact, `contact_thumb_third` and `force_thumb_third` or the like, with the force in newtons as extras;
+    /// and `others`.
     pub fn to_scene(&self) -> Scene {
         let mut parts = vec![self.object_part()];
         let hands = [
@@ -158,6 +162,7 @@ impl<'a> HandoverScene<'a> {
                 parts.extend(covers);
             }
         }
+        parts.extend(self.others.iter().cloned());
         parts.extend(self.contact_parts());
         Scene { parts }
     }

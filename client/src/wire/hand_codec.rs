@@ -1,5 +1,6 @@
 //! Hands.
 
+use glam::Vec3;
 use grasp_proto::v1;
 
 use super::{
@@ -7,8 +8,8 @@ use super::{
     geometry_codec::{pose_from_wire, pose_to_wire},
 };
 use crate::hand::{
-    Digit, DigitAngles, HandAngles, HandJoints, Handedness, JointPose, JointSet, Phalanx, PresentingHand,
-    ReceivingHand,
+    Digit, DigitAngles, HandAngles, HandJoints, HandMesh, Handedness, JointPose, JointSet, Phalanx,
+    PresentingHand, ReceivingHand,
 };
 
 pub(super) fn handedness_to_wire(handedness: Handedness) -> v1::Handedness {
@@ -108,6 +109,15 @@ pub(super) fn presenting_hand_to_wire(hand: &PresentingHand) -> v1::PresentingHa
             hand_scale: *hand_scale,
         }),
         PresentingHand::Joints(joints) => v1::presenting_hand::Form::Joints(hand_joints_to_wire(joints)),
+        PresentingHand::Mesh(HandMesh {
+            positions,
+            triangles,
+            client_from_wrist,
+        }) => v1::presenting_hand::Form::Mesh(v1::HandMesh {
+            client_coordinates: positions.iter().flat_map(Vec3::to_array).collect(),
+            triangles: triangles.as_flattened().to_vec(),
+            client_from_wrist: client_from_wrist.map(pose_to_wire),
+        }),
     };
     v1::PresentingHand { form: Some(form) }
 }

@@ -31,7 +31,7 @@ mod stoppable;
 mod weld;
 mod winding;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use grasp_synthesis::{base::stop::Stop, geometry::mesh::TriangleMesh};
 
 pub use error::ImportError;
@@ -40,7 +40,7 @@ pub use obj::MAX_NAMES_PER_LINE;
 pub use rig::{Binding, ImportedHand, ImportedRig, MappedJoint, PosedNode, RigSource, read_rig, rig_at_rest};
 
 use format::Format;
-use raw::check_counts;
+use raw::{Places, RawMesh, check_counts};
 
 /// The axis that points up in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,6 +115,37 @@ pub struct ImportedMesh {
 /// Every violation; see [`ImportError`]. Beyond 16 they are only counted.
 pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<ImportedMesh, Vec<ImportError>> {
     read_mesh_until(bytes, import, limits, Stop::NEVER)
+}
+
+/// The mesh of triangles that are in memory already, `corners` being their vertices by index, welded and repaired as
+/// [`read_mesh`] does; in metres.
+///
+/// # Errors
+/// A coordinate is not finite or too far away, a corner is no vertex, or no triangle has an area.
+pub fn mesh_of_triangles(
+    positions: impl IntoIterator<Item = Vec3>,
+    corners: &[[u32; 3]],
+) -> Result<ImportedMesh, Vec<ImportError>> {
+    let mut raw = RawMesh {
+        places: Places::Triangles,
+        ..RawMesh::default()
+    };
+    for position in positions {
+        raw.add_vertex(position.as_dvec3().to_array());
+    }
+    let names = raw.names.add_named([]);
+    let vertices = raw.coordinates.len() / 3;
+    for (place, &corners) in corners.iter().enumerate() {
+        if let Some(wrong) = corners.into_iter().find(|&corner| corner as usize >= vertices) {
+            return Err(vec![ImportError::at(
+                format!("triangle {place}"),
+                format!("has vertex {wrong}; there are {vertices}, counted from 0"),
+            )]);
+        }
+        raw.add_triangle(corners, place, names);
+    }
+    raw.check_coordinates(1.0)?;
+    clean::clean(&raw, Import::METRES, DVec3::ZERO, Stop::NEVER)
 }
 
 /// As [`read_mesh`], unless it is stopped.

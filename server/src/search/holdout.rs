@@ -3,19 +3,23 @@
 use std::sync::Arc;
 
 use grasp_synthesis::model::{
-    holdout::{Holdout, PresentingHand},
+    holdout::{HandShape, Holdout, PresentingHand},
     object::GraspObject,
     receiver::Stance,
     strategy::Validity,
 };
 
-use crate::{error::ServiceError, validate::FindQuery};
+use super::hand_mesh::hand_mesh;
+use crate::{
+    error::ServiceError,
+    validate::{FindQuery, GiverHand},
+};
 
 /// Poses the giver's hand and places everything else around the object. The receiver's arm is that of one hand, from a
 /// `stance` in the client's frame.
 ///
 /// # Errors
-/// The giver's joints fold its skin.
+/// The giver's joints fold its skin, or a hand's mesh is no surface.
 pub(super) fn holdout(
     query: &FindQuery,
     object: &Arc<GraspObject>,
@@ -24,22 +28,29 @@ pub(super) fn holdout(
     let object_from_client = query.client_from_object.inverse();
     let presenting_hand = match &query.presenting_hand {
         None => None,
-        Some(giver) if query.validity == Validity::Physical => Some(PresentingHand::of_joints(
-            giver.joints.transformed(object_from_client),
-        )),
-        Some(giver) => Some(
+        Some(GiverHand::Meshed(giver)) => {
+            Some(PresentingHand::of_mesh(hand_mesh(giver, object_from_client)?))
+        }
+        Some(GiverHand::Jointed(giver)) if query.validity == Validity::Physical => Some(
+            PresentingHand::of_joints(giver.joints.transformed(object_from_client)),
+        ),
+        Some(GiverHand::Jointed(giver)) => Some(
             PresentingHand::in_frame(&giver.skin, &giver.joints, object_from_client)
                 .map_err(|error| ServiceError::invalid(giver.field, error.to_string()))?,
         ),
     };
-    let hands = query.other_hands.iter();
+    let shape = |hand: &GiverHand| match hand {
+        GiverHand::Jointed(hand) => Ok(HandShape::Joints(Box::new(
+            hand.joints.transformed(object_from_client),
+        ))),
+        GiverHand::Meshed(hand) => hand_mesh(hand, object_from_client).map(HandShape::Mesh),
+    };
+    let other_hands: Result<Vec<HandShape>, ServiceError> = query.other_hands.iter().map(shape).collect();
     let obstacles = query.obstacles.iter();
     Ok(Holdout {
         object: Arc::clone(object),
         presenting_hand,
-        other_hands: hands
-            .map(|hand| hand.joints.transformed(object_from_client))
-            .collect(),
+        other_hands: other_hands?,
         obstacles: obstacles
             .map(|obstacle| obstacle.transformed(object_from_client))
             .collect(),

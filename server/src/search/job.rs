@@ -37,7 +37,7 @@ use crate::{
     error::ServiceError,
     objects::StoredObject,
     rigs::RigHand,
-    validate::FindQuery,
+    validate::{FindQuery, GiverHand},
 };
 
 /// Everything that a search needs.
@@ -122,8 +122,8 @@ impl Clock for SinceArrival {
 }
 
 impl FindJob {
-    /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames is
-    /// not.
+    /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames and meshes
+    /// of hands are not.
     pub(super) fn is_quick_if_known(&self) -> bool {
         let is_known = |known: &KnownGrips| known.atlas.is_some() || !known.recent.is_empty();
         self.known.iter().any(is_known)
@@ -132,6 +132,7 @@ impl FindJob {
             && self.query.choice == Choice::FirstValid
             && !self.query.reproducible
             && !self.query.plan_key_frames
+            && !self.query.has_hand_mesh()
     }
 
     /// When the search has to end, with or without a grasp.
@@ -142,7 +143,7 @@ impl FindJob {
     /// Places hands and obstacles around the object and makes the settings.
     ///
     /// # Errors
-    /// The giver's joints fold its skin.
+    /// Those of [`holdout`].
     pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
         let first = self.query.receiving_hand.clone();
@@ -324,7 +325,7 @@ impl PreparedJob {
             client_from_object: self.query.client_from_object,
         };
         let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
-        let warnings: Vec<String> = hands.flat_map(|hand| hand.warnings.iter().cloned()).collect();
+        let warnings: Vec<String> = hands.flat_map(GiverHand::warnings).cloned().collect();
         let other = self.hands.iter().find(|other| other.hand.hand != hand.hand);
         let circumstances = Circumstances {
             search_time,

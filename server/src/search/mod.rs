@@ -2,6 +2,7 @@
 
 mod either_hand;
 mod find;
+mod hand_mesh;
 mod holdout;
 mod job;
 mod progress;

@@ -92,6 +92,12 @@ impl FindQuery {
         self.allows_atlas && self.uses_seeds()
     }
 
+    /// True if a hand to keep clear of is a mesh.
+    pub(crate) fn has_hand_mesh(&self) -> bool {
+        let mut hands = self.presenting_hand.iter().chain(&self.other_hands);
+        hands.any(|hand| matches!(hand, GiverHand::Meshed(_)))
+    }
+
     /// True if its attempts use what is known about the object or similar ones.
     pub(crate) fn uses_seeds(&self) -> bool {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
@@ -163,7 +169,7 @@ pub(crate) fn find_query(
     let validity = validity(known(Field::root("validity"), request.validity, v));
     let other_hands = obstacles::other_hands(
         Field::root("other_hands"),
-        request.other_hands,
+        (presenting_hand.as_ref(), request.other_hands),
         validity,
         (convention, rigs),
         v,

@@ -26,9 +26,9 @@ use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 
 pub(crate) use find_grasp::{FindQuery, find_query};
-pub(crate) use hand::GiverHand;
 #[cfg(test)]
 pub(crate) use hand::fixtures;
+pub(crate) use hand::{GiverHand, MeshedHand};
 pub(crate) use labels::{LabelFilter, Labels};
 pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, object_id_of};
 pub(crate) use object_size::RequestedSize;

@@ -17,22 +17,25 @@ const MAXIMUM_OTHER_HANDS: usize = 3;
 /// Largest number of obstacles. Each is compared with every hand that a search tries, at up to a microsecond each.
 const MAXIMUM_OBSTACLES: usize = 64;
 
-/// The other hands, in the client's frame and `OpenXR` axes, without those that are wrong.
+/// The hands beside the presenting one, in the client's frame and `OpenXR` axes, without those that are wrong.
 pub(super) fn other_hands(
     field: Field<'_>,
-    sent: Vec<v1::PresentingHand>,
+    (presenting, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>),
     validity: Validity,
     (convention, rigs): (Convention, &RigStore),
     violations: &mut Violations,
 ) -> Vec<GiverHand> {
     check_count(field, sent.len(), MAXIMUM_OTHER_HANDS, validity, violations);
-    sent.into_iter()
+    let hands: Vec<GiverHand> = sent
+        .into_iter()
         .take(MAXIMUM_OTHER_HANDS)
         .enumerate()
         .filter_map(|(place, sent)| {
             hand::presenting_hand(field.at(place), sent, convention, rigs, violations)
         })
-        .collect()
+        .collect();
+    hand::check_meshes_together(field, presenting.into_iter().chain(&hands), violations);
+    hands
 }
 
 /// The obstacles, in the client's frame and `OpenXR` axes, without those that are wrong.

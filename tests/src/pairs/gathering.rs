@@ -116,7 +116,7 @@ impl Offer {
 
     /// The giver's joints in the object's frame.
     pub fn giver_joints(&self) -> Option<&HandJoints> {
-        self.holdout.presenting_hand.as_ref().map(|hand| &hand.joints)
+        self.holdout.presenting_hand.as_ref()?.shape.joints()
     }
 }
 

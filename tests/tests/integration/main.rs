@@ -17,6 +17,7 @@ mod limits;
 mod load;
 mod malformed;
 mod mesh_formats;
+mod mesh_givers;
 mod object_changes;
 mod object_lists;
 mod object_meshes;

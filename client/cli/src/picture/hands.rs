@@ -4,7 +4,7 @@ use grasp_assets::hands::{self, hand};
 use grasp_client::{
     Grasp, HandAngles, HandJoints, Handedness, JOINT_COUNT, JointPose, JointSet, Pose, PresentingHand,
 };
-use grasp_scene::PosedHand;
+use grasp_scene::{Part, PosedHand, linear_from_srgb};
 use grasp_synthesis::{
     base::pose,
     model::hand::{
@@ -39,11 +39,27 @@ fn built_in(rig: &str, handedness: Handedness) -> Result<&'static hands::Hand, F
         .ok_or_else(|| Failure::Usage(format!("rig {rig:?} is not built in; its hand cannot be drawn")))
 }
 
+/// A presenting hand as it is drawn.
+#[derive(Debug)]
+pub(super) enum Giver {
+    /// With the skin of a built-in rig.
+    Skin(Box<SceneHand>),
+    /// As the client draws it.
+    Mesh(Part),
+}
+
 /// The presenting hand of a request.
-pub(super) fn giver(hand: &PresentingHand) -> Result<SceneHand, Failure> {
+pub(super) fn giver(hand: &PresentingHand) -> Result<Giver, Failure> {
+    let skin = |hand| Giver::Skin(Box::new(hand));
     match hand {
-        PresentingHand::Angles(angles) => from_angles(angles),
-        PresentingHand::Joints(joints) => from_tracked(joints),
+        PresentingHand::Angles(angles) => from_angles(angles).map(skin),
+        PresentingHand::Joints(joints) => from_tracked(joints).map(skin),
+        PresentingHand::Mesh(mesh) => Ok(Giver::Mesh(Part::new(
+            "giver_hand",
+            mesh.positions.clone(),
+            mesh.triangles.clone(),
+            linear_from_srgb(206, 176, 154),
+        ))),
     }
 }
 
@@ -129,7 +145,9 @@ mod tests {
     fn draws_built_in_giver_at_its_holdout() {
         for holdout in holdouts() {
             let request = grasp_client::built_in::request_for(holdout);
-            let drawn = giver(&request.presenting_hand.unwrap()).unwrap();
+            let Giver::Skin(drawn) = giver(&request.presenting_hand.unwrap()).unwrap() else {
+                panic!("{}: it has a skin", holdout.name);
+            };
             let rig = &hand(&holdout.giver_rig, holdout.giver_handedness).unwrap().rig;
             let expected = synthesis::joints::HandJoints::of_pose(rig, &holdout.giver_pose());
             for (drawn, expected) in drawn.joints.joints.iter().zip(&expected.joints) {

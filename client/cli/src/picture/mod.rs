@@ -12,6 +12,7 @@ use grasp_scene::{ArmJoints, ContactMark, HandoverScene, Image, PosedHand, Rende
 use grasp_synthesis::model::hand;
 
 use crate::{failure::Failure, values::ViewSize};
+use hands::Giver;
 pub(crate) use model::Model;
 
 /// A holdout and, if found, its grasp.
@@ -73,12 +74,12 @@ impl Picture {
     }
 
     fn scene(&self) -> Result<HandoverScene<'_>, Failure> {
-        let giver = self
-            .request
-            .presenting_hand
-            .as_ref()
-            .map(hands::giver)
-            .transpose()?;
+        let giver = self.request.presenting_hand.as_ref();
+        let (giver, others) = match giver.map(hands::giver).transpose()? {
+            None => (None, Vec::new()),
+            Some(Giver::Skin(hand)) => (Some(*hand), Vec::new()),
+            Some(Giver::Mesh(part)) => (None, vec![part]),
+        };
         let receiver = |grasp: &Option<Grasp>| grasp.as_ref().map(hands::receiver).transpose();
         let hands = self.grasp.iter().chain(&self.other_grasp);
         let contacts = hands.flat_map(|grasp| &grasp.contacts);
@@ -98,6 +99,7 @@ impl Picture {
                     elbow: arm.client_elbow,
                 }),
             contacts: contacts.map(mark).collect(),
+            others,
             ..HandoverScene::new(
                 self.model.mesh(),
                 hands::synthesis_pose(self.request.client_from_object),

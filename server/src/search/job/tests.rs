@@ -131,6 +131,25 @@ fn angled_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
         .boxed()
 }
 
+/// Some triangles near the object, closed or not.
+fn hand_mesh() -> BoxedStrategy<v1::presenting_hand::Form> {
+    let coordinates = proptest::collection::vec(number(-0.1..0.1), 24);
+    let triangles = proptest::collection::vec(0..8_u32, 12).prop_map(|mut corners| {
+        // A tetrahedron as well.
+        corners.extend([0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]);
+        corners
+    });
+    (coordinates, triangles, proptest::option::of(pose(0.2)))
+        .prop_map(|(client_coordinates, triangles, client_from_wrist)| {
+            v1::presenting_hand::Form::Mesh(v1::HandMesh {
+                client_coordinates,
+                triangles,
+                client_from_wrist: client_from_wrist.flatten(),
+            })
+        })
+        .boxed()
+}
+
 /// A body near the object, seldom one that is anywhere.
 fn receiver() -> BoxedStrategy<v1::Receiver> {
     use v1::receiver::Body;
@@ -155,7 +174,8 @@ fn receiver() -> BoxedStrategy<v1::Receiver> {
 
 fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
     let hand = || {
-        prop_oneof![tracked_hand(), angled_hand()].prop_map(|form| v1::PresentingHand { form: Some(form) })
+        let form = prop_oneof![2 => tracked_hand(), 1 => angled_hand(), 1 => hand_mesh()];
+        form.prop_map(|form| v1::PresentingHand { form: Some(form) })
     };
     let others = (proptest::option::weighted(0.2, hand()), any_obstacles());
     (
@@ -235,7 +255,7 @@ fn answers_every_request_that_passes_validation() {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let searched = Cell::new([0; 3]);
+    let searched = Cell::new([0; 4]);
     let outcome = TestRunner::new(runs()).run(&(request(), objects()), |(request, object)| {
         let arrived = Instant::now();
         let Ok(query) = find_query(request, ("thesis", &RigStore::new(0, None)), |_| true) else {
@@ -243,8 +263,9 @@ fn answers_every_request_that_passes_validation() {
         };
         let kind = match &query.presenting_hand {
             None => 0,
-            Some(giver) if giver.field.ends_with("angles") => 1,
-            Some(_) => 2,
+            Some(GiverHand::Jointed(giver)) if giver.field.ends_with("angles") => 1,
+            Some(GiverHand::Jointed(_)) => 2,
+            Some(GiverHand::Meshed(_)) => 3,
         };
         let mut counts = searched.get();
         counts[kind] += 1;

@@ -9,7 +9,7 @@ use grasp_synthesis::model::hand::{
     rig::{AngleRange, DigitRig},
 };
 
-use super::{GiverHand, hand_scale, required_handedness, rig_named};
+use super::{JointedHand, hand_scale, required_handedness, rig_named};
 use crate::{
     convention::Convention,
     rigs::store::RigStore,
@@ -27,7 +27,7 @@ pub(super) fn angled_hand(
     convention: Convention,
     rigs: &RigStore,
     violations: &mut Violations,
-) -> Option<GiverHand> {
+) -> Option<JointedHand> {
     let handedness = required_handedness(field.child("handedness"), angles.handedness, violations);
     // Both hands have the same limits, which are checked even if the handedness is missing.
     let rig = rig_named(field.child("rig"), &angles.rig, rigs, violations);
@@ -56,7 +56,7 @@ pub(super) fn angled_hand(
         frame_from_wrist: thesis_from_openxr_frame(convention.joint_to_openxr(client_from_wrist)),
         digits,
     };
-    Some(GiverHand {
+    Some(JointedHand {
         joints: HandJoints::of_pose(&hand.rig.scaled(scale), &pose),
         skin: Arc::clone(&hand.skin),
         field: "presenting_hand.angles",

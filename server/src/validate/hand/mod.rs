@@ -1,9 +1,10 @@
-//! Checks hands: joint angles of a rig, and tracked joints.
+//! Checks hands: joint angles of a rig, tracked joints, and meshes.
 
 mod angles;
 mod axes;
 #[cfg(test)]
 pub(crate) mod fixtures;
+mod meshed;
 mod proportions;
 mod radii;
 mod reference;
@@ -27,6 +28,9 @@ use crate::{
     rigs::{RigHand, StoredRig, store::RigStore},
 };
 use angles::angled_hand;
+pub(crate) use meshed::MeshedHand;
+pub(super) use meshed::check_meshes_together;
+use meshed::meshed_hand;
 use tracked::tracked_hand;
 
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
@@ -37,7 +41,16 @@ const THESIS_RIG: &str = "thesis";
 
 /// The giver's hand, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
-pub(crate) struct GiverHand {
+pub(crate) enum GiverHand {
+    /// Of known joints.
+    Jointed(Box<JointedHand>),
+    /// Of a known surface.
+    Meshed(MeshedHand),
+}
+
+/// A hand whose joints are known, in the client's frame and `OpenXR` axes.
+#[derive(Clone, Debug)]
+pub(crate) struct JointedHand {
     /// Its joints.
     pub joints: HandJoints,
     /// The skin to pose on them.
@@ -46,6 +59,20 @@ pub(crate) struct GiverHand {
     pub field: &'static str,
     /// What was repaired, for the report.
     pub warnings: Vec<String>,
+}
+
+impl GiverHand {
+    fn jointed(hand: JointedHand) -> Self {
+        Self::Jointed(Box::new(hand))
+    }
+
+    /// What was repaired, for the report.
+    pub(crate) fn warnings(&self) -> &[String] {
+        match self {
+            Self::Jointed(hand) => &hand.warnings,
+            Self::Meshed(_) => &[],
+        }
+    }
 }
 
 /// The giver's hand or another one to keep clear of; none if it is wrong.
@@ -58,14 +85,20 @@ pub(super) fn presenting_hand(
 ) -> Option<GiverHand> {
     match hand.form {
         None => {
-            violations.add(field, "is empty; it must have angles or joints, or be absent");
+            violations.add(
+                field,
+                "is empty; it must have angles, joints or a mesh, or be absent",
+            );
             None
         }
         Some(v1::presenting_hand::Form::Angles(angles)) => {
-            angled_hand(field.child("angles"), &angles, convention, rigs, violations)
+            angled_hand(field.child("angles"), &angles, convention, rigs, violations).map(GiverHand::jointed)
         }
         Some(v1::presenting_hand::Form::Joints(joints)) => {
-            tracked_hand(field.child("joints"), &joints, convention, violations)
+            tracked_hand(field.child("joints"), &joints, convention, violations).map(GiverHand::jointed)
+        }
+        Some(v1::presenting_hand::Form::Mesh(mesh)) => {
+            meshed_hand(field.child("mesh"), &mesh, convention, violations).map(GiverHand::Meshed)
         }
     }
 }

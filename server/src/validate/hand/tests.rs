@@ -18,7 +18,7 @@ use proptest::{
 };
 
 use super::{
-    GiverHand,
+    JointedHand,
     fixtures::{joints_of_a_rig, sent},
     tracked::tracked_hand,
 };
@@ -40,7 +40,7 @@ const CONVENTIONS: [Convention; 4] = [
 const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
 
 /// The hand, or the fields of its violations and their descriptions.
-fn read(hand: &v1::HandJoints, convention: Convention) -> Result<GiverHand, Vec<(String, String)>> {
+fn read(hand: &v1::HandJoints, convention: Convention) -> Result<JointedHand, Vec<(String, String)>> {
     let mut violations = Violations::default();
     let read = tracked_hand(FIELD, hand, convention, &mut violations);
     match violations.finish(()) {

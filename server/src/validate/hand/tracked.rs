@@ -13,7 +13,7 @@ use grasp_synthesis::{
 };
 
 use super::{
-    GiverHand,
+    JointedHand,
     axes::{Fault, Turned, axes},
     proportions::{Stray, strays},
     radii::{LARGEST_RADIUS, replace_missing},
@@ -53,7 +53,7 @@ pub(super) fn tracked_hand(
     hand: &v1::HandJoints,
     convention: Convention,
     violations: &mut Violations,
-) -> Option<GiverHand> {
+) -> Option<JointedHand> {
     let before = violations.len();
     let handedness_field = field.child("handedness");
     let handedness = required_handedness(handedness_field, hand.handedness, violations);
@@ -95,7 +95,7 @@ pub(super) fn tracked_hand(
     if sent.places[index::PALM].is_none() {
         sent.joints[index::PALM] = synthesised_palm(&sent.joints);
     }
-    Some(GiverHand {
+    Some(JointedHand {
         joints: HandJoints {
             handedness,
             joints: sent.joints,

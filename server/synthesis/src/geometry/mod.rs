@@ -7,6 +7,7 @@ mod containment;
 mod crossing;
 mod distance_field;
 pub mod handles;
+pub mod inner_balls;
 pub mod local_shape;
 pub mod local_thickness;
 pub mod mesh;

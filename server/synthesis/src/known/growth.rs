@@ -342,6 +342,7 @@ impl<'a> Growth<'a> {
             presented: Presented {
                 giver: Some(hand),
                 other_hands: Vec::new(),
+                meshes: Vec::new(),
                 obstacles: Vec::new(),
                 giver_palm: None,
                 receiver: Receiver::ANYWHERE,

@@ -5,7 +5,11 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{
-    hand::{joints::HandJoints, skin::Skin},
+    hand::{
+        joints::{HandJoints, index},
+        mesh::HandMesh,
+        skin::Skin,
+    },
     object::GraspObject,
     obstacle::Obstacle,
     receiver::Stance,
@@ -18,13 +22,22 @@ use crate::{
     },
 };
 
+/// Another person's hand, posed, in the object's frame.
+#[derive(Clone, Debug)]
+pub enum HandShape {
+    /// Its joints.
+    Joints(Box<HandJoints>),
+    /// Its mesh.
+    Mesh(Arc<HandMesh>),
+}
+
 /// The giver's hand, posed, in the object's frame.
 #[derive(Clone, Debug)]
 pub struct PresentingHand {
-    /// Its joints.
-    pub joints: HandJoints,
-    /// Its posed skin with search structure; none under `PHYSICAL` validity, which uses the hand's solids alone.
-    pub surface: Option<MeshBvh>,
+    /// Its shape.
+    pub shape: HandShape,
+    /// The posed skin of joints, with search structure; none under `PHYSICAL` validity, which uses the hand's solids alone.
+    pub skin: Option<MeshBvh>,
     /// The centre of the palm's skin, in metres.
     pub palm: Vec3,
 }
@@ -37,7 +50,7 @@ pub struct Holdout {
     /// The giver's hand; none for an object that floats freely.
     pub presenting_hand: Option<PresentingHand>,
     /// Further hands to keep clear of. `THESIS` validity knows the presenting hand only.
-    pub other_hands: Vec<HandJoints>,
+    pub other_hands: Vec<HandShape>,
     /// Obstacles to keep clear of. `THESIS` validity knows none.
     pub obstacles: Vec<Obstacle>,
     /// Where the receiver's arm may come from. `THESIS` validity does not ask.
@@ -98,6 +111,24 @@ impl Holdout {
     }
 }
 
+impl HandShape {
+    /// The wrist's `OpenXR` joint frame, if it is known.
+    pub fn wrist(&self) -> Option<Pose> {
+        match self {
+            Self::Joints(joints) => Some(joints.joints[index::WRIST].pose),
+            Self::Mesh(mesh) => mesh.wrist,
+        }
+    }
+
+    /// The joints, if they are known.
+    pub fn joints(&self) -> Option<&HandJoints> {
+        match self {
+            Self::Joints(joints) => Some(joints),
+            Self::Mesh(_) => None,
+        }
+    }
+}
+
 impl PresentingHand {
     /// Poses a skin on joints in the object's frame. Triangles that the pose collapses are dropped.
     ///
@@ -116,8 +147,8 @@ impl PresentingHand {
             })?;
         Ok(Self {
             palm: joints.palm_skin(),
-            joints,
-            surface: Some(MeshBvh::build_quick(mesh)),
+            shape: HandShape::Joints(Box::new(joints)),
+            skin: Some(MeshBvh::build_quick(mesh)),
         })
     }
 
@@ -126,8 +157,25 @@ impl PresentingHand {
     pub fn of_joints(joints: HandJoints) -> Self {
         Self {
             palm: joints.palm_skin(),
-            joints,
-            surface: None,
+            shape: HandShape::Joints(Box::new(joints)),
+            skin: None,
+        }
+    }
+
+    /// A hand of which only the mesh is known, for either validity.
+    pub fn of_mesh(mesh: Arc<HandMesh>) -> Self {
+        Self {
+            palm: mesh.palm(),
+            shape: HandShape::Mesh(mesh),
+            skin: None,
+        }
+    }
+
+    /// Its surface with search structure, which `THESIS` validity requires.
+    pub fn surface(&self) -> Option<&MeshBvh> {
+        match &self.shape {
+            HandShape::Joints(_) => self.skin.as_ref(),
+            HandShape::Mesh(mesh) => Some(&mesh.surface),
         }
     }
 

@@ -3,14 +3,22 @@
 //! [`Barriers`] answers the questions of [`PreparedHand`] for all of them together. Most holdouts have one giver and
 //! nothing else, so that hand comes first, and the others are looked at only where it decides nothing.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
-use super::solids::{Bounded, PreparedHand, SPHERES, Spheres, TaperedCapsule, TrackedSolids};
-use crate::{geometry::solid_box::SolidBox, model::obstacle::Obstacle};
+use super::solids::{Bounded, PreparedHand, SPHERES, Spheres, TaperedCapsule, TrackedSolids, clearance};
+use crate::{
+    geometry::solid_box::SolidBox,
+    model::{hand::mesh::HandMesh, obstacle::Obstacle},
+};
 
 /// How much closer than to another hand a hand may come to an obstacle, in metres: 0.1 mm remain, against rounding. A
 /// hand that takes something thin from a table all but touches it; with half of this, no pen on a table can be taken.
 const CLOSER_TO_OBSTACLES: f32 = 0.0009;
+
+/// Comparisons of prepared hands that take as long as one with a mesh, about.
+const MESH_COMPARISONS: usize = 16;
 
 /// An obstacle prepared for comparison with many hands. All its distances are longer by `CLOSER_TO_OBSTACLES` than they
 /// are, so that one threshold serves hands and obstacles.
@@ -29,6 +37,9 @@ pub struct Barriers<'a> {
     pub giver: Option<&'a PreparedHand>,
     /// Further hands.
     pub other_hands: &'a [PreparedHand],
+    /// Those of these hands of which the mesh is known. As prepared, they are what is certainly inside; distances are from
+    /// the mesh.
+    pub meshes: &'a [Arc<HandMesh>],
     /// The obstacles.
     pub obstacles: &'a [PreparedObstacle],
 }
@@ -92,6 +103,7 @@ impl<'a> Barriers<'a> {
     pub const NONE: Barriers<'static> = Barriers {
         giver: None,
         other_hands: &[],
+        meshes: &[],
         obstacles: &[],
     };
 
@@ -116,7 +128,8 @@ impl<'a> Barriers<'a> {
 
     /// The number of comparisons between two clock checks, of which `with_giver` are due with a single hand.
     pub fn comparisons_per_check(&self, with_giver: usize) -> usize {
-        (with_giver / (1 + self.other_hands.len() + self.obstacles.len())).max(1)
+        let meshes = MESH_COMPARISONS * self.meshes.len();
+        (with_giver / (1 + self.other_hands.len() + self.obstacles.len() + meshes)).max(1)
     }
 
     /// All hands, the giver's first.
@@ -218,7 +231,10 @@ impl<'a> Barriers<'a> {
     ) -> bool {
         self.hands()
             .any(|hand| hand.comes_within(solids.clone(), distance))
-            || self.least_from_obstacles(solids, distance, distance).is_none()
+            || self
+                .least_from_obstacles(solids.clone(), distance, distance)
+                .is_none()
+            || self.least_from_meshes(solids, distance, distance).is_none()
     }
 
     /// As [`PreparedHand::least_distance`].
@@ -231,7 +247,30 @@ impl<'a> Barriers<'a> {
         let least = self.hands().try_fold(enough, |least, hand| {
             hand.least_distance(solids.clone(), least, required)
         })?;
-        self.least_from_obstacles(solids, least, required)
+        let least = self.least_from_obstacles(solids.clone(), least, required)?;
+        self.least_from_meshes(solids, least, required)
+    }
+
+    /// As [`PreparedHand::least_distance`], for the meshes alone.
+    fn least_from_meshes<'b>(
+        &self,
+        solids: impl Iterator<Item = &'b TaperedCapsule>,
+        enough: f32,
+        required: f32,
+    ) -> Option<f32> {
+        let mut least = enough;
+        if self.meshes.is_empty() {
+            return Some(least);
+        }
+        for solid in solids {
+            for mesh in self.meshes {
+                least = least.min(clearance(solid, &mesh.surface, least));
+                if least < required {
+                    return None;
+                }
+            }
+        }
+        Some(least)
     }
 
     /// As [`PreparedHand::least_distance`], for the obstacles alone.
@@ -266,6 +305,10 @@ impl<'a> Barriers<'a> {
         for other in self.hands() {
             let clearance = other.clearance(hand, required)?;
             clearances.hands = Some(clearances.hands.map_or(clearance, |least| least.min(clearance)));
+        }
+        if !self.meshes.is_empty() {
+            let enough = clearances.hands.unwrap_or(f32::INFINITY);
+            clearances.hands = Some(self.least_from_meshes(hand.iter(), enough, required)?);
         }
         if !self.obstacles.is_empty() {
             let least = self.least_from_obstacles(hand.iter(), f32::INFINITY, required)?;

@@ -16,10 +16,7 @@ use crate::{
     base::{pose::Pose, ramp::ramp},
     geometry::mesh_bvh::MeshBvh,
     model::{
-        hand::{
-            joints::{HandJoints, index, thesis_from_openxr_frame},
-            rig::Rig,
-        },
+        hand::{joints::thesis_from_openxr_frame, rig::Rig},
         receiver::{Arm, ArmPose, FOREARM_LENGTH, Stance, UPPER_ARM_LENGTH},
     },
 };
@@ -107,16 +104,15 @@ impl Receiver {
         up: Vec3::Y,
     };
 
-    /// The receiver of an object whose centre of mass is `centre`, from a giver's hand, if there is one. `up` is a unit
-    /// vector.
-    pub fn new(stance: Stance, giver: Option<&HandJoints>, centre: Vec3, up: Vec3) -> Self {
+    /// The receiver of an object whose centre of mass is `centre`, from a giver whose wrist has this `OpenXR` joint
+    /// frame, if it is known. `up` is a unit vector.
+    pub fn new(stance: Stance, giver_wrist: Option<Pose>, centre: Vec3, up: Vec3) -> Self {
         let mut receiver = Self {
             stance,
             up,
             ..Self::ANYWHERE
         };
-        let giver_wrist = giver.map(|hand| thesis_from_openxr_frame(hand.joints[index::WRIST].pose));
-        match (stance, giver_wrist) {
+        match (stance, giver_wrist.map(thesis_from_openxr_frame)) {
             (Stance::Any, _) | (Stance::Facing, None) => {}
             (Stance::At(arm), _) => receiver.add(arm, centre),
             (Stance::Facing, Some(wrist)) => {

@@ -1,5 +1,7 @@
 //! The scene of a grip: the object under some friction, and what a holdout adds to it.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::{
@@ -14,8 +16,8 @@ use crate::{
         pose::Pose,
     },
     model::{
-        hand::{joints::HandJoints, rig::Rig},
-        holdout::Holdout,
+        hand::{mesh::HandMesh, rig::Rig},
+        holdout::{HandShape, Holdout},
         object::GraspObject,
         receiver::ArmPose,
     },
@@ -70,6 +72,8 @@ pub struct Presented {
     pub giver: Option<PreparedHand>,
     /// Further hands.
     pub other_hands: Vec<PreparedHand>,
+    /// Those of these hands of which the mesh is known: the others are exact as they are.
+    pub meshes: Vec<Arc<HandMesh>>,
     /// Obstacles.
     pub obstacles: Vec<PreparedObstacle>,
     /// Centre of the giver's palm, in metres, in the object's frame.
@@ -88,25 +92,30 @@ impl Presented {
 
     /// [`Presented::of`] with some of the mechanisms.
     pub(crate) fn with_mechanisms(mechanisms: Mechanisms, holdout: &Holdout) -> Self {
-        let prepared = |joints: &HandJoints| {
-            let solids = TrackedSolids::of_joints(joints);
-            if mechanisms.has(Mechanism::GiverOrder) {
-                PreparedHand::new(&solids)
-            } else {
-                PreparedHand::in_anatomical_order(&solids)
+        let prepared = |shape: &HandShape| match shape {
+            HandShape::Joints(joints) if mechanisms.has(Mechanism::GiverOrder) => {
+                PreparedHand::new(&TrackedSolids::of_joints(joints))
             }
+            HandShape::Joints(joints) => PreparedHand::in_anatomical_order(&TrackedSolids::of_joints(joints)),
+            HandShape::Mesh(mesh) => PreparedHand::inside(mesh),
         };
         let giver = holdout.presenting_hand.as_ref();
-        let hands = giver.map(|hand| &hand.joints).into_iter();
-        let mut hands = hands.chain(&holdout.other_hands).map(prepared);
+        let shapes = giver.map(|hand| &hand.shape).into_iter();
+        let shapes = shapes.chain(&holdout.other_hands);
+        let meshes = shapes.clone().filter_map(|shape| match shape {
+            HandShape::Joints(_) => None,
+            HandShape::Mesh(mesh) => Some(Arc::clone(mesh)),
+        });
+        let mut hands = shapes.clone().map(prepared);
         Self {
             giver: hands.next(),
             other_hands: hands.collect(),
+            meshes: meshes.collect(),
             obstacles: holdout.obstacles.iter().map(PreparedObstacle::new).collect(),
             giver_palm: giver.map(|hand| hand.palm),
             receiver: Receiver::new(
                 holdout.stance,
-                giver.map(|hand| &hand.joints),
+                giver.and_then(|hand| hand.shape.wrist()),
                 holdout.object.centre_of_mass,
                 holdout.up,
             ),
@@ -126,6 +135,7 @@ impl Presented {
         Barriers {
             giver: self.giver.as_ref(),
             other_hands: &self.other_hands,
+            meshes: &self.meshes,
             obstacles: &self.obstacles,
         }
     }

@@ -25,8 +25,8 @@ pub fn collision(
 ) -> Option<Rejection> {
     let object = &holdout.object.surface;
     let giver = holdout.presenting_hand.as_ref().map(|hand| {
-        let surface = hand.surface.as_ref();
-        surface.expect("THESIS validity needs a mesh of the giver's hand")
+        hand.surface()
+            .expect("THESIS validity needs a mesh of the giver's hand")
     });
     let palm = rig.palm_segments.map(|segment| {
         Segment::new(

@@ -3,6 +3,7 @@
 pub mod description;
 pub mod joints;
 pub mod kinematics;
+pub mod mesh;
 pub mod rig;
 pub mod skin;
 

@@ -11,6 +11,7 @@ use super::{
     hand_clearance::Bounded,
     spheres::{SPHERES, Spheres},
 };
+use crate::model::hand::mesh::HandMesh;
 
 /// Number of the giver's solids, padded to whole registers.
 const LANES: usize = TrackedSolids::COUNT.next_multiple_of(8);
@@ -73,14 +74,29 @@ impl PreparedHand {
         Self::in_order(giver, &std::array::from_fn(|solid| solid))
     }
 
+    /// What is certainly inside a mesh: distances from it are upper bounds of those from the mesh.
+    pub(crate) fn inside(mesh: &HandMesh) -> Self {
+        // Without volume, a point of the surface.
+        let point = mesh.surface.mesh().corners(0)[0];
+        let mut balls = [TaperedCapsule::new(point, point, 0.0, 0.0); TrackedSolids::COUNT];
+        for (place, ball) in balls.iter_mut().zip(&mesh.balls) {
+            *place = TaperedCapsule::new(ball.centre, ball.centre, ball.radius, ball.radius);
+        }
+        Self::of(&balls.map(Bounded::new))
+    }
+
     fn in_order(giver: &TrackedSolids, order: &[usize; TrackedSolids::COUNT]) -> Self {
         let all = giver.to_array();
         let mut solids = [Bounded::new(all[0]); TrackedSolids::COUNT];
         for (place, &solid) in solids.iter_mut().zip(order) {
             *place = Bounded::new(all[solid]);
         }
+        Self::of(&solids)
+    }
+
+    fn of(solids: &[Bounded; TrackedSolids::COUNT]) -> Self {
         let mut prepared = Self {
-            solids,
+            solids: *solids,
             starts: [[0.0; LANES]; 3],
             axes: [[0.0; LANES]; 3],
             inverse_squares: [0.0; LANES],

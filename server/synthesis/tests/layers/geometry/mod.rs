@@ -5,6 +5,7 @@ mod closest_point;
 mod containment;
 mod crossing;
 mod crowded;
+mod inner_balls;
 mod local_shape;
 mod local_thickness;
 mod opposed;

@@ -48,7 +48,7 @@ fn presenting_hand_skin_follows_its_joints() {
     let mut random = Random::new(12);
     let object_from_frame = Pose::new(random.in_cube(), random.rotation());
     let hand = PresentingHand::in_frame(&skin(), &joints(), object_from_frame).expect("the hand is sound");
-    let posed = hand.surface.as_ref().expect("it has a skin");
+    let posed = hand.surface().expect("it has a skin");
     let surface = posed.mesh();
     assert_eq!(surface.triangles(), skin().triangles);
     for (posed, bound) in surface.positions().iter().zip(skin().positions) {
@@ -65,7 +65,7 @@ fn collapsed_triangles_of_a_skin_are_dropped() {
     let [a, b, _] = skin.triangles[20];
     skin.positions[a as usize] = skin.positions[b as usize];
     let hand = PresentingHand::new(&skin, joints()).expect("the hand is sound");
-    let posed = hand.surface.as_ref().expect("it has a skin");
+    let posed = hand.surface().expect("it has a skin");
     let kept = posed.mesh().triangles().len();
     assert_eq!(
         kept,

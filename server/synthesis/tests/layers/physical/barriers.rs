@@ -6,7 +6,7 @@ use grasp_synthesis::{
     geometry::oriented_box::OrientedBox,
     model::{
         hand::{HandPose, joints::HandJoints},
-        holdout::{Holdout, PresentingHand},
+        holdout::{HandShape, Holdout, PresentingHand},
         obstacle::Obstacle,
     },
     physical::{
@@ -79,7 +79,13 @@ fn clearances_and_verdicts_match_all_pairs() {
             UP,
         )
         .expect("up is a unit vector");
-        holdout.other_hands = hands.iter().skip(1).cloned().collect();
+        holdout.other_hands = hands
+            .iter()
+            .skip(1)
+            .cloned()
+            .map(Box::new)
+            .map(HandShape::Joints)
+            .collect();
         holdout.obstacles.clone_from(&obstacles);
         let presented = Presented::of(&holdout);
         let barriers = presented.barriers();

@@ -4,6 +4,7 @@ mod balance;
 mod barriers;
 mod closing;
 mod closure;
+mod hand_mesh;
 mod hand_solids;
 mod hanging;
 mod prepared_hand;

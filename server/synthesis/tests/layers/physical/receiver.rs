@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        hand::{HandPose, Handedness, joints::HandJoints},
+        hand::{Handedness, joints::openxr_from_thesis_frame},
         object::GraspObject,
         receiver::{Arm, ArmPose, Stance},
     },
@@ -35,16 +35,9 @@ fn wrist(position: Vec3, forearm: Vec3, roll: f32) -> Pose {
     )
 }
 
-/// A giver's hand with a forearm in a direction, at a point.
-fn giver(position: Vec3, forearm: Vec3) -> HandJoints {
-    let rig = adult(Handedness::Right);
-    HandJoints::of_pose(
-        rig,
-        &HandPose {
-            frame_from_wrist: wrist(position, forearm, 0.3),
-            digits: rig.stretched(),
-        },
-    )
+/// The joint frame of a giver's wrist at a point, with a forearm in a direction.
+fn giver(position: Vec3, forearm: Vec3) -> Pose {
+    openxr_from_thesis_frame(wrist(position, forearm, 0.3))
 }
 
 fn arm_at(shoulder: Vec3) -> Arm {
@@ -69,7 +62,7 @@ fn hands_from_opposite_the_giver_suit_and_those_from_the_givers_side_do_not() {
         let azimuth = Quat::from_axis_angle(UP, random.between(-3.0, 3.0));
         let forearm = azimuth * Vec3::new(0.0, random.between(-0.5, 0.5), 1.0).normalize_or(Vec3::Z);
         let hand = giver(forearm * 0.1, forearm);
-        let receiver = Receiver::new(Stance::Facing, Some(&hand), Vec3::ZERO, UP);
+        let receiver = Receiver::new(Stance::Facing, Some(hand), Vec3::ZERO, UP);
         let away = -(azimuth * Vec3::Z);
         assert!(receiver.suits_forearm(away) > 0.8, "{forearm}");
         assert!(receiver.suits_forearm(forearm) == 0.0, "{forearm}");
@@ -85,7 +78,7 @@ fn suitability_turns_with_the_scene() {
         let (forearm, along, turn) = (random.direction(), random.direction(), random.rotation());
         let suits = |forearm: Vec3, along: Vec3, up: Vec3| {
             let hand = giver(forearm * 0.1, forearm);
-            Receiver::new(Stance::Facing, Some(&hand), Vec3::ZERO, up).suits_forearm(along)
+            Receiver::new(Stance::Facing, Some(hand), Vec3::ZERO, up).suits_forearm(along)
         };
         // Forearms along gravity leave open where the giver stands, and then any direction is as good as another.
         if forearm.reject_from(UP).length() > 0.3 {
@@ -100,7 +93,7 @@ fn nothing_is_expected_without_giver_or_body_or_if_any_stance_will_do() {
     let hand = giver(Vec3::Z * 0.1, Vec3::Z);
     for receiver in [
         Receiver::new(Stance::Facing, None, Vec3::ZERO, UP),
-        Receiver::new(Stance::Any, Some(&hand), Vec3::ZERO, UP),
+        Receiver::new(Stance::Any, Some(hand), Vec3::ZERO, UP),
     ] {
         assert!(!receiver.is_expected());
         assert!((receiver.suits_forearm(Vec3::Z) - 1.0).abs() < f32::EPSILON);
@@ -152,7 +145,7 @@ fn a_wrist_out_of_reach_does_not_suit_and_one_within_suits_as_its_forearm_does()
     for _ in 0..600 {
         let at = Vec3::new(0.0, 0.0, 5.0);
         let hand = giver(at + Vec3::Z * 0.1, Vec3::Z);
-        let receiver = Receiver::new(Stance::Facing, Some(&hand), at, UP);
+        let receiver = Receiver::new(Stance::Facing, Some(hand), at, UP);
         let forearm = random.direction();
         // Some wrists are beyond the giver's body.
         let pose = wrist(
@@ -182,7 +175,7 @@ fn assumed_elbows_hang_below_the_shoulder_and_rather_outward() {
             let at = Vec3::new(0.0, 0.0, 5.0);
             // The receiver looks along +Z, so that the right arm is on the side of -X.
             let hand = giver(at + Vec3::Z * 0.1, Vec3::Z);
-            let receiver = Receiver::new(Stance::Facing, Some(&hand), at, UP);
+            let receiver = Receiver::new(Stance::Facing, Some(hand), at, UP);
             let pose = wrist(at - Vec3::Z * 0.1, random.direction(), random.between(-3.0, 3.0));
             let Some(arm) = reached(&receiver, handedness, pose) else {
                 continue;

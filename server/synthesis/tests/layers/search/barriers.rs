@@ -13,7 +13,7 @@ use grasp_synthesis::{
     model::{
         grasp::Grasp,
         hand::{HandPose, joints::HandJoints},
-        holdout::Holdout,
+        holdout::{HandShape, Holdout},
         obstacle::Obstacle,
     },
     physical::{
@@ -49,7 +49,12 @@ static REMOTE: LazyLock<Arc<Atlas>> =
 fn distances(holdout: &Holdout, pose: &HandPose) -> [f32; 2] {
     let solids = HandSolids::of_pose(right(), pose);
     let ours = TrackedSolids::of_rig(right(), pose.frame_from_wrist, &solids);
-    let hands: Vec<TrackedSolids> = holdout.other_hands.iter().map(TrackedSolids::of_joints).collect();
+    let hands: Vec<TrackedSolids> = holdout
+        .other_hands
+        .iter()
+        .filter_map(HandShape::joints)
+        .map(TrackedSolids::of_joints)
+        .collect();
     let from_hands = hands.iter().flat_map(TrackedSolids::iter).map(|their| {
         let distances = ours.iter().map(|our| our.distance(their));
         distances.fold(f32::INFINITY, f32::min)
@@ -79,7 +84,12 @@ fn crowded(random: &mut Random) -> Holdout {
     let mut holdout = floating(Arc::clone(object("remote")));
     for _ in 0..random.index(3) {
         let grip = &REMOTE.entries()[random.index(REMOTE.entries().len())].grip;
-        holdout.other_hands.push(HandJoints::of_pose(right(), &grip.pose));
+        holdout
+            .other_hands
+            .push(HandShape::Joints(Box::new(HandJoints::of_pose(
+                right(),
+                &grip.pose,
+            ))));
     }
     for _ in 0..=random.index(2) {
         let place = random.in_cube() * 0.12;

@@ -122,7 +122,9 @@ fn gaps(planned: &Planned, pose: &HandPose) -> (f32, f32) {
         .map(|solid| clearance(solid, surface, 0.01))
         .fold(f32::INFINITY, f32::min);
     let giver = planned.holdout.presenting_hand.as_ref();
-    let theirs = giver.map(|giver| TrackedSolids::of_joints(&giver.joints));
+    let theirs = giver
+        .and_then(|giver| giver.shape.joints())
+        .map(TrackedSolids::of_joints);
     let giver = theirs.iter().flat_map(TrackedSolids::iter).flat_map(|their| {
         let distances = tracked.iter().map(|our| our.distance(their));
         distances.collect::<Vec<_>>()

@@ -135,7 +135,7 @@ fn assert_valid(grasp: &Grasp, search: &Search<'_>) {
     let giver = holdout
         .presenting_hand
         .as_ref()
-        .and_then(|hand| Some(hand.surface.as_ref()?.mesh()));
+        .and_then(|hand| Some(hand.surface()?.mesh()));
     for [from, to] in palm.chain(bones) {
         for mesh in std::iter::once(mesh).chain(giver) {
             assert!(!crosses(mesh, from, to) && !winds_around(mesh, from));
@@ -367,7 +367,7 @@ fn collision_at(object: GraspObject, giver_at: Option<Vec3>, wrist: Vec3) -> Opt
         floating(object)
     };
     if let (Some(at), Some(giver)) = (giver_at, &mut holdout.presenting_hand) {
-        giver.surface = Some(box_at(at, Vec3::splat(0.02), 2));
+        giver.skin = Some(box_at(at, Vec3::splat(0.02), 2));
     }
     let wrist = WristFrame::new(Pose::from_position(wrist));
     collision(
