@@ -63,6 +63,6 @@ pub use config::{Config, ConfigError};
 pub use health_check::{HealthCheckError, check_health};
 pub use limits::{StoreLimits, StreamLimits};
 pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory, memory_limits};
-pub use objects::directory::{DirectoryError, DirectoryProblem};
+pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};

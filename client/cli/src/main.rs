@@ -1,5 +1,6 @@
 //! The command line `grasp`: one module per command, and what the commands share.
 
+mod bake;
 mod completions;
 mod demo;
 mod experiment;
@@ -54,6 +55,7 @@ enum Command {
     Objects(objects::Command),
     #[command(subcommand)]
     Rigs(rigs::Command),
+    Bake(bake::Arguments),
     Experiment(experiment::Arguments),
     Health(health::Arguments),
     Completions(completions::Arguments),
@@ -66,6 +68,8 @@ enum Ending {
     Done,
     /// No grasp was found within the budget.
     NoGrasp,
+    /// The server rejected some of several things.
+    Rejected,
     /// The server is up but not serving.
     NotServing,
 }
@@ -75,6 +79,7 @@ impl Ending {
         match self {
             Self::Done => 0,
             Self::NoGrasp => 3,
+            Self::Rejected => 4,
             Self::NotServing => 5,
         }
     }
@@ -120,6 +125,7 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Objects(command) => objects::run(command, output).await,
         Command::Rigs(command) => rigs::run(command, output).await,
+        Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
         Command::Experiment(arguments) => experiment::run(arguments, output).await,
         Command::Health(arguments) => health::run(arguments, output).await,
         Command::Completions(arguments) => completions::run(&arguments, output),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use glam::Vec3;
-use grasp_client::{ForbiddenSurfaces, NewObject, UpAxis};
+use grasp_client::{ClientError, ForbiddenSurfaces, GraspClient, NewObject, Object, UpAxis};
 
 use crate::{
     Ending,
@@ -89,13 +89,21 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         ..NewObject::new(id, mesh, arguments.mass)
     };
     let client = arguments.server.connect().await?;
-    let object = if object.mesh.len() > LARGEST_MESSAGE {
-        client.upload_object(&object).await?
-    } else {
-        client.create_object(&object).await?
-    };
+    let object = create_or_upload(&client, &object).await?;
     output.write(&object, super::describe)?;
     Ok(Ending::Done)
+}
+
+/// Creates an object, in one message if it fits.
+pub(crate) async fn create_or_upload(
+    client: &GraspClient,
+    object: &NewObject,
+) -> Result<Object, ClientError> {
+    if object.mesh.len() > LARGEST_MESSAGE {
+        client.upload_object(object).await
+    } else {
+        client.create_object(object).await
+    }
 }
 
 /// The file's name without its extension, in lower case, with hyphens for runs of other characters.

@@ -10,7 +10,7 @@ mod watch;
 
 use std::collections::BTreeMap;
 
-pub(crate) use create::id_from_file;
+pub(crate) use create::{create_or_upload, id_from_file};
 
 use clap::Subcommand;
 use glam::Vec3;

@@ -1,5 +1,6 @@
 //! The built command line `grasp`, against a scripted and a real server.
 
+mod bake;
 mod commands;
 mod experiments;
 mod objects;

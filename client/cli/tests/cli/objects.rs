@@ -8,7 +8,7 @@ use tokio::net::TcpListener;
 
 use crate::commands::{code, empty_folder, json, run, text};
 
-const BOX_OBJ: &str = "\
+pub(crate) const BOX_OBJ: &str = "\
 v -0.02 -0.015 -0.01
 v 0.02 -0.015 -0.01
 v 0.02 0.015 -0.01

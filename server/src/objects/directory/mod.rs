@@ -4,6 +4,7 @@
 //! They pass the same checks and limits as objects that clients create. Any mistake keeps the server from starting, and
 //! the error lists all of them: a pipeline that misses an object silently would fail much later.
 
+mod folder_objects;
 mod manifest;
 mod pairs;
 
@@ -23,8 +24,9 @@ use crate::{
     limits::{BYTES_BESIDES_MESH, StoreLimits},
     validate::{Labels, Violations, object_fields, quoted},
 };
+pub use folder_objects::{FolderObject, objects_of_folder};
 use manifest::read_manifest;
-use pairs::{Pair, pairs};
+use pairs::{Manifests, Pair, pairs};
 
 /// Largest number of listed problems; the others are only counted, to bound the log line.
 const LISTED_PROBLEMS: usize = 100;
@@ -106,7 +108,7 @@ pub(crate) fn load(
     let mut problems = Vec::new();
     let mut objects = Vec::new();
     let mut bytes = 0_usize;
-    for pair in pairs(path, store.objects, &mut problems) {
+    for pair in pairs(path, store.objects, Manifests::Required, &mut problems) {
         match read_pair(path, &pair, limits) {
             Ok(object) => {
                 bytes = bytes.saturating_add(object.object.bytes());

@@ -13,6 +13,17 @@ pub(super) struct Pair {
     pub mesh: String,
     /// The manifest's file name.
     pub toml: String,
+    /// True if there is a manifest.
+    pub has_manifest: bool,
+}
+
+/// Whether a mesh must have a manifest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Manifests {
+    /// One without is a problem.
+    Required,
+    /// One without is a pair, too.
+    Optional,
 }
 
 /// Which files exist under one name.
@@ -26,11 +37,17 @@ struct Found {
 /// The extensions of meshes.
 const MESHES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
 
-/// All pairs of a folder, sorted by name. A file without a partner and an unreadable folder are problems.
+/// All pairs of a folder, sorted by name. An unreadable folder, a manifest without a mesh and, if manifests are required, a mesh
+/// without a manifest are problems.
 ///
 /// Other files (pictures, material libraries, notes) are ignored, and so are names that start with a dot, which volumes
 /// of container platforms contain.
-pub(super) fn pairs(path: &Path, maximum: usize, problems: &mut Vec<DirectoryProblem>) -> Vec<Pair> {
+pub(super) fn pairs(
+    path: &Path,
+    maximum: usize,
+    manifests: Manifests,
+    problems: &mut Vec<DirectoryProblem>,
+) -> Vec<Pair> {
     let names = match read_names(path, problems) {
         Ok(names) => names,
         Err(error) => {
@@ -69,8 +86,13 @@ pub(super) fn pairs(path: &Path, maximum: usize, problems: &mut Vec<DirectoryPro
                 format_args!("is a second mesh beside {mesh}; keep one of them"),
             ));
         }
-        if found.toml {
-            pairs.push(Pair { id, mesh, toml });
+        if found.toml || manifests == Manifests::Optional {
+            pairs.push(Pair {
+                id,
+                mesh,
+                toml,
+                has_manifest: found.toml,
+            });
         } else {
             problems.push(DirectoryProblem::of(
                 mesh,

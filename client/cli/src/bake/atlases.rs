@@ -1,0 +1,178 @@
+//! Waits for the atlases of both hands.
+
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
+
+use grasp_client::{ClientError, FindRequest, GraspClient, ObjectWatch};
+use indicatif::ProgressBar;
+
+use super::results::Row;
+use crate::failure::Failure;
+
+/// Steps of an object's progress: each hand's atlas becomes useful, and complete.
+pub(super) const STEPS: u64 = 4;
+
+/// Grips of an atlas that answers most requests.
+const USEFUL: u32 = 100;
+
+/// How long to wait for news before the state of all objects is read: news may be lost with a connection, and progress between
+/// them is none.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// How long none of the atlases may grow before they are given up: the server then has no memory for them.
+const STALLED: Duration = Duration::from_secs(120);
+
+/// Objects whose atlases grow.
+#[derive(Debug)]
+pub(super) struct Waiting<'a> {
+    client: &'a GraspClient,
+    /// None once the server has ended it.
+    watch: Option<ObjectWatch>,
+    /// By name.
+    objects: BTreeMap<String, Growing>,
+    /// True once the state of all was read since the last was added.
+    is_read: bool,
+    /// When one of them last grew.
+    grew: Instant,
+}
+
+#[derive(Debug)]
+struct Growing {
+    place: usize,
+    row: Row,
+    steps: u64,
+}
+
+impl<'a> Waiting<'a> {
+    /// Starts to watch.
+    ///
+    /// # Errors
+    /// Those of the call.
+    pub(super) async fn start(client: &'a GraspClient) -> Result<Self, Failure> {
+        Ok(Self {
+            watch: Some(client.watch_objects("", false).await?),
+            client,
+            objects: BTreeMap::new(),
+            is_read: false,
+            grew: Instant::now(),
+        })
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.objects.len()
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.objects.is_empty()
+    }
+
+    /// Adds an object, with its place in the table.
+    pub(super) fn add(&mut self, place: usize, row: Row) {
+        self.is_read = false;
+        self.grew = Instant::now();
+        let growing = Growing { place, row, steps: 0 };
+        self.objects.insert(growing.row.name.clone(), growing);
+    }
+
+    /// The objects whose atlases are complete; waits for news if there are none yet.
+    ///
+    /// # Errors
+    /// Those of the calls.
+    pub(super) async fn ready(&mut self, progress: &ProgressBar) -> Result<Vec<(usize, Row)>, Failure> {
+        if self.is_read {
+            self.wait().await;
+        }
+        self.is_read = true;
+        let names: Vec<String> = self.objects.keys().cloned().collect();
+        let mut ready = Vec::new();
+        for name in names {
+            let state = self.client.get_object(&name).await;
+            let Some(growing) = self.objects.get_mut(&name) else {
+                continue;
+            };
+            let before = growing.row.grips;
+            match state {
+                Err(ClientError::NotFound(_)) => {
+                    growing.row.error = Some("was deleted or evicted meanwhile".to_owned());
+                }
+                state => growing.row.describe(&state?),
+            }
+            if growing.row.grips != before {
+                self.grew = Instant::now();
+            } else if self.grew.elapsed() > STALLED {
+                growing.row.stalled = true;
+            }
+            let row = &growing.row;
+            let is_over = row.error.is_some() || row.stalled;
+            let steps = if is_over { STEPS } else { steps_of(row) };
+            progress.inc(steps.saturating_sub(growing.steps));
+            growing.steps = steps.max(growing.steps);
+            if steps == STEPS {
+                ready.extend(
+                    self.objects
+                        .remove(&name)
+                        .map(|growing| (growing.place, growing.row)),
+                );
+            } else if row
+                .grips
+                .is_some_and(|grips| grips.iter().all(|hand| hand.entries == 0))
+            {
+                self.wake(&name).await?;
+            }
+        }
+        Ok(ready)
+    }
+
+    /// Waits for news of one of the objects.
+    async fn wait(&mut self) {
+        let Some(watch) = &mut self.watch else {
+            tokio::time::sleep(PATIENCE).await;
+            return;
+        };
+        let news = async {
+            loop {
+                match watch.next().await {
+                    Ok(Some(news))
+                        if news
+                            .name
+                            .as_ref()
+                            .is_some_and(|name| self.objects.contains_key(name)) =>
+                    {
+                        return true;
+                    }
+                    Ok(Some(_)) => {}
+                    Ok(None) | Err(_) => return false,
+                }
+            }
+        };
+        if tokio::time::timeout(PATIENCE, news).await == Ok(false) {
+            self.watch = None;
+        }
+    }
+
+    /// Has the server load an object that rests, so that its atlas goes on.
+    async fn wake(&self, name: &str) -> Result<(), Failure> {
+        let request = FindRequest {
+            max_attempts: Some(1),
+            budget: Some(Duration::from_millis(10)),
+            ..FindRequest::new(name)
+        };
+        self.client.find_grasp(&request).await?;
+        Ok(())
+    }
+}
+
+/// Steps done of an object's progress. A server without atlases has nothing to wait for.
+fn steps_of(row: &Row) -> u64 {
+    let Some(grips) = row.grips else { return STEPS };
+    let done = grips.map(|hand| {
+        if hand.complete {
+            2
+        } else {
+            u64::from(hand.entries >= USEFUL)
+        }
+    });
+    done.into_iter().sum()
+}

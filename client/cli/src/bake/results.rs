@@ -1,0 +1,191 @@
+//! The table of what was baked.
+
+use std::path::Path;
+
+use grasp_client::Object;
+use serde::Serialize;
+
+use super::densities::Density;
+use crate::{
+    failure::Failure,
+    output::{Output, table},
+};
+
+/// What is said of atlases that ceased to grow.
+const STALLED: &str = "its atlases do not grow: the server needs more memory for them (cache_bytes)";
+
+/// What became of a mesh.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Row {
+    /// "objects/{object}".
+    pub name: String,
+    /// The file's name.
+    pub mesh: String,
+    /// True if this run created it.
+    pub created: bool,
+    /// Its mass in kilograms; none if it was rejected.
+    pub mass_kg: Option<f32>,
+    /// The density that its mass was computed with; none if a manifest has the mass.
+    pub density: Option<Density>,
+    /// Number of triangles; none if it was rejected.
+    pub triangles: Option<u32>,
+    /// The atlases of the right and of the left hand; none on a server without atlases.
+    pub grips: Option<[Grips; 2]>,
+    /// True if the atlases ceased to grow before they were complete.
+    pub stalled: bool,
+    /// What test givers showed.
+    pub givers: Givers,
+    /// Oddities of the mesh.
+    pub warnings: Vec<String>,
+    /// Why it was rejected.
+    pub error: Option<String>,
+}
+
+/// The state of one hand's atlas.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub(super) struct Grips {
+    /// Number of grips.
+    pub entries: u32,
+    /// True if it does not grow any more.
+    pub complete: bool,
+}
+
+/// From how many test givers an object was taken.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub(super) struct Givers {
+    /// Givers that found a hold.
+    pub tried: u16,
+    /// Those of them that it was taken from.
+    pub answered: u16,
+}
+
+impl Row {
+    /// Of a mesh that is to be registered.
+    pub(super) fn new(id: &str, mesh: &Path) -> Self {
+        Self {
+            name: format!("objects/{id}"),
+            mesh: mesh
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            created: false,
+            mass_kg: None,
+            density: None,
+            triangles: None,
+            grips: None,
+            stalled: false,
+            givers: Givers::default(),
+            warnings: Vec::new(),
+            error: None,
+        }
+    }
+
+    /// Takes over what the server says of the object.
+    pub(super) fn describe(&mut self, object: &Object) {
+        self.mass_kg = Some(object.mass_kg);
+        self.triangles = Some(object.triangle_count);
+        self.warnings.clone_from(&object.warnings);
+        let both = object.atlas.as_ref().zip(object.left_atlas.as_ref());
+        self.grips = both.map(|(right, left)| {
+            [right, left].map(|atlas| Grips {
+                entries: atlas.entries,
+                complete: atlas.complete,
+            })
+        });
+    }
+}
+
+/// Writes the table, or the rows as JSON.
+pub(super) fn write(rows: &[Row], output: Output) -> Result<(), Failure> {
+    output.write(&rows, |rows| text(rows))
+}
+
+fn text(rows: &[Row]) -> String {
+    let mut all = table(&[
+        "object",
+        "",
+        ">mass",
+        "density",
+        ">triangles",
+        ">grips r + l",
+        ">givers",
+        "warnings",
+    ]);
+    for row in rows {
+        let state = match (&row.error, row.created) {
+            (Some(_), _) => "rejected",
+            (None, true) => "new",
+            (None, false) => "",
+        };
+        let stalled = row.stalled.then(|| STALLED.to_owned());
+        let notes = row.error.iter().chain(&stalled).chain(&row.warnings);
+        all.add_row([
+            row.name.clone(),
+            state.to_owned(),
+            row.mass_kg
+                .map_or_else(String::new, |mass| format!("{:.0} g", 1000.0 * mass)),
+            row.density.as_ref().map_or_else(String::new, density),
+            row.triangles.map_or_else(String::new, |count| count.to_string()),
+            row.grips.map_or_else(String::new, |[right, left]| {
+                format!("{} + {}", right.entries, left.entries)
+            }),
+            givers(row.givers),
+            notes.cloned().collect::<Vec<_>>().join("; "),
+        ]);
+    }
+    all.to_string()
+}
+
+fn density(density: &Density) -> String {
+    let material = density.material.unwrap_or("by default");
+    format!("{:.0} kg/m³, {material}", density.kg_per_m3)
+}
+
+/// The share of test givers from whom the object was taken.
+fn givers(Givers { tried, answered }: Givers) -> String {
+    if tried == 0 {
+        return String::new();
+    }
+    let percent = 100.0 * f64::from(answered) / f64::from(tried);
+    format!("{percent:.0} % of {tried}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_say_mass_density_grips_and_why_not() {
+        let mut row = Row::new("mug", Path::new("a/Mug.obj"));
+        row.created = true;
+        row.mass_kg = Some(0.35);
+        row.density = Some(Density {
+            material: None,
+            kg_per_m3: 400.0,
+        });
+        row.triangles = Some(1984);
+        let grips = |entries| Grips {
+            entries,
+            complete: true,
+        };
+        row.grips = Some([grips(2048), grips(1990)]);
+        row.givers = Givers {
+            tried: 12,
+            answered: 11,
+        };
+        let mut wrong = Row::new("bolt", Path::new("bolt.stl"));
+        wrong.error = Some("mesh: has no triangles".to_owned());
+        let text = text(&[row, wrong]);
+        for part in [
+            "350 g",
+            "400 kg/m³, by default",
+            "2048 + 1990",
+            "92 % of 12",
+            "rejected",
+            "has no triangles",
+        ] {
+            assert!(text.contains(part), "{part} in\n{text}");
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Objects and rigs saved in a bucket outlast the server.
+//!
+//! tests/s3/run starts an S3 server and sets the variables: `GRASP_TEST_STORE` is an empty `s3://BUCKET/PREFIX`, and `AWS_*` say where
+//! it is.
+
+use std::net::{Ipv6Addr, SocketAddr};
+
+use grasp_proto::v1::{
+    self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
+    object_service_client::ObjectServiceClient,
+};
+use grasp_server::{Config, ServeError, Server, config::RawConfig};
+use tokio::{net::TcpListener, task::JoinHandle};
+use tokio_util::sync::CancellationToken;
+use tonic::{
+    Code,
+    transport::{Channel, Endpoint},
+};
+
+const BOX_OBJ: &str = "v -.02 -.015 -.01\nv .02 -.015 -.01\nv .02 .015 -.01\nv -.02 .015 -.01\n\
+                       v -.02 -.015 .01\nv .02 -.015 .01\nv .02 .015 .01\nv -.02 .015 .01\n\
+                       f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+/// The configuration of a server that saves in the bucket.
+fn config() -> Config {
+    let store = std::env::var("GRASP_TEST_STORE").expect("tests/s3/run sets GRASP_TEST_STORE");
+    let raw = RawConfig {
+        store: Some(store),
+        builder_threads: Some(0),
+        ..RawConfig::default()
+    };
+    raw.validate().expect("the place is valid")
+}
+
+struct Running {
+    address: SocketAddr,
+    stop: CancellationToken,
+    serving: JoinHandle<Result<(), ServeError>>,
+}
+
+impl Running {
+    async fn start() -> Self {
+        let listener = TcpListener::bind((Ipv6Addr::LOCALHOST, 0)).await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let server = Server::new(config()).unwrap();
+        let stop = CancellationToken::new();
+        let serving = tokio::spawn(server.serve(listener, stop.clone().cancelled_owned()));
+        Self {
+            address,
+            stop,
+            serving,
+        }
+    }
+
+    async fn channel(&self) -> Channel {
+        let endpoint = Endpoint::from_shared(format!("http://{}", self.address)).unwrap();
+        endpoint.connect().await.unwrap()
+    }
+
+    async fn stop(self) {
+        self.stop.cancel();
+        self.serving.await.unwrap().unwrap();
+    }
+}
+
+async fn objects(channel: &Channel) -> Vec<v1::Object> {
+    let request = v1::ListObjectsRequest::default();
+    let page = ObjectServiceClient::new(channel.clone())
+        .list_objects(request)
+        .await;
+    let mut objects = page.unwrap().into_inner().objects;
+    objects.retain(|object| !object.built_in);
+    objects
+}
+
+async fn rigs(channel: &Channel) -> Vec<v1::Rig> {
+    let request = v1::ListRigsRequest::default();
+    let page = HandRigServiceClient::new(channel.clone())
+        .list_rigs(request)
+        .await;
+    let mut rigs = page.unwrap().into_inner().rigs;
+    rigs.retain(|rig| !rig.built_in);
+    rigs
+}
+
+/// A rig of the shape that a built-in one describes.
+async fn create_rig(channel: &Channel) {
+    let mut client = HandRigServiceClient::new(channel.clone());
+    let name = "rigs/adult".to_owned();
+    let adult = client
+        .get_rig(v1::GetRigRequest { name })
+        .await
+        .unwrap()
+        .into_inner();
+    let hands = adult.rig.unwrap().hands;
+    let hands = hands.into_iter().map(|hand| v1::HandJoints {
+        handedness: hand.handedness,
+        joint_set: v1::JointSet::Openxr26.into(),
+        joints: hand.stretched_joints,
+    });
+    let request = v1::CreateRigRequest {
+        rig_id: "mine".to_owned(),
+        source: Some(v1::create_rig_request::Source::Joints(v1::JointsAtRest {
+            hands: hands.collect(),
+        })),
+        ..Default::default()
+    };
+    client.create_rig(request).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_and_rigs_in_a_bucket_outlast_the_server() {
+    let server = Running::start().await;
+    let channel = server.channel().await;
+    let mut client = ObjectServiceClient::new(channel.clone());
+    for id in ["crate", "gone"] {
+        let request = v1::CreateObjectRequest {
+            object_id: id.to_owned(),
+            mesh: BOX_OBJ.into(),
+            mass_kg: 0.2,
+            labels: [("level".to_owned(), "hall".to_owned())].into(),
+            ..Default::default()
+        };
+        client.create_object(request).await.unwrap();
+    }
+    let update = v1::UpdateObjectRequest {
+        name: "objects/crate".to_owned(),
+        mass_kg: Some(0.3),
+        ..Default::default()
+    };
+    client.update_object(update).await.unwrap();
+    let delete = v1::DeleteObjectRequest {
+        name: "objects/gone".to_owned(),
+        ..Default::default()
+    };
+    client.delete_object(delete).await.unwrap();
+    create_rig(&channel).await;
+    let before = (objects(&channel).await, rigs(&channel).await);
+    assert_eq!((before.0.len(), before.1.len()), (1, 1));
+    server.stop().await;
+
+    let server = Running::start().await;
+    let channel = server.channel().await;
+    assert_eq!((objects(&channel).await, rigs(&channel).await), before);
+    // The mesh, which two objects shared, is still there.
+    let request = v1::FindGraspRequest {
+        object: "objects/crate".to_owned(),
+        ..Default::default()
+    };
+    let answer = GraspServiceClient::new(channel.clone()).find_grasp(request).await;
+    assert!(answer.unwrap().into_inner().grasp.is_some());
+    let again = v1::CreateObjectRequest {
+        object_id: "crate".to_owned(),
+        mesh: BOX_OBJ.into(),
+        mass_kg: 0.2,
+        ..Default::default()
+    };
+    let mut client = ObjectServiceClient::new(channel.clone());
+    let status = client.create_object(again).await.unwrap_err();
+    assert_eq!(status.code(), Code::AlreadyExists);
+    server.stop().await;
+}
