@@ -22,7 +22,7 @@ const USEFUL: u32 = 100;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// How long none of the atlases may grow before they are given up: the server then has no memory for them.
-const STALLED: Duration = Duration::from_secs(120);
+const STALLED: Duration = Duration::from_mins(2);
 
 /// Objects whose atlases grow.
 #[derive(Debug)]
