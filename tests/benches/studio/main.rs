@@ -22,6 +22,10 @@ use objects::Studio;
 /// Share of the calls that are to be answered from atlases.
 const ANSWERED_FROM_ATLASES: f64 = 0.9;
 
+/// Givers per shape. Placing one takes a fifth of a second.
+const GIVERS: u64 = 12;
+const QUICK_GIVERS: u64 = 1;
+
 /// Lines of the table.
 const INTERVALS: u32 = 20;
 
@@ -93,7 +97,8 @@ fn main() {
 }
 
 async fn measure(arguments: &Arguments) -> Report {
-    let studio = Studio::new(arguments.objects as usize, arguments.exponent);
+    let givers = if arguments.test { QUICK_GIVERS } else { GIVERS };
+    let studio = Studio::new(arguments.objects as usize, arguments.exponent, givers);
     let folder = Folder::new();
     let server = TestServer::start_with(|config| {
         config.builder_threads = 1;

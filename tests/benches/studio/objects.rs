@@ -13,9 +13,6 @@ use grasp_tests::{
 use rand::{RngExt as _, SeedableRng as _, seq::SliceRandom as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Givers per shape. Placing one takes a fifth of a second.
-const GIVERS: u64 = 12;
-
 /// Smallest and largest factor by which an object is stretched along an axis. Givers are placed on the unstretched shape, and
 /// with more their hands would sink in or come off.
 const STRETCH: [f32; 2] = [0.94, 1.06];
@@ -46,8 +43,8 @@ struct Object {
 }
 
 impl Studio {
-    /// So many objects, asked for in proportion to 1/n to the power `exponent`.
-    pub(crate) fn new(count: usize, exponent: f64) -> Self {
+    /// So many objects, asked for in proportion to 1/n to the power `exponent`, with so many givers per shape.
+    pub(crate) fn new(count: usize, exponent: f64, givers: u64) -> Self {
         let hands = giving_hands();
         let bar = bar(objects().len(), "placing givers".to_owned());
         let shapes = objects().iter().map(|built_in| {
@@ -59,7 +56,7 @@ impl Studio {
                 triangles: mesh.triangles().to_vec(),
                 mass: object.mass,
                 friction: object.friction,
-                givers: (0..GIVERS).map(|seed| place(object, &hands, seed)).collect(),
+                givers: (0..givers).map(|seed| place(object, &hands, seed)).collect(),
             }
         });
         let shapes: Vec<Shape> = shapes.collect();
