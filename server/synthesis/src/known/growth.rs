@@ -51,11 +51,11 @@ pub const ENTRIES: usize = 8192;
 
 /// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work. Four times as many
 /// raise the scores of the chosen grips by a twentieth, and answer a giver in twenty more of very thin objects.
-const ENOUGH_GRIPS: usize = 1024;
-const ENOUGH_PROPOSALS: u64 = 16_384;
+const ENOUGH_GRIPS: usize = 1536;
+const ENOUGH_PROPOSALS: u64 = 24_576;
 
 /// Grips that are kept of a growth that is enough.
-pub const CHOSEN: usize = 256;
+pub const CHOSEN: usize = 340;
 
 /// Proposals per round.
 pub const ROUND: u64 = 64;
