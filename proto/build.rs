@@ -11,6 +11,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "grasp/v1/obstacle.proto",
         "grasp/v1/receiver.proto",
         "grasp/v1/constraints.proto",
+        "grasp/v1/region.proto",
+        "grasp/v1/known_grip.proto",
         "grasp/v1/object_service.proto",
         "grasp/v1/grasp_type.proto",
         "grasp/v1/grasp_service.proto",

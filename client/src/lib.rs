@@ -41,6 +41,7 @@ mod grasp_type;
 mod hand;
 mod json;
 mod key_frame;
+mod known_grip;
 mod object;
 mod object_streams;
 mod objects;
@@ -48,6 +49,7 @@ mod obstacle;
 mod pose;
 mod query;
 mod receiver;
+mod region;
 mod retry;
 mod rig;
 mod rigs;
@@ -65,6 +67,7 @@ pub use hand::{
 };
 pub use json::rfc3339;
 pub use key_frame::{KeyFrame, KeyFrameKind};
+pub use known_grip::{KnownGrip, KnownGripUse};
 pub use object::{
     AtlasGrowth, AtlasState, ForbiddenSurfaces, Health, NewObject, Object, ObjectChange, ObjectMesh,
     ObjectNews, ObjectPage, ObjectQuery, ObjectUpdate, Reset, UpAxis,
@@ -74,6 +77,7 @@ pub use obstacle::{Capsule, Obstacle, SolidBox};
 pub use pose::Pose;
 pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};
 pub use receiver::{Arm, Receiver, ReceiverBody, ReceiverStance, StandingBody};
+pub use region::{Region, RegionKind, RegionShape};
 pub use retry::RetryPolicy;
 pub use rig::{AngleRange, DigitLimits, NewRig, NodePose, PosedModel, Rig, RigHand, RigNode, RigSource};
 pub use score::{Score, ScoreTerm};

@@ -8,7 +8,7 @@ use std::{
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::{json, pose::Pose};
+use crate::{json, known_grip::KnownGrip, pose::Pose, region::Region};
 
 /// An object on the server.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,6 +46,12 @@ pub struct Object {
     /// Where the origin of the object's frame is in the mesh file, in the file's units and axes; none: at the file's origin.
     #[serde(default)]
     pub origin_in_file: Option<DVec3>,
+    /// Its regions, as clients gave them; none in lists, news and meshes.
+    #[serde(default)]
+    pub regions: Vec<Region>,
+    /// Its known grips, as clients gave them; none in lists, news and meshes.
+    #[serde(default)]
+    pub known_grips: Vec<KnownGrip>,
     /// Labels that clients gave it.
     #[serde(default)]
     pub labels: BTreeMap<String, String>,
@@ -138,6 +144,10 @@ pub struct NewObject {
     pub friction: Option<f32>,
     /// Surfaces that must not be touched.
     pub forbidden: ForbiddenSurfaces,
+    /// Parts of the surface that hands should take, leave, or not touch; at most 32.
+    pub regions: Vec<Region>,
+    /// Grips to try first, or not to answer; at most 32.
+    pub known_grips: Vec<KnownGrip>,
     /// Labels: at most 16, with keys of 1 to 63 of a-z, 0-9, -, _, . and /, and values of at most 63 bytes.
     pub labels: BTreeMap<String, String>,
     /// A UUID that lets the server recognise the request when it comes again; none: the client draws one for each call, so
@@ -157,6 +167,8 @@ impl NewObject {
             centre_of_mass: None,
             friction: None,
             forbidden: ForbiddenSurfaces::default(),
+            regions: Vec::new(),
+            known_grips: Vec::new(),
             labels: BTreeMap::new(),
             request_id: None,
         }
@@ -176,6 +188,10 @@ pub struct ObjectUpdate {
     pub friction: Option<Reset<f32>>,
     /// Surfaces that must not be touched, instead of all former ones.
     pub forbidden: Option<ForbiddenSurfaces>,
+    /// Regions, instead of all former ones.
+    pub regions: Option<Vec<Region>>,
+    /// Known grips, instead of all former ones.
+    pub known_grips: Option<Vec<KnownGrip>>,
     /// Labels, instead of all former ones.
     pub labels: Option<BTreeMap<String, String>>,
 }

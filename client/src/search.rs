@@ -364,6 +364,8 @@ pub enum GraspSource {
     Atlas,
     /// An earlier request: the grasp or the finger subset that it found is valid for this holdout, too.
     Recent,
+    /// A preferred grip of the object.
+    Preferred,
 }
 
 /// What can keep one hand from holding an object, whatever its pose.
@@ -450,6 +452,9 @@ pub struct SearchReport {
     /// If the search chose between both hands: the stamp of the other hand's atlas; none if none was used.
     #[serde(default)]
     pub other_atlas_stamp: Option<String>,
+    /// Name of the object's preferred grip that the grasp is; none if it is none.
+    #[serde(default)]
+    pub preferred_grip: Option<String>,
     /// What the server repaired in the request, such as radii of the giver's joints that were 0.
     #[serde(default)]
     pub warnings: Vec<String>,

@@ -61,7 +61,7 @@ pub(super) fn phalanx_from_wire(field: &str, value: i32) -> Result<Option<Phalan
     }
 }
 
-fn digit_angles_to_wire(angles: &DigitAngles) -> v1::DigitAngles {
+pub(super) fn digit_angles_to_wire(angles: &DigitAngles) -> v1::DigitAngles {
     v1::DigitAngles {
         base_yaw: angles.base_yaw,
         base_pitch: angles.base_pitch,

@@ -6,9 +6,11 @@
 mod constraint_codec;
 mod geometry_codec;
 mod hand_codec;
+mod known_grip_codec;
 mod object_codec;
 mod obstacle_codec;
 mod receiver_codec;
+mod region_codec;
 mod rig_codec;
 mod search_codec;
 

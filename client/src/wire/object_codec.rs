@@ -10,6 +10,8 @@ use uuid::Uuid;
 use super::{
     Malformed, each,
     geometry_codec::{duration_from_wire, pose_from_wire, vector_from_wire, vector_to_wire},
+    known_grip_codec::{known_grip_from_wire, known_grip_to_wire},
+    region_codec::{region_from_wire, region_to_wire},
     required,
 };
 use crate::object::{
@@ -42,6 +44,8 @@ pub(crate) fn described_object_to_wire(object: &NewObject) -> v1::CreateObjectRe
         centre_of_mass: object.centre_of_mass.map(vector_to_wire),
         friction: object.friction,
         forbidden: Some(forbidden_to_wire(&object.forbidden)),
+        regions: object.regions.iter().map(region_to_wire).collect(),
+        known_grips: object.known_grips.iter().map(known_grip_to_wire).collect(),
         labels: object.labels.clone(),
         request_id: request_id.unwrap_or_else(|| Uuid::new_v4().to_string()),
     }
@@ -62,6 +66,8 @@ pub(crate) fn update_to_wire(name: String, update: &ObjectUpdate) -> v1::UpdateO
         centre_of_mass,
         friction,
         forbidden,
+        regions,
+        known_grips,
         labels,
     } = update;
     let listed = [
@@ -70,6 +76,8 @@ pub(crate) fn update_to_wire(name: String, update: &ObjectUpdate) -> v1::UpdateO
         ("friction", friction.is_some()),
         ("forbidden", forbidden.is_some()),
         ("labels", labels.is_some()),
+        ("regions", regions.is_some()),
+        ("known_grips", known_grips.is_some()),
     ];
     let paths = listed.iter().filter(|(_, is_listed)| *is_listed);
     v1::UpdateObjectRequest {
@@ -83,6 +91,8 @@ pub(crate) fn update_to_wire(name: String, update: &ObjectUpdate) -> v1::UpdateO
         friction: given(*friction),
         forbidden: forbidden.as_ref().map(forbidden_to_wire),
         labels: labels.clone().unwrap_or_default(),
+        regions: regions.iter().flatten().map(region_to_wire).collect(),
+        known_grips: known_grips.iter().flatten().map(known_grip_to_wire).collect(),
     }
 }
 
@@ -123,6 +133,8 @@ fn object_fields_from_wire(object: v1::Object) -> Result<Object, Malformed> {
         origin_in_file: object
             .origin_in_file
             .map(|origin| DVec3::new(origin.x, origin.y, origin.z)),
+        regions: each("regions", object.regions, region_from_wire)?,
+        known_grips: each("known_grips", object.known_grips, known_grip_from_wire)?,
         labels: object.labels,
         etag: object.etag,
         create_time: time_from_wire("create_time", object.create_time)?,
@@ -301,12 +313,13 @@ mod tests {
                 mass_kg: Some(0.3),
                 friction: Some(Reset::Default),
                 centre_of_mass: Some(Reset::To(Vec3::X)),
+                regions: Some(Vec::new()),
                 ..ObjectUpdate::default()
             },
         );
         assert_eq!(
             wire.update_mask.unwrap().paths,
-            ["mass_kg", "centre_of_mass", "friction"]
+            ["mass_kg", "centre_of_mass", "friction", "regions"]
         );
         assert_eq!((wire.mass_kg, wire.friction), (Some(0.3), None));
         assert_eq!(wire.centre_of_mass.unwrap().x, 1.0);

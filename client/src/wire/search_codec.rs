@@ -152,6 +152,7 @@ fn source_from_wire(value: i32) -> Option<GraspSource> {
         v1::GraspSource::Search => Some(GraspSource::Search),
         v1::GraspSource::Atlas => Some(GraspSource::Atlas),
         v1::GraspSource::Recent => Some(GraspSource::Recent),
+        v1::GraspSource::Preferred => Some(GraspSource::Preferred),
     }
 }
 
@@ -351,6 +352,7 @@ fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed>
         atlas_entries: report.atlas_entries,
         atlas_stamp: Some(report.atlas_stamp).filter(|stamp| !stamp.is_empty()),
         other_atlas_stamp: Some(report.other_atlas_stamp).filter(|stamp| !stamp.is_empty()),
+        preferred_grip: Some(report.preferred_grip).filter(|name| !name.is_empty()),
         limits: report.limits.into_iter().map(limit_from_wire).collect(),
         warnings: report.warnings,
     })

@@ -144,6 +144,7 @@ fn wire_report() -> v1::SearchReport {
         atlas_entries: 25,
         atlas_stamp: "26".to_owned(),
         other_atlas_stamp: "33".to_owned(),
+        preferred_grip: "by the rim".to_owned(),
         limits: vec![
             v1::Limit {
                 kind: v1::LimitKind::Torque.into(),
@@ -239,6 +240,7 @@ fn converts_every_number_of_an_answer() {
     assert_eq!(report.source, Some(GraspSource::Atlas));
     assert_eq!(report.atlas_stamp.as_deref(), Some("26"));
     assert_eq!(report.other_atlas_stamp.as_deref(), Some("33"));
+    assert_eq!(report.preferred_grip.as_deref(), Some("by the rim"));
     let limits = [
         (LimitKind::Torque, 28.0, Some(29.0), "30"),
         (LimitKind::Unrecognised, 31.0, None, "32"),

@@ -19,7 +19,7 @@ use grasp_synthesis::{
             rig::Rig,
         },
         receiver::ArmPose,
-        score::{Score, Term},
+        score::Score,
     },
     search::{
         GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport,
@@ -47,6 +47,8 @@ pub(crate) struct Circumstances<'a> {
     pub search_time: Duration,
     /// Effective budget.
     pub budget: Duration,
+    /// Name of the preferred grip that was found.
+    pub preferred_grip: Option<&'a str>,
     /// What was repaired in the request.
     pub warnings: &'a [String],
     /// The atlas of the hand that the search might have chosen instead.
@@ -242,13 +244,12 @@ fn wire_arm(arm: &ArmPose, frame: ClientFrame) -> v1::Arm {
 fn wire_score(score: &Score) -> v1::Score {
     v1::Score {
         total: score.total(),
-        terms: Term::ALL
-            .into_iter()
-            .zip(score.values)
-            .map(|(term, value)| v1::ScoreTerm {
-                name: term.name().to_owned(),
-                value,
-                weight: term.weight(),
+        terms: score
+            .terms()
+            .map(|term| v1::ScoreTerm {
+                name: term.name.to_owned(),
+                value: term.value,
+                weight: term.weight,
             })
             .collect(),
     }
@@ -335,6 +336,7 @@ fn report(
             Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
             Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
             Some(GraspSource::Recent) => v1::GraspSource::Recent,
+            Some(GraspSource::Preferred(_)) => v1::GraspSource::Preferred,
             None => v1::GraspSource::Unspecified,
         }
         .into(),
@@ -347,6 +349,7 @@ fn report(
             .unwrap_or_default(),
         warnings: circumstances.warnings.to_vec(),
         limits: report.limits.iter().map(wire_limit).collect(),
+        preferred_grip: circumstances.preferred_grip.unwrap_or_default().to_owned(),
         other_atlas_stamp: circumstances
             .other_atlas
             .map(|atlas| atlas_stamp(atlas))

@@ -5,7 +5,13 @@ use std::sync::Arc;
 use grasp_import::{MeshLimits, read_mesh_until};
 use grasp_synthesis::{base::stop::Stop, model::object::GraspObject};
 
-use super::{StoredObject, centre_of_mass::centre_or_computed, extent::check_extent, mesh_file::MeshFile};
+use super::{
+    StoredObject,
+    centre_of_mass::centre_or_computed,
+    extent::check_extent,
+    given::{Given, OnMesh},
+    mesh_file::MeshFile,
+};
 use crate::{
     error::ServiceError,
     validate::{Field, ObjectFields, Violations},
@@ -43,11 +49,12 @@ pub(crate) fn build_object(
     }
     // Clients count the triangles of their file, some of which may have been dropped.
     let file = MeshFile::of(&read);
-    let forbidden = file.forbidden(
-        &fields.forbidden.groups,
-        &fields.forbidden.triangles,
-        &mut violations,
-    );
+    let given = Given {
+        forbidden: Arc::new(fields.forbidden.clone()),
+        regions: fields.regions.as_slice().into(),
+        grips: fields.known_grips.as_slice().into(),
+    };
+    let OnMesh { forbidden, regions } = given.on_mesh(&read.mesh, &file, &mut violations, stop)?;
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
@@ -61,13 +68,17 @@ pub(crate) fn build_object(
         stop,
     )?;
     match object {
-        Ok(object) => Ok(StoredObject::from_file_until(
-            fields.id.clone(),
-            Arc::new(object),
-            warnings,
-            Arc::new(file),
-            stop,
-        )?),
+        Ok(object) => {
+            let object = object.with_regions(regions).with_banned(given.banned());
+            let stored = StoredObject::from_file_until(
+                fields.id.clone(),
+                Arc::new(object),
+                warnings,
+                Arc::new(file),
+                stop,
+            )?;
+            Ok(StoredObject { given, ..stored })
+        }
         Err(errors) => {
             for error in errors {
                 violations.add(mesh_field, error.to_string());

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_proto::v1;
-use grasp_synthesis::model::object::ObjectError;
+use grasp_synthesis::{base::stop::unstopped, model::object::ObjectError};
 
-use super::{StoredObject, centre_of_mass::centre_or_computed};
+use super::{StoredObject, centre_of_mass::centre_or_computed, given::OnMesh};
 use crate::{
     answer::vector,
     error::ServiceError,
@@ -36,12 +36,18 @@ pub(crate) fn changed(
         Setting::Default => centre_or_computed(mesh, None, &mut warnings),
         Setting::To(centre) => centre_or_computed(mesh, Some(centre), &mut warnings),
     };
-    let forbidden = match &change.forbidden {
-        None => stored.forbidden_triangles(),
-        Some(forbidden) => stored
-            .file
-            .forbidden(&forbidden.groups, &forbidden.triangles, &mut violations),
-    };
+    let mut given = stored.given.clone();
+    if let Some(forbidden) = &change.forbidden {
+        given.forbidden = Arc::new(forbidden.clone());
+    }
+    if let Some(regions) = &change.regions {
+        given.regions = regions.as_slice().into();
+    }
+    if let Some(grips) = &change.known_grips {
+        given.grips = grips.as_slice().into();
+    }
+    let OnMesh { forbidden, regions } =
+        unstopped(|stop| given.on_mesh(mesh, &stored.file, &mut violations, stop));
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
@@ -49,17 +55,24 @@ pub(crate) fn changed(
         && friction == object.friction
         && centre == object.centre_of_mass
         && warnings == stored.warnings
-        && forbidden == stored.forbidden_triangles();
+        && given.regions == stored.given.regions
+        && given.grips == stored.given.grips
+        && forbidden.len() == object.forbidden_count()
+        && forbidden.iter().all(|&triangle| object.is_forbidden(triangle));
     if is_same {
         return Ok(None);
     }
     match object.with_properties(mass, centre, friction, &forbidden) {
-        Ok(changed) => Ok(Some(StoredObject::from_file(
-            stored.id.clone(),
-            Arc::new(changed),
-            warnings,
-            Arc::clone(&stored.file),
-        ))),
+        Ok(changed) => {
+            let changed = changed.with_regions(regions).with_banned(given.banned());
+            let changed = StoredObject::from_file(
+                stored.id.clone(),
+                Arc::new(changed),
+                warnings,
+                Arc::clone(&stored.file),
+            );
+            Ok(Some(StoredObject { given, ..changed }))
+        }
         Err(errors) => {
             for error in errors {
                 violations.add(field_of(&error), error);
@@ -80,6 +93,12 @@ pub(crate) fn change_request(request: &mut v1::CreateObjectRequest, change: &Obj
     request.centre_of_mass = centre_of_mass.map(vector);
     if let Some(Forbidden { groups, triangles }) = change.forbidden.clone() {
         request.forbidden = Some(v1::ForbiddenSurfaces { groups, triangles });
+    }
+    if let Some(regions) = &change.regions {
+        request.regions = regions.iter().map(|region| region.given.clone()).collect();
+    }
+    if let Some(grips) = &change.known_grips {
+        request.known_grips = grips.iter().map(|grip| grip.given.clone()).collect();
     }
 }
 
@@ -144,7 +163,7 @@ mod tests {
         assert_eq!((after.object.mass, after.object.friction), (0.4, Some(0.8)));
         assert_eq!(after.object.centre_of_mass, Vec3::splat(0.02));
         // Every triangle but the dropped one, which is none of the mesh.
-        assert_eq!(after.forbidden_triangles(), [0, 1, 2, 3]);
+        assert_eq!(after.object.forbidden_count(), 4);
         assert_ne!(after.content_hash, before.content_hash);
         // As if it had been created like this.
         let fields = ObjectFields {

@@ -74,16 +74,16 @@ impl MeshFile {
         self.indices.as_deref().map_or(0, size_of_val) + of_groups
     }
 
-    /// The triangles of the mesh that a client forbids, ascending. Adds a violation for each name and index that is not in
-    /// the file.
-    pub(super) fn forbidden(
+    /// The triangles of the mesh that a client names, ascending. Adds a violation for each name and index that is not in the
+    /// file to the fields `groups` and `triangles` of `field`.
+    pub(super) fn named(
         &self,
+        field: Field<'_>,
         groups: &[String],
         triangles: &[u32],
         violations: &mut Violations,
     ) -> Vec<u32> {
-        let field = Field::root("forbidden");
-        let mut forbidden = Vec::new();
+        let mut named = Vec::new();
         for (place, name) in groups.iter().enumerate() {
             let known = self
                 .groups
@@ -91,7 +91,7 @@ impl MeshFile {
             match known {
                 Ok(group) => {
                     let runs = self.groups[group].triangles.iter();
-                    forbidden.extend(runs.flat_map(|run| run.first..run.first + run.count));
+                    named.extend(runs.flat_map(|run| run.first..run.first + run.count));
                 }
                 Err(_) => violations.add(
                     field.child("groups").at(place),
@@ -107,12 +107,12 @@ impl MeshFile {
                     format_args!("is {triangle}; the mesh has {all} triangles, counted from 0"),
                 );
             } else if let Some(index) = self.index_in_mesh(triangle) {
-                forbidden.push(index);
+                named.push(index);
             }
         }
-        forbidden.sort_unstable();
-        forbidden.dedup();
-        forbidden
+        named.sort_unstable();
+        named.dedup();
+        named
     }
 
     /// The index in the mesh of a triangle of the file; none if it was dropped.
@@ -190,7 +190,7 @@ mod tests {
             let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
             let file = MeshFile::of(&imported(kept.clone(), 40, groups.clone()));
             let mut violations = Violations::default();
-            let forbidden = file.forbidden(&names, &asked, &mut violations);
+            let forbidden = file.named(Field::root("forbidden"), &names, &asked, &mut violations);
             prop_assert!(violations.is_empty());
             for (index, in_file) in kept.iter().enumerate() {
                 let index = index as u32;
@@ -205,10 +205,16 @@ mod tests {
     fn unknown_names_and_indices_are_violations() {
         let file = MeshFile::of(&imported(vec![0], 2, vec![("lid".to_owned(), vec![0])]));
         let mut violations = Violations::default();
-        let forbidden = file.forbidden(&["rim".to_owned(), "lid".to_owned()], &[1, 2], &mut violations);
+        let field = Field::root("forbidden");
+        let forbidden = file.named(
+            field,
+            &["rim".to_owned(), "lid".to_owned()],
+            &[1, 2],
+            &mut violations,
+        );
         assert_eq!(forbidden, [0]);
         assert_eq!(violations.len(), 2);
-        assert!(MeshFile::plain(3).forbidden(&[], &[2], &mut violations) == [2]);
+        assert!(MeshFile::plain(3).named(field, &[], &[2], &mut violations) == [2]);
     }
 
     #[test]

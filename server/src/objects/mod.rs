@@ -7,6 +7,7 @@ pub(crate) mod change;
 pub(crate) mod changes;
 pub(crate) mod directory;
 mod extent;
+pub(crate) mod given;
 pub(crate) mod glb;
 mod mesh_file;
 pub(crate) mod resized;
@@ -35,8 +36,8 @@ use grasp_synthesis::{
 };
 use sha2::{Digest as _, Sha256};
 
-use self::mesh_file::MeshFile;
 pub(crate) use self::revision::{Body, Listed, Record, Resting, Revision};
+use self::{given::Given, mesh_file::MeshFile};
 use crate::{
     answer::{vector, wire_pose},
     atlas_slots::AtlasSlots,
@@ -64,6 +65,8 @@ pub(crate) struct StoredObject {
     pub warnings: Vec<String>,
     /// What is kept of its file.
     pub file: Arc<MeshFile>,
+    /// What its client knows of it.
+    pub given: Given,
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
     /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
@@ -108,6 +111,7 @@ impl StoredObject {
             object: Arc::new(PreparedObject::new_until(object, stop)?),
             warnings,
             file,
+            given: Given::default(),
             atlas_slots: AtlasSlots::default(),
             transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
         })
@@ -156,13 +160,6 @@ impl StoredObject {
         Some((held, grips))
     }
 
-    /// The triangles that must not be touched, ascending.
-    pub(crate) fn forbidden_triangles(&self) -> Vec<u32> {
-        let all = 0..count(self.object.surface.mesh().triangles().len());
-        all.filter(|&triangle| self.object.is_forbidden(triangle))
-            .collect()
-    }
-
     /// "objects/{object}".
     pub(crate) fn name(&self) -> String {
         name_of(&self.id)
@@ -194,9 +191,11 @@ impl StoredObject {
             + self.transferred_grips.len() * TransferredGrips::MAX_BYTES
             + self.warnings.iter().map(String::len).sum::<usize>()
             + self.file.bytes()
+            + self.object.regions().bytes()
+            + self.given.bytes()
     }
 
-    /// The message that describes the object but for its labels, etag, times and atlas.
+    /// The message that describes the object but for its labels, etag, times, atlas, regions and known grips.
     fn description(&self) -> v1::Object {
         let mesh = self.object.surface.mesh();
         let bounding_box = &self.object.bounding_box;

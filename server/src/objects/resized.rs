@@ -100,11 +100,14 @@ fn resized(stored: &StoredObject, size: ObjectSize, stop: Stop<'_>) -> Result<St
         }
     };
     check_resized(object.surface.mesh()).map_err(|wrong| ServiceError::invalid("object_scale", wrong))?;
-    Ok(StoredObject::from_file_until(
-        stored.id.clone(),
-        Arc::new(object),
-        Vec::new(),
-        Arc::clone(&stored.file),
-        stop,
-    )?)
+    Ok(StoredObject {
+        given: stored.given.at_scale(size.scale(), stored.object.object()),
+        ..StoredObject::from_file_until(
+            stored.id.clone(),
+            Arc::new(object),
+            Vec::new(),
+            Arc::clone(&stored.file),
+            stop,
+        )?
+    })
 }

@@ -164,7 +164,7 @@ impl EitherHand<'_> {
         let mut is_found = false;
         for (slices, settings) in self.hands.iter_mut().zip(self.settings) {
             let known = &slices.next.known;
-            if known.tried > 0 || (known.atlas.is_none() && known.recent.is_empty()) {
+            if known.tried > 0 || known.is_empty() {
                 continue;
             }
             let until = site.clock.now().saturating_add(KNOWN_GRIPS_TIME);

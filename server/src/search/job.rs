@@ -90,6 +90,8 @@ struct HandSearch {
     /// The holdout, with the arm of this hand.
     holdout: Holdout,
     settings: SearchSettings,
+    /// Names of the preferred grips in the settings.
+    preferred: Vec<String>,
 }
 
 /// A job whose holdouts and settings are ready to be searched.
@@ -159,10 +161,18 @@ impl FindJob {
             (hand, holdout)
         });
         let hands = [(first, of_first)].into_iter().chain(alternative);
-        let hands = hands.zip(&self.known).map(|((hand, holdout), known)| HandSearch {
-            settings: self.settings(&hand.hand, known),
-            hand,
-            holdout,
+        let hands = hands.zip(&self.known).map(|((hand, holdout), known)| {
+            let mut settings = self.settings(&hand.hand, known);
+            let (preferred, poses): (Vec<_>, Vec<_>) = self.stored.given.preferred(&hand).into_iter().unzip();
+            if !self.query.is_replay {
+                settings.known.preferred = poses.into();
+            }
+            HandSearch {
+                hand,
+                holdout,
+                settings,
+                preferred,
+            }
         });
         Ok(PreparedJob {
             hands: hands.collect(),
@@ -214,6 +224,7 @@ impl FindJob {
                 } else {
                     RecentGrips::default()
                 },
+                preferred: Arc::default(),
                 tried: 0,
             },
             run: Run {
@@ -242,7 +253,10 @@ impl PreparedJob {
             let HandSearch { settings, .. } = &self.hands[place];
             match find_known_grasp(self.task(place), settings, &self.clock, within) {
                 LookUp::Found(outcome) => {
-                    let rank = |outcome: &SearchOutcome| (outcome.replaceable_until.is_none(), outcome.value);
+                    let rank = |outcome: &SearchOutcome| {
+                        let is_preferred = outcome.report.source.map(GraspSource::is_preferred);
+                        (is_preferred, outcome.replaceable_until.is_none(), outcome.value)
+                    };
                     let is_better = |best: &Ended| rank(&outcome) > rank(&best.outcome);
                     if best.as_ref().is_none_or(is_better) {
                         best = Some(Ended {
@@ -305,6 +319,7 @@ impl PreparedJob {
             hand,
             holdout,
             settings,
+            preferred,
         } = &self.hands[place];
         let ended = Instant::now();
         let search_time = ended - self.start;
@@ -331,6 +346,10 @@ impl PreparedJob {
             search_time,
             budget: self.budget,
             warnings: &warnings,
+            preferred_grip: match outcome.report.source {
+                Some(GraspSource::Preferred(index)) => Some(&preferred[usize::from(index)]),
+                _ => None,
+            },
             other_atlas: other.and_then(|other| other.settings.known.seeds.atlas()),
         };
         Ok(Answered {
@@ -368,6 +387,7 @@ impl PreparedJob {
             hand,
             holdout,
             settings,
+            ..
         } = &self.hands[place];
         let own_friction = holdout.object.friction_under(Validity::Physical);
         let is_new = self.learns && matches!(outcome.report.source, Some(GraspSource::Attempt(_)));

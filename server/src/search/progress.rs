@@ -81,12 +81,14 @@ impl Sum {
         }
     }
 
-    /// True if a slice's grasp is preferred to the best so far: one that a person would choose to others; then the one with
+    /// True if a slice's grasp is preferred to the best so far: a preferred grip to all others; one that a person would choose
+    /// to others; then the one with
     /// the lower attempt, if the search is reproducible and both have one; then the better one.
     fn prefers(&self, slice: &SearchOutcome) -> bool {
         let Some(best) = &self.best else { return true };
         let are_chosen = [&self.replaceable_until, &slice.replaceable_until].map(Option::is_none);
         match (are_chosen, best.source, slice.report.source) {
+            (_, Some(best), Some(new)) if best.is_preferred() != new.is_preferred() => new.is_preferred(),
             ([false, true], ..) => true,
             ([true, false], ..) => false,
             ([true, true], Some(GraspSource::Attempt(best)), Some(GraspSource::Attempt(new)))

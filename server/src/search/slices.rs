@@ -5,7 +5,10 @@
 //! search.
 
 use std::{
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
@@ -86,6 +89,7 @@ impl<'a> Slices<'a> {
         let outcome = find_grasp_in(site.pool, &self.scene, &self.next, site.clock, site.stop);
         self.next.known.atlas = None;
         self.next.known.recent = RecentGrips::default();
+        self.next.known.preferred = Arc::default();
         self.left -= self.next.run.max_attempts;
         outcome
     }
@@ -106,6 +110,7 @@ impl<'a> Slices<'a> {
     pub(super) fn restore_known(&mut self, settings: &SearchSettings) {
         self.next.known.atlas.clone_from(&settings.known.atlas);
         self.next.known.recent.clone_from(&settings.known.recent);
+        self.next.known.preferred.clone_from(&settings.known.preferred);
     }
 }
 

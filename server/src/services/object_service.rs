@@ -64,7 +64,7 @@ impl ObjectHandler {
         })
         .await??;
         Ok(v1::CreateObjectResponse {
-            object: Some(self.message(&object)),
+            object: Some(self.whole_message(&object).await?),
         })
     }
 
@@ -105,11 +105,12 @@ impl ObjectHandler {
         Ok(state)
     }
 
-    fn get(&self, name: &str, call: &CallContext) -> Result<v1::GetObjectResponse, ServiceError> {
+    async fn get(&self, name: &str, call: &CallContext) -> Result<v1::GetObjectResponse, ServiceError> {
         let id = checked_id(name)?;
         call.log_object(&id);
+        let object = self.shared.objects.get(&id)?;
         Ok(v1::GetObjectResponse {
-            object: Some(self.message(&self.shared.objects.get(&id)?)),
+            object: Some(self.whole_message(&object).await?),
         })
     }
 
@@ -146,7 +147,7 @@ impl ObjectHandler {
             }
         };
         Ok(v1::UpdateObjectResponse {
-            object: Some(self.message(&object)),
+            object: Some(self.whole_message(&object).await?),
         })
     }
 
@@ -220,7 +221,22 @@ impl ObjectHandler {
         Ok(v1::DeleteObjectResponse {})
     }
 
-    /// The message that describes an object.
+    /// The message that describes an object, with what its client knows of it.
+    pub(super) async fn whole_message(&self, state: &Listed) -> Result<v1::Object, ServiceError> {
+        let (regions, known_grips) = if let Some(object) = state.object() {
+            (object.given.regions_to_wire(), object.given.grips_to_wire())
+        } else {
+            let request = self.shared.objects.saved_request(state.id()).await?;
+            (request.regions, request.known_grips)
+        };
+        Ok(v1::Object {
+            regions,
+            known_grips,
+            ..self.message(state)
+        })
+    }
+
+    /// The message that describes an object in lists: without regions and known grips, which may be long.
     pub(super) fn message(&self, state: &Listed) -> v1::Object {
         let object = state.object().map(AsRef::as_ref);
         let atlas = |handedness| self.shared.atlases.state(object, handedness);
@@ -283,7 +299,7 @@ impl ObjectService for ObjectHandler {
         request: Request<v1::GetObjectRequest>,
     ) -> Result<Response<v1::GetObjectResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.get(&request.get_ref().name, &call)?))
+        Ok(Response::new(self.get(&request.get_ref().name, &call).await?))
     }
 
     async fn list_objects(

@@ -56,7 +56,7 @@ impl ObjectHandler {
         .await?
         .map_err(blame_parts)?;
         Ok(v1::UploadObjectResponse {
-            object: Some(self.message(&object)),
+            object: Some(self.whole_message(&object).await?),
         })
     }
 

@@ -7,12 +7,14 @@
 mod constraints;
 mod find_grasp;
 mod hand;
+mod known_grips;
 mod labels;
 mod object;
 mod object_size;
 mod obstacles;
 mod page;
 mod receiver;
+mod regions;
 mod rig;
 mod search_limits;
 mod update;
@@ -29,12 +31,14 @@ pub(crate) use find_grasp::{FindQuery, find_query};
 #[cfg(test)]
 pub(crate) use hand::fixtures;
 pub(crate) use hand::{GiverHand, MeshedHand};
+pub(crate) use known_grips::{GripFields, GripKind, PreferredGrip};
 pub(crate) use labels::{LabelFilter, Labels};
 pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, object_id_of};
 pub(crate) use object_size::RequestedSize;
 #[cfg(test)]
 pub(crate) use obstacles::tests::any_obstacles;
 pub(crate) use page::{PageQuery, Place, page_query, page_token};
+pub(crate) use regions::{RegionFields, RegionKind};
 pub(crate) use rig::{RigFields, RigOrigin, rig_fields, rig_id_of, rig_page_query, rig_page_token};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
 pub(crate) use upload::{UploadQuery, upload_query};

@@ -7,7 +7,10 @@ use prost::Message as _;
 use sha2::{Digest as _, Sha256};
 use uuid::Uuid;
 
-use super::{Field, Labels, Violations, friction, labels::labels, point, quoted};
+use super::{
+    Field, GripFields, Labels, RegionFields, Violations, friction, known_grips::known_grips, labels::labels,
+    point, quoted, regions::regions,
+};
 
 /// Prefix of every object's name.
 const COLLECTION: &str = "objects/";
@@ -40,6 +43,10 @@ pub(crate) struct ObjectFields {
     pub friction: Option<f32>,
     /// Surfaces that must not be touched.
     pub forbidden: Forbidden,
+    /// Parts of the surface that hands should take, leave, or not touch.
+    pub regions: Vec<RegionFields>,
+    /// Grips to try first, or not to answer.
+    pub known_grips: Vec<GripFields>,
     /// Labels.
     pub labels: Labels,
     /// What identifies the request, if it may be repeated.
@@ -212,6 +219,8 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
         .friction
         .map(|value| friction(Field::root("friction"), value, violations));
     labels(Field::root("labels"), &request.labels, violations);
+    let regions = regions(Field::root("regions"), request.regions, violations);
+    let known_grips = known_grips(Field::root("known_grips"), request.known_grips, violations);
     ObjectFields {
         id: request.object_id,
         mesh: Vec::new(),
@@ -221,6 +230,8 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
         centre_of_mass,
         friction,
         forbidden: request.forbidden.unwrap_or_default().into(),
+        regions,
+        known_grips,
         labels: request.labels,
         request: None,
     }
@@ -287,6 +298,8 @@ impl ObjectFields {
             centre_of_mass: None,
             friction: None,
             forbidden: Forbidden::default(),
+            regions: Vec::new(),
+            known_grips: Vec::new(),
             labels: Labels::new(),
             request: None,
         }

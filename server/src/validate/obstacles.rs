@@ -159,7 +159,7 @@ fn solid_box(
 }
 
 /// A field of message type that must be present.
-fn required<T>(field: Field<'_>, sent: Option<T>, violations: &mut Violations) -> Option<T> {
+pub(super) fn required<T>(field: Field<'_>, sent: Option<T>, violations: &mut Violations) -> Option<T> {
     if sent.is_none() {
         violations.add(field, "is absent; it is required");
     }

@@ -4,15 +4,25 @@ use glam::Vec3;
 use grasp_proto::v1;
 
 use super::{
-    Field, Forbidden, Labels, Violations, friction,
+    Field, Forbidden, GripFields, Labels, RegionFields, Violations, friction,
+    known_grips::known_grips,
     labels::labels,
     object::{check_mass, object_id_of},
     point, quoted,
+    regions::regions,
 };
 use crate::error::ServiceError;
 
 /// The fields that a mask may name.
-const PATHS: [&str; 5] = ["mass_kg", "centre_of_mass", "friction", "forbidden", "labels"];
+const PATHS: [&str; 7] = [
+    "mass_kg",
+    "centre_of_mass",
+    "friction",
+    "forbidden",
+    "labels",
+    "regions",
+    "known_grips",
+];
 
 /// A checked request to change an object.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +48,10 @@ pub(crate) struct ObjectChange {
     pub friction: Setting<f32>,
     /// Surfaces that must not be touched; none to keep them.
     pub forbidden: Option<Forbidden>,
+    /// Parts of the surface that hands should take, leave, or not touch; none to keep them.
+    pub regions: Option<Vec<RegionFields>>,
+    /// Grips to try first, or not to answer; none to keep them.
+    pub known_grips: Option<Vec<GripFields>>,
 }
 
 /// What becomes of a property that has a default.
@@ -127,6 +141,13 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
     if is_changed("forbidden", request.forbidden.is_some()) {
         change.forbidden = Some(request.forbidden.unwrap_or_default().into());
     }
+    if is_changed("regions", !request.regions.is_empty()) {
+        change.regions = Some(regions(Field::root("regions"), request.regions, &mut violations));
+    }
+    if is_changed("known_grips", !request.known_grips.is_empty()) {
+        let field = Field::root("known_grips");
+        change.known_grips = Some(known_grips(field, request.known_grips, &mut violations));
+    }
     let new_labels = is_changed("labels", !request.labels.is_empty()).then_some(request.labels);
     if let Some(new_labels) = &new_labels {
         labels(Field::root("labels"), new_labels, &mut violations);
@@ -180,12 +201,14 @@ mod tests {
 
     #[test]
     fn a_mask_selects_and_resets() {
-        let query = update_query(request(&["friction", "centre_of_mass", "forbidden"])).unwrap();
+        let query = update_query(request(&["friction", "centre_of_mass", "forbidden", "regions"])).unwrap();
         let expected = ObjectChange {
             mass: None,
             centre_of_mass: Setting::Default,
             friction: Setting::Default,
             forbidden: Some(Forbidden::default()),
+            regions: Some(Vec::new()),
+            known_grips: None,
         };
         assert_eq!((query.change, query.labels), (expected, None));
         let cleared = v1::UpdateObjectRequest {

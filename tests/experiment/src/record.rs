@@ -52,7 +52,7 @@ impl Source {
         match source {
             GraspSource::Attempt(index) => Some(Self::Attempt(index)),
             GraspSource::Atlas(entry) => Some(Self::AtlasEntry(entry)),
-            GraspSource::Recent => None,
+            GraspSource::Recent | GraspSource::Preferred(_) => None,
         }
     }
 

@@ -13,6 +13,7 @@ mod hooks;
 mod invalid;
 mod invalid_barriers;
 mod key_frames;
+mod known_grips;
 mod limits;
 mod load;
 mod malformed;
@@ -32,6 +33,7 @@ mod physical;
 mod real_input;
 mod receiver;
 mod reflection;
+mod regions;
 mod registration;
 
 mod reported;

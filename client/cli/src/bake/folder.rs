@@ -87,6 +87,9 @@ pub(super) fn new_object(baked: Baked) -> Result<(NewObject, Option<Density>), S
         forbidden,
         labels,
         request_id: _,
+        // Manifests have neither.
+        regions: _,
+        known_grips: _,
     } = manifest;
     let v1::ForbiddenSurfaces { groups, triangles } = forbidden.unwrap_or_default();
     let object = NewObject {

@@ -77,10 +77,13 @@ fn request_id(object: &NewObject) -> String {
         friction,
         forbidden,
         labels,
+        regions,
+        known_grips,
         request_id: _,
     } = object;
     let beside_mesh = format!(
-        "{id:?} {up_axis:?} {unit_metres:?} {mass_kg:?} {centre_of_mass:?} {friction:?} {forbidden:?} {labels:?}"
+        "{id:?} {up_axis:?} {unit_metres:?} {mass_kg:?} {centre_of_mass:?} {friction:?} {forbidden:?} {labels:?} \
+         {regions:?} {known_grips:?}"
     );
     hash.update(Sha256::digest(mesh));
     hash.update(beside_mesh);

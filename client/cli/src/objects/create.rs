@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use glam::Vec3;
 use grasp_client::{ClientError, ForbiddenSurfaces, GraspClient, NewObject, Object, UpAxis};
 
+use super::{known_grips, listed_in, regions};
 use crate::{
     Ending,
     failure::Failure,
@@ -22,6 +23,7 @@ const LARGEST_MESSAGE: usize = 8 << 20;
 ///
 /// Shows the new object, like `grasp objects get`.
 #[derive(Args, Debug)]
+#[command(after_long_help = format!("{}\n\n{}", regions::FORMAT, known_grips::FORMAT))]
 pub(crate) struct Arguments {
     /// Last part of the object's name. Default: the file's name in lower case, with hyphens.
     id: Option<String>,
@@ -49,6 +51,12 @@ pub(crate) struct Arguments {
     /// Triangles that must not be touched: indices and ranges, such as 7,10-20.
     #[arg(long, value_name = "INDICES", value_parser = parse_triangles, value_delimiter = ',')]
     forbidden_triangles: Vec<TriangleRange>,
+    /// A JSON file with the object's regions, which hands should take, leave, or not touch; see below.
+    #[arg(long, value_name = "FILE")]
+    regions: Option<PathBuf>,
+    /// A JSON file with grips of the object, to try first or not to answer; see below.
+    #[arg(long, value_name = "FILE")]
+    known_grips: Option<PathBuf>,
     /// A label, such as level=kitchen; may be repeated.
     #[arg(long = "label", value_name = "KEY=VALUE", value_parser = parse_label)]
     labels: Vec<(String, String)>,
@@ -85,6 +93,8 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             groups: arguments.forbidden_group,
             triangles: triangles.flat_map(|range| range.0.clone()).collect(),
         },
+        regions: listed_in(arguments.regions.as_deref())?.unwrap_or_default(),
+        known_grips: listed_in(arguments.known_grips.as_deref())?.unwrap_or_default(),
         labels: arguments.labels.into_iter().collect(),
         ..NewObject::new(id, mesh, arguments.mass)
     };

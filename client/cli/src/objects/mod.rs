@@ -3,18 +3,21 @@
 mod create;
 mod delete;
 mod get;
+mod known_grips;
 mod list;
 mod mesh;
+mod regions;
 mod update;
 mod watch;
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 pub(crate) use create::{create_or_upload, id_from_file};
 
 use clap::Subcommand;
 use glam::Vec3;
 use grasp_client::{AtlasGrowth, AtlasState, Object, rfc3339};
+use serde::de::DeserializeOwned;
 
 use crate::{
     Ending,
@@ -53,6 +56,17 @@ pub(crate) fn full_name(name: &str) -> String {
     } else {
         format!("objects/{name}")
     }
+}
+
+/// What a JSON file lists, if one is given.
+fn listed_in<T: DeserializeOwned>(path: Option<&Path>) -> Result<Option<Vec<T>>, Failure> {
+    let Some(path) = path else { return Ok(None) };
+    let cannot = |what: &str| format!("cannot {what} {}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|error| Failure::other(cannot("read"), error))?;
+    let listed = serde_json::from_str(&text);
+    listed
+        .map(Some)
+        .map_err(|error| Failure::other(cannot("use"), error))
 }
 
 /// The edge lengths of a box in millimetres, longest first.
@@ -113,6 +127,8 @@ fn describe(object: &Object) -> String {
             "forbidden",
             format!("{} triangles", object.forbidden_triangle_count),
         ),
+        ("regions", regions::list(&object.regions)),
+        ("known grips", known_grips::list(&object.known_grips)),
         ("atlas", atlas(object.atlas.as_ref())),
         ("content hash", object.content_hash.clone()),
         ("labels", labels(&object.labels)),

@@ -1,9 +1,12 @@
 //! `grasp objects update`
 
+use std::path::PathBuf;
+
 use clap::Args;
 use glam::Vec3;
 use grasp_client::{ForbiddenSurfaces, ObjectUpdate, Reset};
 
+use super::listed_in;
 use crate::{
     Ending,
     failure::Failure,
@@ -47,6 +50,18 @@ pub(crate) struct Arguments {
     /// Allow touching every surface.
     #[arg(long, conflicts_with_all = ["forbidden_group", "forbidden_triangles"])]
     nothing_forbidden: bool,
+    /// A JSON file with regions, as of `grasp objects create`. Replaces all regions.
+    #[arg(long, value_name = "FILE")]
+    regions: Option<PathBuf>,
+    /// Remove all regions.
+    #[arg(long, conflicts_with = "regions")]
+    no_regions: bool,
+    /// A JSON file with known grips, as of `grasp objects create`. Replaces all known grips.
+    #[arg(long, value_name = "FILE")]
+    known_grips: Option<PathBuf>,
+    /// Remove all known grips.
+    #[arg(long, conflicts_with = "known_grips")]
+    no_known_grips: bool,
     /// A label, such as level=kitchen; may be repeated. Replaces all labels.
     #[arg(long = "label", value_name = "KEY=VALUE", value_parser = parse_label)]
     labels: Vec<(String, String)>,
@@ -58,7 +73,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    fn update(&self) -> ObjectUpdate {
+    fn update(&self) -> Result<ObjectUpdate, Failure> {
         let triangles = self.forbidden_triangles.iter();
         let forbidden = ForbiddenSurfaces {
             groups: self.forbidden_group.clone(),
@@ -66,14 +81,18 @@ impl Arguments {
         };
         let is_forbidden_given = self.nothing_forbidden || forbidden != ForbiddenSurfaces::default();
         let are_labels_given = self.no_labels || !self.labels.is_empty();
-        ObjectUpdate {
+        let regions = listed_in(self.regions.as_deref())?;
+        let known_grips = listed_in(self.known_grips.as_deref())?;
+        Ok(ObjectUpdate {
             etag: self.etag.clone(),
             mass_kg: self.mass,
             centre_of_mass: reset(self.centre_of_mass, self.default_centre_of_mass),
             friction: reset(self.friction, self.default_friction),
             forbidden: is_forbidden_given.then_some(forbidden),
+            regions: regions.or(self.no_regions.then(Vec::new)),
+            known_grips: known_grips.or(self.no_known_grips.then(Vec::new)),
             labels: are_labels_given.then(|| self.labels.iter().cloned().collect()),
-        }
+        })
     }
 }
 
@@ -82,10 +101,10 @@ fn reset<T>(value: Option<T>, to_default: bool) -> Option<Reset<T>> {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let update = arguments.update();
+    let update = arguments.update()?;
     if update.is_empty() {
         return Err(Failure::Usage(
-            "nothing to change; give a mass, centre of mass, friction, forbidden surfaces or labels"
+            "nothing to change; give a mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels"
                 .to_owned(),
         ));
     }

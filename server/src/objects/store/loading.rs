@@ -9,6 +9,7 @@ use futures_util::{
     future::{BoxFuture, Shared, WeakShared},
 };
 use grasp_import::MeshLimits;
+use grasp_proto::v1;
 use tokio::sync::Semaphore;
 
 use super::{Entry, ObjectStore};
@@ -96,6 +97,17 @@ impl ObjectStore {
             }
         }
         Ok(created.objects.len())
+    }
+
+    /// The request that would create an object at rest, without its mesh.
+    ///
+    /// # Errors
+    /// [`ServiceError::ObjectDamaged`] and [`ServiceError::StoreFailed`].
+    pub(crate) async fn saved_request(&self, id: &str) -> Result<v1::CreateObjectRequest, ServiceError> {
+        let Some(Durability { saved, .. }) = &self.durability else {
+            return Err(ServiceError::StoreFailed);
+        };
+        Ok(saved.record(id).await?.request)
     }
 
     /// The object with this id, loaded if necessary. It is not evicted while its `object` is held.
@@ -193,7 +205,7 @@ impl ObjectStore {
             let _permits = (permit, room);
             let mesh = mesh.filter(|mesh| SavedObjects::is_mesh(mesh, hash));
             let Some(mesh) = mesh else { return Ok(None) };
-            let request = grasp_proto::v1::CreateObjectRequest {
+            let request = v1::CreateObjectRequest {
                 mesh: mesh.into(),
                 ..record.request
             };

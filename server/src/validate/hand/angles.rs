@@ -6,7 +6,7 @@ use grasp_proto::v1;
 use grasp_synthesis::model::hand::{
     DigitAngles, HandPose, Handedness,
     joints::{HandJoints, thesis_from_openxr_frame},
-    rig::{AngleRange, DigitRig},
+    rig::{AngleRange, DigitLimits},
 };
 
 use super::{JointedHand, hand_scale, required_handedness, rig_named};
@@ -39,18 +39,13 @@ pub(super) fn angled_hand(
         violations,
     );
     let digits_field = field.child("digits");
-    if angles.digits.len() != 5 {
-        violations.add(
-            digits_field,
-            format_args!("has {} digits; it must have 5, thumb first", angles.digits.len()),
-        );
-    }
-    let rig = rig?;
+    let Some(rig) = rig else {
+        check_count(digits_field, &angles.digits, violations);
+        return None;
+    };
     let hand = &rig.hand(handedness.unwrap_or(Handedness::Right)).hand;
-    let mut digits = [DigitAngles::default(); 5];
-    for (place, (digit, sent)) in digits.iter_mut().zip(&angles.digits).enumerate() {
-        *digit = digit_angles(digits_field.at(place), sent, &hand.rig.digits[place], violations);
-    }
+    let limits = hand.rig.digits.map(|digit| digit.limits);
+    let digits = checked_digits(digits_field, &angles.digits, &limits, violations);
     handedness?;
     let pose = HandPose {
         frame_from_wrist: thesis_from_openxr_frame(convention.joint_to_openxr(client_from_wrist)),
@@ -64,13 +59,36 @@ pub(super) fn angled_hand(
     })
 }
 
+/// Five digits within limits, thumb first.
+pub(in crate::validate) fn checked_digits(
+    field: Field<'_>,
+    sent: &[v1::DigitAngles],
+    limits: &[DigitLimits; 5],
+    violations: &mut Violations,
+) -> [DigitAngles; 5] {
+    check_count(field, sent, violations);
+    let mut digits = [DigitAngles::default(); 5];
+    for (place, (digit, sent)) in digits.iter_mut().zip(sent).enumerate() {
+        *digit = digit_angles(field.at(place), sent, &limits[place], violations);
+    }
+    digits
+}
+
+fn check_count(field: Field<'_>, sent: &[v1::DigitAngles], violations: &mut Violations) {
+    if sent.len() != 5 {
+        violations.add(
+            field,
+            format_args!("has {} digits; it must have 5, thumb first", sent.len()),
+        );
+    }
+}
+
 fn digit_angles(
     field: Field<'_>,
     sent: &v1::DigitAngles,
-    rig: &DigitRig,
+    limits: &DigitLimits,
     violations: &mut Violations,
 ) -> DigitAngles {
-    let limits = &rig.limits;
     let mut checked = |name, angle: f32, range: AngleRange| {
         if !range.contains(angle, ANGLE_SLACK) {
             violations.add(
@@ -108,8 +126,8 @@ mod tests {
     #[test]
     fn clamps_angles_within_the_slack_and_couples_absent_ones() {
         let hand = hands::hand("thesis", Handedness::Right).expect("the rig is built in");
-        let rig = &hand.rig.digits[1];
-        let limit = rig.limits.second_pitch.max;
+        let limits = &hand.rig.digits[1].limits;
+        let limit = limits.second_pitch.max;
         let angles = v1::DigitAngles {
             base_yaw: 0.0,
             base_pitch: 0.1,
@@ -117,16 +135,16 @@ mod tests {
             third_pitch: None,
         };
         let mut violations = Violations::default();
-        let read = digit_angles(FIELD, &angles, rig, &mut violations);
+        let read = digit_angles(FIELD, &angles, limits, &mut violations);
         assert!(violations.is_empty());
         assert_eq!(read.second_pitch, limit);
-        let coupled = (limit * 2.0 / 3.0).min(rig.limits.third_pitch.max);
+        let coupled = (limit * 2.0 / 3.0).min(limits.third_pitch.max);
         assert!((read.third_pitch - coupled).abs() < 1e-6);
         let over = v1::DigitAngles {
             second_pitch: limit + 2.0 * ANGLE_SLACK,
             ..angles
         };
-        digit_angles(FIELD, &over, rig, &mut violations);
+        digit_angles(FIELD, &over, limits, &mut violations);
         assert_eq!(violations.len(), 1);
     }
 }

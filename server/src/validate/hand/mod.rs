@@ -28,6 +28,7 @@ use crate::{
     rigs::{RigHand, StoredRig, store::RigStore},
 };
 use angles::angled_hand;
+pub(super) use angles::checked_digits;
 pub(crate) use meshed::MeshedHand;
 pub(super) use meshed::check_meshes_together;
 use meshed::meshed_hand;
@@ -148,7 +149,7 @@ pub(super) struct ReceivingHands {
 }
 
 /// The size of a hand relative to its rig; 1 if it is wrong.
-fn hand_scale(field: Field<'_>, scale: Option<f32>, violations: &mut Violations) -> f32 {
+pub(super) fn hand_scale(field: Field<'_>, scale: Option<f32>, violations: &mut Violations) -> f32 {
     let scale = scale.unwrap_or(1.0);
     if HAND_SCALES.contains(&scale) {
         return scale;
@@ -197,7 +198,11 @@ pub(super) fn joints_at_rest(
 }
 
 /// A handedness without a default.
-fn required_handedness(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Handedness> {
+pub(super) fn required_handedness(
+    field: Field<'_>,
+    value: i32,
+    violations: &mut Violations,
+) -> Option<Handedness> {
     if v1::Handedness::try_from(value) == Ok(v1::Handedness::Unspecified) {
         violations.add(field, "is required: HANDEDNESS_LEFT or HANDEDNESS_RIGHT");
         return None;

@@ -23,6 +23,7 @@ pub mod tapered_capsule;
 pub mod topology;
 mod wedges;
 mod wide_bvh;
+pub mod zone;
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

@@ -14,7 +14,7 @@ use crate::{
         grasp::{Contact, Grasp},
         grasp_type::Classification,
         hand::{HandPart, rig::Rig},
-        score::{Score, Term, Values},
+        score::{Term, Values, grip_total, mean_value},
     },
     physical::{
         contacts::soften,
@@ -72,7 +72,7 @@ impl Entry {
             gripper.relative_closure(scene, grip.epsilon),
             solids,
         );
-        let of_grip = Score { values: grip_values }.grip_total();
+        let of_grip = grip_total(&grip_values);
         let mut friction_uses = FrictionUses::default();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(&gripper.soft_contacts, direction(index));
@@ -87,7 +87,7 @@ impl Entry {
                     force_values(scene, &contacts, &balance.forces),
                     upright_values(scene.object, grip.pose.frame_from_wrist, direction(index)),
                 );
-                quantized(of_grip + Score { values }.total())
+                quantized(of_grip + mean_value(&values))
             })
         });
         let finger_subsets = FingerSubsets::of(grip.holding_digits(), |kept| {
@@ -114,7 +114,7 @@ impl Entry {
             return None;
         }
         let margins = grasp.margins?;
-        let Score { mut values } = grasp.score?;
+        let mut values = grasp.score?.values;
         for (term, value) in Term::ALL.into_iter().zip(&mut values) {
             if !term.is_grip_term() {
                 *value = 0.0;

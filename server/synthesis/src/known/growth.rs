@@ -26,7 +26,7 @@ use crate::{
     model::{
         hand::{joints::HandJoints, rig::Rig},
         object::GraspObject,
-        score::Score,
+        score::grip_total,
         strategy::Validity,
     },
     physical::{
@@ -390,7 +390,7 @@ impl<'a> Growth<'a> {
             &solids,
         );
         let cell = Cell::of(self.rig, &grip.pose, contacts);
-        if !needs_grips && self.spread.admission(cell, Score { values }.grip_total()) == Admission::Reject {
+        if !needs_grips && self.spread.admission(cell, grip_total(&values)) == Admission::Reject {
             return None;
         }
         let entry = Entry::new(&self.scene, self.rig, grip, &solids, gripper);

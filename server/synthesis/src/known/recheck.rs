@@ -60,6 +60,12 @@ impl<'a> GripChecker<'a> {
             presented,
             ..
         } = *self;
+        if !scene
+            .object
+            .admits_wrist(rig.handedness, entry.grip.pose.frame_from_wrist)
+        {
+            return None;
+        }
         let clearances = clear_of_barriers(solids, presented.barriers())?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(&gripper.soft_contacts, presented.up);

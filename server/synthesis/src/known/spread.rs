@@ -8,7 +8,7 @@ use super::entry::Entry;
 use crate::model::{
     grasp::Contact,
     hand::{Digit, HandPart, HandPose, rig::Rig},
-    score::Score,
+    score::grip_total,
 };
 
 /// Edge of the cells that palms are sorted into, in metres.
@@ -92,10 +92,7 @@ impl Spread {
 
 /// The part of an entry's score that depends on neither gravity nor giver.
 pub(super) fn base_score(entry: &Entry) -> f32 {
-    Score {
-        values: entry.grip_values,
-    }
-    .grip_total()
+    grip_total(&entry.grip_values)
 }
 
 /// The axis nearest to a direction: 0 to 5 for x, -x, y, -y, z, -z.

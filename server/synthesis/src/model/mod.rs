@@ -2,6 +2,7 @@
 //! and
 //! a request's constraints.
 
+pub mod banned_grip;
 pub mod bend_ratios;
 pub mod constraints;
 pub mod forces;
@@ -13,5 +14,6 @@ pub mod object;
 pub mod obstacle;
 pub mod parts;
 pub mod receiver;
+pub mod regions;
 pub mod score;
 pub mod strategy;

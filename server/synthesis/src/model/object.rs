@@ -4,8 +4,11 @@ use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
-use super::{parts::Parts, strategy::Validity};
-use crate::base::stop::{Stop, Stopped, unstopped};
+use super::{banned_grip::BannedGrip, hand::Handedness, parts::Parts, regions::Regions, strategy::Validity};
+use crate::base::{
+    pose::Pose,
+    stop::{Stop, Stopped, unstopped},
+};
 use crate::geometry::{
     handles::Handles,
     local_shape::LocalShape,
@@ -50,6 +53,10 @@ pub struct GraspObject {
     /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried
     /// first.
     forbidden_surface: Option<MeshBvh>,
+    /// Which parts hands should take or leave.
+    regions: Regions,
+    /// The grips with which it is not to be taken.
+    banned: Vec<BannedGrip>,
     /// What its parts are for, found on first use.
     parts: OnceLock<Parts>,
 }
@@ -167,6 +174,20 @@ impl GraspObject {
             local_shape: self.local_shape.clone(),
         };
         Self::of_parts(measures, Arc::clone(&self.surface), checked)
+            .with_regions(self.regions.clone())
+            .with_banned(self.banned.clone())
+    }
+
+    /// The same object with these regions, in its frame.
+    #[must_use]
+    pub fn with_regions(self, regions: Regions) -> Self {
+        Self { regions, ..self }
+    }
+
+    /// The same object, not to be taken with these grips, in its frame.
+    #[must_use]
+    pub fn with_banned(self, banned: Vec<BannedGrip>) -> Self {
+        Self { banned, ..self }
     }
 
     /// The same object, `scale` times as large about the origin of its frame, with the given mass in kilograms. Its bounding
@@ -198,7 +219,10 @@ impl GraspObject {
         };
         let bounding_box = self.bounding_box.scaled(scale);
         let (measures, surface) = measures_and_surface(mesh, Some(bounding_box), stop)?;
-        Ok(Ok(Self::of_parts(measures, Arc::new(surface), properties)))
+        let resized = Self::of_parts(measures, Arc::new(surface), properties);
+        Ok(Ok(resized
+            .with_regions(self.regions.scaled(scale))
+            .with_banned(self.banned_at(scale))))
     }
 
     fn of_parts(measures: Measures, surface: Arc<MeshBvh>, properties: CheckedProperties) -> Self {
@@ -226,6 +250,8 @@ impl GraspObject {
                 .map(MeshBvh::build_quick),
             surface,
             forbidden,
+            regions: Regions::default(),
+            banned: Vec::new(),
             parts: OnceLock::new(),
         }
     }
@@ -241,6 +267,48 @@ impl GraspObject {
     /// True if the triangle must not be touched (Algorithm 7); O(1).
     pub fn is_forbidden(&self, triangle: u32) -> bool {
         self.forbidden[triangle as usize]
+    }
+
+    /// Which parts hands should take or leave.
+    pub fn regions(&self) -> &Regions {
+        &self.regions
+    }
+
+    /// True if the object is to be taken with a wrist there.
+    pub fn admits_wrist(&self, handedness: Handedness, object_from_wrist: Pose) -> bool {
+        let mut banned = self.banned.iter();
+        !banned.any(|grip| grip.covers(handedness, object_from_wrist))
+    }
+
+    /// Where a wrist is that holds the object at `scale` times its size as one at its own size does: it keeps its offset from the
+    /// nearest place of the surface.
+    pub fn wrist_at(&self, scale: f32, object_from_wrist: Pose) -> Pose {
+        let Pose {
+            position,
+            orientation,
+        } = object_from_wrist;
+        let nearest = self.surface.closest_point_within(position, f32::MAX);
+        let way = nearest.map_or(Vec3::ZERO, |nearest| nearest.position * (scale - 1.0));
+        Pose::new(position + way, orientation)
+    }
+
+    fn banned_at(&self, scale: f32) -> Vec<BannedGrip> {
+        let moved = |grip: &BannedGrip| BannedGrip {
+            object_from_wrist: self.wrist_at(scale, grip.object_from_wrist),
+            ..*grip
+        };
+        self.banned.iter().map(moved).collect()
+    }
+
+    /// How much the place of the surface next to a point is wanted, from 0 to 1; 1 if there is none within `distance` metres.
+    pub fn wish_near(&self, point: Vec3, distance: f32) -> f32 {
+        if self.regions.is_empty() {
+            return 1.0;
+        }
+        let nearest = self.surface.closest_point_within(point, distance);
+        nearest.map_or(1.0, |nearest| {
+            self.regions.wish_at(nearest.triangle, nearest.position)
+        })
     }
 
     /// What its parts are for, as the mesh shows. The first call takes some milliseconds.

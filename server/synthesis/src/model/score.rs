@@ -1,6 +1,7 @@
 //! A grasp's score: the weighted mean of named terms from 0 (worst) to 1 (best).
 //!
-//! The weights are the project's choice. [`crate::rating::scoring`] computes the terms.
+//! The weights are the project's choice. [`crate::rating::scoring`] computes the terms, and [`super::regions`] those of an object
+//! with regions.
 
 /// Number of terms.
 pub const TERMS: usize = 20;
@@ -154,23 +155,114 @@ impl Term {
     }
 }
 
+/// A term of the score that only objects with regions have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RegionTerm {
+    /// The contacts are on preferred regions.
+    OnPreferred,
+    /// The contacts are off regions to avoid.
+    OffAvoided,
+}
+
+impl RegionTerm {
+    /// All terms.
+    pub const ALL: [Self; 2] = [Self::OnPreferred, Self::OffAvoided];
+
+    /// The name used in answers.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OnPreferred => "on_preferred",
+            Self::OffAvoided => "off_avoided",
+        }
+    }
+}
+
+/// Weight in the mean of a region term of the greatest importance. An owner knows the object: it outweighs any two of the other
+/// terms.
+const REGION_WEIGHT: f32 = 30.0;
+
+/// What a grasp earns by an object's regions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegionValue {
+    /// From 0 (worst) to 1 (best).
+    pub value: f32,
+    /// How much it counts: the largest weight of a region, more than 0 and at most 1.
+    pub importance: f32,
+}
+
+impl RegionValue {
+    /// The weight in the mean, relative to the other terms.
+    pub fn weight(self) -> f32 {
+        REGION_WEIGHT * self.importance
+    }
+}
+
+/// The values of [`RegionTerm::ALL`]; none for what the object has no regions of.
+pub type RegionValues = [Option<RegionValue>; RegionTerm::ALL.len()];
+
+/// A term of one score.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScoredTerm {
+    /// The name used in answers.
+    pub name: &'static str,
+    /// From 0 (worst) to 1 (best).
+    pub value: f32,
+    /// The weight in the mean, relative to the other terms.
+    pub weight: f32,
+}
+
 /// A grasp's score, term by term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Score {
     /// Values from 0 (worst) to 1 (best), in the order of [`Term::ALL`].
     pub values: Values,
+    /// Values of the terms for the object's regions.
+    pub regions: RegionValues,
 }
 
 impl Score {
     /// The weighted mean of all terms, 0 to 1.
     pub fn total(&self) -> f32 {
-        weighted_mean(&self.values, |_| true)
+        let common = mean_value(&self.values);
+        if self.regions == RegionValues::default() {
+            return common;
+        }
+        let weight_of_common: f32 = Term::ALL.iter().map(|term| term.weight()).sum();
+        let of_regions = self.regions.iter().flatten();
+        let (sum, weights) = of_regions
+            .fold((common * weight_of_common, weight_of_common), |(sum, all), of| {
+                (sum + of.value * of.weight(), all + of.weight())
+            });
+        sum / weights
     }
 
-    /// The contribution to [`Score::total`] of the terms that depend on hand and object alone.
-    pub fn grip_total(&self) -> f32 {
-        weighted_mean(&self.values, Term::is_grip_term)
+    /// The terms that count.
+    pub fn terms(&self) -> impl Iterator<Item = ScoredTerm> {
+        let common = Term::ALL.into_iter().zip(self.values);
+        let common = common.map(|(term, value)| ScoredTerm {
+            name: term.name(),
+            value,
+            weight: term.weight(),
+        });
+        let of_regions = RegionTerm::ALL.into_iter().zip(self.regions);
+        common.chain(of_regions.filter_map(|(term, earned)| {
+            earned.map(|earned| ScoredTerm {
+                name: term.name(),
+                value: earned.value,
+                weight: earned.weight(),
+            })
+        }))
     }
+}
+
+/// The weighted mean of values to which terms that are left out contribute 0.
+pub fn mean_value(values: &Values) -> f32 {
+    weighted_mean(values, |_| true)
+}
+
+/// The contribution to [`mean_value`] of the terms that depend on hand and object alone.
+pub fn grip_total(values: &Values) -> f32 {
+    weighted_mean(values, Term::is_grip_term)
 }
 
 /// The weighted sum of the terms that `counts` accepts, divided by the weight of all terms.

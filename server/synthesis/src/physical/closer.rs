@@ -4,6 +4,7 @@
 use super::{
     barriers::Barriers,
     closing::{ClosedDigit, Closing},
+    flexing::Flexing,
     grip::{GIVER_CLEARANCE, NoGrip, nears_forbidden_surface},
     obstacle::Obstacle,
     scene::ObjectScene,
@@ -12,7 +13,7 @@ use super::{
 };
 use crate::{
     base::{pose::Pose, rejection::Rejection},
-    model::hand::{Digit, HandPose, kinematics::DigitPlane, rig::Rig},
+    model::hand::{Digit, DigitAngles, HandPose, kinematics::DigitPlane, rig::Rig},
 };
 
 /// Flexions in radians, in order of preference, that take an idle finger clear of the barriers: tucked into the palm, or
@@ -57,6 +58,25 @@ impl Closer<'_> {
             obstacles,
             curls_last: self.shape.is_hook() && digit != Digit::Thumb,
         }
+    }
+
+    /// A digit that somebody posed, closed or opened as little as it takes to touch. `None` if it cannot be freed.
+    pub(super) fn settle(
+        &self,
+        digit: Digit,
+        posed: DigitAngles,
+        obstacles: &[Obstacle],
+    ) -> Option<ClosedDigit> {
+        let closing = self.closing(digit, obstacles);
+        let settling = Closing {
+            flexing: Flexing {
+                base_yaw: posed.base_yaw,
+                ..closing.flexing
+            },
+            plane: DigitPlane::new(closing.flexing.digit, self.object_from_wrist, posed.base_yaw),
+            ..closing
+        };
+        settling.settle(posed)
     }
 
     /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to a barrier.

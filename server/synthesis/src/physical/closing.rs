@@ -45,6 +45,10 @@ const CURLED: [f32; 3] = [0.35, 0.7, 1.0];
 /// Shares of the preshape tried as starts for hooking: straighter fingers meet what is below the handle.
 const HOOKED: &[f32] = &[1.0, 0.92, 0.84, 0.76, 0.65];
 
+/// Shares of a digit's bend tried as starts when it was posed by somebody, and the share up to which it bends to touch.
+const LESS_BENT: [f32; 5] = [1.0, 0.93, 0.85, 0.7, 0.5];
+const MORE_BENT: f32 = 1.15;
+
 /// Above this gap, in metres, a lower bound replaces the exact gap. Smaller values take more steps of a few
 /// nanoseconds each, larger ones more mesh queries.
 pub(super) const COARSE_GAP: f32 = 0.004;
@@ -145,6 +149,35 @@ impl Closing<'_> {
             links,
             touches,
         })
+    }
+
+    /// A digit that was posed by somebody: bent, each joint in proportion to its angle, until its first touch. Starts where it was
+    /// posed, or less bent if it is inside something there; keeps that if nothing is near. `None` if it is inside however it bends.
+    pub(super) fn settle(&self, posed: DigitAngles) -> Option<ClosedDigit> {
+        let bent_by = |share: f32| DigitAngles {
+            base_yaw: posed.base_yaw,
+            base_pitch: posed.base_pitch * share,
+            second_pitch: posed.second_pitch * share,
+            third_pitch: posed.third_pitch * share,
+        };
+        let starts = LESS_BENT.map(|share| (share, bent_by(share)));
+        let (share, start) = starts.into_iter().find(|(_, start)| self.is_free(start))?;
+        let rates = [posed.base_pitch, posed.second_pitch, posed.third_pitch].map(|bend| bend.max(0.0));
+        let touched = |angles: DigitAngles| {
+            let links = self.links(&angles);
+            ClosedDigit {
+                angles,
+                touches: std::array::from_fn(|link| self.link_touches(&links[link])),
+                links,
+            }
+        };
+        let at_start = touched(start);
+        if at_start.touches_object() {
+            return Some(at_start);
+        }
+        let sweep = Sweep { start, rates };
+        let bent = touched(self.advance(&sweep, -TOUCH_DEPTH, MORE_BENT - share));
+        Some(if bent.touches_object() { bent } else { at_start })
     }
 
     /// The poses to close from, preferred ones first.

@@ -5,6 +5,8 @@
 //! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
 //! known.
 
+mod posed_hand;
+
 use glam::Vec3;
 
 use super::{

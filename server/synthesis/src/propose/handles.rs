@@ -50,6 +50,10 @@ pub fn wrap_handle(context: &ProposalContext<'_>, stream: &mut AttemptStream) ->
         let lever = |handle: &&Handle| handle.middle.distance_squared(centre_of_mass);
         let handle = drawn.min_by(|a, b| lever(a).total_cmp(&lever(b)))?;
         let (touching, radius) = in_palm(handle, context, stream)?;
+        let wish = context.object.wish_near(handle.middle, RAY_LENGTH);
+        if !context.is_wanted(wish, stream) {
+            return None;
+        }
         if !context.is_chosen(touching, stream) || !context.palm_fits(touching) {
             return None;
         }

@@ -99,8 +99,7 @@ impl PreparedObject {
     /// # Errors
     /// [`Stopped`].
     pub fn new_until(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Self, Stopped> {
-        let surface_pairs =
-            SurfacePairs::of(&object.surface, stop, |triangle| object.is_forbidden(triangle))?;
+        let surface_pairs = SurfacePairs::of(&object, stop)?;
         let holdable = HoldableSurface::of(&object, &surface_pairs, stop)?;
         // Found here rather than by the first search.
         object.parts_until(stop)?;

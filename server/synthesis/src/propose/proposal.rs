@@ -199,6 +199,15 @@ impl<'a> ProposalContext<'a> {
             || stream.unit() < self.choice(object_from_wrist).max(LEAST_CHOICE)
     }
 
+    /// True if a hand is to be tried at a place, by how much the object's owner wants hands there; always in every
+    /// [`ANYWHERE_EVERY`]th attempt.
+    pub(super) fn is_wanted(&self, wish: f32, stream: &mut AttemptStream) -> bool {
+        wish >= 1.0
+            || self.chooses.is_none()
+            || stream.attempt().is_multiple_of(ANYWHERE_EVERY)
+            || stream.unit() < wish.max(LEAST_CHOICE)
+    }
+
     /// Places opposed pads at the first of some locations where the hand fits.
     fn propose_pads(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
         (0..MAX_LOCATIONS)
@@ -254,8 +263,11 @@ impl<'a> ProposalContext<'a> {
     fn propose_from_cache(&self, stream: &mut AttemptStream) -> Option<Proposal> {
         let row = self.placements?.row(stream.attempt(), self.rig);
         let free = row
-            .filter(|candidate| candidate.pair.is_free_of(self.barriers))
-            .map(|candidate| self.settled(candidate, stream));
+            .filter(|candidate| {
+                candidate.pair.is_free_of(self.barriers) && self.is_wanted(candidate.pair.wish, stream)
+            })
+            .collect::<Vec<_>>();
+        let free = free.into_iter().map(|candidate| self.settled(candidate, stream));
         let ordered = self.order_by_success_prior(
             &ObjectFeatures::of(self.object),
             PREFERENCE,
@@ -354,15 +366,23 @@ impl<'a> ProposalContext<'a> {
     /// A pair clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
     pub(super) fn free_pair(&self, stream: &mut AttemptStream) -> Option<SurfacePair> {
         (0..MAX_DRAWS)
-            .map_while(|_| self.surface.pair(stream))
-            .find(|pair| pair.is_free_of(self.barriers))
+            .map_while(|_| {
+                let pair = self.surface.pair(stream)?;
+                let is_taken = pair.is_free_of(self.barriers) && self.is_wanted(pair.wish, stream);
+                Some(is_taken.then_some(pair))
+            })
+            .find_map(|taken| taken)
     }
 
     /// A point clear of the barriers; `None` if none of [`MAX_DRAWS`] is.
     pub(super) fn free_point(&self, stream: &mut AttemptStream) -> Option<SurfacePoint> {
         (0..MAX_DRAWS)
-            .map_while(|_| self.surface.point(stream))
-            .find(|point| point.is_free_of(self.barriers))
+            .map_while(|_| {
+                let point = self.surface.point(stream)?;
+                let is_taken = point.is_free_of(self.barriers) && self.is_wanted(point.wish, stream);
+                Some(is_taken.then_some(point))
+            })
+            .find_map(|taken| taken)
     }
 
     /// True if palm, forearm and digits collide with neither object nor barriers, as far as inner spheres show.

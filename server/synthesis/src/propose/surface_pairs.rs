@@ -9,9 +9,9 @@ use crate::{
     },
     geometry::{
         Segment,
-        mesh_bvh::MeshBvh,
         surface_samples::{SurfaceSampler, ray_stride},
     },
+    model::object::GraspObject,
     physical::barriers::Barriers,
 };
 
@@ -51,6 +51,8 @@ pub struct SurfacePoint {
     pub position: Vec3,
     /// Outward unit normal.
     pub normal: Vec3,
+    /// How much hands should take the object there, from 0 to 1.
+    pub wish: f32,
 }
 
 impl SurfacePoint {
@@ -69,6 +71,8 @@ pub struct SurfacePair {
     pub end: Vec3,
     /// Distance between the ends, in metres.
     pub thickness: f32,
+    /// How much hands should take the object there, from 0 to 1.
+    pub wish: f32,
 }
 
 impl SurfacePair {
@@ -99,17 +103,14 @@ pub struct SurfacePairs {
 }
 
 impl SurfacePairs {
-    /// Samples a surface, without the triangles for which `is_forbidden` returns true.
+    /// Samples the surface of an object that may be touched.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub fn of(
-        surface: &MeshBvh,
-        stop: Stop<'_>,
-        is_forbidden: impl Fn(u32) -> bool,
-    ) -> Result<Self, Stopped> {
+    pub fn of(object: &GraspObject, stop: Stop<'_>) -> Result<Self, Stopped> {
+        let surface = &object.surface;
         let mesh = surface.mesh();
-        let sampler = SurfaceSampler::new(mesh, |triangle| !is_forbidden(triangle));
+        let sampler = SurfaceSampler::new(mesh, |triangle| !object.is_forbidden(triangle));
         let mut sampled = Self::default();
         let stride = ray_stride(surface, &sampler, SAMPLES, SEED, MAX_THICKNESS);
         for sample in (0..SAMPLES).step_by(stride) {
@@ -121,6 +122,7 @@ impl SurfacePairs {
             let point = SurfacePoint {
                 position,
                 normal: mesh.normal(triangle),
+                wish: object.regions().wish_at(triangle as u32, position),
             };
             sampled.points.push(point);
             let slant = point.normal.any_orthogonal_vector() * stream.between(-MAX_SLANT, MAX_SLANT)
@@ -136,12 +138,13 @@ impl SurfacePairs {
                         start: point.position,
                         end: start,
                         thickness: START_DEPTH,
+                        wish: point.wish,
                     });
                 }
                 continue;
             };
             let opposite = mesh.normal(exit.triangle as usize);
-            if is_forbidden(exit.triangle)
+            if object.is_forbidden(exit.triangle)
                 || opposite.dot(inward) < MIN_COS
                 || -point.normal.dot(inward) < MIN_COS
             {
@@ -151,6 +154,7 @@ impl SurfacePairs {
                 start: point.position,
                 end: exit.position,
                 thickness: exit.distance + START_DEPTH,
+                wish: 0.5 * (point.wish + object.regions().wish_at(exit.triangle, exit.position)),
             });
         }
         Ok(sampled)

@@ -142,7 +142,13 @@ impl GraspContext<'_> {
             grasp.arm = presented.arm_of(object.object, rig, grasp.pose.frame_from_wrist);
         }
         // Closing may have moved the wrist since its placement was admitted.
-        if !constraints.admits(&grasp) || (presented.receiver.must_reach() && grasp.arm.is_none()) {
+        let is_banned = !object
+            .object
+            .admits_wrist(rig.handedness, grasp.pose.frame_from_wrist);
+        if is_banned
+            || !constraints.admits(&grasp)
+            || (presented.receiver.must_reach() && grasp.arm.is_none())
+        {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
         Ok(grasp)

@@ -201,7 +201,10 @@ pub fn score(
     values[Term::GiverClearance as usize] =
         clearance.map_or(1.0, |distance| (distance / AMPLE_GIVER_CLEARANCE).min(1.0));
     values[Term::AwayFromGiver as usize] = away_from_giver(scene.object, rig, &grasp.pose, presented);
-    Score { values }
+    Score {
+        values,
+        regions: scene.object.regions().values(&grasp.contacts),
+    }
 }
 
 /// 1 if neighbouring fingers flex alike, 0 if some pair differs by [`MAX_FLEXION_DIFFERENCE`].

@@ -202,7 +202,7 @@ impl Attempt {
         match held {
             Ok(held) => {
                 let grasp = thesis_grasp(&scene.thesis().holdout.object, scene.rig(), held);
-                if scene.constraints().admits(&grasp) {
+                if scene.constraints().admits(&grasp) && scene.admits_wrist(grasp.pose.frame_from_wrist) {
                     AttemptEnd::Valid(Box::new(grasp))
                 } else {
                     Failure::from(Rejection::UnmetConstraint).into()

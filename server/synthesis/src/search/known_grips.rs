@@ -1,4 +1,4 @@
-//! Known grips as candidates of a race: those of the atlas, then recent ones.
+//! Known grips as candidates of a race: preferred hands, those of the atlas, then recent ones.
 //!
 //! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, of the shortlist, then of
 //! the whole atlas; then, only if none of them is valid, those of the next grade.
@@ -13,15 +13,29 @@ use std::{
 
 use glam::Vec3;
 
-use super::{preference::Preference, report::GraspSource, scene::Scene, settings::SearchSettings};
+use super::{
+    preference::{Preference, suits_owner},
+    report::GraspSource,
+    scene::Scene,
+    settings::SearchSettings,
+};
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
+    base::{
+        mechanisms::{Mechanism, Mechanisms},
+        stopwatch::NoStopwatch,
+    },
     known::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
         recheck::GripChecker,
     },
-    model::{grasp::Grasp, hand::rig::Rig, score::Score, strategy::Choice},
+    model::{
+        grasp::Grasp,
+        hand::{HandPose, rig::Rig},
+        regions::Regions,
+        score::Score,
+        strategy::Choice,
+    },
     physical::{
         barriers::Barriers,
         grip::Gripper,
@@ -40,6 +54,8 @@ static STORED_ORDER: LazyLock<Vec<u16>> = LazyLock::new(|| (0..u16::MAX).collect
 /// Known grips in the order in which they are tried.
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
+    /// Hands to try before all others.
+    preferred: &'a [HandPose],
     atlas: Option<&'a Atlas>,
     /// The atlas' shortlist for givers. These are screened one by one, because excluding grips of the whole
     /// atlas at once takes as long.
@@ -59,7 +75,7 @@ pub(super) struct KnownGrips<'a> {
     mechanisms: Mechanisms,
     /// Grips that certainly collide with the giver, computed on first use.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place to try, counted through `listed`, the passes through `order`, and `recent`.
+    /// The next place to try, counted through `preferred`, `listed`, the passes through `order`, and `recent`.
     cursor: AtomicUsize,
 }
 
@@ -95,6 +111,8 @@ enum Next<'a> {
     Exhausted,
     /// The grips just passed certainly collide with a barrier.
     AllExcluded,
+    /// The preferred hand with this index.
+    Preferred(usize),
     /// A grip to check; those passed before it certainly collide.
     Candidate(Candidate<'a>),
 }
@@ -119,9 +137,9 @@ pub(super) enum TryResult {
 /// How a known grip suits where the receiver stands and what people choose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Grade {
-    /// Its forearm comes from there, and people would take the object so.
+    /// Its forearm comes from there, people would take the object so, and its owner would have it taken there.
     Chosen,
-    /// Its forearm comes from there, and it holds what people would hold, firmly.
+    /// Its forearm comes from there, and it holds what people would hold, firmly, where the owner would have it.
     Firm,
     /// Its forearm comes from there.
     Suitable,
@@ -137,6 +155,7 @@ struct Grading<'a> {
     receiver: &'a Receiver,
     rig: &'a Rig,
     preference: Preference,
+    regions: &'a Regions,
 }
 
 /// Whether a grip has a grade, as far as tells what is quickly looked at.
@@ -164,8 +183,9 @@ impl Grading<'_> {
         }
         let preference = self.preference;
         let values = &entry.grip_values;
-        let is_chosen = || preference.is_met_by_grip(values, entry.classification, false);
-        let is_firm = || preference.is_firm(values, false);
+        let suits_owner = || self.regions.is_empty() || suits_owner(&self.regions.values(&entry.contacts));
+        let is_chosen = || preference.is_met_by_grip(values, entry.classification, false) && suits_owner();
+        let is_firm = || preference.is_firm(values, false) && suits_owner();
         let fits = match grade {
             Grade::Chosen => is_chosen(),
             Grade::Firm => is_firm() && !is_chosen(),
@@ -215,7 +235,8 @@ impl<'a> KnownGrips<'a> {
         } else {
             settings.known.recent.entries()
         };
-        let has_any = atlas.is_some() || !recent.is_empty();
+        let preferred = &*settings.known.preferred;
+        let has_any = atlas.is_some() || !recent.is_empty() || !preferred.is_empty();
         if !has_any || !settings.query.uses_known_grips() {
             return None;
         }
@@ -242,6 +263,7 @@ impl<'a> KnownGrips<'a> {
         let compact =
             atlas.filter(|atlas| is_listed && mechanisms.has(Mechanism::Shortlists) && atlas.is_compact());
         Some(Self {
+            preferred,
             atlas,
             listed: match compact {
                 Some(atlas) => atlas.by_value(presented.up, stance),
@@ -252,6 +274,7 @@ impl<'a> KnownGrips<'a> {
                 receiver,
                 rig: scene.rig(),
                 preference: scene.preference(),
+                regions: object.object.regions(),
             }),
             order: atlas.map_or(&[], order),
             recent,
@@ -293,7 +316,8 @@ impl<'a> KnownGrips<'a> {
     /// Advances to the next grip that does not certainly collide with a barrier, past at most
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
-        let end = self.listed.len() + self.passes() * self.order.len() + self.recent.len();
+        let first = self.preferred.len();
+        let end = first + self.listed.len() + self.passes() * self.order.len() + self.recent.len();
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
@@ -302,8 +326,11 @@ impl<'a> KnownGrips<'a> {
             }
             let mut to = end.min(from + at_once);
             let mut next = Next::AllExcluded;
-            let candidate = (from..to).find_map(|place| Some((place, self.candidate_at(place)?)));
-            if let Some((place, found)) = candidate {
+            if from < first {
+                (to, next) = (from + 1, Next::Preferred(from));
+            } else if let Some((place, found)) =
+                (from..to).find_map(|place| Some((place, self.candidate_at(place - first)?)))
+            {
                 to = place + 1;
                 next = Next::Candidate(found);
             }
@@ -317,7 +344,7 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// The grip at a place, unless it certainly collides with a barrier or has another grade than those tried there. What
+    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than those tried there. What
     /// takes longest is looked at last.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(place) = place.checked_sub(self.listed.len()) else {
@@ -419,6 +446,7 @@ impl<'a> KnownGrips<'a> {
         } = match self.next() {
             Next::Exhausted => return TryResult::Exhausted,
             Next::AllExcluded => return TryResult::Rejected,
+            Next::Preferred(index) => return self.try_preferred(index, gripper),
             Next::Candidate(candidate) => candidate,
         };
         match self.recheck(entry, &solids, gripper) {
@@ -428,6 +456,24 @@ impl<'a> KnownGrips<'a> {
                 grasp,
             },
             None => TryResult::Rejected,
+        }
+    }
+
+    /// Tries a preferred hand.
+    fn try_preferred(&self, index: usize, gripper: &mut Gripper) -> TryResult {
+        let Some(around) = self.scene.surroundings() else {
+            return TryResult::Rejected;
+        };
+        let held = gripper
+            .hold_posed(&around.object, self.rig, &self.preferred[index], around.presented)
+            .and_then(|(grip, solids)| around.assess(&grip, &solids, gripper, &mut NoStopwatch));
+        match held {
+            Ok(grasp) => TryResult::Valid {
+                source: GraspSource::Preferred(index as u16),
+                value: grasp_value(&grasp),
+                grasp,
+            },
+            Err(_) => TryResult::Rejected,
         }
     }
 

@@ -6,7 +6,7 @@ use crate::{
         grasp::Grasp,
         grasp_type::Classification,
         object::GraspObject,
-        score::{Term, Values},
+        score::{RegionTerm, RegionValues, Term, Values},
     },
     physical::{barriers::Barriers, receiver::SUITABLE},
 };
@@ -29,8 +29,16 @@ const HELD_BY_HANDLE: f32 = 0.8;
 /// Distance of a handle's skin from other hands and obstacles, in metres, from which a hand can take it there.
 const ROOM: f32 = 0.012;
 
+/// Distance in metres within which the skin of a handle is found from its middle: thicker ones cannot be wrapped.
+const HANDLE_REACH: f32 = 0.06;
+
 /// Least share of a handle that has this room for it to be free.
 const FREE_SHARE: f32 = 0.4;
+
+/// Largest share of a preferred region's weight that contacts may miss, and largest share of weight to avoid under them, for what
+/// an owner would choose. Regions of less than the former weight decide between grasps but reject none.
+const MISSED: f32 = 0.5;
+const AVOIDED: f32 = 0.1;
 
 /// What a person would choose in one scene.
 #[derive(Clone, Copy, Debug)]
@@ -40,13 +48,14 @@ pub(super) struct Preference {
 }
 
 impl Preference {
-    /// The preference for an object among barriers.
+    /// The preference for an object among barriers. Handles that an owner would not have taken do not count.
     pub(super) fn of(object: &GraspObject, barriers: Barriers<'_>) -> Self {
         let parts = object.parts();
         let is_free = |distance: f32| {
             let free = parts.handles.main().filter(|handle| {
                 let around = handle.radius + distance;
                 !barriers.certainly_cover(handle.middle, around, around)
+                    && object.wish_near(handle.middle, HANDLE_REACH) >= MISSED
             });
             free.count() as f32 >= FREE_SHARE * parts.handles.main().count() as f32
         };
@@ -60,6 +69,7 @@ impl Preference {
         grasp.score.as_ref().is_none_or(|score| {
             reach(&score.values, &LEAST_AS_PRESENTED)
                 && self.is_met_by_grip(&score.values, grasp.classification, grasp.hangs)
+                && suits_owner(&score.regions)
         })
     }
 
@@ -82,6 +92,17 @@ impl Preference {
     fn has_handle(self, values: &Values) -> bool {
         !self.wants_handle || values[Term::OnHandle as usize] >= HELD_BY_HANDLE
     }
+}
+
+/// True if an object's owner would choose contacts that earn this by its regions.
+pub(super) fn suits_owner(values: &RegionValues) -> bool {
+    RegionTerm::ALL.into_iter().zip(values).all(|(term, earned)| {
+        let most = match term {
+            RegionTerm::OnPreferred => MISSED,
+            RegionTerm::OffAvoided => AVOIDED,
+        };
+        earned.is_none_or(|earned| (1.0 - earned.value) * earned.importance <= most)
+    })
 }
 
 /// True if no value is below its least.

@@ -88,7 +88,7 @@ impl Winner {
     fn index(&self) -> Option<u64> {
         match self.source {
             GraspSource::Attempt(index) => Some(index),
-            GraspSource::Atlas(_) | GraspSource::Recent => None,
+            GraspSource::Atlas(_) | GraspSource::Recent | GraspSource::Preferred(_) => None,
         }
     }
 }
@@ -279,7 +279,13 @@ impl<'a> Race<'a> {
         let mut winners = self.winners.lock().unwrap_or_else(PoisonError::into_inner);
         let rival = &mut winners.chosen;
         let is_preferred = match (self.settings.query.choice, source) {
-            (Choice::BestWithinBudget, _) => rival.as_ref().is_none_or(|best| value > best.value),
+            (_, GraspSource::Preferred(_)) => {
+                self.over.store(true, Ordering::Relaxed);
+                rival.as_ref().is_none_or(|rival| !rival.source.is_preferred())
+            }
+            (Choice::BestWithinBudget, _) => rival
+                .as_ref()
+                .is_none_or(|best| !best.source.is_preferred() && value > best.value),
             (Choice::FirstValid, _) if !is_chosen => {
                 match source {
                     GraspSource::Attempt(index) if is_reproducible => {
@@ -291,7 +297,7 @@ impl<'a> Race<'a> {
                         self.settles.fetch_min(nanos, Ordering::SeqCst);
                     }
                     // Known grips are tried from the best grade on, so they are not replaced.
-                    GraspSource::Atlas(_) | GraspSource::Recent => {}
+                    GraspSource::Atlas(_) | GraspSource::Recent | GraspSource::Preferred(_) => {}
                 }
                 winners.others.push(winner);
                 return;

@@ -106,6 +106,15 @@ pub enum GraspSource {
     Atlas(u16),
     /// A recent grip.
     Recent,
+    /// A preferred hand, by index.
+    Preferred(u16),
+}
+
+impl GraspSource {
+    /// True for a preferred hand, which precedes all others.
+    pub fn is_preferred(self) -> bool {
+        matches!(self, Self::Preferred(_))
+    }
 }
 
 #[cfg(test)]

@@ -160,8 +160,10 @@ impl<'a> Scene<'a> {
     /// True if the constraints admit a wrist pose, and the receiver's arm reaches it if it must.
     pub(super) fn admits_wrist(&self, object_from_wrist: Pose) -> bool {
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
+        let Task { holdout, rig, .. } = self.task;
         self.constraints.admits_wrist(object_from_wrist)
-            && presented.is_none_or(|presented| presented.receiver.reaches(self.task.rig, object_from_wrist))
+            && holdout.object.admits_wrist(rig.handedness, object_from_wrist)
+            && presented.is_none_or(|presented| presented.receiver.reaches(rig, object_from_wrist))
     }
 
     /// The input of Algorithm 1.

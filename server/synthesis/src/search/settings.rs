@@ -8,6 +8,7 @@ use crate::{
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
+        hand::HandPose,
         object::GraspObject,
         strategy::{Choice, Strategy, Validity},
     },
@@ -89,8 +90,17 @@ pub struct Known {
     /// Grips that earlier searches found, under the object's own friction. They are tried after those of the
     /// atlas; reproducible searches ignore them.
     pub recent: RecentGrips,
+    /// Hands in the object's frame that are tried before all other known grips, likewise.
+    pub preferred: Arc<[HandPose]>,
     /// Number of known grips to skip, from [`super::LookUp::NotFound`] for the same ones.
     pub tried: usize,
+}
+
+impl Known {
+    /// True if there are no grips to try.
+    pub fn is_empty(&self) -> bool {
+        self.atlas.is_none() && self.recent.is_empty() && self.preferred.is_empty()
+    }
 }
 
 /// How to run a search. By default, one worker until it finds a grasp.

@@ -13,3 +13,4 @@ mod oriented_box;
 mod sharp;
 mod solid_box;
 mod triangle_mesh;
+mod zone;

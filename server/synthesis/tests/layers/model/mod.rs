@@ -8,4 +8,5 @@ mod kinematics;
 mod openxr_frames;
 mod posed_skin;
 mod recorded_hands;
+mod regions;
 mod rig_description;

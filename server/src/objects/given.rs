@@ -1,0 +1,171 @@
+//! What a client knows of its object: surfaces not to touch, regions and grips, as given and as they are on the mesh.
+
+use std::sync::Arc;
+
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::stop::{Stop, Stopped},
+    geometry::mesh::TriangleMesh,
+    model::{
+        banned_grip::BannedGrip,
+        hand::HandPose,
+        object::GraspObject,
+        regions::{Region, Regions},
+    },
+};
+use prost::Message as _;
+
+use super::mesh_file::MeshFile;
+use crate::{
+    rigs::RigHand,
+    validate::{Field, Forbidden, GripFields, GripKind, PreferredGrip, RegionFields, RegionKind, Violations},
+};
+
+/// Triangles compared with the shapes of forbidden regions between two checks of the stop.
+const TRIANGLES_PER_CHECK: usize = 256;
+
+/// What a client knows of its object. By default nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Given {
+    /// The surfaces that must not be touched.
+    pub forbidden: Arc<Forbidden>,
+    /// The regions.
+    pub regions: Arc<[RegionFields]>,
+    /// The grips to try first, or not to answer.
+    pub grips: Arc<[GripFields]>,
+}
+
+/// What it means for the triangles of a mesh.
+#[derive(Debug)]
+pub(super) struct OnMesh {
+    /// The triangles that must not be touched, ascending.
+    pub forbidden: Vec<u32>,
+    /// What hands should take or leave.
+    pub regions: Regions,
+}
+
+impl Given {
+    /// Finds it on a mesh from a file. Adds a violation for each name and index that is not in the file.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn on_mesh(
+        &self,
+        mesh: &TriangleMesh,
+        file: &MeshFile,
+        violations: &mut Violations,
+        stop: Stop<'_>,
+    ) -> Result<OnMesh, Stopped> {
+        let Forbidden { groups, triangles } = &*self.forbidden;
+        let mut forbidden = file.named(Field::root("forbidden"), groups, triangles, violations);
+        let mut regions = Vec::new();
+        for (place, region) in self.regions.iter().enumerate() {
+            let field = Field::root("regions").at(place);
+            let v1::Region {
+                groups, triangles, ..
+            } = &region.given;
+            let named = file.named(field, groups, triangles, violations);
+            match region.kind {
+                RegionKind::Forbidden => {
+                    forbidden.extend(named);
+                    for triangle in 0..mesh.triangles().len() {
+                        stop.check_every(TRIANGLES_PER_CHECK, triangle)?;
+                        let corners = mesh.corners(triangle);
+                        if region.zones.iter().any(|zone| zone.meets(corners)) {
+                            forbidden.push(triangle as u32);
+                        }
+                    }
+                }
+                RegionKind::Weighted(wish, weight) => regions.push(Region {
+                    wish,
+                    weight,
+                    triangles: named,
+                    zones: region.zones.clone(),
+                }),
+            }
+        }
+        forbidden.sort_unstable();
+        forbidden.dedup();
+        Ok(OnMesh {
+            forbidden,
+            regions: Regions::new(&regions, mesh.triangles().len()),
+        })
+    }
+
+    /// The grips that are not to be answered.
+    pub(super) fn banned(&self) -> Vec<BannedGrip> {
+        let kinds = self.grips.iter().filter_map(|grip| grip.kind);
+        kinds
+            .filter_map(|kind| match kind {
+                GripKind::Banned(banned) => Some(banned),
+                GripKind::Preferred(_) => None,
+            })
+            .collect()
+    }
+
+    /// The grips to try first with a hand, by name.
+    pub(crate) fn preferred(&self, hand: &RigHand) -> Vec<(String, HandPose)> {
+        let rig = &hand.hand.rig;
+        let hundredths = (100.0 * hand.scale).round() as u16;
+        let grips = self.grips.iter();
+        grips
+            .filter_map(|grip| match grip.kind {
+                Some(GripKind::Preferred(preferred))
+                    if preferred.handedness == rig.handedness
+                        && preferred.hundredths == hundredths
+                        && grip.given.rig == rig.name =>
+                {
+                    Some((grip.given.name.clone(), preferred.pose(rig)))
+                }
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// The same about an object at another size.
+    pub(super) fn at_scale(&self, scale: f32, object: &GraspObject) -> Self {
+        let moved = |grip: &GripFields| GripFields {
+            kind: grip.kind.map(|kind| match kind {
+                GripKind::Preferred(preferred) => GripKind::Preferred(PreferredGrip {
+                    object_from_wrist: object.wrist_at(scale, preferred.object_from_wrist),
+                    ..preferred
+                }),
+                // The object at its size knows them.
+                GripKind::Banned(banned) => GripKind::Banned(banned),
+            }),
+            ..grip.clone()
+        };
+        Self {
+            grips: self.grips.iter().map(moved).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// The grips as messages.
+    pub(crate) fn grips_to_wire(&self) -> Vec<v1::KnownGrip> {
+        self.grips.iter().map(|grip| grip.given.clone()).collect()
+    }
+
+    /// The regions as messages.
+    pub(crate) fn regions_to_wire(&self) -> Vec<v1::Region> {
+        self.regions.iter().map(|region| region.given.clone()).collect()
+    }
+
+    /// Its estimated size in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        let Forbidden { groups, triangles } = &*self.forbidden;
+        let of_groups: usize = groups.iter().map(|name| size_of_val(name) + name.len()).sum();
+        let of_regions = self.regions.iter().map(|region| {
+            let of_zones: usize = region
+                .zones
+                .iter()
+                .map(grasp_synthesis::geometry::zone::Zone::bytes)
+                .sum();
+            // Numbers take up to four times as many bytes in memory as in a message.
+            size_of_val(region) + 4 * region.given.encoded_len() + of_zones
+        });
+        let of_grips = self.grips.iter();
+        let of_grips = of_grips.map(|grip| size_of_val(grip) + 4 * grip.given.encoded_len());
+        of_groups + size_of_val(triangles.as_slice()) + of_regions.sum::<usize>() + of_grips.sum::<usize>()
+    }
+}

@@ -1,0 +1,148 @@
+//! Parts of space that mark parts of a surface.
+
+use glam::Vec3;
+
+use super::{
+    Segment,
+    closest::closest_on_triangle,
+    crossing::{ExactCrossing, ExactQuery},
+    oriented_box::OrientedBox,
+    tapered_capsule::TaperedCapsule,
+};
+
+/// A part of space in the object's frame, with its boundary.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Zone {
+    /// All points within a distance of one.
+    Ball {
+        /// The centre, in metres.
+        centre: Vec3,
+        /// The radius in metres; more than 0.
+        radius: f32,
+    },
+    /// The inside of a box.
+    Box(OrientedBox),
+    /// One side of a plane.
+    HalfSpace {
+        /// A point of the plane, in metres.
+        point: Vec3,
+        /// Unit vector from the plane into the half-space.
+        normal: Vec3,
+    },
+    /// All points within a distance of a line of segments.
+    Tube {
+        /// The ends of the segments, in metres; at least two.
+        points: Vec<Vec3>,
+        /// The distance in metres; more than 0.
+        radius: f32,
+    },
+}
+
+impl Zone {
+    /// The same zone, `scale` times as large about the origin.
+    #[must_use]
+    pub fn scaled(&self, scale: f32) -> Self {
+        match self {
+            Self::Ball { centre, radius } => Self::Ball {
+                centre: *centre * scale,
+                radius: radius * scale,
+            },
+            Self::Box(of) => Self::Box(of.scaled(scale)),
+            Self::HalfSpace { point, normal } => Self::HalfSpace {
+                point: *point * scale,
+                normal: *normal,
+            },
+            Self::Tube { points, radius } => Self::Tube {
+                points: points.iter().map(|&point| point * scale).collect(),
+                radius: radius * scale,
+            },
+        }
+    }
+
+    /// True if a point is in the zone.
+    pub fn contains(&self, point: Vec3) -> bool {
+        match self {
+            Self::Ball { centre, radius } => point.distance_squared(*centre) <= radius * radius,
+            Self::Box(of) => {
+                let local = of.object_from_box.inverse().transform_point(point);
+                local.abs().cmple(of.half_extents).all()
+            }
+            Self::HalfSpace { point: on, normal } => (point - on).dot(*normal) >= 0.0,
+            Self::Tube { points, radius } => points.windows(2).any(|ends| {
+                let along = ends[1] - ends[0];
+                let share = (point - ends[0]).dot(along) / along.length_squared().max(f32::MIN_POSITIVE);
+                let nearest = ends[0] + along * share.clamp(0.0, 1.0);
+                point.distance_squared(nearest) <= radius * radius
+            }),
+        }
+    }
+
+    /// True if a triangle has a point in the zone.
+    pub fn meets(&self, corners: [Vec3; 3]) -> bool {
+        match self {
+            Self::Ball { centre, radius } => distance(corners, *centre) <= *radius,
+            Self::Box(of) => {
+                let box_from_object = of.object_from_box.inverse();
+                let local = corners.map(|corner| box_from_object.transform_point(corner));
+                reaches_into_box(local, of.half_extents)
+            }
+            Self::HalfSpace { .. } => corners.iter().any(|&corner| self.contains(corner)),
+            Self::Tube { points, radius } => points
+                .windows(2)
+                .any(|ends| distance_of_segment(corners, Segment::new(ends[0], ends[1])) <= *radius),
+        }
+    }
+
+    /// Memory use in bytes.
+    pub fn bytes(&self) -> usize {
+        let points = match self {
+            Self::Tube { points, .. } => points.as_slice(),
+            _ => &[],
+        };
+        size_of::<Self>() + size_of_val(points)
+    }
+}
+
+/// The distance of a point from a triangle, in metres.
+fn distance(corners: [Vec3; 3], point: Vec3) -> f32 {
+    let point = point.as_dvec3();
+    closest_on_triangle(corners, point).distance(point) as f32
+}
+
+/// The distance of a segment from a triangle, in metres: 0 where they cross, or else at an end of the segment or an edge.
+fn distance_of_segment(corners: [Vec3; 3], segment: Segment) -> f32 {
+    let crossing = ExactQuery::new(segment).test(corners);
+    if !matches!(crossing, ExactCrossing::Miss | ExactCrossing::Graze(None)) {
+        return 0.0;
+    }
+    let line = |start, end| TaperedCapsule::new(start, end, 0.0, 0.0);
+    let axis = line(segment.start, segment.end);
+    let [a, b, c] = corners;
+    let of_edges = [(a, b), (b, c), (c, a)].map(|(start, end)| line(start, end).distance(&axis));
+    let of_ends = [segment.start, segment.end].map(|end| distance(corners, end));
+    of_edges.into_iter().chain(of_ends).fold(f32::INFINITY, f32::min)
+}
+
+/// True if something of a triangle is left when it is clipped by the six faces of a box around the origin (I. Sutherland and
+/// G. Hodgman, "Reentrant Polygon Clipping", 1974).
+fn reaches_into_box(corners: [Vec3; 3], half_extents: Vec3) -> bool {
+    let mut polygon = corners.to_vec();
+    for axis in 0..3 {
+        for side in [1.0, -1.0] {
+            let beyond = |point: Vec3| side * point[axis] - half_extents[axis];
+            let mut clipped = Vec::with_capacity(polygon.len() + 1);
+            for (place, &from) in polygon.iter().enumerate() {
+                let to = polygon[(place + 1) % polygon.len()];
+                let (before, after) = (beyond(from), beyond(to));
+                if before <= 0.0 {
+                    clipped.push(from);
+                }
+                if (before <= 0.0) != (after <= 0.0) {
+                    clipped.push(from.lerp(to, before / (before - after)));
+                }
+            }
+            polygon = clipped;
+        }
+    }
+    !polygon.is_empty()
+}

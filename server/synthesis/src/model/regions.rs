@@ -1,0 +1,160 @@
+//! Parts of an object that hands should take or leave, as its owner knows them.
+
+use super::{
+    grasp::Contact,
+    score::{RegionTerm, RegionValue, RegionValues},
+};
+use crate::geometry::zone::Zone;
+use glam::Vec3;
+
+/// What a region asks of hands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish {
+    /// To take the object elsewhere.
+    Avoid,
+    /// To take it there.
+    Prefer,
+}
+
+/// A part of an object's surface: triangles, and what of the surface is in some zones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// What it asks of hands.
+    pub wish: Wish,
+    /// How much it counts; more than 0, at most 1.
+    pub weight: f32,
+    /// Indices of triangles. Those that do not exist are ignored.
+    pub triangles: Vec<u32>,
+    /// Zones in the object's frame.
+    pub zones: Vec<Zone>,
+}
+
+/// The regions of an object. By default none.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Regions {
+    preferred: Marked,
+    avoided: Marked,
+}
+
+/// How much the places of a surface count for one of the wishes.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Marked {
+    /// The weight of each triangle; empty if all are 0.
+    triangles: Vec<f32>,
+    zones: Vec<(Zone, f32)>,
+    /// The largest weight; 0 without regions.
+    greatest: f32,
+}
+
+impl Regions {
+    /// Prepares the regions of a surface of so many triangles. Where several of the same wish overlap, the one that counts most
+    /// decides.
+    pub fn new(regions: &[Region], triangles: usize) -> Self {
+        let mut all = Self::default();
+        for region in regions {
+            let marked = match region.wish {
+                Wish::Avoid => &mut all.avoided,
+                Wish::Prefer => &mut all.preferred,
+            };
+            marked.add(region, triangles);
+        }
+        all
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The same regions of the object at another size.
+    #[must_use]
+    pub fn scaled(&self, scale: f32) -> Self {
+        Self {
+            preferred: self.preferred.scaled(scale),
+            avoided: self.avoided.scaled(scale),
+        }
+    }
+
+    /// How much a place of the surface is wanted, from 0 to 1: 1 where nothing better is asked for.
+    pub fn wish_at(&self, triangle: u32, position: Vec3) -> f32 {
+        let missed = self.preferred.greatest - self.preferred.weight_at(triangle, position);
+        (1.0 - missed) * (1.0 - self.avoided.weight_at(triangle, position))
+    }
+
+    /// The terms of the score that contacts earn; none without regions. The share of contacts on preferred regions, and off those
+    /// to avoid, each counted by its weight relative to the largest.
+    pub fn values(&self, contacts: &[Contact]) -> RegionValues {
+        RegionTerm::ALL.map(|term| {
+            let marked = match term {
+                RegionTerm::OnPreferred => &self.preferred,
+                RegionTerm::OffAvoided => &self.avoided,
+            };
+            (marked.greatest > 0.0).then(|| {
+                let on = marked.share(contacts) / marked.greatest;
+                RegionValue {
+                    value: match term {
+                        RegionTerm::OnPreferred => on,
+                        RegionTerm::OffAvoided => 1.0 - on,
+                    },
+                    importance: marked.greatest,
+                }
+            })
+        })
+    }
+
+    /// Memory use in bytes.
+    pub fn bytes(&self) -> usize {
+        self.preferred.bytes() + self.avoided.bytes()
+    }
+}
+
+impl Marked {
+    fn add(&mut self, region: &Region, triangles: usize) {
+        if !region.triangles.is_empty() {
+            self.triangles.resize(triangles, 0.0);
+        }
+        for &triangle in &region.triangles {
+            if let Some(weight) = self.triangles.get_mut(triangle as usize) {
+                *weight = weight.max(region.weight);
+            }
+        }
+        let zones = region.zones.iter().cloned();
+        self.zones.extend(zones.map(|zone| (zone, region.weight)));
+        self.greatest = self.greatest.max(region.weight);
+    }
+
+    fn scaled(&self, scale: f32) -> Self {
+        Self {
+            triangles: self.triangles.clone(),
+            zones: self
+                .zones
+                .iter()
+                .map(|(zone, weight)| (zone.scaled(scale), *weight))
+                .collect(),
+            greatest: self.greatest,
+        }
+    }
+
+    /// How much a place counts, from 0 to the largest weight.
+    fn weight_at(&self, triangle: u32, position: Vec3) -> f32 {
+        let of_triangle = self.triangles.get(triangle as usize).copied().unwrap_or_default();
+        self.zones.iter().fold(of_triangle, |most, (zone, weight)| {
+            if *weight > most && zone.contains(position) {
+                *weight
+            } else {
+                most
+            }
+        })
+    }
+
+    /// The mean weight of contacts; 0 without any.
+    fn share(&self, contacts: &[Contact]) -> f32 {
+        let weights = contacts.iter().map(|at| self.weight_at(at.triangle, at.position));
+        weights.sum::<f32>() / contacts.len().max(1) as f32
+    }
+
+    fn bytes(&self) -> usize {
+        let of_zones: usize = self.zones.iter().map(|(zone, _)| zone.bytes()).sum();
+        size_of_val(self.triangles.as_slice()) + of_zones
+    }
+}
