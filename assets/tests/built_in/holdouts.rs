@@ -216,7 +216,7 @@ fn some_givers_cover_about_half_of_the_object() {
     for built_in in holdouts() {
         let held = built_in.to_holdout().expect("the built-in holdout is sound");
         let giver = held.presenting_hand.as_ref().expect("a giver holds it");
-        let giver = giver.surface.as_ref().expect("it has a skin");
+        let giver = giver.surface().expect("it has a skin");
         let mesh = surface(built_in).mesh();
         let (mut all, mut covered) = (0.0, 0.0);
         for triangle in 0..mesh.triangles().len() {

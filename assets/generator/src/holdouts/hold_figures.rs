@@ -71,7 +71,7 @@ pub(crate) fn posed_skin(hand: &Hand, pose: &HandPose) -> Option<MeshBvh> {
     let joints = HandJoints::of_pose(&hand.rig, pose);
     PresentingHand::new(&hand.skin, joints)
         .ok()
-        .and_then(|presenting| presenting.surface)
+        .and_then(|presenting| presenting.skin)
 }
 
 /// How deep skin and object overlap, in metres: the deepest skin vertex in the object, and the deepest surface point

@@ -59,7 +59,7 @@ fn line(holdout: &BuiltInHoldout, giver: &Hand, held: &Holdout) -> String {
     let skin = held
         .presenting_hand
         .as_ref()
-        .and_then(|hand| hand.surface.as_ref())
+        .and_then(|hand| hand.surface())
         .expect("a giver with a skin holds every holdout");
     let pose = HandPose {
         frame_from_wrist: holdout.world_from_object.inverse() * holdout.world_from_giver_wrist,

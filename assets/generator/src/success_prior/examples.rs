@@ -117,6 +117,7 @@ fn present(holding: &[HandPose], rig: &Rig, stream: &mut AttemptStream, by_giver
     Presented {
         giver,
         other_hands: Vec::new(),
+        meshes: Vec::new(),
         obstacles: Vec::new(),
         giver_palm: None,
         receiver: Receiver::ANYWHERE,

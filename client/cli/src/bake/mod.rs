@@ -26,7 +26,7 @@ use results::Row;
 /// what else a folder of objects says (see docker/README.md). Without it the file is in metres, and the mass is the volume times
 /// a density: that of the material which groups, objects, nodes or materials of the file are named after, or 400 kg/m³.
 ///
-/// May be interrupted and started again: what is registered already is not registered anew, and a server that saves its objects
+/// May be interrupted and started again: what is registered already is not registered again, and a server that saves its objects
 /// goes on with its atlases where it stopped, even after a restart.
 ///
 /// Exit code 4 if objects were rejected; the table says why.

@@ -95,7 +95,7 @@ async fn a_folder_is_registered_once() {
     );
     server.stop().await;
 
-    // After a restart, nothing is created anew, and a changed file is not taken for the old one.
+    // After a restart, nothing is created again, and a changed file is not taken for the old one.
     let server = Server::start(&store).await;
     fs::write(folder.join("Tea Tin.toml"), "mass_kg = 0.3\n").unwrap();
     fs::remove_file(folder.join("empty.obj")).unwrap();

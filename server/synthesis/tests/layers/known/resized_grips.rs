@@ -38,7 +38,7 @@ fn a_resized_object_is_what_its_scaled_mesh_makes() {
             for (new, old) in mesh.positions().iter().zip(original.surface.mesh().positions()) {
                 assert!(new.distance(*old * scale) <= 1e-6 * scale);
             }
-            // The box is as tight as one that is fitted anew.
+            // The box is as tight as one that is fitted again.
             let volume = |of: &OrientedBox| of.half_extents.element_product();
             let fitted = OrientedBox::around(mesh);
             assert!(
