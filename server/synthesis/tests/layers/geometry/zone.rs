@@ -20,7 +20,7 @@ fn vector(stream: &mut AttemptStream) -> Vec3 {
 /// Zones of every kind.
 fn zones(stream: &mut AttemptStream) -> [Zone; 4] {
     let turn = Pose::from_orientation(glam::Quat::from_scaled_axis(vector(stream) * 3.0));
-    let mut radius = || stream.between(0.05, 0.6);
+    let mut radius = || stream.between(0.2, 1.2);
     let [ball, tube, x, y, z] = [radius(), radius(), radius(), radius(), radius()];
     [
         Zone::Ball {
