@@ -96,7 +96,7 @@ def test_default_memory_matches_the_page():
         + value["cache_bytes"]
         + value["maximum_uploads"] * upload
         + 20 * mib * value["builder_threads"]
-        + 2 * mib * value["maximum_searches"]
+        + 4 * mib * value["maximum_searches"]
         + mib * value["maximum_rigs"]
         + value["maximum_unread_bytes"]
         + 2 * value["maximum_upload_bytes"]

@@ -6,11 +6,11 @@ from conftest import grasp, limits_memory, skip
 
 # The settings that docker/README.md gives for a container of 256 MiB.
 SMALL = {
-    "GRASP_CACHE_BYTES": str(40 << 20),
+    "GRASP_CACHE_BYTES": str(48 << 20),
     "GRASP_MAXIMUM_UPLOADS": "1",
     "GRASP_MAXIMUM_UPLOAD_BYTES": str(1 << 20),
     "GRASP_MAXIMUM_WATCHERS": "4",
-    "GRASP_MAXIMUM_SEARCHES": "4",
+    "GRASP_MAXIMUM_SEARCHES": "2",
     "GRASP_MAXIMUM_CONNECTIONS": "100",
     "GRASP_MAXIMUM_UNREAD_BYTES": str(4 << 20),
     "GRASP_MAXIMUM_RIGS": "2",
