@@ -15,6 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "grasp/v1/known_grip.proto",
         "grasp/v1/object_service.proto",
         "grasp/v1/grasp_type.proto",
+        "grasp/v1/grasp.proto",
         "grasp/v1/grasp_service.proto",
         "grasp/v1/hand_rig_service.proto",
     ];

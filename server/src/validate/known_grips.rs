@@ -1,7 +1,5 @@
 //! Checks the grips that a client knows of its object.
 
-use std::collections::HashSet;
-
 use grasp_assets::hands::{RIG_NAMES, hand};
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -18,9 +16,9 @@ use grasp_synthesis::{
 
 use super::{
     Field, Violations,
+    given_names::GivenNames,
     hand::{checked_digits, hand_scale, required_handedness},
     pose, quoted,
-    regions::check_name,
     rig::rig_id_of,
 };
 use crate::rigs::COLLECTION;
@@ -100,20 +98,11 @@ pub(super) fn known_grips(
         );
         return Vec::new();
     }
-    let mut names = HashSet::new();
+    let mut names = GivenNames::of("grip");
     let mut checked = Vec::with_capacity(given.len());
     for (place, given) in given.into_iter().enumerate() {
         let field = field.at(place);
-        check_name(field.child("name"), &given.name, violations);
-        if !names.insert(given.name.clone()) {
-            violations.add(
-                field.child("name"),
-                format_args!(
-                    "is {} again; every grip needs a name of its own",
-                    quoted(&given.name)
-                ),
-            );
-        }
+        names.check(field.child("name"), &given.name, violations);
         checked.push(GripFields {
             kind: kind(field, &given, violations),
             given,

@@ -6,6 +6,7 @@
 
 mod constraints;
 mod find_grasp;
+mod given_names;
 mod hand;
 mod known_grips;
 mod labels;

@@ -1,7 +1,5 @@
 //! Checks the regions of an object, but for what only its file tells.
 
-use std::collections::HashSet;
-
 use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -9,7 +7,9 @@ use grasp_synthesis::{
     model::regions::Wish,
 };
 
-use super::{FARTHEST, Field, Violations, direction, finite, obstacles::required, point, pose, quoted};
+use super::{
+    FARTHEST, Field, Violations, direction, finite, given_names::GivenNames, obstacles::required, point, pose,
+};
 
 /// Largest number of regions of an object.
 const MOST_REGIONS: usize = 32;
@@ -23,9 +23,6 @@ const MOST_TRIANGLES: usize = 20_000;
 
 /// Largest number of groups named in all of them, likewise.
 const MOST_GROUPS: usize = 256;
-
-/// Largest number of characters of a name.
-const LONGEST_NAME: usize = 63;
 
 /// A checked region, as a client gave it.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,37 +69,14 @@ pub(super) fn regions(
             return Vec::new();
         }
     }
-    let mut names = HashSet::new();
+    let mut names = GivenNames::of("region");
     let mut checked = Vec::with_capacity(given.len());
     for (place, given) in given.into_iter().enumerate() {
         let field = field.at(place);
-        check_name(field.child("name"), &given.name, violations);
-        if !names.insert(given.name.clone()) {
-            violations.add(
-                field.child("name"),
-                format_args!(
-                    "is {} again; every region needs a name of its own",
-                    quoted(&given.name)
-                ),
-            );
-        }
+        names.check(field.child("name"), &given.name, violations);
         checked.push(region(field, given, violations));
     }
     checked
-}
-
-/// Checks a name that a client gives to what it knows of an object.
-pub(super) fn check_name(field: Field<'_>, name: &str, violations: &mut Violations) {
-    let length = name.chars().count();
-    if !(1..=LONGEST_NAME).contains(&length) || name.chars().any(char::is_control) {
-        violations.add(
-            field,
-            format_args!(
-                "is {}; it must be 1 to {LONGEST_NAME} characters, without control characters",
-                quoted(name)
-            ),
-        );
-    }
 }
 
 /// Number of shapes as which one counts.

@@ -2,6 +2,7 @@
 #![cfg(target_os = "linux")]
 
 mod process;
+mod saved;
 
 use std::{
     fs,

@@ -1,12 +1,6 @@
 //! Objects that are saved outlast the server, however it ends, and their time in memory.
 
-use std::{
-    env, fs,
-    io::{BufRead as _, BufReader},
-    path::Path,
-    process::{Child, Command, Stdio},
-    time::Duration,
-};
+use std::{fs, path::Path, time::Duration};
 
 use grasp_proto::v1::{self, get_mesh_response::Part, object_service_client::ObjectServiceClient};
 use grasp_server::{Config, ServeError, Server, config::StorePlace};
@@ -14,12 +8,6 @@ use grasp_tests::TestServer;
 use tonic::{Code, Status, transport::Channel};
 
 use crate::fixtures::{BOX_OBJ, Folder, bounded, box_request, reason, seconds, sha256};
-
-/// The variable that has the folder of a server in a process of its own.
-const FOLDER_VARIABLE: &str = "GRASP_TEST_SAVED_OBJECTS";
-
-/// What precedes the address that such a server prints.
-const ADDRESS: &str = "address ";
 
 fn save_in(folder: &Path) -> impl FnOnce(&mut Config) {
     let place = StorePlace::Folder(folder.to_owned());
@@ -287,124 +275,5 @@ async fn a_second_server_does_not_start_on_the_same_folder() {
         panic!("two servers would overwrite each other's objects");
     };
     assert!(error.to_string().contains("another server"), "{error}");
-    server.stop().await;
-}
-
-/// A server in a process of its own; killed when dropped.
-struct ServerProcess {
-    child: Child,
-    endpoint: String,
-}
-
-impl ServerProcess {
-    fn start(folder: &Path) -> Self {
-        let program = env::current_exe().expect("the test has a path");
-        let mut child = Command::new(program)
-            .args([
-                "saved_objects::serves_in_a_process",
-                "--exact",
-                "--ignored",
-                "--nocapture",
-            ])
-            .env(FOLDER_VARIABLE, folder)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the test can be started again");
-        let output = child.stdout.take().expect("its output is a pipe");
-        let mut lines = BufReader::new(output).lines().map_while(Result::ok);
-        let address = lines.find_map(|line| line.split_once(ADDRESS).map(|(_, address)| address.to_owned()));
-        Self {
-            child,
-            endpoint: address.expect("it prints its address"),
-        }
-    }
-
-    fn kill(&mut self) {
-        // SIGKILL on Unix: the process has no time for anything. Fails only if it has ended already.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-impl Drop for ServerProcess {
-    fn drop(&mut self) {
-        self.kill();
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-#[ignore = "is the process of another test"]
-async fn serves_in_a_process() {
-    let Some(folder) = env::var_os(FOLDER_VARIABLE) else {
-        return;
-    };
-    let server = TestServer::start_with(save_in(Path::new(&folder))).await;
-    println!("\n{ADDRESS}{}", server.endpoint());
-    // Until the other process ends.
-    let wait = || std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
-    tokio::task::spawn_blocking(wait).await.unwrap().unwrap();
-    server.stop().await;
-}
-
-/// A box with a mesh of its own.
-fn numbered(round: u64, task: usize, number: usize) -> v1::CreateObjectRequest {
-    let id = format!("r{round}-{task}-{number}");
-    v1::CreateObjectRequest {
-        mesh: format!("{BOX_OBJ}# {id}\n").into_bytes(),
-        ..box_request(&id)
-    }
-}
-
-/// Creates objects one after the other until the server is gone; returns those that it confirmed.
-async fn create_until_gone(endpoint: String, round: u64, task: usize) -> Vec<v1::Object> {
-    let mut client = ObjectServiceClient::connect(endpoint)
-        .await
-        .expect("the server accepts connections");
-    let mut confirmed = Vec::new();
-    loop {
-        let request = numbered(round, task, confirmed.len());
-        match client.create_object(request).await {
-            Ok(answer) => confirmed.extend(answer.into_inner().object),
-            Err(_) => return confirmed,
-        }
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn killing_the_server_leaves_every_object_whole_or_absent() {
-    let folder = Folder::absent("saved-killed");
-    let mut confirmed: Vec<v1::Object> = Vec::new();
-    for round in 0..3 {
-        let path = folder.path().to_owned();
-        let mut process = tokio::task::spawn_blocking(move || ServerProcess::start(&path))
-            .await
-            .unwrap();
-        let tasks = [0, 1, 2].map(|task| {
-            let endpoint = process.endpoint.clone();
-            tokio::spawn(create_until_gone(endpoint, round, task))
-        });
-        tokio::time::sleep(Duration::from_millis(400 + 137 * round)).await;
-        process.kill();
-        for task in tasks {
-            confirmed.extend(bounded("the end of a client", task).await.unwrap());
-        }
-    }
-    assert!(
-        confirmed.len() > 3,
-        "the server was killed before it did anything"
-    );
-    let server = start(&folder, 10).await;
-    let mut found = all(&server).await;
-    found.retain(|object| !object.built_in);
-    for object in &confirmed {
-        assert!(found.contains(object), "{} is lost or changed", object.name);
-    }
-    let mut client = server.objects().await;
-    for object in &found {
-        let (bytes, hash) = mesh(&mut client, &object.name).await.expect("it is whole");
-        assert_eq!(sha256(&bytes), hash, "{}", object.name);
-    }
-    assert_eq!(fs::read_dir(folder.path().join("damaged")).unwrap().count(), 0);
     server.stop().await;
 }

@@ -1,0 +1,153 @@
+//! A server that is killed while it saves objects.
+
+use std::{fs, path::PathBuf, time::Duration};
+
+use grasp_proto::v1::{self, get_mesh_response::Part, object_service_client::ObjectServiceClient};
+use sha2::{Digest as _, Sha256};
+use tonic::{Status, transport::Channel};
+
+use crate::process::Running;
+
+const BOX: &str = "\
+v -0.02 -0.015 -0.01
+v 0.02 -0.015 -0.01
+v 0.02 0.015 -0.01
+v -0.02 0.015 -0.01
+v -0.02 -0.015 0.01
+v 0.02 -0.015 0.01
+v 0.02 0.015 0.01
+v -0.02 0.015 0.01
+f 1 4 3 2
+f 5 6 7 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+";
+
+/// How long a client may take to notice that its server is gone.
+const HANGS_AFTER: Duration = Duration::from_secs(30);
+
+/// A folder that is removed at the end.
+struct Folder(PathBuf);
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn start(folder: &Folder) -> Running {
+    let folder = folder.0.to_str().expect("the path is text");
+    Running::start(&[
+        ("GRASP_LISTEN", "127.0.0.1:0"),
+        ("GRASP_STORE", folder),
+        ("GRASP_BUILDER_THREADS", "0"),
+    ])
+}
+
+async fn client(server: &Running) -> ObjectServiceClient<Channel> {
+    ObjectServiceClient::connect(format!("http://{}", server.address()))
+        .await
+        .expect("the server accepts connections")
+}
+
+/// A box with a mesh of its own.
+fn numbered(round: u64, task: usize, number: usize) -> v1::CreateObjectRequest {
+    let object_id = format!("r{round}-{task}-{number}");
+    v1::CreateObjectRequest {
+        mesh: format!("{BOX}# {object_id}\n").into_bytes(),
+        object_id,
+        mass_kg: 0.1,
+        ..Default::default()
+    }
+}
+
+/// Creates objects one after the other until the server is gone; returns those that it confirmed.
+async fn create_until_gone(
+    mut client: ObjectServiceClient<Channel>,
+    round: u64,
+    task: usize,
+) -> Vec<v1::Object> {
+    let mut confirmed = Vec::new();
+    while let Ok(answer) = client.create_object(numbered(round, task, confirmed.len())).await {
+        confirmed.extend(answer.into_inner().object);
+    }
+    confirmed
+}
+
+/// The mesh of an object, and the SHA-256 that its header has.
+async fn mesh(client: &mut ObjectServiceClient<Channel>, name: String) -> Result<(Vec<u8>, String), Status> {
+    let mut parts = client.get_mesh(v1::GetMeshRequest { name }).await?.into_inner();
+    let (mut bytes, mut hash) = (Vec::new(), String::new());
+    while let Some(answer) = parts.message().await? {
+        match answer.part {
+            Some(Part::Header(header)) => hash = header.sha256,
+            Some(Part::Piece(piece)) => bytes.extend(piece),
+            None => panic!("a message without its part"),
+        }
+    }
+    Ok((bytes, hash))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn killing_the_server_leaves_every_object_whole_or_absent() {
+    let folder = Folder(std::env::temp_dir().join(format!("grasp-killed-{}", std::process::id())));
+    let mut confirmed: Vec<v1::Object> = Vec::new();
+    for round in 0..3 {
+        let server = start(&folder);
+        let mut tasks = Vec::new();
+        for task in 0..3 {
+            tasks.push(tokio::spawn(create_until_gone(
+                client(&server).await,
+                round,
+                task,
+            )));
+        }
+        tokio::time::sleep(Duration::from_millis(400 + 137 * round)).await;
+        // SIGKILL: the process has no time for anything.
+        drop(server);
+        for task in tasks {
+            let ended = tokio::time::timeout(HANGS_AFTER, task).await;
+            confirmed.extend(ended.expect("the client noticed").expect("it did not panic"));
+        }
+    }
+    assert!(
+        confirmed.len() > 3,
+        "the server was killed before it did anything"
+    );
+    let server = start(&folder);
+    let mut client = client(&server).await;
+    let all = v1::ListObjectsRequest {
+        page_size: 1000,
+        ..Default::default()
+    };
+    let listed = client
+        .list_objects(all)
+        .await
+        .expect("it lists them")
+        .into_inner();
+    let found: Vec<v1::Object> = listed
+        .objects
+        .into_iter()
+        .filter(|object| !object.built_in)
+        .collect();
+    for object in &confirmed {
+        assert!(found.contains(object), "{} is lost or changed", object.name);
+    }
+    for object in &found {
+        let (bytes, hash) = mesh(&mut client, object.name.clone()).await.expect("it is whole");
+        let in_header = hash.as_bytes().as_chunks::<2>().0.iter().map(|digits| {
+            let digits = str::from_utf8(digits).expect("digits are text");
+            u8::from_str_radix(digits, 16).expect("they are hexadecimal")
+        });
+        assert!(in_header.eq(Sha256::digest(&bytes)), "{}", object.name);
+    }
+    assert_eq!(
+        fs::read_dir(folder.0.join("damaged"))
+            .expect("it is there")
+            .count(),
+        0
+    );
+    server.terminate();
+}
