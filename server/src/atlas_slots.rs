@@ -103,6 +103,26 @@ impl AtlasSlots {
         });
     }
 
+    /// Copies of all slots with their hands.
+    pub(crate) fn all(&self) -> Vec<(Arc<Hand>, Slot)> {
+        self.lock().clone()
+    }
+
+    /// Fills a hand's slot with that of another object of the same grips, but for the recent ones. Growth of that object's atlas ends
+    /// with the object, so what is not complete is absent here until it is requested.
+    pub(crate) fn take_over(&self, hand: &Arc<Hand>, slot: Slot) {
+        self.with(hand, |own| {
+            *own = Slot {
+                state: match slot.state {
+                    BuildState::Growing => BuildState::Absent,
+                    state => state,
+                },
+                recent: RecentGrips::default(),
+                ..slot
+            };
+        });
+    }
+
     /// Ends the growth of an atlas.
     pub(crate) fn end(&self, hand: &Arc<Hand>, state: BuildState) {
         self.with(hand, |slot| slot.state = state);

@@ -11,6 +11,7 @@ use grasp_synthesis::known::growth::Grown;
 
 use super::hand_label;
 use crate::{
+    atlas_slots::Slot,
     demand::Demand,
     objects::{StoredObject, store::ObjectStore},
 };
@@ -53,6 +54,15 @@ impl LoadedAtlases {
             owners.push((Arc::downgrade(object), Arc::clone(hand)));
         }
         fits
+    }
+
+    /// Gives a changed object what is known of the object that it replaces.
+    pub(super) fn hand_over(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, slot: Slot) {
+        let mut owners = self.owners();
+        if slot.grown.is_some() {
+            owners.push((Arc::downgrade(object), Arc::clone(hand)));
+        }
+        object.atlas_slots.take_over(hand, slot);
     }
 
     /// True if an atlas of so many bytes would fit, after evicting others that are asked for less.

@@ -102,6 +102,17 @@ impl Atlases {
         }
     }
 
+    /// As [`Self::register`] for an object that was changed. A change that grips do not depend on, such as of regions, leaves it its
+    /// atlases.
+    pub(crate) fn register_changed(&self, before: &StoredObject, object: &Arc<StoredObject>) {
+        if self.0.are_running() && object.has_grips_of(before) {
+            for (hand, slot) in before.atlas_slots.all() {
+                self.0.loaded.hand_over(object, &hand, slot);
+            }
+        }
+        self.register(object);
+    }
+
     /// The known grips of an object and one or two hands; requests the atlases that are absent.
     pub(crate) fn get(&self, object: &Arc<StoredObject>, hands: [Option<&Arc<Hand>>; 2]) -> [KnownGrips; 2] {
         if !self.0.are_running() {

@@ -206,6 +206,39 @@ fn shipped_grips_are_complete_and_nothing_grows() {
     assert!(shipped.atlas.is_complete() && shipped.atlas.entries().len() >= 50);
 }
 
+#[test]
+fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
+    let [before, same] = [(); 2].map(|()| Arc::new(small("a")));
+    let heavier = before.object.with_properties(9.0, Vec3::ZERO, None, &[]);
+    let heavier = Arc::new(StoredObject::plain("a", heavier.unwrap()));
+    let atlases = start(1, &store(10, 1 << 30));
+    let left = hand("adult", Handedness::Left).unwrap();
+    let known_of = grown(&before);
+    let loaded = &atlases.0.loaded;
+    assert!(loaded.publish(&before, adult(), Arc::clone(&known_of), Duration::ZERO));
+    before.atlas_slots.end(adult(), BuildState::Finished);
+    assert!(loaded.publish(&before, left, Arc::clone(&known_of), Duration::ZERO));
+    before.atlas_slots.request(left, Duration::ZERO);
+    atlases.register_changed(&before, &same);
+    atlases.register_changed(&before, &heavier);
+    let slot = |object: &StoredObject, hand| object.atlas_slots.get(hand).unwrap();
+    let complete = slot(&same, adult());
+    assert_eq!(complete.state, BuildState::Finished);
+    assert!(Arc::ptr_eq(&complete.grown.unwrap(), &known_of));
+    // The heavier object's atlases start from nothing, and the left hand's goes on from where it was.
+    assert_eq!(slot(&heavier, adult()).state, BuildState::Growing);
+    assert_eq!(slot(&same, left).state, BuildState::Growing);
+    let has_grown = || {
+        slot(&same, left)
+            .grown
+            .is_some_and(|of| of.atlas.entries().len() > 10)
+    };
+    until("the growth of what was not complete", has_grown);
+    // All count, and can be dropped.
+    loaded.shrink_to(0);
+    assert!(slot(&same, adult()).grown.is_none());
+}
+
 /// What a server reads from the file of an atlas, and how many grips the file has afterwards.
 fn read_back(test: &str, written: &Grown) -> (Arc<Grown>, usize) {
     let folder = Folder::new(test);

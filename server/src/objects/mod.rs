@@ -165,6 +165,12 @@ impl StoredObject {
         name_of(&self.id)
     }
 
+    /// True if the same grips hold it as another object: their surface, properties and forbidden triangles are the same.
+    pub(crate) fn has_grips_of(&self, other: &Self) -> bool {
+        let properties = |of: &Self| (of.object.mass, of.object.friction, of.object.centre_of_mass);
+        self.content_hash == other.content_hash && properties(self) == properties(other)
+    }
+
     /// True if a search holds it: evicting it would free nothing.
     pub(crate) fn is_in_use(&self) -> bool {
         Arc::strong_count(&self.object) > 1

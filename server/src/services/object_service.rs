@@ -185,12 +185,12 @@ impl ObjectHandler {
             default_rig,
             ..
         } = &*self.shared;
-        let object = match object {
-            Some(object) => changed(object, &query.change)?,
+        let changed = match object {
+            Some(before) => changed(before, &query.change)?.map(|object| (before, object)),
             None => None,
         };
         let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
-        let Some(object) = object else {
+        let Some((before, object)) = changed else {
             return if *labels == base.record.labels {
                 Ok(base)
             } else {
@@ -200,7 +200,7 @@ impl ObjectHandler {
         unstopped(|stop| object.prepare(default_rig, stop));
         let state = objects.replace(&base, labels.clone(), Some((object, &query.change)))?;
         if let Some(object) = state.object() {
-            atlases.register(object);
+            atlases.register_changed(before, object);
         }
         Ok(state)
     }
