@@ -27,7 +27,7 @@
 //!
 //! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
 //! kilograms, newtons, radians and unit quaternions, in the axes of the request's [`Convention`]. No generated type is
-//! part of this interface.
+//! part of this interface, unless feature `messages` adds what tools need that read requests from elsewhere.
 //!
 //! The folder `examples` has complete programs: one search, an own object with a tracked hand, and a game loop. Feature
 //! `built-in` adds the built-in holdouts as requests.

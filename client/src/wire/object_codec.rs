@@ -51,6 +51,51 @@ pub(crate) fn described_object_to_wire(object: &NewObject) -> v1::CreateObjectRe
     }
 }
 
+#[cfg(feature = "messages")]
+impl NewObject {
+    /// The object that a request would create.
+    ///
+    /// # Errors
+    /// [`ClientError::Malformed`](crate::ClientError::Malformed) if a required field is missing or an enum has an unknown value.
+    pub fn from_message(request: v1::CreateObjectRequest) -> Result<Self, crate::ClientError> {
+        // Every field, so that none is forgotten.
+        let v1::CreateObjectRequest {
+            object_id,
+            mesh,
+            obj,
+            up_axis,
+            unit_metres,
+            mass_kg,
+            centre_of_mass,
+            friction,
+            forbidden,
+            labels,
+            request_id,
+            regions,
+            known_grips,
+        } = request;
+        let v1::ForbiddenSurfaces { groups, triangles } = forbidden.unwrap_or_default();
+        Ok(Self {
+            id: object_id,
+            mesh: if mesh.is_empty() { obj } else { mesh },
+            up_axis: match v1::UpAxis::try_from(up_axis) {
+                Ok(v1::UpAxis::Z) => UpAxis::Z,
+                Ok(v1::UpAxis::Y | v1::UpAxis::Unspecified) => UpAxis::Y,
+                Err(_) => return Err(Malformed::unknown_value("up_axis", up_axis).into()),
+            },
+            unit_metres,
+            mass_kg,
+            centre_of_mass: centre_of_mass.map(vector_from_wire),
+            friction,
+            forbidden: ForbiddenSurfaces { groups, triangles },
+            regions: each("regions", regions, region_from_wire)?,
+            known_grips: each("known_grips", known_grips, known_grip_from_wire)?,
+            labels,
+            request_id: (!request_id.is_empty()).then_some(request_id),
+        })
+    }
+}
+
 fn forbidden_to_wire(forbidden: &ForbiddenSurfaces) -> v1::ForbiddenSurfaces {
     v1::ForbiddenSurfaces {
         groups: forbidden.groups.clone(),
@@ -410,5 +455,46 @@ mod tests {
         let forbidden = wire.forbidden.unwrap();
         assert_eq!(forbidden.groups, ["rim"]);
         assert_eq!(forbidden.triangles, [4, 5]);
+    }
+
+    #[cfg(feature = "messages")]
+    #[test]
+    fn an_object_to_create_survives_its_message() {
+        let object = NewObject {
+            up_axis: UpAxis::Z,
+            unit_metres: Some(0.01),
+            centre_of_mass: Some(Vec3::Y),
+            friction: Some(0.5),
+            forbidden: ForbiddenSurfaces {
+                groups: vec!["rim".to_owned()],
+                triangles: vec![3],
+            },
+            regions: vec![crate::Region::of_shapes(
+                "grip",
+                crate::RegionKind::Prefer,
+                vec![crate::RegionShape::Sphere {
+                    centre: Vec3::X,
+                    radius: 0.1,
+                }],
+            )],
+            known_grips: vec![crate::KnownGrip::banned(
+                "below",
+                crate::Handedness::Left,
+                crate::Pose::default(),
+            )],
+            labels: [("level".to_owned(), "kitchen".to_owned())].into(),
+            request_id: Some("id".to_owned()),
+            ..NewObject::new("mug", b"solid".to_vec(), 0.3)
+        };
+        assert_eq!(
+            NewObject::from_message(new_object_to_wire(&object)).unwrap(),
+            object
+        );
+        let wrong = v1::CreateObjectRequest {
+            regions: vec![v1::Region::default()],
+            ..new_object_to_wire(&object)
+        };
+        let error = NewObject::from_message(wrong).unwrap_err().to_string();
+        assert!(error.contains("regions[0].kind"), "{error}");
     }
 }

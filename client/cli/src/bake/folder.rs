@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use grasp_client::{ForbiddenSurfaces, NewObject, UpAxis};
+use grasp_client::NewObject;
 use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_proto::v1;
 use grasp_server::{FolderObject, objects_of_folder};
@@ -74,43 +74,21 @@ pub(super) fn new_object(baked: Baked) -> Result<(NewObject, Option<Density>), S
         let mass = mass(&read, &density);
         return Ok((NewObject::new(baked.id, mesh, mass), Some(density)));
     };
-    // Every field, so that none that manifests get is forgotten here.
-    let v1::CreateObjectRequest {
-        object_id: _,
-        mesh: _,
-        obj: _,
-        up_axis,
-        unit_metres,
-        mass_kg,
-        centre_of_mass,
-        friction,
-        forbidden,
-        labels,
-        request_id: _,
-        // Manifests have neither.
-        regions: _,
-        known_grips: _,
-    } = manifest;
-    let v1::ForbiddenSurfaces { groups, triangles } = forbidden.unwrap_or_default();
-    let object = NewObject {
-        up_axis: if up_axis == i32::from(v1::UpAxis::Z) {
-            UpAxis::Z
-        } else {
-            UpAxis::Y
-        },
-        unit_metres,
-        centre_of_mass: centre_of_mass.map(|v| glam::Vec3::new(v.x, v.y, v.z)),
-        friction,
-        forbidden: ForbiddenSurfaces { groups, triangles },
-        labels,
-        ..NewObject::new(baked.id, mesh, mass_kg)
+    let request = v1::CreateObjectRequest {
+        object_id: baked.id,
+        mesh,
+        ..manifest
     };
+    let object = NewObject::from_message(request).map_err(|error| error.to_string())?;
     Ok((object, None))
 }
 
 #[cfg(test)]
 mod tests {
+    use grasp_client::{KnownGrip, Region, UpAxis};
+
     use super::*;
+    use crate::objects::{known_grips, regions};
 
     fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
         let path = std::env::temp_dir().join(format!("grasp-bake-{name}-{}", std::process::id()));
@@ -149,6 +127,60 @@ mod tests {
         // A sixth of a litre at 400 kg/m³.
         assert!((plain.mass_kg - 0.4 / 6.0).abs() < 1e-6, "{}", plain.mass_kg);
         assert_eq!(of_plain.unwrap().kg_per_m3, 400.0);
+        std::fs::remove_dir_all(path).unwrap();
+    }
+
+    /// As the documentation of `grasp objects create` writes them, in TOML.
+    const REGIONS: &str = r#"
+mass_kg = 0.2
+
+[[regions]]
+name = "handle"
+kind = "prefer"
+weight = 0.8
+groups = ["grip"]
+triangles = [7]
+shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radius = 0.012 } }]
+
+[[regions]]
+name = "rim"
+kind = "avoid"
+shapes = [{ half_space = { point = [0, 0.09, 0], normal = [0, 1, 0] } }]
+
+[[regions]]
+name = "blade"
+kind = "forbidden"
+shapes = [
+    { sphere = { centre = [0, 0, 0], radius = 0.03 } },
+    { box = { object_from_box = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } },
+]
+
+[[known_grips]]
+name = "by the handle"
+use = "preferred"
+rig = "adult"
+handedness = "right"
+hand_scale = 1
+object_from_wrist = { position = [0.1, 0, 0], orientation = [0, 0, 0, 1] }
+digits = [{ base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }, {}, {}, {}, {}]
+
+[[known_grips]]
+name = "through the cup"
+use = "banned"
+handedness = "left"
+object_from_wrist = { position = [0, 0.1, 0] }
+near_metres = 0.03
+near_radians = 0.5
+"#;
+
+    #[test]
+    fn manifests_have_the_regions_and_grips_that_files_of_them_have() {
+        let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", REGIONS)]);
+        let (mug, _) = new_object(read_folder(&path).unwrap()[0].clone()).unwrap();
+        let example = |text: &str| text[text.find("  [").expect("it has an example")..].to_owned();
+        let regions: Vec<Region> = serde_json::from_str(&example(regions::FORMAT)).unwrap();
+        let grips: Vec<KnownGrip> = serde_json::from_str(&example(known_grips::FORMAT)).unwrap();
+        assert_eq!((mug.regions, mug.known_grips), (regions, grips));
         std::fs::remove_dir_all(path).unwrap();
     }
 

@@ -3,7 +3,7 @@
 use grasp_client::{KnownGrip, KnownGripUse};
 
 /// What a file of known grips looks like.
-pub(super) const FORMAT: &str = r#"A file of known grips is a list; "digits" and "rig" are for preferred ones, "near_…" for banned ones. `grasp find --json` shows
+pub(crate) const FORMAT: &str = r#"A file of known grips is a list; "digits" and "rig" are for preferred ones, "near_…" for banned ones. `grasp find --json` shows
 "object_from_wrist" and "digits" of a grasp:
   [{"name": "by the handle", "use": "preferred", "rig": "adult", "handedness": "right", "hand_scale": 1,
     "object_from_wrist": {"position": [0.1, 0, 0], "orientation": [0, 0, 0, 1]},

@@ -3,10 +3,10 @@
 mod create;
 mod delete;
 mod get;
-mod known_grips;
+pub(crate) mod known_grips;
 mod list;
 mod mesh;
-mod regions;
+pub(crate) mod regions;
 mod update;
 mod watch;
 

@@ -3,7 +3,7 @@
 use grasp_client::{Region, RegionKind};
 
 /// What a file of regions looks like.
-pub(super) const FORMAT: &str = r#"A file of regions is a list; in each, "name" and "kind" are required, and one of "groups", "triangles" and "shapes":
+pub(crate) const FORMAT: &str = r#"A file of regions is a list; in each, "name" and "kind" are required, and one of "groups", "triangles" and "shapes":
   [{"name": "handle", "kind": "prefer", "weight": 0.8, "groups": ["grip"], "triangles": [7],
     "shapes": [{"tube": {"points": [[0.04, 0, 0], [0.07, 0.03, 0]], "radius": 0.012}}]},
    {"name": "rim", "kind": "avoid", "shapes": [{"half_space": {"point": [0, 0.09, 0], "normal": [0, 1, 0]}}]},

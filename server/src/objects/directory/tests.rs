@@ -125,7 +125,7 @@ fn reports_all_problems_at_once() {
         "heavy.toml: mass_kg: is 2000; it must be more than 0 and at most 1000",
         "heavy.toml: friction: is 0; it must be more than 0 and at most 5",
         "heavy.obj: line 2: vertex 2 does not exist; 1 are known, counted from 1 or backward from -1",
-        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, up_axis, centre_of_mass, friction, forbidden, labels",
+        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, up_axis, centre_of_mass, friction, forbidden, regions, known_grips, labels",
         "keys.toml: mass_kg: is missing; it must be the mass in kilograms",
         "keys.toml: friction: is \"high\"; it must be a number",
         "keys.toml: centre_of_mass: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",
@@ -152,6 +152,126 @@ fn reports_all_problems_at_once() {
     );
     // Vertex 3 does not exist either.
     assert_eq!(problems.len(), expected.len() + 2, "{problems:#?}");
+}
+
+#[test]
+fn manifests_mark_regions_and_list_known_grips() {
+    let manifest = r#"
+        mass_kg = 1
+        [[regions]]
+        name = "top"
+        kind = "forbidden"
+        shapes = [{ half_space = { point = [0, 0, 0.9], normal = [0, 0, 1] } }]
+        groups = ["lid"]
+        [[regions]]
+        name = "grip"
+        kind = "prefer"
+        weight = 0.5
+        triangles = [1]
+        [[known_grips]]
+        name = "from below"
+        use = "banned"
+        handedness = "right"
+        object_from_wrist = { position = [0, 0, -0.1] }
+        near_metres = 0.05
+    "#;
+    let folder = Folder::new("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", manifest)]);
+    let mug = &folder.load().unwrap()[0].object;
+    assert!(mug.object.is_forbidden(0), "the lid is forbidden");
+    let regions = mug.given.regions_to_wire();
+    assert_eq!(
+        regions
+            .iter()
+            .map(|region| region.name.as_str())
+            .collect::<Vec<_>>(),
+        ["top", "grip"]
+    );
+    assert_eq!(
+        (regions[1].weight, regions[1].triangles.as_slice()),
+        (Some(0.5), [1].as_slice())
+    );
+    let grips = mug.given.grips_to_wire();
+    assert_eq!(
+        (grips[0].name.as_str(), grips[0].near_metres),
+        ("from below", Some(0.05))
+    );
+    assert_eq!(mug.given.banned().len(), 1);
+}
+
+#[test]
+fn reports_everything_wrong_with_regions_and_known_grips() {
+    let types = r#"
+        mass_kg = 1
+        [[regions]]
+        kind = "like"
+        weight = "much"
+        colour = "red"
+        shapes = [{ sphere = { centre = [0, 0], radius = 0.1 } }, { cone = {} }, 3]
+        [[known_grips]]
+        name = 3
+        use = "preferred"
+        object_from_wrist = { position = [0, 0, 0], orientation = [0, 0, 1] }
+        digits = [{ base_yaw = "wide", ring = 1 }]
+    "#;
+    let values = r#"
+        mass_kg = 1
+        [[regions]]
+        name = "rim"
+        kind = "avoid"
+        groups = ["lit"]
+        [[regions]]
+        name = "rim"
+        kind = "prefer"
+        shapes = [{ sphere = { radius = 0.1 } }, { tube = { points = [[0, 0, 0]] } }]
+        [[known_grips]]
+        name = "artist's"
+        use = "preferred"
+        rig = "adul"
+        handedness = "right"
+    "#;
+    let folder = Folder::new(
+        "wrong-regions",
+        &[
+            ("types.obj", TETRAHEDRON),
+            ("types.toml", types),
+            ("values.obj", TETRAHEDRON),
+            ("values.toml", values),
+        ],
+    );
+    let problems = folder.problems();
+    for line in [
+        "types.toml: regions[0].name: is missing; it must be a text",
+        "types.toml: regions[0].kind: is \"like\"; it must be \"forbidden\", \"avoid\" or \"prefer\"",
+        "types.toml: regions[0].weight: is \"much\"; it must be a number",
+        "types.toml: regions[0].colour: is unknown; the keys are name, kind, weight, groups, triangles, shapes",
+        "types.toml: regions[0].shapes[0].sphere.centre: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",
+        "types.toml: regions[0].shapes[1]: is a table; it must be a table with one of \"sphere\", \"box\", \"half_space\" or \"tube\"",
+        "types.toml: regions[0].shapes[2]: is 3; it must be a table with one of \"sphere\", \"box\", \"half_space\" or \"tube\"",
+        "types.toml: known_grips[0].name: is 3; it must be a text",
+        "types.toml: known_grips[0].handedness: is missing; it must be \"left\" or \"right\"",
+        "types.toml: known_grips[0].object_from_wrist.orientation: is a list of 3; it must be a quaternion x, y, z, w, as in [0, 0, 0, 1]",
+        "types.toml: known_grips[0].digits[0].base_yaw: is \"wide\"; it must be a number",
+        "types.toml: known_grips[0].digits[0].ring: is unknown; the keys are base_yaw, base_pitch, second_pitch, third_pitch",
+    ] {
+        assert!(
+            problems.iter().any(|problem| problem == line),
+            "{line}\nnot in\n{problems:#?}"
+        );
+    }
+    for start in [
+        "values.toml: regions[0].groups[0]: is \"lit\"",
+        "values.toml: regions[1].name: ",
+        "values.toml: regions[1].shapes[0].sphere.centre: ",
+        "values.toml: regions[1].shapes[1].tube.points: ",
+        "values.toml: regions[1].shapes[1].tube.radius: ",
+        "values.toml: known_grips[0].rig: ",
+        "values.toml: known_grips[0].digits: ",
+    ] {
+        assert!(
+            problems.iter().any(|problem| problem.starts_with(start)),
+            "{start}\nnot in\n{problems:#?}"
+        );
+    }
 }
 
 #[test]
