@@ -19,46 +19,43 @@ use crate::{
 /// Splits polygons, welds, drops degenerate and repeated triangles, turns those that face the wrong way, and checks how they
 /// join.
 pub(crate) fn clean(
-    raw: &RawMesh,
+    mut raw: RawMesh,
     import: Import,
     origin_in_file: DVec3,
     stop: Stop<'_>,
 ) -> Result<ImportedMesh, Vec<ImportError>> {
-    let mut split = triangles(raw, stop)?;
+    let mut split = triangles(&mut raw, stop)?;
     let (positions, welded) = weld(raw.positions(), import, stop).map_err(stopped)?;
-    for corner in split.corners.as_flattened_mut() {
+    raw.coordinates = Vec::new();
+    for corner in &mut split.corners {
         *corner = welded[*corner as usize];
     }
-    split_alike(raw, &welded, &mut split.corners);
+    let triangles = split.corners.as_chunks_mut::<3>().0;
+    split_alike(&raw, &welded, triangles);
+    drop(welded);
+    raw.corners = Vec::new();
     stop.check().map_err(stopped)?;
-    let origins = raw
-        .faces
-        .iter()
-        .zip(0..)
-        .flat_map(|(read, face)| std::iter::repeat_n(face, read.corners - 2));
 
     // Slivers with three distinct vertices have no area but still close the gap between their neighbours.
-    let mut joined = Vec::with_capacity(split.corners.len());
-    let mut faces: Vec<u32> = Vec::with_capacity(split.corners.len());
-    let mut indices_in_file: Vec<u32> = Vec::with_capacity(split.corners.len());
+    let is_dropped: Vec<bool> = triangles
+        .iter()
+        .map(|&triangle| has_repeated_corner(triangle))
+        .collect();
     let mut without_area = Occurrences::default();
-    for ((&triangle, face), index) in split.corners.iter().zip(origins).zip(0..) {
-        if has_repeated_corner(triangle) {
-            without_area.note(raw.faces[face as usize].place);
-        } else {
-            joined.push(triangle);
-            faces.push(face);
-            indices_in_file.push(index);
-        }
+    for face in chosen(raw.faces.by_triangle(), &is_dropped) {
+        without_area.note(face.place);
     }
-    let place_of = |triangle: usize| Place(raw.places, raw.faces[faces[triangle] as usize].place);
-    let mut doubles = Doubles::of(&joined, stop).map_err(stopped)?;
-    let turned = repair(&positions, &mut joined, &mut doubles.uses, stop).map_err(stopped)?;
+    let place_of = |triangle: usize| Place(raw.places, raw.faces.of_triangle(triangle).place);
+    let mut doubles = Doubles::of(triangles, is_dropped, stop).map_err(stopped)?;
+    let turned = repair(&positions, triangles, &mut doubles.uses, stop).map_err(stopped)?;
     stop.check().map_err(stopped)?;
-    let edges = Edges::of(&doubles.uses, positions.len());
-    let mut is_kept = vec![false; joined.len()];
-    for triangle in (0..joined.len()).filter(|&triangle| !doubles.is_dropped[triangle]) {
-        is_kept[triangle] = has_area(&positions, joined[triangle]);
+    let is_single = |&(triangle, _): &(usize, _)| !doubles.is_dropped[triangle];
+    let single = triangles.iter().copied().enumerate().filter(is_single);
+    let edges = Edges::of(&doubles.uses, single.map(|(_, corners)| corners), positions.len());
+    doubles.uses = Vec::new();
+    let mut is_kept = vec![false; triangles.len()];
+    for triangle in (0..triangles.len()).filter(|&triangle| !doubles.is_dropped[triangle]) {
+        is_kept[triangle] = has_area(&positions, triangles[triangle]);
         if !is_kept[triangle] {
             without_area.note_least(place_of(triangle).1);
         }
@@ -71,23 +68,28 @@ pub(crate) fn clean(
     }
 
     let mut warnings = raw.warnings.clone();
-    warnings.extend(of_faces(raw, without_area, split.overlapping));
+    warnings.extend(of_faces(&raw, without_area, split.overlapping));
     warnings.extend(of_triangles(&doubles, &turned, place_of));
     if raw.unused_vertices > 0 {
         let unused = raw.unused_vertices;
         warnings.push(format!("{unused} vertices are not used by any face"));
     }
     warnings.extend(edges.warnings(place_of));
-    let names = faces.iter().map(|&face| raw.faces[face as usize].names);
+    let kept = is_kept.iter().filter(|is_kept| **is_kept).count();
+    let mut indices_in_file = Vec::with_capacity(kept);
+    indices_in_file.extend(chosen(0.., &is_kept));
+    let mut of_mesh = Vec::with_capacity(kept);
+    of_mesh.extend(chosen(triangles.iter().copied(), &is_kept));
+    drop(split.corners);
+    let names = raw.faces.by_triangle().map(|face| face.names);
     let groups = raw.names.groups(chosen(names, &is_kept));
-    let triangles = chosen(joined.iter().copied(), &is_kept).collect();
-    let mesh = TriangleMesh::new(positions, triangles).map_err(|error| vec![ImportError::Unusable(error)])?;
+    let mesh = TriangleMesh::new(positions, of_mesh).map_err(|error| vec![ImportError::Unusable(error)])?;
     Ok(ImportedMesh {
         mesh,
         origin_in_file,
-        triangles_in_file: raw.triangle_count(),
+        triangles_in_file: raw.faces.triangles(),
         groups,
-        indices_in_file: chosen(indices_in_file.iter().copied(), &is_kept).collect(),
+        indices_in_file,
         warnings,
     })
 }

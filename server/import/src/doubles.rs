@@ -3,7 +3,7 @@
 use grasp_synthesis::base::stop::{Stop, Stopped};
 
 use crate::{
-    edges::{EdgeUse, by_edge, edge_uses},
+    edges::{EdgeUse, by_edge, drop_uses, edge_uses},
     raw::Occurrences,
 };
 
@@ -12,7 +12,7 @@ use crate::{
 pub(crate) struct Doubles {
     /// The edges of all triangles that are kept.
     pub(crate) uses: Vec<EdgeUse>,
-    /// Whether each triangle is dropped.
+    /// Whether each triangle is dropped, those without area included.
     pub(crate) is_dropped: Vec<bool>,
     /// Triangles that repeat an earlier one, with its winding.
     pub(crate) repeated: Occurrences,
@@ -30,7 +30,8 @@ struct Pair {
 }
 
 impl Doubles {
-    /// Finds repeated triangles, and decides of which two-sided ones only the earlier side is kept.
+    /// Finds repeated triangles among those that are not dropped yet, and decides of which two-sided ones only the earlier side is
+    /// kept.
     ///
     /// One side is kept of a patch of pairs that the rest of the surface needs to be closed, and of a sheet that touches
     /// nothing else.
@@ -38,16 +39,14 @@ impl Doubles {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(crate) fn of(triangles: &[[u32; 3]], stop: Stop<'_>) -> Result<Self, Stopped> {
+    pub(crate) fn of(triangles: &[[u32; 3]], is_dropped: Vec<bool>, stop: Stop<'_>) -> Result<Self, Stopped> {
         let mut doubles = Self {
-            is_dropped: vec![false; triangles.len()],
+            is_dropped,
             ..Self::default()
         };
         let pairs = doubles.drop_repeated(triangles);
         stop.check()?;
-        let kept = triangles.iter().copied().enumerate();
-        let kept = kept.filter(|&(triangle, _)| !doubles.is_dropped[triangle]);
-        doubles.uses = edge_uses(kept.map(|(triangle, corners)| (triangle as u32, corners)));
+        doubles.uses = edge_uses(triangles, &doubles.is_dropped);
         if !pairs.is_empty() {
             doubles.drop_sides(&pairs);
         }
@@ -57,15 +56,14 @@ impl Doubles {
 
     /// Drops triangles that repeat earlier ones; returns the pairs among the rest.
     fn drop_repeated(&mut self, triangles: &[[u32; 3]]) -> Vec<Pair> {
-        let mut sorted: Vec<([u32; 3], u32)> = triangles
-            .iter()
-            .zip(0..)
-            .map(|(&corners, triangle)| {
+        let mut sorted = Vec::with_capacity(triangles.len());
+        for ((&corners, &is_dropped), triangle) in triangles.iter().zip(&self.is_dropped).zip(0_u32..) {
+            if !is_dropped {
                 let mut key = corners;
                 key.sort_unstable();
-                (key, triangle)
-            })
-            .collect();
+                sorted.push((key, triangle));
+            }
+        }
         sorted.sort_unstable();
         let mut pairs = Vec::new();
         for same in sorted.chunk_by(|a, b| a.0 == b.0) {
@@ -112,13 +110,13 @@ impl Doubles {
             let of_pairs = || {
                 users
                     .iter()
-                    .map(|edge| pair_of[edge.triangle as usize])
+                    .map(|edge| pair_of[edge.triangle() as usize])
                     .filter(|&pair| pair != UNPAIRED)
             };
             let rest = || {
                 users
                     .iter()
-                    .filter(|edge| pair_of[edge.triangle as usize] == UNPAIRED)
+                    .filter(|edge| pair_of[edge.triangle() as usize] == UNPAIRED)
             };
             let Some(first) = of_pairs().next() else { continue };
             for other in of_pairs() {
@@ -147,8 +145,7 @@ impl Doubles {
                 self.is_dropped[pair.later as usize] = true;
             }
         }
-        let is_dropped = &self.is_dropped;
-        self.uses.retain(|edge| !is_dropped[edge.triangle as usize]);
+        drop_uses(&mut self.uses, &self.is_dropped);
     }
 }
 

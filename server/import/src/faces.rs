@@ -16,16 +16,22 @@ const FACES_PER_CHECK: usize = 256;
 /// The triangles of all faces.
 #[derive(Debug, Default)]
 pub(crate) struct Triangles {
-    /// Their corners as vertices of the mesh, in the file's order.
-    pub(crate) corners: Vec<[u32; 3]>,
+    /// Their corners as vertices of the mesh, three by three, in the file's order.
+    pub(crate) corners: Vec<u32>,
     /// Polygons that intersect themselves.
     pub(crate) overlapping: Occurrences,
 }
 
-/// Splits every face; one of n corners becomes n - 2 triangles.
-pub(crate) fn triangles(raw: &RawMesh, stop: Stop<'_>) -> Result<Triangles, Vec<ImportError>> {
+/// Splits every face; one of n corners becomes n - 2 triangles. Takes the corners of a mesh that has triangles only.
+pub(crate) fn triangles(raw: &mut RawMesh, stop: Stop<'_>) -> Result<Triangles, Vec<ImportError>> {
+    if raw.faces.are_triangles() {
+        return Ok(Triangles {
+            corners: std::mem::take(&mut raw.corners),
+            ..Triangles::default()
+        });
+    }
     let mut triangles = Triangles {
-        corners: Vec::with_capacity(raw.triangle_count()),
+        corners: Vec::with_capacity(3 * raw.faces.triangles()),
         ..Triangles::default()
     };
     let mut violations = Violations::default();
@@ -35,8 +41,8 @@ pub(crate) fn triangles(raw: &RawMesh, stop: Stop<'_>) -> Result<Triangles, Vec<
         stop.check_every(FACES_PER_CHECK, number).map_err(stopped)?;
         let (corners, others) = rest.split_at(face.corners);
         rest = others;
-        if let &[a, b, c] = corners {
-            triangles.corners.push([a, b, c]);
+        if corners.len() == 3 {
+            triangles.corners.extend(corners);
             continue;
         }
         positions.clear();
@@ -53,7 +59,7 @@ pub(crate) fn triangles(raw: &RawMesh, stop: Stop<'_>) -> Result<Triangles, Vec<
                 corners: face.corners,
             }),
         }
-        let vertices = places.iter().map(|triangle| triangle.map(|place| corners[place]));
+        let vertices = places.iter().flatten().map(|&place| corners[place]);
         triangles.corners.extend(vertices);
     }
     violations.into_result()?;

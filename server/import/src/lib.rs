@@ -26,6 +26,7 @@ mod polygon;
 mod polygon_twins;
 mod raw;
 mod rig;
+mod runs;
 mod stl;
 mod stoppable;
 mod weld;
@@ -145,7 +146,7 @@ pub fn mesh_of_triangles(
         raw.add_triangle(corners, place, names);
     }
     raw.check_coordinates(1.0)?;
-    clean::clean(&raw, Import::METRES, DVec3::ZERO, Stop::NEVER)
+    clean::clean(raw, Import::METRES, DVec3::ZERO, Stop::NEVER)
 }
 
 /// As [`read_mesh`], unless it is stopped.
@@ -179,7 +180,7 @@ pub fn read_mesh_until(
     };
     raw.check_coordinates(f64::from(unit))?;
     let origin_in_file = placement::recentre(&mut raw, import);
-    let read = clean::clean(&raw, import, origin_in_file, stop).map_err(|errors| format.named(errors))?;
+    let read = clean::clean(raw, import, origin_in_file, stop).map_err(|errors| format.named(errors))?;
     check_counts(read.mesh.positions().len() as u64, 0, limits).map_err(|error| vec![error])?;
     Ok(read)
 }

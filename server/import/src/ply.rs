@@ -3,6 +3,8 @@
 //! The numbers of elements in a header are checked before anything is read by them: the parser reads as many as a header
 //! claims.
 
+use std::io::ErrorKind;
+
 use grasp_synthesis::base::stop::Stop;
 use ply_rs_bw::{
     parser::{ParseError, Parser, Reader},
@@ -16,9 +18,19 @@ use crate::{
     error::{ImportError, Violations},
     format::without_mark,
     limits::MeshLimits,
-    raw::{Places, RawFace, RawMesh, check_counts},
+    raw::{Places, RawMesh, check_counts},
+    runs::RawFace,
     stoppable::Stoppable,
 };
+
+/// What errors of the parser are about.
+const FILE: &str = "the PLY file";
+
+/// Elements that the parser returns at a time.
+const ELEMENTS_PER_PIECE: usize = 512;
+
+/// The fewest bytes of a triangle: its number of corners, and their indices.
+const LEAST_TRIANGLE_BYTES: usize = 4;
 
 /// The names under which files list the vertices of a face.
 const INDEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -37,76 +49,126 @@ struct Ignored;
 
 /// Reads a file.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
-    let failed = |error: ParseError| vec![ImportError::at("the PLY file", brief(&error.to_string()))];
     let mut reader = Reader::new(Stoppable::new(without_mark(bytes), stop));
     let header = Parser::<Ignored>::new()
         .read_header(&mut reader)
-        .map_err(failed)?;
+        .map_err(|error| vec![ImportError::at(FILE, brief(&error.to_string()))])?;
     check_header(&header, bytes.len(), limits).map_err(|error| vec![error])?;
     let mut raw = RawMesh {
         places: Places::Faces,
         ..RawMesh::default()
     };
-    let mut faces = Vec::new();
+    let count = |name: &str| header.elements.get(name).map_or(0, |element| element.count);
+    raw.coordinates.reserve_exact(3 * count("vertex"));
+    // Of larger polygons, there are fewer.
+    raw.corners
+        .reserve_exact(3 * count("face").min(bytes.len() / LEAST_TRIANGLE_BYTES));
+    let names = raw.names.add_named([]);
+    let mut reading = FaceReader {
+        raw: &mut raw,
+        names,
+        vertices: count("vertex"),
+        limits,
+        faces: 0,
+        triangles: 0,
+        violations: Violations::default(),
+    };
     for element in header.elements.values() {
         match element.name.as_str() {
-            "vertex" => {
-                let vertices = Parser::<Vertex>::new();
-                for Vertex(position) in vertices
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(failed)?
-                {
-                    raw.add_vertex(position);
-                }
-            }
-            "face" => {
-                faces = Parser::<Face>::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(failed)?;
-            }
-            _ => {
-                Parser::<Ignored>::new()
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(failed)?;
-            }
+            "vertex" => in_pieces(&mut reader, element, &header, |Vertex(position)| {
+                reading.raw.add_vertex(position);
+                Ok(())
+            })?,
+            "face" => in_pieces(&mut reader, element, &header, |face| reading.add(face))?,
+            _ => in_pieces(&mut reader, element, &header, |Ignored| Ok(()))?,
         }
     }
-    add_faces(&mut raw, faces, limits)?;
+    reading.violations.into_result()?;
     Ok(raw)
 }
 
-/// Appends all faces.
-fn add_faces(raw: &mut RawMesh, faces: Vec<Face>, limits: MeshLimits) -> Result<(), Vec<ImportError>> {
-    let names = raw.names.add_named([]);
-    let vertices = raw.coordinates.len() / 3;
-    let mut triangles = 0;
-    let mut violations = Violations::default();
-    for (place, face) in faces.into_iter().enumerate() {
-        let mut wrong = |what: String| violations.push(ImportError::at(format!("face {place}"), what));
-        let Some(corners) = face.0 else {
+/// Reads elements a piece at a time, so that the parser does not keep all of them.
+fn in_pieces<E: PropertyAccess>(
+    reader: &mut Reader<Stoppable<'_>>,
+    element: &ElementDef,
+    header: &Header,
+    mut add: impl FnMut(E) -> Result<(), ImportError>,
+) -> Result<(), Vec<ImportError>> {
+    let parser = Parser::<E>::new();
+    let mut piece = element.clone();
+    let mut left = element.count;
+    while left > 0 {
+        piece.count = left.min(ELEMENTS_PER_PIECE);
+        left -= piece.count;
+        let read = parser.read_payload_for_element(reader, &piece, header);
+        for element in read.map_err(|error| failed(&error, element))? {
+            add(element).map_err(|error| vec![error])?;
+        }
+    }
+    Ok(())
+}
+
+/// Why the elements of a kind cannot be read.
+fn failed(error: &ParseError, element: &ElementDef) -> Vec<ImportError> {
+    let ElementDef { name, count, .. } = element;
+    let what = if error.kind() == ErrorKind::UnexpectedEof {
+        format!("is cut off: it ends before the last of the {count} elements {name:?} that it claims")
+    } else {
+        brief(&error.to_string())
+    };
+    vec![ImportError::at(FILE, what)]
+}
+
+/// Appends the faces of a file to a mesh.
+struct FaceReader<'r> {
+    raw: &'r mut RawMesh,
+    names: usize,
+    /// Vertices of the file.
+    vertices: usize,
+    limits: MeshLimits,
+    /// Faces and triangles so far.
+    faces: usize,
+    triangles: u64,
+    violations: Violations,
+}
+
+impl FaceReader<'_> {
+    /// Appends a face.
+    ///
+    /// # Errors
+    /// There are too many triangles. Anything else that is wrong is among the violations.
+    fn add(&mut self, Face(corners): Face) -> Result<(), ImportError> {
+        let place = self.faces;
+        self.faces += 1;
+        let vertices = self.vertices;
+        let mut wrong = |what: String| {
+            self.violations
+                .push(ImportError::at(format!("face {place}"), what));
+        };
+        let Some(corners) = corners else {
             wrong("a vertex index is negative or no whole number".to_owned());
-            continue;
+            return Ok(());
         };
         if let Some(index) = corners.iter().find(|&&index| index as usize >= vertices) {
             wrong(format!(
                 "vertex {index} does not exist; there are {vertices}, counted from 0"
             ));
-            continue;
+            return Ok(());
         }
         if corners.len() < 3 {
-            raw.without_area.note(place);
-            continue;
+            self.raw.without_area.note(place);
+            return Ok(());
         }
-        triangles += corners.len() as u64 - 2;
-        check_counts(0, triangles, limits).map_err(|error| vec![error])?;
-        raw.faces.push(RawFace {
+        self.triangles += corners.len() as u64 - 2;
+        check_counts(0, self.triangles, self.limits)?;
+        self.raw.faces.push(RawFace {
             place,
             corners: corners.len(),
-            names,
+            names: self.names,
         });
-        raw.corners.extend(corners);
+        self.raw.corners.extend(corners);
+        Ok(())
     }
-    violations.into_result()
 }
 
 /// A parser's message on one line, and cut short: it may repeat a whole line of the file.

@@ -1,6 +1,6 @@
 //! Polygons that occur more than once: their triangles only match if they are split in the same way.
 
-use crate::raw::{RawFace, RawMesh};
+use crate::{raw::RawMesh, runs::RawFace};
 
 /// A polygon of more than three corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,7 +18,7 @@ struct Polygon {
 pub(crate) fn split_alike(raw: &RawMesh, welded: &[u32], triangles: &mut [[u32; 3]]) {
     let mut polygons = Vec::new();
     let (mut first_corner, mut first_triangle) = (0, 0);
-    for &RawFace { corners, .. } in &raw.faces {
+    for RawFace { corners, .. } in raw.faces.iter() {
         if corners > 3 {
             let vertices = raw.corners[first_corner..first_corner + corners].iter();
             let hash = vertices.fold(0_u64, |sum, &vertex| {

@@ -9,6 +9,7 @@ use std::{
 use crate::{
     error::{ImportError, Violations},
     limits::{MAX_COORDINATE_METRES, MeshLimits},
+    runs::{Faces, RawFace},
 };
 use glam::DVec3;
 
@@ -36,7 +37,7 @@ pub(crate) struct RawMesh {
     /// The corners of all faces, as indices of vertices.
     pub(crate) corners: Vec<u32>,
     /// The faces, in the file's order.
-    pub(crate) faces: Vec<RawFace>,
+    pub(crate) faces: Faces,
     /// The names of faces' parts.
     pub(crate) names: NameSets,
     /// What faces are counted by.
@@ -51,23 +52,7 @@ pub(crate) struct RawMesh {
     pub(crate) warnings: Vec<String>,
 }
 
-/// A face of three or more corners.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RawFace {
-    /// Its place in the file, counted as [`RawMesh::places`] says.
-    pub(crate) place: usize,
-    /// Number of corners, at least 3.
-    pub(crate) corners: usize,
-    /// Index of its names in [`RawMesh::names`].
-    pub(crate) names: usize,
-}
-
 impl RawMesh {
-    /// Number of triangles after polygons are split.
-    pub(crate) fn triangle_count(&self) -> usize {
-        self.faces.iter().map(|face| face.corners - 2).sum()
-    }
-
     /// The vertices.
     pub(crate) fn positions(&self) -> impl Iterator<Item = DVec3> {
         let positions = self.coordinates.as_chunks::<3>().0;

@@ -3,7 +3,7 @@
 //! Text is first rewritten in the form that the parser expects: lower case, one solid, and normals, which are ignored, that
 //! are numbers. The names of its solids are those of the triangles' parts.
 
-use std::{io::Cursor, ops::RangeInclusive};
+use std::{borrow::Cow, io::Cursor, ops::RangeInclusive};
 
 use grasp_synthesis::base::stop::Stop;
 use stl_io::{Triangle, create_stl_reader};
@@ -69,15 +69,19 @@ pub(crate) fn read_binary(
         )]);
     }
     // A header may begin with the word by which the parser knows text.
-    let mut blank = bytes.to_vec();
-    blank[..HEADER_BYTES - 4].fill(0);
+    let mut blank = Cow::Borrowed(bytes);
+    if bytes.starts_with(b"solid") {
+        blank.to_mut()[..HEADER_BYTES - 4].fill(0);
+    }
     let mut raw = RawMesh {
         places: Places::Triangles,
         ..RawMesh::default()
     };
     let names = raw.names.add_named([]);
+    raw.coordinates.reserve(9 * present.min(claimed as usize));
+    raw.corners.reserve(3 * present.min(claimed as usize));
     read_into(&mut raw, Cursor::new(blank), stop, |triangle| (triangle, names))?;
-    let spare = bytes.len() - HEADER_BYTES - raw.faces.len() * TRIANGLE_BYTES;
+    let spare = bytes.len() - HEADER_BYTES - raw.faces.triangles() * TRIANGLE_BYTES;
     if spare > 0 {
         raw.warnings
             .push(format!("{spare} bytes behind the last triangle were ignored"));
@@ -110,7 +114,7 @@ pub(crate) fn read_text(
 /// Appends all triangles; `about` gives the place and the set of names of each by its number.
 fn read_into(
     raw: &mut RawMesh,
-    mut file: Cursor<Vec<u8>>,
+    mut file: Cursor<impl AsRef<[u8]>>,
     stop: Stop<'_>,
     about: impl Fn(usize) -> (usize, usize),
 ) -> Result<(), Vec<ImportError>> {

@@ -38,8 +38,24 @@ struct Patch {
     is_mixed: bool,
 }
 
+/// A triangle across an edge, and whether it faces the opposite way, in four bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Neighbour(u32);
+
+impl Neighbour {
+    const NONE: Self = Self(u32::MAX);
+
+    fn new(triangle: u32, opposes: bool) -> Self {
+        Self(triangle << 1 | u32::from(opposes))
+    }
+
+    fn parts(self) -> Option<(u32, bool)> {
+        (self != Self::NONE).then_some((self.0 >> 1, self.0 & 1 == 1))
+    }
+}
+
 /// All patches of a mesh.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Patches {
     list: Vec<Patch>,
     /// Triangles, patch after patch.
@@ -103,33 +119,35 @@ fn turn(triangles: &mut [[u32; 3]], uses: &mut [EdgeUse], is_chosen: &[bool]) {
         triangle.swap(1, 2);
     }
     for edge in uses {
-        edge.is_forward ^= is_chosen[edge.triangle as usize];
+        if is_chosen[edge.triangle() as usize] {
+            edge.turn();
+        }
     }
 }
 
 impl Patches {
     /// Finds patches, and which of their triangles disagree with the first.
     fn of(triangles: usize, uses: &[EdgeUse]) -> Self {
-        // Up to three neighbours each: the other triangle, and whether it faces the opposite way.
-        let mut neighbours = vec![[(NO_PATCH, false); 3]; triangles];
+        let mut neighbours = vec![[Neighbour::NONE; 3]; triangles];
         let mut is_used = vec![false; triangles];
         for users in by_edge(uses) {
             for edge in users {
-                is_used[edge.triangle as usize] = true;
+                is_used[edge.triangle() as usize] = true;
             }
             if let &[a, b] = users {
                 for (from, to) in [(a, b), (b, a)] {
-                    let slots = &mut neighbours[from.triangle as usize];
-                    if let Some(free) = slots.iter_mut().find(|(other, _)| *other == NO_PATCH) {
-                        *free = (to.triangle, a.is_forward == b.is_forward);
+                    let slots = &mut neighbours[from.triangle() as usize];
+                    if let Some(free) = slots.iter_mut().find(|other| **other == Neighbour::NONE) {
+                        *free = Neighbour::new(to.triangle(), a.is_forward() == b.is_forward());
                     }
                 }
             }
         }
         let mut patches = Self {
+            list: Vec::new(),
+            members: Vec::with_capacity(triangles),
             of: vec![NO_PATCH; triangles],
             turns: vec![false; triangles],
-            ..Self::default()
         };
         for (first, _) in is_used.iter().enumerate().filter(|(_, is_used)| **is_used) {
             if patches.of[first] == NO_PATCH {
@@ -140,7 +158,7 @@ impl Patches {
     }
 
     /// Adds the patch of a triangle.
-    fn add(&mut self, first: u32, neighbours: &[[(u32, bool); 3]]) {
+    fn add(&mut self, first: u32, neighbours: &[[Neighbour; 3]]) {
         let patch = self.list.len() as u32;
         let start = self.members.len();
         let mut is_orientable = true;
@@ -148,10 +166,10 @@ impl Patches {
         self.members.push(first);
         let mut next = start;
         while let Some(&triangle) = self.members.get(next) {
-            for &(other, opposes) in &neighbours[triangle as usize] {
-                if other == NO_PATCH {
+            for neighbour in &neighbours[triangle as usize] {
+                let Some((other, opposes)) = neighbour.parts() else {
                     continue;
-                }
+                };
                 let turns = self.turns[triangle as usize] != opposes;
                 if self.of[other as usize] == NO_PATCH {
                     self.of[other as usize] = patch;
@@ -255,7 +273,7 @@ impl Patches {
         balances.extend(
             users
                 .iter()
-                .map(|edge| (self.of[edge.triangle as usize], edge.direction())),
+                .map(|edge| (self.of[edge.triangle() as usize], edge.direction())),
         );
         balances.sort_unstable();
         balances.dedup_by(|next, kept| {

@@ -54,6 +54,16 @@ impl<'a> Buffers<'a> {
         accessor: &Accessor<'_>,
         count: usize,
     ) -> Result<Vec<[f64; N]>, ImportError> {
+        self.converted(accessor, count, |element| element)
+    }
+
+    /// As [`Self::numbers`], each element converted on the way.
+    pub(crate) fn converted<const N: usize, T: Clone>(
+        &self,
+        accessor: &Accessor<'_>,
+        count: usize,
+        convert: impl Fn([f64; N]) -> T,
+    ) -> Result<Vec<T>, ImportError> {
         let wrong = |what: String| ImportError::at(format!("accessors[{}]", accessor.index()), what);
         let components = accessor.dimensions().multiplicity();
         if components != N {
@@ -66,15 +76,21 @@ impl<'a> Buffers<'a> {
         self.spend(count as u64)?;
         let kind = accessor.data_type();
         let size = kind.size() * N;
-        let mut numbers = match accessor.view() {
+        let scale = scale_of(accessor);
+        let read = |element: &[u8], kind| {
+            let element = components_of(element, kind);
+            // The smallest signed integer stands for −1 as well.
+            convert(scale.map_or(element, |scale| element.map(|number| (number / scale).max(-1.0))))
+        };
+        let mut numbers: Vec<T> = match accessor.view() {
             Some(view) => {
                 let stride = view.stride().unwrap_or(size);
                 self.elements(&view, accessor.offset(), stride, size, count)
                     .ok_or_else(|| wrong(beyond(count)))?
-                    .map(|element| components_of(element, kind))
+                    .map(|element| read(element, kind))
                     .collect()
             }
-            None => vec![[0.0; N]; count],
+            None => vec![convert([0.0; N]); count],
         };
         if let Some(sparse) = accessor.sparse() {
             let (indices, values) = (sparse.indices(), sparse.values());
@@ -97,28 +113,8 @@ impl<'a> Buffers<'a> {
                     return Err(wrong(format!("replaces element {place}, which does not exist")));
                 }
                 if let Some(number) = numbers.get_mut(place) {
-                    *number = components_of(element, kind);
+                    *number = read(element, kind);
                 }
-            }
-        }
-        if accessor.normalized() {
-            let scale = match kind {
-                DataType::I8 => 127.0,
-                DataType::U8 => 255.0,
-                DataType::I16 => 32767.0,
-                DataType::U16 => 65535.0,
-                DataType::U32 | DataType::F32 => 1.0,
-            };
-            // The smallest signed integer stands for −1 as well.
-            let fraction = |number: f64| {
-                if scale == 1.0 {
-                    number
-                } else {
-                    (number / scale).max(-1.0)
-                }
-            };
-            for element in &mut numbers {
-                *element = element.map(fraction);
             }
         }
         Ok(numbers)
@@ -142,6 +138,18 @@ impl<'a> Buffers<'a> {
         }
         Some((0..count).map(move |element| &bytes[offset + element * stride..][..size]))
     }
+}
+
+/// What the integers of an accessor are divided by; none if they stand for themselves.
+fn scale_of(accessor: &Accessor<'_>) -> Option<f64> {
+    let scale = match accessor.data_type() {
+        DataType::I8 => 127.0,
+        DataType::U8 => 255.0,
+        DataType::I16 => 32767.0,
+        DataType::U16 => 65535.0,
+        DataType::U32 | DataType::F32 => return None,
+    };
+    accessor.normalized().then_some(scale)
 }
 
 fn beyond(count: usize) -> String {

@@ -65,7 +65,7 @@ pub(super) fn read_into(
             ];
             let names = raw.names.add(own.into_iter().flatten().collect());
             let mut positions = positions(&primitive, node, buffers, raw, limits).map_err(place)?;
-            let indices = indices(&primitive, positions.len(), buffers, limits).map_err(place)?;
+            let vertices = positions.len();
             let first = (raw.coordinates.len() / 3) as u32;
             let mut scene_from_mesh = scene.scene_from_node[index];
             if let Some(joints) = joints {
@@ -77,16 +77,21 @@ pub(super) fn read_into(
                     *position = scene_from_mesh.transform_point3(*position);
                 }
             }
+            raw.coordinates.reserve(3 * vertices);
             for position in positions {
                 raw.add_vertex(position.to_array());
             }
+            let indices = indices(&primitive, vertices, buffers, limits).map_err(place)?;
             // A mirrored instance shows its other side.
             let is_mirrored = scene_from_mesh.determinant() < 0.0;
-            let triangles = triangles(&indices, primitive.mode());
-            check_counts(0, (raw.faces.len() + triangles.len()) as u64, limits).map_err(place)?;
-            for [a, b, c] in triangles {
+            let triangles = triangle_count(&indices, primitive.mode());
+            let before = raw.faces.triangles();
+            check_counts(0, (before + triangles) as u64, limits).map_err(place)?;
+            raw.corners.reserve(3 * triangles);
+            for triangle in 0..triangles {
+                let [a, b, c] = corners(&indices, primitive.mode(), triangle);
                 let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
-                raw.add_triangle(corners.map(|corner| first + corner), raw.faces.len(), names);
+                raw.add_triangle(corners.map(|corner| first + corner), before + triangle, names);
             }
         }
     }
@@ -110,11 +115,7 @@ fn positions(
         .ok_or_else(|| ImportError::at("attributes", "has no POSITION"))?;
     let before = raw.coordinates.len() / 3;
     check_counts((before + accessor.count()) as u64, 0, limits)?;
-    let mut positions: Vec<DVec3> = buffers
-        .numbers(&accessor, accessor.count())?
-        .into_iter()
-        .map(DVec3::from_array)
-        .collect();
+    let mut positions = buffers.converted(&accessor, accessor.count(), DVec3::from_array)?;
     let mesh = node.mesh();
     let defaults = mesh.as_ref().and_then(gltf::Mesh::weights);
     let weights = node.weights().or(defaults).unwrap_or_default();
@@ -142,39 +143,39 @@ fn indices(
         return Ok((0..vertices as u32).collect());
     };
     check_counts(0, accessor.count() as u64 / 3, limits)?;
-    let indices = buffers.numbers(&accessor, accessor.count())?;
-    indices
-        .into_iter()
-        .map(|[index]| {
-            if (0.0..vertices as f64).contains(&index) {
-                Ok(index as u32)
-            } else {
-                Err(ImportError::at(
-                    "indices",
-                    format!("vertex {index} does not exist; there are {vertices}, counted from 0"),
-                ))
-            }
-        })
-        .collect()
+    // What is no whole number in range becomes the largest, which no vertex has.
+    let index_of = |[number]: [f64; 1]| if number >= 0.0 { number as u32 } else { u32::MAX };
+    let indices = buffers.converted(&accessor, accessor.count(), index_of)?;
+    match indices.iter().find(|&&index| index as usize >= vertices) {
+        Some(index) => Err(ImportError::at(
+            "indices",
+            format!("vertex {index} does not exist; there are {vertices}, counted from 0"),
+        )),
+        None => Ok(indices),
+    }
 }
 
-/// The triangles of a list, strip or fan of indices.
-fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
+/// Number of triangles of a list, strip or fan of indices.
+fn triangle_count(indices: &[u32], mode: Mode) -> usize {
     match mode {
-        Mode::TriangleStrip => indices
-            .windows(3)
-            .enumerate()
-            .map(|(place, corners)| match (place % 2, corners) {
-                (0, &[a, b, c]) | (_, &[b, a, c]) => [a, b, c],
-                _ => [0; 3],
-            })
-            .collect(),
-        Mode::TriangleFan => {
-            let middle = indices.first().copied().unwrap_or_default();
-            let rest = indices.get(1..).unwrap_or_default();
-            rest.array_windows().map(|&[a, b]| [middle, a, b]).collect()
+        Mode::TriangleStrip | Mode::TriangleFan => indices.len().saturating_sub(2),
+        _ => indices.len() / 3,
+    }
+}
+
+/// The corners of a triangle of a list, strip or fan of indices.
+fn corners(indices: &[u32], mode: Mode, triangle: usize) -> [u32; 3] {
+    match mode {
+        Mode::TriangleStrip => {
+            let [a, b, c] = [0, 1, 2].map(|corner| indices[triangle + corner]);
+            if triangle.is_multiple_of(2) {
+                [a, b, c]
+            } else {
+                [b, a, c]
+            }
         }
-        _ => indices.as_chunks().0.to_vec(),
+        Mode::TriangleFan => [indices[0], indices[triangle + 1], indices[triangle + 2]],
+        _ => [0, 1, 2].map(|corner| indices[3 * triangle + corner]),
     }
 }
 

@@ -3,7 +3,7 @@
 //! A first pass (`scan`) enforces the limits, reports every violation with its line, and rewrites vertices and faces in
 //! plain form for the parser `tobj`. That keeps memory proportional to the text, keeps `tobj` away from the file system
 //! and from input on which it panics, and preserves the order of triangles: `tobj` sees neither the groups nor the
-//! materials by which it would sort them.
+//! materials by which it would sort them, but pieces of the text in turn.
 
 mod encoding;
 pub(crate) mod lines;
@@ -46,25 +46,35 @@ fn read_text(
     limits: MeshLimits,
     stop: Stop<'_>,
 ) -> Result<RawMesh, Vec<ImportError>> {
-    let scan = Scan::of(text, unit_metres, limits, stop)?;
+    let mut scan = Scan::of(text, unit_metres, limits, stop)?;
+    let plain = std::mem::take(&mut scan.plain);
     // tobj would split every polygon into a fan, convex or not.
     let options = tobj::LoadOptions::default();
     // The scan drops references to material libraries; if one got through, it would be rejected, not opened.
     let reject = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut Stoppable::new(scan.plain.as_bytes(), stop), &options, reject)
+    let (models, _) = tobj::load_obj_buf(&mut Stoppable::new(plain.as_bytes(), stop), &options, reject)
         .map_err(|error| vec![ImportError::Unreadable(error)])?;
-    // Without groups in its input, tobj returns one model.
-    let parsed = models.into_iter().next().map(|model| model.mesh);
-    let Some(parsed) = parsed.filter(|_| !scan.faces.is_empty()) else {
+    drop(plain);
+    if scan.faces.is_empty() {
         return Err(vec![ImportError::Empty {
             dropped: scan.without_area.count,
             unknown: scan.unknown.count,
         }]);
-    };
+    }
+    let (mut coordinates, mut corners) = (Vec::new(), Vec::new());
+    let sum = |of: fn(&tobj::Mesh) -> usize| models.iter().map(|model| of(&model.mesh)).sum();
+    coordinates.reserve_exact(sum(|mesh| mesh.positions.len()));
+    corners.reserve_exact(sum(|mesh| mesh.indices.len()));
+    // Pieces have vertices of their own; those that they share are welded later.
+    for tobj::Model { mesh, .. } in models {
+        let first = (coordinates.len() / 3) as u32;
+        coordinates.extend(mesh.positions);
+        corners.extend(mesh.indices.iter().map(|index| first + index));
+    }
     Ok(RawMesh {
-        unused_vertices: scan.vertices - parsed.positions.len() / 3,
-        coordinates: parsed.positions,
-        corners: parsed.indices,
+        unused_vertices: scan.unused_vertices,
+        coordinates,
+        corners,
         faces: scan.faces,
         names: scan.names,
         places: Places::Lines,

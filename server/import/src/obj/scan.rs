@@ -8,7 +8,8 @@ use super::{
 use crate::{
     error::{ImportError, Violations},
     limits::{MAX_COORDINATE_METRES, MeshLimits},
-    raw::{NameSets, Occurrences, RawFace},
+    raw::{NameSets, Occurrences},
+    runs::{Faces, RawFace},
     stoppable::stopped,
 };
 use grasp_synthesis::base::stop::Stop;
@@ -19,14 +20,14 @@ const LINES_PER_CHECK: usize = 1024;
 /// Result of the first pass.
 #[derive(Debug, Default)]
 pub(super) struct Scan {
-    /// Text for `tobj`: only `v` with 3 or 4 numbers and `f` with positive vertex indices.
+    /// Text for `tobj`: only `v` with 3 or 4 numbers, `f` with positive vertex indices, and an `o` after each piece of faces.
     pub(super) plain: String,
     /// The faces of `plain`.
-    pub(super) faces: Vec<RawFace>,
-    /// Number of triangles of those faces.
-    pub(super) triangles: usize,
+    pub(super) faces: Faces,
     /// Number of vertices in `plain`.
     pub(super) vertices: usize,
+    /// Vertices that no face uses.
+    pub(super) unused_vertices: usize,
     /// Points, lines, and faces with fewer than three corners.
     pub(super) without_area: Occurrences,
     /// Lines that start with an unknown keyword.
@@ -49,7 +50,13 @@ impl Scan {
             text,
             unit_metres,
             limits,
-            scan: Self::default(),
+            scan: Self {
+                plain: String::with_capacity(text.len()),
+                ..Self::default()
+            },
+            is_used: Vec::new(),
+            triangles: 0,
+            faces_of_piece: 0,
             violations: Violations::default(),
             over_limit: false,
             seven_numbers: None,
@@ -70,6 +77,9 @@ impl Scan {
     }
 }
 
+/// Faces of the plain text that belong together: `tobj` keeps a hundred bytes for each of them until the next `o`.
+const FACES_PER_PIECE: usize = 512;
+
 /// The names in force at a line, as indices.
 #[derive(Debug, Default)]
 struct Names {
@@ -83,6 +93,12 @@ struct Scanner<'t> {
     unit_metres: f32,
     limits: MeshLimits,
     scan: Scan,
+    /// Which vertices faces use.
+    is_used: Vec<bool>,
+    /// Number of triangles so far.
+    triangles: usize,
+    /// Number of faces since the last `o`.
+    faces_of_piece: usize,
     violations: Violations,
     /// A limit was exceeded: scanning stopped, and the rest of the text is unknown.
     over_limit: bool,
@@ -183,14 +199,19 @@ impl Scanner<'_> {
         if corners < 3 {
             return self.scan.without_area.note(line);
         }
-        self.scan.triangles += corners - 2;
-        if self.scan.triangles > self.limits.triangles {
+        self.triangles += corners - 2;
+        if self.triangles > self.limits.triangles {
             self.over_limit = true;
             let limit = self.limits.triangles;
             return self
                 .violations
                 .push(ImportError::TooManyTriangles { line, limit });
         }
+        if self.faces_of_piece == FACES_PER_PIECE {
+            self.scan.plain.push_str("o\n");
+            self.faces_of_piece = 0;
+        }
+        self.faces_of_piece += 1;
         self.scan.plain.push('f');
         for corner in words {
             match vertex_index(corner) {
@@ -238,6 +259,9 @@ impl Scanner<'_> {
         };
         if positive > vertices {
             self.forward.push((line, positive));
+        } else {
+            self.is_used.resize(vertices, false);
+            self.is_used[positive - 1] = true;
         }
         self.scan.plain.push(' ');
         self.scan.plain.push_str(&positive.to_string());
@@ -288,6 +312,11 @@ impl Scanner<'_> {
             });
         }
         self.violations.into_result()?;
+        self.is_used.resize(vertices, false);
+        for (_, index) in self.forward {
+            self.is_used[index - 1] = true;
+        }
+        self.scan.unused_vertices = self.is_used.iter().filter(|is_used| !**is_used).count();
         self.scan
             .warnings
             .extend(self.seven_numbers.and_then(|seven| seven.warning));

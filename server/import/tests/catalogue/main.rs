@@ -17,8 +17,8 @@ use expected::{Expected, FILES};
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 /// Memory that reading may take at its peak, as a multiple of the file, and in any case: the OBJ parser keeps a hundred bytes
-/// for each face.
-const BYTES_PER_BYTE: usize = 14;
+/// for some hundred faces.
+const BYTES_PER_BYTE: usize = 6;
 const BYTES_BESIDES: usize = 64 << 10;
 
 /// Reached only if something hangs, even without optimisation on a busy machine.
