@@ -180,6 +180,8 @@ impl NewObject {
 pub struct ObjectUpdate {
     /// The etag of the state to change; the call fails if the object has another one by now. None: any state.
     pub etag: Option<String>,
+    /// Metres per unit of the mesh; more than 0. What was given in metres or kilograms stays as it is.
+    pub unit_metres: Option<f32>,
     /// Mass in kilograms; more than 0.
     pub mass_kg: Option<f32>,
     /// Centre of mass in the object's frame, in metres.

@@ -107,6 +107,7 @@ fn forbidden_to_wire(forbidden: &ForbiddenSurfaces) -> v1::ForbiddenSurfaces {
 pub(crate) fn update_to_wire(name: String, update: &ObjectUpdate) -> v1::UpdateObjectRequest {
     let ObjectUpdate {
         etag,
+        unit_metres,
         mass_kg,
         centre_of_mass,
         friction,
@@ -116,6 +117,7 @@ pub(crate) fn update_to_wire(name: String, update: &ObjectUpdate) -> v1::UpdateO
         labels,
     } = update;
     let listed = [
+        ("unit_metres", unit_metres.is_some()),
         ("mass_kg", mass_kg.is_some()),
         ("centre_of_mass", centre_of_mass.is_some()),
         ("friction", friction.is_some()),
@@ -131,6 +133,7 @@ pub(crate) fn update_to_wire(name: String, update: &ObjectUpdate) -> v1::UpdateO
             paths: paths.map(|(path, _)| (*path).to_owned()).collect(),
         }),
         etag: etag.clone().unwrap_or_default(),
+        unit_metres: *unit_metres,
         mass_kg: *mass_kg,
         centre_of_mass: given(*centre_of_mass).map(vector_to_wire),
         friction: given(*friction),

@@ -38,6 +38,7 @@ use grasp_synthesis::{base::stop::Stop, geometry::mesh::TriangleMesh};
 pub use error::ImportError;
 pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
 pub use obj::MAX_NAMES_PER_LINE;
+pub use placement::keeps_origin;
 pub use rig::{Binding, ImportedHand, ImportedRig, MappedJoint, PosedNode, RigSource, read_rig, rig_at_rest};
 
 use format::Format;

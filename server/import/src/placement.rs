@@ -8,6 +8,11 @@ use crate::{Import, raw::RawMesh};
 /// steps of single precision exceed a micrometre, and distances computed from such coordinates lose what fingers can feel.
 const KEPT_ORIGIN_METRES: f64 = 10.0;
 
+/// True if a mesh whose box has this centre, in metres from the file's origin, keeps that origin.
+pub fn keeps_origin(centre: DVec3) -> bool {
+    centre.length() <= KEPT_ORIGIN_METRES
+}
+
 /// Moves a mesh that is far from the file's origin to the centre of its box; returns where its origin is in the file.
 pub(crate) fn recentre(raw: &mut RawMesh, import: Import) -> DVec3 {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -20,7 +25,7 @@ pub(crate) fn recentre(raw: &mut RawMesh, import: Import) -> DVec3 {
     let centre = low.midpoint(high);
     let moved = import.metres_from_file(centre);
     // Without faces, there is no centre.
-    if !(moved.is_finite() && moved.length() > KEPT_ORIGIN_METRES) {
+    if !moved.is_finite() || keeps_origin(moved) {
         return DVec3::ZERO;
     }
     for position in raw.coordinates.as_chunks_mut::<3>().0 {

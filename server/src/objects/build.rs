@@ -43,13 +43,13 @@ pub(crate) fn build_object(
         }
     };
     let mut warnings = read.warnings.clone();
-    match check_extent(&read.mesh) {
-        Ok(warning) => warnings.extend(warning),
-        Err(wrong) => violations.add(mesh_field, wrong),
+    if let Err(wrong) = check_extent(&read.mesh, &mut warnings) {
+        violations.add(mesh_field, wrong);
     }
     // Clients count the triangles of their file, some of which may have been dropped.
-    let file = MeshFile::of(&read);
+    let file = MeshFile::of(&read, fields.import.unit_metres);
     let given = Given {
+        centre_of_mass: fields.centre_of_mass,
         forbidden: Arc::new(fields.forbidden.clone()),
         regions: fields.regions.as_slice().into(),
         grips: fields.known_grips.as_slice().into(),
@@ -58,7 +58,7 @@ pub(crate) fn build_object(
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
-    let centre_of_mass = centre_or_computed(&read.mesh, fields.centre_of_mass, &mut warnings);
+    let centre_of_mass = centre_or_computed(&read.mesh, given.centre_of_mass, &mut warnings);
     let object = GraspObject::new_until(
         read.mesh,
         fields.mass,

@@ -2,11 +2,18 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use grasp_import::keeps_origin;
 use grasp_proto::v1;
-use grasp_synthesis::{base::stop::unstopped, model::object::ObjectError};
+use grasp_synthesis::{
+    base::stop::unstopped,
+    model::object::{GraspObject, ObjectError},
+};
 
-use super::{StoredObject, centre_of_mass::centre_or_computed, given::OnMesh};
+use super::{
+    StoredObject, centre_of_mass::centre_or_computed, extent::check_extent, given::OnMesh,
+    mesh_file::MeshFile,
+};
 use crate::{
     answer::vector,
     error::ServiceError,
@@ -16,27 +23,31 @@ use crate::{
 /// The object after a change; none if the change leaves it as it is. Takes some ten milliseconds, more for large meshes.
 ///
 /// # Errors
-/// [`ServiceError::Invalid`] with every forbidden surface that its file does not have.
+/// [`ServiceError::Invalid`] with every surface that its file does not have, or because of a unit that it cannot have.
 pub(crate) fn changed(
     stored: &StoredObject,
     change: &ObjectChange,
 ) -> Result<Option<StoredObject>, ServiceError> {
-    let object = &stored.object;
     let mut violations = Violations::default();
     let mut warnings = stored.warnings.clone();
-    let mass = change.mass.unwrap_or(object.mass);
+    let mass = change.mass.unwrap_or(stored.object.mass);
+    let resized = match change.unit_metres {
+        Some(unit) if unit != stored.file.unit_metres => Some(with_unit(stored, unit, mass, &mut warnings)?),
+        _ => None,
+    };
+    let (object, file) = match &resized {
+        Some((object, file)) => (object, file),
+        None => (stored.object.object(), &stored.file),
+    };
     let friction = match change.friction {
         Setting::Kept => object.friction,
         Setting::Default => None,
         Setting::To(friction) => Some(friction),
     };
     let mesh = object.surface.mesh();
-    let centre = match change.centre_of_mass {
-        Setting::Kept => object.centre_of_mass,
-        Setting::Default => centre_or_computed(mesh, None, &mut warnings),
-        Setting::To(centre) => centre_or_computed(mesh, Some(centre), &mut warnings),
-    };
     let mut given = stored.given.clone();
+    change.centre_of_mass.apply(&mut given.centre_of_mass);
+    let centre = centre_or_computed(mesh, given.centre_of_mass, &mut warnings);
     if let Some(forbidden) = &change.forbidden {
         given.forbidden = Arc::new(forbidden.clone());
     }
@@ -46,12 +57,12 @@ pub(crate) fn changed(
     if let Some(grips) = &change.known_grips {
         given.grips = grips.as_slice().into();
     }
-    let OnMesh { forbidden, regions } =
-        unstopped(|stop| given.on_mesh(mesh, &stored.file, &mut violations, stop));
+    let OnMesh { forbidden, regions } = unstopped(|stop| given.on_mesh(mesh, file, &mut violations, stop));
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
-    let is_same = mass == object.mass
+    let is_same = resized.is_none()
+        && mass == object.mass
         && friction == object.friction
         && centre == object.centre_of_mass
         && warnings == stored.warnings
@@ -65,12 +76,8 @@ pub(crate) fn changed(
     match object.with_properties(mass, centre, friction, &forbidden) {
         Ok(changed) => {
             let changed = changed.with_regions(regions).with_banned(given.banned());
-            let changed = StoredObject::from_file(
-                stored.id.clone(),
-                Arc::new(changed),
-                warnings,
-                Arc::clone(&stored.file),
-            );
+            let changed =
+                StoredObject::from_file(stored.id.clone(), Arc::new(changed), warnings, Arc::clone(file));
             Ok(Some(StoredObject { given, ..changed }))
         }
         Err(errors) => {
@@ -82,8 +89,37 @@ pub(crate) fn changed(
     }
 }
 
+/// The object as its mesh makes it with another unit, and what is then kept of its file.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] if it would be too large or too small, or have another origin.
+fn with_unit(
+    stored: &StoredObject,
+    unit_metres: f32,
+    mass: f32,
+    warnings: &mut Vec<String>,
+) -> Result<(Arc<GraspObject>, Arc<MeshFile>), ServiceError> {
+    let invalid = |wrong: String| ServiceError::invalid("unit_metres", wrong);
+    let scale = unit_metres / stored.file.unit_metres;
+    let resized = unstopped(|stop| stored.object.resized_until(scale, mass, stop));
+    let resized = resized.map_err(|error| invalid(format!("is {unit_metres}: {error}")))?;
+    let mesh = resized.surface.mesh();
+    check_extent(mesh, warnings).map_err(invalid)?;
+    let centre = mesh.aabb().centre().as_dvec3();
+    if stored.file.origin != DVec3::ZERO || !keeps_origin(centre) {
+        return Err(invalid(format!(
+            "is {unit_metres}; with it, the object's origin would be elsewhere in the mesh: delete the object, and create it again"
+        )));
+    }
+    let file = stored.file.with_unit(unit_metres);
+    Ok((Arc::new(resized), Arc::new(file)))
+}
+
 /// Changes the request that would create an object to one that would create the changed object.
 pub(crate) fn change_request(request: &mut v1::CreateObjectRequest, change: &ObjectChange) {
+    if change.unit_metres.is_some() {
+        request.unit_metres = change.unit_metres;
+    }
     if let Some(mass) = change.mass {
         request.mass_kg = mass;
     }
@@ -177,6 +213,51 @@ mod tests {
         };
         let created = build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap();
         assert_eq!(created.content_hash, after.content_hash);
+    }
+
+    #[test]
+    fn another_unit_makes_the_object_that_its_file_makes_with_it() {
+        // 600 m long: the unit should have been a millimetre.
+        let of = |unit_metres| {
+            let fields = ObjectFields {
+                mesh:
+                    b"v 0 0 0\nv 600 0 0\nv 0 600 0\nv 0 0 600\nf 1 3 2\ng lid\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+                        .to_vec(),
+                import: Import::with_unit(unit_metres),
+                ..ObjectFields::named("tetrahedron", 0.1)
+            };
+            build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap()
+        };
+        let before = of(0.01);
+        assert_eq!(before.warnings.len(), 1, "{:?}", before.warnings);
+        let unit = |unit_metres| ObjectChange {
+            unit_metres: Some(unit_metres),
+            ..forbid(&["lid"], &[])
+        };
+        let after = changed(&before, &unit(0.0005)).unwrap().unwrap();
+        let expected = of(0.0005);
+        assert_eq!(
+            (&after.warnings, after.file.unit_metres),
+            (&expected.warnings, 0.0005)
+        );
+        assert!((after.object.centre_of_mass - expected.object.centre_of_mass).length() < 1e-6);
+        let [one, other] = [&after, &expected].map(|of| of.object.surface.mesh().positions());
+        assert!(one.iter().zip(other).all(|(a, b)| (a - b).length() < 1e-6));
+        assert_eq!((after.object.mass, after.object.forbidden_count()), (0.1, 3));
+        // A centre that was given stays where it is.
+        let given = ObjectChange {
+            centre_of_mass: Setting::To(Vec3::splat(0.02)),
+            ..ObjectChange::default()
+        };
+        let given = changed(&before, &given).unwrap().unwrap();
+        let after = changed(&given, &unit(0.0005)).unwrap().unwrap();
+        assert_eq!(after.object.centre_of_mass, Vec3::splat(0.02));
+        for (unit_metres, part) in [(1.0, "elsewhere"), (0.000_001, "elsewhere")] {
+            let Err(ServiceError::Invalid(violations)) = changed(&of(0.1), &unit(unit_metres)) else {
+                panic!("its origin would be another");
+            };
+            assert!(violations[0].description.contains(part), "{violations:?}");
+        }
     }
 
     #[test]

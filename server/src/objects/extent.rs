@@ -16,11 +16,15 @@ const PLAUSIBLE: [f32; 2] = [0.03, 1.0];
 /// twice, and the contrary.
 const USUAL_ERRORS: [f32; 9] = [1e-6, 0.001, 0.01, 0.0254, 0.1, 10.0, 100.0, 1000.0, 1e6];
 
-/// A warning about an unusual size.
+/// What the warning about an unusual size says after the number.
+const UNUSUAL: &str = "m long, which is unusual";
+
+/// A warning about an unusual size, instead of one from before.
 ///
 /// # Errors
 /// Why an object of this size cannot be used.
-pub(super) fn check_extent(mesh: &TriangleMesh) -> Result<Option<String>, String> {
+pub(super) fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>) -> Result<(), String> {
+    warnings.retain(|warning| !warning.contains(UNUSUAL));
     let extent = mesh.aabb().extents().max_element();
     // The negation also rejects an extent that overflowed.
     if !within(USABLE, extent) {
@@ -30,15 +34,15 @@ pub(super) fn check_extent(mesh: &TriangleMesh) -> Result<Option<String>, String
             rounded(extent)
         ));
     }
-    Ok((!within(USUAL, extent)).then(|| {
+    if !within(USUAL, extent) {
         let factor = likely_factor(extent);
-        format!(
-            "the object is {} m long, which is unusual: is unit_metres right? Multiplied by {factor}, it would make the \
-             object {} m long",
+        warnings.push(format!(
+            "the object is {} {UNUSUAL}: is unit_metres right? Multiplied by {factor}, it would make the object {} m long",
             rounded(extent),
             rounded(extent * factor)
-        )
-    }))
+        ));
+    }
+    Ok(())
 }
 
 /// Checks the size of an object that was created at a usable one.
@@ -86,7 +90,16 @@ mod tests {
 
     fn long(extent: f32) -> Result<Option<String>, String> {
         let corners = vec![Vec3::ZERO, Vec3::X * extent, Vec3::Y * extent];
-        check_extent(&TriangleMesh::new(corners, vec![[0, 1, 2]]).unwrap())
+        let mesh = TriangleMesh::new(corners, vec![[0, 1, 2]]).unwrap();
+        let mut warnings = vec!["another".to_owned()];
+        // The second check replaces the warning of the first.
+        check_extent(&mesh, &mut warnings)?;
+        check_extent(&mesh, &mut warnings)?;
+        assert!(
+            (1..=2).contains(&warnings.len()) && warnings[0] == "another",
+            "{warnings:?}"
+        );
+        Ok(warnings.into_iter().nth(1))
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::{Stop, Stopped},
@@ -27,6 +28,8 @@ const TRIANGLES_PER_CHECK: usize = 256;
 /// What a client knows of its object. By default nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Given {
+    /// The centre of mass in metres, in the object's frame; none for that of the mesh.
+    pub centre_of_mass: Option<Vec3>,
     /// The surfaces that must not be touched.
     pub forbidden: Arc<Forbidden>,
     /// The regions.

@@ -10,8 +10,10 @@ use crate::validate::{Field, Violations, quoted};
 const LISTED_GROUPS: usize = 12;
 
 /// What is kept of a mesh's file: a few bytes per group, and four per triangle if the file had others that were dropped.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct MeshFile {
+    /// The length of one unit of the file, in metres.
+    pub unit_metres: f32,
     /// The object's origin in the file, in the file's units and axes.
     pub origin: DVec3,
     /// Number of triangles in the file, dropped ones included.
@@ -23,7 +25,7 @@ pub(crate) struct MeshFile {
 }
 
 /// A named part of a mesh.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Group {
     name: Box<str>,
     triangles: Box<[Run]>,
@@ -40,6 +42,7 @@ impl MeshFile {
     /// Of a mesh without names whose triangles are those of its file.
     pub(super) fn plain(triangles: usize) -> Self {
         Self {
+            unit_metres: 1.0,
             origin: DVec3::ZERO,
             triangles: count(triangles),
             indices: None,
@@ -47,11 +50,12 @@ impl MeshFile {
         }
     }
 
-    /// Of a mesh that was read.
-    pub(super) fn of(read: &ImportedMesh) -> Self {
+    /// Of a mesh that was read with this unit.
+    pub(super) fn of(read: &ImportedMesh, unit_metres: f32) -> Self {
         let is_complete = read.indices_in_file.len() == read.triangles_in_file;
         let groups = read.groups.iter();
         Self {
+            unit_metres,
             origin: read.origin_in_file,
             triangles: count(read.triangles_in_file),
             indices: (!is_complete).then(|| read.indices_in_file.clone().into()),
@@ -61,6 +65,14 @@ impl MeshFile {
                     triangles: runs(triangles),
                 })
                 .collect(),
+        }
+    }
+
+    /// The same file with another unit.
+    pub(super) fn with_unit(&self, unit_metres: f32) -> Self {
+        Self {
+            unit_metres,
+            ..self.clone()
         }
     }
 
@@ -188,7 +200,7 @@ mod tests {
             let groups: Vec<(String, Vec<u32>)> =
                 members.iter().enumerate().map(|(n, set)| (format!("g{n}"), in_mesh(set))).collect();
             let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
-            let file = MeshFile::of(&imported(kept.clone(), 40, groups.clone()));
+            let file = MeshFile::of(&imported(kept.clone(), 40, groups.clone()), 1.0);
             let mut violations = Violations::default();
             let forbidden = file.named(Field::root("forbidden"), &names, &asked, &mut violations);
             prop_assert!(violations.is_empty());
@@ -203,7 +215,7 @@ mod tests {
 
     #[test]
     fn unknown_names_and_indices_are_violations() {
-        let file = MeshFile::of(&imported(vec![0], 2, vec![("lid".to_owned(), vec![0])]));
+        let file = MeshFile::of(&imported(vec![0], 2, vec![("lid".to_owned(), vec![0])]), 1.0);
         let mut violations = Violations::default();
         let field = Field::root("forbidden");
         let forbidden = file.named(
@@ -219,9 +231,9 @@ mod tests {
 
     #[test]
     fn a_complete_file_keeps_no_indices() {
-        let complete = MeshFile::of(&imported((0..1000).collect(), 1000, Vec::new()));
+        let complete = MeshFile::of(&imported((0..1000).collect(), 1000, Vec::new()), 1.0);
         assert_eq!(complete.bytes(), 0);
-        let dropped = MeshFile::of(&imported((1..1000).collect(), 1000, Vec::new()));
+        let dropped = MeshFile::of(&imported((1..1000).collect(), 1000, Vec::new()), 1.0);
         assert_eq!(dropped.bytes(), 4 * 999);
     }
 }

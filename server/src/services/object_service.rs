@@ -165,10 +165,20 @@ impl ObjectHandler {
         } else {
             Some(self.shared.object(&query.id, call).await?.object)
         };
+        // Another size is best read from the file, if that is saved.
+        let unit = query.change.unit_metres;
+        let resized = object
+            .as_ref()
+            .zip(unit)
+            .filter(|(object, unit)| object.file.unit_metres != *unit);
+        let rebuilt = match resized {
+            Some(_) => objects.rebuilt(&query.id, &query.change).await?,
+            None => None,
+        };
         let (handler, query) = (self.clone(), Arc::clone(query));
         run_blocking(move || {
             let _permit = permit;
-            handler.apply_update(&query, base, object.as_deref())
+            handler.apply_update(&query, base, object.as_deref(), rebuilt)
         })
         .await?
     }
@@ -178,6 +188,7 @@ impl ObjectHandler {
         query: &UpdateQuery,
         base: Listed,
         object: Option<&StoredObject>,
+        rebuilt: Option<StoredObject>,
     ) -> Result<Listed, ServiceError> {
         let Shared {
             objects,
@@ -185,9 +196,10 @@ impl ObjectHandler {
             default_rig,
             ..
         } = &*self.shared;
-        let changed = match object {
-            Some(before) => changed(before, &query.change)?.map(|object| (before, object)),
-            None => None,
+        let changed = match (object, rebuilt) {
+            (Some(before), Some(rebuilt)) => Some((before, rebuilt)),
+            (Some(before), None) => changed(before, &query.change)?.map(|object| (before, object)),
+            (None, _) => None,
         };
         let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
         let Some((before, object)) = changed else {

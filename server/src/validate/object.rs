@@ -195,22 +195,7 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
             UpAxis::Y
         }
     };
-    let unit_metres = match request.unit_metres {
-        None => 1.0,
-        Some(unit) if UNIT_RANGE.contains(&unit) => unit,
-        Some(unit) => {
-            violations.add(
-                Field::root("unit_metres"),
-                format_args!(
-                    "is {unit}; it must be {} to {}",
-                    UNIT_RANGE.start(),
-                    UNIT_RANGE.end()
-                ),
-            );
-            // The mesh is still read, to find its violations too.
-            1.0
-        }
-    };
+    let unit_metres = unit_metres(request.unit_metres, violations);
     check_mass(Field::root("mass_kg"), request.mass_kg, violations);
     let centre_of_mass = request
         .centre_of_mass
@@ -234,6 +219,22 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
         known_grips,
         labels: request.labels,
         request: None,
+    }
+}
+
+/// Metres per unit of a mesh; 1 if the unit is absent or wrong, so that the mesh is still read, to find its violations too.
+pub(super) fn unit_metres(given: Option<f32>, violations: &mut Violations) -> f32 {
+    match given {
+        None => 1.0,
+        Some(unit) if UNIT_RANGE.contains(&unit) => unit,
+        Some(unit) => {
+            let [least, most] = [UNIT_RANGE.start(), UNIT_RANGE.end()];
+            violations.add(
+                Field::root("unit_metres"),
+                format_args!("is {unit}; it must be {least} to {most}"),
+            );
+            1.0
+        }
     }
 }
 

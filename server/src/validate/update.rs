@@ -7,14 +7,15 @@ use super::{
     Field, Forbidden, GripFields, Labels, RegionFields, Violations, friction,
     known_grips::known_grips,
     labels::labels,
-    object::{check_mass, object_id_of},
+    object::{check_mass, object_id_of, unit_metres},
     point, quoted,
     regions::regions,
 };
 use crate::error::ServiceError;
 
 /// The fields that a mask may name.
-const PATHS: [&str; 7] = [
+const PATHS: [&str; 8] = [
+    "unit_metres",
     "mass_kg",
     "centre_of_mass",
     "friction",
@@ -40,6 +41,8 @@ pub(crate) struct UpdateQuery {
 /// Physical properties to change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ObjectChange {
+    /// Metres per unit of the mesh; none to keep it.
+    pub unit_metres: Option<f32>,
     /// Mass in kilograms; none to keep it.
     pub mass: Option<f32>,
     /// Centre of mass in metres, in the object's frame; by default that of the mesh.
@@ -120,6 +123,9 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
         }
     };
     let mut change = ObjectChange::default();
+    if is_changed("unit_metres", request.unit_metres.is_some()) {
+        change.unit_metres = Some(unit_metres(request.unit_metres, &mut violations));
+    }
     if is_changed("mass_kg", request.mass_kg.is_some()) {
         // Like a new object, a changed one must have a mass.
         let mass = request.mass_kg.unwrap_or_default();
@@ -201,8 +207,16 @@ mod tests {
 
     #[test]
     fn a_mask_selects_and_resets() {
-        let query = update_query(request(&["friction", "centre_of_mass", "forbidden", "regions"])).unwrap();
+        let query = update_query(request(&[
+            "unit_metres",
+            "friction",
+            "centre_of_mass",
+            "forbidden",
+            "regions",
+        ]))
+        .unwrap();
         let expected = ObjectChange {
+            unit_metres: Some(1.0),
             mass: None,
             centre_of_mass: Setting::Default,
             friction: Setting::Default,
@@ -224,7 +238,8 @@ mod tests {
             name: "mug".to_owned(),
             mass_kg: None,
             friction: Some(9.0),
-            ..request(&["mass_kg", "mesh", "friction", "labels.a"])
+            unit_metres: Some(0.0),
+            ..request(&["mass_kg", "mesh", "friction", "labels.a", "unit_metres"])
         };
         assert_eq!(
             blamed(wrong),
@@ -232,6 +247,7 @@ mod tests {
                 "name",
                 "update_mask.paths[1]",
                 "update_mask.paths[3]",
+                "unit_metres",
                 "mass_kg",
                 "friction"
             ]

@@ -72,6 +72,71 @@ fn find(name: &str) -> v1::FindGraspRequest {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn another_unit_makes_the_object_that_creation_with_it_makes() {
+    let folder = Folder::absent("saved-unit");
+    let server = start(&folder, 10).await;
+    let request = |id, unit_metres| v1::CreateObjectRequest {
+        unit_metres,
+        ..box_request(id)
+    };
+    // In the file's units, its centre is 40 m from the origin, which is too far, and 40 cm.
+    let far: String = BOX_OBJ
+        .lines()
+        .map(|line| {
+            match line
+                .strip_prefix("v ")
+                .map(|at| at.split(' ').collect::<Vec<_>>())
+            {
+                Some(at) => {
+                    let x: f32 = at[0].parse().unwrap();
+                    format!("v {} {} {}\n", x + 40.0, at[1], at[2])
+                }
+                None => format!("{line}\n"),
+            }
+        })
+        .collect();
+    let far = |id, unit_metres| v1::CreateObjectRequest {
+        mesh: far.clone().into_bytes(),
+        ..request(id, unit_metres)
+    };
+    let unit_of = |name: &str, unit_metres| v1::UpdateObjectRequest {
+        name: format!("objects/{name}"),
+        unit_metres: Some(unit_metres),
+        ..Default::default()
+    };
+    for (wrong, right, is_far) in [("a", "b", false), ("c", "d", true)] {
+        let new = |id, unit| if is_far { far(id, unit) } else { request(id, unit) };
+        let before = create(&server, new(wrong, None)).await.unwrap();
+        let expected = create(&server, new(right, Some(0.01))).await.unwrap();
+        assert_eq!(before.origin_in_file.is_some(), is_far);
+        let mut objects = server.objects().await;
+        let changed = objects.update_object(unit_of(wrong, 0.01)).await.unwrap();
+        let changed = changed.into_inner().object.unwrap();
+        assert_eq!(changed.content_hash, expected.content_hash);
+        assert_eq!(changed.centre_of_mass, expected.centre_of_mass);
+        assert_eq!((changed.mass_kg, &changed.warnings), (0.1, &expected.warnings));
+        assert_eq!(changed.origin_in_file, None);
+        assert_ne!(changed.etag, before.etag);
+        let again = objects.update_object(unit_of(wrong, 0.01)).await.unwrap();
+        assert_eq!(again.into_inner().object.unwrap().etag, changed.etag);
+        let error = objects.update_object(unit_of(wrong, 1e-6)).await.unwrap_err();
+        assert_eq!(error.code(), Code::InvalidArgument);
+    }
+    let before = all(&server).await;
+    let (_, hash_before) = mesh(&mut server.objects().await, "objects/a").await.unwrap();
+    server.stop().await;
+    let server = start(&folder, 10).await;
+    // Loaded from its file, it is the same.
+    let (_, hash) = mesh(&mut server.objects().await, "objects/a").await.unwrap();
+    assert_eq!(hash, hash_before);
+    let hashes = |objects: &[v1::Object]| -> Vec<String> {
+        objects.iter().map(|object| object.content_hash.clone()).collect()
+    };
+    assert_eq!(hashes(&all(&server).await), hashes(&before));
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_restart_keeps_objects_labels_etags_and_request_ids() {
     let folder = Folder::absent("saved-restart");
     let server = start(&folder, 10).await;

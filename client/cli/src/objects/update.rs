@@ -26,6 +26,9 @@ pub(crate) struct Arguments {
     /// Change it only if it still has this etag.
     #[arg(long, value_name = "ETAG")]
     etag: Option<String>,
+    /// Metres per unit of the mesh: gives the object another size. What was given in metres or kilograms stays as it is.
+    #[arg(long, value_name = "METRES")]
+    unit_metres: Option<f32>,
     /// Mass in kilograms.
     #[arg(long, value_name = "KG")]
     mass: Option<f32>,
@@ -85,6 +88,7 @@ impl Arguments {
         let known_grips = listed_in(self.known_grips.as_deref())?;
         Ok(ObjectUpdate {
             etag: self.etag.clone(),
+            unit_metres: self.unit_metres,
             mass_kg: self.mass,
             centre_of_mass: reset(self.centre_of_mass, self.default_centre_of_mass),
             friction: reset(self.friction, self.default_friction),
@@ -104,7 +108,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let update = arguments.update()?;
     if update.is_empty() {
         return Err(Failure::Usage(
-            "nothing to change; give a mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels"
+            "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels"
                 .to_owned(),
         ));
     }

@@ -19,11 +19,12 @@ use crate::{
     objects::{
         Body, Listed, Resting, Revision, StoredObject,
         build::build_object,
+        change::change_request,
         name_of,
         saved::{SavedObject, SavedObjects},
     },
     saved::StoreError,
-    validate::{Violations, object_fields},
+    validate::{ObjectChange, Violations, object_fields},
 };
 
 /// Bytes per permit of the pool that meshes being loaded share.
@@ -160,7 +161,7 @@ impl ObjectStore {
     }
 
     async fn load_now(&self, resting: &Arc<Resting>) -> Outcome {
-        let object = self.read_and_build(&resting.id).await;
+        let object = self.read_and_build(&resting.id, None).await;
         let mut created = self.created();
         let state = created.objects.get(&resting.id).map(|entry| entry.state.clone());
         let is_same = |state: &Listed| matches!(&state.body, Body::AtRest(now) if Arc::ptr_eq(now, resting));
@@ -178,13 +179,35 @@ impl ObjectStore {
         Ok(Some(revision))
     }
 
-    async fn read_and_build(&self, id: &str) -> Result<StoredObject, ServiceError> {
+    /// The object as it would be created with a change; none if its file is not saved.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`], and those of [`Self::loaded`] but for the first.
+    pub(crate) async fn rebuilt(
+        &self,
+        id: &str,
+        change: &ObjectChange,
+    ) -> Result<Option<StoredObject>, ServiceError> {
+        if self.durability.is_none() {
+            return Ok(None);
+        }
+        self.read_and_build(id, Some(change)).await.map(Some)
+    }
+
+    async fn read_and_build(
+        &self,
+        id: &str,
+        change: Option<&ObjectChange>,
+    ) -> Result<StoredObject, ServiceError> {
         let Some(Durability { saved, loading }) = &self.durability else {
             return Err(ServiceError::StoreFailed);
         };
         let acquired = Arc::clone(&loading.objects).acquire_owned().await;
         let permit = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let record = saved.record(id).await?;
+        let mut record = saved.record(id).await?;
+        if let Some(change) = change {
+            change_request(&mut record.request, change);
+        }
         let limits = loading.limits;
         if record.mesh_bytes > limits.bytes as u64 {
             return Err(ServiceError::ObjectUnloadable {
@@ -224,10 +247,12 @@ impl ObjectStore {
                 Err(ServiceError::ObjectDamaged { name: name_of(id) })
             }
             // Its request was valid under the limits of its time.
-            Err(error @ ServiceError::Invalid(_)) => Err(ServiceError::ObjectUnloadable {
-                name: name_of(id),
-                reason: error.to_string(),
-            }),
+            Err(error @ ServiceError::Invalid(_)) if change.is_none() => {
+                Err(ServiceError::ObjectUnloadable {
+                    name: name_of(id),
+                    reason: error.to_string(),
+                })
+            }
             Err(error) => Err(error),
         }
     }
