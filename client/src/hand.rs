@@ -73,6 +73,14 @@ pub struct JointPose {
     pub radius: f32,
 }
 
+impl JointPose {
+    /// A joint of a finger that the hand does not have.
+    pub const MISSING: Self = Self {
+        client_from_joint: Pose::IDENTITY,
+        radius: 0.0,
+    };
+}
+
 /// Number and order of joint poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum JointSet {

@@ -29,9 +29,10 @@ pub struct KeyFrame {
     pub kind: KeyFrameKind,
     /// The wrist's joint frame in the client's frame.
     pub client_from_wrist: Pose,
-    /// The digits, thumb first.
+    /// The digits, thumb first; zero for one that the rig does not have.
     pub digits: [DigitAngles; 5],
-    /// The joints of `XR_EXT_hand_tracking`, in the convention's order, in the client's frame.
+    /// The joints of `XR_EXT_hand_tracking`, in the convention's order, in the client's frame; [`JointPose::MISSING`] for those of
+    /// a digit that the rig does not have.
     pub joints: [JointPose; JOINT_COUNT],
     /// The model of the rig; none if the rig's hand has none.
     #[serde(default)]

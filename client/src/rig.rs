@@ -4,7 +4,7 @@ use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    hand::{HandJoints, Handedness, JOINT_COUNT, JointPose},
+    hand::{Digit, HandJoints, Handedness, JOINT_COUNT, JointPose},
     pose::Pose,
 };
 
@@ -50,10 +50,13 @@ pub struct RigNode {
 pub struct RigHand {
     /// Left or right.
     pub handedness: Handedness,
-    /// The stretched hand: the 26 `OpenXR` joints in the wrist's frame, in `OpenXR` axes and metres.
+    /// The digits that the hand has, thumb first.
+    pub digits: Vec<Digit>,
+    /// The stretched hand: the 26 `OpenXR` joints in the wrist's frame, in `OpenXR` axes and metres; without radius if the hand
+    /// does not have the joint's digit.
     pub stretched_joints: [JointPose; JOINT_COUNT],
-    /// The limits of the digits, thumb first.
-    pub limits: [DigitLimits; 5],
+    /// The limits of the digits, thumb first; none for one that the hand does not have.
+    pub limits: [Option<DigitLimits>; 5],
     /// True if the hand is the mirror image of the other one.
     pub mirrored: bool,
     /// The model's node that all other joints are below; empty without a model and for a mirrored hand.
@@ -80,7 +83,7 @@ pub struct Rig {
 pub enum RigSource {
     /// The content of a GLB, glTF or VRM file with a skinned hand or a whole character.
     Model(Vec<u8>),
-    /// Joints at rest of one or both hands, in metres and `OpenXR` axes.
+    /// Joints at rest of one or both hands, in metres and `OpenXR` axes; those of missing fingers are [`JointPose::MISSING`].
     Joints(Vec<HandJoints>),
 }
 

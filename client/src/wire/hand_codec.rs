@@ -80,6 +80,9 @@ pub(super) fn digit_angles_from_wire(angles: v1::DigitAngles) -> DigitAngles {
 }
 
 fn joint_to_wire(joint: &JointPose) -> v1::JointPose {
+    if *joint == JointPose::MISSING {
+        return v1::JointPose::default();
+    }
     v1::JointPose {
         client_from_joint: Some(pose_to_wire(joint.client_from_joint)),
         radius: joint.radius,

@@ -6,7 +6,9 @@ use grasp_proto::v1;
 use super::{
     Malformed, each, exactly,
     geometry_codec::{pose_from_wire, vector_from_wire},
-    hand_codec::{hand_joints_to_wire, handedness_from_wire, handedness_to_wire, joint_from_wire},
+    hand_codec::{
+        digit_from_wire, hand_joints_to_wire, handedness_from_wire, handedness_to_wire, joint_from_wire,
+    },
     required,
 };
 use crate::{
@@ -79,6 +81,13 @@ fn hand_from_wire(hand: v1::RigHand) -> Result<RigHand, Malformed> {
     Ok(RigHand {
         handedness: handedness_from_wire("handedness", hand.handedness)?,
         stretched_joints: exactly("stretched_joints", joints.collect())?,
+        digits: hand
+            .digits
+            .into_iter()
+            .map(|digit| {
+                digit_from_wire("digits", digit)?.ok_or_else(|| Malformed::unknown_value("digits", digit))
+            })
+            .collect::<Result<_, _>>()?,
         limits: exactly("limits", each("limits", hand.limits, limits_from_wire)?)?,
         mirrored: hand.mirrored,
         root_node: hand.root_node,
@@ -92,17 +101,20 @@ fn hand_from_wire(hand: v1::RigHand) -> Result<RigHand, Malformed> {
     })
 }
 
-fn limits_from_wire(limits: v1::DigitLimits) -> Result<DigitLimits, Malformed> {
+fn limits_from_wire(limits: v1::DigitLimits) -> Result<Option<DigitLimits>, Malformed> {
+    if limits == v1::DigitLimits::default() {
+        return Ok(None);
+    }
     let range = |field, range| {
         let v1::AngleRange { min, max } = required(field, range)?;
         Ok(AngleRange { min, max })
     };
-    Ok(DigitLimits {
+    Ok(Some(DigitLimits {
         base_yaw: range("base_yaw", limits.base_yaw)?,
         base_pitch: range("base_pitch", limits.base_pitch)?,
         second_pitch: range("second_pitch", limits.second_pitch)?,
         third_pitch: range("third_pitch", limits.third_pitch)?,
-    })
+    }))
 }
 
 pub(super) fn model_from_wire(model: v1::PosedModel) -> Result<PosedModel, Malformed> {

@@ -13,8 +13,8 @@ use grasp_synthesis::{
     model::{
         grasp::{Contact, Grasp, KeyFrame, Stage},
         hand::{
-            HandPose, Handedness,
-            joints::{HandJoints, JOINT_COUNT, openxr_from_thesis_frame},
+            Digit, HandPose, Handedness,
+            joints::{HandJoints, JOINT_COUNT, Joint, openxr_from_thesis_frame},
             kinematics::{HandFrames, hand_frames},
             rig::Rig,
         },
@@ -28,7 +28,8 @@ use grasp_synthesis::{
     },
 };
 
-use self::names::{wire_digit, wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
+pub(crate) use self::names::wire_digit;
+use self::names::{wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
 
 /// The frame and convention in which a client gets its answer.
@@ -135,30 +136,41 @@ impl WireHand {
         let joints = HandJoints::of_pose(rig, pose).transformed(client_from_object);
         Self {
             client_from_wrist: wire_pose(convention.joint_from_openxr(client_from_wrist)),
-            digits: pose
-                .digits
-                .iter()
-                .map(|angles| v1::DigitAngles {
-                    base_yaw: angles.base_yaw,
-                    base_pitch: angles.base_pitch,
-                    second_pitch: angles.second_pitch,
-                    third_pitch: Some(angles.third_pitch),
+            digits: Digit::ALL
+                .into_iter()
+                .zip(&pose.digits)
+                .map(|(digit, angles)| {
+                    if !rig.has(digit) {
+                        return v1::DigitAngles::default();
+                    }
+                    v1::DigitAngles {
+                        base_yaw: angles.base_yaw,
+                        base_pitch: angles.base_pitch,
+                        second_pitch: angles.second_pitch,
+                        third_pitch: Some(angles.third_pitch),
+                    }
                 })
                 .collect(),
             joints: (0..JOINT_COUNT)
-                .map(|place| {
-                    let joint = joints.joints[convention.joint_at(place)];
-                    v1::JointPose {
-                        client_from_joint: Some(wire_pose(convention.joint_from_openxr(joint.pose))),
-                        radius: convention.length_from_openxr(joint.radius),
-                    }
-                })
+                .map(|place| wire_joint(&joints, convention.joint_at(place), convention))
                 .collect(),
             model: hand
                 .binding
                 .as_deref()
                 .map(|binding| wire_model(binding, hand.scale, &hand_frames(rig, pose), frame)),
         }
+    }
+}
+
+/// A joint of a hand, empty if it is of a missing finger.
+pub(crate) fn wire_joint(hand: &HandJoints, joint: usize, convention: Convention) -> v1::JointPose {
+    if !hand.has(joint) {
+        return v1::JointPose::default();
+    }
+    let Joint { pose, radius } = hand.joints[joint];
+    v1::JointPose {
+        client_from_joint: Some(wire_pose(convention.joint_from_openxr(pose))),
+        radius: convention.length_from_openxr(radius),
     }
 }
 

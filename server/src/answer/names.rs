@@ -48,7 +48,7 @@ pub(super) fn wire_grasp_type(grasp_type: GraspType) -> v1::GraspType {
     }
 }
 
-pub(super) fn wire_digit(digit: Digit) -> v1::Digit {
+pub(crate) fn wire_digit(digit: Digit) -> v1::Digit {
     match digit {
         Digit::Thumb => v1::Digit::Thumb,
         Digit::Index => v1::Digit::Index,

@@ -4,9 +4,13 @@ use std::sync::Arc;
 
 use grasp_assets::hands::{self, Hand};
 use grasp_import::{ImportError, ImportedHand, MeshLimits, RigSource, read_rig, rig_at_rest};
-use grasp_synthesis::{model::hand::Handedness, propose::prepared::PreparedRig};
+use grasp_synthesis::{
+    model::hand::{Digit, Handedness, rig::Rig},
+    propose::prepared::PreparedRig,
+};
 
 use crate::{
+    answer::wire_digit,
     error::ServiceError,
     executor::run_blocking,
     rigs::{RigHand, StoredRig, name_of, store::RigStore},
@@ -58,12 +62,36 @@ pub(super) fn build_rig(
         }
     };
     let mirrored = [made.left.is_mirrored, made.right.is_mirrored];
+    let mut warnings = fields.warnings;
+    let own = [&made.left, &made.right]
+        .into_iter()
+        .filter(|hand| !hand.is_mirrored);
+    warnings.extend(own.filter_map(|hand| missing_fingers(&hand.rig)));
     violations.finish(StoredRig {
         id: fields.id,
         built_in: false,
         hands: [made.left, made.right].map(rig_hand),
         mirrored,
-        warnings: fields.warnings,
+        warnings,
+    })
+}
+
+/// A warning that names the fingers that a hand does not have.
+fn missing_fingers(rig: &Rig) -> Option<String> {
+    let missing: Vec<&str> = Digit::ALL
+        .into_iter()
+        .filter(|&digit| !rig.has(digit))
+        .map(|digit| wire_digit(digit).as_str_name())
+        .collect();
+    let side = match rig.handedness {
+        Handedness::Left => "left",
+        Handedness::Right => "right",
+    };
+    (!missing.is_empty()).then(|| {
+        format!(
+            "the {side} hand has no {}; it is posed without",
+            missing.join(" and ")
+        )
     })
 }
 

@@ -5,14 +5,15 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
-        HandPose,
-        joints::{HandJoints, JOINT_NAMES, thesis_from_openxr_frame},
+        Digit, HandPose,
+        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, thesis_from_openxr_frame},
         rig::{AngleRange, DigitLimits, Rig},
     },
 };
 
 use crate::{
-    answer::{wire_handedness, wire_pose},
+    answer::{wire_digit, wire_handedness, wire_joint},
+    convention::Convention,
     rigs::{RigHand, StoredRig},
 };
 
@@ -37,23 +38,23 @@ fn wire_hand(hand: &RigHand, mirrored: bool) -> v1::RigHand {
         frame_from_wrist: thesis_from_openxr_frame(Pose::IDENTITY),
         digits: rig.stretched(),
     };
+    let stretched = HandJoints::of_pose(rig, &stretched);
     let handedness = wire_handedness(rig.handedness).into();
     let joints = hand.binding.iter().flat_map(|binding| binding.joints());
     v1::RigHand {
         handedness,
-        stretched_joints: HandJoints::of_pose(rig, &stretched)
-            .joints
-            .iter()
-            .map(|joint| v1::JointPose {
-                client_from_joint: Some(wire_pose(joint.pose)),
-                radius: joint.radius,
+        stretched_joints: (0..JOINT_COUNT)
+            .map(|joint| wire_joint(&stretched, joint, Convention::OpenXr))
+            .collect(),
+        limits: Digit::ALL
+            .map(|digit| {
+                if rig.has(digit) {
+                    wire_limits(&rig.digit(digit).limits)
+                } else {
+                    v1::DigitLimits::default()
+                }
             })
-            .collect(),
-        limits: rig
-            .digits
-            .iter()
-            .map(|digit| wire_limits(&digit.limits))
-            .collect(),
+            .to_vec(),
         mirrored,
         root_node: hand.binding.as_deref().map_or("", Binding::root).to_owned(),
         nodes: joints
@@ -62,6 +63,11 @@ fn wire_hand(hand: &RigHand, mirrored: bool) -> v1::RigHand {
                 joint: JOINT_NAMES[joint].to_owned(),
                 handedness,
             })
+            .collect(),
+        digits: Digit::ALL
+            .into_iter()
+            .filter(|&digit| rig.has(digit))
+            .map(|digit| wire_digit(digit).into())
             .collect(),
     }
 }

@@ -7,6 +7,7 @@ use grasp_synthesis::{
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
+        hand::{Digit, rig::Rig},
         obstacle::Obstacle,
         strategy::{Choice, Strategy, Validity},
     },
@@ -22,6 +23,7 @@ use super::{
     search_limits::{SearchLimits, search_limits},
 };
 use crate::{
+    answer::wire_digit,
     convention::Convention,
     error::ServiceError,
     rigs::{RigHand, store::RigStore},
@@ -147,6 +149,22 @@ fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut 
     }
 }
 
+/// Digits that must touch are digits that the hand has.
+fn check_has_digits(constraints: &Constraints, rig: &Rig, violations: &mut Violations) {
+    for digit in Digit::ALL {
+        if constraints.must_touch.contains(digit) && !rig.has(digit) {
+            violations.add(
+                Field::root("constraints").child("must_touch"),
+                format_args!(
+                    "contains {}, which {} does not have; leave it out",
+                    wire_digit(digit).as_str_name(),
+                    rig.name
+                ),
+            );
+        }
+    }
+}
+
 /// Checks a request. An id for which `object_exists` is false is a violation if there are others; without others, it is
 /// left to the look-up, which knows about evicted objects.
 ///
@@ -206,6 +224,9 @@ pub(crate) fn find_query(
         .friction
         .map(|value| friction(Field::root("friction"), value, v));
     let constraints = constraints(Field::root("constraints"), request.constraints, convention, v);
+    if let Some(hands) = &receiving_hands {
+        check_has_digits(&constraints, &hands.hand.hand.rig, v);
+    }
     let atlas_use: v1::AtlasUse = known(Field::root("atlas"), request.atlas, v);
     check_reproducible(request.reproducible, choice, v);
     let takes_both_hands = takes_both_hands(

@@ -7,6 +7,7 @@ mod budget;
 mod constraints;
 mod conventions;
 mod either_hand;
+mod few_fingers;
 mod fixtures;
 mod health;
 mod hooks;

@@ -237,7 +237,7 @@ async fn a_described_hand_is_its_twin_and_gives_like_it() {
     });
     let described = NewRig {
         source: RigSource::Joints(hands.collect()),
-        limits: Some(adult.hands[1].limits),
+        limits: Some(adult.hands[1].limits.map(Option::unwrap)),
         ..NewRig::of_model("twin", Vec::new())
     };
     let twin = client.create_rig(&described).await.unwrap();

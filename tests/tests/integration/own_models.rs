@@ -15,13 +15,15 @@ use grasp_tests::TestServer;
 use crate::own_hands::{model, new_rig};
 
 /// A skin in the client's frame.
-struct Drawn {
-    positions: Vec<Vec3>,
-    triangles: Vec<[usize; 3]>,
+pub(crate) struct Drawn {
+    /// Not finite where the skin follows other nodes than the hand's.
+    pub(crate) positions: Vec<Vec3>,
+    /// Those of the hand.
+    pub(crate) triangles: Vec<[usize; 3]>,
 }
 
-/// Draws a GLB's only skin with posed nodes, as a viewer that puts the root where the answer says.
-fn drawn(glb: &[u8], posed: &PosedModel) -> Drawn {
+/// Draws the hand of a GLB's only skin with posed nodes, as a viewer that puts the root where the answer says.
+pub(crate) fn drawn(glb: &[u8], posed: &PosedModel) -> Drawn {
     let file = gltf::Gltf::from_slice(glb).unwrap();
     let blob = file.blob.as_deref();
     let root = file
@@ -41,6 +43,7 @@ fn drawn(glb: &[u8], posed: &PosedModel) -> Drawn {
         .zip(inverse_binds)
         .map(|(joint, inverse)| {
             let below = below_root(&file.document, joint.index(), root.index(), posed);
+            let below = below.unwrap_or(Mat4::NAN);
             client_from_root * below * Mat4::from_cols_array_2d(&inverse)
         })
         .collect();
@@ -49,9 +52,10 @@ fn drawn(glb: &[u8], posed: &PosedModel) -> Drawn {
     let joints = reader.read_joints(0).unwrap().into_u16();
     let weights = reader.read_weights(0).unwrap().into_f32();
     let vertices = reader.read_positions().unwrap().zip(joints.zip(weights));
-    let positions = vertices
+    let positions: Vec<Vec3> = vertices
         .map(|(position, (joints, weights))| {
-            let moved = joints.iter().zip(weights).map(|(&joint, weight)| {
+            let moved = joints.iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
+            let moved = moved.map(|(&joint, weight)| {
                 weight * matrices[usize::from(joint)].transform_point3(Vec3::from(position))
             });
             moved.sum()
@@ -64,11 +68,12 @@ fn drawn(glb: &[u8], posed: &PosedModel) -> Drawn {
         .map(|corner| corner as usize)
         .collect();
     Drawn {
-        positions,
         triangles: corners
             .chunks(3)
             .map(|corners| [corners[0], corners[1], corners[2]])
+            .filter(|corners| corners.iter().all(|&corner| positions[corner].is_finite()))
             .collect(),
+        positions,
     }
 }
 
@@ -103,9 +108,10 @@ fn global(document: &Document, node: usize, above: Option<usize>) -> Mat4 {
     parent(document, node).map_or(own, |parent| global(document, parent, above) * own)
 }
 
-fn below_root(document: &Document, node: usize, root: usize, posed: &PosedModel) -> Mat4 {
+/// The transform of a node in the root's frame; none if it is not below.
+fn below_root(document: &Document, node: usize, root: usize, posed: &PosedModel) -> Option<Mat4> {
     if node == root {
-        return Mat4::IDENTITY;
+        return Some(Mat4::IDENTITY);
     }
     let described = document.nodes().nth(node).unwrap();
     let mut own = local(&described);
@@ -118,7 +124,7 @@ fn below_root(document: &Document, node: usize, root: usize, posed: &PosedModel)
         let translation = pose.translation.unwrap_or(translation);
         own = Mat4::from_scale_rotation_translation(scale, pose.rotation, translation);
     }
-    below_root(document, parent(document, node).unwrap(), root, posed) * own
+    Some(below_root(document, parent(document, node)?, root, posed)? * own)
 }
 
 /// The nearest point of a triangle, by projection onto its plane and its edges.
@@ -150,7 +156,7 @@ pub(crate) fn winding(mesh: &TriangleMesh, point: Vec3) -> f32 {
 }
 
 /// How far the drawn skin is from each contact, and how deep it is in the object, in metres.
-fn measure(skin: &Drawn, grasp: &Grasp, holdout: &BuiltInHoldout) -> (Vec<f32>, f32) {
+pub(crate) fn measure(skin: &Drawn, grasp: &Grasp, holdout: &BuiltInHoldout) -> (Vec<f32>, f32) {
     let from_contacts = grasp
         .contacts
         .iter()

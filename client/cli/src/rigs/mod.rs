@@ -5,7 +5,7 @@ mod create;
 use std::fmt::Write as _;
 
 use clap::{Args, Subcommand};
-use grasp_client::{Handedness, Rig, RigHand};
+use grasp_client::{Handedness, JointPose, Rig, RigHand};
 use serde::Serialize;
 
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
 
 const ABOUT: &str = r"Show everything about a rig except its model.
 
-With --json: name, built_in, hands (left, then right: handedness, stretched_joints, limits, mirrored, root_node, nodes),
+With --json: name, built_in, hands (left, then right: handedness, stretched_joints, digits, limits, mirrored, root_node, nodes),
 warnings; metres, radians, quaternions x y z w.";
 
 /// List, show, create and delete rigs of hands.
@@ -99,13 +99,16 @@ fn full_name(name: &str) -> String {
 }
 
 fn listed(rigs: &[Rig]) -> String {
-    let mut table = table(&["rig", ">left", ">right", "built in", "model", "warnings"]);
+    let mut table = table(&[
+        "rig", ">left", ">right", ">digits", "built in", "model", "warnings",
+    ]);
     for rig in rigs {
         let [left, right] = &rig.hands;
         table.add_row([
             rig.name.clone(),
             length(left),
             length(right),
+            digits(&rig.hands),
             yes(rig.built_in).to_owned(),
             yes(rig.hands.iter().any(|hand| !hand.root_node.is_empty())).to_owned(),
             rig.warnings.len().to_string(),
@@ -118,12 +121,28 @@ fn yes(is_so: bool) -> &'static str {
     if is_so { "yes" } else { "no" }
 }
 
-/// From the wrist to the tip of the stretched middle finger, in millimetres.
+/// How many digits the hands have: one number if it is the same.
+fn digits([left, right]: &[RigHand; 2]) -> String {
+    match (left.digits.len(), right.digits.len()) {
+        (left, right) if left == right => left.to_string(),
+        (left, right) => format!("{left} and {right}"),
+    }
+}
+
+/// From the wrist to the tip of the longest finger, stretched, in millimetres.
 fn length(hand: &RigHand) -> String {
     const WRIST: usize = 1;
-    const MIDDLE_TIP: usize = 15;
+    const TIPS: [usize; 4] = [10, 15, 20, 25];
     let at = |joint: usize| hand.stretched_joints[joint].client_from_joint.position;
-    format!("{:.0} mm", 1000.0 * at(WRIST).distance(at(MIDDLE_TIP)))
+    let of_finger = |tip: usize| {
+        if hand.stretched_joints[tip] == JointPose::MISSING {
+            0.0
+        } else {
+            at(WRIST).distance(at(tip))
+        }
+    };
+    let longest = TIPS.map(of_finger).into_iter().fold(0.0, f32::max);
+    format!("{:.0} mm", 1000.0 * longest)
 }
 
 /// Everything about a rig, for people.
@@ -134,6 +153,10 @@ fn describe(rig: &Rig) -> String {
     ];
     for hand in &rig.hands {
         let mut text = length(hand);
+        if hand.digits.len() < 5 {
+            // Writing to a string cannot fail.
+            let _ = write!(text, ", {} digits", hand.digits.len());
+        }
         if hand.mirrored {
             text.push_str(", the other hand mirrored");
         }

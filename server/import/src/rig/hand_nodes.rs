@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use grasp_synthesis::model::hand::{
-    Handedness,
+    Digit, Handedness,
     joints::{JOINT_COUNT, JOINT_NAMES, index},
 };
 
@@ -23,10 +23,61 @@ pub(super) struct HandNodes {
     pub(super) joints: [Option<usize>; JOINT_COUNT],
 }
 
-/// Joints without which a hand cannot be posed; tips and the fingers' metacarpals are derived, and the palm is no node.
+impl HandNodes {
+    /// True if one of a digit's joints is there; thumb first.
+    pub(super) fn has(&self, digit: usize) -> bool {
+        self.joints[joints_of(digit)].iter().any(Option::is_some)
+    }
+}
+
+/// Joints without which a digit cannot be posed; tips and the fingers' metacarpals are derived, and the palm is no node.
 pub(super) fn is_required(joint: usize) -> bool {
     let is_metacarpal = index::FIRST_OF_DIGIT[1..].contains(&joint);
     joint != index::PALM && !index::TIP_OF_DIGIT.contains(&joint) && !is_metacarpal
+}
+
+/// Names of the digits, thumb first.
+pub(super) const DIGIT_NAMES: [&str; 5] = [
+    "thumb",
+    "index finger",
+    "middle finger",
+    "ring finger",
+    "little finger",
+];
+
+/// Fewest fingers of a hand.
+const FEWEST_FINGERS: usize = 2;
+
+/// The joints of a digit, from its metacarpal to its tip, as `OpenXR` indices.
+pub(super) fn joints_of(digit: usize) -> std::ops::RangeInclusive<usize> {
+    index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]
+}
+
+/// Adds a violation if a hand with these digits, thumb first, can hold nothing.
+pub(super) fn check_digits(side: Handedness, has: [bool; 5], violations: &mut Violations) {
+    let [thumb, fingers @ ..] = has;
+    let name = hand_name(side);
+    if !thumb {
+        violations.push(ImportError::at(
+            format!("{name}, thumb"),
+            "is missing; without a thumb, nothing opposes the fingers and no grasp holds. If it is there under other names, \
+             give them in joint_map",
+        ));
+    }
+    let missing: Vec<&str> = (1..5)
+        .filter(|&digit| !has[digit])
+        .map(|digit| DIGIT_NAMES[digit])
+        .collect();
+    if fingers.iter().filter(|&&finger| finger).count() < FEWEST_FINGERS {
+        violations.push(ImportError::at(
+            name,
+            format!(
+                "lacks the {}; a hand must have a thumb and at least {FEWEST_FINGERS} fingers, because objects turn between \
+                 two digits. If they are there under other names, give them in joint_map",
+                missing.join(", ")
+            ),
+        ));
+    }
 }
 
 /// "left hand" or "right hand".
@@ -202,15 +253,19 @@ pub(super) fn shortened(text: &str) -> String {
 /// Adds a violation for every required joint that is missing, and for nodes that are two joints or not below one another.
 fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
     let name = hand_name(hand.side);
+    let has = Digit::ALL.map(|digit| hand.has(digit.index()));
+    check_digits(hand.side, has, violations);
     for (joint, node) in hand.joints.iter().enumerate() {
-        if node.is_none() && is_required(joint) {
+        let is_of_missing = (0..5).any(|digit| !has[digit] && joints_of(digit).contains(&joint));
+        if node.is_none() && is_required(joint) && !is_of_missing {
             violations.push(ImportError::at(
                 format!("{name}, {}", JOINT_NAMES[joint]),
-                "is missing: no node has its name. Hands with fewer than five digits cannot be posed; if it is there under \
-                 another name, give that in joint_map",
+                "is missing: no node has its name, although others of the hand or the digit are there. Fingers may be missing \
+                 as a whole; if it is there under another name, give that in joint_map",
             ));
         }
     }
+    check_unknown_fingers(model, hand, has, violations);
     for (place, node) in hand.joints.iter().enumerate() {
         let Some(node) = *node else { continue };
         let joint = JOINT_NAMES[place];
@@ -241,11 +296,43 @@ fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
     }
 }
 
+/// Adds a violation if fingers are missing and unknown bones below the wrist may be theirs: they would stay stretched, and the
+/// drawn finger would go through what the others hold.
+fn check_unknown_fingers(model: &Model, hand: &HandNodes, has: [bool; 5], violations: &mut Violations) {
+    let missing: Vec<&str> = (1..5)
+        .filter(|&digit| !has[digit])
+        .map(|digit| DIGIT_NAMES[digit])
+        .collect();
+    if missing.is_empty() {
+        return;
+    }
+    let is_joint = |node: usize| hand.joints.contains(&Some(node));
+    let is_unknown = |node: usize| !is_joint(node) && model.moves_skin(node);
+    let is_below_wrist = |node: usize| model.nearest(node, is_joint) == hand.joints[index::WRIST];
+    // A single bone is a twist or what holds a prop, two in a row are a finger.
+    let unknown: Vec<String> = (0..model.names.len())
+        .filter(|&node| {
+            let parent = model.parents[node];
+            is_unknown(node) && parent.is_some_and(is_unknown) && is_below_wrist(node)
+        })
+        .map(|node| format!("{:?}", shortened(&model.names[node])))
+        .take(8)
+        .collect();
+    if !unknown.is_empty() {
+        violations.push(ImportError::at(
+            format!("{}, {}", hand_name(hand.side), missing.join(" and ")),
+            format!(
+                "has no nodes with its names, but there are unknown bones below the wrist: {}; if they are its joints, say which in \
+                 joint_map, and if not, take them out of the skin",
+                unknown.join(", ")
+            ),
+        ));
+    }
+}
+
 /// True if a joint may hang below another: on the wrist, on the same digit nearer to the wrist, or on the palm's bones.
 fn may_be_above(above: usize, joint: usize) -> bool {
-    let digit = |joint: usize| {
-        (0..5).find(|&digit| (index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]).contains(&joint))
-    };
+    let digit = |joint: usize| (0..5).find(|&digit| joints_of(digit).contains(&joint));
     if joint == index::WRIST {
         return false;
     }

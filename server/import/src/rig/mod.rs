@@ -30,7 +30,7 @@ use crate::{
     gltf::{self, Scene},
     limits::MeshLimits,
 };
-use hand_nodes::{HandNodes, hand_name, hand_nodes};
+use hand_nodes::{HandNodes, check_digits, hand_name, hand_nodes, joints_of};
 use model::Model;
 use radii::{SkinVertex, Widths};
 use rest::{RestJoints, Skeleton};
@@ -152,7 +152,8 @@ pub fn read_rig(
     Ok(both(&read))
 }
 
-/// Makes a rig of the joints of one or both hands, flat and at rest, in any frame and in metres.
+/// Makes a rig of the joints of one or both hands, flat and at rest, in any frame and in metres. Fingers whose tips have no radius
+/// are missing.
 ///
 /// # Errors
 /// Every violation; see [`ImportError`].
@@ -161,12 +162,18 @@ pub fn rig_at_rest(hands: &[HandJoints], source: RigSource<'_>) -> Result<Import
     let made: Vec<ImportedHand> = hands
         .iter()
         .filter_map(|hand| {
-            let rest = RestJoints {
-                side: hand.handedness,
-                positions: hand
-                    .joints
-                    .map(|joint| Some(as_right(hand.handedness, joint.pose.position))),
-            };
+            let side = hand.handedness;
+            let has = index::TIP_OF_DIGIT.map(|tip| hand.joints[tip].radius > 0.0);
+            let mut positions = hand.joints.map(|joint| Some(as_right(side, joint.pose.position)));
+            for digit in (0..5).filter(|&digit| !has[digit]) {
+                positions[joints_of(digit)].fill(None);
+            }
+            let before = violations.len();
+            check_digits(side, has, &mut violations);
+            if violations.len() > before {
+                return None;
+            }
+            let rest = RestJoints { side, positions };
             let skeleton = Skeleton::new(&rest, source.reference, &mut violations)?;
             let widths = Widths {
                 radii: hand.joints.map(|joint| joint.radius),

@@ -59,7 +59,7 @@ impl Widths {
         if skin.is_empty() {
             return widths;
         }
-        for digit in 0..5 {
+        for digit in (0..5).filter(|&digit| skeleton.has[digit]) {
             widths.measure_digit(digit, skin, skeleton);
         }
         widths.measure_palm(skin, skeleton);

@@ -13,7 +13,10 @@ use grasp_synthesis::{
     },
 };
 
-use super::{hand_nodes::hand_name, radii::Widths};
+use super::{
+    hand_nodes::{hand_name, joints_of},
+    radii::Widths,
+};
 use crate::error::{ImportError, Violations};
 
 /// Smallest and largest length of a bone, in metres: from a doll's to a giant's.
@@ -34,7 +37,7 @@ const BENT_BACK: f32 = -0.15;
 pub(super) struct RestJoints {
     /// What the hand is, for messages. The joints of a left hand are mirrored.
     pub(super) side: Handedness,
-    /// By `OpenXR` index; tips, the fingers' metacarpals and the palm may be absent.
+    /// By `OpenXR` index; tips, the fingers' metacarpals, the palm and all joints of missing fingers may be absent.
     pub(super) positions: [Option<Vec3>; JOINT_COUNT],
 }
 
@@ -47,8 +50,29 @@ pub(super) struct Skeleton {
     pub(super) size: f32,
     /// Breadth of the knuckles relative to the reference.
     pub(super) breadth: f32,
-    /// The joints in the wrist's frame, without the palm; tips are where the file has them or as long as the reference's.
+    /// The joints in the wrist's frame, without the palm; tips are where the file has them or as long as the reference's. All
+    /// of a missing finger's but the metacarpal are at the knuckle that it would have.
     pub(super) joints: [Vec3; JOINT_COUNT],
+    /// Which digits the hand has, thumb first.
+    pub(super) has: [bool; 5],
+}
+
+/// The fingers, counted from the index finger, between which one is or would be, and its share of the way from the first to the
+/// second: the neighbours of a missing one or, where it has only one, that one.
+fn neighbours(has: [bool; 4], finger: usize) -> Option<(usize, usize, f32)> {
+    if has[finger] {
+        return Some((finger, finger, 0.0));
+    }
+    let before = (0..finger).rev().find(|&other| has[other]);
+    let after = (finger + 1..4).find(|&other| has[other]);
+    match (before, after) {
+        (Some(before), Some(after)) => {
+            let share = (finger - before) as f32 / (after - before) as f32;
+            Some((before, after, share))
+        }
+        (Some(only), None) | (None, Some(only)) => Some((only, only, 0.0)),
+        (None, None) => None,
+    }
 }
 
 /// A bone's ends as `OpenXR` indices.
@@ -120,7 +144,12 @@ impl Skeleton {
             return None;
         }
         let wrist = at(index::WRIST)?;
-        let knuckle = |finger: usize| at(base_of(finger + 1));
+        let has: [bool; 5] = std::array::from_fn(|digit| at(base_of(digit)).is_some());
+        let [_, fingers @ ..] = has;
+        let knuckle = |finger: usize| {
+            let (before, after, share) = neighbours(fingers, finger)?;
+            Some(at(base_of(before + 1))?.lerp(at(base_of(after + 1))?, share))
+        };
         let knuckles = [knuckle(0)?, knuckle(1)?, knuckle(2)?, knuckle(3)?];
         let (axes, length, breadth) = palm_frame(wrist, knuckles);
         let of_reference =
@@ -145,7 +174,7 @@ impl Skeleton {
                 *position = wrist_from_frame.transform_point(at);
             }
         }
-        for digit in 0..5 {
+        for digit in (0..5).filter(|&digit| has[digit]) {
             let (tip, chain) = (index::TIP_OF_DIGIT[digit], &reference.digits[digit]);
             if at(tip).is_none() {
                 let last = joints[tip - 1] - joints[tip - 2];
@@ -161,11 +190,21 @@ impl Skeleton {
                 joints[first] = share * joints[first + 1] + size * (start - share * reference_knuckle);
             }
         }
+        for finger in (0..4).filter(|&finger| !fingers[finger]) {
+            let (before, after, share) = neighbours(fingers, finger)?;
+            let between = |of_finger: fn(usize) -> usize| {
+                joints[of_finger(before + 1)].lerp(joints[of_finger(after + 1)], share)
+            };
+            let (metacarpal, knuckle) = (between(|digit| index::FIRST_OF_DIGIT[digit]), between(base_of));
+            joints[joints_of(finger + 1)].fill(knuckle);
+            joints[index::FIRST_OF_DIGIT[finger + 1]] = metacarpal;
+        }
         let skeleton = Self {
             frame_from_wrist,
             size,
             breadth,
             joints,
+            has,
         };
         skeleton.check_shape(name, violations);
         (violations.len() == before).then_some(skeleton)
@@ -194,7 +233,8 @@ impl Skeleton {
             let rise = |direction: Vec3| direction.z.atan2(direction.y.max(1e-3));
             rise(links[2]) - rise(links[0])
         };
-        let mean = (1..5).map(bend).sum::<f32>() / 4.0;
+        let fingers = (1..5).filter(|&digit| self.has[digit]);
+        let mean = fingers.clone().map(bend).sum::<f32>() / fingers.count().max(1) as f32;
         if mean < BENT_BACK && joint(thumb + 1).z < 0.0 {
             violations.push(ImportError::at(
                 name,
@@ -212,6 +252,7 @@ impl Skeleton {
         reference: &Rig,
         limits: Option<[DigitLimits; 5]>,
     ) -> Rig {
+        let radii = self.radii(widths);
         let mut joints = self.joints;
         for (digit, &tip) in index::TIP_OF_DIGIT.iter().enumerate() {
             if let Some(place) = widths.tips[digit] {
@@ -233,7 +274,7 @@ impl Skeleton {
                 wrist_from_base: Pose::new(joints[base], orientation),
                 yaw_sign: chain.yaw_sign,
                 lengths: std::array::from_fn(length),
-                diameters: link_diameters(digit, [0, 1, 2].map(|link| 2.0 * widths.radii[base + link])),
+                diameters: link_diameters(digit, [0, 1, 2].map(|link| 2.0 * radii[base + link])),
                 limits,
             }
         });
@@ -241,7 +282,7 @@ impl Skeleton {
         let middle_knuckle = joints[base_of(2)];
         let along = (middle_knuckle - finger_metacarpals[1]).normalize_or(Vec3::Y);
         let palmar = Quat::from_rotation_arc(Vec3::Y, along) * Vec3::Z;
-        let palm_radius = widths.radii[index::PALM];
+        let palm_radius = radii[index::PALM];
         let scale = Vec3::new(
             self.breadth,
             self.size,
@@ -257,12 +298,44 @@ impl Skeleton {
             palm_segments: reference
                 .palm_segments
                 .map(|segment| Segment::new(scale * segment.start, scale * segment.end)),
-            joint_radii: widths.radii,
+            joint_radii: radii,
         };
-        rig.reach = digit_frames(&rig.digits[2], Pose::IDENTITY, DigitAngles::default())
-            .tip
-            .length();
+        let length = |digit: Digit| {
+            let stretched = digit_frames(rig.digit(digit), Pose::IDENTITY, DigitAngles::default());
+            stretched.tip.length()
+        };
+        rig.reach = if rig.has(Digit::Middle) {
+            length(Digit::Middle)
+        } else {
+            rig.fingers().map(length).fold(0.0, f32::max)
+        };
         rig
+    }
+
+    /// The radii of the joints. The knuckle and the metacarpal of a missing finger are as thick as its neighbours', and its other
+    /// joints have no radius.
+    fn radii(&self, widths: &Widths) -> [f32; JOINT_COUNT] {
+        let mut radii = widths.radii;
+        let [_, fingers @ ..] = self.has;
+        for finger in (0..4).filter(|&finger| !fingers[finger]) {
+            let Some((before, after, share)) = neighbours(fingers, finger) else {
+                continue;
+            };
+            let joints = joints_of(finger + 1);
+            let (metacarpal, knuckle) = (*joints.start(), base_of(finger + 1));
+            radii[joints].fill(0.0);
+            for (joint, before, after) in [
+                (
+                    metacarpal,
+                    index::FIRST_OF_DIGIT[before + 1],
+                    index::FIRST_OF_DIGIT[after + 1],
+                ),
+                (knuckle, base_of(before + 1), base_of(after + 1)),
+            ] {
+                radii[joint] = widths.radii[before] + share * (widths.radii[after] - widths.radii[before]);
+            }
+        }
+        radii
     }
 }
 

@@ -1,6 +1,6 @@
 //! Rigs of hands, from models and from joints at rest.
 
-mod character;
+mod fingers;
 mod naming;
 mod posing;
 mod rejecting;
@@ -8,7 +8,11 @@ mod shapes;
 
 use grasp_assets::hands::hand;
 use grasp_import::{ImportError, ImportedRig, MappedJoint, MeshLimits, RigSource, read_rig};
-use grasp_synthesis::model::hand::{Handedness, joints::JOINT_NAMES, rig::Rig};
+use grasp_synthesis::model::hand::{
+    Handedness,
+    joints::{HandJoints, JOINT_NAMES},
+    rig::Rig,
+};
 
 const LIMITS: MeshLimits = MeshLimits {
     bytes: 8 << 20,
@@ -18,6 +22,15 @@ const LIMITS: MeshLimits = MeshLimits {
 
 fn adult(side: Handedness) -> &'static Rig {
     &hand("adult", side).expect("the rig is built in").rig
+}
+
+/// The adult's joints at rest, as a client would describe them.
+fn adult_at_rest(side: Handedness) -> HandJoints {
+    hand("adult", side)
+        .expect("the rig is built in")
+        .skin
+        .bind
+        .clone()
 }
 
 fn source(joint_map: &[MappedJoint]) -> RigSource<'_> {

@@ -9,11 +9,9 @@ use grasp_synthesis::{
     model::hand::{DigitAngles, HandPose, Handedness, joints::HandJoints, kinematics::hand_frames},
 };
 
-use crate::{
-    character::{Character, Style},
-    naming::mixamo,
-    read,
-};
+use grasp_characters::{Character, Style, names::mixamo};
+
+use crate::read;
 
 /// Where a viewer draws the vertices of a GLB's only skin with changed nodes, in its scene.
 fn drawn(glb: &[u8], change: impl Fn(&str, Mat4) -> Mat4) -> Vec<(Vec3, Vec<u16>)> {

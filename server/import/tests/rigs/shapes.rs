@@ -4,11 +4,9 @@ use grasp_assets::hands::glb;
 use grasp_import::{RigSource, read_rig, rig_at_rest};
 use grasp_synthesis::model::hand::Handedness;
 
-use crate::{
-    LIMITS, adult,
-    character::{Character, Style, adult_at_rest},
-    differences, read, source,
-};
+use grasp_characters::{Character, Style};
+
+use crate::{LIMITS, adult, adult_at_rest, differences, read, source};
 
 #[test]
 fn built_in_hands_give_back_their_rigs() {

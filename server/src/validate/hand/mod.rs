@@ -18,7 +18,7 @@ use glam::Vec3;
 use grasp_assets::hands::RIG_NAMES;
 use grasp_proto::v1;
 use grasp_synthesis::model::{
-    hand::{Handedness, joints::HandJoints, skin::Skin},
+    hand::{Digit, Handedness, joints::HandJoints, skin::Skin},
     strategy::Validity,
 };
 
@@ -32,7 +32,7 @@ pub(super) use angles::checked_digits;
 pub(crate) use meshed::MeshedHand;
 pub(super) use meshed::check_meshes_together;
 use meshed::meshed_hand;
-use tracked::tracked_hand;
+use tracked::{Lacking, tracked_hand};
 
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
 const HAND_SCALES: std::ops::RangeInclusive<f32> = 0.5..=2.0;
@@ -95,9 +95,14 @@ pub(super) fn presenting_hand(
         Some(v1::presenting_hand::Form::Angles(angles)) => {
             angled_hand(field.child("angles"), &angles, convention, rigs, violations).map(GiverHand::jointed)
         }
-        Some(v1::presenting_hand::Form::Joints(joints)) => {
-            tracked_hand(field.child("joints"), &joints, convention, violations).map(GiverHand::jointed)
-        }
+        Some(v1::presenting_hand::Form::Joints(joints)) => tracked_hand(
+            field.child("joints"),
+            &joints,
+            convention,
+            Lacking::Nothing,
+            violations,
+        )
+        .map(GiverHand::jointed),
         Some(v1::presenting_hand::Form::Mesh(mesh)) => {
             meshed_hand(field.child("mesh"), &mesh, convention, violations).map(GiverHand::Meshed)
         }
@@ -125,7 +130,18 @@ pub(super) fn receiving_hand(
     };
     let scale = hand_scale(field.child("hand_scale"), hand.hand_scale, violations);
     let hundredths = (100.0 * scale).round() as u16;
-    let rig = rig_named(field.child("rig"), rig, rigs, violations);
+    let rig_field = field.child("rig");
+    let rig = rig_named(rig_field, rig, rigs, violations);
+    let lacks = |digit: Digit| {
+        rig.as_ref()
+            .is_some_and(|rig| !rig.hand(handedness).hand.rig.has(digit))
+    };
+    if validity == Validity::Thesis && Digit::ALL.into_iter().any(lacks) {
+        violations.add(
+            rig_field,
+            "has fewer than five digits, which VALIDITY_THESIS poses; use VALIDITY_PHYSICAL or another rig",
+        );
+    }
     let hands = rig.map(|rig| {
         let sized = |side| match hundredths {
             100 => rig.hand(side).clone(),
@@ -185,14 +201,14 @@ fn rig_named(
     rig
 }
 
-/// The joints of a hand at rest; none if they are wrong.
+/// The joints of a hand at rest, without radii where fingers are missing; none if they are wrong.
 pub(super) fn joints_at_rest(
     field: Field<'_>,
     hand: &v1::HandJoints,
     warnings: &mut Vec<String>,
     violations: &mut Violations,
 ) -> Option<HandJoints> {
-    let hand = tracked_hand(field, hand, Convention::OpenXr, violations)?;
+    let hand = tracked_hand(field, hand, Convention::OpenXr, Lacking::Fingers, violations)?;
     warnings.extend(hand.warnings);
     Some(hand.joints)
 }

@@ -47,11 +47,21 @@ struct SentJoints<'a> {
     readable: [bool; JOINT_COUNT],
 }
 
+/// What a hand may lack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Lacking {
+    /// It has all its joints: trackers report five digits.
+    Nothing,
+    /// All joints of a finger may be empty. They get no radius.
+    Fingers,
+}
+
 /// The hand in the client's frame; none if it is wrong.
 pub(super) fn tracked_hand(
     field: Field<'_>,
     hand: &v1::HandJoints,
     convention: Convention,
+    lacking: Lacking,
     violations: &mut Violations,
 ) -> Option<JointedHand> {
     let before = violations.len();
@@ -83,7 +93,7 @@ pub(super) fn tracked_hand(
         );
         return None;
     }
-    let mut sent = SentJoints::read(joints_field, &hand.joints, set, convention, violations);
+    let mut sent = SentJoints::read(joints_field, (&hand.joints, lacking), set, convention, violations);
     let (Some(handedness), Some(_)) = (handedness, expected) else {
         return None;
     };
@@ -92,8 +102,13 @@ pub(super) fn tracked_hand(
         return None;
     }
     let warnings = sent.replace_missing_radii();
+    for digit in (1..5).filter(|&digit| !sent.readable[index::TIP_OF_DIGIT[digit]]) {
+        for joint in &mut sent.joints[index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]] {
+            joint.radius = 0.0;
+        }
+    }
     if sent.places[index::PALM].is_none() {
-        sent.joints[index::PALM] = synthesised_palm(&sent.joints);
+        sent.joints[index::PALM] = sent.synthesised_palm();
     }
     Some(JointedHand {
         joints: HandJoints {
@@ -109,7 +124,7 @@ pub(super) fn tracked_hand(
 impl<'a> SentJoints<'a> {
     fn read(
         field: Field<'a>,
-        list: &[v1::JointPose],
+        (list, lacking): (&[v1::JointPose], Lacking),
         set: v1::JointSet,
         convention: Convention,
         violations: &mut Violations,
@@ -125,11 +140,25 @@ impl<'a> SentJoints<'a> {
             places: [None; JOINT_COUNT],
             readable: [false; JOINT_COUNT],
         };
+        let index_of = |place: usize| match set {
+            v1::JointSet::Webxr25 => place + 1,
+            v1::JointSet::Openxr26 | v1::JointSet::Unspecified => convention.joint_at(place),
+        };
+        let mut is_empty = [false; JOINT_COUNT];
         for (place, joint) in list.iter().enumerate() {
-            let index = match set {
-                v1::JointSet::Webxr25 => place + 1,
-                v1::JointSet::Openxr26 | v1::JointSet::Unspecified => convention.joint_at(place),
-            };
+            is_empty[index_of(place)] = *joint == v1::JointPose::default();
+        }
+        let mut is_missing = [false; JOINT_COUNT];
+        for digit in 1..5 {
+            let joints = index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit];
+            let is_whole = is_empty[joints.clone()].iter().all(|&empty| empty);
+            is_missing[joints].fill(lacking == Lacking::Fingers && is_whole);
+        }
+        for (place, joint) in list.iter().enumerate() {
+            let index = index_of(place);
+            if is_missing[index] {
+                continue;
+            }
             sent.places[index] = Some(place);
             (sent.joints[index], sent.readable[index]) =
                 joint_pose(field.at(place), joint, convention, violations);
@@ -263,6 +292,22 @@ impl<'a> SentJoints<'a> {
         );
     }
 
+    /// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, with its axes and radius. Without a
+    /// middle finger, another one counts.
+    fn synthesised_palm(&self) -> Joint {
+        let has = |digit: &usize| self.readable[index::FIRST_OF_DIGIT[*digit]];
+        let digit = [2, 3, 1, 4].into_iter().find(has).unwrap_or(2);
+        let metacarpal = self.joints[index::FIRST_OF_DIGIT[digit]];
+        let proximal = self.joints[index::FIRST_OF_DIGIT[digit] + 1];
+        Joint {
+            pose: Pose {
+                position: (metacarpal.pose.position + proximal.pose.position) * 0.5,
+                orientation: metacarpal.pose.orientation,
+            },
+            radius: metacarpal.radius,
+        }
+    }
+
     /// Replaces missing radii; returns a warning if there are any.
     fn replace_missing_radii(&mut self) -> Vec<String> {
         let is_missing = |joint: usize| self.places[joint].is_some() && self.joints[joint].radius == 0.0;
@@ -318,17 +363,4 @@ fn joint_pose(
     }
     let pose = convention.joint_to_openxr(pose(pose_field, sent.client_from_joint, unit, violations));
     (Joint { pose, radius }, violations.len() == before)
-}
-
-/// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, with its axes and radius.
-fn synthesised_palm(joints: &[Joint; JOINT_COUNT]) -> Joint {
-    let metacarpal = joints[index::FIRST_OF_DIGIT[2]];
-    let proximal = joints[index::FIRST_OF_DIGIT[2] + 1];
-    Joint {
-        pose: Pose {
-            position: (metacarpal.pose.position + proximal.pose.position) * 0.5,
-            orientation: metacarpal.pose.orientation,
-        },
-        radius: metacarpal.radius,
-    }
 }

@@ -141,10 +141,10 @@ impl Closer<'_> {
         Ok(closed)
     }
 
-    /// The digits, with fingers that hold nothing moved to rest.
+    /// The digits, with fingers that hold nothing moved to rest. Missing ones stay as they are.
     pub(super) fn rest_idle(&self, closed: &[ClosedDigit; 5], obstacles: &[Obstacle]) -> [ClosedDigit; 5] {
         let mut rested = *closed;
-        for &finger in &Digit::ALL[1..] {
+        for finger in self.rig.fingers() {
             let place = finger.index();
             if !closed[place].touches_object() {
                 let flexion = self.shape.resting_flexion(closed, place);

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     base::{pose::Pose, random::AttemptStream},
-    model::object::GraspObject,
+    model::{hand::rig::Rig, object::GraspObject},
     physical::shape::{HandShape, Proposal},
 };
 
@@ -142,7 +142,7 @@ impl ProposalContext<'_> {
         let in_palm = stream.unit() < palm_share;
         (0..MAX_LOCATIONS).take_while(|_| !interrupted()).find_map(|_| {
             if in_palm {
-                let shape = flat_palm_shape(stream);
+                let shape = flat_palm_shape(self.rig, stream);
                 let point = best_of(|| self.free_point(stream), |point| aim.merit_of_point(point))?;
                 self.palm_on(point, shape, &admits, stream)
             } else {
@@ -155,8 +155,8 @@ impl ProposalContext<'_> {
 
 /// Draws the shape of a hand with the palm on what is too wide for one hand: nearly flat under it, so that a thumb far out
 /// of the palm's plane would start inside.
-fn flat_palm_shape(stream: &mut AttemptStream) -> HandShape {
-    let shape = palm_shape(stream);
+fn flat_palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
+    let shape = palm_shape(rig, stream);
     HandShape {
         thumb_yaw: shape.thumb_yaw * stream.unit(),
         ..shape

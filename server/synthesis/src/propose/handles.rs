@@ -63,17 +63,17 @@ pub fn wrap_handle(context: &ProposalContext<'_>, stream: &mut AttemptStream) ->
         Some(Proposal {
             object_from_wrist: Pose::new(touching.position - above, touching.orientation),
             shape: HandShape {
-                closing: closing_on(handle, stream),
+                closing: context.rig.own_digits(closing_on(handle, stream)),
                 thumb_yaw: thumb_yaw.clamp(0.0, 1.0),
                 preshape: PRESHAPE.map(|[min, max]| stream.between(min, max)),
-                ..palm_shape(stream)
+                ..palm_shape(context.rig, stream)
             },
             advance: 2.0 * PALM_START_HEIGHT,
         })
     })
 }
 
-/// The digits that close on a handle: fewer on one with room for few, as in a cup's ear. There, some hands leave out one finger
+/// The digits of a hand of five that close on a handle: fewer on one with room for few, as in a cup's ear. There, some hands leave out one finger
 /// more, and the others rest outside.
 fn closing_on(handle: &Handle, stream: &mut AttemptStream) -> [bool; 5] {
     let room = (handle.length / FINGER_BREADTH) as usize;

@@ -230,6 +230,7 @@ impl Hook {
                 height < 0.0
             })
             .map_or(FINGER_SETS[2].0, |(set, _)| *set);
+        let closing = rig.own_digits(closing);
         let knuckle = stream.between(KNUCKLE_FLEXION[0], KNUCKLE_FLEXION[1]);
         let second = stream.between(MIDDLE_FLEXION[0], MIDDLE_FLEXION[1]);
         let mut shape = HandShape {

@@ -107,8 +107,8 @@ const TUCKED_SHARE: f32 = 0.4;
 /// collide more with object and giver, less leaves thicker parts of the object too thick.
 const PRESHAPE_OPENING: f32 = 0.22;
 
-/// Draws a hand shape for an object of a width in metres.
-pub fn draw_shape(width: f32, stream: &mut AttemptStream) -> HandShape {
+/// Draws a hand shape of a rig for an object of a width in metres.
+pub fn draw_shape(rig: &Rig, width: f32, stream: &mut AttemptStream) -> HandShape {
     let mut height = stream.unit();
     let closing = FINGER_SETS
         .iter()
@@ -125,7 +125,7 @@ pub fn draw_shape(width: f32, stream: &mut AttemptStream) -> HandShape {
             stream.between(BEND_RATIO[0], BEND_RATIO[1]),
             stream.between(BEND_RATIO[0], BEND_RATIO[1]),
         ],
-        closing,
+        closing: rig.own_digits(closing),
         preshape: [0.0; 2],
         tucks: stream.unit() < TUCKED_SHARE,
     }
@@ -213,7 +213,7 @@ struct OpposingHand {
     finger_link: usize,
     /// Pad positions along the links of thumb and fingers, 0 to 1.
     positions: [f32; 2],
-    /// Only the index finger opposes the thumb, whichever others close.
+    /// Only the finger next to the thumb opposes it, whichever others close.
     index_alone: bool,
 }
 
@@ -233,7 +233,7 @@ impl OpposingHand {
     fn draw(rig: &Rig, stream: &mut AttemptStream) -> Option<Opposition> {
         let [min, max] = WIDTH_RANGE;
         let width = min * (max / min).powf(stream.unit());
-        let shape = draw_shape(width, stream);
+        let shape = draw_shape(rig, width, stream);
         let distal = stream.unit() < DISTAL_SHARE;
         let mut position = || stream.between(PAD_POSITIONS[0], PAD_POSITIONS[1]);
         let positions = [position(), if distal { position() } else { 0.5 }];
@@ -340,16 +340,18 @@ impl OpposingHand {
                 self.positions[1],
             )
         };
-        let index = finger(Digit::Index);
-        // Index and middle finger decide; the others follow.
-        if self.shape.closing[Digit::Middle.index()] && !self.index_alone {
-            let middle = finger(Digit::Middle);
-            (
-                (index.0 + middle.0) * 0.5,
-                (index.1 + middle.1).normalize_or_zero(),
-            )
-        } else {
-            index
+        // The two fingers next to the thumb decide; the others follow.
+        let mut fingers = rig.fingers();
+        let first = finger(fingers.next().unwrap_or(Digit::Index));
+        match fingers.next().filter(|second| self.shape.closing[second.index()]) {
+            Some(second) if !self.index_alone => {
+                let second = finger(second);
+                (
+                    (first.0 + second.0) * 0.5,
+                    (first.1 + second.1).normalize_or_zero(),
+                )
+            }
+            _ => first,
         }
     }
 

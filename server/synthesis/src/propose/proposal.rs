@@ -14,7 +14,7 @@ use super::{
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     base::{pose::Pose, random::AttemptStream},
-    model::object::GraspObject,
+    model::{hand::rig::Rig, object::GraspObject},
     physical::{
         barriers::Barriers,
         grip::{GIVER_CLEARANCE, MAX_PENETRATION},
@@ -139,10 +139,10 @@ impl<'a> Candidate<'a> {
 }
 
 /// Draws the shape of a hand that holds in the palm: all digits close.
-pub(super) fn palm_shape(stream: &mut AttemptStream) -> HandShape {
+pub(super) fn palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
     HandShape {
-        closing: [true; 5],
-        ..draw_shape(f32::INFINITY, stream)
+        closing: rig.own_digits([true; 5]),
+        ..draw_shape(rig, f32::INFINITY, stream)
     }
 }
 
@@ -417,7 +417,7 @@ impl<'a> ProposalContext<'a> {
 
     /// Places the palm over a free point of the surface.
     fn palm_on_point(&self, stream: &mut AttemptStream) -> Option<Proposal> {
-        let shape = palm_shape(stream);
+        let shape = palm_shape(self.rig, stream);
         let point = self.free_point(stream)?;
         self.palm_on(point, shape, |_| true, stream)
     }

@@ -100,7 +100,7 @@ pub fn posture_values(
     classification: Classification,
 ) -> Values {
     let mut values = [0.0; TERMS];
-    values[Term::SharedFlexion as usize] = shared_flexion(pose);
+    values[Term::SharedFlexion as usize] = shared_flexion(rig, pose);
     values[Term::EnoughDigits as usize] = enough_digits(object, contacts);
     values[Term::Pads as usize] = pads(rig, pose, contacts);
     values[Term::NaturalType as usize] = natural_type(classification);
@@ -208,15 +208,18 @@ pub fn score(
 }
 
 /// 1 if neighbouring fingers flex alike, 0 if some pair differs by [`MAX_FLEXION_DIFFERENCE`].
-fn shared_flexion(pose: &HandPose) -> f32 {
+fn shared_flexion(rig: &Rig, pose: &HandPose) -> f32 {
     let flexion = |digit: Digit| {
         let angles = pose.digits[digit.index()];
         angles.base_pitch + angles.second_pitch + angles.third_pitch
     };
-    let worst = Digit::ALL[1..]
-        .windows(2)
-        .map(|pair| (flexion(pair[0]) - flexion(pair[1])).abs())
-        .fold(0.0, f32::max);
+    let mut flexions = rig.fingers().map(flexion);
+    let mut before = flexions.next().unwrap_or_default();
+    let mut worst = 0.0_f32;
+    for flexion in flexions {
+        worst = worst.max((before - flexion).abs());
+        before = flexion;
+    }
     (1.0 - worst / MAX_FLEXION_DIFFERENCE).max(0.0)
 }
 

@@ -344,8 +344,8 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than those tried there. What
-    /// takes longest is looked at last.
+    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than
+    /// those tried there. What takes longest is looked at last.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         let Some(place) = place.checked_sub(self.listed.len()) else {
             if self.shortlist.is_empty() {

@@ -176,8 +176,9 @@ fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Optio
 /// The thinnest finger fits nowhere between the object and the giver.
 fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Option<Limit> {
     let giver: &PreparedHand = presented.giver.as_ref()?;
-    let radii = Digit::ALL.map(|digit| link_radii(rig, digit).into_iter().fold(f32::INFINITY, f32::min));
-    let needed = INSIDE_FINGER * radii.into_iter().fold(f32::INFINITY, f32::min);
+    let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));
+    let radii = digits.flat_map(|digit| link_radii(rig, digit));
+    let needed = INSIDE_FINGER * radii.fold(f32::INFINITY, f32::min);
     let sides: &[f32] = if surface.pairs().iter().any(SurfacePair::is_of_sheet) {
         &[1.0, -1.0]
     } else {

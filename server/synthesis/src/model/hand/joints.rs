@@ -86,7 +86,7 @@ pub struct Joint {
     pub radius: f32,
 }
 
-/// All joints of a hand, in `OpenXR` order and axes.
+/// All joints of a hand, in `OpenXR` order and axes. Of a missing finger, they are as in [`Rig`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandJoints {
     /// Which hand.
@@ -144,6 +144,13 @@ impl HandJoints {
             handedness: rig.handedness,
             joints,
         }
+    }
+
+    /// True if the hand has a joint, by `OpenXR` index: all but those of missing fingers, whose tips have no radius.
+    pub fn has(&self, joint: usize) -> bool {
+        let mut digits = index::FIRST_OF_DIGIT.into_iter().zip(index::TIP_OF_DIGIT);
+        let tip = digits.find_map(|(first, tip)| (first..=tip).contains(&joint).then_some(tip));
+        tip.is_none_or(|tip| self.joints[tip].radius > 0.0)
     }
 
     /// The same joints in another frame.

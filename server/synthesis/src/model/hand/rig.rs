@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Digit, DigitAngles, Handedness, Phalanx};
+use super::{Digit, DigitAngles, Handedness, Phalanx, joints::index};
 use crate::{base::pose::Pose, geometry::Segment};
 
 /// A closed range of angles, in radians.
@@ -61,6 +61,9 @@ pub struct DigitRig {
 }
 
 /// A hand's rig, in the wrist frame: +y along the stretched fingers, +z out of the palm.
+///
+/// Of the four fingers, a hand may lack two. The tip of a missing finger has no radius, and its links have no length: all its
+/// joints but the metacarpal are at its knuckle, which, like the metacarpal, still shapes the palm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// "thesis", "adult" or a custom name.
@@ -69,7 +72,8 @@ pub struct Rig {
     pub handedness: Handedness,
     /// H: the centre of the palm's skin, from which the palm distance is measured (thesis 5.3), in metres.
     pub palm: Vec3,
-    /// d: distance from wrist to tip of the stretched middle finger (thesis 4.3), in metres.
+    /// d: distance from wrist to tip of the stretched middle finger (thesis 4.3) or, without one, of the longest finger, in
+    /// metres.
     pub reach: f32,
     /// The digit chains, thumb first.
     pub digits: [DigitRig; 5],
@@ -87,6 +91,29 @@ impl Rig {
     /// A digit's chain.
     pub fn digit(&self, digit: Digit) -> &DigitRig {
         &self.digits[digit.index()]
+    }
+
+    /// True if the hand has the digit.
+    pub fn has(&self, digit: Digit) -> bool {
+        self.joint_radii[index::TIP_OF_DIGIT[digit.index()]] > 0.0
+    }
+
+    /// The fingers that the hand has, index finger first.
+    pub fn fingers(&self) -> impl DoubleEndedIterator<Item = Digit> {
+        Digit::ALL[1..].iter().copied().filter(|&finger| self.has(finger))
+    }
+
+    /// The digits with which the hand does what these digits of a hand with four fingers do: as many fingers, if it has them,
+    /// those next to the thumb.
+    #[must_use]
+    pub fn own_digits(&self, digits: [bool; 5]) -> [bool; 5] {
+        let [thumb, fingers @ ..] = digits;
+        let count = fingers.iter().filter(|&&finger| finger).count();
+        let mut own = [thumb, false, false, false, false];
+        for finger in self.fingers().take(count) {
+            own[finger.index()] = true;
+        }
+        own
     }
 
     /// Length of a link, in metres.

@@ -28,7 +28,7 @@ const MIN_LENGTH: f32 = 1e-4;
 
 impl Skin {
     /// The vertex positions for joints at `joints`, in their frame and in metres. Where bones are longer or thicker
-    /// than in the bind pose, the skin stretches along and across each bone.
+    /// than in the bind pose, the skin stretches along and across each bone. That of a missing finger shrinks to its knuckle.
     pub fn posed(&self, joints: &HandJoints) -> Vec<Vec3> {
         let size = ratio(hand_length(joints), hand_length(&self.bind));
         let matrices: [Affine3A; JOINT_COUNT] = std::array::from_fn(|joint| {
@@ -62,6 +62,9 @@ fn joint_scale(bind: &HandJoints, target: &HandJoints, joint: usize, size: f32) 
     let along = ratio(bone(target, joint).length(), bone(bind, joint).length());
     if joint == index::WRIST || joint == index::PALM {
         return Vec3::splat(size);
+    }
+    if !target.has(joint) && !index::FIRST_OF_DIGIT.contains(&joint) {
+        return Vec3::ZERO;
     }
     if index::FIRST_OF_DIGIT.contains(&joint) {
         // The palm is one piece: it scales with the hand, not with the tracked radius of one joint.

@@ -70,7 +70,7 @@ impl Gripper {
         self.obstacles
             .extend(Obstacle::of_palm(&HandSolids::of_pose(rig, pose)));
         let mut digits = [ClosedDigit::default(); 5];
-        for digit in Digit::ALL {
+        for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
             let settled = closer.settle(digit, pose.digits[digit.index()], &self.obstacles)?;
             if barriers.comes_within(settled.links.iter(), GIVER_CLEARANCE) {
                 return None;

@@ -25,14 +25,16 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
         first.start_radius = first.start_radius.min(first.end_radius * KNUCKLE_TAPER);
     }
     let digits = phalanges.map(|links| links.map(Bounded::new));
-    for (i, digit) in digits.iter().enumerate() {
-        for other in &digits[i + 1..] {
+    // Missing digits are a point in the palm.
+    let is_there = |digit: &[Bounded; 3]| digit[2].solid.end_radius > 0.0;
+    for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
+        for other in digits[i + 1..].iter().filter(|other| is_there(other)) {
             least = between(digit, other, least);
         }
     }
     let palm = hand.palm.map(Bounded::new);
     let thenar = hand.thenar.map(Bounded::new);
-    for (i, digit) in digits.iter().enumerate() {
+    for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
         least = between(&digit[1..], &palm, least);
         if i > 0 {
             least = between(&digit[1..], &thenar, least);

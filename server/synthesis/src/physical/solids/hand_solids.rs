@@ -34,7 +34,8 @@ const FOREARM_SIDES: [f32; 2] = [0.65, 0.85];
 /// The solids of a posed hand and its forearm, in the frame of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HandSolids {
-    /// The three links of each digit, thumb first. The thumb's first link is its metacarpal.
+    /// The three links of each digit, thumb first. The thumb's first link is its metacarpal. Those of a missing digit are a
+    /// point within the palm, which therefore decides first.
     pub phalanges: [[TaperedCapsule; 3]; 5],
     /// The part of the palm that moves with the wrist.
     pub palm: [TaperedCapsule; PALM_SOLIDS],
@@ -163,8 +164,11 @@ pub fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
 }
 
 /// The links of a digit with joints and tip at `points` and distances `radii` from there to the skin. The tip lies on
-/// the skin, so the last link's sphere ends there.
+/// the skin, so the last link's sphere ends there. Those of a missing digit are a point within the palm.
 pub fn link_solids(points: [Vec3; 4], radii: [f32; 4]) -> [TaperedCapsule; 3] {
+    if radii[3] <= 0.0 {
+        return [TaperedCapsule::new(points[0], points[0], 0.0, 0.0); 3];
+    }
     let link = |i: usize| TaperedCapsule::new(points[i], points[i + 1], radii[i], radii[i + 1]);
     let last = link(2);
     let direction = (last.end - last.start).normalize_or_zero();

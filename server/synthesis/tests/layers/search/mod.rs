@@ -9,6 +9,7 @@ mod key_frames;
 mod limits;
 mod look_up;
 mod mechanisms;
+mod missing_fingers;
 mod preferences;
 mod race;
 mod refinement;

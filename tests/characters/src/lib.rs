@@ -1,61 +1,58 @@
 //! Writes characters with the built-in hands, as programs with their own names, units and axes would.
 
+mod fingers;
+pub mod names;
+
 use glam::{Mat4, Quat, Vec3};
-use grasp_assets::hands::hand;
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
-        Handedness,
-        joints::{HandJoints, JOINT_COUNT, index},
-        skin::Skin,
+        Digit, Handedness,
+        joints::{JOINT_COUNT, index},
     },
 };
 use serde_json::{Value, json};
 
+use fingers::Shape;
+use names::side_name;
+
 /// How a program writes characters.
-pub(crate) struct Style {
+#[derive(Clone, Copy, Debug)]
+pub struct Style {
     /// The name of a joint's node; none for joints that it does not have.
-    pub(crate) name: fn(Handedness, usize) -> Option<String>,
+    pub name: fn(Handedness, usize) -> Option<String>,
     /// Units of the file per metre; the armature's scale makes metres of them.
-    pub(crate) units_per_metre: f32,
+    pub units_per_metre: f32,
     /// Which hands it shows.
-    pub(crate) sides: &'static [Handedness],
+    pub sides: &'static [Handedness],
     /// Metres per metre of the built-in hand.
-    pub(crate) size: f32,
+    pub size: f32,
     /// True for nodes that are all next to one another.
-    pub(crate) is_flat: bool,
+    pub is_flat: bool,
+    /// The fingers of its hands, in order. Fewer than four are spread over the palm and are thicker.
+    pub fingers: &'static [Digit],
     /// The document's extensions, from the names of the nodes.
-    pub(crate) extensions: fn(&[String]) -> Value,
+    pub extensions: fn(&[String]) -> Value,
 }
 
 impl Style {
     /// Both hands in metres, in a tree.
-    pub(crate) const PLAIN: Self = Self {
-        name: webxr,
+    pub const PLAIN: Self = Self {
+        name: names::webxr,
         units_per_metre: 1.0,
         sides: &[Handedness::Left, Handedness::Right],
         size: 1.0,
         is_flat: false,
+        fingers: &[Digit::Index, Digit::Middle, Digit::Ring, Digit::Little],
         extensions: |_| json!({}),
     };
 }
 
-/// "Left" or "Right".
-pub(crate) fn side_name(side: Handedness) -> &'static str {
-    match side {
-        Handedness::Left => "Left",
-        Handedness::Right => "Right",
-    }
-}
-
-fn webxr(side: Handedness, joint: usize) -> Option<String> {
-    let name = grasp_synthesis::model::hand::joints::JOINT_NAMES[joint];
-    (joint != index::PALM).then(|| format!("{}-{name}", side_name(side)))
-}
-
-/// A character, and where its wrists are.
-pub(crate) struct Character {
-    pub(crate) glb: Vec<u8>,
+/// A character.
+#[derive(Clone, Debug)]
+pub struct Character {
+    /// The file.
+    pub glb: Vec<u8>,
 }
 
 struct Node {
@@ -66,7 +63,7 @@ struct Node {
 }
 
 /// The wrist of a hand that is stretched to the side, in `OpenXR` axes.
-pub(crate) fn character_from_wrist(side: Handedness) -> Pose {
+pub fn character_from_wrist(side: Handedness) -> Pose {
     let right = Pose::new(
         Vec3::new(-0.68, 1.38, 0.04),
         Quat::from_rotation_z(0.2) * Quat::from_rotation_y(std::f32::consts::FRAC_PI_2),
@@ -99,8 +96,8 @@ fn odd_axes(joint: usize) -> Quat {
 }
 
 impl Character {
-    /// Writes a character whose hands are the adult's, bound and standing in the bind pose.
-    pub(crate) fn new(style: &Style) -> Self {
+    /// Writes a character whose hands are the adult's but for their size and fingers, bound and standing in the bind pose.
+    pub fn new(style: &Style) -> Self {
         let mut nodes = vec![
             Node {
                 name: "Armature".to_owned(),
@@ -131,8 +128,11 @@ impl Character {
         }
         corners.extend([0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6]);
         for &side in style.sides {
-            let adult = hand("adult", side).expect("the rig is built in");
-            let Skin { bind, .. } = &*adult.skin;
+            let Shape {
+                skin,
+                bind,
+                positions: shaped,
+            } = Shape::new(side, style.fingers);
             let character_from_hand = character_from_wrist(side) * bind.joints[index::WRIST].pose.inverse();
             let place = |pose: Pose| {
                 let wrist = bind.joints[index::WRIST].pose.position;
@@ -148,7 +148,7 @@ impl Character {
                 parent: Some(1),
                 pose: Pose::from_position(character_from_wrist(side).position * Vec3::new(0.6, 1.0, 1.0)),
             });
-            let name = |joint: usize| (style.name)(side, joint);
+            let name = |joint: usize| (style.name)(side, joint).filter(|_| bind.has(joint));
             let has = |joint: usize| name(joint).is_some();
             let mut node_of = [0; JOINT_COUNT];
             for joint in 1..JOINT_COUNT {
@@ -166,17 +166,20 @@ impl Character {
                 });
             }
             let first = positions.len() as u32;
-            let placed = adult.skin.positions.iter();
-            positions.extend(placed.map(|&position| place(Pose::from_position(position)).position));
-            joints.extend(adult.skin.joint_indices.iter().map(|indices| {
+            positions.extend(
+                shaped
+                    .iter()
+                    .map(|&position| place(Pose::from_position(position)).position),
+            );
+            joints.extend(skin.joint_indices.iter().map(|indices| {
                 indices.map(|joint| {
                     let joint = usize::from(joint).max(1);
                     let joint = if has(joint) { joint } else { parent_of(joint, has) };
                     node_of[joint] as u16
                 })
             }));
-            weights.extend(&adult.skin.weights);
-            corners.extend(adult.skin.triangles.iter().flatten().map(|corner| first + corner));
+            weights.extend(&skin.weights);
+            corners.extend(skin.triangles.iter().flatten().map(|corner| first + corner));
         }
         Self {
             glb: write(style, &nodes, &positions, &joints, &weights, &corners),
@@ -292,8 +295,8 @@ fn write(
     glb(&document, buffer)
 }
 
-/// Packs a document and its buffer.
-pub(crate) fn glb(document: &Value, mut buffer: Vec<u8>) -> Vec<u8> {
+/// Packs a document and its buffer as GLB.
+pub fn glb(document: &Value, mut buffer: Vec<u8>) -> Vec<u8> {
     let mut text = document.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
     buffer.resize(buffer.len().next_multiple_of(4), 0);
@@ -308,13 +311,4 @@ pub(crate) fn glb(document: &Value, mut buffer: Vec<u8>) -> Vec<u8> {
     file.extend(b"BIN\0");
     file.extend(buffer);
     file
-}
-
-/// The adult's joints at rest, as a client would describe them.
-pub(crate) fn adult_at_rest(side: Handedness) -> HandJoints {
-    hand("adult", side)
-        .expect("the rig is built in")
-        .skin
-        .bind
-        .clone()
 }
