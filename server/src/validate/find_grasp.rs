@@ -150,7 +150,13 @@ fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut 
 }
 
 /// Digits that must touch are digits that the hand has.
-fn check_has_digits(constraints: &Constraints, rig: &Rig, violations: &mut Violations) {
+fn check_has_digits(
+    constraints: &Constraints,
+    hands: Option<&hand::ReceivingHands>,
+    violations: &mut Violations,
+) {
+    let Some(hands) = hands else { return };
+    let rig: &Rig = &hands.hand.hand.rig;
     for digit in Digit::ALL {
         if constraints.must_touch.contains(digit) && !rig.has(digit) {
             violations.add(
@@ -224,9 +230,7 @@ pub(crate) fn find_query(
         .friction
         .map(|value| friction(Field::root("friction"), value, v));
     let constraints = constraints(Field::root("constraints"), request.constraints, convention, v);
-    if let Some(hands) = &receiving_hands {
-        check_has_digits(&constraints, &hands.hand.hand.rig, v);
-    }
+    check_has_digits(&constraints, receiving_hands.as_ref(), v);
     let atlas_use: v1::AtlasUse = known(Field::root("atlas"), request.atlas, v);
     check_reproducible(request.reproducible, choice, v);
     let takes_both_hands = takes_both_hands(

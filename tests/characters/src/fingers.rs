@@ -97,7 +97,7 @@ fn offsets(bind: &HandJoints, fingers: &[Digit]) -> [[Vec3; 2]; 5] {
 fn close(skin: &Skin, bind: &HandJoints, digit: usize, positions: &mut [Vec3]) {
     let [base, knuckle] = [0, 1].map(|place| bind.joints[index::FIRST_OF_DIGIT[digit] + place]);
     let [radius, behind] = STUMP.map(|share| share * knuckle.radius);
-    let along = (knuckle.pose.position - base.pose.position).normalize();
+    let along = (knuckle.pose.position - base.pose.position).normalize_or(Vec3::Y);
     let centre = knuckle.pose.position - behind * along;
     let links = index::FIRST_OF_DIGIT[digit] + 1..=index::TIP_OF_DIGIT[digit];
     for (position, (joints, weights)) in positions
@@ -111,7 +111,7 @@ fn close(skin: &Skin, bind: &HandJoints, digit: usize, positions: &mut [Vec3]) {
             .sum();
         let from_centre = *position - centre;
         if from_centre.length() > radius {
-            let closed = centre + radius * from_centre.normalize();
+            let closed = centre + radius * from_centre.normalize_or(Vec3::Y);
             *position = position.lerp(closed, of_finger.min(1.0));
         }
     }
