@@ -31,6 +31,14 @@ const ALL: [Digit; 5] = [
     Digit::Little,
 ];
 
+const WIRE_DIGITS: [v1::Digit; 5] = [
+    v1::Digit::Thumb,
+    v1::Digit::Index,
+    v1::Digit::Middle,
+    v1::Digit::Ring,
+    v1::Digit::Little,
+];
+
 fn cartoon(fingers: &'static [hand::Digit]) -> Vec<u8> {
     let style = Style {
         name: mixamo,
@@ -168,6 +176,10 @@ async fn a_hand_of_four_digits_gives() {
     server.stop().await;
 }
 
+fn thumbless(side: hand::Handedness, joint: usize) -> Option<String> {
+    webxr(side, joint).filter(|_| !JOINTS[0].contains(&joint))
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn what_such_hands_cannot_do_is_refused_by_name() {
     let server = TestServer::start().await;
@@ -198,9 +210,6 @@ async fn what_such_hands_cannot_do_is_refused_by_name() {
     };
     assert_blamed(&server, little, &["constraints.must_touch"]).await;
 
-    fn thumbless(side: hand::Handedness, joint: usize) -> Option<String> {
-        webxr(side, joint).filter(|_| !JOINTS[0].contains(&joint))
-    }
     let style = Style {
         name: thumbless,
         ..Style::PLAIN
@@ -257,9 +266,11 @@ async fn a_described_hand_leaves_fingers_empty() {
             .into_inner()
             .rig
             .unwrap();
-        let digits: Vec<i32> = (0..5)
-            .filter(|digit| !missing.contains(digit))
-            .map(|digit| digit as i32 + 1)
+        let digits: Vec<i32> = WIRE_DIGITS
+            .into_iter()
+            .enumerate()
+            .filter(|(digit, _)| !missing.contains(digit))
+            .map(|(_, digit)| digit.into())
             .collect();
         assert_eq!(rig.hands[0].digits, digits);
         assert!(rig.hands[0].mirrored);

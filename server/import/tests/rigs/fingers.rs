@@ -94,6 +94,9 @@ fn joints_at_rest_without_radii_are_no_finger() {
 
 #[test]
 fn hands_that_cannot_oppose_are_refused_by_name() {
+    fn index_only(side: Handedness, joint: usize) -> Option<String> {
+        webxr(side, joint).filter(|_| joint < index::FIRST_OF_DIGIT[2])
+    }
     fn thumbless(side: Handedness, joint: usize) -> Option<String> {
         let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
         webxr(side, joint).filter(|_| !is_thumb)
@@ -115,9 +118,6 @@ fn hands_that_cannot_oppose_are_refused_by_name() {
             .all(|message| message.contains("hand, thumb: is missing; without a thumb")),
         "{found:?}"
     );
-    fn index_only(side: Handedness, joint: usize) -> Option<String> {
-        webxr(side, joint).filter(|_| joint < index::FIRST_OF_DIGIT[2])
-    }
     let found = named(index_only, whole);
     assert_eq!(found.len(), 2, "{found:?}");
     assert!(
