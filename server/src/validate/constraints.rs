@@ -9,8 +9,17 @@ use grasp_synthesis::model::{
     hand::Digit,
 };
 
-use super::{FARTHEST, Field, Violations, direction, known, point};
+use super::{FARTHEST, Field, Violations, direction, hand::ReceivingHands, known, point};
 use crate::convention::Convention;
+
+/// The digits as the contract names them.
+const DIGITS: [(v1::Digit, Digit); 5] = [
+    (v1::Digit::Thumb, Digit::Thumb),
+    (v1::Digit::Index, Digit::Index),
+    (v1::Digit::Middle, Digit::Middle),
+    (v1::Digit::Ring, Digit::Ring),
+    (v1::Digit::Little, Digit::Little),
+];
 
 /// The constraints on the grasp, in the client's frame and `OpenXR` axes. Wrong fields constrain nothing.
 pub(super) fn constraints(
@@ -172,13 +181,30 @@ fn digit(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Di
         violations.add(field, "is DIGIT_UNSPECIFIED; it must name a digit");
         return None;
     }
-    match known(field, value, violations) {
-        v1::Digit::Unspecified => None,
-        v1::Digit::Thumb => Some(Digit::Thumb),
-        v1::Digit::Index => Some(Digit::Index),
-        v1::Digit::Middle => Some(Digit::Middle),
-        v1::Digit::Ring => Some(Digit::Ring),
-        v1::Digit::Little => Some(Digit::Little),
+    let wire: v1::Digit = known(field, value, violations);
+    let named = DIGITS.iter().find(|(name, _)| *name == wire);
+    named.map(|&(_, digit)| digit)
+}
+
+/// Digits that must touch are digits that the receiving hand has, if its rig is known.
+pub(super) fn check_has_digits(
+    constraints: &Constraints,
+    hands: Option<&ReceivingHands>,
+    violations: &mut Violations,
+) {
+    let Some(hands) = hands else { return };
+    let rig = &hands.hand.hand.rig;
+    for (name, digit) in DIGITS {
+        if constraints.must_touch.contains(digit) && !rig.has(digit) {
+            violations.add(
+                Field::root("constraints").child("must_touch"),
+                format_args!(
+                    "contains {}, which {} does not have; leave it out",
+                    name.as_str_name(),
+                    rig.name
+                ),
+            );
+        }
     }
 }
 

