@@ -15,6 +15,7 @@ mod echo;
 mod ellipsoid;
 mod everyday;
 mod graspit;
+mod hands;
 mod registration;
 mod requests;
 mod setting;
@@ -59,6 +60,8 @@ enum Row {
     Registration,
     /// Comparison with `GraspIt!`.
     Graspit,
+    /// Hands of the clients' own.
+    Hands,
     /// All mechanisms against each one switched off; only if named in `--only`.
     Ablation,
 }
@@ -74,6 +77,7 @@ impl Row {
             Self::Everyday => "everyday",
             Self::Registration => "registration",
             Self::Graspit => "graspit",
+            Self::Hands => "hands",
             Self::Ablation => "ablation",
         }
     }
@@ -204,6 +208,9 @@ fn measure(setting: &Setting, minutes: Option<u32>, is_selected: impl Fn(Row) ->
     }
     if is_selected(Row::Graspit) {
         lines.extend(graspit::measure(setting));
+    }
+    if is_selected(Row::Hands) {
+        lines.extend(hands::measure(setting));
     }
     if is_selected(Row::Ablation) {
         let longest = minutes.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));

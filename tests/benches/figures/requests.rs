@@ -20,6 +20,10 @@ pub(crate) struct Answer {
     pub(crate) from_atlas: bool,
     /// Whether it came from the grips of earlier requests.
     pub(crate) from_recent: bool,
+    /// Grips of the object that the server knew.
+    pub(crate) atlas_entries: u32,
+    /// How deep the grasp is in the object, in metres; 0 without a grasp.
+    pub(crate) penetration: f32,
     /// Valid grasps that were compared.
     pub(crate) candidates: u64,
     /// Duration of the search as the server reports it: without reading the request, planning key frames and writing
@@ -50,6 +54,7 @@ pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::
     let round_trip = start.elapsed();
     let answer = answer.into_inner();
     let report = answer.report.as_ref().expect("every answer has a report");
+    let margins = answer.grasp.as_ref().and_then(|grasp| grasp.margins.as_ref());
     let time = |time: &Option<prost_types::Duration>| {
         let time = time.as_ref().expect("every report has its times");
         Duration::try_from(*time).expect("times are positive")
@@ -58,6 +63,8 @@ pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::
         found: answer.outcome() == v1::Outcome::Found,
         from_atlas: report.source() == v1::GraspSource::Atlas,
         from_recent: report.source() == v1::GraspSource::Recent,
+        atlas_entries: report.atlas_entries,
+        penetration: margins.map_or(0.0, |margins| margins.penetration),
         candidates: report.candidates,
         search_time: time(&report.search_time),
         budget: time(&report.budget),

@@ -295,6 +295,13 @@ fn write(
     glb(&document, buffer)
 }
 
+/// The right hand of the `WebXR` input profiles, a model that nobody here made; none before `tests/foreign/run` fetches it.
+pub fn webxr_hand() -> Option<Vec<u8>> {
+    let workspace = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let profiles = workspace.join("target/foreign/node_modules/@webxr-input-profiles/assets/dist/profiles");
+    std::fs::read(profiles.join("generic-hand/right.glb")).ok()
+}
+
 /// Packs a document and its buffer as GLB.
 pub fn glb(document: &Value, mut buffer: Vec<u8>) -> Vec<u8> {
     let mut text = document.to_string().into_bytes();

@@ -144,10 +144,11 @@ async fn hands_take_with_the_fingers_that_they_have() {
         deeper.sort_by(f32::total_cmp);
         println!("{id}: {found} found, contacts {contacts:?}, deeper {deeper:?}");
         assert!(found >= least, "{id}: {found}");
-        // The tips of thick digits are flatter than their solids.
-        assert!(contacts[contacts.len() / 2] < 0.0012, "{id}: {contacts:?}");
+        assert!(contacts[contacts.len() / 2] < 0.0005, "{id}: {contacts:?}");
+        assert!(contacts[contacts.len() * 9 / 10] < 0.001, "{id}: {contacts:?}");
+        // Beside the stumps of what is missing.
         assert!(contacts[contacts.len() - 1] < 0.0025, "{id}: {contacts:?}");
-        assert!(deeper[deeper.len() - 1] < 0.0015, "{id}: {deeper:?}");
+        assert!(deeper[deeper.len() - 1] < 0.001, "{id}: {deeper:?}");
     }
     server.stop().await;
 }

@@ -6,13 +6,32 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, holdouts},
     objects::object,
 };
+use grasp_characters::{
+    Character, Style,
+    names::{bone, mixamo, vrm_1},
+    webxr_hand,
+};
 use grasp_client::{
-    AtlasUse, FindRequest, Grasp, Handedness, PosedModel, ReceivingHand, built_in::request_for,
+    AtlasUse, FindRequest, Grasp, Handedness, NewRig, PosedModel, ReceivingHand, built_in::request_for,
 };
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 use grasp_tests::TestServer;
 
-use crate::own_hands::{model, new_rig};
+use crate::own_hands::model;
+
+/// The adult's hands as a program with Mixamo's names writes them.
+const MIXAMO: Style = Style {
+    name: mixamo,
+    units_per_metre: 100.0,
+    ..Style::PLAIN
+};
+
+/// The same as VRM 1.0.
+const VRM: Style = Style {
+    name: bone,
+    extensions: vrm_1,
+    ..Style::PLAIN
+};
 
 /// A skin in the client's frame.
 pub(crate) struct Drawn {
@@ -203,15 +222,27 @@ pub(crate) fn measure(skin: &Drawn, grasp: &Grasp, holdout: &BuiltInHoldout) -> 
 async fn the_drawn_skin_touches_where_the_answer_says() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    for (id, scale, hand_scale) in [
-        ("twin", 1.0, None),
-        ("small", 0.85, None),
-        ("grown", 0.85, Some(1.2)),
-    ] {
-        client.create_rig(&new_rig(id, scale)).await.unwrap();
-        let glb = model(scale);
+    // With the largest distance of a contact from the skin: of the palm, which is that of the built-in hands made as large, or beside
+    // an angular fingertip. Then how much deeper the skin may be than the answer says.
+    let mut models = vec![
+        ("twin", model(1.0), None, [0.001, 0.0005]),
+        ("small", model(0.85), None, [0.001, 0.0005]),
+        ("grown", model(0.85), Some(1.2), [0.001, 0.0006]),
+        ("mixamo", Character::new(&MIXAMO).glb, None, [0.0015, 0.0005]),
+        ("vrm", Character::new(&VRM).glb, None, [0.001, 0.0005]),
+    ];
+    match webxr_hand() {
+        Some(glb) => models.push(("webxr", glb, None, [0.0016, 0.0016])),
+        None => println!("skipped: the WebXR hand, which tests/foreign/run fetches, is not there"),
+    }
+    for (id, glb, hand_scale, [farthest, deeper]) in models {
+        let rig = NewRig {
+            handedness: Some(Handedness::Right),
+            ..NewRig::of_model(id, glb.clone())
+        };
+        client.create_rig(&rig).await.unwrap();
         let (mut contacts, mut deepest): (Vec<f32>, Vec<f32>) = (Vec::new(), Vec::new());
-        for holdout in holdouts().iter().step_by(3) {
+        for holdout in holdouts() {
             let request = FindRequest {
                 receiving_hand: ReceivingHand {
                     rig: Some(format!("rigs/{id}")),
@@ -219,7 +250,7 @@ async fn the_drawn_skin_touches_where_the_answer_says() {
                     hand_scale,
                 },
                 budget: Some(std::time::Duration::from_secs(20)),
-                // Each time the same grasps: where the nail's side touches, the solid is 2 mm thicker than the drawn finger.
+                // Each time the same grasps.
                 seed: Some(1),
                 reproducible: true,
                 atlas: Some(AtlasUse::None),
@@ -239,9 +270,10 @@ async fn the_drawn_skin_touches_where_the_answer_says() {
         contacts.sort_by(f32::total_cmp);
         deepest.sort_by(f32::total_cmp);
         println!("{id}: contacts {contacts:?}, deeper than answered {deepest:?}");
-        assert!(contacts[contacts.len() / 2] < 0.001, "{id}: {contacts:?}");
-        assert!(contacts[contacts.len() - 1] < 0.002, "{id}: {contacts:?}");
-        assert!(deepest[deepest.len() - 1] < 0.0015, "{id}: {deepest:?}");
+        assert!(contacts[contacts.len() / 2] < 0.0005, "{id}: {contacts:?}");
+        assert!(contacts[contacts.len() * 9 / 10] < 0.001, "{id}: {contacts:?}");
+        assert!(contacts[contacts.len() - 1] < farthest, "{id}: {contacts:?}");
+        assert!(deepest[deepest.len() - 1] < deeper, "{id}: {deepest:?}");
     }
     server.stop().await;
 }

@@ -1,7 +1,7 @@
 //! Makes rigs of hands from models (GLB, glTF or VRM with a skinned hand or a whole character) and from joints at rest.
 //!
 //! [`hand_nodes`] finds the joints among the model's nodes, [`rest`] places a reference hand's axes and limits on them,
-//! [`radii`] measures the skin, and [`binding`] later poses the model's nodes like the rig. Right hands are made; the joints of
+//! [`radii`] measures the skin, [`tips`] fits the fingertips to it, and [`binding`] later poses the model's nodes like the rig. Right hands are made; the joints of
 //! left ones are mirrored first.
 
 mod binding;
@@ -10,6 +10,7 @@ mod model;
 mod names;
 mod radii;
 mod rest;
+mod tips;
 mod vrm;
 
 use std::collections::HashMap;
@@ -282,7 +283,11 @@ fn read_hand(
     let widths = Widths::of(&skin, &skeleton, source.reference);
     let rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
     let rig = of_side(hand.side, rig);
-    let at_rest = skeleton.joints.map(|joint| as_right(hand.side, joint));
+    let mut at_rest = skeleton.joints;
+    for (tip, end) in index::TIP_OF_DIGIT.into_iter().zip(widths.tips) {
+        at_rest[tip] = end.unwrap_or(at_rest[tip]);
+    }
+    let at_rest = at_rest.map(|joint| as_right(hand.side, joint));
     let scene_from_wrist = match hand.side {
         Handedness::Left => skeleton.frame_from_wrist.mirrored_x(),
         Handedness::Right => skeleton.frame_from_wrist,

@@ -2,13 +2,16 @@
 //!
 //! Medians are used throughout, so that nails, rings, seams and single stray vertices do not count.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use grasp_synthesis::model::hand::{
     joints::{JOINT_COUNT, index},
     rig::Rig,
 };
 
-use super::rest::Skeleton;
+use super::{
+    rest::Skeleton,
+    tips::{LastLink, Tip},
+};
 
 /// The part of a bone's length on either side of a joint in which vertices count to the joint.
 const NEAR_JOINT: f32 = 0.3;
@@ -18,6 +21,9 @@ const TIP_BAND: [f32; 2] = [0.35, 0.85];
 
 /// Width of a fingertip relative to its last joint, as in the built-in rigs: where the search for it starts.
 const TIP_SHARE: f32 = 0.84;
+
+/// Largest width of a finger at its knuckle relative to its second joint; the built-in rigs have 1.1 to 1.2.
+const KNUCKLE_SHARE: f32 = 1.3;
 
 /// Fewest vertices for a width.
 const FEWEST: usize = 4;
@@ -60,13 +66,13 @@ impl Widths {
             return widths;
         }
         for digit in (0..5).filter(|&digit| skeleton.has[digit]) {
-            widths.measure_digit(digit, skin, skeleton);
+            widths.measure_digit(digit, skin, skeleton, reference);
         }
         widths.measure_palm(skin, skeleton);
         widths
     }
 
-    fn measure_digit(&mut self, digit: usize, skin: &[SkinVertex], skeleton: &Skeleton) {
+    fn measure_digit(&mut self, digit: usize, skin: &[SkinVertex], skeleton: &Skeleton, reference: &Rig) {
         let tip = index::TIP_OF_DIGIT[digit];
         let base = tip - 3;
         let of_joint = |joint: usize| {
@@ -74,8 +80,8 @@ impl Widths {
                 .filter(move |vertex| vertex.joint == joint || joint + 1 == tip && vertex.joint == tip)
                 .map(|vertex| vertex.position)
         };
-        let end =
-            last_direction(of_joint(tip - 1), skeleton, tip).inspect(|&end| self.tips[digit] = Some(end));
+        let end = skin_end(of_joint(tip - 1), skeleton.joints[tip - 1], skeleton.joints[tip]);
+        self.tips[digit] = end;
         let mut points = [0, 1, 2, 3].map(|place| skeleton.joints[base + place]);
         points[3] = end.unwrap_or(points[3]);
         let mut measured = [None; 4];
@@ -107,6 +113,10 @@ impl Widths {
             let [least, most] = RADIUS_RANGE.map(|share| share * expected[place]);
             measured[place] = measured[place].filter(|radius| (least..=most).contains(radius));
         }
+        // Flesh of the palm that follows a finger is no part of it.
+        if let [Some(knuckle), Some(second), ..] = &mut measured {
+            *knuckle = knuckle.min(KNUCKLE_SHARE * *second);
+        }
         // What the skin does not show is as thick, relative to the reference, as what it shows.
         let ratios = measured.iter().zip(expected);
         let ratio = middle(
@@ -117,6 +127,27 @@ impl Widths {
         let ratio = ratio.unwrap_or(1.0);
         for place in 0..4 {
             self.radii[base + place] = measured[place].unwrap_or(ratio * expected[place]);
+        }
+        if let Some(mut end) = end {
+            let outer: Vec<Vec3> = of_joint(tip - 1).collect();
+            let at_base = reference.digits[digit].wrist_from_base.orientation;
+            // Once along the bone, and once along the link that fits, which ends elsewhere.
+            for _ in 0..2 {
+                let along = (end - points[2]).normalize_or(Vec3::Y);
+                let link = LastLink {
+                    start: points[2],
+                    start_radius: self.radii[tip - 1],
+                    tip: Tip {
+                        end,
+                        radius: self.radii[tip],
+                    },
+                    pad: Quat::from_rotation_arc(at_base * Vec3::Y, along) * (at_base * Vec3::Z),
+                };
+                let fitted = link.fitted(&outer);
+                self.radii[tip] = fitted.radius;
+                end = skin_end(outer.iter().copied(), points[2], fitted.end).unwrap_or(fitted.end);
+            }
+            self.tips[digit] = Some(end);
         }
     }
 
@@ -174,25 +205,21 @@ fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_
     Some(radius)
 }
 
-/// Where the skin of the last bone ends along the line through the middle of its outer half; none if too few vertices follow it.
-fn last_direction(vertices: impl Iterator<Item = Vec3>, skeleton: &Skeleton, tip: usize) -> Option<Vec3> {
-    let start = skeleton.joints[tip - 1];
-    let (expected, length) = {
-        let bone = skeleton.joints[tip] - start;
-        (bone.normalize_or(Vec3::Y), bone.length())
-    };
-    let outer: Vec<(f32, Vec3)> = vertices
-        .map(|vertex| ((vertex - start).dot(expected), vertex))
-        .filter(|(along, vertex)| {
-            (0.4 * length..LONGEST_TIP * length).contains(along)
-                && (vertex - start).reject_from_normalized(expected).length() < length
-        })
+/// Where the skin of the last bone ends along the line from its joint to where its end is expected; none if too few vertices follow
+/// it.
+fn skin_end(vertices: impl Iterator<Item = Vec3>, start: Vec3, expected: Vec3) -> Option<Vec3> {
+    let bone = expected - start;
+    let (direction, length) = (bone.normalize_or(Vec3::Y), bone.length());
+    let outer: Vec<f32> = vertices
+        .filter(|vertex| (vertex - start).reject_from_normalized(direction).length() < length)
+        .map(|vertex| (vertex - start).dot(direction))
+        .filter(|along| (0.4 * length..LONGEST_TIP * length).contains(along))
         .collect();
     if outer.len() < FEWEST {
         return None;
     }
-    let end = outer.iter().map(|(along, _)| *along).fold(0.0, f32::max);
-    Some(start + end * expected)
+    let end = outer.into_iter().fold(0.0, f32::max);
+    Some(start + end * direction)
 }
 
 /// The median of at least [`FEWEST`] numbers.
