@@ -40,7 +40,7 @@ use crate::{
     reserve::DeadlineReserve,
     rigs::{saved::SavedRigs, store::RigStore},
     saved::{SavedFiles, StoreError},
-    services::{GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads, load_saved_rigs},
+    services::{Ahead, GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads, load_saved_rigs},
 };
 
 /// Largest number of open streams per connection.
@@ -186,7 +186,10 @@ impl Server {
             Some(path) => logged(path, directory::load(path, obj_limits, config.store)?),
             None => Vec::new(),
         };
-        let directory_bytes = directory.iter().map(|pinned| pinned.object.bytes()).sum();
+        let directory_bytes = directory
+            .iter()
+            .map(|pinned| pinned.object.derived_and_own_bytes())
+            .sum();
         let loading_limits = MeshLimits {
             bytes: config.largest_mesh(),
             ..obj_limits
@@ -194,15 +197,11 @@ impl Server {
         let files = SavedFiles::open(&config.place)?.map(Arc::new);
         let durability = files.clone().map(|files| Durability {
             saved: SavedObjects::new(files, config.maximum_saved_objects),
-            loading: Loading::new(
-                loading_limits,
-                config.maximum_uploads.get(),
-                config.default_rig.clone(),
-            ),
+            loading: Loading::new(loading_limits, config.maximum_uploads.get()),
         });
         let objects = Arc::new(ObjectStore::new(config.store, directory, durability));
         for object in objects.pinned() {
-            unstopped(|stop| object.prepare(&config.default_rig, stop));
+            unstopped(|stop| object.derived_until(stop)?.prepare(&config.default_rig, stop));
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
@@ -234,6 +233,8 @@ impl Server {
             improvement: config.improvement,
             obj_limits,
             deletions: Arc::new(Semaphore::new(1)),
+            deriving: Arc::new(Semaphore::new(config.derivations())),
+            ahead: Ahead::default(),
             uploads: Uploads::new(config.streams.upload_bytes.get(), config.streams.upload_idle),
             maximum_watchers: config.streams.watchers.get(),
             shutdown: CancellationToken::new(),

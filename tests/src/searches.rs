@@ -15,7 +15,8 @@ use grasp_synthesis::{
     model::{
         hand::Handedness,
         holdout::Holdout,
-        object::{GraspObject, THESIS_FRICTION},
+        object::GraspObject,
+        plain_object::THESIS_FRICTION,
         strategy::{Strategy, Validity},
     },
     propose::prepared::{PreparedObject, PreparedRig},

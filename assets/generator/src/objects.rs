@@ -9,7 +9,7 @@ use grasp_assets::objects::{Manifest, ManifestBox};
 use grasp_mesh_builder::Shape;
 use grasp_synthesis::{
     geometry::{mesh::TriangleMesh, oriented_box::OrientedBox},
-    model::object::THESIS_FRICTION,
+    model::plain_object::THESIS_FRICTION,
 };
 
 use crate::AssetFile;

@@ -15,12 +15,14 @@ use grasp_assets::{
     hands::{Hand, hand},
 };
 use grasp_synthesis::{
+    base::stop::Stop,
     known::{
         codec::decode_compact,
         growth::{CHOSEN, Grown, Growth},
     },
     model::hand::Handedness,
     physical::grip::Gripper,
+    propose::prepared::PreparedObject,
 };
 
 use super::{
@@ -33,7 +35,11 @@ use super::{
 use crate::{
     atlas_slots::{BuildState, Slot},
     executor::SearchExecutor,
-    objects::{StoredObject, changes::Event, store::ObjectStore},
+    objects::{
+        StoredObject,
+        changes::Event,
+        store::{Need, ObjectStore},
+    },
 };
 
 /// Niceness of a builder thread: 19 is the lowest priority on Linux. A lower value takes more CPU time from searches.
@@ -109,6 +115,16 @@ impl Builders {
     /// True if there are threads and they were not stopped.
     pub(super) fn are_running(&self) -> bool {
         !self.queue.is_stopped() && self.running() > 0
+    }
+
+    /// An object in the form that searches use, built if necessary; none if there is no room for it, or if the server stops. Holding
+    /// it does not keep the object from being evicted.
+    fn prepared(&self, object: &Arc<StoredObject>) -> Option<Arc<PreparedObject>> {
+        let is_stopped = || self.queue.is_stopped();
+        let derived = self.objects.derived(object, Need::Ahead, Stop::when(&is_stopped));
+        let derived =
+            derived.inspect_err(|error| tracing::debug!(object = object.name(), %error, "no atlas grows"));
+        Some(Arc::clone(&derived.ok()?.object))
     }
 
     /// A hand of the default rig.
@@ -271,13 +287,17 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
     if !builders.loaded.has_room(object, &job.hand, EXPECTED_BYTES) {
         return Turn::Ended(BuildState::NoRoom);
     }
+    let Some(prepared) = builders.prepared(object) else {
+        return Turn::Ended(BuildState::NoRoom);
+    };
     let growth = match &slot.grown {
-        Some(grown) => Growth::resume(&object.object, &job.hand.rig, grown),
-        None => Growth::new(&object.object, &job.hand.rig),
+        Some(grown) => Growth::resume(&prepared, &job.hand.rig, grown),
+        None => Growth::new(&prepared, &job.hand.rig),
     };
     let growing = Growing {
         builders,
         object,
+        prepared: &prepared,
         job,
         growth,
         gripper: Gripper::default(),
@@ -293,7 +313,10 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
 fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Turn {
     let start = thread_time();
     let on_disk = || read_file(builders, object, hand);
-    let Some(read) = shipped_grips(object, hand).or_else(on_disk).map(Arc::new) else {
+    let Some(read) = shipped_grips(builders, object, hand)
+        .or_else(on_disk)
+        .map(Arc::new)
+    else {
         return Turn::Next(Stage::Starting);
     };
     let entries = read.atlas.entries().len();
@@ -315,14 +338,18 @@ fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) 
 }
 
 /// The atlas on disk. If another server has grown more than is kept, the file is replaced by an excerpt.
-fn read_file(builders: &Builders, object: &StoredObject, hand: &Arc<Hand>) -> Option<Grown> {
+fn read_file(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
     let files = builders.files.as_ref()?;
-    let read = files.read(object, hand)?;
+    if !files.has(object, hand) {
+        return None;
+    }
+    let prepared = builders.prepared(object)?;
+    let read = files.read(object, &prepared, hand)?;
     if !read.atlas.is_complete() || read.atlas.entries().len() <= CHOSEN {
         return Some(read);
     }
-    let kept = Growth::resume(&object.object, &hand.rig, &read).kept();
-    files.write(object, hand, &kept);
+    let kept = Growth::resume(&prepared, &hand.rig, &read).kept();
+    files.write(object, &prepared, hand, &kept);
     Some(kept)
 }
 
@@ -330,6 +357,7 @@ fn read_file(builders: &Builders, object: &StoredObject, hand: &Arc<Hand>) -> Op
 struct Growing<'a> {
     builders: &'a Builders,
     object: &'a Arc<StoredObject>,
+    prepared: &'a PreparedObject,
     job: &'a BuildJob,
     growth: Growth<'a>,
     gripper: Gripper,
@@ -399,7 +427,7 @@ impl Growing<'_> {
     /// Writes and publishes an atlas. False if there is no room.
     fn keep(&mut self, grown: Grown) -> bool {
         if let Some(files) = &self.builders.files {
-            files.write(self.object, &self.job.hand, &grown);
+            files.write(self.object, self.prepared, &self.job.hand, &grown);
         }
         let (object, hand) = (self.object, &self.job.hand);
         let before = object.atlas_slots.get(hand).unwrap_or_default();
@@ -429,12 +457,13 @@ fn thread_time() -> Duration {
 }
 
 /// The grips that ship with the server for an object and a hand: chosen from more than a server grows, hence complete.
-fn shipped_grips(object: &StoredObject, hand: &Arc<Hand>) -> Option<Grown> {
+fn shipped_grips(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
     let bytes = object
         .built_in
         .then(|| shipped_atlas(&object.id, &hand.rig))
         .flatten()?;
-    match decode_compact(bytes, &object.object, &hand.rig) {
+    let prepared = builders.prepared(object)?;
+    match decode_compact(bytes, &prepared, &hand.rig) {
         Ok(grown) => Some(grown.completed()),
         Err(error) => {
             tracing::warn!(

@@ -17,10 +17,13 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::known::{
-    codec::{decode_compact, encode},
-    growth::Grown,
-    key::file_name,
+use grasp_synthesis::{
+    known::{
+        codec::{decode_compact, encode},
+        growth::Grown,
+        key::file_name,
+    },
+    propose::prepared::PreparedObject,
 };
 
 use super::hand_label;
@@ -72,11 +75,21 @@ impl AtlasFiles {
         Self { most_bytes, ..self }
     }
 
+    /// True if there is a file for an object and a hand.
+    pub(super) fn has(&self, object: &StoredObject, hand: &Hand) -> bool {
+        self.path(object, hand).exists()
+    }
+
     /// Reads the atlas of an object and a hand; none if there is no file, or a broken one, which is logged.
-    pub(super) fn read(&self, object: &StoredObject, hand: &Hand) -> Option<Grown> {
+    pub(super) fn read(
+        &self,
+        object: &StoredObject,
+        prepared: &PreparedObject,
+        hand: &Hand,
+    ) -> Option<Grown> {
         let path = self.path(object, hand);
         let read = read_bounded(&path).and_then(|bytes| {
-            decode_compact(&bytes, &object.object, &hand.rig)
+            decode_compact(&bytes, prepared, &hand.rig)
                 .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
         });
         match read {
@@ -98,8 +111,8 @@ impl AtlasFiles {
     }
 
     /// Writes the atlas of an object and a hand; a failure is logged.
-    pub(super) fn write(&self, object: &StoredObject, hand: &Hand, grown: &Grown) {
-        let bytes = encode(grown, &object.object, &hand.rig);
+    pub(super) fn write(&self, object: &StoredObject, prepared: &PreparedObject, hand: &Hand, grown: &Grown) {
+        let bytes = encode(grown, prepared, &hand.rig);
         if let Err(error) = self.replace(&self.path(object, hand), &bytes) {
             let folder = self.folder.display();
             let hand = hand_label(hand);
@@ -265,7 +278,7 @@ pub(super) mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::atlases::tests::{adult, cuboid, grown, small};
+    use crate::atlases::tests::{adult, cuboid, grown, prepared, small};
 
     /// A test's own folder, removed at its end.
     pub(crate) struct Folder(PathBuf);
@@ -316,11 +329,14 @@ pub(super) mod tests {
         let files = folder.open();
         let (object, other) = (small("a"), cuboid("b", Vec3::new(0.03, 0.015, 0.05)));
         let grown = grown(&object);
-        assert!(files.read(&object, adult()).is_none());
-        files.write(&object, adult(), &grown);
-        files.write(&object, adult(), &grown);
-        assert_eq!(files.read(&object, adult()).as_ref(), Some(&*grown));
-        assert!(files.read(&other, adult()).is_none());
+        assert!(files.read(&object, &prepared(&object), adult()).is_none());
+        files.write(&object, &prepared(&object), adult(), &grown);
+        files.write(&object, &prepared(&object), adult(), &grown);
+        assert_eq!(
+            files.read(&object, &prepared(&object), adult()).as_ref(),
+            Some(&*grown)
+        );
+        assert!(files.read(&other, &prepared(&other), adult()).is_none());
         let names = folder.names();
         assert_eq!(names.len(), 1, "{names:?}");
         let path = folder.0.join(&names[0]);
@@ -330,10 +346,13 @@ pub(super) mod tests {
         let whole = fs::read(&path).unwrap();
         for broken in [&whole[..whole.len() / 2], b"", &[&whole[..], b"more"].concat()] {
             fs::write(&path, broken).unwrap();
-            assert!(files.read(&object, adult()).is_none());
+            assert!(files.read(&object, &prepared(&object), adult()).is_none());
         }
-        files.write(&object, adult(), &grown);
-        assert_eq!(files.read(&object, adult()).as_ref(), Some(&*grown));
+        files.write(&object, &prepared(&object), adult(), &grown);
+        assert_eq!(
+            files.read(&object, &prepared(&object), adult()).as_ref(),
+            Some(&*grown)
+        );
     }
 
     #[test]
@@ -342,15 +361,19 @@ pub(super) mod tests {
         let objects = [0.02, 0.021, 0.022].map(|x| cuboid("any", Vec3::new(x, 0.015, 0.05)));
         let grown = objects.each_ref().map(grown);
         let files = folder.open();
-        files.write(&objects[0], adult(), &grown[0]);
+        files.write(&objects[0], &prepared(&objects[0]), adult(), &grown[0]);
         let files = files.bounded(5 * folder.bytes() / 2);
         pause();
-        files.write(&objects[1], adult(), &grown[1]);
+        files.write(&objects[1], &prepared(&objects[1]), adult(), &grown[1]);
         pause();
-        let is_there = |place: usize| files.read(&objects[place], adult()).is_some();
+        let is_there = |place: usize| {
+            files
+                .read(&objects[place], &prepared(&objects[place]), adult())
+                .is_some()
+        };
         assert!(is_there(0));
         pause();
-        files.write(&objects[2], adult(), &grown[2]);
+        files.write(&objects[2], &prepared(&objects[2]), adult(), &grown[2]);
         assert_eq!([0, 1, 2].map(is_there), [true, false, true]);
     }
 
@@ -360,7 +383,7 @@ pub(super) mod tests {
         let objects = [0.02, 0.021].map(|x| cuboid("any", Vec3::new(x, 0.015, 0.05)));
         let grown = objects.each_ref().map(grown);
         let files = folder.open();
-        files.write(&objects[0], adult(), &grown[0]);
+        files.write(&objects[0], &prepared(&objects[0]), adult(), &grown[0]);
         let bytes = folder.bytes();
         let files = files.bounded(5 * bytes / 2);
         fs::write(
@@ -369,8 +392,12 @@ pub(super) mod tests {
         )
         .unwrap();
         pause();
-        files.write(&objects[1], adult(), &grown[1]);
-        let is_there = |place: usize| files.read(&objects[place], adult()).is_some();
+        files.write(&objects[1], &prepared(&objects[1]), adult(), &grown[1]);
+        let is_there = |place: usize| {
+            files
+                .read(&objects[place], &prepared(&objects[place]), adult())
+                .is_some()
+        };
         assert_eq!([0, 1].map(is_there), [false, true]);
     }
 

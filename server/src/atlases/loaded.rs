@@ -53,6 +53,7 @@ impl LoadedAtlases {
         if fits || was_loaded {
             owners.push((Arc::downgrade(object), Arc::clone(hand)));
         }
+        self.objects.leave(taken(&owners));
         fits
     }
 
@@ -90,9 +91,11 @@ impl LoadedAtlases {
         bytes <= room && make_room(owners, room - bytes, demand)
     }
 
-    /// Evicts atlases until the others fit in the room that created objects leave.
+    /// Evicts atlases until the others fit in the room that created objects leave, and then what is derived from objects until it
+    /// fits beside them.
     pub(super) fn make_room_for_objects(&self) {
         self.shrink_to(self.objects.room());
+        self.objects.leave(taken(&self.owners()));
     }
 
     /// Evicts atlases until the others take no more than `bytes`.
@@ -104,6 +107,14 @@ impl LoadedAtlases {
         // No code panics while it holds the lock; if some did, the list would still be consistent.
         self.owners.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Bytes of atlases.
+fn taken(owners: &[Owner]) -> usize {
+    let slots = owners
+        .iter()
+        .filter_map(|(object, hand)| object.upgrade()?.atlas_slots.demand_and_bytes(hand));
+    slots.map(|(_, bytes)| bytes).sum()
 }
 
 /// True for the owner that an object and a hand are.

@@ -5,11 +5,13 @@ use std::time::{Duration, Instant};
 use glam::Vec3;
 use grasp_assets::hands::hand;
 use grasp_synthesis::{
+    base::stop::unstopped,
     known::{
         growth::{CHOSEN, Grown, Growth},
         primitives::Primitive,
     },
     physical::grip::Gripper,
+    propose::prepared::PreparedObject,
 };
 
 use super::{
@@ -25,7 +27,7 @@ const HANGS_AFTER: Duration = Duration::from_mins(1);
 
 /// A closed box; half extents in metres.
 pub(super) fn cuboid(id: &str, half_extents: Vec3) -> StoredObject {
-    StoredObject::plain(id, Primitive { half_extents }.object())
+    StoredObject::plain(id, Primitive { half_extents }.object().plain().clone())
 }
 
 /// A box that fits in a hand.
@@ -37,9 +39,16 @@ pub(super) fn adult() -> &'static Arc<Hand> {
     hand("adult", Handedness::Right).unwrap()
 }
 
+/// An object in the form that searches use.
+pub(super) fn prepared(object: &StoredObject) -> Arc<PreparedObject> {
+    let derived = unstopped(|stop| object.derived_until(stop));
+    Arc::clone(&derived.object)
+}
+
 /// The first grips of an object.
 pub(super) fn grown(object: &StoredObject) -> Arc<Grown> {
-    let mut growth = Growth::new(&object.object, &adult().rig);
+    let prepared = prepared(object);
+    let mut growth = Growth::new(&prepared, &adult().rig);
     let mut gripper = Gripper::default();
     while growth.len() < 10 {
         growth.round(&mut gripper);
@@ -244,7 +253,7 @@ fn read_back(test: &str, written: &Grown) -> (Arc<Grown>, usize) {
     let folder = Folder::new(test);
     let files = folder.open();
     let object = Arc::new(small("a"));
-    files.write(&object, adult(), written);
+    files.write(&object, &prepared(&object), adult(), written);
     let executor = SearchExecutor::new(1, 1).unwrap();
     let store = store(10, 1 << 30);
     let atlases = Atlases::start(1, &store, executor, Some(files), "adult".to_owned()).unwrap();
@@ -254,14 +263,18 @@ fn read_back(test: &str, written: &Grown) -> (Arc<Grown>, usize) {
         slot.is_some_and(|slot| slot.state == BuildState::Finished)
     });
     let slot = object.atlas_slots.get(adult()).unwrap();
-    let read = folder.open().read(&object, adult()).expect("the file is there");
+    let read = folder
+        .open()
+        .read(&object, &prepared(&object), adult())
+        .expect("the file is there");
     (slot.grown.expect("it was read"), read.atlas.entries().len())
 }
 
 #[test]
 fn a_complete_file_is_read_as_it_is_and_a_longer_one_is_cut_to_what_is_kept() {
     let object = small("a");
-    let mut growth = Growth::new(&object.object, &adult().rig);
+    let prepared = prepared(&object);
+    let mut growth = Growth::new(&prepared, &adult().rig);
     let mut gripper = Gripper::default();
     while !growth.is_enough() {
         growth.round(&mut gripper);

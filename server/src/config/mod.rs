@@ -131,6 +131,11 @@ impl Config {
         self.atlas_directory.clone().or_else(beside_objects)
     }
 
+    /// Number of objects that are prepared for searches at a time: half as many as are received, because that takes less time.
+    pub(crate) fn derivations(&self) -> usize {
+        self.maximum_uploads.get().div_ceil(2)
+    }
+
     /// Largest mesh file in bytes, in one message or in pieces.
     pub(crate) fn largest_mesh(&self) -> usize {
         self.maximum_object_bytes.max(self.streams.upload_bytes).get()

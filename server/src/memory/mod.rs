@@ -36,13 +36,16 @@ const PER_SEARCH: u64 = 4 * MIB;
 /// Bytes per byte of a mesh's text while it is received and read: the request and the text in it. Measured: 1.9.
 const PER_TEXT_BYTE: u64 = 2;
 
-/// Bytes per triangle of a mesh while its search structures are built, excluding the text. Measured: 360, and up to 626
-/// for a mesh of forbidden triangles in many groups.
-const PER_BUILT_TRIANGLE: u64 = 640;
+/// Bytes per triangle of a mesh while it is read, excluding the text. Measured: up to 105, and 290 for a mesh of forbidden
+/// triangles in many groups.
+const PER_READ_TRIANGLE: u64 = 340;
 
-/// Bytes per object that is built, independent of its size: the distance field and the surface pairs. Measured: up to
-/// 0.24 MiB.
-const PER_BUILT_OBJECT: u64 = 512 << 10;
+/// Bytes per triangle of an object while what searches need is derived from it. Estimated: 220.
+const PER_DERIVED_TRIANGLE: u64 = 240;
+
+/// Bytes per object while the same is derived, independent of its size: the distance field, the surface pairs, and what is sharp.
+/// Measured: 0.4 MiB. Estimated: 2 MiB for the oddest surfaces.
+const PER_DERIVED_OBJECT: u64 = 2 * MIB;
 
 /// Bytes per watcher that is as far behind as it may be: 2048 objects with their ids and events. Estimated: 0.4 MiB.
 const PER_WATCHER: u64 = 512 << 10;
@@ -163,8 +166,11 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     let triangles = config.maximum_object_triangles.get() as u64;
     let upload = text
         .saturating_mul(PER_TEXT_BYTE)
-        .saturating_add(triangles.saturating_mul(PER_BUILT_TRIANGLE))
-        .saturating_add(PER_BUILT_OBJECT);
+        .saturating_add(triangles.saturating_mul(PER_READ_TRIANGLE));
+    let derivations = config.derivations() as u64;
+    let derivation = triangles
+        .saturating_mul(PER_DERIVED_TRIANGLE)
+        .saturating_add(PER_DERIVED_OBJECT);
     let threads = (config.workers.get() as u64).saturating_add(config.io_threads.get() as u64);
     let uploads = config.maximum_uploads.get() as u64;
     let upload_bytes = config.streams.upload_bytes.get() as u64;
@@ -198,8 +204,15 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
         share(
             uploads.saturating_mul(upload),
             format!(
-                "to build objects (maximum_uploads is {uploads}, maximum_object_bytes is {text}, \
+                "to read objects (maximum_uploads is {uploads}, maximum_object_bytes is {text}, \
                  maximum_object_triangles is {triangles})"
+            ),
+        ),
+        share(
+            derivations.saturating_mul(derivation),
+            format!(
+                "to prepare objects for searches, {derivations} at a time (maximum_uploads is {uploads}, maximum_object_triangles is \
+                 {triangles})"
             ),
         ),
         share(
@@ -233,10 +246,10 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
             saved.saturating_mul(PER_SAVED_OBJECT),
             format!("for what describes saved objects (maximum_saved_objects is {saved})"),
         ));
-        let building = uploads.saturating_mul(upload.saturating_sub(text.saturating_mul(PER_TEXT_BYTE)));
+        let reading = uploads.saturating_mul(triangles.saturating_mul(PER_READ_TRIANGLE));
         let meshes = (config.largest_mesh() as u64).saturating_mul(PER_TEXT_BYTE);
         shares.push(share(
-            building.saturating_add(meshes),
+            reading.saturating_add(meshes),
             format!(
                 "to load saved objects, unless store is memory (maximum_uploads is {uploads}, maximum_object_triangles is {triangles}, \
                  maximum_upload_bytes is {upload_bytes})"
@@ -252,15 +265,16 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     shares
 }
 
-/// Memory that threads reserve but do not use: threads of the pools, one per search, and two per upload, whose object
-/// is prepared by two threads in parallel.
+/// Memory that threads reserve but do not use: threads of the pools, one per search and upload, and two per object that is
+/// prepared for searches.
 fn stacks(config: &Config) -> MemoryShare {
     let threads = [
         config.workers.get(),
         config.io_threads.get(),
         config.maximum_searches.get(),
         config.maximum_uploads.get(),
-        config.maximum_uploads.get(),
+        config.derivations(),
+        config.derivations(),
         config.builder_threads,
     ]
     .iter()
@@ -287,8 +301,8 @@ mod tests {
         }
     }
 
-    /// 20 MiB at rest, 2 threads of 64 KiB, a cache of 100 MiB, 3 uploads of 2.5 MiB and 1000 triangles, 5 searches of
-    /// 4 MiB, 7 connections of 32 KiB, 1 builder of 20 MiB, 8 MiB of answers, 4 MiB
+    /// 20 MiB at rest, 2 threads of 64 KiB, a cache of 100 MiB, 3 uploads of 2 MiB and 1000 triangles, 2 objects of 2 MiB that
+    /// are prepared, 5 searches of 4 MiB, 7 connections of 32 KiB, 1 builder of 20 MiB, 8 MiB of answers, 4 MiB
     /// in pieces, 2 watchers of 512 KiB.
     fn config() -> Config {
         let count = |n: usize| n.try_into().unwrap();
@@ -316,10 +330,10 @@ mod tests {
         }
     }
 
-    const NEEDED: u64 = (26 + 100 + 3 * 2 + 5 * 4 + 20 + 8 + 4 * 2 + 1 + 2) * MIB
-        + 3 * (512 << 10)
+    const NEEDED: u64 = (26 + 100 + 3 * 2 + 2 * 2 + 5 * 4 + 20 + 8 + 4 * 2 + 1 + 2) * MIB
         + 2 * (64 << 10)
-        + 3 * 640_000
+        + 3 * 340_000
+        + 2 * 240_000
         + 7 * (32 << 10);
 
     #[test]
@@ -332,12 +346,12 @@ mod tests {
 
     #[test]
     fn reserved_memory_includes_every_threads_stack() {
-        let reserved = NEEDED + (1 + 1 + 5 + 2 * 3 + 1) * 2 * MIB;
+        let reserved = NEEDED + (1 + 1 + 5 + 3 + 2 * 2 + 1) * 2 * MIB;
         let check = |bytes| check_memory(&config(), 0, &[limit(bytes, LimitKind::Reserved)]);
         assert_eq!(check(reserved), Ok(()));
         let text = check(reserved - 1).unwrap_err().to_string();
         assert!(
-            text.contains("28 MiB reserved for the stacks of 14 threads"),
+            text.contains("30 MiB reserved for the stacks of 15 threads"),
             "{text}"
         );
     }
@@ -360,7 +374,7 @@ mod tests {
             maximum_saved_objects: 1000.try_into().unwrap(),
             ..config()
         };
-        let needed = NEEDED + 1000 * (8 << 10) + 2 * (4 << 20) + 3 * (640_000 + (512 << 10));
+        let needed = NEEDED + 1000 * (8 << 10) + 2 * (4 << 20) + 3 * 340_000;
         let check = |bytes| check_memory(&config, 0, &[limit(bytes, LimitKind::Used)]);
         assert_eq!(check(needed), Ok(()));
         let text = check(needed - 1).unwrap_err().to_string();
@@ -379,8 +393,8 @@ mod tests {
         assert_eq!(
             lines[..4],
             [
-                "too little memory: the limit is 30 MiB (a test); this configuration may use 195 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may use 223 MiB",
+                "too little memory: the limit is 30 MiB (a test); this configuration may use 197 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may use 227 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]
@@ -427,6 +441,6 @@ mod tests {
         };
         let check = |mib| check_memory(&config, 0, &[limit(mib * MIB, LimitKind::Used)]);
         assert_eq!(check(2000), Ok(()));
-        assert!(check(1900).is_err());
+        assert!(check(1850).is_err());
     }
 }

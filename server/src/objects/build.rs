@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use grasp_import::{MeshLimits, read_mesh_until};
-use grasp_synthesis::{base::stop::Stop, model::object::GraspObject};
+use grasp_synthesis::{base::stop::Stop, model::plain_object::PlainObject};
 
 use super::{
     StoredObject,
@@ -17,7 +17,7 @@ use crate::{
     validate::{Field, ObjectFields, Violations},
 };
 
-/// Reads and checks the mesh and builds its search structures. Takes up to seconds for the largest meshes.
+/// Reads and checks the mesh. Takes up to seconds for the largest meshes.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with `violations` and everything else that is wrong, [`ServiceError::Cancelled`] if it was stopped.
@@ -59,7 +59,7 @@ pub(crate) fn build_object(
         return Err(violations.into_error());
     }
     let centre_of_mass = centre_or_computed(&read.mesh, given.centre_of_mass, &mut warnings);
-    let object = GraspObject::new_until(
+    let object = PlainObject::new_until(
         read.mesh,
         fields.mass,
         centre_of_mass,
@@ -70,13 +70,7 @@ pub(crate) fn build_object(
     match object {
         Ok(object) => {
             let object = object.with_regions(regions).with_banned(given.banned());
-            let stored = StoredObject::from_file_until(
-                fields.id.clone(),
-                Arc::new(object),
-                warnings,
-                Arc::new(file),
-                stop,
-            )?;
+            let stored = StoredObject::from_file(fields.id.clone(), object, warnings, Arc::new(file));
             Ok(StoredObject { given, ..stored })
         }
         Err(errors) => {

@@ -7,7 +7,7 @@ use grasp_import::keeps_origin;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::unstopped,
-    model::object::{GraspObject, ObjectError},
+    model::plain_object::{ObjectError, PlainObject},
 };
 
 use super::{
@@ -20,7 +20,7 @@ use crate::{
     validate::{Forbidden, ObjectChange, Setting, Violations},
 };
 
-/// The object after a change; none if the change leaves it as it is. Takes some ten milliseconds, more for large meshes.
+/// The object after a change; none if the change leaves it as it is.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with every surface that its file does not have, or because of a unit that it cannot have.
@@ -37,14 +37,14 @@ pub(crate) fn changed(
     };
     let (object, file) = match &resized {
         Some((object, file)) => (object, file),
-        None => (stored.object.object(), &stored.file),
+        None => (&stored.object, &stored.file),
     };
     let friction = match change.friction {
         Setting::Kept => object.friction,
         Setting::Default => None,
         Setting::To(friction) => Some(friction),
     };
-    let mesh = object.surface.mesh();
+    let mesh = &object.mesh;
     let mut given = stored.given.clone();
     change.centre_of_mass.apply(&mut given.centre_of_mass);
     let centre = centre_or_computed(mesh, given.centre_of_mass, &mut warnings);
@@ -76,8 +76,7 @@ pub(crate) fn changed(
     match object.with_properties(mass, centre, friction, &forbidden) {
         Ok(changed) => {
             let changed = changed.with_regions(regions).with_banned(given.banned());
-            let changed =
-                StoredObject::from_file(stored.id.clone(), Arc::new(changed), warnings, Arc::clone(file));
+            let changed = StoredObject::from_file(stored.id.clone(), changed, warnings, Arc::clone(file));
             Ok(Some(StoredObject { given, ..changed }))
         }
         Err(errors) => {
@@ -98,12 +97,12 @@ fn with_unit(
     unit_metres: f32,
     mass: f32,
     warnings: &mut Vec<String>,
-) -> Result<(Arc<GraspObject>, Arc<MeshFile>), ServiceError> {
+) -> Result<(PlainObject, Arc<MeshFile>), ServiceError> {
     let invalid = |wrong: String| ServiceError::invalid("unit_metres", wrong);
     let scale = unit_metres / stored.file.unit_metres;
-    let resized = unstopped(|stop| stored.object.resized_until(scale, mass, stop));
+    let resized = stored.object.scaled(scale, mass);
     let resized = resized.map_err(|error| invalid(format!("is {unit_metres}: {error}")))?;
-    let mesh = resized.surface.mesh();
+    let mesh = &resized.mesh;
     check_extent(mesh, warnings).map_err(invalid)?;
     let centre = mesh.aabb().centre().as_dvec3();
     if stored.file.origin != DVec3::ZERO || !keeps_origin(centre) {
@@ -112,7 +111,7 @@ fn with_unit(
         )));
     }
     let file = stored.file.with_unit(unit_metres);
-    Ok((Arc::new(resized), Arc::new(file)))
+    Ok((resized, Arc::new(file)))
 }
 
 /// Changes the request that would create an object to one that would create the changed object.
@@ -195,7 +194,7 @@ mod tests {
             ..forbid(&["lid"], &[0, 1])
         };
         let after = changed(&before, &change).unwrap().unwrap();
-        assert!(Arc::ptr_eq(&before.object.surface, &after.object.surface));
+        assert!(Arc::ptr_eq(&before.object.mesh, &after.object.mesh));
         assert_eq!((after.object.mass, after.object.friction), (0.4, Some(0.8)));
         assert_eq!(after.object.centre_of_mass, Vec3::splat(0.02));
         // Every triangle but the dropped one, which is none of the mesh.

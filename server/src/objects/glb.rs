@@ -1,7 +1,7 @@
 //! An object's mesh as a GLB file, made piece by piece, so that it is never in memory as a whole.
 
 use glam::Vec3;
-use grasp_synthesis::{geometry::mesh::TriangleMesh, model::object::GraspObject};
+use grasp_synthesis::{geometry::mesh::TriangleMesh, model::plain_object::PlainObject};
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
@@ -23,14 +23,14 @@ const FORBIDDEN_COLOUR: [f32; 4] = [0.7, 0.05, 0.05, 1.0];
 /// The file of an object's mesh.
 #[derive(Debug)]
 pub(crate) struct MeshGlb<'a> {
-    object: &'a GraspObject,
+    object: &'a PlainObject,
     /// The file's JSON, padded with spaces to a multiple of four bytes.
     document: Vec<u8>,
 }
 
 impl<'a> MeshGlb<'a> {
     /// Prepares the file, without its mesh.
-    pub(crate) fn new(object: &'a GraspObject, name: &str) -> Self {
+    pub(crate) fn new(object: &'a PlainObject, name: &str) -> Self {
         let mut document = document(object, name).to_string().into_bytes();
         document.resize(document.len().next_multiple_of(4), b' ');
         Self { object, document }
@@ -88,7 +88,7 @@ impl<'a> MeshGlb<'a> {
     }
 
     fn mesh(&self) -> &'a TriangleMesh {
-        self.object.surface.mesh()
+        &self.object.mesh
     }
 }
 
@@ -115,8 +115,8 @@ fn binary_bytes(mesh: &TriangleMesh) -> usize {
 
 /// The file's JSON: one mesh of up to two primitives that share their vertices, triangles that may be touched before those
 /// that must not.
-fn document(object: &GraspObject, name: &str) -> serde_json::Value {
-    let mesh = object.surface.mesh();
+fn document(object: &PlainObject, name: &str) -> serde_json::Value {
+    let mesh = &object.mesh;
     let (vertices, triangles) = (mesh.positions().len(), mesh.triangles().len());
     let forbidden = object.forbidden_count();
     let (low, high) = bounds(mesh);
@@ -184,9 +184,9 @@ fn bounds(mesh: &TriangleMesh) -> (Vec3, Vec3) {
 
 /// Where the forbidden triangles are among all of the mesh, whose indices contacts name: the first of each run and how many
 /// follow one another.
-fn runs(object: &GraspObject) -> Vec<[u32; 2]> {
+fn runs(object: &PlainObject) -> Vec<[u32; 2]> {
     let mut runs: Vec<[u32; 2]> = Vec::new();
-    for triangle in 0..count(object.surface.mesh().triangles().len()) {
+    for triangle in 0..count(object.mesh.triangles().len()) {
         if !object.is_forbidden(triangle) {
             continue;
         }
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn the_file_reads_back_as_the_mesh_with_its_forbidden_part() {
         let stored = tetrahedron("small", 0.1, &[1, 2]);
-        let glb = MeshGlb::new(stored.object.object(), "small");
+        let glb = MeshGlb::new(&stored.object, "small");
         let pieces: Vec<Vec<u8>> = glb.pieces().collect();
         assert!(pieces.iter().all(|piece| piece.len() <= PIECE_BYTES));
         let file = pieces.concat();
@@ -221,7 +221,7 @@ mod tests {
         };
         let read = read_mesh(&file, Import::METRES, limits).expect("it is a GLB file");
         assert_eq!(read.mesh.triangles().len(), 4);
-        let original = stored.object.surface.mesh();
+        let original = &stored.object.mesh;
         assert_eq!(read.mesh.positions().len(), original.positions().len());
         let (_, forbidden) = read
             .groups
@@ -245,9 +245,9 @@ mod tests {
     #[test]
     fn names_the_runs_of_forbidden_triangles() {
         let stored = tetrahedron("small", 0.1, &[0, 2, 3]);
-        assert_eq!(runs(stored.object.object()), [[0, 1], [2, 2]]);
+        assert_eq!(runs(&stored.object), [[0, 1], [2, 2]]);
         let free = tetrahedron("free", 0.1, &[]);
-        let document = document(free.object.object(), "free");
+        let document = document(&free.object, "free");
         assert_eq!(document["meshes"][0]["primitives"].as_array().unwrap().len(), 1);
     }
 }

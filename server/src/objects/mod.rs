@@ -5,6 +5,7 @@ pub(crate) mod build;
 mod centre_of_mass;
 pub(crate) mod change;
 pub(crate) mod changes;
+mod derived;
 pub(crate) mod directory;
 mod extent;
 pub(crate) mod given;
@@ -15,40 +16,29 @@ mod revision;
 pub(crate) mod saved;
 pub(crate) mod store;
 
-use std::{
-    sync::{Arc, OnceLock},
-    thread,
-};
+use std::sync::Arc;
 
 use glam::DVec3;
-use grasp_assets::{
-    hands::{Hand, hand, is_built_in},
-    primitives::held_primitives,
-};
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::{Stop, Stopped, unstopped},
-    geometry::mesh::TriangleMesh,
-    known::{primitives::HeldPrimitive, transferred_grips::TransferredGrips},
-    model::{hand::Handedness, object::GraspObject, strategy::Validity},
-    propose::placement_cache::PlacementCaches,
-    propose::prepared::PreparedObject,
+    model::{object::GraspObject, plain_object::PlainObject, strategy::Validity},
 };
 use sha2::{Digest as _, Sha256};
 
-pub(crate) use self::revision::{Body, Listed, Record, Resting, Revision};
-use self::{given::Given, mesh_file::MeshFile};
+pub(crate) use self::{
+    derived::Derived,
+    revision::{Body, Listed, Record, Resting, Revision},
+};
+use self::{
+    derived::{DerivedCell, expected_bytes},
+    given::Given,
+    mesh_file::MeshFile,
+};
 use crate::{
     answer::{vector, wire_pose},
     atlas_slots::AtlasSlots,
 };
-
-/// Bytes per triangle in the search structures, in addition to its three indices: the hierarchy's nodes, the prepared triangle
-/// and the forbidden flag. A generous estimate, because it bounds the cache.
-const SEARCH_BYTES_PER_TRIANGLE: usize = 192;
-
-/// Where grips transferred to an object are kept once they are made.
-type GripsSlot = OnceLock<Arc<TransferredGrips>>;
 
 /// An object as the server keeps it.
 #[derive(Debug)]
@@ -57,8 +47,8 @@ pub(crate) struct StoredObject {
     pub id: String,
     /// True if it is part of the server.
     pub built_in: bool,
-    /// The object in the form that searches use; every search holds a clone.
-    pub object: Arc<PreparedObject>,
+    /// The object at rest.
+    pub object: PlainObject,
     /// SHA-256 of vertices, triangles and forbidden set, in hexadecimal.
     pub content_hash: String,
     /// Oddities of its mesh.
@@ -69,95 +59,75 @@ pub(crate) struct StoredObject {
     pub given: Given,
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
-    /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
-    transferred_grips: Vec<GripsSlot>,
+    /// What is derived from it.
+    derived: DerivedCell,
+    /// Cloned by every call that uses the object.
+    uses: Arc<()>,
 }
 
 impl StoredObject {
-    /// A built-in object.
+    /// A built-in object, with what is derived from it.
     pub(crate) fn built_in(id: String, object: Arc<GraspObject>) -> Self {
-        let file = MeshFile::plain(object.surface.mesh().triangles().len());
+        let file = MeshFile::plain(object.mesh.triangles().len());
+        let stored = Self::from_file(id, object.plain().clone(), Vec::new(), Arc::new(file));
+        unstopped(|stop| stored.fill(object, stop));
         Self {
             built_in: true,
-            ..Self::from_file(id, object, Vec::new(), Arc::new(file))
+            ..stored
         }
     }
 
     /// An object from a client's file.
     pub(crate) fn from_file(
         id: String,
-        object: Arc<GraspObject>,
+        object: PlainObject,
         warnings: Vec<String>,
         file: Arc<MeshFile>,
     ) -> Self {
-        unstopped(|stop| Self::from_file_until(id, object, warnings, file, stop))
-    }
-
-    /// As [`Self::from_file`], unless it is stopped.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub(crate) fn from_file_until(
-        id: String,
-        object: Arc<GraspObject>,
-        warnings: Vec<String>,
-        file: Arc<MeshFile>,
-        stop: Stop<'_>,
-    ) -> Result<Self, Stopped> {
-        Ok(Self {
+        Self {
             id,
             built_in: false,
             content_hash: content_hash(&object),
-            object: Arc::new(PreparedObject::new_until(object, stop)?),
+            object,
             warnings,
             file,
             given: Given::default(),
             atlas_slots: AtlasSlots::default(),
-            transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
-        })
+            derived: DerivedCell::default(),
+            uses: Arc::default(),
+        }
     }
 
-    /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with
-    /// each hand would have to do. Takes some ten milliseconds per hand, in parallel if the system has a thread for it.
+    /// Keeps what is derived from an object that has its search structures.
     ///
     /// # Errors
     /// [`Stopped`].
-    pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
-        let prepare_hand = |handedness| -> Result<(), Stopped> {
-            let Some(hand) = hand(rig, handedness) else {
-                return Ok(());
-            };
-            self.object.build_placement_cache(&hand.rig, stop)?;
-            if let Some((held, grips)) = self.transferred_grips_of(hand) {
-                let transferred = TransferredGrips::of_until(&self.object, held, stop)?;
-                grips.get_or_init(|| Arc::new(transferred));
-            }
-            Ok(())
-        };
-        thread::scope(|scope| {
-            let left = thread::Builder::new().spawn_scoped(scope, || prepare_hand(Handedness::Left));
-            let right = prepare_hand(Handedness::Right);
-            let left = left.ok().and_then(|thread| thread.join().ok());
-            left.unwrap_or_else(|| prepare_hand(Handedness::Left)).and(right)
+    pub(crate) fn fill(&self, object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Arc<Derived>, Stopped> {
+        self.derived
+            .get_or_build(|| Ok(Arc::new(Derived::of(object, stop)?)))
+    }
+
+    /// What is derived from it, built if necessary: some ten milliseconds, up to seconds for the largest meshes. It stays until
+    /// the object is dropped; the store does the same within the bounds of the cache.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn derived_until(&self, stop: Stop<'_>) -> Result<Arc<Derived>, Stopped> {
+        self.derived.get_or_build(|| {
+            let object = GraspObject::of_until(self.object.clone(), stop)?;
+            Ok(Arc::new(Derived::of(Arc::new(object), stop)?))
         })
     }
 
-    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if none fits.
-    /// There are such grips for one rig; hands of the clients' own rigs start from those, too.
-    pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
-        let (held, grips) = self.transferred_grips_of(hand)?;
-        let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
-        (!grips.is_empty()).then(|| Arc::clone(grips))
+    /// Takes what was derived from an object of the same content.
+    fn share(&self, twin: &Derived) -> Arc<Derived> {
+        let shared = self.derived.get_or_build(|| Ok(Arc::new(twin.clone())));
+        shared.unwrap_or_else(|Stopped| Arc::new(twin.clone()))
     }
 
-    /// The primitives' grips for a hand, and the place of those transferred from them.
-    fn transferred_grips_of(&self, hand: &Hand) -> Option<(&'static Arc<[HeldPrimitive]>, &GripsSlot)> {
-        let all = || held_primitives().iter().zip(&self.transferred_grips);
-        let is_side = |of: &Hand| of.rig.handedness == hand.rig.handedness;
-        let own = all().find(|((of, _), _)| **of == *hand);
-        let of_other = || all().find(|((of, _), _)| !is_built_in(hand) && is_side(of));
-        let ((_, held), grips) = own.or_else(of_other)?;
-        Some((held, grips))
+    /// Keeps it from being evicted, and what is derived from it with it, as long as the reference is held.
+    pub(crate) fn hold(&self) -> Arc<()> {
+        Arc::clone(&self.uses)
     }
 
     /// "objects/{object}".
@@ -171,39 +141,35 @@ impl StoredObject {
         self.content_hash == other.content_hash && properties(self) == properties(other)
     }
 
-    /// True if a search holds it: evicting it would free nothing.
-    pub(crate) fn is_in_use(&self) -> bool {
-        Arc::strong_count(&self.object) > 1
+    /// True if the same can be derived from it as from another object.
+    fn derives_as(&self, other: &Self) -> bool {
+        self.has_grips_of(other)
+            && self.given.regions == other.given.regions
+            && self.given.grips == other.given.grips
     }
 
-    /// Its estimated size in bytes, without atlases.
+    /// True if a call uses it: evicting it would free nothing.
+    pub(crate) fn is_in_use(&self) -> bool {
+        Arc::strong_count(&self.uses) > 1 || self.derived.is_in_use()
+    }
+
+    /// Its estimated size at rest in bytes, without atlases.
     pub(crate) fn bytes(&self) -> usize {
-        let of_mesh = |mesh: &TriangleMesh| {
-            size_of_val(mesh.positions())
-                + size_of_val(mesh.triangles())
-                + mesh.triangles().len() * SEARCH_BYTES_PER_TRIANGLE
-        };
-        of_mesh(self.object.surface.mesh())
-            + self
-                .object
-                .forbidden_surface()
-                .map_or(0, |surface| of_mesh(surface.mesh()))
-            + self.object.surface.distance_field_bytes()
-            + self.object.local_thickness.bytes()
-            + self.object.local_shape.bytes()
-            + self.object.surface_pairs().bytes()
-            + self.object.parts().bytes()
-            + PlacementCaches::MAX_BYTES
-            + self.transferred_grips.len() * TransferredGrips::MAX_BYTES
+        self.object.bytes()
             + self.warnings.iter().map(String::len).sum::<usize>()
             + self.file.bytes()
-            + self.object.regions().bytes()
             + self.given.bytes()
+    }
+
+    /// Its estimated size in bytes with what is derived from it, built or not.
+    pub(crate) fn derived_and_own_bytes(&self) -> usize {
+        let derived = self.derived.get();
+        self.bytes() + derived.map_or_else(|| expected_bytes(&self.object), |derived| derived.bytes())
     }
 
     /// The message that describes the object but for its labels, etag, times, atlas, regions and known grips.
     fn description(&self) -> v1::Object {
-        let mesh = self.object.surface.mesh();
+        let mesh = &self.object.mesh;
         let bounding_box = &self.object.bounding_box;
         v1::Object {
             name: self.name(),
@@ -239,8 +205,8 @@ fn count(n: usize) -> u32 {
 }
 
 /// SHA-256 over the counts, the vertices, the triangles and the forbidden set, all little-endian.
-fn content_hash(object: &GraspObject) -> String {
-    let mesh = object.surface.mesh();
+fn content_hash(object: &PlainObject) -> String {
+    let mesh = &object.mesh;
     let mut hash = Sha256::new();
     hash.update((mesh.positions().len() as u64).to_le_bytes());
     hash.update((mesh.triangles().len() as u64).to_le_bytes());
@@ -277,9 +243,9 @@ pub(crate) mod tests {
 
     impl StoredObject {
         /// An object whose file has the triangles of its mesh.
-        pub(crate) fn plain(id: &str, object: GraspObject) -> Self {
-            let file = MeshFile::plain(object.surface.mesh().triangles().len());
-            Self::from_file(id.to_owned(), Arc::new(object), Vec::new(), Arc::new(file))
+        pub(crate) fn plain(id: &str, object: PlainObject) -> Self {
+            let file = MeshFile::plain(object.mesh.triangles().len());
+            Self::from_file(id.to_owned(), object, Vec::new(), Arc::new(file))
         }
     }
 
@@ -288,8 +254,9 @@ pub(crate) mod tests {
         let positions = vec![Vec3::ZERO, Vec3::X * edge, Vec3::Y * edge, Vec3::Z * edge];
         let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let mesh = TriangleMesh::new(positions, triangles).unwrap();
-        let object = GraspObject::new(mesh, 0.1, Vec3::ZERO, Some(0.3), forbidden).unwrap();
-        StoredObject::plain(id, object)
+        let object =
+            unstopped(|stop| PlainObject::new_until(mesh, 0.1, Vec3::ZERO, Some(0.3), forbidden, stop));
+        StoredObject::plain(id, object.unwrap())
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Instant};
 
-use grasp_synthesis::{base::stop::Stop, model::object::ResizeError};
+use grasp_synthesis::{base::stop::Stop, model::plain_object::ResizeError};
 use tokio::{sync::Semaphore, time::timeout_at};
 
 use super::{StoredObject, extent::check_resized, store::SizeSlot};
@@ -89,7 +89,8 @@ impl Resizer {
 /// - [`ServiceError::Invalid`] if the object cannot have this size.
 /// - [`ServiceError::Cancelled`] if it was stopped.
 fn resized(stored: &StoredObject, size: ObjectSize, stop: Stop<'_>) -> Result<StoredObject, ServiceError> {
-    let object = match stored.object.resized_until(size.scale(), size.mass, stop)? {
+    let base = stored.derived_until(stop)?;
+    let object = match base.object.resized_until(size.scale(), size.mass, stop)? {
         Ok(object) => object,
         Err(error) => {
             let field = match error {
@@ -99,15 +100,16 @@ fn resized(stored: &StoredObject, size: ObjectSize, stop: Stop<'_>) -> Result<St
             return Err(ServiceError::invalid(field, error.to_string()));
         }
     };
-    check_resized(object.surface.mesh()).map_err(|wrong| ServiceError::invalid("object_scale", wrong))?;
-    Ok(StoredObject {
-        given: stored.given.at_scale(size.scale(), stored.object.object()),
-        ..StoredObject::from_file_until(
+    check_resized(&object.mesh).map_err(|wrong| ServiceError::invalid("object_scale", wrong))?;
+    let resized = StoredObject {
+        given: stored.given.at_scale(size.scale(), base.object.object()),
+        ..StoredObject::from_file(
             stored.id.clone(),
-            Arc::new(object),
+            object.plain().clone(),
             Vec::new(),
             Arc::clone(&stored.file),
-            stop,
-        )?
-    })
+        )
+    };
+    resized.fill(Arc::new(object), stop)?;
+    Ok(resized)
 }

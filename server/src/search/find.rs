@@ -91,7 +91,7 @@ mod tests {
     use std::sync::mpsc;
 
     use grasp_proto::v1;
-    use grasp_synthesis::base::mechanisms::Mechanisms;
+    use grasp_synthesis::base::{mechanisms::Mechanisms, stop::unstopped};
 
     use super::*;
     use crate::{objects::tests::tetrahedron, rigs::store::RigStore, validate::find_query};
@@ -106,7 +106,7 @@ mod tests {
         FindJob {
             query: find_query(request, ("adult", &RigStore::new(0, None)), |_| true)
                 .expect("the request is valid"),
-            object: Arc::clone(&stored.object),
+            derived: unstopped(|stop| stored.derived_until(stop)),
             stored,
             resized: None,
             seed: 3,

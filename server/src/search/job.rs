@@ -14,7 +14,6 @@ use grasp_synthesis::{
         holdout::Holdout,
         strategy::{Choice, Validity},
     },
-    propose::prepared::PreparedObject,
     search::{
         GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
@@ -35,7 +34,7 @@ use crate::{
     answer::{Circumstances, ClientFrame, find_response},
     atlases::KnownGrips,
     error::ServiceError,
-    objects::StoredObject,
+    objects::{Derived, StoredObject},
     rigs::RigHand,
     validate::{FindQuery, GiverHand},
 };
@@ -45,9 +44,9 @@ use crate::{
 pub(crate) struct FindJob {
     /// The request.
     pub query: FindQuery,
-    /// The object. Holding this reference keeps it from being evicted.
-    pub object: Arc<PreparedObject>,
-    /// The same object as stored, for its transferred grips.
+    /// The object in the form that searches use. Holding this reference keeps it from being evicted.
+    pub derived: Arc<Derived>,
+    /// The object as stored.
     pub stored: Arc<StoredObject>,
     /// How many times as large the object is as that of `known`, if its size or mass is another one: known grips are starts
     /// then.
@@ -98,7 +97,7 @@ struct HandSearch {
 #[derive(Debug)]
 pub(super) struct PreparedJob {
     query: FindQuery,
-    object: Arc<PreparedObject>,
+    derived: Arc<Derived>,
     /// The receiving hand's search and, if the request leaves the choice, the other hand's.
     hands: Vec<HandSearch>,
     clock: SinceArrival,
@@ -150,7 +149,7 @@ impl FindJob {
         let start = Instant::now();
         let first = self.query.receiving_hand.clone();
         let stance = |hand: &RigHand| self.query.stances.of(hand.hand.rig.handedness);
-        let of_first = holdout(&self.query, self.object.object(), stance(&first))?;
+        let of_first = holdout(&self.query, self.derived.object.object(), stance(&first))?;
         let object_from_client = self.query.client_from_object.inverse();
         let of_other = |hand: &RigHand| Holdout {
             stance: stance(hand).transformed(object_from_client),
@@ -179,7 +178,7 @@ impl FindJob {
             // What holds an object at another size says little about it at its own.
             learns: self.query.uses_atlas() && self.resized.is_none(),
             query: self.query,
-            object: self.object,
+            derived: self.derived,
             clock: SinceArrival(self.arrived),
             start,
             budget: self.budget,
@@ -198,7 +197,7 @@ impl FindJob {
             (Some(atlas), None) => SeedSource::Atlas(Arc::clone(atlas)),
             (Some(atlas), Some(scale)) => SeedSource::Resized(ResizedGrips::new(Arc::clone(atlas), scale)),
             (None, _) if query.uses_seeds() => {
-                let transferred = self.stored.transferred_grips(hand);
+                let transferred = self.derived.transferred_grips(hand);
                 transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)
             }
             (None, _) => SeedSource::Nothing,
@@ -301,7 +300,7 @@ impl PreparedJob {
         let HandSearch { hand, holdout, .. } = &self.hands[place];
         Task {
             holdout,
-            object: &self.object,
+            object: &self.derived.object,
             rig: &hand.hand.rig,
         }
     }

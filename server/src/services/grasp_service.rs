@@ -7,6 +7,7 @@ use std::{
 };
 
 use grasp_proto::v1::{self, grasp_service_server::GraspService};
+use grasp_synthesis::base::stop::Stop;
 use tonic::{Request, Response, Status};
 
 use super::Shared;
@@ -14,7 +15,7 @@ use crate::{
     budget::effective_budget,
     call::{CallContext, SearchSummary},
     error::ServiceError,
-    objects::{StoredObject, resized::ObjectSize},
+    objects::{Derived, StoredObject, resized::ObjectSize, store::Need},
     search::{self, FindJob},
     validate::{FindQuery, RequestedSize, find_query},
 };
@@ -43,7 +44,7 @@ impl GraspHandler {
         call.log_object(&query.object_id);
         let stored = shared.object(&query.object_id, call).await?.object;
         // Held while the call lasts, so that the object is not evicted.
-        let _object = Arc::clone(&stored.object);
+        let _object = stored.hold();
         let admission = shared.executor.admit()?;
         let held_out = self.held_out(&stored, query.object_size, call).await?;
         let job = self.job(query, &stored, held_out, call)?;
@@ -70,17 +71,23 @@ impl GraspHandler {
             resizer,
             ..
         } = &*self.shared;
+        let is_kept = objects.kept(stored, Need::Call).is_some();
+        let derived = self.shared.derived(stored, call).await?;
+        let since = if is_kept { call.arrived } else { Instant::now() };
         let Some(size) = ObjectSize::of(size, stored) else {
             return Ok(HeldOut {
+                derived,
                 object: Arc::clone(stored),
                 resized: None,
-                since: call.arrived,
+                since,
             });
         };
         let slot = objects.resized(stored, size)?;
         atlases.make_room();
+        let object = resizer.fill(slot, stored, size, call.answer_due()).await?;
         Ok(HeldOut {
-            object: resizer.fill(slot, stored, size, call.answer_due()).await?,
+            derived: object.derived_until(Stop::NEVER)?,
+            object,
             resized: Some(size.scale()),
             since: Instant::now(),
         })
@@ -102,6 +109,7 @@ impl GraspHandler {
         call.log_reserve(reserve);
         let HeldOut {
             object,
+            derived,
             resized,
             since,
         } = held_out;
@@ -119,7 +127,7 @@ impl GraspHandler {
             Default::default()
         };
         Ok(FindJob {
-            object: Arc::clone(&object.object),
+            derived,
             stored: object,
             resized,
             seed: query.seed.unwrap_or_else(drawn_seed),
@@ -144,6 +152,8 @@ impl GraspHandler {
 struct HeldOut {
     /// The object at its size.
     object: Arc<StoredObject>,
+    /// What is derived from it.
+    derived: Arc<Derived>,
     /// How many times as large it is, if size or mass are not its own.
     resized: Option<f32>,
     /// From when the budget counts: preparing the object does not.

@@ -9,11 +9,17 @@ mod rig_message;
 mod streaming;
 mod upload;
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 use grasp_import::MeshLimits;
-use grasp_synthesis::base::mechanisms::Mechanisms;
-use tokio::sync::Semaphore;
+use grasp_synthesis::base::{mechanisms::Mechanisms, stop::Stop};
+use tokio::{sync::Semaphore, time::timeout_at};
 use tokio_util::sync::CancellationToken;
 
 pub(crate) use grasp_service::GraspHandler;
@@ -27,11 +33,36 @@ use crate::{
     budget::BudgetLimits,
     call::CallContext,
     error::ServiceError,
-    executor::{SearchExecutor, run_blocking},
-    objects::{Revision, resized::Resizer, store::ObjectStore},
+    executor::{SearchExecutor, run_blocking, run_stoppable},
+    objects::{
+        Derived, Revision, StoredObject,
+        resized::Resizer,
+        store::{Need, ObjectStore},
+    },
     reserve::DeadlineReserve,
     rigs::store::RigStore,
 };
+
+/// New objects of which the latest are prepared for their first calls.
+const MOST_AHEAD: u64 = 16;
+
+/// Whose turn it is to be prepared ahead of calls.
+#[derive(Debug)]
+pub(crate) struct Ahead {
+    /// Number of objects so far.
+    next: AtomicU64,
+    /// One at a time.
+    turn: Semaphore,
+}
+
+impl Default for Ahead {
+    fn default() -> Self {
+        Self {
+            next: AtomicU64::new(0),
+            turn: Semaphore::new(1),
+        }
+    }
+}
 
 /// State shared by the handlers.
 #[derive(Debug)]
@@ -63,6 +94,10 @@ pub(crate) struct Shared {
     pub maximum_watchers: usize,
     /// Cancelled when the server begins to shut down, which ends streams without an end of their own.
     pub shutdown: CancellationToken,
+    /// One permit per object that may be prepared for searches at a time.
+    pub deriving: Arc<Semaphore>,
+    /// Objects from which it is to be derived before a call asks for it.
+    pub ahead: Ahead,
     /// Rig of the receiving hand if a request names none.
     pub default_rig: String,
     /// The mechanisms that searches run.
@@ -105,5 +140,72 @@ impl Shared {
         }?;
         self.atlases.register(&revision.object);
         Ok(revision)
+    }
+
+    /// What is derived from an object, built if necessary before the call's deadline, and prepared for the hands of the default
+    /// rig then.
+    ///
+    /// # Errors
+    /// [`ServiceError::DeadlineExceeded`], and those of [`ObjectStore::derived`].
+    pub(crate) async fn derived(
+        &self,
+        object: &Arc<StoredObject>,
+        call: &CallContext,
+    ) -> Result<Arc<Derived>, ServiceError> {
+        if let Some(kept) = self.objects.kept(object, Need::Call) {
+            return Ok(kept);
+        }
+        let due = call.answer_due();
+        let permit = Arc::clone(&self.deriving).acquire_owned();
+        let permit = match due {
+            Some(due) => timeout_at(due.into(), permit)
+                .await
+                .map_err(|_| ServiceError::DeadlineExceeded)?,
+            None => permit.await,
+        };
+        let permit = permit.map_err(|_| ServiceError::ShuttingDown)?;
+        let derive = self.derive(object, Need::Call);
+        let derived = run_stoppable(due, move |stop| {
+            let _permit = permit;
+            derive(stop)
+        });
+        let derived = derived.await??;
+        self.atlases.make_room();
+        Ok(derived)
+    }
+
+    /// Derives what calls need from a new object, once no other has to be and unless many newer ones wait.
+    fn derive_ahead(self: &Arc<Self>, object: &Arc<StoredObject>) {
+        let number = self.ahead.next.fetch_add(1, Ordering::Relaxed);
+        let (shared, object) = (Arc::clone(self), Arc::downgrade(object));
+        tokio::spawn(async move {
+            let Ok(_turn) = shared.ahead.turn.acquire().await else {
+                return;
+            };
+            let newer = shared.ahead.next.load(Ordering::Relaxed) - number;
+            let Some(object) = object.upgrade().filter(|_| newer <= MOST_AHEAD) else {
+                return;
+            };
+            let derived = run_stoppable(None, shared.derive(&object, Need::Ahead)).await;
+            if let Err(error) = derived.flatten() {
+                tracing::debug!(object = object.name(), %error, "nothing was derived ahead of calls");
+            }
+            shared.atlases.make_room();
+        });
+    }
+
+    /// The work of deriving something.
+    fn derive(
+        &self,
+        object: &Arc<StoredObject>,
+        need: Need,
+    ) -> impl FnOnce(Stop<'_>) -> Result<Arc<Derived>, ServiceError> + Send + 'static {
+        let (objects, object) = (Arc::clone(&self.objects), Arc::clone(object));
+        let rig = self.default_rig.clone();
+        move |stop| {
+            let derived = objects.derived(&object, need, stop)?;
+            derived.prepare(&rig, stop)?;
+            Ok(derived)
+        }
     }
 }

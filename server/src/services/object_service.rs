@@ -4,10 +4,7 @@ use std::sync::Arc;
 
 use grasp_import::MeshLimits;
 use grasp_proto::v1::{self, object_service_server::ObjectService};
-use grasp_synthesis::{
-    base::stop::{Stop, unstopped},
-    model::hand::Handedness,
-};
+use grasp_synthesis::{base::stop::Stop, model::hand::Handedness};
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
@@ -93,7 +90,7 @@ impl ObjectHandler {
             }
         }
         let object = build_object(&fields, limits, violations, stop)?;
-        object.prepare(&shared.default_rig, stop)?;
+        shared.objects.check_size(&object)?;
         origin.source = Source {
             request: source,
             mesh: fields.mesh.into(),
@@ -101,6 +98,7 @@ impl ObjectHandler {
         let state = shared.objects.insert(object, origin)?;
         if let Some(object) = state.object() {
             shared.atlases.register(object);
+            shared.derive_ahead(object);
         }
         Ok(state)
     }
@@ -190,12 +188,7 @@ impl ObjectHandler {
         object: Option<&StoredObject>,
         rebuilt: Option<StoredObject>,
     ) -> Result<Listed, ServiceError> {
-        let Shared {
-            objects,
-            atlases,
-            default_rig,
-            ..
-        } = &*self.shared;
+        let Shared { objects, atlases, .. } = &*self.shared;
         let changed = match (object, rebuilt) {
             (Some(before), Some(rebuilt)) => Some((before, rebuilt)),
             (Some(before), None) => changed(before, &query.change)?.map(|object| (before, object)),
@@ -209,10 +202,10 @@ impl ObjectHandler {
                 objects.replace(&base, labels.clone(), None)
             };
         };
-        unstopped(|stop| object.prepare(default_rig, stop));
         let state = objects.replace(&base, labels.clone(), Some((object, &query.change)))?;
         if let Some(object) = state.object() {
             atlases.register_changed(before, object);
+            self.shared.derive_ahead(object);
         }
         Ok(state)
     }

@@ -70,12 +70,13 @@ impl ObjectHandler {
         call.log_object(&id);
         let revision = self.shared.object(&id, call).await?;
         // Holding it keeps the object from being evicted, which would free nothing meanwhile.
-        let object = Arc::clone(&revision.object.object);
+        let object = Arc::clone(&revision.object);
+        let held = object.hold();
         let hashed = Arc::clone(&object);
         let mut header = run_blocking({
             let id = id.clone();
             move || {
-                let glb = MeshGlb::new(hashed.object(), &id);
+                let glb = MeshGlb::new(&hashed.object, &id);
                 v1::MeshHeader {
                     total_bytes: glb.bytes() as u64,
                     sha256: hex(&glb.sha256()),
@@ -86,9 +87,10 @@ impl ObjectHandler {
         .await?;
         header.object = Some(self.message(&revision.into()));
         Ok(messages(|sender| async move {
+            let _held = held;
             let part = |part| v1::GetMeshResponse { part: Some(part) };
             sender.send(part(Part::Header(header))).await?;
-            let glb = MeshGlb::new(object.object(), &id);
+            let glb = MeshGlb::new(&object.object, &id);
             for piece in glb.pieces() {
                 sender.send(part(Part::Piece(piece))).await?;
             }

@@ -111,7 +111,7 @@ pub(crate) fn load(
     for pair in pairs(path, store.objects, Manifests::Required, &mut problems) {
         match read_pair(path, &pair, limits) {
             Ok(object) => {
-                bytes = bytes.saturating_add(object.object.bytes());
+                bytes = bytes.saturating_add(object.object.derived_and_own_bytes());
                 if bytes > store.bytes {
                     problems.push(DirectoryProblem::of(
                         pair.mesh,

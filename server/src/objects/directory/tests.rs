@@ -77,7 +77,7 @@ fn pairs_become_objects_and_other_files_are_ignored() {
     assert_eq!(mug.centre_of_mass, glam::Vec3::new(0.0, 0.01, 0.02));
     let forbidden: Vec<bool> = (0..4).map(|t| mug.is_forbidden(t)).collect();
     assert_eq!(forbidden, [true, false, false, true]);
-    let longest = mug.surface.mesh().positions().iter().map(|p| p.max_element());
+    let longest = mug.mesh.positions().iter().map(|p| p.max_element());
     assert!((longest.fold(0.0, f32::max) - 0.1).abs() < 1e-6);
     assert!(objects.iter().all(|pinned| !pinned.object.built_in));
     assert_eq!(objects[1].labels["level"], "kitchen");
@@ -323,7 +323,7 @@ fn bounds_all_objects_together() {
             ("b.toml", MASS),
         ],
     );
-    let one = folder.load().unwrap()[0].object.bytes();
+    let one = folder.load().unwrap()[0].object.derived_and_own_bytes();
     let load = |objects, bytes| load(&folder.0, LIMITS, StoreLimits { objects, bytes });
     assert_eq!(load(2, 2 * one).unwrap().len(), 2);
     let by_count = load(1, 2 * one).unwrap_err().to_string();

@@ -66,7 +66,7 @@ impl Folder {
         };
         let durability = Durability {
             saved: self.open(maximum),
-            loading: Loading::new(LIMITS, 2, "adult".to_owned()),
+            loading: Loading::new(LIMITS, 2),
         };
         let objects = Arc::new(Objects::new(limits, Vec::new(), Some(durability)));
         wait_for(objects.read_saved()).unwrap();

@@ -8,7 +8,7 @@ use std::{
 
 use uuid::Uuid;
 
-use super::{loading::Load, sizes::Sizes};
+use super::{deriving::Kepts, loading::Load, sizes::Sizes};
 use crate::{
     error::ServiceError,
     objects::{
@@ -31,6 +31,8 @@ pub(super) struct Created {
     pub requests: HashMap<Uuid, String>,
     /// The objects at other sizes.
     pub sizes: Sizes,
+    /// What is derived from objects.
+    pub derived: Kepts,
     /// Number of objects that are not at rest, and of those about to be added.
     pub loaded: usize,
     /// Size of the same, and of objects at other sizes, in bytes.
@@ -83,6 +85,7 @@ impl Created {
             objects: BTreeMap::new(),
             requests: HashMap::new(),
             sizes: Sizes::default(),
+            derived: Kepts::default(),
             loaded: 0,
             bytes: 0,
             uses: 0,
@@ -148,6 +151,7 @@ impl Created {
         self.uncount(&before);
         if !is_same_object {
             self.drop_sizes(id);
+            self.forget_derived(&before);
         }
         self.bytes += bytes;
         self.loaded += loaded;
@@ -159,6 +163,7 @@ impl Created {
             self.tell(id, event, Some(&entry.state.record.labels), None);
             self.uncount(&entry.state);
             self.drop_sizes(id);
+            self.forget_derived(&entry.state);
             if let Some(request) = entry.request {
                 self.requests.remove(&request.id);
             }
@@ -195,6 +200,12 @@ impl Created {
         }
         self.evicted.push_back(id);
         true
+    }
+
+    fn forget_derived(&mut self, state: &Listed) {
+        if let Some(object) = state.object() {
+            self.derived.forget(object);
+        }
     }
 
     fn count(&mut self, state: &Listed) {

@@ -45,8 +45,6 @@ pub(super) struct Load {
 pub(crate) struct Loading {
     /// Bounds on meshes.
     limits: MeshLimits,
-    /// The rig for whose hands objects are prepared.
-    rig: String,
     /// One permit per object that may be loaded at a time.
     objects: Arc<Semaphore>,
     /// Permits for the bytes of their mesh files.
@@ -55,10 +53,9 @@ pub(crate) struct Loading {
 
 impl Loading {
     /// Loads so many objects at a time, with mesh files of `limits.bytes` together and thus each.
-    pub(crate) fn new(limits: MeshLimits, at_a_time: usize, rig: String) -> Self {
+    pub(crate) fn new(limits: MeshLimits, at_a_time: usize) -> Self {
         Self {
             limits,
-            rig,
             objects: Arc::new(Semaphore::new(at_a_time)),
             bytes: Arc::new(Semaphore::new(limits.bytes.div_ceil(BYTES_PER_PERMIT))),
         }
@@ -222,7 +219,7 @@ impl ObjectStore {
         let acquired = Arc::clone(&loading.bytes).acquire_many_owned(permits).await;
         let room = acquired.map_err(|_| ServiceError::ShuttingDown)?;
         let mesh = saved.mesh(&record).await?;
-        let (rig, hash) = (loading.rig.clone(), record.mesh_hash());
+        let hash = record.mesh_hash();
         let built = run_stoppable(None, move |stop| {
             // Moved into the work, which may go on for some milliseconds when nobody waits.
             let _permits = (permit, room);
@@ -234,9 +231,7 @@ impl ObjectStore {
             };
             let mut violations = Violations::default();
             let fields = object_fields(request, limits.bytes, &mut violations);
-            let object = build_object(&fields, limits, violations, stop)?;
-            object.prepare(&rig, stop)?;
-            Ok(Some(object))
+            build_object(&fields, limits, violations, stop).map(Some)
         });
         match built.await? {
             Ok(Some(object)) => Ok(object),

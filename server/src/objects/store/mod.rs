@@ -1,13 +1,15 @@
 //! Objects by name. Built-in ones and those of the objects directory stay as they are; created ones can be changed and
 //! deleted.
 //!
-//! When a new object does not fit, created objects that no call uses make room, the least recently used first. If objects
+//! What is derived from objects for searching is built when a call needs it. When something does not fit, that makes room first,
+//! and then created objects that no call uses, the least recently used first. If objects
 //! are saved, those are put to rest: only what describes them stays in memory, and they are loaded again when a call needs
 //! them. Otherwise they are evicted, and the error for an evicted object says so, so that its client creates it again.
 //!
 //! Labels and times are kept here, not in the object: a change of them leaves its atlases and its searches alone.
 
 mod created;
+mod deriving;
 pub(crate) mod loading;
 mod room;
 mod sizes;
@@ -26,11 +28,11 @@ use grasp_assets::objects::{object, objects};
 use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
 
-pub(crate) use self::sizes::SizeSlot;
 use self::{
     created::{Created, Entry, Etags},
     loading::Durability,
 };
+pub(crate) use self::{deriving::Need, sizes::SizeSlot};
 use super::{
     Listed, Record, Revision, StoredObject,
     change::change_request,
@@ -122,9 +124,11 @@ impl ObjectStore {
         self.pinned.values().filter_map(Listed::object)
     }
 
-    /// Bytes of the limit that created objects do not use.
+    /// Bytes of the limit that created objects do not use, counting what is derived and makes room.
     pub(crate) fn room(&self) -> usize {
-        self.limits.bytes.saturating_sub(self.created().bytes)
+        let created = self.created();
+        let needed = created.taken() - created.derived.unused_bytes();
+        self.limits.bytes.saturating_sub(needed)
     }
 
     /// True if an object has this id.

@@ -33,7 +33,7 @@ impl ObjectStore {
         Ok(Reserved { bytes, objects })
     }
 
-    /// Drops objects at other sizes, and puts objects to rest or evicts them, until so many more bytes and objects fit.
+    /// Drops what is derived from objects and objects at other sizes, and puts objects to rest or evicts them, until so many more bytes and objects fit.
     pub(super) fn make_room(
         &self,
         created: &mut Created,
@@ -52,8 +52,8 @@ impl ObjectStore {
                 ),
             ));
         }
-        while created.loaded + objects > self.limits.objects || created.bytes + bytes > self.limits.bytes {
-            let frees_bytes = created.bytes + bytes > self.limits.bytes && created.evict_size(|_| true);
+        while created.loaded + objects > self.limits.objects || created.taken() + bytes > self.limits.bytes {
+            let frees_bytes = created.taken() + bytes > self.limits.bytes && created.evict_derived_or_size();
             if !frees_bytes && !created.evict_one(grows) {
                 return Err(ServiceError::Overloaded {
                     limit: Limit::ObjectCache,

@@ -3,8 +3,6 @@
 
 use std::sync::{Arc, OnceLock, Weak};
 
-use grasp_synthesis::propose::prepared::PreparedObject;
-
 use super::{Created, ObjectStore, RETRY_AFTER};
 use crate::{
     error::{Limit, ServiceError},
@@ -21,7 +19,7 @@ pub(crate) type SizeSlot = Arc<OnceLock<Arc<StoredObject>>>;
 #[derive(Debug)]
 pub(super) struct Resized {
     /// The object at its own size.
-    of: Weak<PreparedObject>,
+    of: Weak<StoredObject>,
     id: String,
     size: ObjectSize,
     bytes: usize,
@@ -53,7 +51,7 @@ impl ObjectStore {
     ) -> Result<SizeSlot, ServiceError> {
         let mut created = self.created();
         let sizes = &mut created.sizes.0;
-        let is_same = |kept: &Resized| kept.size == size && kept.of.as_ptr() == Arc::as_ptr(&stored.object);
+        let is_same = |kept: &Resized| kept.size == size && kept.of.as_ptr() == Arc::as_ptr(stored);
         if let Some(place) = sizes.iter().position(is_same) {
             let kept = sizes.remove(place);
             let slot = Arc::clone(&kept.slot);
@@ -66,7 +64,7 @@ impl ObjectStore {
         {
             return Err(self.every_size_is_in_use());
         }
-        let bytes = stored.bytes();
+        let bytes = stored.derived_and_own_bytes();
         let own = if created.objects.contains_key(&stored.id) {
             bytes
         } else {
@@ -81,15 +79,15 @@ impl ObjectStore {
                 ),
             ));
         }
-        while created.bytes + bytes > self.limits.bytes {
-            if !created.evict_size(|_| true) && !created.evict_one(Some(&stored.id)) {
+        while created.taken() + bytes > self.limits.bytes {
+            if !created.evict_derived_or_size() && !created.evict_one(Some(&stored.id)) {
                 return Err(self.every_size_is_in_use());
             }
         }
         let slot = SizeSlot::default();
         created.bytes += bytes;
         created.sizes.0.push(Resized {
-            of: Arc::downgrade(&stored.object),
+            of: Arc::downgrade(stored),
             id: stored.id.clone(),
             size,
             bytes,
@@ -143,9 +141,12 @@ mod tests {
         validate::{Labels, ObjectChange, RequestedSize},
     };
 
-    /// A store with room for so many tetrahedra.
+    /// A store with room for so many tetrahedra, with what is derived from them.
     fn store(tetrahedra: usize) -> ObjectStore {
-        let bytes = tetrahedra * tetrahedron("any", 1.0, &[]).bytes();
+        store_of(tetrahedra * tetrahedron("any", 1.0, &[]).derived_and_own_bytes())
+    }
+
+    fn store_of(bytes: usize) -> ObjectStore {
         ObjectStore::new(StoreLimits { objects: 100, bytes }, Vec::new(), None)
     }
 
@@ -187,18 +188,20 @@ mod tests {
 
     #[test]
     fn sizes_count_and_make_room_before_objects_do() {
-        let store = store(3);
-        let (a, whole) = (insert(&store, "a"), store.room());
-        let bytes = a.bytes();
+        let one = tetrahedron("any", 1.0, &[]);
+        let (at_rest, sized) = (one.bytes(), one.derived_and_own_bytes());
+        let store = store_of(at_rest + 2 * sized);
+        let a = insert(&store, "a");
         drop(store.resized(&a, size(&a, 50)).unwrap());
+        assert_eq!(store.room(), sized);
         drop(store.resized(&a, size(&a, 200)).unwrap());
-        assert_eq!(store.room(), whole - 2 * bytes);
+        assert_eq!(store.room(), 0);
         insert(&store, "b");
         assert!(store.contains("a") && store.contains("b"));
-        assert_eq!(store.room(), whole - 2 * bytes);
+        assert_eq!(store.room(), sized - at_rest);
         // Whatever is of an object goes with it.
         store.remove("a", None).unwrap();
-        assert_eq!(store.room(), whole);
+        assert_eq!(store.room(), 2 * sized);
     }
 
     #[test]
@@ -217,7 +220,7 @@ mod tests {
         for hundredths in 101..150 {
             drop(ample.resized(&a, size(&a, hundredths)).unwrap());
         }
-        assert_eq!(ample.room(), whole - SIZES_PER_OBJECT * a.bytes());
+        assert_eq!(ample.room(), whole - SIZES_PER_OBJECT * a.derived_and_own_bytes());
     }
 
     #[test]

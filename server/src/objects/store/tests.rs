@@ -89,8 +89,8 @@ fn keeps_objects_in_use() {
     let store = store(2, 100);
     insert(&store, "a").unwrap();
     insert(&store, "b").unwrap();
-    let a = Arc::clone(&store.get("a").unwrap().loaded().unwrap().object.object);
-    let b = Arc::clone(&store.get("b").unwrap().loaded().unwrap().object.object);
+    let a = store.get("a").unwrap().loaded().unwrap().object.hold();
+    let b = store.get("b").unwrap().loaded().unwrap().object.hold();
     // Listing an object does not use it.
     let looked_at = store.page(&list(10, ""));
     assert!(matches!(

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use glam::{Quat, Vec3};
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_synthesis::{
-    base::pose::Pose,
+    base::{pose::Pose, stop::unstopped},
     model::hand::{Handedness, rig::AngleRange},
 };
 use proptest::{
@@ -283,7 +283,7 @@ fn answers_every_request_that_passes_validation() {
             patience: Duration::ZERO,
             has_deadline: false,
             query,
-            object: Arc::clone(&object.object),
+            derived: unstopped(|stop| object.derived_until(stop)),
             stored: Arc::new(object),
             resized: None,
             seed: 3,

@@ -123,6 +123,11 @@ impl Containment {
         self.caps.len()
     }
 
+    /// Memory use in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(self.caps.as_slice()) + size_of_val(self.is_sheet.as_slice())
+    }
+
     /// True if the triangle belongs to a sheet.
     pub(super) fn is_sheet(&self, triangle: usize) -> bool {
         self.is_sheet.get(triangle).is_some_and(|&is_sheet| is_sheet)

@@ -31,6 +31,15 @@ const SPARE_STEPS: usize = 1 << 18;
 /// Number of spheres along the axis that cover a capsule. More tighten the bound and take longer.
 const SPHERES: usize = 3;
 
+/// What is near a node.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    /// The distance to the surface, in metres, or an upper bound of it.
+    pub(super) distance: f32,
+    /// The triangle that is closest to the node or to a neighbour.
+    pub(super) triangle: Option<u32>,
+}
+
 /// Distances from the nodes of a grid to a surface.
 #[derive(Clone, Debug)]
 pub(super) struct DistanceField {
@@ -46,15 +55,16 @@ pub(super) struct DistanceField {
 }
 
 impl DistanceField {
-    /// Samples the field of a surface inside `aabb`. `distance(point, within, may_go_on)` returns the point's distance from the
-    /// surface, or `within` if it is larger; it gives up once `may_go_on` returns false, which it asks at each step.
+    /// Samples the field of a surface inside `aabb`. `nearest(point, near, may_go_on)` returns what is closest to the point, or
+    /// `near` if nothing is within its distance, which it may look at first; it gives up once `may_go_on` returns false, which it
+    /// asks at each step.
     ///
     /// # Errors
     /// [`Stopped`].
     pub(super) fn new(
         aabb: &Aabb,
         stop: Stop<'_>,
-        distance: impl Fn(Vec3, f32, &mut dyn FnMut() -> bool) -> Result<f32, GivenUp>,
+        nearest: impl Fn(Vec3, Nearest, &mut dyn FnMut() -> bool) -> Result<Nearest, GivenUp>,
     ) -> Result<Self, Stopped> {
         let size = aabb.max - aabb.min + 2.0 * MARGIN;
         let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
@@ -68,10 +78,15 @@ impl DistanceField {
         let mut distances = Vec::with_capacity((counts.x * counts.y * counts.z) as usize);
         let mut steps_left = SPARE_STEPS;
         let mut is_cut_short = false;
+        let mut at_row_start = None;
         for z in 0..counts.z {
             for y in 0..counts.y {
                 // Distances of neighbouring nodes differ by at most the spacing, which bounds the next search.
-                let (mut least, mut most) = (0.0_f32, diagonal);
+                let mut least = 0.0_f32;
+                let mut near = Nearest {
+                    distance: diagonal,
+                    triangle: at_row_start,
+                };
                 for x in 0..counts.x {
                     stop.check_every(NODES_PER_CHECK, x as usize)?;
                     let node = origin + UVec3::new(x, y, z).as_vec3() * spacing;
@@ -80,12 +95,17 @@ impl DistanceField {
                         steps_left = steps_left.saturating_sub(1);
                         steps_left > 0
                     };
-                    if let Ok(found) = distance(node, most, &mut may_go_on) {
-                        (least, most) = (found, (found + spacing) * 1.001);
+                    if let Ok(found) = nearest(node, near, &mut may_go_on) {
+                        least = found.distance;
+                        near = found;
                     } else {
                         is_cut_short = true;
                         // Where so much overlaps, what is known of the neighbour has to do.
-                        (least, most) = ((least - spacing * 1.001).max(0.0), (most + spacing) * 1.001);
+                        least = (least - spacing * 1.001).max(0.0);
+                    }
+                    near.distance = (near.distance + spacing) * 1.001;
+                    if x == 0 {
+                        at_row_start = near.triangle;
                     }
                     distances.push(least);
                 }

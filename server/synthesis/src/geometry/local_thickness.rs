@@ -1,9 +1,10 @@
 //! How thick a mesh is near a point: the lever by which fingers that hold it there keep it from rolling.
 
+use std::sync::OnceLock;
+
 use glam::{DVec3, Vec3};
 
 use super::{principal_axes::principal_axes, surface_samples::SurfaceSample};
-use crate::base::stop::{Stop, Stopped};
 
 /// Radius of the part of the surface around a sample that counts as near, in metres: the reach of a hand's contacts.
 const REACH: f32 = 0.06;
@@ -11,59 +12,56 @@ const REACH: f32 = 0.06;
 /// Smallest number of samples in a part, so that a large, sparsely sampled face is not taken for a speck.
 const MIN_NEIGHBOURS: usize = 16;
 
-/// The thickness of the parts of a mesh around samples of its surface.
+/// The thickness of the parts of a mesh around samples of its surface, each measured when it is first asked for.
 #[derive(Clone, Debug, Default)]
 pub struct LocalThickness {
-    samples: Vec<(Vec3, f32)>,
+    samples: Vec<(Vec3, OnceLock<f32>)>,
 }
 
 impl LocalThickness {
-    /// Measures a mesh from points spread evenly over it; takes some milliseconds.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub fn of(samples: &[SurfaceSample], stop: Stop<'_>) -> Result<Self, Stopped> {
-        let points: Vec<Vec3> = samples.iter().map(|sample| sample.position).collect();
-        let mut by_distance = Vec::with_capacity(points.len());
-        let samples = points
-            .iter()
-            .map(|&centre| {
-                stop.check()?;
-                by_distance.clear();
-                by_distance.extend(
-                    points
-                        .iter()
-                        .map(|&point| (point.distance_squared(centre), point)),
-                );
-                let count = by_distance
-                    .iter()
-                    .filter(|(squared, _)| *squared <= REACH * REACH)
-                    .count();
-                let count = count.max(MIN_NEIGHBOURS).min(by_distance.len());
-                if count < by_distance.len() {
-                    by_distance.select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0));
-                }
-                let part: Vec<DVec3> = by_distance[..count]
-                    .iter()
-                    .map(|(_, point)| point.as_dvec3())
-                    .collect();
-                Ok((centre, thickness(&part)))
-            })
-            .collect::<Result<_, Stopped>>()?;
-        Ok(Self { samples })
+    /// Of a mesh with these points, which are spread evenly over it.
+    pub fn of(samples: &[SurfaceSample]) -> Self {
+        let samples = samples.iter();
+        Self {
+            samples: samples.map(|sample| (sample.position, OnceLock::new())).collect(),
+        }
     }
 
     /// Root mean square distance of the surface near a point from the axis along which it is longest, in metres: the radius
-    /// of a rod. 0 if nothing was sampled.
+    /// of a rod. 0 if nothing was sampled. Takes some ten microseconds for a part that nobody has asked for.
     pub fn near(&self, point: Vec3) -> f32 {
-        let mut nearest = (f32::INFINITY, 0.0);
-        for &(position, thickness) in &self.samples {
-            let squared = position.distance_squared(point);
+        let mut nearest = (f32::INFINITY, None);
+        for sample in &self.samples {
+            let squared = sample.0.distance_squared(point);
             if squared < nearest.0 {
-                nearest = (squared, thickness);
+                nearest = (squared, Some(sample));
             }
         }
-        nearest.1
+        let (_, nearest) = nearest;
+        nearest.map_or(0.0, |(centre, measured)| {
+            *measured.get_or_init(|| self.measure(*centre))
+        })
+    }
+
+    /// The thickness of the part around a sample.
+    fn measure(&self, centre: Vec3) -> f32 {
+        let points = self.samples.iter();
+        let mut by_distance: Vec<(f32, Vec3)> = points
+            .map(|&(point, _)| (point.distance_squared(centre), point))
+            .collect();
+        let count = by_distance
+            .iter()
+            .filter(|(squared, _)| *squared <= REACH * REACH)
+            .count();
+        let count = count.max(MIN_NEIGHBOURS).min(by_distance.len());
+        if count < by_distance.len() {
+            by_distance.select_nth_unstable_by(count, |a, b| a.0.total_cmp(&b.0));
+        }
+        let part: Vec<DVec3> = by_distance[..count]
+            .iter()
+            .map(|(_, point)| point.as_dvec3())
+            .collect();
+        thickness(&part)
     }
 
     /// Memory use in bytes.

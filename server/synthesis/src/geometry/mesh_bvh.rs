@@ -1,5 +1,7 @@
 //! A mesh with its bounding volume hierarchy (BVH), and the queries on it.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 
 use super::{
@@ -9,7 +11,7 @@ use super::{
     closest,
     containment::Containment,
     crossing,
-    distance_field::DistanceField,
+    distance_field::{DistanceField, Nearest},
     mesh::TriangleMesh,
     tapered_capsule::TaperedCapsule,
     wide_bvh::{BuildQuality, WideBvh},
@@ -18,6 +20,9 @@ use crate::base::stop::{Stop, Stopped, unstopped};
 
 /// Edges of holes beyond which a surface is crowded: a test for containment takes half a millisecond then.
 const CROWDED_RIM: usize = 8192;
+
+/// Factor on the distance to one triangle, within which that triangle is found in spite of rounding.
+const NEARLY: f32 = 1.0 + 64.0 * f32::EPSILON;
 
 /// A point where a segment crosses a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +50,7 @@ pub struct ClosestPoint {
 /// depth, and answer "no" or "none" if a coordinate is not finite.
 #[derive(Clone, Debug)]
 pub struct MeshBvh {
-    mesh: TriangleMesh,
+    mesh: Arc<TriangleMesh>,
     bvh: WideBvh,
     aabb: Aabb,
     containment: Containment,
@@ -55,7 +60,7 @@ pub struct MeshBvh {
 
 impl MeshBvh {
     /// Builds the hierarchy for a mesh that is queried many times: a few milliseconds for 2,000 triangles.
-    pub fn build(mesh: TriangleMesh) -> Self {
+    pub fn build(mesh: impl Into<Arc<TriangleMesh>>) -> Self {
         unstopped(|stop| Self::build_until(mesh, stop))
     }
 
@@ -63,22 +68,34 @@ impl MeshBvh {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub fn build_until(mesh: TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
-        Self::with_quality(mesh, BuildQuality::Thorough, stop)
+    pub fn build_until(mesh: impl Into<Arc<TriangleMesh>>, stop: Stop<'_>) -> Result<Self, Stopped> {
+        Self::with_quality(mesh.into(), BuildQuality::Thorough, stop)
     }
 
     /// Builds the hierarchy for a mesh that serves one request: less than a millisecond for 5,000 triangles. Queries
     /// give the same answers but take longer.
-    pub fn build_quick(mesh: TriangleMesh) -> Self {
-        unstopped(|stop| Self::with_quality(mesh, BuildQuality::Quick, stop))
+    pub fn build_quick(mesh: impl Into<Arc<TriangleMesh>>) -> Self {
+        unstopped(|stop| Self::with_quality(mesh.into(), BuildQuality::Quick, stop))
     }
 
-    fn with_quality(mesh: TriangleMesh, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
+    fn with_quality(mesh: Arc<TriangleMesh>, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
         let aabb = mesh.aabb();
         let bvh = WideBvh::build(&mesh, quality, stop)?;
-        let distance = |point: Vec3, within: f32, may_go_on: &mut dyn FnMut() -> bool| {
+        let distance = |point: Vec3, near: Nearest, may_go_on: &mut dyn FnMut() -> bool| {
+            // The triangle that is closest to the neighbour is nearly so here, and excludes most others.
+            let to_near = |triangle: u32| {
+                let corners = mesh.corners(triangle as usize);
+                let closest = closest::closest_on_triangle(corners, point.as_dvec3());
+                NEARLY * closest.distance(point.as_dvec3()) as f32
+            };
+            let within = near
+                .triangle
+                .map_or(near.distance, |triangle| near.distance.min(to_near(triangle)));
             let found = closest::closest_if_cheap(&bvh, &mesh, point, within, may_go_on)?;
-            Ok(found.map_or(within, |(_, _, distance)| distance))
+            Ok(found.map_or(near, |(triangle, _, distance)| Nearest {
+                distance,
+                triangle: Some(triangle),
+            }))
         };
         let distance_field = match quality {
             BuildQuality::Thorough => Some(DistanceField::new(&aabb, stop, distance)?),
@@ -94,7 +111,7 @@ impl MeshBvh {
     }
 
     /// The mesh.
-    pub fn mesh(&self) -> &TriangleMesh {
+    pub fn mesh(&self) -> &Arc<TriangleMesh> {
         &self.mesh
     }
 
@@ -172,6 +189,11 @@ impl MeshBvh {
             return None;
         }
         capsule_gap::closest(&self.bvh, &self.mesh, capsule, within)
+    }
+
+    /// Memory use in bytes, without the mesh.
+    pub fn bytes(&self) -> usize {
+        self.bvh.bytes() + self.containment.bytes() + self.distance_field_bytes()
     }
 
     /// Memory of the distance field, in bytes; 0 without one.

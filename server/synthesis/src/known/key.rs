@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use sha2::{Digest as _, Sha256};
 
-use crate::model::{hand::rig::Rig, object::GraspObject, strategy::Validity};
+use crate::model::{hand::rig::Rig, plain_object::PlainObject, strategy::Validity};
 
 pub use crate::known::key::algorithm::ALGORITHM;
 
@@ -17,7 +17,7 @@ pub const KEY_BYTES: usize = 32;
 const FILE_NAME_BYTES: usize = 16;
 
 /// The SHA-256 of everything that the grips of an object and a hand depend on.
-pub fn key(object: &GraspObject, rig: &Rig) -> [u8; KEY_BYTES] {
+pub fn key(object: &PlainObject, rig: &Rig) -> [u8; KEY_BYTES] {
     let mut hash = Hash(Sha256::new());
     hash.0.update(ALGORITHM.to_le_bytes());
     hash.object(object);
@@ -26,7 +26,7 @@ pub fn key(object: &GraspObject, rig: &Rig) -> [u8; KEY_BYTES] {
 }
 
 /// The file name of the atlas of an object and a hand: hexadecimal digits of the key and ".atlas".
-pub fn file_name(object: &GraspObject, rig: &Rig) -> String {
+pub fn file_name(object: &PlainObject, rig: &Rig) -> String {
     let mut name = String::with_capacity(2 * FILE_NAME_BYTES + 6);
     for byte in &key(object, rig)[..FILE_NAME_BYTES] {
         // Writing to a string cannot fail.
@@ -49,8 +49,8 @@ impl Hash {
         }
     }
 
-    fn object(&mut self, object: &GraspObject) {
-        let mesh = object.surface.mesh();
+    fn object(&mut self, object: &PlainObject) {
+        let mesh = &object.mesh;
         self.count(mesh.positions().len() as u32);
         self.count(mesh.triangles().len() as u32);
         for position in mesh.positions() {

@@ -13,6 +13,7 @@ pub mod holdout;
 pub mod object;
 pub mod obstacle;
 pub mod parts;
+pub mod plain_object;
 pub mod receiver;
 pub mod regions;
 pub mod score;

@@ -1,115 +1,52 @@
 //! Objects that can be grasped.
 
-use std::sync::{Arc, OnceLock};
+use std::{
+    ops::Deref,
+    sync::{Arc, OnceLock},
+};
 
 use glam::Vec3;
 
-use super::{banned_grip::BannedGrip, hand::Handedness, parts::Parts, regions::Regions, strategy::Validity};
+use super::{
+    banned_grip::BannedGrip,
+    parts::Parts,
+    plain_object::{ObjectError, PlainObject, ResizeError},
+    regions::Regions,
+};
 use crate::base::{
     pose::Pose,
     stop::{Stop, Stopped, unstopped},
 };
 use crate::geometry::{
-    handles::Handles,
-    local_shape::LocalShape,
-    local_thickness::LocalThickness,
-    mesh::{MeshError, TriangleMesh},
-    mesh_bvh::MeshBvh,
-    oriented_box::OrientedBox,
-    surface_samples::even_samples,
-    tapered_capsule::TaperedCapsule,
+    handles::Handles, local_shape::LocalShape, local_thickness::LocalThickness, mesh::TriangleMesh,
+    mesh_bvh::MeshBvh, surface_samples::even_samples, tapered_capsule::TaperedCapsule,
 };
-
-/// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
-pub const THESIS_FRICTION: f32 = 0.34;
-
-/// Default coefficient of static friction between dry skin and smooth plastic or metal, measured at 0.4 to 1.0 (S.
-/// Derler and L.-C. Gerhardt, "Tribology of Skin", 2012). A higher one accepts grasps that would slip.
-pub const SKIN_FRICTION: f32 = 0.6;
-
-/// Number of nonexistent forbidden triangles that are listed one by one; the rest are counted. It bounds the size of
-/// the error that a request can provoke.
-pub const MAX_NAMED_TRIANGLES: usize = 10;
 
 /// A graspable object with its search structures, in its own frame.
 #[derive(Clone, Debug)]
 pub struct GraspObject {
+    plain: PlainObject,
     /// Its surface with search structure, which [`Self::with_properties`] shares.
     pub surface: Arc<MeshBvh>,
-    /// Its tight bounding box: B of thesis 4.3.
-    pub bounding_box: OrientedBox,
     /// How thick it is where a hand may hold it.
     pub local_thickness: LocalThickness,
     /// How flat, long or round it is there.
     pub local_shape: LocalShape,
-    /// Mass, in kilograms.
-    pub mass: f32,
-    /// Centre of mass in the object's frame, in metres.
-    pub centre_of_mass: Vec3,
-    /// Coefficient of static friction between skin and surface; none if unknown.
-    pub friction: Option<f32>,
-    /// One flag per triangle: true if it must not be touched.
-    forbidden: Vec<bool>,
     /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried
     /// first.
     forbidden_surface: Option<MeshBvh>,
-    /// Which parts hands should take or leave.
-    regions: Regions,
-    /// The grips with which it is not to be taken.
-    banned: Vec<BannedGrip>,
     /// What its parts are for, found on first use.
     parts: OnceLock<Parts>,
-}
-
-/// Why an object was rejected.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ObjectError {
-    /// Mass is not a positive number.
-    #[error("mass is {0} kg; it must be finite and more than 0")]
-    Mass(f32),
-    /// Friction is not a positive number.
-    #[error("friction is {0}; it must be finite and more than 0")]
-    Friction(f32),
-    /// The centre of mass is not finite.
-    #[error("centre of mass {0} is not finite")]
-    CentreOfMass(Vec3),
-    /// A forbidden triangle does not exist.
-    #[error("forbidden triangle {triangle} does not exist; the mesh has {triangles}")]
-    ForbiddenTriangle {
-        /// The given index.
-        triangle: u32,
-        /// Number of triangles.
-        triangles: usize,
-    },
-    /// More than [`MAX_NAMED_TRIANGLES`] forbidden triangles do not exist.
-    #[error("{count} more forbidden triangles do not exist; the mesh has {triangles}")]
-    MoreForbiddenTriangles {
-        /// How many are not listed.
-        count: usize,
-        /// Number of triangles.
-        triangles: usize,
-    },
-}
-
-/// Why an object cannot have another size.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ResizeError {
-    /// Its mass is not a positive number.
-    #[error("the mass would be {0} kg; it must be finite and more than 0")]
-    Mass(f32),
-    /// Its mesh is no mesh any more.
-    #[error("at this size, {0}")]
-    Mesh(#[from] MeshError),
 }
 
 impl GraspObject {
     /// Builds the search structures of an object.
     ///
     /// # Errors
-    /// Every violation found. Of the forbidden triangles that do not exist, the first [`MAX_NAMED_TRIANGLES`] are
-    /// listed and the others counted.
+    /// Every violation found. Of the forbidden triangles that do not exist, the first
+    /// [`MAX_NAMED_TRIANGLES`](super::plain_object::MAX_NAMED_TRIANGLES) are listed and the others counted.
     pub fn new(
-        mesh: TriangleMesh,
+        mesh: impl Into<Arc<TriangleMesh>>,
         mass: f32,
         centre_of_mass: Vec3,
         friction: Option<f32>,
@@ -123,26 +60,32 @@ impl GraspObject {
     /// # Errors
     /// [`Stopped`]; within, those of [`Self::new`].
     pub fn new_until(
-        mesh: TriangleMesh,
+        mesh: impl Into<Arc<TriangleMesh>>,
         mass: f32,
         centre_of_mass: Vec3,
         friction: Option<f32>,
         forbidden_triangles: &[u32],
         stop: Stop<'_>,
     ) -> Result<Result<Self, Vec<ObjectError>>, Stopped> {
-        let checked = CheckedProperties::new(
-            mesh.triangles().len(),
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden_triangles,
-        );
-        let checked = match checked {
-            Ok(checked) => checked,
-            Err(errors) => return Ok(Err(errors)),
-        };
-        let (measures, surface) = measures_and_surface(mesh, None, stop)?;
-        Ok(Ok(Self::of_parts(measures, Arc::new(surface), checked)))
+        match PlainObject::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop)? {
+            Ok(plain) => Ok(Ok(Self::of_until(plain, stop)?)),
+            Err(errors) => Ok(Err(errors)),
+        }
+    }
+
+    /// Builds the search structures of an object, unless it is stopped.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of_until(plain: PlainObject, stop: Stop<'_>) -> Result<Self, Stopped> {
+        let surface = MeshBvh::build_until(Arc::clone(&plain.mesh), stop)?;
+        let samples = even_samples(&plain.mesh);
+        Ok(Self::of_parts(
+            plain,
+            Arc::new(surface),
+            LocalThickness::of(&samples),
+            LocalShape::of(&samples),
+        ))
     }
 
     /// The same shape with other physical properties. Shares the mesh and its search structure, and repeats none of its
@@ -157,37 +100,39 @@ impl GraspObject {
         friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
-        let checked = CheckedProperties::new(
-            self.forbidden.len(),
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden_triangles,
-        )?;
-        Ok(self.with_checked_properties(checked))
+        let plain = self
+            .plain
+            .with_properties(mass, centre_of_mass, friction, forbidden_triangles)?;
+        Ok(self.with_plain(plain))
     }
 
-    fn with_checked_properties(&self, checked: CheckedProperties) -> Self {
-        let measures = Measures {
-            bounding_box: self.bounding_box,
-            local_thickness: self.local_thickness.clone(),
-            local_shape: self.local_shape.clone(),
-        };
-        Self::of_parts(measures, Arc::clone(&self.surface), checked)
-            .with_regions(self.regions.clone())
-            .with_banned(self.banned.clone())
+    /// The object of the same mesh that `plain` is, with the search structure and measurements of this one.
+    #[must_use]
+    pub fn with_plain(&self, plain: PlainObject) -> Self {
+        Self::of_parts(
+            plain,
+            Arc::clone(&self.surface),
+            self.local_thickness.clone(),
+            self.local_shape.clone(),
+        )
     }
 
     /// The same object with these regions, in its frame.
     #[must_use]
     pub fn with_regions(self, regions: Regions) -> Self {
-        Self { regions, ..self }
+        Self {
+            plain: self.plain.with_regions(regions),
+            ..self
+        }
     }
 
     /// The same object, not to be taken with these grips, in its frame.
     #[must_use]
     pub fn with_banned(self, banned: Vec<BannedGrip>) -> Self {
-        Self { banned, ..self }
+        Self {
+            plain: self.plain.with_banned(banned),
+            ..self
+        }
     }
 
     /// The same object, `scale` times as large about the origin of its frame, with the given mass in kilograms. Its bounding
@@ -201,83 +146,39 @@ impl GraspObject {
         mass: f32,
         stop: Stop<'_>,
     ) -> Result<Result<Self, ResizeError>, Stopped> {
-        if !(mass.is_finite() && mass > 0.0) {
-            return Ok(Err(ResizeError::Mass(mass)));
-        }
-        let properties = CheckedProperties {
-            mass,
-            centre_of_mass: self.centre_of_mass * scale,
-            friction: self.friction,
-            forbidden: self.forbidden.clone(),
+        let plain = match self.plain.scaled(scale, mass) {
+            Ok(plain) => plain,
+            Err(error) => return Ok(Err(error)),
         };
         if scale == 1.0 {
-            return Ok(Ok(self.with_checked_properties(properties)));
+            return Ok(Ok(self.with_plain(plain)));
         }
-        let mesh = match self.surface.mesh().scaled(scale) {
-            Ok(mesh) => mesh,
-            Err(error) => return Ok(Err(error.into())),
-        };
-        let bounding_box = self.bounding_box.scaled(scale);
-        let (measures, surface) = measures_and_surface(mesh, Some(bounding_box), stop)?;
-        let resized = Self::of_parts(measures, Arc::new(surface), properties);
-        Ok(Ok(resized
-            .with_regions(self.regions.scaled(scale))
-            .with_banned(self.banned_at(scale))))
+        Ok(Ok(Self::of_until(
+            plain.with_banned(self.banned_at(scale)),
+            stop,
+        )?))
     }
 
-    fn of_parts(measures: Measures, surface: Arc<MeshBvh>, properties: CheckedProperties) -> Self {
-        let Measures {
-            bounding_box,
-            local_thickness,
-            local_shape,
-        } = measures;
-        let CheckedProperties {
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden,
-        } = properties;
+    fn of_parts(
+        plain: PlainObject,
+        surface: Arc<MeshBvh>,
+        local_thickness: LocalThickness,
+        local_shape: LocalShape,
+    ) -> Self {
+        let forbidden = plain.mesh.submesh(|triangle| plain.is_forbidden(triangle as u32));
         Self {
-            bounding_box,
+            forbidden_surface: forbidden.map(MeshBvh::build_quick),
+            plain,
+            surface,
             local_thickness,
             local_shape,
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden_surface: surface
-                .mesh()
-                .submesh(|triangle| forbidden[triangle])
-                .map(MeshBvh::build_quick),
-            surface,
-            forbidden,
-            regions: Regions::default(),
-            banned: Vec::new(),
             parts: OnceLock::new(),
         }
     }
 
-    /// The coefficient of friction to judge grasps by: the object's own, or the default of the kind of validity.
-    pub fn friction_under(&self, validity: Validity) -> f32 {
-        self.friction.unwrap_or(match validity {
-            Validity::Thesis => THESIS_FRICTION,
-            Validity::Physical => SKIN_FRICTION,
-        })
-    }
-
-    /// True if the triangle must not be touched (Algorithm 7); O(1).
-    pub fn is_forbidden(&self, triangle: u32) -> bool {
-        self.forbidden[triangle as usize]
-    }
-
-    /// Which parts hands should take or leave.
-    pub fn regions(&self) -> &Regions {
-        &self.regions
-    }
-
-    /// True if the object is to be taken with a wrist there.
-    pub fn admits_wrist(&self, handedness: Handedness, object_from_wrist: Pose) -> bool {
-        let mut banned = self.banned.iter();
-        !banned.any(|grip| grip.covers(handedness, object_from_wrist))
+    /// The object without what is derived from it.
+    pub fn plain(&self) -> &PlainObject {
+        &self.plain
     }
 
     /// Where a wrist is that holds the object at `scale` times its size as one at its own size does: it keeps its offset from the
@@ -297,17 +198,17 @@ impl GraspObject {
             object_from_wrist: self.wrist_at(scale, grip.object_from_wrist),
             ..*grip
         };
-        self.banned.iter().map(moved).collect()
+        self.plain.banned().iter().map(moved).collect()
     }
 
     /// How much the place of the surface next to a point is wanted, from 0 to 1; 1 if there is none within `distance` metres.
     pub fn wish_near(&self, point: Vec3, distance: f32) -> f32 {
-        if self.regions.is_empty() {
+        if self.regions().is_empty() {
             return 1.0;
         }
         let nearest = self.surface.closest_point_within(point, distance);
         nearest.map_or(1.0, |nearest| {
-            self.regions.wish_at(nearest.triangle, nearest.position)
+            self.regions().wish_at(nearest.triangle, nearest.position)
         })
     }
 
@@ -333,12 +234,6 @@ impl GraspObject {
         &self.parts().handles
     }
 
-    /// Number of triangles that must not be touched.
-    pub fn forbidden_count(&self) -> usize {
-        let surface = self.forbidden_surface.as_ref();
-        surface.map_or(0, |surface| surface.mesh().triangles().len())
-    }
-
     /// The surface that must not be touched; none if there is no forbidden triangle.
     pub fn forbidden_surface(&self) -> Option<&MeshBvh> {
         self.forbidden_surface.as_ref()
@@ -349,102 +244,24 @@ impl GraspObject {
         let surface = self.forbidden_surface.as_ref();
         surface.is_some_and(|surface| surface.comes_within(capsule, distance))
     }
-}
-
-/// What does not follow from an object's mesh.
-struct CheckedProperties {
-    mass: f32,
-    centre_of_mass: Vec3,
-    friction: Option<f32>,
-    /// One flag per triangle.
-    forbidden: Vec<bool>,
-}
-
-impl CheckedProperties {
-    /// The properties of an object of so many triangles, or everything that is wrong with them.
-    fn new(
-        triangles: usize,
-        mass: f32,
-        centre_of_mass: Vec3,
-        friction: Option<f32>,
-        forbidden_triangles: &[u32],
-    ) -> Result<Self, Vec<ObjectError>> {
-        let mut errors = Vec::new();
-        if !(mass.is_finite() && mass > 0.0) {
-            errors.push(ObjectError::Mass(mass));
-        }
-        if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
-            errors.push(ObjectError::Friction(friction));
-        }
-        if !centre_of_mass.is_finite() {
-            errors.push(ObjectError::CentreOfMass(centre_of_mass));
-        }
-        let mut forbidden = vec![false; triangles];
-        let mut unknown = Vec::new();
-        for &triangle in forbidden_triangles {
-            match forbidden.get_mut(triangle as usize) {
-                Some(flag) => *flag = true,
-                None => unknown.push(triangle),
-            }
-        }
-        errors.extend(
-            unknown
-                .iter()
-                .take(MAX_NAMED_TRIANGLES)
-                .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
-        );
-        if unknown.len() > MAX_NAMED_TRIANGLES {
-            errors.push(ObjectError::MoreForbiddenTriangles {
-                count: unknown.len() - MAX_NAMED_TRIANGLES,
-                triangles,
-            });
-        }
-        if !errors.is_empty() {
-            return Err(errors);
-        }
-        Ok(Self {
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden,
-        })
+    /// Memory use in bytes of what is derived; the plain object comes to it.
+    pub fn derived_bytes(&self) -> usize {
+        let of_forbidden = self.forbidden_surface.as_ref().map_or(0, |surface| {
+            let mesh = surface.mesh();
+            size_of_val(mesh.positions()) + size_of_val(mesh.triangles()) + surface.bytes()
+        });
+        self.surface.bytes()
+            + of_forbidden
+            + self.local_thickness.bytes()
+            + self.local_shape.bytes()
+            + self.parts.get().map_or(0, Parts::bytes)
     }
 }
 
-/// What is measured of an object's mesh, apart from its search structure.
-struct Measures {
-    bounding_box: OrientedBox,
-    local_thickness: LocalThickness,
-    local_shape: LocalShape,
-}
+impl Deref for GraspObject {
+    type Target = PlainObject;
 
-impl Measures {
-    fn of(mesh: &TriangleMesh, bounding_box: Option<OrientedBox>, stop: Stop<'_>) -> Result<Self, Stopped> {
-        let samples = even_samples(mesh);
-        Ok(Self {
-            bounding_box: match bounding_box {
-                Some(known) => known,
-                None => OrientedBox::around_until(mesh, stop)?,
-            },
-            local_thickness: LocalThickness::of(&samples, stop)?,
-            local_shape: LocalShape::of(&samples),
-        })
+    fn deref(&self) -> &PlainObject {
+        &self.plain
     }
-}
-
-/// Measures a mesh and builds its search structure in parallel, or in sequence if no thread can be spawned. The former
-/// takes a fifth of the work, less if the bounding box is known.
-fn measures_and_surface(
-    mesh: TriangleMesh,
-    bounding_box: Option<OrientedBox>,
-    stop: Stop<'_>,
-) -> Result<(Measures, MeshBvh), Stopped> {
-    let measure = |mesh: &TriangleMesh| Measures::of(mesh, bounding_box, stop);
-    let copy = mesh.clone();
-    std::thread::scope(|scope| {
-        let parallel = std::thread::Builder::new().spawn_scoped(scope, || measure(&copy));
-        let surface = MeshBvh::build_until(mesh, stop);
-        let of_copy = parallel.ok().and_then(|thread| thread.join().ok());
-        Ok((of_copy.unwrap_or_else(|| measure(&copy))?, surface?))
-    })
 }

@@ -90,7 +90,9 @@ impl PlacementCache {
                 pair: candidate.pair,
                 object_from_wrist: candidate.object_from_wrist,
             });
-            Ok(kept.collect())
+            let mut kept: Vec<CachedPlacement> = kept.collect();
+            kept.shrink_to_fit();
+            Ok(kept)
         };
         Ok(Self {
             rows: (0..rows).map(row).collect::<Result<_, Stopped>>()?,

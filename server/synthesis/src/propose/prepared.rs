@@ -111,6 +111,11 @@ impl PreparedObject {
         })
     }
 
+    /// Memory use in bytes of what is derived from the plain object, placement caches of four hands included.
+    pub fn derived_bytes(&self) -> usize {
+        self.object.derived_bytes() + self.surface_pairs.bytes() + PlacementCaches::MAX_BYTES
+    }
+
     /// The object itself.
     pub fn object(&self) -> &Arc<GraspObject> {
         &self.object

@@ -1,9 +1,8 @@
 //! How thick meshes are near a point, against closed forms.
 
 use glam::Vec3;
-use grasp_synthesis::{
-    base::stop::unstopped,
-    geometry::{local_thickness::LocalThickness, mesh::TriangleMesh, surface_samples::even_samples},
+use grasp_synthesis::geometry::{
+    local_thickness::LocalThickness, mesh::TriangleMesh, surface_samples::even_samples,
 };
 
 use crate::fixtures::meshes::{Parts, cuboid, sphere, torus};
@@ -12,7 +11,7 @@ use crate::fixtures::meshes::{Parts, cuboid, sphere, torus};
 const TOLERANCE: f32 = 0.12;
 
 fn thickness(mesh: &TriangleMesh) -> LocalThickness {
-    unstopped(|stop| LocalThickness::of(&even_samples(mesh), stop))
+    LocalThickness::of(&even_samples(mesh))
 }
 
 fn assert_near(found: f32, expected: f32, what: &str) {

@@ -7,11 +7,7 @@ use grasp_synthesis::{
     base::stop::Stop,
     geometry::oriented_box::OrientedBox,
     known::{atlas::Atlas, entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{
-        constraints::Constraints,
-        hand::HandPart,
-        object::{GraspObject, ResizeError},
-    },
+    model::{constraints::Constraints, hand::HandPart, object::GraspObject, plain_object::ResizeError},
     physical::barriers::Barriers,
 };
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use grasp_synthesis::model::object::{GraspObject, ObjectError};
+use grasp_synthesis::model::{object::GraspObject, plain_object::ObjectError};
 
 use crate::fixtures::objects::object;
 

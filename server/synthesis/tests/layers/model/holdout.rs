@@ -13,7 +13,8 @@ use grasp_synthesis::{
             skin::Skin,
         },
         holdout::{Holdout, HoldoutError, PresentingHand, PresentingHandError},
-        object::{GraspObject, MAX_NAMED_TRIANGLES, ObjectError},
+        object::GraspObject,
+        plain_object::{MAX_NAMED_TRIANGLES, ObjectError},
     },
 };
 

@@ -6,10 +6,7 @@ use glam::{Quat, Vec3};
 use grasp_synthesis::{
     base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
     geometry::{handles::Handle, mesh::TriangleMesh},
-    model::{
-        hand::Handedness,
-        object::{GraspObject, THESIS_FRICTION},
-    },
+    model::{hand::Handedness, object::GraspObject, plain_object::THESIS_FRICTION},
     physical::{grip::Gripper, scene::ObjectScene, shape::Proposal},
     propose::{
         handles::wrap_handle,

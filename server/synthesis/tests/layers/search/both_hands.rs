@@ -9,7 +9,8 @@ use grasp_synthesis::{
         grasp::{Contact, Grasp},
         hand::Handedness,
         holdout::Holdout,
-        object::{GraspObject, SKIN_FRICTION},
+        object::GraspObject,
+        plain_object::SKIN_FRICTION,
         strategy::Choice,
     },
     physical::{

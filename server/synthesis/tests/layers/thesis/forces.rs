@@ -7,7 +7,7 @@ use grasp_synthesis::{
         forces::{COMFORTABLE_SHARES, GRAVITY},
         grasp::Contact,
         hand::{Digit, HandPart, Phalanx},
-        object::THESIS_FRICTION,
+        plain_object::THESIS_FRICTION,
     },
     rating::comfort::comfort,
     thesis::{

@@ -1,0 +1,163 @@
+//! What is derived from an object for searching it: built when it is first needed, and dropped first when memory is short.
+
+use std::{
+    sync::{
+        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
+};
+
+use grasp_assets::{
+    hands::{Hand, hand, is_built_in},
+    primitives::held_primitives,
+};
+use grasp_synthesis::{
+    base::stop::{Stop, Stopped},
+    known::{primitives::HeldPrimitive, transferred_grips::TransferredGrips},
+    model::{hand::Handedness, object::GraspObject, plain_object::PlainObject},
+    propose::prepared::PreparedObject,
+};
+
+/// Estimated bytes of what is derived, per triangle and in any case, before it is built: the hierarchy's nodes and packs, and the
+/// field of distances, samples, pairs and placements.
+const BYTES_PER_TRIANGLE: usize = 160;
+const BYTES_BESIDES: usize = 640 << 10;
+
+/// Where grips transferred to an object are kept once they are made.
+type GripsSlot = OnceLock<Arc<TransferredGrips>>;
+
+/// An object in the form that searches use, with what they start from. Clones share both.
+#[derive(Clone, Debug)]
+pub(crate) struct Derived {
+    /// The object.
+    pub object: Arc<PreparedObject>,
+    /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
+    transferred_grips: Arc<[GripsSlot]>,
+}
+
+impl Derived {
+    /// Of an object that has its search structures.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn of(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Self, Stopped> {
+        Ok(Self {
+            object: Arc::new(PreparedObject::new_until(object, stop)?),
+            transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
+        })
+    }
+
+    /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with
+    /// each hand would have to do. Takes some ten milliseconds per hand, in parallel if the system has a thread for it.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
+        let prepare_hand = |handedness| -> Result<(), Stopped> {
+            let Some(hand) = hand(rig, handedness) else {
+                return Ok(());
+            };
+            self.object.build_placement_cache(&hand.rig, stop)?;
+            if let Some((held, grips)) = self.transferred_grips_of(hand) {
+                let transferred = TransferredGrips::of_until(&self.object, held, stop)?;
+                grips.get_or_init(|| Arc::new(transferred));
+            }
+            Ok(())
+        };
+        thread::scope(|scope| {
+            let left = thread::Builder::new().spawn_scoped(scope, || prepare_hand(Handedness::Left));
+            let right = prepare_hand(Handedness::Right);
+            let left = left.ok().and_then(|thread| thread.join().ok());
+            left.unwrap_or_else(|| prepare_hand(Handedness::Left)).and(right)
+        })
+    }
+
+    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if none fits.
+    /// There are such grips for one rig; hands of the clients' own rigs start from those, too.
+    pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
+        let (held, grips) = self.transferred_grips_of(hand)?;
+        let grips = grips.get_or_init(|| Arc::new(TransferredGrips::of(&self.object, held)));
+        (!grips.is_empty()).then(|| Arc::clone(grips))
+    }
+
+    /// The primitives' grips for a hand, and the place of those transferred from them.
+    fn transferred_grips_of(&self, hand: &Hand) -> Option<(&'static Arc<[HeldPrimitive]>, &GripsSlot)> {
+        let all = || held_primitives().iter().zip(&*self.transferred_grips);
+        let is_side = |of: &Hand| of.rig.handedness == hand.rig.handedness;
+        let own = all().find(|((of, _), _)| **of == *hand);
+        let of_other = || all().find(|((of, _), _)| !is_built_in(hand) && is_side(of));
+        let ((_, held), grips) = own.or_else(of_other)?;
+        Some((held, grips))
+    }
+
+    /// Its estimated size in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        self.object.derived_bytes() + self.transferred_grips.len() * TransferredGrips::MAX_BYTES
+    }
+}
+
+/// Where what is derived from an object is kept.
+#[derive(Debug, Default)]
+pub(super) struct DerivedCell {
+    kept: Mutex<Option<Arc<Derived>>>,
+    /// Held while it is built, so that this is done once.
+    building: Mutex<()>,
+    /// When it was last asked for, by a clock of the store; 0 if never.
+    last_used: AtomicU64,
+}
+
+impl DerivedCell {
+    /// What is kept.
+    pub(super) fn get(&self) -> Option<Arc<Derived>> {
+        self.lock().clone()
+    }
+
+    /// What is kept, or else what `build` makes of it, unless another call does so meanwhile.
+    pub(super) fn get_or_build(
+        &self,
+        build: impl FnOnce() -> Result<Arc<Derived>, Stopped>,
+    ) -> Result<Arc<Derived>, Stopped> {
+        // Nothing is left inconsistent if `build` panics.
+        let _building = self.building.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) = self.get() {
+            return Ok(kept);
+        }
+        let built = build()?;
+        *self.lock() = Some(Arc::clone(&built));
+        Ok(built)
+    }
+
+    /// Keeps it no longer. Calls that use it are not disturbed.
+    pub(super) fn forget(&self) {
+        *self.lock() = None;
+        self.use_at(0);
+    }
+
+    /// True if a call uses what is kept.
+    pub(super) fn is_in_use(&self) -> bool {
+        self.lock()
+            .as_ref()
+            .is_some_and(|kept| Arc::strong_count(kept) > 1)
+    }
+
+    /// Records a call that asks for it at a time of the store's clock.
+    pub(super) fn use_at(&self, now: u64) {
+        self.last_used.store(now, Ordering::Relaxed);
+    }
+
+    /// When it was last asked for; 0 if never.
+    pub(super) fn last_used(&self) -> u64 {
+        self.last_used.load(Ordering::Relaxed)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<Arc<Derived>>> {
+        // No code panics while it holds the lock.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The size that what is derived from an object will have at most, in bytes, for all but the oddest surfaces.
+pub(super) fn expected_bytes(object: &PlainObject) -> usize {
+    BYTES_BESIDES + BYTES_PER_TRIANGLE * object.mesh.triangles().len()
+}
