@@ -240,7 +240,7 @@ mod tests {
             (&expected.warnings, 0.0005)
         );
         assert!((after.object.centre_of_mass - expected.object.centre_of_mass).length() < 1e-6);
-        let [one, other] = [&after, &expected].map(|of| of.object.surface.mesh().positions());
+        let [one, other] = [&after, &expected].map(|of| of.object.mesh.positions());
         assert!(one.iter().zip(other).all(|(a, b)| (a - b).length() < 1e-6));
         assert_eq!((after.object.mass, after.object.forbidden_count()), (0.1, 3));
         // A centre that was given stays where it is.

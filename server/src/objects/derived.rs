@@ -22,7 +22,7 @@ use grasp_synthesis::{
 /// Estimated bytes of what is derived, per triangle and in any case, before it is built: the hierarchy's nodes and packs, and the
 /// field of distances, samples, pairs and placements.
 const BYTES_PER_TRIANGLE: usize = 160;
-const BYTES_BESIDES: usize = 640 << 10;
+const BYTES_BESIDES: usize = 480 << 10;
 
 /// Where grips transferred to an object are kept once they are made.
 type GripsSlot = OnceLock<Arc<TransferredGrips>>;
@@ -91,9 +91,9 @@ impl Derived {
         Some((held, grips))
     }
 
-    /// Its estimated size in bytes.
+    /// Its estimated size in bytes, with what is made for two hands.
     pub(crate) fn bytes(&self) -> usize {
-        self.object.derived_bytes() + self.transferred_grips.len() * TransferredGrips::MAX_BYTES
+        self.object.derived_bytes() + 2 * TransferredGrips::MAX_BYTES
     }
 }
 

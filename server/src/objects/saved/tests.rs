@@ -294,7 +294,11 @@ fn calls_that_wait_for_an_object_share_its_loading() {
 
 #[test]
 fn an_object_that_no_call_waits_for_any_more_stays_at_rest() {
-    let runtime = runtime();
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .max_blocking_threads(1)
+        .enable_all()
+        .build()
+        .unwrap();
     let folder = Folder::new();
     let objects = {
         let _context = runtime.enter();
@@ -302,8 +306,12 @@ fn an_object_that_no_call_waits_for_any_more_stays_at_rest() {
         folder.objects(10, 10)
     };
     runtime.block_on(async {
-        // The first poll does not finish: it waits for the disk.
+        // The first poll does not finish: it waits for the only thread that may block.
+        let (release, released) = std::sync::mpsc::channel::<()>();
+        let occupied = tokio::task::spawn_blocking(move || released.recv());
         assert!(objects.loaded("a").now_or_never().is_none());
+        release.send(()).unwrap();
+        occupied.await.unwrap().unwrap();
         tokio::time::sleep(Duration::from_millis(50)).await;
         assert!(objects.get("a").unwrap().object().is_none());
         objects.loaded("a").await.unwrap();

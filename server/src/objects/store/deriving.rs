@@ -64,6 +64,7 @@ impl ObjectStore {
             None => object.derived_until(stop)?,
         };
         let mut created = self.created();
+        created.note_use(object, need);
         let is_created = created
             .objects
             .get(&object.id)
@@ -96,11 +97,7 @@ impl ObjectStore {
     /// What was derived from an object, if it is kept.
     pub(crate) fn kept(&self, object: &Arc<StoredObject>, need: Need) -> Option<Arc<Derived>> {
         let kept = object.derived.get()?;
-        if need == Need::Call {
-            let mut created = self.created();
-            created.uses += 1;
-            object.derived.use_at(created.uses);
-        }
+        self.created().note_use(object, need);
         Some(kept)
     }
 
@@ -157,6 +154,13 @@ impl Created {
     /// all of them are in use.
     pub(super) fn evict_derived_or_size(&mut self) -> bool {
         self.derived.evict() || self.evict_size(|_| true)
+    }
+
+    fn note_use(&mut self, object: &StoredObject, need: Need) {
+        if need == Need::Call {
+            self.uses += 1;
+            object.derived.use_at(self.uses);
+        }
     }
 
     fn derived_of_twin(&self, object: &StoredObject) -> Option<Arc<Derived>> {

@@ -266,7 +266,7 @@ fn a_larger_state_evicts_others_but_not_its_own_object() {
     insert(&store, "b").unwrap();
     let base = store.changeable("a", None).unwrap();
     let larger = StoredObject {
-        warnings: vec!["long".repeat(100)],
+        warnings: vec!["long".repeat(5)],
         ..tetrahedron("a", 1.0, &[])
     };
     store

@@ -1,5 +1,7 @@
 //! A coarse grid of distances to a mesh, which proves that a capsule is clear without visiting triangles.
 
+use std::{ops::Range, thread};
+
 use glam::{UVec3, Vec3};
 
 use super::{aabb::Aabb, closest::GivenUp, tapered_capsule::TaperedCapsule};
@@ -23,10 +25,10 @@ const COARSER: f32 = 1.25;
 /// Nodes between two checks whether to stop: few, because one of a crumpled surface takes up to a millisecond.
 const NODES_PER_CHECK: usize = 4;
 
-/// Steps of the search for the closest triangle that each node adds to what the nodes may take, and what they have to begin with.
+/// Steps of the search for the closest triangle that each node adds to what the nodes may take, and what each half begins with.
 /// Ordinary objects take a tenth; thousands of needles through one place would take all of their triangles for each node.
 const STEPS_PER_NODE: usize = 128;
-const SPARE_STEPS: usize = 1 << 18;
+const SPARE_STEPS: usize = 1 << 17;
 
 /// Number of spheres along the axis that cover a capsule. More tighten the bound and take longer.
 const SPHERES: usize = 3;
@@ -40,46 +42,39 @@ pub(super) struct Nearest {
     pub(super) triangle: Option<u32>,
 }
 
-/// Distances from the nodes of a grid to a surface.
-#[derive(Clone, Debug)]
-pub(super) struct DistanceField {
+/// Where the nodes of a field are, in metres.
+struct Grid {
     origin: Vec3,
     spacing: f32,
-    inverse_spacing: f32,
     counts: UVec3,
-    /// The box around the surface, which gives the better bound beyond the grid.
-    aabb: Aabb,
+    diagonal: f32,
+}
+
+/// The distances of the nodes of some layers of a grid.
+struct Layers {
     distances: Vec<f32>,
-    /// Whether some of the distances are only lower bounds, because finding them would have taken too long.
     is_cut_short: bool,
 }
 
-impl DistanceField {
-    /// Samples the field of a surface inside `aabb`. `nearest(point, near, may_go_on)` returns what is closest to the point, or
-    /// `near` if nothing is within its distance, which it may look at first; it gives up once `may_go_on` returns false, which it
-    /// asks at each step.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub(super) fn new(
-        aabb: &Aabb,
+impl Grid {
+    /// Samples some layers along z.
+    fn sample(
+        &self,
+        layers: Range<u32>,
         stop: Stop<'_>,
-        nearest: impl Fn(Vec3, Nearest, &mut dyn FnMut() -> bool) -> Result<Nearest, GivenUp>,
-    ) -> Result<Self, Stopped> {
-        let size = aabb.max - aabb.min + 2.0 * MARGIN;
-        let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
-        let counts_at = |spacing: f32| (size / spacing).ceil() + 1.0;
-        while counts_at(spacing).element_product() > MOST_NODES {
-            spacing *= COARSER;
-        }
-        let counts = counts_at(spacing).as_uvec3();
-        let origin = aabb.min - MARGIN;
-        let diagonal = size.length();
-        let mut distances = Vec::with_capacity((counts.x * counts.y * counts.z) as usize);
+        nearest: &impl Fn(Vec3, Nearest, &mut dyn FnMut() -> bool) -> Result<Nearest, GivenUp>,
+    ) -> Result<Layers, Stopped> {
+        let &Self {
+            origin,
+            spacing,
+            counts,
+            diagonal,
+        } = self;
+        let mut distances = Vec::with_capacity((counts.x * counts.y) as usize * layers.len());
         let mut steps_left = SPARE_STEPS;
         let mut is_cut_short = false;
         let mut at_row_start = None;
-        for z in 0..counts.z {
+        for z in layers {
             for y in 0..counts.y {
                 // Distances of neighbouring nodes differ by at most the spacing, which bounds the next search.
                 let mut least = 0.0_f32;
@@ -111,14 +106,70 @@ impl DistanceField {
                 }
             }
         }
+        Ok(Layers {
+            distances,
+            is_cut_short,
+        })
+    }
+}
+
+/// Distances from the nodes of a grid to a surface.
+#[derive(Clone, Debug)]
+pub(super) struct DistanceField {
+    origin: Vec3,
+    spacing: f32,
+    inverse_spacing: f32,
+    counts: UVec3,
+    /// The box around the surface, which gives the better bound beyond the grid.
+    aabb: Aabb,
+    distances: Vec<f32>,
+    /// Whether some of the distances are only lower bounds, because finding them would have taken too long.
+    is_cut_short: bool,
+}
+
+impl DistanceField {
+    /// Samples the field of a surface inside `aabb`, in two threads if there is one to spare. `nearest(point, near, may_go_on)` returns what is closest to the point, or
+    /// `near` if nothing is within its distance, which it may look at first; it gives up once `may_go_on` returns false, which it
+    /// asks at each step.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn new(
+        aabb: &Aabb,
+        stop: Stop<'_>,
+        nearest: impl Fn(Vec3, Nearest, &mut dyn FnMut() -> bool) -> Result<Nearest, GivenUp> + Sync,
+    ) -> Result<Self, Stopped> {
+        let size = aabb.max - aabb.min + 2.0 * MARGIN;
+        let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
+        let counts_at = |spacing: f32| (size / spacing).ceil() + 1.0;
+        while counts_at(spacing).element_product() > MOST_NODES {
+            spacing *= COARSER;
+        }
+        let counts = counts_at(spacing).as_uvec3();
+        let grid = Grid {
+            origin: aabb.min - MARGIN,
+            spacing,
+            counts,
+            diagonal: size.length(),
+        };
+        let middle = counts.z / 2;
+        let sample_low = || grid.sample(0..middle, stop, &nearest);
+        let sample_high = || grid.sample(middle..counts.z, stop, &nearest);
+        let (low, high) = thread::scope(|scope| {
+            let parallel = thread::Builder::new().spawn_scoped(scope, sample_high);
+            let low = sample_low();
+            let high = parallel.ok().and_then(|thread| thread.join().ok());
+            (low, high.unwrap_or_else(sample_high))
+        });
+        let (low, high) = (low?, high?);
         Ok(Self {
-            origin,
+            origin: grid.origin,
             spacing,
             inverse_spacing: spacing.recip(),
             counts,
             aabb: *aabb,
-            distances,
-            is_cut_short,
+            distances: [low.distances, high.distances].concat(),
+            is_cut_short: low.is_cut_short || high.is_cut_short,
         })
     }
 

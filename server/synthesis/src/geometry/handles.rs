@@ -41,6 +41,12 @@ const MAX_PROBED: usize = 128;
 const TESTS_PER_PROBE: usize = 2 + 2 * DIRECTIONS;
 const MOST_RIM_EDGES: usize = 1 << 21;
 
+/// Rays and tests of a probe, packs of triangles that all of them together may have to look at, and probes from which that is
+/// estimated.
+const QUERIES_PER_PROBE: usize = RAYS + TESTS_PER_PROBE;
+const MOST_PACKS: usize = 1 << 20;
+const ESTIMATED_FROM: usize = 12;
+
 /// Rays from the middle of a part, in all directions, and their length in metres.
 const RAYS: usize = 32;
 pub(crate) const RAY_LENGTH: f32 = 0.045;
@@ -115,6 +121,7 @@ impl Handles {
     ) -> Result<Self, Stopped> {
         let middles = middles(surface, stop, is_forbidden)?;
         let most = (MOST_RIM_EDGES / (TESTS_PER_PROBE * surface.rim_edges()).max(1)).clamp(1, MAX_PROBED);
+        let most = most.min(affordable(surface, &middles));
         let stride = middles.len().div_ceil(most).max(1);
         let mut handles: Vec<Handle> = Vec::new();
         for middle in middles.into_iter().step_by(stride) {
@@ -156,6 +163,18 @@ impl Handles {
     pub fn bytes(&self) -> usize {
         size_of_val(self.0.as_slice())
     }
+}
+
+/// How many places can be probed in bounded time: all, unless thousands of triangles overlap along every ray.
+fn affordable(surface: &MeshBvh, middles: &[Vec3]) -> usize {
+    let step = middles.len().div_ceil(ESTIMATED_FROM).max(1);
+    let rays = middles.iter().step_by(step).zip(Vec3::AXES.into_iter().cycle());
+    let packs: usize = rays
+        .clone()
+        .map(|(&middle, axis)| surface.packs_along(Segment::new(middle, middle + axis * RAY_LENGTH)))
+        .sum();
+    let per_probe = QUERIES_PER_PROBE * packs / rays.count().max(1);
+    (MOST_PACKS / per_probe.max(1)).max(1)
 }
 
 impl Handle {

@@ -100,6 +100,7 @@ impl LocalShape {
         let mut samples = samples.to_vec();
         let mut patches = Vec::with_capacity(2 * samples.len() / PATCH_SAMPLES);
         group(&mut samples, &mut patches);
+        patches.shrink_to_fit();
         Self { patches }
     }
 

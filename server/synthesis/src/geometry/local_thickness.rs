@@ -1,6 +1,6 @@
 //! How thick a mesh is near a point: the lever by which fingers that hold it there keep it from rolling.
 
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use glam::{DVec3, Vec3};
 
@@ -15,7 +15,35 @@ const MIN_NEIGHBOURS: usize = 16;
 /// The thickness of the parts of a mesh around samples of its surface, each measured when it is first asked for.
 #[derive(Clone, Debug, Default)]
 pub struct LocalThickness {
-    samples: Vec<(Vec3, OnceLock<f32>)>,
+    samples: Vec<(Vec3, Measured)>,
+}
+
+/// A thickness once it is measured, in four bytes. Whoever measures it finds the same.
+#[derive(Debug)]
+struct Measured(AtomicU32);
+
+impl Default for Measured {
+    fn default() -> Self {
+        Self(AtomicU32::new(f32::NAN.to_bits()))
+    }
+}
+
+impl Clone for Measured {
+    fn clone(&self) -> Self {
+        Self(AtomicU32::new(self.0.load(Ordering::Relaxed)))
+    }
+}
+
+impl Measured {
+    fn get_or(&self, measure: impl FnOnce() -> f32) -> f32 {
+        let known = f32::from_bits(self.0.load(Ordering::Relaxed));
+        if !known.is_nan() {
+            return known;
+        }
+        let measured = measure();
+        self.0.store(measured.to_bits(), Ordering::Relaxed);
+        measured
+    }
 }
 
 impl LocalThickness {
@@ -23,7 +51,9 @@ impl LocalThickness {
     pub fn of(samples: &[SurfaceSample]) -> Self {
         let samples = samples.iter();
         Self {
-            samples: samples.map(|sample| (sample.position, OnceLock::new())).collect(),
+            samples: samples
+                .map(|sample| (sample.position, Measured::default()))
+                .collect(),
         }
     }
 
@@ -39,7 +69,7 @@ impl LocalThickness {
         }
         let (_, nearest) = nearest;
         nearest.map_or(0.0, |(centre, measured)| {
-            *measured.get_or_init(|| self.measure(*centre))
+            measured.get_or(|| self.measure(*centre))
         })
     }
 

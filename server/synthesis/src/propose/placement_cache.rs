@@ -5,6 +5,8 @@ use std::{
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
+use glam::{Quat, Vec3};
+
 use super::{
     prepared::{PreparedObject, PreparedRig},
     proposal::{Candidate, ProposalContext},
@@ -40,13 +42,36 @@ const SEED: u64 = 0x5245_5045;
 /// Largest number of caches per object: one each for the left and right hands of the built-in rigs.
 const MAX_RIGS: usize = 4;
 
-/// A hand that fits at the object.
+/// A hand that fits at the object, in a form that wastes no bytes on alignment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CachedPlacement {
     /// The index of its opposition among the rig's.
     opposition: u16,
     pair: SurfacePair,
-    object_from_wrist: Pose,
+    position: Vec3,
+    orientation: [f32; 4],
+}
+
+impl CachedPlacement {
+    fn of(candidate: &Candidate<'_>) -> Self {
+        let Pose {
+            position,
+            orientation,
+        } = candidate.object_from_wrist;
+        Self {
+            opposition: candidate.opposition.index,
+            pair: candidate.pair,
+            position,
+            orientation: orientation.to_array(),
+        }
+    }
+
+    fn object_from_wrist(&self) -> Pose {
+        Pose {
+            position: self.position,
+            orientation: Quat::from_array(self.orientation),
+        }
+    }
 }
 
 /// The placements at which a rig's hand fits at an object and is likely to hold it, whoever presents it.
@@ -85,11 +110,7 @@ impl PlacementCache {
             let sampled = context.sample_candidates(SAMPLED, &mut stream);
             let ordered = context.order_by_success_prior(&features, PREFERENCE, sampled, &mut stream);
             let fitting = ordered.iter().filter(|candidate| context.fits(candidate));
-            let kept = fitting.take(KEPT).map(|candidate| CachedPlacement {
-                opposition: candidate.opposition.index,
-                pair: candidate.pair,
-                object_from_wrist: candidate.object_from_wrist,
-            });
+            let kept = fitting.take(KEPT).map(CachedPlacement::of);
             let mut kept: Vec<CachedPlacement> = kept.collect();
             kept.shrink_to_fit();
             Ok(kept)
@@ -105,7 +126,7 @@ impl PlacementCache {
         row.into_iter().flatten().map(|placement| Candidate {
             opposition: rig.oppositions().get(placement.opposition),
             pair: placement.pair,
-            object_from_wrist: placement.object_from_wrist,
+            object_from_wrist: placement.object_from_wrist(),
         })
     }
 }
@@ -121,8 +142,8 @@ const RELEVANT_MECHANISMS: [Mechanism; 2] = [Mechanism::SuccessPrior, Mechanism:
 type CacheSlot = (PreparedRig, Mechanisms, Arc<OnceLock<Arc<PlacementCache>>>);
 
 impl PlacementCaches {
-    /// Upper bound on their size, in bytes.
-    pub const MAX_BYTES: usize = MAX_RIGS * ROWS as usize * KEPT * size_of::<CachedPlacement>();
+    /// Upper bound on the size of one cache, in bytes.
+    pub const BYTES_PER_RIG: usize = ROWS as usize * KEPT * size_of::<CachedPlacement>();
 
     /// The cache of a rig, built on first use. Beyond [`MAX_RIGS`], the oldest is evicted.
     pub(super) fn of(

@@ -111,9 +111,9 @@ impl PreparedObject {
         })
     }
 
-    /// Memory use in bytes of what is derived from the plain object, placement caches of four hands included.
+    /// Memory use in bytes of what is derived from the plain object, placement caches of two hands included.
     pub fn derived_bytes(&self) -> usize {
-        self.object.derived_bytes() + self.surface_pairs.bytes() + PlacementCaches::MAX_BYTES
+        self.object.derived_bytes() + self.surface_pairs.bytes() + 2 * PlacementCaches::BYTES_PER_RIG
     }
 
     /// The object itself.

@@ -157,6 +157,8 @@ impl SurfacePairs {
                 wish: 0.5 * (point.wish + object.regions().wish_at(exit.triangle, exit.position)),
             });
         }
+        sampled.pairs.shrink_to_fit();
+        sampled.points.shrink_to_fit();
         Ok(sampled)
     }
 
