@@ -240,22 +240,7 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
             format!("for answers that wait for their readers (maximum_unread_bytes is {unread})"),
         ),
     ];
-    if config.place != StorePlace::Memory {
-        let saved = config.maximum_saved_objects.get() as u64;
-        shares.push(share(
-            saved.saturating_mul(PER_SAVED_OBJECT),
-            format!("for what describes saved objects (maximum_saved_objects is {saved})"),
-        ));
-        let reading = uploads.saturating_mul(triangles.saturating_mul(PER_READ_TRIANGLE));
-        let meshes = (config.largest_mesh() as u64).saturating_mul(PER_TEXT_BYTE);
-        shares.push(share(
-            reading.saturating_add(meshes),
-            format!(
-                "to load saved objects, unless store is memory (maximum_uploads is {uploads}, maximum_object_triangles is {triangles}, \
-                 maximum_upload_bytes is {upload_bytes})"
-            ),
-        ));
-    }
+    shares.extend(saved_shares(config));
     if let Some(path) = &config.objects_directory {
         shares.push(share(
             directory_bytes as u64,
@@ -263,6 +248,32 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
         ));
     }
     shares
+}
+
+/// The shares of what is saved; none if nothing is.
+fn saved_shares(config: &Config) -> Vec<MemoryShare> {
+    if config.place == StorePlace::Memory {
+        return Vec::new();
+    }
+    let saved = config.maximum_saved_objects.get() as u64;
+    let uploads = config.maximum_uploads.get() as u64;
+    let upload_bytes = config.streams.upload_bytes.get() as u64;
+    let triangles = config.maximum_object_triangles.get() as u64;
+    let reading = uploads.saturating_mul(triangles.saturating_mul(PER_READ_TRIANGLE));
+    let meshes = (config.largest_mesh() as u64).saturating_mul(PER_TEXT_BYTE);
+    vec![
+        MemoryShare {
+            bytes: saved.saturating_mul(PER_SAVED_OBJECT),
+            purpose: format!("for what describes saved objects (maximum_saved_objects is {saved})"),
+        },
+        MemoryShare {
+            bytes: reading.saturating_add(meshes),
+            purpose: format!(
+                "to load saved objects, unless store is memory (maximum_uploads is {uploads}, maximum_object_triangles is {triangles}, \
+                 maximum_upload_bytes is {upload_bytes})"
+            ),
+        },
+    ]
 }
 
 /// Memory that threads reserve but do not use: threads of the pools, one per search and upload, and two per object that is

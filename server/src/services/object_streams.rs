@@ -87,13 +87,13 @@ impl ObjectHandler {
         .await?;
         header.object = Some(self.message(&revision.into()));
         Ok(messages(|sender| async move {
-            let _held = held;
             let part = |part| v1::GetMeshResponse { part: Some(part) };
             sender.send(part(Part::Header(header))).await?;
             let glb = MeshGlb::new(&object.object, &id);
             for piece in glb.pieces() {
                 sender.send(part(Part::Piece(piece))).await?;
             }
+            drop(held);
             Ok(())
         }))
     }

@@ -27,6 +27,7 @@ mod object_sizes;
 mod object_uploads;
 mod object_watches;
 mod objects;
+mod objects_at_rest;
 mod objects_directory;
 mod own_hands;
 mod own_models;

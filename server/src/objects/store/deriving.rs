@@ -71,7 +71,8 @@ impl ObjectStore {
             .and_then(|entry| entry.state.object())
             .is_some_and(|of| Arc::ptr_eq(of, object));
         if is_created && !created.derived.has(object) {
-            self.keep(&mut created, object, derived.bytes())?;
+            let fits = self.keep(&mut created, object, derived.bytes());
+            fits.inspect_err(|_| object.derived.forget())?;
         }
         Ok(derived)
     }
@@ -120,7 +121,6 @@ impl ObjectStore {
         }
         while created.taken() + bytes > self.limits.bytes {
             if !created.evict_derived_or_size() && !created.evict_one(Some(&object.id)) {
-                object.derived.forget();
                 return Err(ServiceError::Overloaded {
                     limit: Limit::ObjectCache,
                     maximum: self.limits.objects,
