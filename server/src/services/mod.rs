@@ -18,7 +18,7 @@ use std::{
 };
 
 use grasp_import::MeshLimits;
-use grasp_synthesis::base::{mechanisms::Mechanisms, stop::Stop};
+use grasp_synthesis::base::mechanisms::Mechanisms;
 use tokio::{sync::Semaphore, time::timeout_at};
 use tokio_util::sync::CancellationToken;
 
@@ -164,10 +164,16 @@ impl Shared {
             None => permit.await,
         };
         let permit = permit.map_err(|_| ServiceError::ShuttingDown)?;
-        let derive = self.derive(object, Need::Call);
+        let (objects, object, rig) = (
+            Arc::clone(&self.objects),
+            Arc::clone(object),
+            self.default_rig.clone(),
+        );
         let derived = run_stoppable(due, move |stop| {
             let _permit = permit;
-            derive(stop)
+            let derived = objects.derived(&object, Need::Call, stop)?;
+            derived.prepare(&rig, stop)?;
+            Ok::<_, ServiceError>(derived)
         });
         let derived = derived.await??;
         self.atlases.make_room();
@@ -178,7 +184,8 @@ impl Shared {
     fn derive_ahead(self: &Arc<Self>, object: &Arc<StoredObject>) {
         let number = self.ahead.next.fetch_add(1, Ordering::Relaxed);
         let (shared, object) = (Arc::clone(self), Arc::downgrade(object));
-        tokio::spawn(async move {
+        let shutdown = self.shutdown.clone();
+        let derive = async move {
             let Ok(_turn) = shared.ahead.turn.acquire().await else {
                 return;
             };
@@ -186,26 +193,22 @@ impl Shared {
             let Some(object) = object.upgrade().filter(|_| newer <= MOST_AHEAD) else {
                 return;
             };
-            let derived = run_stoppable(None, shared.derive(&object, Need::Ahead)).await;
+            let (objects, rig, of) = (
+                Arc::clone(&shared.objects),
+                shared.default_rig.clone(),
+                Arc::clone(&object),
+            );
+            let derived = run_stoppable(None, move |stop| {
+                // A copy, which shares all of it but does not keep the object from being evicted.
+                let derived = Derived::clone(&*objects.derived(&of, Need::Ahead, stop)?);
+                Ok::<_, ServiceError>(derived.prepare(&rig, stop)?)
+            })
+            .await;
             if let Err(error) = derived.flatten() {
                 tracing::debug!(object = object.name(), %error, "nothing was derived ahead of calls");
             }
             shared.atlases.make_room();
-        });
-    }
-
-    /// The work of deriving something.
-    fn derive(
-        &self,
-        object: &Arc<StoredObject>,
-        need: Need,
-    ) -> impl FnOnce(Stop<'_>) -> Result<Arc<Derived>, ServiceError> + Send + 'static {
-        let (objects, object) = (Arc::clone(&self.objects), Arc::clone(object));
-        let rig = self.default_rig.clone();
-        move |stop| {
-            let derived = objects.derived(&object, need, stop)?;
-            derived.prepare(&rig, stop)?;
-            Ok(derived)
-        }
+        };
+        tokio::spawn(async move { shutdown.run_until_cancelled(derive).await });
     }
 }

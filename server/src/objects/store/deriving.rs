@@ -58,7 +58,6 @@ impl ObjectStore {
             return Ok(kept);
         }
         let twin = self.created().derived_of_twin(object);
-        let _held = object.hold();
         let derived = match twin {
             Some(twin) => object.share(&twin),
             None => object.derived_until(stop)?,
