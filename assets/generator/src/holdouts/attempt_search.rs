@@ -19,7 +19,7 @@ use grasp_synthesis::{
         bend_ratios::BendRatioChoice,
         grasp::Grasp,
         holdout::Holdout,
-        object::THESIS_FRICTION,
+        plain_object::THESIS_FRICTION,
         receiver::Stance,
         strategy::{Strategy, Validity},
     },
