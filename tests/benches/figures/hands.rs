@@ -53,9 +53,11 @@ pub(crate) fn measure(setting: &Setting) -> Vec<Line> {
     for compared in hands(setting, &server) {
         let Compared { what, hand, built_in } = compared;
         let (cold, own) = answers(setting, &server, what, &hand);
-        let (_, other) = answers(setting, &server, "the built-in one", &built_in);
+        let (other_cold, other) = answers(setting, &server, "the built-in one", &built_in);
+        let adult = format!("adult of the size of {what}");
+        lines.push(cold_line(&adult, &other_cold));
         lines.push(cold_line(what, &cold));
-        lines.push(warm_line(&format!("adult of the size of {what}"), &other, &other));
+        lines.push(warm_line(&adult, &other, &other));
         lines.push(warm_line(what, &own, &other));
     }
     setting.serving.block_on(server.stop());
