@@ -3,6 +3,8 @@
 //! and packs of up to four triangles, so that one `Vec4` operation tests four boxes or four triangles (H. Dammertz,
 //! J. Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays, 2008).
 
+use std::ops::Range;
+
 use glam::{DVec3, Vec3, Vec3A, Vec4};
 use obvhs::{
     BvhBuildParams,
@@ -38,10 +40,10 @@ const ORDINARY_OVERLAP: f32 = 10.0;
 /// Number of triangles from which that overlap is smaller, in inverse proportion, so that the time per triangle does not grow.
 const OVERLAPPING_TRIANGLES: f32 = 3_000.0;
 
-/// Passes of reinsertion: the n-th moves an n-th odd share of the nodes. The builder's usual number, and that for meshes of more
-/// triangles than [`OVERLAPPING_TRIANGLES`], of which the later passes take half the time and improve queries by a hundredth.
-const REINSERTION_PASSES: usize = 16;
-const LARGE_MESH_PASSES: usize = 2;
+/// Passes of reinsertion: pass n moves one of 2n + 1 nodes. The builder's usual ones, and those for meshes of more triangles than
+/// [`OVERLAPPING_TRIANGLES`]: the first and the late ones would take most of the time, up to 28 µs per triangle of a long wire.
+const REINSERTION_PASSES: Range<usize> = 0..16;
+const LARGE_MESH_PASSES: Range<usize> = 1..3;
 
 /// How much time to spend on building.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -333,7 +335,7 @@ fn reinsert(tree: &mut Bvh2, ratio: f32, stop: Stop<'_>) -> Result<(), Stopped> 
     } else {
         REINSERTION_PASSES
     };
-    for pass in 0..passes {
+    for pass in passes {
         stop.check()?;
         optimizer.run(tree, ratio, Some(vec![1.0 / (2 * pass + 1) as f32]));
     }
