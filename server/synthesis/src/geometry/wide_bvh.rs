@@ -41,7 +41,7 @@ const ORDINARY_OVERLAP: f32 = 10.0;
 const OVERLAPPING_TRIANGLES: f32 = 3_000.0;
 
 /// Passes of reinsertion: pass n moves one of 2n + 1 nodes. The builder's usual ones, and those for meshes of more triangles than
-/// [`OVERLAPPING_TRIANGLES`]: the first and the late ones would take most of the time, up to 28 µs per triangle of a long wire.
+/// [`OVERLAPPING_TRIANGLES`]: the first and the late ones would take most of the time.
 const REINSERTION_PASSES: Range<usize> = 0..16;
 const LARGE_MESH_PASSES: Range<usize> = 1..3;
 
