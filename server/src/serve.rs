@@ -149,6 +149,11 @@ impl Gauges {
         self.calls.count()
     }
 
+    /// Number of created objects that searches need not prepare.
+    pub fn prepared_objects(&self) -> usize {
+        self.shared.objects.prepared()
+    }
+
     /// Bytes of answers that wait for clients to read them.
     pub fn unread_bytes(&self) -> usize {
         self.unread.bytes()

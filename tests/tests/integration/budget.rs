@@ -102,13 +102,23 @@ async fn without_a_budget_a_search_for_the_best_continues_for_the_first() {
     server.stop().await;
 }
 
+/// A request that no attempt can satisfy, for an object whose preparation takes none of the deadline.
+async fn impossible_at_once(server: &TestServer) -> v1::FindGraspRequest {
+    let request = impossible(server).await;
+    until("the preparation of the object", || {
+        server.gauges().prepared_objects() == 1
+    })
+    .await;
+    request
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_deadline_less_the_reserve_bounds_the_budget() {
     let server =
         TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::from_millis(1900)).await;
     let mut request = Request::new(v1::FindGraspRequest {
         budget: Some(seconds(10)),
-        ..impossible(&server).await
+        ..impossible_at_once(&server).await
     });
     request.set_timeout(Duration::from_secs(2));
     let answer = bounded("the answer", server.grasps().await.find_grasp(request)).await;
@@ -124,7 +134,7 @@ async fn the_reserve_grows_with_the_delays_of_answers() {
     let server = TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::ZERO).await;
     let message = v1::FindGraspRequest {
         max_attempts: Some(1),
-        ..impossible(&server).await
+        ..impossible_at_once(&server).await
     };
     let mut budgets = Vec::new();
     for _ in 0..2 {

@@ -101,6 +101,11 @@ impl ObjectStore {
         Some(kept)
     }
 
+    /// Number of created objects for which it is kept.
+    pub(crate) fn prepared(&self) -> usize {
+        self.created().derived.list.len()
+    }
+
     /// Counts what was derived, and drops what is needed less until it fits.
     fn keep(
         &self,
