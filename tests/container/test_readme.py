@@ -90,11 +90,13 @@ def test_default_memory_matches_the_page():
     printed = run("docker", "run", "--rm", "--env", "GRASP_WORKERS=30", "grasp-server", "--print-config").stdout
     value = {key: int(text) for key, text in re.findall(r"^(\w+) = (\d+)$", printed, flags=re.MULTILINE)}
     mib = 1 << 20
-    upload = 2 * value["maximum_object_bytes"] + 640 * value["maximum_object_triangles"] + 512 * 1024
+    upload = 2 * value["maximum_object_bytes"] + 340 * value["maximum_object_triangles"]
+    prepared = 240 * value["maximum_object_triangles"] + 2 * mib
     total = (
         26 * mib
         + value["cache_bytes"]
         + value["maximum_uploads"] * upload
+        + (value["maximum_uploads"] + 1) // 2 * prepared
         + 20 * mib * value["builder_threads"]
         + 4 * mib * value["maximum_searches"]
         + mib * value["maximum_rigs"]
