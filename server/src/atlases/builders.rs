@@ -1,5 +1,7 @@
 //! The threads that build atlases, one turn after the other.
 
+mod reading;
+
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
@@ -10,21 +12,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_assets::{
-    atlases::shipped_atlas,
-    hands::{Hand, hand},
-};
+use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
     base::stop::Stop,
-    known::{
-        codec::decode_compact,
-        growth::{CHOSEN, Grown, Growth},
-    },
+    known::growth::{Grown, Growth},
     model::hand::Handedness,
     physical::grip::Gripper,
     propose::prepared::PreparedObject,
 };
 
+use self::reading::read_turn;
 use super::{
     build_queue::{BuildJob, BuildQueue, Stage},
     files::AtlasFiles,
@@ -309,50 +306,6 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
     }
 }
 
-/// Publishes the atlas on disk or the shipped grips, if there are any.
-fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Turn {
-    let start = thread_time();
-    let on_disk = || read_file(builders, object, hand);
-    let Some(read) = shipped_grips(builders, object, hand)
-        .or_else(on_disk)
-        .map(Arc::new)
-    else {
-        return Turn::Next(Stage::Starting);
-    };
-    let entries = read.atlas.entries().len();
-    let complete = read.atlas.is_complete();
-    if !builders
-        .loaded
-        .publish(object, hand, read, thread_time().saturating_sub(start))
-    {
-        return Turn::Ended(BuildState::NoRoom);
-    }
-    tracing::info!(object = object.name(), hand = %hand_label(hand), entries, complete, "read an atlas");
-    if complete {
-        Turn::Ended(BuildState::Finished)
-    } else if entries >= USEFUL {
-        Turn::Next(Stage::Completing)
-    } else {
-        Turn::Next(Stage::Starting)
-    }
-}
-
-/// The atlas on disk. If another server has grown more than is kept, the file is replaced by an excerpt.
-fn read_file(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
-    let files = builders.files.as_ref()?;
-    if !files.has(object, hand) {
-        return None;
-    }
-    let prepared = builders.prepared(object)?;
-    let read = files.read(object, &prepared, hand)?;
-    if !read.atlas.is_complete() || read.atlas.entries().len() <= CHOSEN {
-        return Some(read);
-    }
-    let kept = Growth::resume(&prepared, &hand.rig, &read).kept();
-    files.write(object, &prepared, hand, &kept);
-    Some(kept)
-}
-
 /// An atlas that a thread is growing.
 struct Growing<'a> {
     builders: &'a Builders,
@@ -454,27 +407,6 @@ fn thread_time() -> Duration {
 fn thread_time() -> Duration {
     static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
     START.elapsed()
-}
-
-/// The grips that ship with the server for an object and a hand: chosen from more than a server grows, hence complete.
-fn shipped_grips(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
-    let bytes = object
-        .built_in
-        .then(|| shipped_atlas(&object.id, &hand.rig))
-        .flatten()?;
-    let prepared = builders.prepared(object)?;
-    match decode_compact(bytes, &prepared, &hand.rig) {
-        Ok(grown) => Some(grown.completed()),
-        Err(error) => {
-            tracing::warn!(
-                object = object.name(),
-                hand = %hand_label(hand),
-                %error,
-                "cannot read the shipped grips"
-            );
-            None
-        }
-    }
 }
 
 /// While searches run, pauses in proportion to the time just worked.

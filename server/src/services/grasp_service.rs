@@ -71,9 +71,10 @@ impl GraspHandler {
             resizer,
             ..
         } = &*self.shared;
-        let is_kept = objects.kept(stored, Need::Call).is_some();
-        let derived = self.shared.derived(stored, call).await?;
-        let since = if is_kept { call.arrived } else { Instant::now() };
+        let (derived, since) = match objects.kept(stored, Need::Call) {
+            Some(kept) => (kept, call.arrived),
+            None => (self.shared.derived(stored, call).await?, Instant::now()),
+        };
         let Some(size) = ObjectSize::of(size, stored) else {
             return Ok(HeldOut {
                 derived,

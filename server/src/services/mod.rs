@@ -142,8 +142,8 @@ impl Shared {
         Ok(revision)
     }
 
-    /// What is derived from an object, built if necessary before the call's deadline, and prepared for the hands of the default
-    /// rig then.
+    /// What is derived from an object, built before the call's deadline unless another call does so meanwhile, and prepared for the
+    /// hands of the default rig.
     ///
     /// # Errors
     /// [`ServiceError::DeadlineExceeded`], and those of [`ObjectStore::derived`].
@@ -152,9 +152,6 @@ impl Shared {
         object: &Arc<StoredObject>,
         call: &CallContext,
     ) -> Result<Arc<Derived>, ServiceError> {
-        if let Some(kept) = self.objects.kept(object, Need::Call) {
-            return Ok(kept);
-        }
         let due = call.answer_due();
         let permit = Arc::clone(&self.deriving).acquire_owned();
         let permit = match due {

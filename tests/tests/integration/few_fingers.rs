@@ -6,8 +6,8 @@ use grasp_characters::{
     names::{mixamo, webxr},
 };
 use grasp_client::{
-    AtlasUse, Digit, FindRequest, Grasp, HandAngles, Handedness, JointPose, NewRig, PresentingHand,
-    ReceivingHand, built_in::request_for,
+    AtlasUse, Digit, FindRequest, Grasp, GraspClient, HandAngles, Handedness, JointPose, NewRig,
+    PresentingHand, ReceivingHand, built_in::request_for,
 };
 use grasp_proto::v1;
 use grasp_synthesis::model::hand;
@@ -153,14 +153,18 @@ async fn hands_take_with_the_fingers_that_they_have() {
     server.stop().await;
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_hand_of_four_digits_gives() {
+/// A server with the rig of a hand of four digits.
+async fn with_four_digits() -> (TestServer, GraspClient) {
     let server = TestServer::start().await;
     let client = server.client().await;
-    client
-        .create_rig(&NewRig::of_model("four", cartoon(FOUR)))
-        .await
-        .unwrap();
+    let rig = NewRig::of_model("four", cartoon(FOUR));
+    client.create_rig(&rig).await.unwrap();
+    (server, client)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hand_of_four_digits_gives() {
+    let (server, client) = with_four_digits().await;
     let mut request = request_for(holdout("remote-hold1").unwrap());
     let Some(PresentingHand::Angles(HandAngles { rig, digits, .. })) = &mut request.presenting_hand else {
         panic!("the giver is given by angles");
@@ -189,12 +193,7 @@ fn thumbless(side: hand::Handedness, joint: usize) -> Option<String> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_such_hands_cannot_do_is_refused_by_name() {
-    let server = TestServer::start().await;
-    let client = server.client().await;
-    client
-        .create_rig(&NewRig::of_model("four", cartoon(FOUR)))
-        .await
-        .unwrap();
+    let (server, client) = with_four_digits().await;
     let four = || {
         Some(v1::ReceivingHand {
             rig: "rigs/four".to_owned(),
