@@ -16,6 +16,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "grasp/v1/object_service.proto",
         "grasp/v1/grasp_type.proto",
         "grasp/v1/grasp.proto",
+        "grasp/v1/standing_grasp.proto",
+        "grasp/v1/find_grasp.proto",
+        "grasp/v1/stream_grasps.proto",
+        "grasp/v1/track_holdout.proto",
+        "grasp/v1/validate_grasp.proto",
+        "grasp/v1/evaluate_holdout.proto",
         "grasp/v1/grasp_service.proto",
         "grasp/v1/hand_rig_service.proto",
     ];

@@ -367,6 +367,8 @@ pub enum GraspSource {
     Recent,
     /// A preferred grip of the object.
     Preferred,
+    /// The request's standing grasp, as it is or with fingers moved out of the way.
+    Standing,
 }
 
 /// What can keep one hand from holding an object, whatever its pose.

@@ -90,6 +90,7 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         improvement: request.improvement.map(duration_to_wire),
         object_scale: request.object_scale,
         object_mass_kg: request.object_mass_kg,
+        standing: None,
     }
 }
 
@@ -153,6 +154,7 @@ fn source_from_wire(value: i32) -> Option<GraspSource> {
         v1::GraspSource::Atlas => Some(GraspSource::Atlas),
         v1::GraspSource::Recent => Some(GraspSource::Recent),
         v1::GraspSource::Preferred => Some(GraspSource::Preferred),
+        v1::GraspSource::Standing => Some(GraspSource::Standing),
     }
 }
 

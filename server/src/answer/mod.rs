@@ -87,6 +87,7 @@ pub(crate) fn find_response(
             circumstances,
         )),
         other_grasp: other_grasp(),
+        standing: None,
     })
 }
 

@@ -8,9 +8,9 @@ use std::{
 
 use grasp_proto::v1::{self, grasp_service_server::GraspService};
 use grasp_synthesis::base::stop::Stop;
-use tonic::{Request, Response, Status};
+use tonic::{Request, Response, Status, Streaming};
 
-use super::Shared;
+use super::{Shared, streaming::Messages, tracks::TrackAnswers};
 use crate::{
     budget::effective_budget,
     call::{CallContext, SearchSummary},
@@ -169,6 +169,59 @@ impl GraspService for GraspHandler {
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
         Ok(Response::new(self.find(request.into_inner(), &call).await?))
+    }
+
+    type StreamGraspsStream = Messages<v1::StreamGraspsResponse>;
+
+    async fn stream_grasps(
+        &self,
+        request: Request<v1::StreamGraspsRequest>,
+    ) -> Result<Response<Self::StreamGraspsStream>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.stream(request.into_inner(), &call).await?))
+    }
+
+    type TrackHoldoutStream = TrackAnswers<v1::TrackHoldoutResponse>;
+
+    async fn track_holdout(
+        &self,
+        request: Request<Streaming<v1::TrackHoldoutRequest>>,
+    ) -> Result<Response<Self::TrackHoldoutStream>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.track(request.into_inner(), &call).await?))
+    }
+
+    type OpenTrackStream = TrackAnswers<v1::OpenTrackResponse>;
+
+    async fn open_track(
+        &self,
+        request: Request<v1::OpenTrackRequest>,
+    ) -> Result<Response<Self::OpenTrackStream>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.open(request.into_inner(), &call).await?))
+    }
+
+    async fn push_frame(
+        &self,
+        request: Request<v1::PushFrameRequest>,
+    ) -> Result<Response<v1::PushFrameResponse>, Status> {
+        Ok(Response::new(self.push(request.into_inner())?))
+    }
+
+    async fn validate_grasp(
+        &self,
+        request: Request<v1::ValidateGraspRequest>,
+    ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.validate(request.into_inner(), &call).await?))
+    }
+
+    async fn evaluate_holdout(
+        &self,
+        request: Request<v1::EvaluateHoldoutRequest>,
+    ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.evaluate(request.into_inner(), &call).await?))
     }
 }
 

@@ -1,13 +1,17 @@
 //! The handlers of the gRPC services.
 
+mod evaluate_holdout;
 mod grasp_service;
 mod hand_rig_service;
 mod object_service;
 mod object_streams;
 mod rig_builder;
 mod rig_message;
+mod stream_grasps;
 mod streaming;
+mod tracks;
 mod upload;
+mod validate_grasp;
 
 use std::{
     sync::{
