@@ -21,6 +21,7 @@ fn wire_answer() -> v1::FindGraspResponse {
         outcome: v1::Outcome::Found.into(),
         grasp: Some(wire_grasp()),
         other_grasp: None,
+        standing: None,
         report: Some(wire_report()),
     }
 }

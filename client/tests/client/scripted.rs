@@ -96,7 +96,56 @@ impl GraspService for Scripted {
                 ..v1::SearchReport::default()
             }),
             other_grasp: None,
+            standing: None,
         }))
+    }
+
+    type StreamGraspsStream = Pending<Result<v1::StreamGraspsResponse, Status>>;
+
+    async fn stream_grasps(
+        &self,
+        _: Request<v1::StreamGraspsRequest>,
+    ) -> Result<Response<Self::StreamGraspsStream>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+
+    type TrackHoldoutStream = Pending<Result<v1::TrackHoldoutResponse, Status>>;
+
+    async fn track_holdout(
+        &self,
+        _: Request<Streaming<v1::TrackHoldoutRequest>>,
+    ) -> Result<Response<Self::TrackHoldoutStream>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+
+    type OpenTrackStream = Pending<Result<v1::OpenTrackResponse, Status>>;
+
+    async fn open_track(
+        &self,
+        _: Request<v1::OpenTrackRequest>,
+    ) -> Result<Response<Self::OpenTrackStream>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+
+    async fn push_frame(
+        &self,
+        _: Request<v1::PushFrameRequest>,
+    ) -> Result<Response<v1::PushFrameResponse>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+
+    async fn validate_grasp(
+        &self,
+        _: Request<v1::ValidateGraspRequest>,
+    ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+
+    async fn evaluate_holdout(
+        &self,
+        _: Request<v1::EvaluateHoldoutRequest>,
+    ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
+        Err(Status::unimplemented("not scripted"))
     }
 }
 

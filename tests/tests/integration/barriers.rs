@@ -360,6 +360,7 @@ async fn known_grips_that_run_into_barriers_are_not_returned() {
                     GraspSource::Atlas => sources[1] += 1,
                     GraspSource::Recent => sources[2] += 1,
                     GraspSource::Preferred => panic!("the object has no grips of its own"),
+                    GraspSource::Standing => panic!("no request has a standing grasp"),
                 }
             }
         }
