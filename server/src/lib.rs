@@ -6,7 +6,7 @@
 //! message into checked values or a list of everything that is wrong; `objects` finds the object with its search
 //! structures, `rigs` the hands, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
 //! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages
-//! go through `services::streaming`.
+//! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
 //! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
 //!
 //! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
@@ -24,7 +24,7 @@
 //! atlas_slots  saved
 //! rigs
 //! answer  call  config  executor  net  validate
-//! memory  objects
+//! memory  objects  track
 //! atlases
 //! search
 //! services
@@ -56,6 +56,7 @@ mod saved;
 mod search;
 mod serve;
 mod services;
+mod track;
 mod validate;
 
 pub use budget::BudgetLimits;

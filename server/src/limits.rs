@@ -20,6 +20,10 @@ pub struct StreamLimits {
     pub upload_idle: Duration,
     /// Number of watchers of objects.
     pub watchers: NonZeroUsize,
+    /// Number of tracks of moving givers.
+    pub tracks: NonZeroUsize,
+    /// Longest time without a frame of a track.
+    pub track_idle: Duration,
 }
 
 /// Largest size in bytes of everything but the mesh in a `CreateObject` request, and of a manifest on disk.

@@ -41,6 +41,7 @@ use crate::{
     rigs::{saved::SavedRigs, store::RigStore},
     saved::{SavedFiles, StoreError},
     services::{Ahead, GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads, load_saved_rigs},
+    track::OpenTracks,
 };
 
 /// Largest number of open streams per connection.
@@ -154,6 +155,11 @@ impl Gauges {
         self.shared.objects.prepared()
     }
 
+    /// Number of tracks of moving givers.
+    pub fn tracks(&self) -> usize {
+        self.shared.tracks.count()
+    }
+
     /// Bytes of answers that wait for clients to read them.
     pub fn unread_bytes(&self) -> usize {
         self.unread.bytes()
@@ -242,6 +248,8 @@ impl Server {
             ahead: Ahead::default(),
             uploads: Uploads::new(config.streams.upload_bytes.get(), config.streams.upload_idle),
             maximum_watchers: config.streams.watchers.get(),
+            tracks: Arc::new(OpenTracks::new(config.streams.tracks.get())),
+            track_idle: config.streams.track_idle,
             shutdown: CancellationToken::new(),
             default_rig: config.default_rig,
             mechanisms: config.mechanisms,

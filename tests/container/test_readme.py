@@ -103,6 +103,7 @@ def test_default_memory_matches_the_page():
         + value["maximum_unread_bytes"]
         + 2 * value["maximum_upload_bytes"]
         + 512 * 1024 * value["maximum_watchers"]
+        + 512 * 1024 * value["maximum_tracks"]
         + 32 * 1024 * value["maximum_connections"]
         + 64 * 1024 * (30 + value["io_threads"])
     )

@@ -24,7 +24,7 @@ const SERVER: &[&[&str]] = &[
     &["atlas_slots", "saved"],
     &["rigs"],
     &["answer", "call", "config", "executor", "net", "validate"],
-    &["memory", "objects"],
+    &["memory", "objects", "track"],
     &["atlases"],
     &["search"],
     &["services"],

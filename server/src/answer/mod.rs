@@ -416,7 +416,7 @@ fn nearest_miss(miss: &NearestMiss, rig: &Rig, frame: ClientFrame) -> v1::Neares
 }
 
 /// Saturates at the 292 billion years that the message can hold.
-fn wire_duration(duration: Duration) -> prost_types::Duration {
+pub(crate) fn wire_duration(duration: Duration) -> prost_types::Duration {
     prost_types::Duration {
         seconds: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),
         nanos: i32::try_from(duration.subsec_nanos()).unwrap_or(i32::MAX),

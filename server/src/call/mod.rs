@@ -71,6 +71,16 @@ impl CallContext {
             .unwrap_or_else(|| Self::arriving(None))
     }
 
+    /// The context of a part of the call that arrived at a time and is answered like a call of its own.
+    pub(crate) fn of_part(&self, arrived: Instant) -> Self {
+        Self {
+            arrived,
+            deadline: self.deadline,
+            log_fields: Arc::default(),
+            search_end: Arc::default(),
+        }
+    }
+
     fn arriving(timeout: Option<Duration>) -> Self {
         let arrived = Instant::now();
         Self {

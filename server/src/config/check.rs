@@ -167,6 +167,18 @@ impl RawConfig {
                 1..=10_000,
                 defaults.watchers,
             ),
+            tracks: check.count(
+                "maximum_tracks",
+                self.maximum_tracks,
+                1..=10_000,
+                defaults.tracks,
+            ),
+            track_idle: check.time(
+                "track_idle_ms",
+                self.track_idle_ms,
+                100..=600_000,
+                defaults.track_idle,
+            ),
         }
     }
 
@@ -357,6 +369,8 @@ mod tests {
             maximum_upload_bytes: Some(1),
             upload_idle_ms: Some(1),
             maximum_watchers: Some(0),
+            maximum_tracks: Some(0),
+            track_idle_ms: Some(1),
             maximum_object_bytes: Some(1),
             maximum_object_triangles: Some(0),
             store: Some(String::new()),
@@ -377,7 +391,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 28, "{bad:?}");
+        assert_eq!(bad.len(), 30, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

@@ -62,6 +62,12 @@ pub struct RawConfig {
     /// Most watchers of objects; others are rejected [default: 64].
     #[arg(long, env = "GRASP_MAXIMUM_WATCHERS", value_name = "COUNT")]
     pub maximum_watchers: Option<u64>,
+    /// Most tracks of moving givers; others are rejected [default: 256].
+    #[arg(long, env = "GRASP_MAXIMUM_TRACKS", value_name = "COUNT")]
+    pub maximum_tracks: Option<u64>,
+    /// Longest time without a frame of a track, in milliseconds [default: 10000].
+    #[arg(long, env = "GRASP_TRACK_IDLE_MS", value_name = "MS")]
+    pub track_idle_ms: Option<u64>,
     /// Largest mesh file in one message or in the objects directory, in bytes [default: 8388608].
     #[arg(long, env = "GRASP_MAXIMUM_OBJECT_BYTES", value_name = "BYTES")]
     pub maximum_object_bytes: Option<u64>,
@@ -175,6 +181,8 @@ impl RawConfig {
             maximum_upload_bytes: self.maximum_upload_bytes.or(fallback.maximum_upload_bytes),
             upload_idle_ms: self.upload_idle_ms.or(fallback.upload_idle_ms),
             maximum_watchers: self.maximum_watchers.or(fallback.maximum_watchers),
+            maximum_tracks: self.maximum_tracks.or(fallback.maximum_tracks),
+            track_idle_ms: self.track_idle_ms.or(fallback.track_idle_ms),
             maximum_object_bytes: self.maximum_object_bytes.or(fallback.maximum_object_bytes),
             maximum_object_triangles: self
                 .maximum_object_triangles
@@ -214,6 +222,8 @@ impl From<&Config> for RawConfig {
             maximum_upload_bytes: count(config.streams.upload_bytes.get()),
             upload_idle_ms: time(config.streams.upload_idle),
             maximum_watchers: count(config.streams.watchers.get()),
+            maximum_tracks: count(config.streams.tracks.get()),
+            track_idle_ms: time(config.streams.track_idle),
             maximum_object_bytes: count(config.maximum_object_bytes.get()),
             maximum_object_triangles: count(config.maximum_object_triangles.get()),
             store: Some(config.place.to_string()),

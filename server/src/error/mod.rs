@@ -32,6 +32,8 @@ pub enum Limit {
     UploadBytes,
     /// Watchers of objects.
     Watchers,
+    /// Tracks of moving givers.
+    Tracks,
 }
 
 /// Why a call failed.
@@ -158,6 +160,18 @@ pub enum ServiceError {
         /// The longest allowed time.
         limit: Duration,
     },
+    /// No track has the name.
+    #[error("{name} does not exist: a track ends with its call of OpenTrack")]
+    TrackNotFound {
+        /// The requested name.
+        name: String,
+    },
+    /// A client sent no frame of what it tracks.
+    #[error("no frame arrived for {} ms", limit.as_millis())]
+    TrackIdle {
+        /// The longest allowed time.
+        limit: Duration,
+    },
     /// The call took longer than the server allows.
     #[error("the call took more than {} s, the server's limit", limit.as_secs())]
     TookTooLong {
@@ -189,6 +203,19 @@ impl ServiceError {
             description: description.into(),
         }])
     }
+
+    /// The same error of a message that is the field of another one.
+    #[must_use]
+    pub(crate) fn within(self, field: &str) -> Self {
+        let Self::Invalid(violations) = self else {
+            return self;
+        };
+        let violations = violations.into_iter().map(|violation| Violation {
+            field: format!("{field}.{}", violation.field),
+            ..violation
+        });
+        Self::Invalid(violations.collect())
+    }
 }
 
 impl From<Stopped> for ServiceError {
@@ -204,6 +231,7 @@ fn limit_text(limit: Limit) -> &'static str {
         Limit::ObjectCache => "every object in the full cache is in use",
         Limit::UploadBytes => "the uploads that run leave too little of the bytes that they share",
         Limit::Watchers => "the server is at its limit of watchers",
+        Limit::Tracks => "the server is at its limit of tracks",
         Limit::UnreadAnswers => {
             "this connection is at its limit of bytes that wait for the client to read them"
         }

@@ -103,6 +103,12 @@ impl From<ServiceError> for Status {
             ServiceError::UploadStalled { .. } => {
                 plain_status(Code::DeadlineExceeded, "UPLOAD_STALLED", message)
             }
+            ServiceError::TrackNotFound { name } => {
+                let mut details = info("TRACK_NOT_FOUND", [("name", name.clone())]);
+                details.set_resource_info("grasp.v1.Track", name, "", message.clone());
+                Status::with_error_details(Code::NotFound, message, details)
+            }
+            ServiceError::TrackIdle { .. } => plain_status(Code::DeadlineExceeded, "TRACK_IDLE", message),
             ServiceError::TookTooLong { .. } => {
                 plain_status(Code::DeadlineExceeded, "CALL_TOOK_TOO_LONG", message)
             }
@@ -166,6 +172,7 @@ fn limit_reason(limit: Limit) -> &'static str {
         Limit::UnreadAnswers => "TOO_MANY_UNREAD_ANSWERS",
         Limit::UploadBytes => "TOO_MANY_UPLOAD_BYTES",
         Limit::Watchers => "TOO_MANY_WATCHERS",
+        Limit::Tracks => "TOO_MANY_TRACKS",
     }
 }
 
@@ -237,8 +244,20 @@ mod tests {
     }
 
     /// Errors of calls that stream, with their code and reason.
-    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 6] {
+    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 8] {
         [
+            (
+                ServiceError::TrackNotFound {
+                    name: "tracks/x".into(),
+                },
+                Code::NotFound,
+                "TRACK_NOT_FOUND",
+            ),
+            (
+                ServiceError::TrackIdle { limit: SECOND },
+                Code::DeadlineExceeded,
+                "TRACK_IDLE",
+            ),
             (
                 ServiceError::MessageTooLarge { limit: 9 },
                 Code::OutOfRange,

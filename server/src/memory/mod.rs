@@ -50,6 +50,10 @@ const PER_DERIVED_OBJECT: u64 = 2 * MIB;
 /// Bytes per watcher that is as far behind as it may be: 2048 objects with their ids and events. Estimated: 0.4 MiB.
 const PER_WATCHER: u64 = 512 << 10;
 
+/// Bytes per track: its setup, the latest frame, the one that is answered, and what velocities are taken from. Estimated: 0.4 MiB with
+/// the largest meshes of hands, 60 KiB with joints.
+const PER_TRACK: u64 = 512 << 10;
+
 /// Bytes per saved object: what describes it, its labels, and its places in maps. Estimated: 1.5 KiB with a few labels and warnings,
 /// 7 KiB with as many and as long ones as can be.
 const PER_SAVED_OBJECT: u64 = 8 << 10;
@@ -175,6 +179,7 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
     let uploads = config.maximum_uploads.get() as u64;
     let upload_bytes = config.streams.upload_bytes.get() as u64;
     let watchers = config.streams.watchers.get() as u64;
+    let tracks = config.streams.tracks.get() as u64;
     let searches = config.maximum_searches.get() as u64;
     let rigs = config.maximum_rigs.get() as u64;
     let builders = config.builder_threads as u64;
@@ -222,6 +227,10 @@ fn memory_shares(config: &Config, directory_bytes: usize) -> Vec<MemoryShare> {
         share(
             watchers.saturating_mul(PER_WATCHER),
             format!("for watchers of objects (maximum_watchers is {watchers})"),
+        ),
+        share(
+            tracks.saturating_mul(PER_TRACK),
+            format!("for tracks of moving givers (maximum_tracks is {tracks})"),
         ),
         share(
             rigs.saturating_mul(PER_RIG),
@@ -314,7 +323,7 @@ mod tests {
 
     /// 20 MiB at rest, 2 threads of 64 KiB, a cache of 100 MiB, 3 uploads of 2 MiB and 1000 triangles, 2 objects of 2 MiB that
     /// are prepared, 5 searches of 4 MiB, 7 connections of 32 KiB, 1 builder of 20 MiB, 8 MiB of answers, 4 MiB
-    /// in pieces, 2 watchers of 512 KiB.
+    /// in pieces, 2 watchers and 4 tracks of 512 KiB.
     fn config() -> Config {
         let count = |n: usize| n.try_into().unwrap();
         Config {
@@ -329,6 +338,7 @@ mod tests {
             streams: StreamLimits {
                 upload_bytes: count(4 << 20),
                 watchers: count(2),
+                tracks: count(4),
                 ..Config::default().streams
             },
             maximum_object_bytes: count(1 << 20),
@@ -341,7 +351,7 @@ mod tests {
         }
     }
 
-    const NEEDED: u64 = (26 + 100 + 3 * 2 + 2 * 2 + 5 * 4 + 20 + 8 + 4 * 2 + 1 + 2) * MIB
+    const NEEDED: u64 = (26 + 100 + 3 * 2 + 2 * 2 + 5 * 4 + 20 + 8 + 4 * 2 + 1 + 2 + 2) * MIB
         + 2 * (64 << 10)
         + 3 * 340_000
         + 2 * 240_000
@@ -404,8 +414,8 @@ mod tests {
         assert_eq!(
             lines[..4],
             [
-                "too little memory: the limit is 30 MiB (a test); this configuration may use 197 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may use 227 MiB",
+                "too little memory: the limit is 30 MiB (a test); this configuration may use 199 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may use 229 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]
@@ -418,6 +428,7 @@ mod tests {
             "maximum_object_triangles",
             "maximum_upload_bytes",
             "maximum_watchers",
+            "maximum_tracks",
             "maximum_searches",
             "maximum_connections",
             "builder_threads",

@@ -23,7 +23,7 @@ use crate::{
 /// Implements `GraspService`.
 #[derive(Clone, Debug)]
 pub(crate) struct GraspHandler {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
 impl GraspHandler {
@@ -41,6 +41,16 @@ impl GraspHandler {
         let query = find_query(request, (&shared.default_rig, &shared.rigs), |id| {
             shared.objects.contains(id)
         })?;
+        self.answer(query, call).await
+    }
+
+    /// Searches for the grasp that a checked request asks for.
+    pub(super) async fn answer(
+        &self,
+        query: FindQuery,
+        call: &CallContext,
+    ) -> Result<v1::FindGraspResponse, ServiceError> {
+        let shared = &self.shared;
         call.log_object(&query.object_id);
         let stored = shared.object(&query.object_id, call).await?.object;
         // Held while the call lasts, so that the object is not evicted.

@@ -45,6 +45,7 @@ use crate::{
     },
     reserve::DeadlineReserve,
     rigs::store::RigStore,
+    track::OpenTracks,
 };
 
 /// New objects of which the latest are prepared for their first calls.
@@ -96,6 +97,10 @@ pub(crate) struct Shared {
     pub uploads: Uploads,
     /// Largest number of watchers of objects.
     pub maximum_watchers: usize,
+    /// The tracks of moving givers.
+    pub tracks: Arc<OpenTracks>,
+    /// Longest time without a frame of a track.
+    pub track_idle: Duration,
     /// Cancelled when the server begins to shut down, which ends streams without an end of their own.
     pub shutdown: CancellationToken,
     /// One permit per object that may be prepared for searches at a time.

@@ -1,32 +1,302 @@
 //! `GraspService.TrackHoldout`, `OpenTrack` and `PushFrame`.
 
-use grasp_proto::v1;
+use std::{
+    pin::Pin,
+    sync::Arc,
+    time::Instant,
+};
 
-use super::GraspHandler;
-use crate::call::CallContext;
-use tonic::{Status, Streaming};
+use grasp_proto::v1::{self, open_track_response, track_holdout_request};
+use tokio::{sync::OwnedSemaphorePermit, task::JoinHandle};
+use tokio_stream::{Stream, StreamExt as _};
+use tonic::{Code, Status, Streaming};
+
+use super::{GraspHandler, Shared};
+use crate::{
+    answer::wire_duration,
+    call::CallContext,
+    convention::Convention,
+    error::{Limit, ServiceError},
+    limits::LARGEST_FIND_REQUEST,
+    track::{Holding, Inbox, Motion, OpenTrack, PredictionError, Put},
+    validate::{Frame, TrackPolicy, TrackSetup, track_setup},
+};
 
 /// The answers of a track.
-pub(super) type TrackAnswers<T> = super::streaming::Messages<T>;
+pub(super) type TrackAnswers<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
+/// A track from its setup to its end. All of it ends when it is dropped: the reader of its frames, and a search that runs.
+struct Track {
+    handler: GraspHandler,
+    inbox: Arc<Inbox>,
+    policy: TrackPolicy,
+    object_id: String,
+    convention: Convention,
+    hand_scale: Option<f32>,
+    holding: Holding,
+    motion: Option<Motion>,
+    call: CallContext,
+    /// Keeps the object from being evicted between frames.
+    _held: Arc<()>,
+    _permit: OwnedSemaphorePermit,
+}
+
+/// Ends the task that reads frames with the track that they are for.
+struct Reader(JoinHandle<()>);
+
+impl Drop for Reader {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
+}
 
 impl GraspHandler {
+    /// Answers the frames of a stream.
     pub(super) async fn track(
         &self,
-        _frames: Streaming<v1::TrackHoldoutRequest>,
-        _call: &CallContext,
-    ) -> Result<TrackAnswers<v1::TrackHoldoutResponse>, Status> {
-        Err(Status::unimplemented("TrackHoldout"))
+        mut frames: Streaming<v1::TrackHoldoutRequest>,
+        call: &CallContext,
+    ) -> Result<TrackAnswers<v1::TrackHoldoutResponse>, ServiceError> {
+        let first = tokio::time::timeout(self.shared.track_idle, frames.message());
+        let first = first.await.map_err(|_| self.idle())?.map_err(broken)?;
+        let setup = match first.and_then(|request| request.message) {
+            Some(track_holdout_request::Message::Setup(setup)) => Some(setup),
+            Some(track_holdout_request::Message::Frame(_)) | None => None,
+        };
+        let track = self.start(setup, false, call).await?;
+        let (inbox, shared) = (Arc::clone(&track.inbox), Arc::clone(&self.shared));
+        let reader = Reader(tokio::spawn(async move {
+            let end = read(frames, &inbox, &shared).await;
+            inbox.end(end);
+        }));
+        Ok(answers(track, reader, |answer| v1::TrackHoldoutResponse {
+            answer: Some(answer),
+        }))
     }
 
+    /// Opens a track, and answers the frames that are pushed.
     pub(super) async fn open(
         &self,
-        _request: v1::OpenTrackRequest,
-        _call: &CallContext,
-    ) -> Result<TrackAnswers<v1::OpenTrackResponse>, Status> {
-        Err(Status::unimplemented("OpenTrack"))
+        request: v1::OpenTrackRequest,
+        call: &CallContext,
+    ) -> Result<TrackAnswers<v1::OpenTrackResponse>, ServiceError> {
+        let track = self.start(request.setup, true, call).await?;
+        let open: OpenTrack = self.shared.tracks.open(Arc::clone(&track.inbox));
+        let message = |message| v1::OpenTrackResponse {
+            message: Some(message),
+        };
+        let name = message(open_track_response::Message::Track(open.name()));
+        let answers = answers(track, open, move |answer| {
+            message(open_track_response::Message::Answer(answer))
+        });
+        Ok(Box::pin(tokio_stream::once(Ok(name)).chain(answers)))
     }
 
-    pub(super) fn push(&self, _request: v1::PushFrameRequest) -> Result<v1::PushFrameResponse, Status> {
-        Err(Status::unimplemented("PushFrame"))
+    /// Hands a frame to an open track.
+    pub(super) fn push(&self, request: v1::PushFrameRequest) -> Result<v1::PushFrameResponse, ServiceError> {
+        let inbox = self.shared.tracks.get(&request.track)?;
+        let put = put(&inbox, request.frame, &self.shared)?;
+        Ok(v1::PushFrameResponse {
+            overtaken: put == Put::Overtaken,
+        })
+    }
+
+    /// Starts a track.
+    async fn start(
+        &self,
+        setup: Option<v1::TrackSetup>,
+        may_overtake: bool,
+        call: &CallContext,
+    ) -> Result<Track, ServiceError> {
+        let shared = &self.shared;
+        let rigs = (shared.default_rig.as_str(), &shared.rigs);
+        let TrackSetup {
+            intake,
+            policy,
+            object_id,
+            convention,
+            hand_scale,
+        } = track_setup(setup, may_overtake, rigs, |id| shared.objects.contains(id))?;
+        call.log_object(&object_id);
+        let permit = shared.tracks.admit()?;
+        let object = shared.object(&object_id, call).await?.object;
+        // What searches need is derived before the first frame.
+        shared.derived(&object, call).await?;
+        Ok(Track {
+            handler: self.clone(),
+            inbox: Arc::new(Inbox::new(intake)),
+            policy,
+            object_id,
+            convention,
+            hand_scale,
+            holding: Holding::default(),
+            motion: policy.predict_ahead.map(Motion::new),
+            call: call.clone(),
+            _held: object.hold(),
+            _permit: permit,
+        })
+    }
+
+    fn idle(&self) -> ServiceError {
+        ServiceError::TrackIdle {
+            limit: self.shared.track_idle,
+        }
+    }
+}
+
+/// Puts the frames of a stream into an inbox until they end.
+async fn read(
+    mut frames: Streaming<v1::TrackHoldoutRequest>,
+    inbox: &Inbox,
+    shared: &Shared,
+) -> Result<(), ServiceError> {
+    while let Some(request) = frames.message().await.map_err(broken)? {
+        match request.message {
+            Some(track_holdout_request::Message::Frame(frame)) => {
+                put(inbox, Some(frame), shared)?;
+            }
+            Some(track_holdout_request::Message::Setup(_)) => {
+                return Err(ServiceError::invalid(
+                    "setup",
+                    "comes again; it must be the first message only",
+                ));
+            }
+            None => {
+                return Err(ServiceError::invalid(
+                    "frame",
+                    "is missing; each message after the first must be one",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn put(inbox: &Inbox, frame: Option<v1::TrackFrame>, shared: &Shared) -> Result<Put, ServiceError> {
+    let arrived = Instant::now();
+    inbox.put(|intake| intake.check(frame, arrived, (&shared.default_rig, &shared.rigs)))
+}
+
+/// What is no message of the contract, or too long for one.
+fn broken(status: Status) -> ServiceError {
+    match status.code() {
+        Code::OutOfRange => ServiceError::MessageTooLarge {
+            limit: LARGEST_FIND_REQUEST,
+        },
+        _ => ServiceError::Malformed(status.message().to_owned()),
+    }
+}
+
+/// The answers of a track, each computed when the transport has room for it. `kept` lives as long as they do.
+fn answers<T: 'static>(
+    track: Track,
+    kept: impl Send + 'static,
+    message: impl Fn(v1::TrackAnswer) -> T + Send + 'static,
+) -> TrackAnswers<T> {
+    Box::pin(futures_util::stream::unfold(
+        Some((track, kept, message)),
+        |state| async {
+            let (mut track, kept, message) = state?;
+            match track.next().await {
+                Ok(Some(answer)) => {
+                    let answer = message(answer);
+                    Some((Ok(answer), Some((track, kept, message))))
+                }
+                Ok(None) => None,
+                Err(error) => Some((Err(error.into()), None)),
+            }
+        },
+    ))
+}
+
+impl Track {
+    /// The answer to the latest frame, once there is one; none at the end of the frames.
+    async fn next(&mut self) -> Result<Option<v1::TrackAnswer>, ServiceError> {
+        let shutdown = self.handler.shared.shutdown.clone();
+        let idle = self.handler.shared.track_idle;
+        let (inbox, due) = (Arc::clone(&self.inbox), self.call.answer_due());
+        let latest = tokio::time::timeout(idle, inbox.latest());
+        let over = async {
+            match due {
+                Some(due) => tokio::time::sleep_until(due.into()).await,
+                None => std::future::pending().await,
+            }
+        };
+        let taken = tokio::select! {
+            biased;
+            () = shutdown.cancelled() => Err(ServiceError::ShuttingDown),
+            () = over => Err(ServiceError::DeadlineExceeded),
+            latest = latest => latest.unwrap_or_else(|_| Err(self.handler.idle())),
+        };
+        match taken? {
+            Some((frame, skipped)) => self.answer(*frame, skipped).await.map(Some),
+            None => Ok(None),
+        }
+    }
+
+    async fn answer(&mut self, mut frame: Frame, skipped: u32) -> Result<v1::TrackAnswer, ServiceError> {
+        if let (Some(motion), Some(captured)) = (&mut self.motion, frame.captured) {
+            motion.predict(frame.sequence, captured, &mut frame.query);
+        }
+        let mut answer = v1::TrackAnswer {
+            sequence: frame.sequence,
+            skipped_frames: skipped,
+            last_prediction: self.motion.as_ref().and_then(Motion::last_error).map(|error| {
+                wire_error(error, self.convention)
+            }),
+            ..Default::default()
+        };
+        let (captured, arrived) = (frame.captured, frame.arrived);
+        if let Some(aborted) = self.holding.aborted(frame.is_committed) {
+            answer.standing = Some(aborted.clone());
+        } else {
+            let found = self.find(frame).await?;
+            let report = found.standing.unwrap_or_default();
+            self.holding.learn(&report, found.grasp.as_ref(), self.hand_scale, captured);
+            answer.client_from_wrist = found.grasp.as_ref().and_then(|grasp| grasp.client_from_wrist);
+            answer.score = found
+                .grasp
+                .as_ref()
+                .and_then(|grasp| Some(grasp.score.as_ref()?.total));
+            let repeats = self.policy.sends_changes && report.status() == v1::StandingStatus::Kept;
+            answer.grasp = found.grasp.filter(|_| !repeats);
+            answer.warnings = found.report.map(|report| report.warnings).unwrap_or_default();
+            answer.standing = Some(report);
+        }
+        answer.server_time = Some(wire_duration(arrived.elapsed()));
+        Ok(answer)
+    }
+
+    /// Finds the grasp for a frame, as a call with a standing grasp does.
+    async fn find(&mut self, frame: Frame) -> Result<v1::FindGraspResponse, ServiceError> {
+        let standing = self.holding.standing(&frame, &self.policy, self.convention);
+        let call = self.call.of_part(frame.arrived);
+        let object = self.handler.shared.object(&self.object_id, &call).await?.object;
+        self._held = object.hold();
+        let _ = standing;
+        match self.handler.answer(frame.query, &call).await {
+            Err(ServiceError::Overloaded {
+                limit: Limit::Searches,
+                ..
+            }) => Ok(v1::FindGraspResponse {
+                standing: Some(v1::StandingReport {
+                    status: v1::StandingStatus::None.into(),
+                    no_grasp: v1::NoGraspReason::NotFoundInTime.into(),
+                    ..Default::default()
+                }),
+                ..Default::default()
+            }),
+            found => found.map_err(|error| error.within("frame")),
+        }
+    }
+}
+
+fn wire_error(error: PredictionError, convention: Convention) -> v1::PredictionError {
+    let length = |metres| convention.length_from_openxr(metres);
+    v1::PredictionError {
+        sequence: error.sequence,
+        object_distance: length(error.object_distance),
+        object_angle: error.object_angle,
+        giver_distance: error.giver_distance.map(length),
     }
 }

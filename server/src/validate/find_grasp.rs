@@ -158,7 +158,21 @@ pub(crate) fn find_query(
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<FindQuery, ServiceError> {
     let mut violations = Violations::default();
-    let v = &mut violations;
+    match checked_find_query(request, (default_rig, rigs), object_exists, &mut violations) {
+        Some(query) => violations.finish(query),
+        // The function that returned none has added a violation.
+        None => Err(violations.into_error()),
+    }
+}
+
+/// Checks a request that may be part of another one, as [`find_query`] does; none only if there are violations.
+pub(super) fn checked_find_query(
+    request: v1::FindGraspRequest,
+    (default_rig, rigs): (&str, &RigStore),
+    object_exists: impl Fn(&str) -> bool,
+    violations: &mut Violations,
+) -> Option<FindQuery> {
+    let v = violations;
     let convention = Convention::from_wire(known(Field::root("convention"), request.convention, v));
     let object_id = object_id_of(Field::root("object"), &request.object, v);
     let object_size = object_size(request.object_scale, request.object_mass_kg, v);
@@ -226,12 +240,9 @@ pub(crate) fn find_query(
     };
     let stances = stances(request.receiver, request.receiver_stance, &surroundings, v);
     check_exists(object_id.as_deref(), object_exists, v);
-    let (Some(object_id), Some(hands)) = (object_id, receiving_hands) else {
-        // The function that returned none has added a violation.
-        return Err(violations.into_error());
-    };
+    let (object_id, hands) = (object_id?, receiving_hands?);
     let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
-    violations.finish(FindQuery {
+    Some(FindQuery {
         object_id,
         object_size,
         convention,

@@ -81,7 +81,7 @@ fn attempts(max_attempts: Option<u64>, only_attempt: Option<u64>, violations: &m
 }
 
 /// A duration of more than 0.
-fn positive_duration(
+pub(super) fn positive_duration(
     field: Field<'_>,
     sent: prost_types::Duration,
     violations: &mut Violations,
@@ -95,7 +95,7 @@ fn positive_duration(
 }
 
 /// A duration of at least 0.
-fn duration(field: Field<'_>, sent: prost_types::Duration, violations: &mut Violations) -> Option<Duration> {
+pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration, violations: &mut Violations) -> Option<Duration> {
     let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
     let in_range =
         sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
