@@ -2,11 +2,12 @@
 
 use glam::Vec3;
 use grasp_proto::v1;
-use grasp_synthesis::model::hand::joints::HandJoints;
+use grasp_synthesis::model::hand::{Handedness, joints::HandJoints};
 
 use super::*;
 use crate::{
     answer::wire_pose,
+    convention::Convention,
     rigs::store::RigStore,
     validate::{find_query, fixtures},
 };
@@ -22,7 +23,11 @@ fn at(frame: u64) -> Duration {
 
 /// A query with the object there, and the built-in giver's hand held fast to it.
 fn query(client_from_object: Pose) -> FindQuery {
-    let hand = fixtures::tracked_hand(client_from_object);
+    let joints = fixtures::joints_of_a_rig(Handedness::Left).transformed(client_from_object);
+    let sent = fixtures::sent(&joints, Convention::OpenXr, v1::JointSet::Openxr26);
+    let hand = v1::PresentingHand {
+        form: Some(v1::presenting_hand::Form::Joints(sent)),
+    };
     query_with(client_from_object, Some(hand))
 }
 

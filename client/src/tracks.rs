@@ -1,0 +1,82 @@
+//! The client's call that tracks a moving giver.
+
+use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, track_holdout_request::Message};
+use tokio::sync::watch;
+use tokio_stream::{StreamExt as _, wrappers::WatchStream};
+use tonic::{Request, Streaming};
+
+use crate::{
+    client::GraspClient,
+    error::ClientError,
+    track::{TrackAnswer, TrackFrame, TrackSetup},
+    wire,
+};
+
+/// A track of a moving giver. Frames never wait, neither here nor at the server: the latest wins. Dropping it ends the track.
+#[derive(Debug)]
+pub struct Track {
+    frames: TrackFrames,
+    answers: Streaming<v1::TrackHoldoutResponse>,
+}
+
+/// The frames' side of a track, to send frames from elsewhere.
+#[derive(Clone, Debug)]
+pub struct TrackFrames(watch::Sender<Option<v1::TrackFrame>>);
+
+impl TrackFrames {
+    /// Sends a frame, in place of one that has not left yet. Does not wait.
+    pub fn send(&self, frame: &TrackFrame) {
+        self.0.send_replace(Some(wire::track_frame_to_wire(frame)));
+    }
+}
+
+impl Track {
+    /// Sends a frame, in place of one that has not left yet. Does not wait.
+    pub fn send(&self, frame: &TrackFrame) {
+        self.frames.send(frame);
+    }
+
+    /// The frames' side, which keeps the track open as long as it lives.
+    pub fn frames(&self) -> TrackFrames {
+        self.frames.clone()
+    }
+
+    /// Waits for the next answer; none after the answer to the last frame, once the server has ended the track without an error.
+    /// Cancelling the wait loses nothing.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] names what is wrong with a frame,
+    /// [`ClientError::DeadlineExceeded`] if no frame came for too long, [`ClientError::Unavailable`] when the server shuts down.
+    pub async fn answer(&mut self) -> Result<Option<TrackAnswer>, ClientError> {
+        let answer = self.answers.message().await;
+        let answer = answer.map_err(|status| ClientError::from_status(&status, 1))?;
+        Ok(answer.map(wire::track_answer_from_wire).transpose()?)
+    }
+}
+
+impl GraspClient {
+    /// Starts to track a giver who moves. The call timeout applies to the start only.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the setup.
+    pub async fn track(&self, setup: &TrackSetup) -> Result<Track, ClientError> {
+        let setup = wire::track_setup_to_wire(setup);
+        let (frames, answers) = self
+            .call("TrackHoldout", self.call_timeout, &setup, |channel, request| async move {
+                let (mut metadata, extensions, setup) = request.into_parts();
+                // A deadline would end the track.
+                metadata.remove("grpc-timeout");
+                let (frames, latest) = watch::channel(None);
+                let first = tokio_stream::once(Message::Setup(setup));
+                let later = WatchStream::from_changes(latest).filter_map(|frame| frame.map(Message::Frame));
+                let messages = first.chain(later).map(|message| v1::TrackHoldoutRequest {
+                    message: Some(message),
+                });
+                let request = Request::from_parts(metadata, extensions, messages);
+                let answered = GraspServiceClient::new(channel).track_holdout(request).await?;
+                Ok(answered.map(|answers| (TrackFrames(frames), answers)))
+            })
+            .await?;
+        Ok(Track { frames, answers })
+    }
+}
