@@ -6,7 +6,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::known::{entry::Entry, growth::Grown, recent_grips::RecentGrips};
+use grasp_synthesis::known::growth::Grown;
 
 use crate::demand::Demand;
 
@@ -26,15 +26,13 @@ pub(crate) enum BuildState {
     Failed,
 }
 
-/// One hand's atlas and recent grips.
+/// One hand's atlas.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Slot {
     /// State of the build.
     pub state: BuildState,
     /// The grips that requests are answered from, and from which growth resumes.
     pub grown: Option<Arc<Grown>>,
-    /// Grips that searches found recently.
-    pub recent: RecentGrips,
     /// Size of `grown` in bytes.
     pub bytes: usize,
     /// How long this process has worked on the atlas.
@@ -108,8 +106,8 @@ impl AtlasSlots {
         self.lock().clone()
     }
 
-    /// Fills a hand's slot with that of another object of the same grips, but for the recent ones. Growth of that object's atlas ends
-    /// with the object, so what is not complete is absent here until it is requested.
+    /// Fills a hand's slot with that of another object of the same grips. Growth of that object's atlas ends with the object, so
+    /// what is not complete is absent here until it is requested.
     pub(crate) fn take_over(&self, hand: &Arc<Hand>, slot: Slot) {
         self.with(hand, |own| {
             *own = Slot {
@@ -117,7 +115,6 @@ impl AtlasSlots {
                     BuildState::Growing => BuildState::Absent,
                     state => state,
                 },
-                recent: RecentGrips::default(),
                 ..slot
             };
         });
@@ -128,23 +125,7 @@ impl AtlasSlots {
         self.with(hand, |slot| slot.state = state);
     }
 
-    /// Keeps a grip that a search found. True if the number of kept grips grew: false if the grip replaced another.
-    pub(crate) fn remember(&self, hand: &Arc<Hand>, grip: Entry) -> bool {
-        self.with(hand, |slot| {
-            let before = slot.recent.entries().len();
-            slot.recent = slot.recent.with(grip);
-            slot.recent.entries().len() > before
-        })
-    }
-
-    /// Drops the oldest recent grip.
-    pub(crate) fn forget_oldest(&self, hand: &Arc<Hand>) {
-        if self.get(hand).is_some() {
-            self.with(hand, |slot| slot.recent = slot.recent.without_oldest());
-        }
-    }
-
-    /// Drops the atlas and keeps the recent grips. An atlas in the build queue stays there.
+    /// Drops the atlas. One in the build queue stays there.
     pub(crate) fn evict(&self, hand: &Arc<Hand>) {
         self.with(hand, |slot| {
             *slot = Slot {
@@ -154,7 +135,6 @@ impl AtlasSlots {
                 },
                 demand: slot.demand,
                 build_time: slot.build_time,
-                recent: std::mem::take(&mut slot.recent),
                 ..Slot::default()
             };
         });

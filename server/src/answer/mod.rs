@@ -1,6 +1,7 @@
 //! Converts grasps and reports to messages in the client's frame and convention.
 
 mod names;
+mod standing;
 
 use std::{sync::Arc, time::Duration};
 
@@ -29,6 +30,7 @@ use grasp_synthesis::{
 };
 
 pub(crate) use self::names::wire_digit;
+pub(crate) use self::standing::standing_report;
 use self::names::{wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
 
@@ -70,6 +72,7 @@ pub(crate) fn find_response(
     let wire_outcome = match outcome.end {
         SearchEnd::Found => v1::Outcome::Found,
         SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted => v1::Outcome::BudgetExhausted,
+        SearchEnd::Aborted => v1::Outcome::Aborted,
         SearchEnd::Stopped => return Err(ServiceError::Cancelled),
     };
     let other_grasp = || {
@@ -137,21 +140,7 @@ impl WireHand {
         let joints = HandJoints::of_pose(rig, pose).transformed(client_from_object);
         Self {
             client_from_wrist: wire_pose(convention.joint_from_openxr(client_from_wrist)),
-            digits: Digit::ALL
-                .into_iter()
-                .zip(&pose.digits)
-                .map(|(digit, angles)| {
-                    if !rig.has(digit) {
-                        return v1::DigitAngles::default();
-                    }
-                    v1::DigitAngles {
-                        base_yaw: angles.base_yaw,
-                        base_pitch: angles.base_pitch,
-                        second_pitch: angles.second_pitch,
-                        third_pitch: Some(angles.third_pitch),
-                    }
-                })
-                .collect(),
+            digits: wire_digits(rig, pose),
             joints: (0..JOINT_COUNT)
                 .map(|place| wire_joint(&joints, convention.joint_at(place), convention))
                 .collect(),
@@ -161,6 +150,23 @@ impl WireHand {
                 .map(|binding| wire_model(binding, hand.scale, &hand_frames(rig, pose), frame)),
         }
     }
+}
+
+/// The joint angles of five digits, thumb first; empty for one that the rig does not have.
+fn wire_digits(rig: &Rig, pose: &HandPose) -> Vec<v1::DigitAngles> {
+    let digits = Digit::ALL.into_iter().zip(&pose.digits);
+    let angles = digits.map(|(digit, angles)| {
+        if !rig.has(digit) {
+            return v1::DigitAngles::default();
+        }
+        v1::DigitAngles {
+            base_yaw: angles.base_yaw,
+            base_pitch: angles.base_pitch,
+            second_pitch: angles.second_pitch,
+            third_pitch: Some(angles.third_pitch),
+        }
+    });
+    angles.collect()
 }
 
 /// A joint of a hand, empty if it is of a missing finger.
@@ -348,7 +354,7 @@ fn report(
         source: match report.source {
             Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
             Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
-            Some(GraspSource::Recent) => v1::GraspSource::Recent,
+            Some(GraspSource::Standing) => v1::GraspSource::Standing,
             Some(GraspSource::Preferred(_)) => v1::GraspSource::Preferred,
             None => v1::GraspSource::Unspecified,
         }

@@ -27,7 +27,6 @@ use super::{
     files::AtlasFiles,
     hand_label,
     loaded::LoadedAtlases,
-    remembered::RememberedGrips,
 };
 use crate::{
     atlas_slots::{BuildState, Slot},
@@ -71,8 +70,6 @@ pub(super) struct Builders {
     pub queue: BuildQueue,
     /// The atlases in memory.
     pub loaded: LoadedAtlases,
-    /// Grips that searches found.
-    pub remembered: RememberedGrips,
     objects: Arc<ObjectStore>,
     executor: SearchExecutor,
     files: Option<AtlasFiles>,
@@ -95,7 +92,6 @@ impl Builders {
             queue: BuildQueue::default(),
             loaded: LoadedAtlases::new(Arc::clone(&objects)),
             objects,
-            remembered: RememberedGrips::default(),
             executor,
             files,
             default_rig,

@@ -9,13 +9,12 @@
 //! For the built-in objects, a few hundred grips per hand ship with the server, and nothing grows.
 //!
 //! Atlases take what created objects leave of `cache_bytes`: [`loaded`] drops those that are asked for least, which are
-//! built or read again when they are requested. [`remembered`] keeps grips that searches found.
+//! built or read again when they are requested.
 
 mod build_queue;
 mod builders;
 pub(crate) mod files;
 mod loaded;
-mod remembered;
 #[cfg(test)]
 mod tests;
 
@@ -24,7 +23,7 @@ use std::{fmt, sync::Arc};
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    known::{atlas::Atlas, entry::Entry, recent_grips::RecentGrips},
+    known::atlas::Atlas,
     model::hand::Handedness,
 };
 
@@ -35,15 +34,6 @@ use crate::{
     executor::SearchExecutor,
     objects::{StoredObject, store::ObjectStore},
 };
-
-/// Known grips of an object and a hand.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct KnownGrips {
-    /// The atlas, unless it is still empty.
-    pub atlas: Option<Arc<Atlas>>,
-    /// Grips that searches found recently.
-    pub recent: RecentGrips,
-}
 
 /// All atlases and the threads that build them. Dropping it stops the threads.
 #[derive(Debug)]
@@ -113,8 +103,12 @@ impl Atlases {
         self.register(object);
     }
 
-    /// The known grips of an object and one or two hands; requests the atlases that are absent.
-    pub(crate) fn get(&self, object: &Arc<StoredObject>, hands: [Option<&Arc<Hand>>; 2]) -> [KnownGrips; 2] {
+    /// The atlases of an object and one or two hands, unless they are still empty; requests those that are absent.
+    pub(crate) fn get(
+        &self,
+        object: &Arc<StoredObject>,
+        hands: [Option<&Arc<Hand>>; 2],
+    ) -> [Option<Arc<Atlas>>; 2] {
         if !self.0.are_running() {
             return Default::default();
         }
@@ -123,19 +117,9 @@ impl Atlases {
             let slot = hand
                 .and_then(|hand| object.atlas_slots.get(hand))
                 .unwrap_or_default();
-            let atlas = slot.grown.filter(|grown| !grown.atlas.entries().is_empty());
-            KnownGrips {
-                atlas: atlas.map(|grown| Arc::clone(&grown.atlas)),
-                recent: slot.recent,
-            }
+            let grown = slot.grown.filter(|grown| !grown.atlas.entries().is_empty());
+            grown.map(|grown| Arc::clone(&grown.atlas))
         })
-    }
-
-    /// Remembers a grip that a search found under the object's own friction, for later requests.
-    pub(crate) fn remember(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, grip: Entry) {
-        if self.0.are_running() {
-            self.0.remembered.add(object, hand, grip);
-        }
     }
 
     /// The state of an object's atlas for a hand of the default rig; none if there are no atlases. That of an object at rest is

@@ -250,7 +250,7 @@ impl EitherHand<'_> {
             let first = slices.next.run.first_attempt;
             let outcome = slices.run(site, attempts);
             match outcome.end {
-                SearchEnd::Stopped => return Some(SearchEnd::Stopped),
+                end @ (SearchEnd::Stopped | SearchEnd::Aborted) => return Some(end),
                 SearchEnd::DeadlinePassed => {
                     slices.add(site, outcome);
                     return Some(SearchEnd::DeadlinePassed);

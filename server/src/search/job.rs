@@ -1,7 +1,7 @@
 //! One search: a checked request with everything it needs, from preparation to the response.
 
 use std::{
-    sync::{Arc, atomic::AtomicBool},
+    sync::{Arc, OnceLock, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
@@ -9,17 +9,16 @@ use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
-    known::{entry::Entry, recent_grips::RecentGrips, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{
-        holdout::Holdout,
-        strategy::{Choice, Validity},
-    },
+    known::{atlas::Atlas, resized_grips::ResizedGrips, seed_source::SeedSource},
+    model::{holdout::Holdout, strategy::Choice},
     search::{
         GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
         limits::{Limit, limits},
+        prepare,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
+        standing::{Fall, Stand, StandingStatus, StandingVerdict, no_grasp_reason, stand},
     },
 };
 use rayon::ThreadPool;
@@ -31,8 +30,7 @@ use super::{
     slices::{Site, search_in_slices},
 };
 use crate::{
-    answer::{Circumstances, ClientFrame, find_response},
-    atlases::KnownGrips,
+    answer::{Circumstances, ClientFrame, find_response, standing_report},
     error::ServiceError,
     objects::{Derived, StoredObject},
     rigs::RigHand,
@@ -65,8 +63,8 @@ pub(crate) struct FindJob {
     pub workers: usize,
     /// How much longer the search goes on after a first valid grasp that a person would not choose.
     pub improvement: Duration,
-    /// Known grips of the object for the receiving hand, and for the alternative one.
-    pub known: [KnownGrips; 2],
+    /// Atlases of the object for the receiving hand, and for the alternative one.
+    pub known: [Option<Arc<Atlas>>; 2],
     /// Mechanisms of the search that are on.
     pub mechanisms: Mechanisms,
 }
@@ -76,8 +74,6 @@ pub(crate) struct FindJob {
 pub(crate) struct Answered {
     /// The response to the call.
     pub response: v1::FindGraspResponse,
-    /// The grip with its hand if it was not known before, to be remembered.
-    pub new_grip: Option<(Arc<Hand>, Entry)>,
     /// When the search ended, before the response was made.
     pub ended: Instant,
 }
@@ -104,13 +100,16 @@ pub(super) struct PreparedJob {
     start: Instant,
     budget: Duration,
     patience: Duration,
-    /// Whether later searches may use what this one finds.
-    learns: bool,
+    /// Why the standing grasp fell, once that is known.
+    fall: OnceLock<Fall>,
 }
 
 /// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
 /// and encoding its messages. A longer look-up answers more calls without switching threads, and delays other calls.
 const LOOK_UP_TIME: Duration = Duration::from_micros(200);
+
+/// A number of tried known grips that leaves none to try.
+const ALL_TRIED: usize = usize::MAX;
 
 /// Time since a call's arrival.
 #[derive(Debug)]
@@ -124,16 +123,17 @@ impl Clock for SinceArrival {
 
 impl FindJob {
     /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames and meshes
-    /// of hands are not.
+    /// of hands are not. A standing grasp is looked at whatever is asked of searches.
     pub(super) fn is_quick_if_known(&self) -> bool {
-        let is_known = |known: &KnownGrips| known.atlas.is_some() || !known.recent.is_empty();
-        self.known.iter().any(is_known)
-            && self.resized.is_none()
-            && !self.query.is_replay
-            && self.query.choice == Choice::FirstValid
-            && !self.query.reproducible
-            && !self.query.plan_key_frames
-            && !self.query.has_hand_mesh()
+        let query = &self.query;
+        let looks_up = self.resized.is_none()
+            && !query.is_replay
+            && query.choice == Choice::FirstValid
+            && !query.reproducible;
+        self.known.iter().any(Option::is_some)
+            && (looks_up || query.standing.is_some())
+            && !query.plan_key_frames
+            && !query.has_hand_mesh()
     }
 
     /// When the search has to end, with or without a grasp.
@@ -161,7 +161,7 @@ impl FindJob {
         });
         let hands = [(first, of_first)].into_iter().chain(alternative);
         let hands = hands.zip(&self.known).map(|((hand, holdout), known)| {
-            let mut settings = self.settings(&hand.hand, known);
+            let mut settings = self.settings(&hand.hand, known.as_ref());
             let (preferred, poses): (Vec<_>, Vec<_>) = self.stored.given.preferred(&hand).into_iter().unzip();
             if !self.query.is_replay {
                 settings.known.preferred = poses.into();
@@ -175,8 +175,7 @@ impl FindJob {
         });
         Ok(PreparedJob {
             hands: hands.collect(),
-            // What holds an object at another size says little about it at its own.
-            learns: self.query.uses_atlas() && self.resized.is_none(),
+            fall: OnceLock::new(),
             query: self.query,
             derived: self.derived,
             clock: SinceArrival(self.arrived),
@@ -187,11 +186,10 @@ impl FindJob {
     }
 
     /// The settings of one hand's search.
-    fn settings(&self, hand: &Hand, known: &KnownGrips) -> SearchSettings {
+    fn settings(&self, hand: &Hand, atlas: Option<&Arc<Atlas>>) -> SearchSettings {
         let query = &self.query;
         let object_from_client = query.client_from_object.inverse();
         // Reproducible answers need a complete atlas: a growing one would change them.
-        let atlas = known.atlas.as_ref();
         let atlas = atlas.filter(|atlas| !query.reproducible || atlas.is_complete());
         let seeds = match (atlas, self.resized) {
             (Some(atlas), None) => SeedSource::Atlas(Arc::clone(atlas)),
@@ -214,15 +212,15 @@ impl FindJob {
                 choice: query.choice,
                 improvement: self.improvement,
                 other_hand: query.other_hand.as_ref().map(|hand| hand.hand.rig.clone()),
+                standing: query
+                    .standing
+                    .as_ref()
+                    .filter(|standing| standing.handedness == hand.rig.handedness)
+                    .map(|standing| standing.grasp),
             },
             known: Known {
                 atlas: atlas.filter(|_| is_answered_by_known).cloned(),
                 seeds,
-                recent: if is_answered_by_known {
-                    known.recent.clone()
-                } else {
-                    RecentGrips::default()
-                },
                 preferred: Arc::default(),
                 tried: 0,
             },
@@ -241,10 +239,22 @@ impl FindJob {
 }
 
 impl PreparedJob {
-    /// Answers with the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`] continues where this
-    /// stopped.
+    /// Answers with the standing grasp or the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`]
+    /// continues where this stopped.
     pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         let until = self.clock.now() + LOOK_UP_TIME;
+        if let Some(place) = self.standing_place() {
+            let task = self.task(place);
+            let settings = &self.hands[place].settings;
+            match stand(&prepare(task, settings), settings, &self.clock, Some(until)) {
+                Some(Stand::Settled(settled)) => return Some(self.answer_standing(place, *settled)),
+                Some(Stand::Fallen(fall)) => {
+                    self.fall.get_or_init(|| fall);
+                    self.hands[place].settings.known.tried = ALL_TRIED;
+                }
+                Some(Stand::OutOfTime) | None => return None,
+            }
+        }
         let mut best: Option<Ended> = None;
         for place in 0..self.hands.len() {
             let hands_left = (self.hands.len() - place) as u32;
@@ -286,7 +296,22 @@ impl PreparedJob {
             stop,
             progress,
         };
-        let search = |place: HandPlace| (self.task(place), &self.hands[place].settings);
+        let mut settings: Vec<SearchSettings> =
+            self.hands.iter().map(|hand| hand.settings.clone()).collect();
+        if let Some(place) = self.standing_place()
+            && self.fall.get().is_none()
+        {
+            let settings = &mut settings[place];
+            match stand(&prepare(self.task(place), settings), settings, &self.clock, None) {
+                Some(Stand::Settled(settled)) => return self.answer_standing(place, *settled),
+                Some(Stand::Fallen(fall)) => {
+                    self.fall.get_or_init(|| fall);
+                    settings.known.tried = ALL_TRIED;
+                }
+                Some(Stand::OutOfTime) | None => {}
+            }
+        }
+        let search = |place: HandPlace| (self.task(place), &settings[place]);
         let ended = if self.hands.len() > 1 {
             search_either(site, [search(0), search(1)], self.patience)
         } else {
@@ -294,6 +319,36 @@ impl PreparedJob {
             search_in_slices(site, task, settings, self.patience)
         };
         self.answer(ended)
+    }
+
+    /// The hand of the standing grasp.
+    fn standing_place(&self) -> Option<HandPlace> {
+        let has_it = |hand: &HandSearch| hand.settings.query.standing.is_some();
+        self.hands.iter().position(has_it)
+    }
+
+    /// Makes the response without a search.
+    fn answer_standing(
+        &self,
+        hand: HandPlace,
+        (outcome, verdict): (SearchOutcome, StandingVerdict),
+    ) -> Result<Answered, ServiceError> {
+        self.answer_with(Ended { hand, outcome }, Some(verdict))
+    }
+
+    /// What became of a standing grasp that fell.
+    fn verdict_after(&self, ended: &Ended) -> Option<StandingVerdict> {
+        let place = self.standing_place()?;
+        let settings = &self.hands[place].settings;
+        let scene = prepare(self.task(place), settings);
+        let is_same_hand = ended.hand == place;
+        let mut verdict =
+            StandingVerdict::after_search(&scene, self.fall.get().copied(), &ended.outcome, is_same_hand);
+        if verdict.status == StandingStatus::None {
+            let limits = &ended.outcome.report.limits;
+            verdict.no_grasp = Some(no_grasp_reason(&scene, settings, limits));
+        }
+        Some(verdict)
     }
 
     fn task(&self, place: HandPlace) -> Task<'_> {
@@ -310,29 +365,36 @@ impl PreparedJob {
     /// # Errors
     /// The search was stopped.
     pub(super) fn answer(&self, ended: Ended) -> Result<Answered, ServiceError> {
+        self.answer_with(ended, None)
+    }
+
+    /// The same with what became of a standing grasp, unless the search tells.
+    fn answer_with(&self, ended: Ended, verdict: Option<StandingVerdict>) -> Result<Answered, ServiceError> {
+        let mut ended_search = ended;
+        let ended = Instant::now();
+        let search_time = ended - self.start;
+        if matches!(
+            ended_search.outcome.end,
+            SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted
+        ) {
+            // A small part of what the budget leaves for the way back.
+            ended_search.outcome.report.limits = self.limits();
+        }
+        let verdict = verdict.or_else(|| self.verdict_after(&ended_search));
         let Ended {
             hand: place,
             mut outcome,
-        } = ended;
+        } = ended_search;
         let HandSearch {
             hand,
             holdout,
             settings,
             preferred,
         } = &self.hands[place];
-        let ended = Instant::now();
-        let search_time = ended - self.start;
         if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
             let approach = settings.query.constraints.approach;
             let friction = settings.query.friction_on(&holdout.object);
             plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
-        }
-        if matches!(
-            outcome.end,
-            SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted
-        ) {
-            // A small part of what the budget leaves for the way back.
-            outcome.report.limits = self.limits();
         }
         let frame = ClientFrame {
             convention: self.query.convention,
@@ -351,17 +413,23 @@ impl PreparedJob {
             },
             other_atlas: other.and_then(|other| other.settings.known.seeds.atlas()),
         };
-        Ok(Answered {
-            response: find_response(
-                &outcome,
-                (hand, self.query.other_hand.as_ref()),
-                frame,
-                settings,
-                circumstances,
-            )?,
-            new_grip: self.new_grip(&outcome, place),
-            ended,
-        })
+        let mut response = find_response(
+            &outcome,
+            (hand, self.query.other_hand.as_ref()),
+            frame,
+            settings,
+            circumstances,
+        )?;
+        if let (Some(given), Some(verdict)) = (&self.query.standing, verdict) {
+            if let (StandingStatus::Kept | StandingStatus::Adjusted, Some(grasp)) =
+                (verdict.status, &mut response.grasp)
+            {
+                // Rounding to and from the client's convention would move the hand a little with every request.
+                grasp.object_from_wrist = Some(given.object_from_wrist);
+            }
+            response.standing = Some(standing_report(&verdict, hand, frame));
+        }
+        Ok(Answered { response, ended })
     }
 
     /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same.
@@ -377,24 +445,6 @@ impl PreparedJob {
             all.extend(new);
         }
         all
-    }
-
-    /// The grip to remember: one that was found by an attempt under the object's own friction, which the grips of an
-    /// atlas are made for.
-    fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(Arc<Hand>, Entry)> {
-        let HandSearch {
-            hand,
-            holdout,
-            settings,
-            ..
-        } = &self.hands[place];
-        let own_friction = holdout.object.friction_under(Validity::Physical);
-        let is_new = self.learns && matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
-        let grasp = outcome.grasp.as_ref()?;
-        let entry = (is_new && settings.query.friction_on(&holdout.object) == own_friction)
-            .then(|| Entry::of_grasp(grasp))
-            .flatten();
-        entry.map(|entry| (Arc::clone(&hand.hand), entry))
     }
 }
 

@@ -14,7 +14,6 @@ use std::{
 
 use grasp_synthesis::{
     base::clock::Clock,
-    known::recent_grips::RecentGrips,
     model::strategy::Choice,
     search::{
         SearchEnd, SearchOutcome, find_grasp_in, prepare,
@@ -88,7 +87,6 @@ impl<'a> Slices<'a> {
         self.next.run.max_attempts = self.left.min(attempts);
         let outcome = find_grasp_in(site.pool, &self.scene, &self.next, site.clock, site.stop);
         self.next.known.atlas = None;
-        self.next.known.recent = RecentGrips::default();
         self.next.known.preferred = Arc::default();
         self.left -= self.next.run.max_attempts;
         outcome
@@ -109,7 +107,6 @@ impl<'a> Slices<'a> {
     /// Restores the known grips, to be tried again.
     pub(super) fn restore_known(&mut self, settings: &SearchSettings) {
         self.next.known.atlas.clone_from(&settings.known.atlas);
-        self.next.known.recent.clone_from(&settings.known.recent);
         self.next.known.preferred.clone_from(&settings.known.preferred);
     }
 }

@@ -61,9 +61,6 @@ impl GraspHandler {
         call.search_is_due(job.due());
         let answered = search::find(job, &shared.executor, admission).await?;
         call.search_ended(answered.ended);
-        if let Some((hand, grip)) = answered.new_grip {
-            shared.atlases.remember(&stored, &hand, grip);
-        }
         call.log_search(summary(&answered.response));
         Ok(answered.response)
     }

@@ -251,7 +251,7 @@ impl Track {
             answer.standing = Some(aborted.clone());
         } else {
             let found = self.find(frame).await?;
-            let report = found.standing.unwrap_or_default();
+            let report = found.standing.clone().unwrap_or_else(|| first_report(&found));
             self.holding.learn(&report, found.grasp.as_ref(), self.hand_scale, captured);
             answer.client_from_wrist = found.grasp.as_ref().and_then(|grasp| grasp.client_from_wrist);
             answer.score = found
@@ -268,26 +268,48 @@ impl Track {
     }
 
     /// Finds the grasp for a frame, as a call with a standing grasp does.
-    async fn find(&mut self, frame: Frame) -> Result<v1::FindGraspResponse, ServiceError> {
-        let standing = self.holding.standing(&frame, &self.policy, self.convention);
+    async fn find(&mut self, mut frame: Frame) -> Result<v1::FindGraspResponse, ServiceError> {
+        if let Some(standing) = self.holding.standing(&frame, &self.policy, self.convention) {
+            frame.query.hold_on_to(standing, &self.handler.shared.rigs)?;
+        }
         let call = self.call.of_part(frame.arrived);
         let object = self.handler.shared.object(&self.object_id, &call).await?.object;
         self._held = object.hold();
-        let _ = standing;
         match self.handler.answer(frame.query, &call).await {
             Err(ServiceError::Overloaded {
                 limit: Limit::Searches,
                 ..
             }) => Ok(v1::FindGraspResponse {
-                standing: Some(v1::StandingReport {
-                    status: v1::StandingStatus::None.into(),
-                    no_grasp: v1::NoGraspReason::NotFoundInTime.into(),
-                    ..Default::default()
-                }),
+                standing: Some(none(v1::NoGraspReason::NotFoundInTime)),
                 ..Default::default()
             }),
             found => found.map_err(|error| error.within("frame")),
         }
+    }
+}
+
+/// The report on an answer before which nothing stood.
+fn first_report(found: &v1::FindGraspResponse) -> v1::StandingReport {
+    if found.grasp.is_some() {
+        return v1::StandingReport {
+            status: v1::StandingStatus::Replanned.into(),
+            ..Default::default()
+        };
+    }
+    let limits = found.report.iter().flat_map(|report| &report.limits);
+    let reason = limits.map(|limit| match limit.kind() {
+        v1::LimitKind::Giver => v1::NoGraspReason::GiverInTheWay,
+        v1::LimitKind::Reach => v1::NoGraspReason::OutOfReach,
+        _ => v1::NoGraspReason::CannotBeHeld,
+    });
+    none(reason.last().unwrap_or(v1::NoGraspReason::NotFoundInTime))
+}
+
+fn none(reason: v1::NoGraspReason) -> v1::StandingReport {
+    v1::StandingReport {
+        status: v1::StandingStatus::None.into(),
+        no_grasp: reason.into(),
+        ..Default::default()
     }
 }
 

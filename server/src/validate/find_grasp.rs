@@ -20,6 +20,7 @@ use super::{
     obstacles, pose,
     receiver::{Stances, Surroundings, stances},
     search_limits::{SearchLimits, search_limits},
+    standing::{Asked, StandingQuery, standing},
 };
 use crate::{
     convention::Convention,
@@ -84,6 +85,8 @@ pub(crate) struct FindQuery {
     pub is_replay: bool,
     /// True to plan the key frames of approach and closing.
     pub plan_key_frames: bool,
+    /// The grasp to hold on to.
+    pub standing: Option<StandingQuery>,
 }
 
 impl FindQuery {
@@ -231,6 +234,15 @@ pub(super) fn checked_find_query(
     );
     let chooses_hand = !is_named && !takes_both_hands && validity == Validity::Physical;
     check_replay(request.only_attempt, chooses_hand, v);
+    let asked = Asked {
+        convention,
+        searched: (strategy, validity),
+        takes_both_hands,
+        is_replay: request.only_attempt.is_some(),
+        hands: receiving_hands.as_ref(),
+        chooses_hand,
+    };
+    let standing = standing(request.standing, &asked, rigs, v);
     let surroundings = Surroundings {
         convention,
         object: object_origin,
@@ -268,6 +280,7 @@ pub(super) fn checked_find_query(
         allows_atlas: atlas_use != v1::AtlasUse::None,
         is_replay: request.only_attempt.is_some(),
         plan_key_frames: request.plan_key_frames,
+        standing,
     })
 }
 

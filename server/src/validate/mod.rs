@@ -18,6 +18,7 @@ mod receiver;
 mod regions;
 mod rig;
 mod search_limits;
+mod standing;
 mod track;
 mod update;
 mod upload;

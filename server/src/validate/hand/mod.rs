@@ -181,7 +181,7 @@ pub(super) fn hand_scale(field: Field<'_>, scale: Option<f32>, violations: &mut 
     1.0
 }
 
-fn rig_named(
+pub(super) fn rig_named(
     field: Field<'_>,
     name: &str,
     rigs: &RigStore,

@@ -23,8 +23,6 @@ pub enum Mechanism {
     GiverOrder,
     /// Starts balancing a known grip's forces from the friction it is known to use.
     FrictionUses,
-    /// After the atlas, tries grips that recent searches found.
-    RecentGrips,
     /// Spends the first 300 µs of a search on known grips alone, before waking workers.
     HeadStart,
     /// Looks up known grips on the caller's own thread before handing the search to workers.
@@ -57,7 +55,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All mechanisms, in the order in which a search uses them.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 21] = [
         Self::AtlasLookUp,
         Self::Shortlists,
         Self::GravityOrder,
@@ -65,7 +63,6 @@ impl Mechanism {
         Self::InnerSpheres,
         Self::GiverOrder,
         Self::FrictionUses,
-        Self::RecentGrips,
         Self::HeadStart,
         Self::CallerLookUp,
         Self::Seeds,
@@ -92,7 +89,6 @@ impl Mechanism {
             Self::InnerSpheres => "inner-spheres",
             Self::GiverOrder => "giver-order",
             Self::FrictionUses => "friction-uses",
-            Self::RecentGrips => "recent-grips",
             Self::HeadStart => "head-start",
             Self::CallerLookUp => "caller-look-up",
             Self::Seeds => "seeds",

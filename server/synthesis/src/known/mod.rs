@@ -27,7 +27,6 @@ mod inner_spheres;
 pub mod key;
 mod occupancy;
 pub mod primitives;
-pub mod recent_grips;
 pub mod recheck;
 pub mod resized_grips;
 pub mod seed_source;

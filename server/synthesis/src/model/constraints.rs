@@ -152,7 +152,8 @@ impl Constraints {
 }
 
 impl Reach {
-    fn admits(&self, object_from_wrist: Pose) -> bool {
+    /// True if the wrist is within reach.
+    pub fn admits(&self, object_from_wrist: Pose) -> bool {
         self.shoulder.distance_squared(object_from_wrist.position) <= self.distance * self.distance
     }
 }

@@ -7,7 +7,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::solids::{Bounded, PreparedHand, SPHERES, Spheres, TaperedCapsule, TrackedSolids, clearance};
+use super::{
+    grip::GIVER_CLEARANCE,
+    solids::{Bounded, PreparedHand, SPHERES, Spheres, TaperedCapsule, TrackedSolids, clearance},
+};
 use crate::{
     geometry::solid_box::SolidBox,
     model::{hand::mesh::HandMesh, obstacle::Obstacle},
@@ -16,6 +19,9 @@ use crate::{
 /// How much closer than to another hand a hand may come to an obstacle, in metres: 0.1 mm remain, against rounding. A
 /// hand that takes something thin from a table all but touches it; with half of this, no pen on a table can be taken.
 const CLOSER_TO_OBSTACLES: f32 = 0.0009;
+
+/// Clearance between the hand and forearm and obstacles, in metres.
+pub const OBSTACLE_CLEARANCE: f32 = GIVER_CLEARANCE - CLOSER_TO_OBSTACLES;
 
 /// Comparisons of prepared hands that take as long as one with a mesh, about.
 const MESH_COMPARISONS: usize = 16;

@@ -60,6 +60,19 @@ impl Closer<'_> {
         }
     }
 
+    /// The same with another yaw than the shape's.
+    fn closing_at<'a>(&'a self, digit: Digit, base_yaw: f32, obstacles: &'a [Obstacle]) -> Closing<'a> {
+        let closing = self.closing(digit, obstacles);
+        Closing {
+            flexing: Flexing {
+                base_yaw,
+                ..closing.flexing
+            },
+            plane: DigitPlane::new(closing.flexing.digit, self.object_from_wrist, base_yaw),
+            ..closing
+        }
+    }
+
     /// A digit that somebody posed, closed or opened as little as it takes to touch. `None` if it cannot be freed.
     pub(super) fn settle(
         &self,
@@ -67,16 +80,18 @@ impl Closer<'_> {
         posed: DigitAngles,
         obstacles: &[Obstacle],
     ) -> Option<ClosedDigit> {
-        let closing = self.closing(digit, obstacles);
-        let settling = Closing {
-            flexing: Flexing {
-                base_yaw: posed.base_yaw,
-                ..closing.flexing
-            },
-            plane: DigitPlane::new(closing.flexing.digit, self.object_from_wrist, posed.base_yaw),
-            ..closing
-        };
-        settling.settle(posed)
+        self.closing_at(digit, posed.base_yaw, obstacles).settle(posed)
+    }
+
+    /// A relaxed pose with a given yaw, bent by `flexion` radians in total or less if something stops it.
+    pub(super) fn relaxed(
+        &self,
+        digit: Digit,
+        base_yaw: f32,
+        flexion: f32,
+        obstacles: &[Obstacle],
+    ) -> DigitAngles {
+        self.closing_at(digit, base_yaw, obstacles).relax(flexion).angles
     }
 
     /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to a barrier.

@@ -259,6 +259,17 @@ impl Receiver {
         !self.must_reach() || self.has_elbow(rig, wrist)
     }
 
+    /// If the arm must reach the wrist: the distance of its shoulder from there, and the length of its stretched bones, in metres.
+    pub fn shoulder_distance(&self, wrist: Pose) -> Option<[f32; 2]> {
+        match self.stance {
+            Stance::At(arm) => Some([
+                arm.shoulder.distance(wrist.position),
+                arm.upper_arm + arm.forearm,
+            ]),
+            Stance::Any | Stance::Facing => None,
+        }
+    }
+
     /// True if one of the arms reaches the wrist, or if none is expected.
     fn has_elbow(&self, rig: &Rig, wrist: Pose) -> bool {
         let has_elbow = |&arm: &Arm| {

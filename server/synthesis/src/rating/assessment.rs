@@ -14,7 +14,7 @@ use crate::{
         constraints::Constraints,
         grasp::{Contact, Grasp, PhysicalMargins},
         grasp_type::{Classification, GraspType},
-        hand::rig::Rig,
+        hand::{HandPose, rig::Rig},
         object::GraspObject,
     },
     physical::{
@@ -105,6 +105,11 @@ impl GraspContext<'_> {
             return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
         }
         Ok(classification)
+    }
+
+    /// The type of a closed hand with these contacts.
+    pub fn grasp_type(&self, pose: &HandPose, contacts: &[Contact]) -> Option<GraspType> {
+        classify(self.rig, pose, contacts, &self.object.object.local_shape).grasp_type
     }
 
     /// The hand's distances from what it keeps clear of.

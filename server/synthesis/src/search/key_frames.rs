@@ -8,6 +8,7 @@
 //! samples.
 
 mod motion;
+pub(super) mod withdrawal;
 
 use std::cell::{Cell, OnceCell};
 

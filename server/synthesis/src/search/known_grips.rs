@@ -1,4 +1,4 @@
-//! Known grips as candidates of a race: preferred hands, those of the atlas, then recent ones.
+//! Known grips as candidates of a race: preferred hands, then those of the atlas.
 //!
 //! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, of the shortlist, then of
 //! the whole atlas; then, only if none of them is valid, those of the next grade.
@@ -6,7 +6,7 @@
 use std::{
     ops::Deref,
     sync::{
-        Arc, LazyLock, OnceLock,
+        LazyLock, OnceLock,
         atomic::{AtomicUsize, Ordering},
     },
 };
@@ -66,8 +66,6 @@ pub(super) struct KnownGrips<'a> {
     order: &'a [u16],
     /// What grips are graded by; none if all are alike.
     grading: Option<Grading<'a>>,
-    /// Recent grips. Mostly they are worse than those of the atlas, which are a selection.
-    recent: &'a [Arc<Entry>],
     scene: &'a Scene<'a>,
     checker: GripChecker<'a>,
     barriers: Barriers<'a>,
@@ -75,7 +73,7 @@ pub(super) struct KnownGrips<'a> {
     mechanisms: Mechanisms,
     /// Grips that certainly collide with the giver, computed on first use.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place to try, counted through `preferred`, `listed`, the passes through `order`, and `recent`.
+    /// The next place to try, counted through `preferred`, `listed`, and the passes through `order`.
     cursor: AtomicUsize,
 }
 
@@ -230,13 +228,8 @@ impl<'a> KnownGrips<'a> {
         let mechanisms = settings.run.mechanisms;
         let atlas = settings.known.atlas.as_deref();
         let atlas = atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp));
-        let recent = if settings.run.reproducible || !mechanisms.has(Mechanism::RecentGrips) {
-            &[]
-        } else {
-            settings.known.recent.entries()
-        };
         let preferred = &*settings.known.preferred;
-        let has_any = atlas.is_some() || !recent.is_empty() || !preferred.is_empty();
+        let has_any = atlas.is_some() || !preferred.is_empty();
         if !has_any || !settings.query.uses_known_grips() {
             return None;
         }
@@ -277,7 +270,6 @@ impl<'a> KnownGrips<'a> {
                 regions: object.object.regions(),
             }),
             order: atlas.map_or(&[], order),
-            recent,
             scene,
             checker: GripChecker::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
             barriers,
@@ -317,7 +309,7 @@ impl<'a> KnownGrips<'a> {
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let first = self.preferred.len();
-        let end = first + self.listed.len() + self.passes() * self.order.len() + self.recent.len();
+        let end = first + self.listed.len() + self.passes() * self.order.len();
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
@@ -363,9 +355,6 @@ impl<'a> KnownGrips<'a> {
             };
             return self.of_atlas(index, fit, || Some(Solids::Stored(solids)));
         };
-        if place >= self.passes() * self.order.len() {
-            return Some(self.recent_at(place - self.passes() * self.order.len()));
-        }
         let (pass, index) = (place / self.order.len(), self.order[place % self.order.len()]);
         let atlas = self.atlas?;
         if let Some(giver) = self.barriers.giver
@@ -402,17 +391,6 @@ impl<'a> KnownGrips<'a> {
                 .screen_by_second_spheres(place, self.rig, self.barriers);
             screened.map(Solids::Computed)
         })
-    }
-
-    /// A recent grip, which few look-ups reach.
-    #[inline(never)]
-    fn recent_at(&self, index: usize) -> Candidate<'a> {
-        let entry = &self.recent[index];
-        Candidate {
-            source: GraspSource::Recent,
-            entry,
-            solids: Solids::Computed(Box::new(entry.tracked_solids(self.rig))),
-        }
     }
 
     /// A grip of the atlas that may have the grade tried, if it has and its hand may be clear of barriers.

@@ -12,6 +12,7 @@ mod race;
 mod report;
 pub mod scene;
 pub mod settings;
+pub mod standing;
 mod tally;
 mod turns;
 
@@ -44,6 +45,8 @@ pub enum SearchEnd {
     AttemptsExhausted,
     /// The stop flag was set.
     Stopped,
+    /// It did not start: the standing grasp is committed and not valid.
+    Aborted,
 }
 
 /// The outcome of a search.

@@ -16,6 +16,7 @@ use super::{
     report::{GraspSource, SearchReport},
     scene::Scene,
     settings::SearchSettings,
+    standing::{is_at_hand, nearness},
     tally::{Record, Tally},
 };
 use crate::{
@@ -88,7 +89,7 @@ impl Winner {
     fn index(&self) -> Option<u64> {
         match self.source {
             GraspSource::Attempt(index) => Some(index),
-            GraspSource::Atlas(_) | GraspSource::Recent | GraspSource::Preferred(_) => None,
+            GraspSource::Atlas(_) | GraspSource::Standing | GraspSource::Preferred(_) => None,
         }
     }
 }
@@ -153,8 +154,8 @@ impl<'a> Race<'a> {
                     break;
                 }
                 AttemptEnd::Valid(grasp) => {
-                    let is_chosen = !self.has_preferences() || self.scene.preference().is_met_by(&grasp);
-                    let value = grasp_value(&grasp);
+                    let is_chosen = !self.has_preferences() || self.is_met_by(&grasp);
+                    let value = self.value_of(&grasp);
                     self.record_valid(GraspSource::Attempt(index), grasp, value, is_chosen);
                     None
                 }
@@ -297,7 +298,7 @@ impl<'a> Race<'a> {
                         self.settles.fetch_min(nanos, Ordering::SeqCst);
                     }
                     // Known grips are tried from the best grade on, so they are not replaced.
-                    GraspSource::Atlas(_) | GraspSource::Recent | GraspSource::Preferred(_) => {}
+                    GraspSource::Atlas(_) | GraspSource::Standing | GraspSource::Preferred(_) => {}
                 }
                 winners.others.push(winner);
                 return;
@@ -316,6 +317,23 @@ impl<'a> Race<'a> {
         };
         if is_preferred {
             *rival = Some(winner);
+        }
+    }
+
+    /// True if a search for the first valid grasp need not look for another one: a person would choose it or, after a standing
+    /// grasp, it is next to the present hand.
+    fn is_met_by(&self, grasp: &Grasp) -> bool {
+        self.scene.standing().map_or_else(
+            || self.scene.preference().is_met_by(grasp),
+            |standing| is_at_hand(standing, grasp),
+        )
+    }
+
+    /// The quality of an attempt's grasp; after a standing grasp, a search for the first valid one prefers the nearest.
+    fn value_of(&self, grasp: &Grasp) -> f32 {
+        match self.scene.standing() {
+            Some(standing) if self.settings.query.choice == Choice::FirstValid => nearness(standing, grasp),
+            _ => grasp_value(grasp),
         }
     }
 

@@ -104,8 +104,8 @@ pub enum GraspSource {
     Attempt(u64),
     /// A grip of the atlas, by index.
     Atlas(u16),
-    /// A recent grip.
-    Recent,
+    /// The standing grasp, as it is or with digits moved out of the way.
+    Standing,
     /// A preferred hand, by index.
     Preferred(u16),
 }

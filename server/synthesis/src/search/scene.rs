@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use super::{
     preference::Preference,
     settings::SearchSettings,
+    standing::Standing,
     turns::{HandleUse, Turn},
 };
 use crate::{
@@ -22,15 +23,15 @@ use crate::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
         grasp::Grasp,
-        hand::rig::Rig,
+        hand::{Digit, rig::Rig},
         holdout::Holdout,
         strategy::{Strategy, Validity},
     },
     physical::{
         barriers::Barriers,
-        grip::wrist_after_advance,
+        grip::{Grip, wrist_after_advance},
         scene::{ObjectScene, Presented},
-        shape::Proposal,
+        shape::{HandShape, Proposal},
     },
     propose::{
         handles::wrap_handle,
@@ -42,6 +43,11 @@ use crate::{
     rating::assessment::GraspContext,
     thesis,
 };
+
+/// Every how many attempts one is placed next to the present hand of a standing grasp, and how far from it, in metres per axis
+/// and radians. More of them find nothing where the giver has moved in.
+const NEAR_HAND_EVERY: u64 = 2;
+const NEAR_HAND: [f32; 2] = [0.03, 0.5];
 
 /// What to grasp, and with which hand.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +91,8 @@ pub struct Scene<'a> {
     other_hand: Option<PreparedRig>,
     /// What a person would choose, computed on first use.
     preference: OnceLock<Preference>,
+    /// The grasp to hold on to.
+    standing: Option<Standing>,
 }
 
 impl<'a> Scene<'a> {
@@ -120,6 +128,7 @@ impl<'a> Scene<'a> {
             mechanisms,
             other_hand: query.other_hand.clone(),
             preference: OnceLock::new(),
+            standing: query.standing,
             physical: match query.validity {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
@@ -196,6 +205,11 @@ impl<'a> Scene<'a> {
         }
     }
 
+    /// The grasp to hold on to.
+    pub fn standing(&self) -> Option<&Standing> {
+        self.standing.as_ref()
+    }
+
     /// What a person would choose.
     pub(super) fn preference(&self) -> Preference {
         *self.preference.get_or_init(|| {
@@ -247,6 +261,9 @@ impl<'a> Scene<'a> {
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Guided> {
+        if let Some(near) = self.near_present_hand(stream) {
+            return Some(near);
+        }
         if let Some((_, presented)) = &self.physical {
             let object = self.task.object;
             let wraps = self.mechanisms.has(Mechanism::Handles);
@@ -285,6 +302,33 @@ impl<'a> Scene<'a> {
         };
         Some(Guided {
             proposal,
+            is_special: false,
+        })
+    }
+
+    /// A hand next to the present one, in some attempts after a standing grasp. Leaves the stream as [`Self::wrap`] does.
+    fn near_present_hand(&self, stream: &AttemptStream) -> Option<Guided> {
+        let standing = self.standing.as_ref()?;
+        if !stream.attempt().is_multiple_of(NEAR_HAND_EVERY) {
+            return None;
+        }
+        let rig: &Rig = self.task.rig;
+        let grip = Grip {
+            pose: standing.hand,
+            bend_ratios: Digit::ALL.map(|digit| rig.has(digit).then_some(1.0)),
+            penetration: 0.0,
+            epsilon: 0.0,
+        };
+        let wrist = standing.present.frame_from_wrist;
+        let there = Proposal {
+            object_from_wrist: wrist,
+            shape: HandShape::of_grip(rig, &grip),
+            advance: 0.0,
+        };
+        let pivot = wrist.transform_point(rig.palm);
+        let proposal = there.perturbed_about(pivot, NEAR_HAND, &mut stream.clone());
+        Some(Guided {
+            proposal: self.shaped(proposal),
             is_special: false,
         })
     }

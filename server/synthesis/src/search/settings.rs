@@ -2,9 +2,10 @@
 
 use std::{sync::Arc, time::Duration};
 
+use super::standing::Standing;
 use crate::{
     base::mechanisms::Mechanisms,
-    known::{atlas::Atlas, recent_grips::RecentGrips, seed_source::SeedSource},
+    known::{atlas::Atlas, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -50,6 +51,9 @@ pub struct Query {
     pub improvement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,
+    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::standing::stand`] decides
+    /// about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
+    pub standing: Option<Standing>,
 }
 
 impl Default for Query {
@@ -63,6 +67,7 @@ impl Default for Query {
             choice: Choice::FirstValid,
             improvement: IMPROVEMENT,
             other_hand: None,
+            standing: None,
         }
     }
 }
@@ -87,9 +92,6 @@ pub struct Known {
     pub atlas: Option<Arc<Atlas>>,
     /// Where attempts take seeds from if no known grip is valid; likewise.
     pub seeds: SeedSource,
-    /// Grips that earlier searches found, under the object's own friction. They are tried after those of the
-    /// atlas; reproducible searches ignore them.
-    pub recent: RecentGrips,
     /// Hands in the object's frame that are tried before all other known grips, likewise.
     pub preferred: Arc<[HandPose]>,
     /// Number of known grips to skip, from [`super::LookUp::NotFound`] for the same ones.
@@ -99,7 +101,7 @@ pub struct Known {
 impl Known {
     /// True if there are no grips to try.
     pub fn is_empty(&self) -> bool {
-        self.atlas.is_none() && self.recent.is_empty() && self.preferred.is_empty()
+        self.atlas.is_none() && self.preferred.is_empty()
     }
 }
 

@@ -86,7 +86,7 @@ impl Gripper {
 }
 
 /// The shape of the hand, as far as its grip keeps one: how much the second joints bend per degree of the first.
-fn shape_of(pose: &HandPose) -> HandShape {
+pub(super) fn shape_of(pose: &HandPose) -> HandShape {
     let ratio = |digit: Digit| {
         let DigitAngles {
             base_pitch,

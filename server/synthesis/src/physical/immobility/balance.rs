@@ -116,13 +116,20 @@ pub fn balance_with(
     if let Some(found) = problem.lowest_friction_balance(least_use, solvers) {
         return Some(found);
     }
-    let mut found = problem.best(solvers);
-    if found.residual <= BALANCE_TOLERANCE && exceeds_limit(&found) {
-        problem.limited = true;
-        found = problem.best(solvers);
-    }
-    problem.keep_limits(&mut found);
+    let found = problem.any_balance(solvers);
     (found.residual <= BALANCE_TOLERANCE).then_some(found)
+}
+
+/// What contacts that [`balance`] finds no forces for leave unbalanced, as a share of the weight: by the best forces found
+/// before it gave up.
+///
+/// # Panics
+/// As [`balance`].
+pub fn unbalanced_share(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> f32 {
+    let Buffers { cones, solvers, .. } = buffers;
+    cones.clear();
+    cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
+    Problem::new(contacts, load, cones).any_balance(solvers).residual
 }
 
 /// Sum of the digits' normal forces, in newtons, that holds a weight in newtons firmly.
@@ -210,6 +217,17 @@ impl<'a> Problem<'a> {
             }
         }
         firmest.map(|(_, found)| found)
+    }
+
+    /// Forces with all of the friction, whether they balance or not.
+    fn any_balance(&mut self, solvers: &mut Solvers) -> Balance {
+        let mut found = self.best(solvers);
+        if found.residual <= BALANCE_TOLERANCE && exceeds_limit(&found) {
+            self.limited = true;
+            found = self.best(solvers);
+        }
+        self.keep_limits(&mut found);
+        found
     }
 
     /// Sum of the digits' normal forces over the weight.

@@ -1,0 +1,287 @@
+//! Known grips near the present hand, or better than a standing grasp.
+
+use std::{cmp::Reverse, collections::BinaryHeap};
+
+use super::{
+    OutOfTime, Stand, Standing, StandingStatus, StandingVerdict,
+    way::{HandWay, WristWay, cost_if_free, detour},
+};
+use crate::{
+    base::{mechanisms::Mechanism, stopwatch::NoStopwatch},
+    known::{atlas::Atlas, entry::Entry, gravity::nearest_direction, recheck::GripChecker},
+    model::{
+        grasp::Grasp,
+        score::Term,
+        strategy::Validity,
+    },
+    physical::grip::Gripper,
+    rating::assessment::GraspContext,
+    search::{
+        GraspSource, SearchEnd, SearchOutcome, SearchReport, known_grips::grasp_value, scene::Scene,
+        settings::SearchSettings,
+    },
+};
+
+/// How much farther than the nearest valid grip another one may be that costs less altogether.
+const NEARLY_NEAREST: f32 = 1.25;
+
+/// Most valid grips that are compared, at some 10 µs each.
+const MOST_COMPARED: usize = 16;
+
+/// Steps of an entry's score.
+const QUANTA: f32 = 254.0;
+
+/// How much higher than estimated a score may be: gravity is up to 18° from the direction that an entry was rated under. More
+/// checks more grips in vain.
+const ESTIMATE_SLACK: f32 = 0.05;
+
+/// A valid known grip.
+#[derive(Debug)]
+pub(super) struct Known {
+    /// Where it comes from.
+    pub(super) source: GraspSource,
+    /// The grasp.
+    pub(super) grasp: Box<Grasp>,
+}
+
+/// Looks for known grips.
+pub(super) struct Replanner<'a> {
+    scene: &'a Scene<'a>,
+    settings: &'a SearchSettings,
+    around: &'a GraspContext<'a>,
+    standing: &'a Standing,
+    checker: GripChecker<'a>,
+    atlas: Option<&'a Atlas>,
+}
+
+impl<'a> Replanner<'a> {
+    pub(super) fn new(
+        scene: &'a Scene<'a>,
+        settings: &'a SearchSettings,
+        around: &'a GraspContext<'a>,
+        standing: &'a Standing,
+    ) -> Self {
+        let mechanisms = settings.run.mechanisms;
+        let atlas = settings.known.atlas.as_deref();
+        Self {
+            scene,
+            settings,
+            around,
+            standing,
+            checker: GripChecker::new(&around.object, around.rig, around.presented)
+                .with_mechanisms(mechanisms),
+            atlas: atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp)),
+        }
+    }
+
+    /// The valid grip to follow a fallen grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
+    /// the one that costs least. The nearest first; none if none is valid.
+    pub(super) fn nearest(
+        &self,
+        gripper: &mut Gripper,
+        is_late: &impl Fn() -> bool,
+    ) -> Result<Option<Known>, OutOfTime> {
+        if let Some(preferred) = self.preferred(gripper, is_late)? {
+            return Ok(Some(preferred));
+        }
+        let Some(atlas) = self.atlas else {
+            return Ok(None);
+        };
+        let mut by_way: BinaryHeap<Reverse<(u32, u16)>> = (0..)
+            .zip(atlas.entries())
+            // Bits of positive numbers have their order.
+            .map(|(index, entry)| Reverse((self.way_to(entry).to_bits(), index)))
+            .collect();
+        let mut farthest = f32::INFINITY;
+        let mut valid: Vec<(f32, Known)> = Vec::new();
+        while let Some(Reverse((way, index))) = by_way.pop() {
+            let way = f32::from_bits(way);
+            if way > farthest || valid.len() == MOST_COMPARED {
+                break;
+            }
+            if is_late() {
+                return Err(OutOfTime);
+            }
+            let Some(grasp) = self.check(atlas, index, gripper) else {
+                continue;
+            };
+            if valid.is_empty() {
+                farthest = way * NEARLY_NEAREST;
+            }
+            let value = grasp_value(&grasp);
+            let cost = cost_if_free(self.around.rig, &self.standing.present, &grasp, value);
+            let source = GraspSource::Atlas(index);
+            valid.push((cost, Known { source, grasp }));
+        }
+        Ok(self.cheapest(valid))
+    }
+
+    /// The grip that costs least, first in order of equal ones.
+    fn cheapest(&self, mut valid: Vec<(f32, Known)>) -> Option<Known> {
+        valid.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut best: Option<(f32, Known)> = None;
+        for (cost, known) in valid {
+            if best.as_ref().is_some_and(|(least, _)| cost >= *least) {
+                break;
+            }
+            let cost = cost + detour(self.scene, &self.standing.present, &known.grasp.pose);
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, known));
+            }
+        }
+        best.map(|(_, known)| known)
+    }
+
+    /// The nearest valid one of the preferred hands.
+    fn preferred(
+        &self,
+        gripper: &mut Gripper,
+        is_late: &impl Fn() -> bool,
+    ) -> Result<Option<Known>, OutOfTime> {
+        let present = self.standing.present.frame_from_wrist;
+        let mut hands: Vec<_> = self.settings.known.preferred.iter().enumerate().collect();
+        hands.sort_by_cached_key(|(_, hand)| {
+            WristWay::between(present, hand.frame_from_wrist)
+                .length()
+                .to_bits()
+        });
+        for (index, hand) in hands {
+            if is_late() {
+                return Err(OutOfTime);
+            }
+            let GraspContext {
+                object,
+                presented,
+                rig,
+                ..
+            } = self.around;
+            let held = gripper
+                .hold_posed(object, rig, hand, presented)
+                .and_then(|(grip, solids)| self.around.assess(&grip, &solids, gripper, &mut NoStopwatch));
+            if let Ok(grasp) = held {
+                let source = GraspSource::Preferred(index as u16);
+                return Ok(Some(Known { source, grasp }));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The valid grip of the atlas with the highest score, if that is at least `least`.
+    pub(super) fn best(
+        &self,
+        least: f32,
+        gripper: &mut Gripper,
+        is_late: &impl Fn() -> bool,
+    ) -> Result<Option<Known>, OutOfTime> {
+        let Some(atlas) = self.atlas else {
+            return Ok(None);
+        };
+        let mut by_value: Vec<(f32, u16)> = (0..)
+            .zip(atlas.entries())
+            .map(|(index, entry)| (self.score_bound(atlas, index, entry), index))
+            .filter(|&(bound, _)| bound >= least)
+            .collect();
+        by_value.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut best: Option<Known> = None;
+        let mut least = least;
+        for (bound, index) in by_value {
+            if bound < least {
+                break;
+            }
+            if is_late() {
+                return Err(OutOfTime);
+            }
+            if let Some(grasp) = self.check(atlas, index, gripper) {
+                let value = grasp_value(&grasp);
+                if value > least || (value == least && best.is_none()) {
+                    least = value;
+                    let source = GraspSource::Atlas(index);
+                    best = Some(Known { source, grasp });
+                }
+            }
+        }
+        Ok(best)
+    }
+
+    /// An upper bound of the score that a grip has here, as far as its stored scores tell.
+    fn score_bound(&self, atlas: &Atlas, index: u16, entry: &Entry) -> f32 {
+        let GraspContext {
+            object, presented, ..
+        } = self.around;
+        let own_friction = object.object.friction_under(Validity::Physical);
+        if !object.object.regions().is_empty() || object.friction != own_friction {
+            return 1.0;
+        }
+        let direction = nearest_direction(presented.up);
+        let rated = f32::from(entry.scores[direction].saturating_sub(1)) / QUANTA;
+        let forearm = atlas.grips().forearms()[usize::from(index)];
+        rated
+            + Term::Stance.share() * presented.receiver.suits_forearm(forearm)
+            + Term::AwayFromGiver.share()
+            + Term::GiverClearance.share()
+            + ESTIMATE_SLACK
+    }
+
+    fn way_to(&self, entry: &Entry) -> f32 {
+        let present = self.standing.present.frame_from_wrist;
+        WristWay::between(present, entry.grip.pose.frame_from_wrist).length()
+    }
+
+    /// The grasp of a grip of the atlas, if it is valid here.
+    fn check(&self, atlas: &Atlas, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+        let barriers = self.around.presented.barriers();
+        let place = usize::from(index);
+        if !atlas.grips().may_be_clear(place, barriers) {
+            return None;
+        }
+        let entry = &atlas.entries()[place];
+        let constraints = self.around.constraints;
+        if !entry.meets(constraints) {
+            return None;
+        }
+        let rig = self.around.rig;
+        let solids = atlas.grips().screen_by_second_spheres(place, rig, barriers)?;
+        let grasp = self.checker.check(entry, &solids, gripper)?;
+        constraints.admits(&grasp).then(|| Box::new(grasp))
+    }
+
+    /// The answer with a known grip.
+    pub(super) fn settled(&self, known: Known, status: StandingStatus, fall: Option<super::Fall>) -> Stand {
+        self.settled_as(known, StandingVerdict::new(status, fall))
+    }
+
+    /// The answer with a grasp of the same hand, under a verdict that lacks the way.
+    pub(super) fn settled_as(&self, known: Known, verdict: StandingVerdict) -> Stand {
+        let way = HandWay::between(self.scene, &self.standing.present, &known.grasp.pose);
+        let verdict = StandingVerdict {
+            way: Some(way),
+            ..verdict
+        };
+        Stand::Settled(Box::new((self.outcome(Some(known)), verdict)))
+    }
+
+    /// The outcome of a search that ends with this grasp, or aborted.
+    pub(super) fn outcome(&self, known: Option<Known>) -> SearchOutcome {
+        let (source, grasp) = known.map(|known| (known.source, *known.grasp)).unzip();
+        let grasp = grasp.map(|mut grasp| {
+            self.scene.pose_arm(&mut grasp);
+            grasp
+        });
+        SearchOutcome {
+            end: if grasp.is_some() {
+                SearchEnd::Found
+            } else {
+                SearchEnd::Aborted
+            },
+            value: grasp.as_ref().map_or(0.0, grasp_value),
+            replaceable_until: None,
+            report: SearchReport {
+                source,
+                candidates: u64::from(source.is_some()),
+                known_grips: self.atlas.map_or(0, |atlas| atlas.entries().len()),
+                ..SearchReport::default()
+            },
+            grasp,
+        }
+    }
+}
