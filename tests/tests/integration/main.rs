@@ -45,5 +45,6 @@ mod saved_objects;
 mod saved_rigs;
 mod shutdown;
 mod tracked_hands;
+mod tracks;
 mod unread;
 mod uploads;
