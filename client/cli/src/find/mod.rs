@@ -300,7 +300,7 @@ async fn draw(
 }
 
 /// Reads a value from a JSON file or, for `-`, from standard input; `what` names it in errors.
-fn read_json<T: DeserializeOwned>(what: &str, path: &Path) -> Result<T, Failure> {
+pub(crate) fn read_json<T: DeserializeOwned>(what: &str, path: &Path) -> Result<T, Failure> {
     let cannot_read = |error| Failure::other(format!("cannot read {}", path.display()), error);
     let text = if path == Path::new("-") {
         let mut text = String::new();

@@ -1,0 +1,206 @@
+//! `grasp track`
+
+mod motions;
+mod tally;
+
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use clap::{ArgGroup, Args};
+use grasp_client::{FindRequest, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup, built_in::request_for};
+use serde::{Deserialize, Serialize};
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::{
+    EXIT_CODES, Ending,
+    failure::Failure,
+    find::read_json,
+    holdout,
+    output::{Output, write_json, write_json_line, write_line},
+    progress_bar::bar,
+    server_options::ServerOptions,
+    values::{HandName, parse_duration},
+};
+use motions::Moving;
+use tally::Tally;
+
+/// How long to wait for the answer to the last frame.
+const LAST_ANSWER: Duration = Duration::from_secs(2);
+
+/// Hold on to a grasp while the giver moves, and show what becomes of it.
+///
+/// The motion is one of the built-in ones (--moving) of a built-in holdout (--holdout), or a JSON file (--motion): {"setup":
+/// {"holdout": {…as in `grasp find --request`}, "policy": {"better_by": null, "least_seconds_between_changes": 0,
+/// "predict_ahead_seconds": null, "only_changes": false}}, "frames": [{"sequence": 1, "capture_seconds": 0.011,
+/// "client_from_object": {…}, "presenting_hand": {…}, "other_hands": [], "obstacles": [], "receiving_hand": null, "committed":
+/// false, "up": null, "receiver": null}, …]}. --print-motion prints a built-in one as a template.
+///
+/// Frames are sent at their capture times, and nobody waits for answers: a frame may overtake another one. With --json, one line
+/// per answer, and a last one with the summary.
+#[derive(Args, Debug)]
+#[command(after_help = EXIT_CODES)]
+#[command(group(ArgGroup::new("what").required(true).args(["holdout", "motion"])))]
+pub(crate) struct Arguments {
+    /// A built-in holdout, such as remote-hold1.
+    #[arg(long, value_name = "NAME")]
+    holdout: Option<String>,
+    /// How its giver moves.
+    #[arg(long, value_name = "HOW", default_value = "walk", requires = "holdout")]
+    moving: Moving,
+    /// How long.
+    #[arg(long, value_name = "DURATION", default_value = "5s", value_parser = parse_duration, requires = "holdout")]
+    length: Duration,
+    /// Frames per second of a built-in motion.
+    #[arg(long, value_name = "HZ", default_value_t = 90.0, value_parser = parse_rate, requires = "holdout")]
+    rate: f32,
+    /// The hand to pose in a built-in motion. Default: either.
+    #[arg(long, value_name = "HAND", requires = "holdout")]
+    receiving_hand: Option<HandName>,
+    /// A JSON file with a motion; - for standard input.
+    #[arg(long, value_name = "FILE")]
+    motion: Option<PathBuf>,
+    /// How much higher the score of another grasp must be to replace a valid one, from 0 to 1.
+    #[arg(long, value_name = "SCORE")]
+    better_by: Option<f32>,
+    /// Least time between changes to better grasps.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    least_time: Option<Duration>,
+    /// How late answers are shown: frames are answered as they will be then.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    predict_ahead: Option<Duration>,
+    /// Print the motion as JSON instead of playing it.
+    #[arg(long)]
+    print_motion: bool,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+/// A motion to play.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Motion {
+    setup: TrackSetup,
+    frames: Vec<TrackFrame>,
+}
+
+pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+    let motion = arguments.to_motion().await?;
+    if arguments.print_motion {
+        write_json(&motion)?;
+        return Ok(Ending::Done);
+    }
+    let client = arguments.server.connect().await?;
+    let mut track = client.track(&motion.setup).await?;
+    let tally = play(&mut track, &motion.frames, output).await?;
+    let summary = tally.summary();
+    if output.is_json() {
+        write_json_line(&summary)?;
+    } else {
+        write_line(&summary.to_string())?;
+    }
+    Ok(if summary.has_grasp() {
+        Ending::Done
+    } else {
+        Ending::NoGrasp
+    })
+}
+
+impl Arguments {
+    async fn to_motion(&self) -> Result<Motion, Failure> {
+        let mut motion = match (&self.motion, &self.holdout) {
+            (Some(path), _) => read_motion(path).await?,
+            (None, Some(name)) => self.built_in(name)?,
+            // Ruled out by the group of arguments.
+            (None, None) => return Err(Failure::Usage("give --holdout or --motion".to_owned())),
+        };
+        let policy = &mut motion.setup.policy;
+        policy.better_by = self.better_by.or(policy.better_by);
+        policy.least_time_between_changes = self.least_time.unwrap_or(policy.least_time_between_changes);
+        policy.predict_ahead = self.predict_ahead.or(policy.predict_ahead);
+        Ok(motion)
+    }
+
+    /// A built-in motion.
+    fn built_in(&self, name: &str) -> Result<Motion, Failure> {
+        let holdout = request_for(holdout::built_in(name)?);
+        let frames = motions::frames(self.moving, &holdout, self.rate, self.length);
+        let mut fixed = FindRequest::new(holdout.object);
+        fixed.receiving_hand.handedness = self.receiving_hand.map(Into::into);
+        Ok(Motion {
+            setup: TrackSetup {
+                holdout: fixed,
+                policy: TrackPolicy::default(),
+            },
+            frames,
+        })
+    }
+}
+
+async fn read_motion(path: &Path) -> Result<Motion, Failure> {
+    let path = path.to_owned();
+    crate::blocking(move || read_json("motion", &path)).await
+}
+
+/// Frames per second.
+fn parse_rate(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(rate) if (1.0..=1000.0).contains(&rate) => Ok(rate),
+        _ => Err(format!("{text:?} is not a number from 1 to 1000")),
+    }
+}
+
+/// Sends every frame at its time, and takes answers as they come.
+async fn play(track: &mut Track, frames: &[TrackFrame], output: Output) -> Result<Tally, Failure> {
+    let mut tally = Tally::new(frames.len());
+    let progress = bar(frames.len() as u64, "{pos}/{len}");
+    let start = Instant::now();
+    let first_time = frames.first().and_then(|frame| frame.capture_time).unwrap_or_default();
+    let due = |frame: &TrackFrame| {
+        let time = frame.capture_time.unwrap_or_default();
+        start + time.saturating_sub(first_time)
+    };
+    // For frames without times: as a headset sends them.
+    let mut clock = interval(Duration::from_micros(11_111));
+    clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
+    let mut left = frames.iter();
+    let mut next = left.next();
+    while let Some(frame) = next {
+        let is_due = async {
+            match frame.capture_time {
+                Some(_) => tokio::time::sleep_until(due(frame).into()).await,
+                None => drop(clock.tick().await),
+            }
+        };
+        tokio::select! {
+            () = is_due => {
+                tally.sent(frame.sequence);
+                track.send(frame);
+                next = left.next();
+            }
+            answer = track.answer() => {
+                let Some(answer) = answer? else { return Ok(tally) };
+                take(&mut tally, &answer, output)?;
+            }
+        }
+        progress.inc(u64::from(next.is_none_or(|next| next.sequence != frame.sequence)));
+        progress.set_message(tally.line());
+    }
+    let last = frames.last().map(|frame| frame.sequence);
+    while tally.last_answered() < last
+        && let Ok(answer) = tokio::time::timeout(LAST_ANSWER, track.answer()).await
+    {
+        let Some(answer) = answer? else { break };
+        take(&mut tally, &answer, output)?;
+    }
+    Ok(tally)
+}
+
+fn take(tally: &mut Tally, answer: &TrackAnswer, output: Output) -> Result<(), Failure> {
+    tally.answered(answer);
+    if output.is_json() {
+        write_json_line(answer)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,150 @@
+//! Built-in motions of givers: each moves a built-in holdout.
+
+use std::{f32::consts::TAU, time::Duration};
+
+use clap::ValueEnum;
+use glam::{Quat, Vec3};
+use grasp_client::{DigitAngles, FindRequest, Pose, PresentingHand, TrackFrame};
+
+/// Gravity, in metres per second squared.
+const GRAVITY: f32 = 9.81;
+
+/// How a giver moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Moving {
+    /// Holds out, with a hand that is not quite still.
+    Still,
+    /// Walks up and down.
+    Walk,
+    /// Turns the object over.
+    Turn,
+    /// Shakes.
+    Shake,
+    /// Slides the hand along the object.
+    Slide,
+    /// Opens and closes the fingers.
+    Fingers,
+    /// Lets go after two seconds: the object falls.
+    Drop,
+}
+
+/// The frames of a motion, as many per second as `rate`.
+pub(super) fn frames(moving: Moving, holdout: &FindRequest, rate: f32, length: Duration) -> Vec<TrackFrame> {
+    let count = (length.as_secs_f32() * rate).ceil() as u64;
+    (0..count)
+        .map(|sequence| {
+            let time = sequence as f32 / rate;
+            TrackFrame {
+                capture_time: Some(Duration::from_secs_f32(time)),
+                ..TrackFrame::of(sequence, &moved(moving, holdout, time))
+            }
+        })
+        .collect()
+}
+
+/// A holdout at a time in seconds.
+fn moved(moving: Moving, holdout: &FindRequest, time: f32) -> FindRequest {
+    let mut moved = holdout.clone();
+    let origin = holdout.client_from_object.position;
+    let wave = |per_second: f32, phase: f32| (TAU * (per_second * time + phase)).sin();
+    let waves = |per_second: f32| Vec3::new(wave(per_second, 0.0), wave(1.3 * per_second, 0.3), wave(0.8 * per_second, 0.7));
+    let about_object = |turn: Quat| Pose::new(origin - turn * origin, turn);
+    match moving {
+        Moving::Still => together(&mut moved, Pose::new(0.002 * waves(0.7), Quat::IDENTITY)),
+        Moving::Walk => {
+            let way = Vec3::new(0.4 * wave(0.1, 0.0), 0.015 * wave(1.8, 0.0), 0.1 * wave(0.2, 0.0));
+            let turn = Quat::from_rotation_y(0.4 * wave(0.1, 0.25));
+            together(&mut moved, Pose::new(way, Quat::IDENTITY) * about_object(turn));
+        }
+        Moving::Turn => together(&mut moved, about_object(Quat::from_rotation_z(1.5 * wave(0.12, 0.0)))),
+        Moving::Shake => {
+            let turn = Quat::from_scaled_axis(0.03 * waves(7.0));
+            together(&mut moved, Pose::new(0.006 * waves(8.0), Quat::IDENTITY) * about_object(turn));
+        }
+        Moving::Slide => {
+            let along = holdout.client_from_object.orientation * Vec3::X;
+            hand(&mut moved, Pose::new(along * 0.04 * wave(0.2, 0.0), Quat::IDENTITY));
+        }
+        Moving::Fingers => {
+            if let Some(PresentingHand::Angles(angles)) = &mut moved.presenting_hand {
+                let open = 0.5 + 0.5 * wave(0.4, 0.25);
+                angles.digits = angles.digits.map(|digit| opened(digit, open));
+            }
+        }
+        Moving::Drop => {
+            let fallen = (time - 2.0).max(0.0);
+            let down = Vec3::NEG_Y * 0.5 * GRAVITY * fallen * fallen;
+            moved.client_from_object = Pose::new(down, Quat::IDENTITY) * moved.client_from_object;
+        }
+    }
+    moved
+}
+
+/// Moves giver and object together.
+fn together(holdout: &mut FindRequest, by: Pose) {
+    holdout.client_from_object = by * holdout.client_from_object;
+    hand(holdout, by);
+}
+
+/// Moves the giver's hand alone.
+fn hand(holdout: &mut FindRequest, by: Pose) {
+    match &mut holdout.presenting_hand {
+        Some(PresentingHand::Angles(hand)) => hand.client_from_wrist = by * hand.client_from_wrist,
+        Some(PresentingHand::Joints(hand)) => {
+            for joint in &mut hand.joints {
+                joint.client_from_joint = by * joint.client_from_joint;
+            }
+        }
+        Some(PresentingHand::Mesh(_)) | None => {}
+    }
+}
+
+/// A digit that is opened by a share of the way to straight.
+fn opened(digit: DigitAngles, share: f32) -> DigitAngles {
+    let bent = |angle: f32| if angle > 0.0 { angle * (1.0 - 0.6 * share) } else { angle };
+    DigitAngles {
+        base_pitch: bent(digit.base_pitch),
+        second_pitch: bent(digit.second_pitch),
+        third_pitch: digit.third_pitch.map(bent),
+        ..digit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use grasp_client::built_in::request_for;
+
+    fn holdout() -> FindRequest {
+        let all = grasp_assets::holdouts::holdouts();
+        request_for(all.first().expect("there are built-in holdouts"))
+    }
+
+    #[test]
+    fn giver_and_object_move_together_unless_one_of_them_moves_alone() {
+        let holdout = holdout();
+        for moving in Moving::value_variants() {
+            let relative = |request: &FindRequest| {
+                let Some(PresentingHand::Angles(hand)) = &request.presenting_hand else {
+                    panic!("the giver is given by angles");
+                };
+                request.client_from_object.inverse() * hand.client_from_wrist
+            };
+            let at_rest = relative(&holdout);
+            let farthest = (0..50)
+                .map(|frame| relative(&moved(*moving, &holdout, 0.1 * frame as f32)))
+                .map(|wrist| wrist.position.distance(at_rest.position))
+                .fold(0.0, f32::max);
+            let moves_alone = matches!(moving, Moving::Slide | Moving::Drop);
+            assert_eq!(farthest > 0.01, moves_alone, "{moving:?}: {farthest}");
+        }
+    }
+
+    #[test]
+    fn frames_are_numbered_and_timed() {
+        let frames = frames(Moving::Walk, &holdout(), 90.0, Duration::from_secs(2));
+        assert_eq!(frames.len(), 180);
+        assert_eq!(frames[90].capture_time, Some(Duration::from_secs(1)));
+        assert!(frames.iter().zip(0..).all(|(frame, number)| frame.sequence == number));
+    }
+}
