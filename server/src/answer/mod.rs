@@ -1,6 +1,7 @@
 //! Converts grasps and reports to messages in the client's frame and convention.
 
 mod names;
+mod verdicts;
 
 use std::{sync::Arc, time::Duration};
 
@@ -30,6 +31,7 @@ use grasp_synthesis::{
 
 pub(crate) use self::names::wire_digit;
 use self::names::{wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
+pub(crate) use self::verdicts::{wire_hand_way, wire_verdict};
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
 
 /// The frame and convention in which a client gets its answer.
@@ -193,7 +195,8 @@ fn wire_model(binding: &Binding, scale: f32, frames: &HandFrames, frame: ClientF
     }
 }
 
-fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
+/// A grasp as a message.
+pub(crate) fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
     let hand = WireHand::new(&grasp.pose, rig_hand, frame);
     let rig: &Rig = &rig_hand.hand.rig;
     let object_from_wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
@@ -416,7 +419,7 @@ fn nearest_miss(miss: &NearestMiss, rig: &Rig, frame: ClientFrame) -> v1::Neares
 }
 
 /// Saturates at the 292 billion years that the message can hold.
-fn wire_duration(duration: Duration) -> prost_types::Duration {
+pub(crate) fn wire_duration(duration: Duration) -> prost_types::Duration {
     prost_types::Duration {
         seconds: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),
         nanos: i32::try_from(duration.subsec_nanos()).unwrap_or(i32::MAX),

@@ -40,7 +40,7 @@ use crate::{
 };
 
 /// Everything that a search needs.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct FindJob {
     /// The request.
     pub query: FindQuery,
@@ -280,6 +280,11 @@ impl PreparedJob {
         stop: &AtomicBool,
         progress: &Progress,
     ) -> Result<Answered, ServiceError> {
+        self.answer(self.search(pool, stop, progress))
+    }
+
+    /// Searches, without making a response.
+    pub(super) fn search(&self, pool: &ThreadPool, stop: &AtomicBool, progress: &Progress) -> Ended {
         let site = Site {
             pool,
             clock: &self.clock,
@@ -287,13 +292,37 @@ impl PreparedJob {
             progress,
         };
         let search = |place: HandPlace| (self.task(place), &self.hands[place].settings);
-        let ended = if self.hands.len() > 1 {
+        if self.hands.len() > 1 {
             search_either(site, [search(0), search(1)], self.patience)
         } else {
             let (task, settings) = search(0);
             search_in_slices(site, task, settings, self.patience)
-        };
-        self.answer(ended)
+        }
+    }
+
+    /// The receiving hand or, if the request leaves the choice, both, with what each searches and by which settings.
+    pub(super) fn hands(&self) -> impl Iterator<Item = (&RigHand, Task<'_>, &SearchSettings)> {
+        let hands = self.hands.iter().enumerate();
+        hands.map(|(place, search)| (&search.hand, self.task(place), &search.settings))
+    }
+
+    /// True once the budget is spent.
+    pub(super) fn is_over(&self) -> bool {
+        self.clock.now() >= self.budget
+    }
+
+    /// The frame of the response.
+    pub(super) fn frame(&self) -> ClientFrame {
+        ClientFrame {
+            convention: self.query.convention,
+            client_from_object: self.query.client_from_object,
+        }
+    }
+
+    /// What was repaired in the request.
+    pub(super) fn warnings(&self) -> impl Iterator<Item = &String> {
+        let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
+        hands.flat_map(GiverHand::warnings)
     }
 
     fn task(&self, place: HandPlace) -> Task<'_> {
@@ -334,12 +363,8 @@ impl PreparedJob {
             // A small part of what the budget leaves for the way back.
             outcome.report.limits = self.limits();
         }
-        let frame = ClientFrame {
-            convention: self.query.convention,
-            client_from_object: self.query.client_from_object,
-        };
-        let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
-        let warnings: Vec<String> = hands.flat_map(GiverHand::warnings).cloned().collect();
+        let frame = self.frame();
+        let warnings: Vec<String> = self.warnings().cloned().collect();
         let other = self.hands.iter().find(|other| other.hand.hand != hand.hand);
         let circumstances = Circumstances {
             search_time,
@@ -365,7 +390,7 @@ impl PreparedJob {
     }
 
     /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same.
-    fn limits(&self) -> Vec<Limit> {
+    pub(super) fn limits(&self) -> Vec<Limit> {
         let mut all: Vec<Limit> = Vec::new();
         for (place, search) in self.hands.iter().enumerate() {
             let of_hand = limits(self.task(place), &search.settings.query);

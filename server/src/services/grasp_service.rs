@@ -23,7 +23,7 @@ use crate::{
 /// Implements `GraspService`.
 #[derive(Clone, Debug)]
 pub(crate) struct GraspHandler {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
 impl GraspHandler {
@@ -59,7 +59,7 @@ impl GraspHandler {
     }
 
     /// The object as the request holds it out.
-    async fn held_out(
+    pub(super) async fn held_out(
         &self,
         stored: &Arc<StoredObject>,
         size: RequestedSize,
@@ -98,7 +98,7 @@ impl GraspHandler {
     ///
     /// # Errors
     /// [`ServiceError::DeadlineExceeded`] if the deadline leaves no time for it.
-    fn job(
+    pub(super) fn job(
         &self,
         query: FindQuery,
         stored: &Arc<StoredObject>,
@@ -150,7 +150,7 @@ impl GraspHandler {
 }
 
 /// An object as a request holds it out.
-struct HeldOut {
+pub(super) struct HeldOut {
     /// The object at its size.
     object: Arc<StoredObject>,
     /// What is derived from it.

@@ -5,7 +5,10 @@
 //! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
 //! known.
 
+mod as_posed;
 mod posed_hand;
+
+pub use crate::physical::grip::as_posed::PosedHold;
 
 use glam::Vec3;
 
@@ -221,7 +224,7 @@ impl Gripper {
                 .filter(|_| enough_touch)
                 .and_then(|presented| self.hang(scene, &closed, presented.up))
         } else {
-            are_opposed(&self.contacts).then(|| self.closure(scene)).flatten()
+            self.opposed_closure(scene)
         };
         stopwatch.lap(Step::ImmobilityValidation);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
@@ -286,6 +289,11 @@ impl Gripper {
         self.hang?;
         let load = scene.load(&self.soft_contacts, up);
         Some(epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers))
+    }
+
+    /// [`Self::closure`], unless it is clear at once that nothing can be held.
+    fn opposed_closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
+        are_opposed(&self.contacts).then(|| self.closure(scene)).flatten()
     }
 
     /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.
