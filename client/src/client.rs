@@ -14,9 +14,11 @@ use tonic_health::pb::{HealthCheckRequest, health_client::HealthClient};
 
 use crate::{
     error::ClientError,
+    evaluation::{EvaluateAnswer, EvaluateRequest},
     object::Health,
     retry::RetryPolicy,
     search::{FindAnswer, FindRequest},
+    verdict::{ValidateAnswer, ValidateRequest},
     wire,
 };
 
@@ -161,15 +163,61 @@ impl GraspClient {
     /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
     pub async fn find_grasp(&self, request: &FindRequest) -> Result<FindAnswer, ClientError> {
         let message = wire::find_request_to_wire(request);
-        let timeout = self
-            .call_timeout
-            .saturating_add(request.budget.unwrap_or_default());
+        let timeout = self.timeout_of(request);
         let answer = self
             .call("FindGrasp", timeout, &message, |channel, request| async move {
                 GraspServiceClient::new(channel).find_grasp(request).await
             })
             .await?;
         Ok(wire::find_answer_from_wire(answer)?)
+    }
+
+    /// Checks a grasp of the client's own: every check is made, and its verdict has a figure. A grasp that is not valid is an
+    /// answer, not an error. Takes at most the call timeout plus the holdout's budget.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
+    pub async fn validate_grasp(&self, request: &ValidateRequest) -> Result<ValidateAnswer, ClientError> {
+        let message = wire::validate_request_to_wire(request);
+        let timeout = self.timeout_of(&request.holdout);
+        let answer = self
+            .call(
+                "ValidateGrasp",
+                timeout,
+                &message,
+                |channel, request| async move {
+                    GraspServiceClient::new(channel).validate_grasp(request).await
+                },
+            )
+            .await?;
+        Ok(wire::validate_answer_from_wire(answer)?)
+    }
+
+    /// Rates whether and from where an object can be taken, for one pose of the giver's hand or several. Takes at most the call
+    /// timeout plus the holdout's budget.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
+    pub async fn evaluate_holdout(&self, request: &EvaluateRequest) -> Result<EvaluateAnswer, ClientError> {
+        let message = wire::evaluate_request_to_wire(request);
+        let timeout = self.timeout_of(&request.holdout);
+        let answer = self
+            .call(
+                "EvaluateHoldout",
+                timeout,
+                &message,
+                |channel, request| async move {
+                    GraspServiceClient::new(channel).evaluate_holdout(request).await
+                },
+            )
+            .await?;
+        Ok(wire::evaluate_answer_from_wire(answer)?)
+    }
+
+    /// The time limit of a call that may search.
+    fn timeout_of(&self, holdout: &FindRequest) -> Duration {
+        self.call_timeout
+            .saturating_add(holdout.budget.unwrap_or_default())
     }
 
     /// Queries the health of the whole server.

@@ -110,6 +110,24 @@ pub struct HandAngles {
     pub hand_scale: Option<f32>,
 }
 
+/// A hand of a rig at an object, in the object's frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HandAtObject {
+    /// Name of the rig: "thesis", "adult", or that of a created one, "rigs/{rig}".
+    pub rig: String,
+    /// Left or right.
+    pub handedness: Handedness,
+    /// How many times as large as the rig the hand is, from 0.5 to 2, rounded to hundredths; none: 1.
+    #[serde(default)]
+    pub hand_scale: Option<f32>,
+    /// The wrist's joint frame in the object's frame, as [`Grasp::object_from_wrist`](crate::Grasp::object_from_wrist).
+    #[serde(default)]
+    pub object_from_wrist: Pose,
+    /// The digits, thumb first, as [`Grasp::digits`](crate::Grasp::digits).
+    pub digits: [DigitAngles; 5],
+}
+
 /// A hand as joint poses tracked by a headset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -21,6 +21,7 @@
 //! - [`FindRequest`] describes the holdout and the search, [`FindAnswer`] the result. [`PresentingHand`] is the giver's
 //!   hand; [`Obstacle`]s are kept clear of like it; [`Receiver`] is the body whose arm has to reach; [`Constraints`] are
 //!   requirements on the grasp.
+//! - [`ValidateRequest`] checks a grasp of the client's own, [`EvaluateRequest`] rates whether and from where an object can be taken.
 //! - [`NewObject`] describes an object to create, [`ObjectUpdate`] a change, [`ObjectQuery`] a list, and [`ObjectWatch`] tells what
 //!   happens to objects.
 //! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
@@ -37,6 +38,7 @@ pub mod built_in;
 mod client;
 mod constraints;
 mod error;
+mod evaluation;
 mod grasp_type;
 mod hand;
 mod json;
@@ -55,15 +57,19 @@ mod rig;
 mod rigs;
 mod score;
 mod search;
+mod verdict;
 mod wire;
 
 pub use client::{GraspClient, GraspClientBuilder};
 pub use constraints::{ApproachCone, Constraints, Reach};
 pub use error::{BoxError, CallError, ClientError, ErrorDetails, FieldViolation, Resource, code_name};
+pub use evaluation::{
+    EvaluateAnswer, EvaluateRequest, Hindrance, HoldoutRating, InTheWay, NoGraspReason, Side,
+};
 pub use grasp_type::GraspType;
 pub use hand::{
-    Digit, DigitAngles, HandAngles, HandJoints, HandMesh, Handedness, JOINT_COUNT, JointPose, JointSet,
-    Phalanx, PresentingHand, ReceivingHand,
+    Digit, DigitAngles, HandAngles, HandAtObject, HandJoints, HandMesh, Handedness, JOINT_COUNT, JointPose,
+    JointSet, Phalanx, PresentingHand, ReceivingHand,
 };
 pub use json::rfc3339;
 pub use key_frame::{KeyFrame, KeyFrameKind};
@@ -85,6 +91,7 @@ pub use search::{
     Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
     PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
 };
+pub use verdict::{Check, GraspToValidate, HandWay, ValidateAnswer, ValidateRequest, Verdict};
 
 /// The README's Rust example compiles.
 #[cfg(doctest)]

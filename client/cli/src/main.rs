@@ -3,18 +3,21 @@
 mod bake;
 mod completions;
 mod demo;
+mod evaluate;
 mod experiment;
 mod failure;
 mod find;
 mod format;
 mod health;
 mod holdout;
+mod input;
 mod objects;
 mod output;
 mod picture;
 mod progress_bar;
 mod rigs;
 mod server_options;
+mod validate;
 mod values;
 
 use std::process::ExitCode;
@@ -28,10 +31,10 @@ use output::Output;
 /// Part of the interface for scripts; shown at the end of help pages.
 const EXIT_CODES: &str = "\
 Exit codes:
-    0  done; for find: a grasp was found; for health: serving
+    0  done; for find: a grasp was found; for validate: the grasp is valid; for evaluate: the object can be taken; for health: serving
     1  any other error, such as a file that cannot be read
     2  usage: unknown options, values or names, or a malformed request file
-    3  no grasp within the budget
+    3  no grasp within the budget; for validate: the grasp is not valid
     4  rejected by the server: invalid, not found, already exists, read-only, or changed meanwhile
     5  no answer: the server is unreachable, not serving, or too slow
   130  interrupted";
@@ -51,6 +54,8 @@ struct Arguments {
 enum Command {
     Demo(demo::Arguments),
     Find(Box<find::Arguments>),
+    Validate(validate::Arguments),
+    Evaluate(evaluate::Arguments),
     #[command(subcommand)]
     Objects(objects::Command),
     #[command(subcommand)]
@@ -68,6 +73,8 @@ enum Ending {
     Done,
     /// No grasp was found within the budget.
     NoGrasp,
+    /// The grasp is not valid.
+    NotValid,
     /// The server rejected some of several things.
     Rejected,
     /// The server is up but not serving.
@@ -78,7 +85,7 @@ impl Ending {
     fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,
-            Self::NoGrasp => 3,
+            Self::NoGrasp | Self::NotValid => 3,
             Self::Rejected => 4,
             Self::NotServing => 5,
         }
@@ -123,6 +130,8 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
     match command {
         Command::Demo(arguments) => demo::run(arguments, output).await,
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
+        Command::Validate(arguments) => Box::pin(validate::run(arguments, output)).await,
+        Command::Evaluate(arguments) => Box::pin(evaluate::run(arguments, output)).await,
         Command::Objects(command) => objects::run(command, output).await,
         Command::Rigs(command) => rigs::run(command, output).await,
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,

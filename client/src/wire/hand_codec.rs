@@ -8,8 +8,8 @@ use super::{
     geometry_codec::{pose_from_wire, pose_to_wire},
 };
 use crate::hand::{
-    Digit, DigitAngles, HandAngles, HandJoints, HandMesh, Handedness, JointPose, JointSet, Phalanx,
-    PresentingHand, ReceivingHand,
+    Digit, DigitAngles, HandAngles, HandAtObject, HandJoints, HandMesh, Handedness, JointPose, JointSet,
+    Phalanx, PresentingHand, ReceivingHand,
 };
 
 pub(super) fn handedness_to_wire(handedness: Handedness) -> v1::Handedness {
@@ -98,19 +98,7 @@ pub(super) fn joint_from_wire(joint: v1::JointPose) -> JointPose {
 
 pub(super) fn presenting_hand_to_wire(hand: &PresentingHand) -> v1::PresentingHand {
     let form = match hand {
-        PresentingHand::Angles(HandAngles {
-            rig,
-            handedness,
-            client_from_wrist,
-            digits,
-            hand_scale,
-        }) => v1::presenting_hand::Form::Angles(v1::HandAngles {
-            rig: rig.clone(),
-            handedness: handedness_to_wire(*handedness).into(),
-            client_from_wrist: Some(pose_to_wire(*client_from_wrist)),
-            digits: digits.iter().map(digit_angles_to_wire).collect(),
-            hand_scale: *hand_scale,
-        }),
+        PresentingHand::Angles(angles) => v1::presenting_hand::Form::Angles(hand_angles_to_wire(angles)),
         PresentingHand::Joints(joints) => v1::presenting_hand::Form::Joints(hand_joints_to_wire(joints)),
         PresentingHand::Mesh(HandMesh {
             positions,
@@ -123,6 +111,26 @@ pub(super) fn presenting_hand_to_wire(hand: &PresentingHand) -> v1::PresentingHa
         }),
     };
     v1::PresentingHand { form: Some(form) }
+}
+
+pub(super) fn hand_angles_to_wire(hand: &HandAngles) -> v1::HandAngles {
+    v1::HandAngles {
+        rig: hand.rig.clone(),
+        handedness: handedness_to_wire(hand.handedness).into(),
+        client_from_wrist: Some(pose_to_wire(hand.client_from_wrist)),
+        digits: hand.digits.iter().map(digit_angles_to_wire).collect(),
+        hand_scale: hand.hand_scale,
+    }
+}
+
+pub(super) fn hand_at_object_to_wire(hand: &HandAtObject) -> v1::HandAtObject {
+    v1::HandAtObject {
+        rig: hand.rig.clone(),
+        handedness: handedness_to_wire(hand.handedness).into(),
+        hand_scale: hand.hand_scale,
+        object_from_wrist: Some(pose_to_wire(hand.object_from_wrist)),
+        digits: hand.digits.iter().map(digit_angles_to_wire).collect(),
+    }
 }
 
 pub(super) fn hand_joints_to_wire(hand: &HandJoints) -> v1::HandJoints {

@@ -4,6 +4,7 @@
 //! that violate the contract, with the path of the field.
 
 mod constraint_codec;
+mod evaluation_codec;
 mod geometry_codec;
 mod hand_codec;
 mod known_grip_codec;
@@ -14,11 +15,14 @@ mod receiver_codec;
 mod region_codec;
 mod rig_codec;
 mod search_codec;
+mod verdict_codec;
 
+pub(crate) use evaluation_codec::{evaluate_answer_from_wire, evaluate_request_to_wire};
 pub(crate) use object_codec::{health_from_wire, news_from_wire, object_from_wire, object_page_from_wire};
 pub(crate) use object_request_codec::{described_object_to_wire, new_object_to_wire, update_to_wire};
 pub(crate) use rig_codec::{new_rig_to_wire, rig_from_wire, rig_page_from_wire};
 pub(crate) use search_codec::{find_answer_from_wire, find_request_to_wire};
+pub(crate) use verdict_codec::{validate_answer_from_wire, validate_request_to_wire};
 
 use crate::error::ClientError;
 

@@ -222,7 +222,7 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
     })
 }
 
-fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
+pub(super) fn grasp_from_wire(grasp: v1::Grasp) -> Result<Grasp, Malformed> {
     Ok(Grasp {
         handedness: handedness_from_wire("handedness", grasp.handedness)?,
         rig: grasp.rig,

@@ -2,6 +2,7 @@
 
 mod names;
 mod standing;
+mod verdicts;
 
 use std::{sync::Arc, time::Duration};
 
@@ -32,6 +33,7 @@ use grasp_synthesis::{
 pub(crate) use self::names::wire_digit;
 pub(crate) use self::standing::standing_report;
 use self::names::{wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
+pub(crate) use self::verdicts::{wire_hand_way, wire_verdict};
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
 
 /// The frame and convention in which a client gets its answer.
@@ -199,7 +201,8 @@ fn wire_model(binding: &Binding, scale: f32, frames: &HandFrames, frame: ClientF
     }
 }
 
-fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
+/// A grasp as a message.
+pub(crate) fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
     let hand = WireHand::new(&grasp.pose, rig_hand, frame);
     let rig: &Rig = &rig_hand.hand.rig;
     let object_from_wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);

@@ -53,7 +53,7 @@ struct SearchEnd {
 /// A search as it is logged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchSummary {
-    /// Name of the outcome in the contract.
+    /// The outcome: its name in the contract, or what was found about a grasp or a holdout.
     pub outcome: &'static str,
     /// Number of attempts.
     pub attempts: u64,

@@ -10,7 +10,7 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
     known::{atlas::Atlas, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{holdout::Holdout, strategy::Choice},
+    model::{grasp::Grasp, holdout::Holdout, strategy::Choice},
     search::{
         GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
@@ -18,7 +18,7 @@ use grasp_synthesis::{
         prepare,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
-        standing::{Fall, Stand, StandingStatus, StandingVerdict, no_grasp_reason, stand},
+        standing::{Fall, Stand, Standing, StandingStatus, StandingVerdict, no_grasp_reason, stand},
     },
 };
 use rayon::ThreadPool;
@@ -38,7 +38,7 @@ use crate::{
 };
 
 /// Everything that a search needs.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct FindJob {
     /// The request.
     pub query: FindQuery,
@@ -244,16 +244,12 @@ impl PreparedJob {
     pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         let until = self.clock.now() + LOOK_UP_TIME;
         if let Some(place) = self.standing_place() {
-            let task = self.task(place);
-            let settings = &self.hands[place].settings;
-            match stand(&prepare(task, settings), settings, &self.clock, Some(until)) {
-                Some(Stand::Settled(settled)) => return Some(self.answer_standing(place, *settled)),
-                Some(Stand::Fallen(fall)) => {
-                    self.fall.get_or_init(|| fall);
-                    self.hands[place].settings.known.tried = ALL_TRIED;
-                }
-                Some(Stand::OutOfTime) | None => return None,
+            if let Some(settled) = self.stand(place, Some(until)) {
+                return Some(self.answer_standing(place, settled));
             }
+            // Out of time, unless it fell.
+            self.fall.get()?;
+            self.hands[place].settings.known.tried = ALL_TRIED;
         }
         let mut best: Option<Ended> = None;
         for place in 0..self.hands.len() {
@@ -290,6 +286,45 @@ impl PreparedJob {
         stop: &AtomicBool,
         progress: &Progress,
     ) -> Result<Answered, ServiceError> {
+        match self.standing_place() {
+            Some(place) if self.fall.get().is_none() => match self.stand(place, None) {
+                Some(settled) => self.answer_standing(place, settled),
+                None => self.answer(self.search(pool, stop, progress)),
+            },
+            _ => self.answer(self.search(pool, stop, progress)),
+        }
+    }
+
+    /// The nearest valid grasp to one that has to be held on to, or any that a search finds.
+    pub(super) fn nearest(
+        mut self,
+        standing: Standing,
+        (pool, stop): (&ThreadPool, &AtomicBool),
+    ) -> Option<Grasp> {
+        self.hands.first_mut()?.settings.query.standing = Some(standing);
+        let outcome = match self.stand(0, None) {
+            Some((outcome, _)) => outcome,
+            None => self.search(pool, stop, &Progress::default()).outcome,
+        };
+        outcome.grasp
+    }
+
+    /// What is decided about the standing grasp without a search; none if it fell and nothing known replaces it, or if the clock
+    /// reaches `until` first.
+    fn stand(&self, place: HandPlace, until: Option<Duration>) -> Option<(SearchOutcome, StandingVerdict)> {
+        let settings = &self.hands[place].settings;
+        match stand(&prepare(self.task(place), settings), settings, &self.clock, until)? {
+            Stand::Settled(settled) => Some(*settled),
+            Stand::Fallen(fall) => {
+                self.fall.get_or_init(|| fall);
+                None
+            }
+            Stand::OutOfTime => None,
+        }
+    }
+
+    /// Searches, without making a response.
+    pub(super) fn search(&self, pool: &ThreadPool, stop: &AtomicBool, progress: &Progress) -> Ended {
         let site = Site {
             pool,
             clock: &self.clock,
@@ -298,27 +333,42 @@ impl PreparedJob {
         };
         let mut settings: Vec<SearchSettings> =
             self.hands.iter().map(|hand| hand.settings.clone()).collect();
-        if let Some(place) = self.standing_place()
-            && self.fall.get().is_none()
-        {
-            let settings = &mut settings[place];
-            match stand(&prepare(self.task(place), settings), settings, &self.clock, None) {
-                Some(Stand::Settled(settled)) => return self.answer_standing(place, *settled),
-                Some(Stand::Fallen(fall)) => {
-                    self.fall.get_or_init(|| fall);
-                    settings.known.tried = ALL_TRIED;
-                }
-                Some(Stand::OutOfTime) | None => {}
-            }
+        if let (Some(place), Some(_)) = (self.standing_place(), self.fall.get()) {
+            // All known grips were tried when it fell.
+            settings[place].known.tried = ALL_TRIED;
         }
         let search = |place: HandPlace| (self.task(place), &settings[place]);
-        let ended = if self.hands.len() > 1 {
+        if self.hands.len() > 1 {
             search_either(site, [search(0), search(1)], self.patience)
         } else {
             let (task, settings) = search(0);
             search_in_slices(site, task, settings, self.patience)
-        };
-        self.answer(ended)
+        }
+    }
+
+    /// The receiving hand or, if the request leaves the choice, both, with what each searches and by which settings.
+    pub(super) fn hands(&self) -> impl Iterator<Item = (&RigHand, Task<'_>, &SearchSettings)> {
+        let hands = self.hands.iter().enumerate();
+        hands.map(|(place, search)| (&search.hand, self.task(place), &search.settings))
+    }
+
+    /// True once the budget is spent.
+    pub(super) fn is_over(&self) -> bool {
+        self.clock.now() >= self.budget
+    }
+
+    /// The frame of the response.
+    pub(super) fn frame(&self) -> ClientFrame {
+        ClientFrame {
+            convention: self.query.convention,
+            client_from_object: self.query.client_from_object,
+        }
+    }
+
+    /// What was repaired in the request.
+    pub(super) fn warnings(&self) -> impl Iterator<Item = &String> {
+        let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
+        hands.flat_map(GiverHand::warnings)
     }
 
     /// The hand of the standing grasp.
@@ -396,12 +446,8 @@ impl PreparedJob {
             let friction = settings.query.friction_on(&holdout.object);
             plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
         }
-        let frame = ClientFrame {
-            convention: self.query.convention,
-            client_from_object: self.query.client_from_object,
-        };
-        let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
-        let warnings: Vec<String> = hands.flat_map(GiverHand::warnings).cloned().collect();
+        let frame = self.frame();
+        let warnings: Vec<String> = self.warnings().cloned().collect();
         let other = self.hands.iter().find(|other| other.hand.hand != hand.hand);
         let circumstances = Circumstances {
             search_time,
@@ -433,7 +479,7 @@ impl PreparedJob {
     }
 
     /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same.
-    fn limits(&self) -> Vec<Limit> {
+    pub(super) fn limits(&self) -> Vec<Limit> {
         let mut all: Vec<Limit> = Vec::new();
         for (place, search) in self.hands.iter().enumerate() {
             let of_hand = limits(self.task(place), &search.settings.query);

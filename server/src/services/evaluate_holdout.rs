@@ -3,15 +3,50 @@
 use grasp_proto::v1;
 
 use super::GraspHandler;
-use crate::call::CallContext;
-use tonic::Status;
+use crate::{
+    call::{CallContext, SearchSummary},
+    error::ServiceError,
+    search::{EvaluateJob, evaluate},
+    validate::{EvaluateQuery, evaluate_query},
+};
 
 impl GraspHandler {
     pub(super) async fn evaluate(
         &self,
-        _request: v1::EvaluateHoldoutRequest,
-        _call: &CallContext,
-    ) -> Result<v1::EvaluateHoldoutResponse, Status> {
-        Err(Status::unimplemented("EvaluateHoldout"))
+        request: v1::EvaluateHoldoutRequest,
+        call: &CallContext,
+    ) -> Result<v1::EvaluateHoldoutResponse, ServiceError> {
+        let shared = &self.shared;
+        let EvaluateQuery {
+            holdout,
+            other_presenting_hands,
+        } = evaluate_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        call.log_object(&holdout.object_id);
+        let stored = shared.object(&holdout.object_id, call).await?.object;
+        // Held while the call lasts, so that the object is not evicted.
+        let _object = stored.hold();
+        let admission = shared.executor.admit()?;
+        let held_out = self.held_out(&stored, holdout.object_size, call).await?;
+        let find = self.job(holdout, &stored, held_out, call)?;
+        call.search_is_due(find.due());
+        let job = EvaluateJob {
+            find,
+            other_presenting_hands,
+        };
+        let evaluated = evaluate(job, &shared.executor, admission).await?;
+        call.search_ended(evaluated.ended);
+        let is_receivable = evaluated.response.ratings.iter().any(|rating| rating.receivable);
+        call.log_search(SearchSummary {
+            outcome: if is_receivable {
+                "RECEIVABLE"
+            } else {
+                "NOT_RECEIVABLE"
+            },
+            attempts: evaluated.attempts,
+            time: evaluated.time,
+        });
+        Ok(evaluated.response)
     }
 }

@@ -66,7 +66,7 @@ impl GraspHandler {
     }
 
     /// The object as the request holds it out.
-    async fn held_out(
+    pub(super) async fn held_out(
         &self,
         stored: &Arc<StoredObject>,
         size: RequestedSize,
@@ -105,7 +105,7 @@ impl GraspHandler {
     ///
     /// # Errors
     /// [`ServiceError::DeadlineExceeded`] if the deadline leaves no time for it.
-    fn job(
+    pub(super) fn job(
         &self,
         query: FindQuery,
         stored: &Arc<StoredObject>,
@@ -157,7 +157,7 @@ impl GraspHandler {
 }
 
 /// An object as a request holds it out.
-struct HeldOut {
+pub(super) struct HeldOut {
     /// The object at its size.
     object: Arc<StoredObject>,
     /// What is derived from it.

@@ -3,15 +3,53 @@
 use grasp_proto::v1;
 
 use super::GraspHandler;
-use crate::call::CallContext;
-use tonic::Status;
+use crate::{
+    call::{CallContext, SearchSummary},
+    error::ServiceError,
+    search::{JudgeJob, judge},
+    validate::{ValidateQuery, validate_query},
+};
 
 impl GraspHandler {
     pub(super) async fn validate(
         &self,
-        _request: v1::ValidateGraspRequest,
-        _call: &CallContext,
-    ) -> Result<v1::ValidateGraspResponse, Status> {
-        Err(Status::unimplemented("ValidateGrasp"))
+        request: v1::ValidateGraspRequest,
+        call: &CallContext,
+    ) -> Result<v1::ValidateGraspResponse, ServiceError> {
+        let shared = &self.shared;
+        let ValidateQuery {
+            holdout,
+            grasp,
+            find_nearest,
+            warnings,
+        } = validate_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        call.log_object(&holdout.object_id);
+        let stored = shared.object(&holdout.object_id, call).await?.object;
+        // Held while the call lasts, so that the object is not evicted.
+        let _object = stored.hold();
+        let admission = shared.executor.admit()?;
+        let held_out = self.held_out(&stored, holdout.object_size, call).await?;
+        let find = self.job(holdout, &stored, held_out, call)?;
+        call.search_is_due(find.due());
+        let job = JudgeJob {
+            find,
+            grasp,
+            find_nearest,
+            warnings,
+        };
+        let judged = judge(job, &shared.executor, admission).await?;
+        call.search_ended(judged.ended);
+        call.log_search(SearchSummary {
+            outcome: if judged.response.valid {
+                "VALID"
+            } else {
+                "NOT_VALID"
+            },
+            attempts: 0,
+            time: judged.check_time(),
+        });
+        Ok(judged.response)
     }
 }

@@ -29,7 +29,7 @@ use crate::{
 };
 
 /// A valid request.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "the request's switches are independent"
@@ -132,8 +132,13 @@ fn object_pose(
 }
 
 /// Adds to other violations that the object does not exist.
-fn check_exists(id: Option<&str>, object_exists: impl Fn(&str) -> bool, violations: &mut Violations) {
-    if let (false, Some(id)) = (violations.is_empty(), id)
+fn check_exists(
+    id: Option<&str>,
+    object_exists: impl Fn(&str) -> bool,
+    others_are_wrong: bool,
+    violations: &mut Violations,
+) {
+    if let (true, Some(id)) = (others_are_wrong || !violations.is_empty(), id)
         && !object_exists(id)
     {
         violations.add(Field::root("object"), format_args!("objects/{id} does not exist"));
@@ -157,25 +162,34 @@ fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut 
 /// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn find_query(
     request: v1::FindGraspRequest,
-    (default_rig, rigs): (&str, &RigStore),
+    rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<FindQuery, ServiceError> {
     let mut violations = Violations::default();
-    match checked_find_query(request, (default_rig, rigs), object_exists, &mut violations) {
-        Some(query) => violations.finish(query),
+    let query = checked_query(request, rigs, object_exists, false, &mut violations);
+    finished(query, violations)
+}
+
+/// The value of a request, unless there are violations: then there may be none.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] with the violations.
+pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T, ServiceError> {
+    match value {
+        Some(value) => violations.finish(value),
         // The function that returned none has added a violation.
         None => Err(violations.into_error()),
     }
 }
 
-/// Checks a request that may be part of another one, as [`find_query`] does; none only if there are violations.
-pub(super) fn checked_find_query(
+/// As [`find_query`], for a request inside another one, in which other fields may be wrong; none only with violations.
+pub(super) fn checked_query(
     request: v1::FindGraspRequest,
     (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
-    violations: &mut Violations,
+    others_are_wrong: bool,
+    v: &mut Violations,
 ) -> Option<FindQuery> {
-    let v = violations;
     let convention = Convention::from_wire(known(Field::root("convention"), request.convention, v));
     let object_id = object_id_of(Field::root("object"), &request.object, v);
     let object_size = object_size(request.object_scale, request.object_mass_kg, v);
@@ -251,7 +265,7 @@ pub(super) fn checked_find_query(
         chooses_hand,
     };
     let stances = stances(request.receiver, request.receiver_stance, &surroundings, v);
-    check_exists(object_id.as_deref(), object_exists, v);
+    check_exists(object_id.as_deref(), object_exists, others_are_wrong, v);
     let (object_id, hands) = (object_id?, receiving_hands?);
     let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
     Some(FindQuery {

@@ -69,18 +69,9 @@ pub(crate) struct PreferredGrip {
 impl PreferredGrip {
     /// The hand in the object's frame, within the limits of its rig.
     pub(crate) fn pose(&self, rig: &Rig) -> HandPose {
-        let within = |angle: f32, AngleRange { min, max }: AngleRange| angle.clamp(min, max);
         HandPose {
             frame_from_wrist: self.object_from_wrist,
-            digits: std::array::from_fn(|place| {
-                let (angles, limits) = (self.digits[place], &rig.digits[place].limits);
-                DigitAngles {
-                    base_yaw: within(angles.base_yaw, limits.base_yaw),
-                    base_pitch: within(angles.base_pitch, limits.base_pitch),
-                    second_pitch: within(angles.second_pitch, limits.second_pitch),
-                    third_pitch: within(angles.third_pitch, limits.third_pitch),
-                }
-            }),
+            digits: std::array::from_fn(|place| rig.digits[place].limits.clamped(self.digits[place])),
         }
     }
 }

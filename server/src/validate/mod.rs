@@ -5,6 +5,7 @@
 //! obstacles causes no allocations here.
 
 mod constraints;
+mod evaluate_holdout;
 mod find_grasp;
 mod given_names;
 mod hand;
@@ -22,6 +23,7 @@ mod standing;
 mod track;
 mod update;
 mod upload;
+mod validate_grasp;
 mod watch;
 
 use std::fmt;
@@ -30,10 +32,11 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 
+pub(crate) use evaluate_holdout::{EvaluateQuery, evaluate_query};
 pub(crate) use find_grasp::{FindQuery, find_query};
 #[cfg(test)]
 pub(crate) use hand::fixtures;
-pub(crate) use hand::{GiverHand, MeshedHand};
+pub(crate) use hand::{GivenGrasp, GiverHand, MeshedHand};
 pub(crate) use known_grips::{GripFields, GripKind, PreferredGrip};
 pub(crate) use labels::{LabelFilter, Labels};
 pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, object_id_of};
@@ -46,6 +49,7 @@ pub(crate) use rig::{RigFields, RigOrigin, rig_fields, rig_id_of, rig_page_query
 pub(crate) use track::{Frame, TrackIntake, TrackPolicy, TrackSetup, track_setup};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
 pub(crate) use upload::{UploadQuery, upload_query};
+pub(crate) use validate_grasp::{ValidateQuery, validate_query};
 pub(crate) use watch::{WatchQuery, watch_query};
 
 use crate::error::{ServiceError, Violation};
@@ -90,6 +94,19 @@ impl Violations {
     fn add_all_within(&mut self, parent: Field<'_>, inner: Self) {
         for Violation { field, description } in inner.listed {
             self.add(parent.child(&field), description);
+        }
+        self.unlisted += inner.unlisted;
+    }
+
+    /// Adds violations of other fields of a request that has the fields of a holdout in `holdout`. What depends on them blames
+    /// them there.
+    fn add_all_beside_holdout(&mut self, inner: Self) {
+        for Violation { field, description } in inner.listed {
+            if field == "convention" {
+                self.add(Field::root("holdout").child(&field), description);
+            } else {
+                self.add(field, description);
+            }
         }
         self.unlisted += inner.unlisted;
     }

@@ -7,7 +7,7 @@ use grasp_synthesis::base::pose::Pose;
 
 use super::{
     Field, FindQuery, Violations,
-    find_grasp::checked_find_query,
+    find_grasp::checked_query,
     hand::{checked_digits, hand_scale, required_handedness},
     known, pose, quoted,
     search_limits::{duration, positive_duration},
@@ -120,10 +120,11 @@ pub(crate) fn track_setup(
     let request = holdout.unwrap_or_default();
     check_fixed(field, &request, v);
     let mut of_holdout = Violations::default();
-    let query = checked_find_query(
+    let query = checked_query(
         request.clone(),
         (default_rig, rigs),
         object_exists,
+        !v.is_empty(),
         &mut of_holdout,
     );
     v.add_all_within(field, of_holdout);
@@ -272,7 +273,7 @@ impl TrackIntake {
         let (up, receiver) = (request.up, request.receiver);
         let mut of_holdout = Violations::default();
         // The object is looked up when the frame is answered.
-        let query = checked_find_query(request, rigs, |_| true, &mut of_holdout);
+        let query = checked_query(request, rigs, |_| true, false, &mut of_holdout);
         v.add_all_within(field, of_holdout);
         let Some(mut query) = query else {
             return Err(violations.into_error());

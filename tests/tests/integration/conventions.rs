@@ -10,7 +10,7 @@ use grasp_tests::{TestServer, wire_pose};
 use crate::fixtures::held_remote;
 
 /// An engine's axes (columns: where `OpenXR`'s x, y and z go), its unit, and the turn of its hand joints.
-struct Engine {
+pub(crate) struct Engine {
     convention: v1::Convention,
     axes: Mat3,
     units_per_metre: f32,
@@ -18,7 +18,7 @@ struct Engine {
     wrist_place: usize,
 }
 
-fn engines() -> [Engine; 3] {
+pub(crate) fn engines() -> [Engine; 3] {
     let half_turn = Quat::from_axis_angle(
         Vec3::new(0.0, -1.0, 1.0).normalize_or(Vec3::Y),
         std::f32::consts::PI,
@@ -105,7 +105,8 @@ impl Engine {
         }
     }
 
-    fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
+    /// A request of the `OpenXR` convention in the engine's.
+    pub(crate) fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
         let mut request = openxr.clone();
         request.convention = self.convention.into();
         request.client_from_object = openxr

@@ -9,8 +9,12 @@ use std::{
 };
 
 use glam::{Quat, Vec3};
+use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_proto::v1;
-use grasp_synthesis::base::pose::Pose;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{Handedness, joints::openxr_from_thesis_frame},
+};
 use grasp_tests::{TestServer, wire_pose};
 use sha2::{Digest as _, Sha256};
 use tonic::{Code, Status};
@@ -108,6 +112,37 @@ pub(crate) fn held_remote() -> v1::FindGraspRequest {
     };
     v1::FindGraspRequest {
         client_from_object: Some(pose(Vec3::new(0.3, 1.2, 0.0), Quat::from_rotation_y(0.4))),
+        presenting_hand: Some(v1::PresentingHand {
+            form: Some(v1::presenting_hand::Form::Angles(angles)),
+        }),
+        ..floating_remote()
+    }
+}
+
+/// A built-in holdout as a request with a seed, with the giver's hand by its angles.
+pub(crate) fn built_in_request(built_in: &BuiltInHoldout) -> v1::FindGraspRequest {
+    let handedness = match built_in.giver_handedness {
+        Handedness::Left => v1::Handedness::Left,
+        Handedness::Right => v1::Handedness::Right,
+    };
+    let digits = built_in.giver_digits.map(|digit| v1::DigitAngles {
+        base_yaw: digit.base_yaw,
+        base_pitch: digit.base_pitch,
+        second_pitch: digit.second_pitch,
+        third_pitch: Some(digit.third_pitch),
+    });
+    let angles = v1::HandAngles {
+        rig: built_in.giver_rig.clone(),
+        handedness: handedness.into(),
+        client_from_wrist: Some(wire_pose(openxr_from_thesis_frame(
+            built_in.world_from_giver_wrist,
+        ))),
+        digits: digits.to_vec(),
+        hand_scale: None,
+    };
+    v1::FindGraspRequest {
+        object: format!("objects/{}", built_in.object),
+        client_from_object: Some(wire_pose(built_in.world_from_object)),
         presenting_hand: Some(v1::PresentingHand {
             form: Some(v1::presenting_hand::Form::Angles(angles)),
         }),

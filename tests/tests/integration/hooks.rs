@@ -9,7 +9,7 @@ use grasp_tests::TestServer;
 use crate::fixtures::seconds;
 
 /// A case of 20 × 12 × 8 cm with a square handle bar of 16 mm and 40 mm of room under it, as OBJ text.
-fn case() -> String {
+pub(crate) fn case() -> String {
     let mut obj = String::new();
     let mut vertices = 0;
     let mut cuboid = |centre: Vec3, half: Vec3| {

@@ -5,14 +5,13 @@ mod constraints;
 mod receiver;
 
 use std::{
-    io::Read as _,
-    path::{Path, PathBuf},
+    path::PathBuf,
     time::{Duration, Instant},
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{AtlasUse, FindAnswer, FindRequest, Outcome, built_in::request_for};
-use serde::{Serialize, de::DeserializeOwned};
+use grasp_client::{AtlasUse, FindAnswer, FindRequest, Outcome};
+use serde::Serialize;
 
 use constraints::ConstraintOptions;
 use receiver::ReceiverOptions;
@@ -20,7 +19,7 @@ use receiver::ReceiverOptions;
 use crate::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
-    holdout,
+    input::{find_request, read_json},
     output::{Output, write_json},
     picture::{Model, Picture, write_file},
     server_options::ServerOptions,
@@ -236,18 +235,7 @@ impl Arguments {
 
     /// The request of the holdout or the file, overridden by the options.
     async fn to_request(&self) -> Result<FindRequest, Failure> {
-        let mut request = match (&self.holdout, &self.request) {
-            (Some(name), _) => request_for(holdout::built_in(name)?),
-            (None, Some(path)) => {
-                let path = path.clone();
-                blocking(move || read_json("request", &path)).await?
-            }
-            (None, None) => {
-                return Err(Failure::Usage(
-                    "neither --holdout nor --request was given".to_owned(),
-                ));
-            }
-        };
+        let mut request = find_request(self.holdout.as_deref(), self.request.as_deref()).await?;
         if let Some(path) = self.obstacles.clone() {
             request.obstacles = blocking(move || read_json("obstacles", &path)).await?;
         }
@@ -297,17 +285,4 @@ async fn draw(
         Ok(())
     })
     .await
-}
-
-/// Reads a value from a JSON file or, for `-`, from standard input; `what` names it in errors.
-pub(crate) fn read_json<T: DeserializeOwned>(what: &str, path: &Path) -> Result<T, Failure> {
-    let cannot_read = |error| Failure::other(format!("cannot read {}", path.display()), error);
-    let text = if path == Path::new("-") {
-        let mut text = String::new();
-        std::io::stdin().read_to_string(&mut text).map_err(cannot_read)?;
-        text
-    } else {
-        std::fs::read_to_string(path).map_err(cannot_read)?
-    };
-    serde_json::from_str(&text).map_err(|error| Failure::Usage(format!("{what} {}: {error}", path.display())))
 }

@@ -16,8 +16,8 @@ use tokio::time::{MissedTickBehavior, interval};
 use crate::{
     EXIT_CODES, Ending,
     failure::Failure,
-    find::read_json,
     holdout,
+    input::read_json,
     output::{Output, write_json, write_json_line, write_line},
     progress_bar::bar,
     server_options::ServerOptions,

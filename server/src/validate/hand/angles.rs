@@ -74,7 +74,7 @@ pub(in crate::validate) fn checked_digits(
     digits
 }
 
-fn check_count(field: Field<'_>, sent: &[v1::DigitAngles], violations: &mut Violations) {
+pub(super) fn check_count(field: Field<'_>, sent: &[v1::DigitAngles], violations: &mut Violations) {
     if sent.len() != 5 {
         violations.add(
             field,

@@ -4,6 +4,7 @@ mod angles;
 mod axes;
 #[cfg(test)]
 pub(crate) mod fixtures;
+mod given_grasp;
 mod meshed;
 mod proportions;
 mod radii;
@@ -29,6 +30,8 @@ use crate::{
 };
 use angles::angled_hand;
 pub(super) use angles::checked_digits;
+pub(crate) use given_grasp::GivenGrasp;
+pub(super) use given_grasp::{Given, given_grasp};
 pub(crate) use meshed::MeshedHand;
 pub(super) use meshed::check_meshes_together;
 use meshed::meshed_hand;

@@ -205,7 +205,7 @@ impl<'a> SentJoints<'a> {
         if axes.are_foreign {
             violations.add(
                 Field::root("convention"),
-                "does not fit: most joints of the presenting hand point away from their bones, as those of another \
+                "does not fit: most joints of the hand point away from their bones, as those of another \
                  convention do",
             );
         }

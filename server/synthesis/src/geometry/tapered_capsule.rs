@@ -8,6 +8,9 @@ use crate::base::pose::Pose;
 /// closest points of parallel axes always include an end of one of them.
 const PARALLEL: f64 = 1e-10;
 
+/// Steps of the search along an axis, each of which leaves two thirds of it: 25 cm become less than a micrometre.
+const SKIN_STEPS: usize = 32;
+
 /// The convex hull of two spheres: all points within [`TaperedCapsule::radius_at`] of a point of the axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TaperedCapsule {
@@ -100,6 +103,33 @@ impl TaperedCapsule {
         let across = (offset - direction * along).length();
         let t = ((along + across * slope / (1.0 - slope * slope).sqrt()) / length).clamp(0.0, 1.0);
         (t, value(t))
+    }
+
+    /// The point of the skin that is nearest to a convex body, by the signed distance of a point from the body and the direction
+    /// in which that distance grows. Exact to about a micrometre, in about a hundred evaluations.
+    pub fn skin_toward(&self, distance: impl Fn(Vec3) -> f32, outward: impl Fn(Vec3) -> Vec3) -> Vec3 {
+        // Distance less radius is convex along the axis.
+        let value = |t: f32| distance(self.at(t)) - self.radius_at(t);
+        let (mut from, mut to) = (0.0_f32, 1.0_f32);
+        for _ in 0..SKIN_STEPS {
+            let third = (to - from) / 3.0;
+            if value(from + third) <= value(to - third) {
+                to -= third;
+            } else {
+                from += third;
+            }
+        }
+        let along = [0.0, 0.5 * (from + to), 1.0]
+            .into_iter()
+            .min_by(|&a, &b| value(a).total_cmp(&value(b)))
+            .unwrap_or_default();
+        self.at(along) - outward(self.at(along)) * self.radius_at(along)
+    }
+
+    /// The direction in which the distance from a point grows fastest: a unit vector, or 0 on the axis.
+    pub fn outward(&self, point: Vec3) -> Vec3 {
+        let (along, _) = self.nearest(point.as_dvec3());
+        (point - self.at(along as f32)).normalize_or_zero()
     }
 
     /// Distance between the surfaces of two solids, in metres; if negative, how far one must move to clear the other.

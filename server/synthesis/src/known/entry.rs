@@ -61,18 +61,14 @@ impl Entry {
         solids: &HandSolids,
         gripper: &mut Gripper,
     ) -> Self {
-        let contacts = gripper.contacts.clone();
-        let classification = classify(rig, &grip.pose, &contacts, &scene.object.local_shape);
-        let grip_values = grip_values(
-            scene,
-            rig,
-            &grip.pose,
-            &contacts,
-            classification,
-            gripper.relative_closure(scene, grip.epsilon),
-            solids,
-        );
-        let of_grip = grip_total(&grip_values);
+        let held = Self::of_held(scene, rig, grip, solids, gripper);
+        let Self {
+            grip,
+            contacts,
+            grip_values,
+            ..
+        } = &held;
+        let of_grip = grip_total(grip_values);
         let mut friction_uses = FrictionUses::default();
         let scores = std::array::from_fn(|index| {
             let load = scene.load(&gripper.soft_contacts, direction(index));
@@ -84,7 +80,7 @@ impl Entry {
             );
             held.map_or(SLIPS, |balance| {
                 let values = sum(
-                    force_values(scene, &contacts, &balance.forces),
+                    force_values(scene, contacts, &balance.forces),
                     upright_values(scene.object, grip.pose.frame_from_wrist, direction(index)),
                 );
                 quantized(of_grip + mean_value(&values))
@@ -96,13 +92,10 @@ impl Entry {
             gripper.closure(scene).is_some()
         });
         Self {
-            grip,
-            contacts,
-            classification,
-            grip_values,
             scores,
             friction_uses,
             finger_subsets,
+            ..held
         }
     }
 
@@ -135,6 +128,37 @@ impl Entry {
             scores: [SLIPS; DIRECTIONS],
             friction_uses: FrictionUses::default(),
         })
+    }
+
+    /// The grip that `gripper` has just closed, as far as hand and object alone tell. Its scores by gravity and its finger subsets are
+    /// unknown.
+    pub fn of_held(
+        scene: &ObjectScene<'_>,
+        rig: &Rig,
+        grip: Grip,
+        solids: &HandSolids,
+        gripper: &Gripper,
+    ) -> Self {
+        let contacts = gripper.contacts.clone();
+        let classification = classify(rig, &grip.pose, &contacts, &scene.object.local_shape);
+        let grip_values = grip_values(
+            scene,
+            rig,
+            &grip.pose,
+            &contacts,
+            classification,
+            gripper.relative_closure(scene, grip.epsilon),
+            solids,
+        );
+        Self {
+            finger_subsets: FingerSubsets::whole(grip.holding_digits()),
+            grip,
+            contacts,
+            classification,
+            grip_values,
+            scores: [SLIPS; DIRECTIONS],
+            friction_uses: FrictionUses::default(),
+        }
     }
 
     /// The entry evaluated again from the same hand and contacts; none if its closure is insufficient.

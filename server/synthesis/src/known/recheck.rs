@@ -3,7 +3,7 @@
 use super::{entry::Entry, gravity::nearest_direction};
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
-    model::{grasp::Grasp, hand::rig::Rig, strategy::Validity},
+    model::{grasp::Grasp, hand::rig::Rig, receiver::ArmPose, strategy::Validity},
     physical::{
         contacts::soften,
         grip::{Gripper, clear_of_barriers},
@@ -54,6 +54,19 @@ impl<'a> GripChecker<'a> {
     /// The grasp of a known grip for the holdout, with its score; none if it is too close to a barrier or the
     /// object slips. `solids` are the grip's, from [`Entry::tracked_solids`].
     pub fn check(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
+        self.try_check(entry, solids, gripper).ok()
+    }
+
+    /// The same.
+    ///
+    /// # Errors
+    /// The first reason against the grip.
+    pub fn try_check(
+        &self,
+        entry: &Entry,
+        solids: &TrackedSolids,
+        gripper: &mut Gripper,
+    ) -> Result<Grasp, Unfit> {
         let Self {
             scene,
             rig,
@@ -64,9 +77,9 @@ impl<'a> GripChecker<'a> {
             .object
             .admits_wrist(rig.handedness, entry.grip.pose.frame_from_wrist)
         {
-            return None;
+            return Err(Unfit::Banned);
         }
-        let clearances = clear_of_barriers(solids, presented.barriers())?;
+        let clearances = clear_of_barriers(solids, presented.barriers()).ok_or(Unfit::Obstructed)?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(&gripper.soft_contacts, presented.up);
         let known_use = if self.knows_friction_uses {
@@ -74,18 +87,14 @@ impl<'a> GripChecker<'a> {
         } else {
             FrictionUse::default()
         };
-        let balance = balance_with(&gripper.soft_contacts, &load, known_use, &mut gripper.buffers)?;
+        let balance = balance_with(&gripper.soft_contacts, &load, known_use, &mut gripper.buffers)
+            .ok_or(Unfit::Slips)?;
         let epsilon = if self.friction_differs {
-            gripper.closure(scene)?
+            gripper.closure(scene).ok_or(Unfit::Slips)?
         } else {
             entry.grip.epsilon
         };
-        let must_reach = presented.receiver.must_reach();
-        let arm = must_reach.then(|| presented.arm_of(scene.object, rig, entry.grip.pose.frame_from_wrist));
-        let arm = match arm {
-            Some(None) => return None,
-            reached => reached.flatten(),
-        };
+        let arm = self.arm(entry)?;
         let mut grasp = unscored_grasp(
             &entry.grip,
             &entry.contacts,
@@ -97,6 +106,37 @@ impl<'a> GripChecker<'a> {
         );
         grasp.arm = arm;
         grasp.score = Some(score(entry.grip_values, &grasp, scene, rig, presented));
-        Some(grasp)
+        Ok(grasp)
     }
+
+    /// The receiver's arm, if it must reach the grip.
+    ///
+    /// # Errors
+    /// [`Unfit::OutOfReach`] if it does not.
+    pub fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Unfit> {
+        let Self {
+            scene,
+            rig,
+            presented,
+            ..
+        } = *self;
+        if !presented.receiver.must_reach() {
+            return Ok(None);
+        }
+        let arm = presented.arm_of(scene.object, rig, entry.grip.pose.frame_from_wrist);
+        arm.map(Some).ok_or(Unfit::OutOfReach)
+    }
+}
+
+/// Why a known grip does not suit a holdout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unfit {
+    /// It is near a banned grip.
+    Banned,
+    /// It is too close to a barrier.
+    Obstructed,
+    /// The object slips.
+    Slips,
+    /// The receiver's arm does not reach it.
+    OutOfReach,
 }

@@ -18,7 +18,7 @@ use crate::{
 
 /// How much closer than to another hand a hand may come to an obstacle, in metres: 0.1 mm remain, against rounding. A
 /// hand that takes something thin from a table all but touches it; with half of this, no pen on a table can be taken.
-const CLOSER_TO_OBSTACLES: f32 = 0.0009;
+pub(super) const CLOSER_TO_OBSTACLES: f32 = 0.0009;
 
 /// Clearance between the hand and forearm and obstacles, in metres.
 pub const OBSTACLE_CLEARANCE: f32 = GIVER_CLEARANCE - CLOSER_TO_OBSTACLES;
@@ -77,12 +77,9 @@ impl PreparedObstacle {
     }
 
     /// The direction in which the distance from a point grows fastest: a unit vector, or 0 on the axis of a capsule.
-    fn outward(&self, point: Vec3) -> Vec3 {
+    pub(super) fn outward(&self, point: Vec3) -> Vec3 {
         match self {
-            Self::Capsule(capsule) => {
-                let (along, _) = capsule.solid.nearest(point.as_dvec3());
-                (point - capsule.solid.at(along as f32)).normalize_or_zero()
-            }
+            Self::Capsule(capsule) => capsule.solid.outward(point),
             Self::Box(solid) => solid.outward(point),
         }
     }

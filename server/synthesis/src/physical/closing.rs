@@ -77,6 +77,15 @@ impl ClosedDigit {
         self.touches.contains(&true)
     }
 
+    /// A digit that stays as it is.
+    pub(super) fn as_posed(angles: DigitAngles, links: [TaperedCapsule; 3], surface: &MeshBvh) -> Self {
+        Self {
+            angles,
+            touches: std::array::from_fn(|link| touches(&links[link], surface)),
+            links,
+        }
+    }
+
     /// Sum of the three joints' flexion, in radians.
     pub fn flexion(&self) -> f32 {
         self.angles.base_pitch + self.angles.second_pitch + self.angles.third_pitch
@@ -163,14 +172,7 @@ impl Closing<'_> {
         let starts = LESS_BENT.map(|share| (share, bent_by(share)));
         let (share, start) = starts.into_iter().find(|(_, start)| self.is_free(start))?;
         let rates = [posed.base_pitch, posed.second_pitch, posed.third_pitch].map(|bend| bend.max(0.0));
-        let touched = |angles: DigitAngles| {
-            let links = self.links(&angles);
-            ClosedDigit {
-                angles,
-                touches: std::array::from_fn(|link| self.link_touches(&links[link])),
-                links,
-            }
-        };
+        let touched = |angles: DigitAngles| ClosedDigit::as_posed(angles, self.links(&angles), self.surface);
         let at_start = touched(start);
         if at_start.touches_object() {
             return Some(at_start);
@@ -337,8 +339,13 @@ impl Closing<'_> {
     }
 
     fn link_touches(&self, link: &TaperedCapsule) -> bool {
-        clearance(link, self.surface, TOUCHING) < TOUCHING
+        touches(link, self.surface)
     }
+}
+
+/// True if a link touches the object, or is deeper.
+fn touches(link: &TaperedCapsule, surface: &MeshBvh) -> bool {
+    clearance(link, surface, TOUCHING) < TOUCHING
 }
 
 /// The sweep parameter at which the total flexion reaches `flexion` radians, ignoring joint limits.

@@ -5,10 +5,13 @@
 //! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
 //! known.
 
+mod as_posed;
 mod given_hand;
 mod posed_hand;
 
+pub use as_posed::PosedHold;
 pub use given_hand::HoldsBy;
+
 use glam::Vec3;
 
 use super::{
@@ -17,7 +20,7 @@ use super::{
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     hanging::Hang,
-    immobility::{Buffers, SoftContact, TorqueScale, epsilon, unbalanced_share},
+    immobility::{Buffers, SoftContact, TorqueScale, epsilon, nearest_balance},
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::Proposal,
@@ -223,7 +226,7 @@ impl Gripper {
                 .filter(|_| enough_touch)
                 .and_then(|presented| self.hang(scene, &closed, presented.up))
         } else {
-            are_opposed(&self.contacts).then(|| self.closure(scene)).flatten()
+            self.opposed_closure(scene)
         };
         stopwatch.lap(Step::ImmobilityValidation);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
@@ -290,6 +293,11 @@ impl Gripper {
         Some(epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers))
     }
 
+    /// [`Self::closure`], unless it is clear at once that nothing can be held.
+    fn opposed_closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
+        are_opposed(&self.contacts).then(|| self.closure(scene)).flatten()
+    }
+
     /// Ferrari-Canny epsilon of the contacts, if it reaches the required one.
     pub fn closure(&mut self, scene: &ObjectScene<'_>) -> Option<f32> {
         // Closure does not depend on the direction of gravity.
@@ -315,7 +323,7 @@ impl Gripper {
     /// against gravity.
     pub fn unbalanced_share(&mut self, scene: &ObjectScene<'_>, up: Vec3) -> f32 {
         let load = scene.load(&self.soft_contacts, up);
-        unbalanced_share(&self.soft_contacts, &load, &mut self.buffers)
+        nearest_balance(&self.soft_contacts, &load, &mut self.buffers).residual
     }
 
     /// True if the object hangs in the last hand.

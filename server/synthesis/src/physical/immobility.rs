@@ -23,7 +23,7 @@ use super::solids::PALM_SOLIDS;
 use crate::model::hand::Digit;
 pub(crate) use crate::physical::immobility::balance::firm_force;
 pub use crate::physical::immobility::balance::{
-    BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance, balance_with, unbalanced_share,
+    BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance, balance_with, nearest_balance,
 };
 pub use crate::physical::immobility::closure::{EPSILON_TOLERANCE, epsilon, epsilon_upper_bound};
 

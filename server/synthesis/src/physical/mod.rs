@@ -16,6 +16,7 @@ pub mod flexing;
 pub mod grip;
 pub mod hanging;
 pub mod immobility;
+pub mod nearest;
 pub mod obstacle;
 pub mod receiver;
 pub mod scene;

@@ -123,6 +123,18 @@ impl Presented {
         }
     }
 
+    /// The same, if nothing were to be kept clear of.
+    #[must_use]
+    pub fn without_barriers(&self) -> Self {
+        Self {
+            giver: None,
+            other_hands: Vec::new(),
+            meshes: Vec::new(),
+            obstacles: Vec::new(),
+            ..self.clone()
+        }
+    }
+
     /// The receiver's arm of a hand at the object with this wrist pose; none if where the receiver stands is unknown, or if the arm
     /// does not reach the wrist clear of object and barriers.
     pub fn arm_of(&self, object: &GraspObject, rig: &Rig, object_from_wrist: Pose) -> Option<ArmPose> {

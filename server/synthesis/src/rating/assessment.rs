@@ -87,18 +87,23 @@ impl GraspContext<'_> {
         self.rated(grasp, relative_closure, solids).map(Box::new)
     }
 
-    /// The grip's type, if the constraints admit it and the contacts. What hangs is in a hook, whatever the fingers look like.
+    /// The type of a hand. What hangs is in a hook, whatever the fingers look like.
+    pub fn classification(&self, pose: &HandPose, contacts: &[Contact], hangs: bool) -> Classification {
+        if hangs {
+            HOOK
+        } else {
+            classify(self.rig, pose, contacts, &self.object.object.local_shape)
+        }
+    }
+
+    /// The grip's type, if the constraints admit it and the contacts.
     pub(super) fn classified(
         &self,
         grip: &Grip,
         contacts: &[Contact],
         hangs: bool,
     ) -> Result<Classification, NoGrip> {
-        let classification = if hangs {
-            HOOK
-        } else {
-            classify(self.rig, &grip.pose, contacts, &self.object.object.local_shape)
-        };
+        let classification = self.classification(&grip.pose, contacts, hangs);
         if !self.constraints.admits_contacts(contacts)
             || !self.constraints.admits_type(classification.grasp_type)
         {
@@ -123,15 +128,27 @@ impl GraspContext<'_> {
     /// multiple of the required one.
     pub(super) fn rated(
         &self,
-        mut grasp: Grasp,
+        grasp: Grasp,
         relative_closure: f32,
         solids: &HandSolids,
     ) -> Result<Grasp, NoGrip> {
+        let grasp = self.scored(grasp, relative_closure, solids);
+        // Closing may have moved the wrist since its placement was admitted.
+        let is_admitted =
+            self.is_not_banned(&grasp) && self.constraints.admits(&grasp) && self.is_reached(&grasp);
+        is_admitted
+            .then_some(grasp)
+            .ok_or(NoGrip::Rejected(Rejection::UnmetConstraint))
+    }
+
+    /// The grasp with its score and, if the receiver's arm must reach it, the arm. `relative_closure` is as for a rated one.
+    #[must_use]
+    pub fn scored(&self, mut grasp: Grasp, relative_closure: f32, solids: &HandSolids) -> Grasp {
         let Self {
             object,
             presented,
             rig,
-            constraints,
+            ..
         } = self;
         let grip_values = grip_values(
             object,
@@ -146,17 +163,18 @@ impl GraspContext<'_> {
         if presented.receiver.must_reach() {
             grasp.arm = presented.arm_of(object.object, rig, grasp.pose.frame_from_wrist);
         }
-        // Closing may have moved the wrist since its placement was admitted.
-        let is_banned = !object
-            .object
-            .admits_wrist(rig.handedness, grasp.pose.frame_from_wrist);
-        if is_banned
-            || !constraints.admits(&grasp)
-            || (presented.receiver.must_reach() && grasp.arm.is_none())
-        {
-            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
-        }
-        Ok(grasp)
+        grasp
+    }
+
+    /// True unless the grasp is near a grip with which the object is not to be taken.
+    pub fn is_not_banned(&self, grasp: &Grasp) -> bool {
+        let object = self.object.object;
+        object.admits_wrist(self.rig.handedness, grasp.pose.frame_from_wrist)
+    }
+
+    /// True unless the receiver's arm must reach the grasp and does not.
+    pub fn is_reached(&self, grasp: &Grasp) -> bool {
+        !self.presented.receiver.must_reach() || grasp.arm.is_some()
     }
 }
 

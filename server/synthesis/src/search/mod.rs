@@ -3,9 +3,11 @@
 
 pub mod attempt;
 mod both_hands;
+pub mod evaluation;
 pub mod key_frames;
 mod known_grips;
 pub mod limits;
+pub mod nearest;
 pub mod physical_attempt;
 mod preference;
 mod race;
@@ -15,6 +17,7 @@ pub mod settings;
 pub mod standing;
 mod tally;
 mod turns;
+pub mod verdicts;
 
 use std::{sync::atomic::AtomicBool, time::Duration};
 

@@ -1,6 +1,7 @@
 //! The hand: its rig and pose, and the kinematics of its bones, joints and skin.
 
 pub mod description;
+pub mod fit;
 pub mod joints;
 pub mod kinematics;
 pub mod mesh;

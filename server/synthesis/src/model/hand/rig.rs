@@ -42,6 +42,20 @@ pub struct DigitLimits {
     pub third_pitch: AngleRange,
 }
 
+impl DigitLimits {
+    /// The nearest angles within the limits.
+    #[must_use]
+    pub fn clamped(&self, angles: DigitAngles) -> DigitAngles {
+        let within = |angle: f32, AngleRange { min, max }: AngleRange| angle.clamp(min, max);
+        DigitAngles {
+            base_yaw: within(angles.base_yaw, self.base_yaw),
+            base_pitch: within(angles.base_pitch, self.base_pitch),
+            second_pitch: within(angles.second_pitch, self.second_pitch),
+            third_pitch: within(angles.third_pitch, self.third_pitch),
+        }
+    }
+}
+
 /// One digit chain: three links on a base that is fixed in the wrist frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DigitRig {

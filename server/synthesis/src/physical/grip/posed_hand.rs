@@ -1,8 +1,6 @@
 //! Hands that somebody posed, closed or opened as little as it takes to touch.
 
-use super::{
-    GIVER_CLEARANCE, Grip, Gripper, NoGrip, are_opposed, collect_contacts, collides_without_digits, soften,
-};
+use super::{GIVER_CLEARANCE, Grip, Gripper, NoGrip, collect_contacts, collides_without_digits, soften};
 use crate::{
     base::{rejection::Rejection, stopwatch::NoStopwatch},
     model::hand::{Digit, DigitAngles, HandPose, rig::Rig},
@@ -58,7 +56,7 @@ impl Gripper {
             &mut self.contacts,
         );
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
-        let epsilon = are_opposed(&self.contacts).then(|| self.closure(scene)).flatten();
+        let epsilon = self.opposed_closure(scene);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         self.validate(&closer, &digits, epsilon, &mut NoStopwatch)
     }

@@ -108,28 +108,52 @@ pub fn balance_with(
     least_use: FrictionUse,
     buffers: &mut Buffers,
 ) -> Option<Balance> {
+    let found = solved(contacts, load, (least_use, Effort::UntilHopeless), buffers);
+    (found.residual <= BALANCE_TOLERANCE).then_some(found)
+}
+
+/// [`balance`] or, if there is none, what comes close to it: forces inside the same limits, with what they leave unbalanced. Takes
+/// longer than finding out that there is none.
+///
+/// # Panics
+/// As [`balance`].
+pub fn nearest_balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Balance {
+    solved(contacts, load, (FrictionUse::Low, Effort::ToTheEnd), buffers)
+}
+
+/// How long to look for forces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Effort {
+    /// Until no balance within the tolerance is possible.
+    UntilHopeless,
+    /// Until nothing gets closer to balance.
+    ToTheEnd,
+}
+
+/// The best forces found.
+fn solved(
+    contacts: &[SoftContact],
+    load: &Load,
+    (least_use, effort): (FrictionUse, Effort),
+    buffers: &mut Buffers,
+) -> Balance {
     let Buffers { cones, solvers, .. } = buffers;
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
+    problem.effort = effort;
     // Contacts with closure hold nearly any load.
     if let Some(found) = problem.lowest_friction_balance(least_use, solvers) {
-        return Some(found);
+        return found;
     }
-    let found = problem.any_balance(solvers);
-    (found.residual <= BALANCE_TOLERANCE).then_some(found)
-}
-
-/// What contacts that [`balance`] finds no forces for leave unbalanced, as a share of the weight: by the best forces found
-/// before it gave up.
-///
-/// # Panics
-/// As [`balance`].
-pub fn unbalanced_share(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> f32 {
-    let Buffers { cones, solvers, .. } = buffers;
-    cones.clear();
-    cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
-    Problem::new(contacts, load, cones).any_balance(solvers).residual
+    let mut found = problem.best(solvers);
+    let matters = found.residual <= BALANCE_TOLERANCE || effort == Effort::ToTheEnd;
+    if matters && exceeds_limit(&found) {
+        problem.limited = true;
+        found = problem.best(solvers);
+    }
+    problem.keep_limits(&mut found);
+    found
 }
 
 /// Sum of the digits' normal forces, in newtons, that holds a weight in newtons firmly.
@@ -160,6 +184,7 @@ struct Problem<'a> {
     friction_use: FrictionUse,
     limited: bool,
     comfortable: bool,
+    effort: Effort,
 }
 
 impl<'a> Problem<'a> {
@@ -194,6 +219,7 @@ impl<'a> Problem<'a> {
             friction_use: FrictionUse::Full,
             limited: false,
             comfortable: false,
+            effort: Effort::UntilHopeless,
         }
     }
 
@@ -217,17 +243,6 @@ impl<'a> Problem<'a> {
             }
         }
         firmest.map(|(_, found)| found)
-    }
-
-    /// Forces with all of the friction, whether they balance or not.
-    fn any_balance(&mut self, solvers: &mut Solvers) -> Balance {
-        let mut found = self.best(solvers);
-        if found.residual <= BALANCE_TOLERANCE && exceeds_limit(&found) {
-            self.limited = true;
-            found = self.best(solvers);
-        }
-        self.keep_limits(&mut found);
-        found
     }
 
     /// Sum of the digits' normal forces over the weight.
@@ -337,7 +352,8 @@ impl<'a> Problem<'a> {
             // The residual is perpendicular to the solution, so pushes and slacks, together at most `strength`, can
             // shorten it by no more than they gain along it.
             let gained = strength * best_gain.max(slack.0);
-            if !self.comfortable && length - gained / length > f64::from(BALANCE_TOLERANCE) {
+            let gives_up = !self.comfortable && self.effort == Effort::UntilHopeless;
+            if gives_up && length - gained / length > f64::from(BALANCE_TOLERANCE) {
                 return;
             }
             if slack.0 > best_gain {

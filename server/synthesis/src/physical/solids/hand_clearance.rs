@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{HandSolids, TaperedCapsule};
+use super::{HandSolids, SolidPart, TaperedCapsule};
+use crate::model::hand::{Digit, Phalanx};
 
 /// How far two parts of a hand may press into each other before one counts as going through the other, in metres:
 /// neighbouring fingers touch in life, and both yield by a millimetre under little force. Larger values let fingers
@@ -19,7 +20,26 @@ const KNUCKLE_TAPER: f32 = 1.03;
 /// The parts that can meet are the links of different digits, the two outer links of a digit and the palm, and, for
 /// fingers, the ball of the thumb. Inner links and the thumb's ball overlap the palm in every pose.
 pub fn self_clearance(hand: &HandSolids) -> f32 {
-    let mut least = 0.0;
+    least_distance(hand, 0.0, |_| ()) + SOFT_CONTACT
+}
+
+/// The two parts of a hand that can meet and come closest, with their solids, and [`self_clearance`] of them, however far
+/// apart they are.
+pub fn nearest_parts(hand: &HandSolids) -> Option<(f32, [(SolidPart, TaperedCapsule); 2])> {
+    let mut nearest = None;
+    let least = least_distance(hand, f32::INFINITY, |parts| nearest = Some(parts));
+    nearest.map(|parts| (least + SOFT_CONTACT, parts))
+}
+
+/// The smallest distance between parts that can meet, or `enough` if it is larger. Each pair that is closer than all before it is
+/// passed to `nearer`.
+#[inline]
+fn least_distance(
+    hand: &HandSolids,
+    enough: f32,
+    mut nearer: impl FnMut([(SolidPart, TaperedCapsule); 2]),
+) -> f32 {
+    let mut least = enough;
     let mut phalanges = hand.phalanges;
     for [first, ..] in &mut phalanges[1..] {
         first.start_radius = first.start_radius.min(first.end_radius * KNUCKLE_TAPER);
@@ -27,20 +47,38 @@ pub fn self_clearance(hand: &HandSolids) -> f32 {
     let digits = phalanges.map(|links| links.map(Bounded::new));
     // Missing digits are a point in the palm.
     let is_there = |digit: &[Bounded; 3]| digit[2].solid.end_radius > 0.0;
+    let link = |digit: usize, link: usize| SolidPart::Phalanx(Digit::ALL[digit], Phalanx::ALL[link]);
     for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
-        for other in digits[i + 1..].iter().filter(|other| is_there(other)) {
-            least = between(digit, other, least);
+        let others = digits.iter().enumerate().skip(i + 1);
+        for (j, other) in others.filter(|(_, other)| is_there(other)) {
+            least = between(digit, other, least, |our, their| {
+                nearer([
+                    (link(i, our), digit[our].solid),
+                    (link(j, their), other[their].solid),
+                ]);
+            });
         }
     }
     let palm = hand.palm.map(Bounded::new);
     let thenar = hand.thenar.map(Bounded::new);
     for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
-        least = between(&digit[1..], &palm, least);
+        let outer = &digit[1..];
+        least = between(outer, &palm, least, |our, their| {
+            nearer([
+                (link(i, our + 1), outer[our].solid),
+                (SolidPart::Palm, palm[their].solid),
+            ]);
+        });
         if i > 0 {
-            least = between(&digit[1..], &thenar, least);
+            least = between(outer, &thenar, least, |our, their| {
+                nearer([
+                    (link(i, our + 1), outer[our].solid),
+                    (SolidPart::ThumbBall, thenar[their].solid),
+                ]);
+            });
         }
     }
-    least + SOFT_CONTACT
+    least
 }
 
 /// A solid with its bounding sphere.
@@ -101,13 +139,20 @@ impl Bounded {
     }
 }
 
-/// The smallest distance between two groups of solids, or `least` if it is larger.
-fn between(ours: &[Bounded], theirs: &[Bounded], least: f32) -> f32 {
+/// The smallest distance between two groups of solids, or `least` if it is larger. The places of each closer pair are passed to
+/// `nearer`.
+#[inline]
+fn between(ours: &[Bounded], theirs: &[Bounded], least: f32, mut nearer: impl FnMut(usize, usize)) -> f32 {
     let mut least = least;
-    for our in ours {
-        for their in theirs {
-            if !our.is_beyond(their, least) {
-                least = least.min(our.solid.distance(&their.solid));
+    for (our_place, our) in ours.iter().enumerate() {
+        for (their_place, their) in theirs.iter().enumerate() {
+            if our.is_beyond(their, least) {
+                continue;
+            }
+            let distance = our.solid.distance(&their.solid);
+            if distance < least {
+                least = distance;
+                nearer(our_place, their_place);
             }
         }
     }

@@ -14,3 +14,4 @@ mod preferences;
 mod race;
 mod refinement;
 mod stopping;
+mod verdicts;

@@ -1,0 +1,148 @@
+//! Verdicts about a client's own grasp, and a valid one near it.
+
+use std::{
+    sync::atomic::{AtomicBool, Ordering},
+    time::{Duration, Instant},
+};
+
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::stop::Stop,
+    model::hand::fit::farthest_joint,
+    physical::scene::Presented,
+    search::{
+        nearest::{hand_way, nearest_grasp},
+        scene::Task,
+        verdicts,
+    },
+};
+use rayon::ThreadPool;
+
+use super::{
+    job::{FindJob, PreparedJob},
+    on_executor::on_executor,
+    progress::Progress,
+};
+use crate::{
+    answer::{ClientFrame, wire_duration, wire_grasp, wire_hand_way, wire_verdict},
+    error::ServiceError,
+    executor::{Admission, SearchExecutor},
+    validate::GivenGrasp,
+};
+
+/// A grasp to judge.
+#[derive(Debug)]
+pub(crate) struct JudgeJob {
+    /// The search whose checks the grasp has to pass, with the hand of the grasp.
+    pub find: FindJob,
+    /// The grasp.
+    pub grasp: GivenGrasp,
+    /// Whether to search for a valid grasp near it.
+    pub find_nearest: bool,
+    /// What was repaired in the grasp.
+    pub warnings: Vec<String>,
+}
+
+/// The verdicts, and when they were found.
+#[derive(Debug)]
+pub(crate) struct Judged {
+    /// The response to the call.
+    pub response: v1::ValidateGraspResponse,
+    /// When checks and search ended.
+    pub ended: Instant,
+}
+
+/// Judges a grasp on the executor.
+///
+/// # Errors
+/// [`ServiceError::DeadlineExceeded`], or the giver's mesh is no surface, or the work was stopped or panicked.
+pub(crate) async fn judge(
+    job: JudgeJob,
+    executor: &SearchExecutor,
+    admission: Admission,
+) -> Result<Judged, ServiceError> {
+    let due = job.find.has_deadline.then(|| job.find.due());
+    // Boxed: jobs of some kilobytes would make the futures of all calls large.
+    let job = Box::new(job);
+    on_executor(due, executor, admission, move |pool, stop| job.run(pool, stop)).await
+}
+
+impl JudgeJob {
+    fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Judged, ServiceError> {
+        let start = Instant::now();
+        let Self {
+            find,
+            grasp,
+            find_nearest,
+            mut warnings,
+        } = self;
+        let prepared = find.prepare()?;
+        let frame = prepared.frame();
+        warnings.extend(prepared.warnings().cloned());
+        let mut hands = prepared.hands();
+        let (hand, task, settings) = hands.next().ok_or(ServiceError::Cancelled)?;
+        let pose = grasp.at_object(task.rig, frame.client_from_object);
+        let judgement = verdicts::judge(task, &settings.query, &pose);
+        let check_time = start.elapsed();
+        let nearest = if find_nearest && !judgement.is_valid() {
+            let is_over = || stop.load(Ordering::Relaxed) || prepared.is_over();
+            let known = nearest_grasp(task, settings, &pose, Stop::when(&is_over));
+            // A search is due if nothing known is valid and there is time.
+            match known {
+                Ok(None) => prepared.search(pool, stop, &Progress::default()).outcome.grasp,
+                Ok(known) => known,
+                Err(_) => None,
+            }
+        } else {
+            None
+        };
+        if stop.load(Ordering::Relaxed) {
+            return Err(ServiceError::Cancelled);
+        }
+        let ended = Instant::now();
+        let way = nearest.as_ref().map(|nearest| {
+            let Task { holdout, rig, .. } = task;
+            let presented = Presented::of(holdout);
+            hand_way(rig, [&pose, &nearest.pose], &holdout.object, presented.barriers())
+        });
+        let farthest_joint = farthest(&grasp, &prepared, frame);
+        Ok(Judged {
+            response: v1::ValidateGraspResponse {
+                valid: judgement.is_valid(),
+                verdicts: judgement
+                    .verdicts
+                    .iter()
+                    .map(|verdict| wire_verdict(verdict, frame))
+                    .collect(),
+                grasp: Some(wire_grasp(&judgement.grasp, hand, frame)),
+                farthest_joint,
+                nearest: nearest.as_ref().map(|nearest| wire_grasp(nearest, hand, frame)),
+                way_to_nearest: way.map(|way| wire_hand_way(&way, frame)),
+                warnings,
+                check_time: Some(wire_duration(check_time)),
+            },
+            ended,
+        })
+    }
+}
+
+/// How far the rig's joints are from tracked ones at most, in the client's unit; none for a grasp of a rig.
+fn farthest(grasp: &GivenGrasp, prepared: &PreparedJob, frame: ClientFrame) -> Option<f32> {
+    let GivenGrasp::Tracked(joints) = grasp else {
+        return None;
+    };
+    let (_, Task { rig, .. }, _) = prepared.hands().next()?;
+    let object_from_client = frame.client_from_object.inverse();
+    let pose = grasp.at_object(rig, frame.client_from_object);
+    let metres = farthest_joint(rig, &pose, &joints.transformed(object_from_client));
+    Some(frame.convention.length_from_openxr(metres))
+}
+
+impl Judged {
+    /// How long the checks took.
+    pub(crate) fn check_time(&self) -> Duration {
+        let time = self.response.check_time;
+        time.and_then(|time| Duration::try_from(time).ok())
+            .unwrap_or_default()
+    }
+}

@@ -1,0 +1,205 @@
+//! What is right and wrong with a hand that somebody posed: every check of `PHYSICAL` validity with its figure.
+//!
+//! Searches stop at the first check that fails, and mostly without knowing by how much. Here every check is made. The bounds are
+//! those of the searches' own checks, and the figures come from the functions that these decide by.
+
+mod checks;
+
+use std::fmt;
+
+use glam::Vec3;
+
+use self::checks::Checks;
+use super::{scene::Task, settings::Query};
+use crate::{
+    model::{
+        grasp::{Grasp, PhysicalMargins},
+        hand::HandPose,
+    },
+    physical::{
+        barriers::BarrierClearances,
+        grip::{Grip, Gripper},
+        nearest::Barrier,
+        scene::{ObjectScene, Presented},
+        solids::{HandSolids, SolidPart, TrackedSolids},
+    },
+    rating::assessment::{GraspContext, unscored_grasp},
+};
+
+/// A check that a valid grasp passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Check {
+    /// The angles are within the rig's limits; the largest excess in radians.
+    JointLimits,
+    /// The hand is no deeper in the object than flesh yields; the largest depth in metres.
+    Penetration,
+    /// Hand and forearm are clear of other hands; the least distance in metres.
+    GiverClearance,
+    /// Hand and forearm are clear of obstacles; the least distance in metres.
+    ObstacleClearance,
+    /// No part of the hand goes through another; the least distance in metres.
+    SelfCollision,
+    /// The hand touches the object; the number of contacts.
+    Contacts,
+    /// The hand keeps off forbidden surfaces; the least distance in metres.
+    Forbidden,
+    /// The contacts have closure; their epsilon.
+    Closure,
+    /// The contacts carry the weight; the unbalanced share of it.
+    Balance,
+    /// The receiver's arm reaches the wrist; how much farther it would have to reach, in metres.
+    Reach,
+    /// The query's constraints are met.
+    Constraints,
+    /// The hand is not near a banned grip.
+    Banned,
+}
+
+impl Check {
+    /// All checks.
+    pub const ALL: [Self; 12] = [
+        Self::JointLimits,
+        Self::Penetration,
+        Self::GiverClearance,
+        Self::ObstacleClearance,
+        Self::SelfCollision,
+        Self::Contacts,
+        Self::Forbidden,
+        Self::Closure,
+        Self::Balance,
+        Self::Reach,
+        Self::Constraints,
+        Self::Banned,
+    ];
+}
+
+/// What a part of the hand is measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Against {
+    /// Another hand or an obstacle.
+    Barrier(Barrier),
+    /// Another part of the same hand.
+    Part(SolidPart),
+}
+
+impl fmt::Display for Against {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Barrier(barrier) => barrier.fmt(f),
+            Self::Part(part) => part.fmt(f),
+        }
+    }
+}
+
+/// The result of a check.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// The check.
+    pub check: Check,
+    /// True if it is passed.
+    pub passed: bool,
+    /// The figure, in the unit of the check; none if there is nothing to measure.
+    pub figure: Option<f32>,
+    /// The least or the largest figure that passes.
+    pub bound: Option<f32>,
+    /// Where it is measured, in the object's frame.
+    pub at: Option<Vec3>,
+    /// The part of the hand that is measured.
+    pub part: Option<SolidPart>,
+    /// What that part is measured against, unless it is the object.
+    pub against: Option<Against>,
+    /// All of it in words, in SI units.
+    pub description: String,
+}
+
+/// What was found about a hand.
+#[derive(Clone, Debug)]
+pub struct Judgement {
+    /// One verdict per check, in the order of [`Check::ALL`].
+    pub verdicts: Vec<Verdict>,
+    /// The hand as a grasp, with contacts, forces as far as they balance, and margins. Its score is empty unless it is valid.
+    pub grasp: Grasp,
+}
+
+impl Judgement {
+    /// True if every check is passed.
+    pub fn is_valid(&self) -> bool {
+        self.verdicts.iter().all(|verdict| verdict.passed)
+    }
+}
+
+/// Judges a hand in the object's frame; every number of its pose must be finite. Takes some tenths of a millisecond.
+pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose) -> Judgement {
+    let Task { holdout, rig, .. } = task;
+    let presented = Presented::of(holdout);
+    let object = ObjectScene::new(&holdout.object, query.friction_on(&holdout.object));
+    let context = GraspContext {
+        object,
+        presented: &presented,
+        rig,
+        constraints: &query.constraints,
+    };
+    let solids = HandSolids::of_pose(rig, pose);
+    let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+    let checks = Checks {
+        holdout,
+        presented: &presented,
+        rig,
+        solids: &solids,
+        tracked: &tracked,
+    };
+    let mut gripper = Gripper::default();
+    let hold = gripper.hold_as_posed(&object, rig, pose, &presented);
+    let depth = checks.depth();
+    let hand = checks.nearest_hand();
+    let obstacle = checks.nearest_obstacle();
+    let grip = Grip {
+        pose: *pose,
+        // Nobody closed it by a ratio.
+        bend_ratios: hold.touching.map(|touches| touches.then_some(1.0)),
+        penetration: depth.map_or(0.0, |(depth, ..)| depth),
+        epsilon: hold.epsilon,
+    };
+    let mut grasp = unscored_grasp(
+        &grip,
+        &gripper.contacts,
+        context.classification(pose, &gripper.contacts, hold.hangs()),
+        hold.epsilon,
+        hold.balance.clone(),
+        &presented,
+        BarrierClearances {
+            hands: hand.map(|nearest| nearest.distance),
+            obstacles: obstacle.map(|nearest| nearest.distance),
+        },
+    );
+    grasp.hangs = hold.hangs();
+    grasp.arm = presented.arm_of(object.object, rig, pose.frame_from_wrist);
+    let verdicts = vec![
+        checks.joint_limits(pose),
+        checks.penetration(depth),
+        checks.clearance(Check::GiverClearance, hand),
+        checks.clearance(Check::ObstacleClearance, obstacle),
+        checks.self_collision(),
+        checks.contacts(&grasp.contacts),
+        checks.forbidden(),
+        checks.closure(&hold),
+        checks.balance(&hold),
+        checks.reach(context.is_reached(&grasp), pose.frame_from_wrist.position),
+        checks.constraints(&query.constraints, &grasp),
+        checks.banned(context.is_not_banned(&grasp)),
+    ];
+    let mut judgement = Judgement { verdicts, grasp };
+    if judgement.is_valid() {
+        let arm = judgement.grasp.arm;
+        judgement.grasp = context.scored(judgement.grasp, hold.relative_closure, &solids);
+        judgement.grasp.arm = arm;
+    }
+    judgement
+}
+
+impl Judgement {
+    /// The margins of the hand.
+    pub fn margins(&self) -> Option<&PhysicalMargins> {
+        self.grasp.margins.as_ref()
+    }
+}
