@@ -10,7 +10,7 @@ use grasp_proto::v1::{self, grasp_service_server::GraspService};
 use grasp_synthesis::base::stop::Stop;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{Shared, streaming::Messages, tracks::TrackAnswers};
+use super::{Shared, packing::answer, streaming::Messages, tracks::TrackAnswers};
 use crate::{
     budget::effective_budget,
     call::{CallContext, SearchSummary},
@@ -168,7 +168,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::FindGraspRequest>,
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.find(request.into_inner(), &call).await?))
+        Ok(answer(self.find(request.into_inner(), &call).await?))
     }
 
     type StreamGraspsStream = Messages<v1::StreamGraspsResponse>;
@@ -205,7 +205,7 @@ impl GraspService for GraspHandler {
         &self,
         request: Request<v1::PushFrameRequest>,
     ) -> Result<Response<v1::PushFrameResponse>, Status> {
-        Ok(Response::new(self.push(request.into_inner())?))
+        Ok(answer(self.push(request.into_inner())?))
     }
 
     async fn validate_grasp(
@@ -213,7 +213,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::ValidateGraspRequest>,
     ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.validate(request.into_inner(), &call).await?))
+        Ok(answer(self.validate(request.into_inner(), &call).await?))
     }
 
     async fn evaluate_holdout(
@@ -221,7 +221,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::EvaluateHoldoutRequest>,
     ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.evaluate(request.into_inner(), &call).await?))
+        Ok(answer(self.evaluate(request.into_inner(), &call).await?))
     }
 }
 
