@@ -193,7 +193,8 @@ fn wire_model(binding: &Binding, scale: f32, frames: &HandFrames, frame: ClientF
     }
 }
 
-fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
+/// A grasp of a hand.
+pub(crate) fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
     let hand = WireHand::new(&grasp.pose, rig_hand, frame);
     let rig: &Rig = &rig_hand.hand.rig;
     let object_from_wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
@@ -345,14 +346,10 @@ fn report(
         strategy: wire_strategy(settings.query.strategy).into(),
         validity: wire_validity(settings.query.validity).into(),
         candidates: report.candidates,
-        source: match report.source {
-            Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
-            Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
-            Some(GraspSource::Recent) => v1::GraspSource::Recent,
-            Some(GraspSource::Preferred(_)) => v1::GraspSource::Preferred,
-            None => v1::GraspSource::Unspecified,
-        }
-        .into(),
+        source: report
+            .source
+            .map_or(v1::GraspSource::Unspecified, wire_source)
+            .into(),
         atlas_entries: u32::try_from(report.known_grips).unwrap_or(u32::MAX),
         atlas_stamp: settings
             .known
@@ -367,6 +364,16 @@ fn report(
             .other_atlas
             .map(|atlas| atlas_stamp(atlas))
             .unwrap_or_default(),
+    }
+}
+
+/// Where a grasp came from.
+pub(crate) fn wire_source(source: GraspSource) -> v1::GraspSource {
+    match source {
+        GraspSource::Attempt(_) => v1::GraspSource::Search,
+        GraspSource::Atlas(_) => v1::GraspSource::Atlas,
+        GraspSource::Recent => v1::GraspSource::Recent,
+        GraspSource::Preferred(_) => v1::GraspSource::Preferred,
     }
 }
 
@@ -415,8 +422,8 @@ fn nearest_miss(miss: &NearestMiss, rig: &Rig, frame: ClientFrame) -> v1::Neares
     }
 }
 
-/// Saturates at the 292 billion years that the message can hold.
-fn wire_duration(duration: Duration) -> prost_types::Duration {
+/// A duration. Saturates at the 292 billion years that the message can hold.
+pub(crate) fn wire_duration(duration: Duration) -> prost_types::Duration {
     prost_types::Duration {
         seconds: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),
         nanos: i32::try_from(duration.subsec_nanos()).unwrap_or(i32::MAX),

@@ -11,6 +11,7 @@ use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
     known::{entry::Entry, recent_grips::RecentGrips, resized_grips::ResizedGrips, seed_source::SeedSource},
     model::{
+        grasp::Grasp,
         holdout::Holdout,
         strategy::{Choice, Validity},
     },
@@ -84,11 +85,11 @@ pub(crate) struct Answered {
 
 /// One hand's search, ready to be run.
 #[derive(Debug)]
-struct HandSearch {
-    hand: RigHand,
+pub(super) struct HandSearch {
+    pub(super) hand: RigHand,
     /// The holdout, with the arm of this hand.
-    holdout: Holdout,
-    settings: SearchSettings,
+    pub(super) holdout: Holdout,
+    pub(super) settings: SearchSettings,
     /// Names of the preferred grips in the settings.
     preferred: Vec<String>,
 }
@@ -96,12 +97,12 @@ struct HandSearch {
 /// A job whose holdouts and settings are ready to be searched.
 #[derive(Debug)]
 pub(super) struct PreparedJob {
-    query: FindQuery,
-    derived: Arc<Derived>,
+    pub(super) query: FindQuery,
+    pub(super) derived: Arc<Derived>,
     /// The receiving hand's search and, if the request leaves the choice, the other hand's.
-    hands: Vec<HandSearch>,
+    pub(super) hands: Vec<HandSearch>,
     clock: SinceArrival,
-    start: Instant,
+    pub(super) start: Instant,
     budget: Duration,
     patience: Duration,
     /// Whether later searches may use what this one finds.
@@ -235,6 +236,7 @@ impl FindJob {
                 workers: self.workers,
                 record_step_times: query.record_step_times,
                 mechanisms: self.mechanisms,
+                observer: None,
             },
         }
     }
@@ -316,16 +318,14 @@ impl PreparedJob {
         } = ended;
         let HandSearch {
             hand,
-            holdout,
             settings,
             preferred,
+            ..
         } = &self.hands[place];
         let ended = Instant::now();
         let search_time = ended - self.start;
-        if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
-            let approach = settings.query.constraints.approach;
-            let friction = settings.query.friction_on(&holdout.object);
-            plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
+        if let Some(grasp) = &mut outcome.grasp {
+            self.plan_key_frames(place, grasp);
         }
         if matches!(
             outcome.end,
@@ -334,10 +334,7 @@ impl PreparedJob {
             // A small part of what the budget leaves for the way back.
             outcome.report.limits = self.limits();
         }
-        let frame = ClientFrame {
-            convention: self.query.convention,
-            client_from_object: self.query.client_from_object,
-        };
+        let frame = self.client_frame();
         let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
         let warnings: Vec<String> = hands.flat_map(GiverHand::warnings).cloned().collect();
         let other = self.hands.iter().find(|other| other.hand.hand != hand.hand);
@@ -362,6 +359,35 @@ impl PreparedJob {
             new_grip: self.new_grip(&outcome, place),
             ended,
         })
+    }
+
+    /// Plans a grasp's key frames, if the request asks for them.
+    pub(super) fn plan_key_frames(&self, place: HandPlace, grasp: &mut Grasp) {
+        if !self.query.plan_key_frames {
+            return;
+        }
+        let HandSearch {
+            hand,
+            holdout,
+            settings,
+            ..
+        } = &self.hands[place];
+        let approach = settings.query.constraints.approach;
+        let friction = settings.query.friction_on(&holdout.object);
+        plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
+    }
+
+    /// The client's frame and convention.
+    pub(super) fn client_frame(&self) -> ClientFrame {
+        ClientFrame {
+            convention: self.query.convention,
+            client_from_object: self.query.client_from_object,
+        }
+    }
+
+    /// When the search's clock started.
+    pub(super) fn arrived(&self) -> Instant {
+        self.clock.0
     }
 
     /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same.

@@ -7,6 +7,8 @@ mod holdout;
 mod job;
 mod progress;
 mod slices;
+mod stream;
 
 pub(crate) use find::find;
-pub(crate) use job::FindJob;
+pub(crate) use job::{Answered, FindJob};
+pub(crate) use stream::{Found, Stream, Wanted};

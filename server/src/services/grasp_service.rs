@@ -15,6 +15,7 @@ use crate::{
     budget::effective_budget,
     call::{CallContext, SearchSummary},
     error::ServiceError,
+    executor::Admission,
     objects::{Derived, StoredObject, resized::ObjectSize, store::Need},
     search::{self, FindJob},
     validate::{FindQuery, RequestedSize, find_query},
@@ -23,7 +24,7 @@ use crate::{
 /// Implements `GraspService`.
 #[derive(Clone, Debug)]
 pub(crate) struct GraspHandler {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
 impl GraspHandler {
@@ -41,13 +42,12 @@ impl GraspHandler {
         let query = find_query(request, (&shared.default_rig, &shared.rigs), |id| {
             shared.objects.contains(id)
         })?;
-        call.log_object(&query.object_id);
-        let stored = shared.object(&query.object_id, call).await?.object;
-        // Held while the call lasts, so that the object is not evicted.
-        let _object = stored.hold();
-        let admission = shared.executor.admit()?;
-        let held_out = self.held_out(&stored, query.object_size, call).await?;
-        let job = self.job(query, &stored, held_out, call)?;
+        let Ready {
+            stored,
+            _held,
+            admission,
+            job,
+        } = self.ready(query, call).await?;
         call.search_is_due(job.due());
         let answered = search::find(job, &shared.executor, admission).await?;
         call.search_ended(answered.ended);
@@ -56,6 +56,26 @@ impl GraspHandler {
         }
         call.log_search(summary(&answered.response));
         Ok(answered.response)
+    }
+
+    /// Admits a search and prepares what it needs.
+    ///
+    /// # Errors
+    /// There is no such object, the server is at its limit of searches, or the deadline leaves no time.
+    pub(super) async fn ready(&self, query: FindQuery, call: &CallContext) -> Result<Ready, ServiceError> {
+        let shared = &self.shared;
+        call.log_object(&query.object_id);
+        let stored = shared.object(&query.object_id, call).await?.object;
+        let held = stored.hold();
+        let admission = shared.executor.admit()?;
+        let held_out = self.held_out(&stored, query.object_size, call).await?;
+        let job = self.job(query, &stored, held_out, call)?;
+        Ok(Ready {
+            stored,
+            _held: held,
+            admission,
+            job,
+        })
     }
 
     /// The object as the request holds it out.
@@ -149,6 +169,17 @@ impl GraspHandler {
     }
 }
 
+/// A search that may run.
+pub(super) struct Ready {
+    stored: Arc<StoredObject>,
+    /// Held while the call lasts, so that the object is not evicted.
+    pub(super) _held: Arc<()>,
+    /// The right to run it.
+    pub(super) admission: Admission,
+    /// The search.
+    pub(super) job: FindJob,
+}
+
 /// An object as a request holds it out.
 struct HeldOut {
     /// The object at its size.
@@ -231,7 +262,8 @@ fn drawn_seed() -> u64 {
     RandomState::new().hash_one(0_u8)
 }
 
-fn summary(answer: &v1::FindGraspResponse) -> SearchSummary {
+/// A search as it is logged.
+pub(super) fn summary(answer: &v1::FindGraspResponse) -> SearchSummary {
     let report = answer.report.as_ref();
     let time = report
         .and_then(|report| report.search_time)

@@ -15,6 +15,8 @@ use crate::{
     propose::prepared::PreparedRig,
 };
 
+use super::observer::GraspObserver;
+
 /// Default of [`Query::improvement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
 pub const IMPROVEMENT: Duration = Duration::from_millis(5);
 
@@ -124,6 +126,8 @@ pub struct Run {
     pub record_step_times: bool,
     /// The mechanisms that are on.
     pub mechanisms: Mechanisms,
+    /// Sees every valid grasp as it is found.
+    pub observer: Option<Arc<dyn GraspObserver>>,
 }
 
 impl Default for Run {
@@ -137,6 +141,7 @@ impl Default for Run {
             workers: 1,
             record_step_times: false,
             mechanisms: Mechanisms::ALL,
+            observer: None,
         }
     }
 }
