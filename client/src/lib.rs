@@ -21,6 +21,7 @@
 //! - [`FindRequest`] describes the holdout and the search, [`FindAnswer`] the result. [`PresentingHand`] is the giver's
 //!   hand; [`Obstacle`]s are kept clear of like it; [`Receiver`] is the body whose arm has to reach; [`Constraints`] are
 //!   requirements on the grasp.
+//! - [`GraspStream`] has every better grasp as it is found, or the best that differ.
 //! - [`NewObject`] describes an object to create, [`ObjectUpdate`] a change, [`ObjectQuery`] a list, and [`ObjectWatch`] tells what
 //!   happens to objects.
 //! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
@@ -55,6 +56,7 @@ mod rig;
 mod rigs;
 mod score;
 mod search;
+mod stream;
 mod wire;
 
 pub use client::{GraspClient, GraspClientBuilder};
@@ -85,6 +87,7 @@ pub use search::{
     Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
     PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
 };
+pub use stream::{DifferBy, GraspStream, StreamEvent, StreamSummary, Streamed, StreamedGrasp};
 
 /// The README's Rust example compiles.
 #[cfg(doctest)]
