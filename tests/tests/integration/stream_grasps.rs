@@ -132,21 +132,26 @@ async fn each_grasp_is_better_and_the_last_is_the_best() {
 #[tokio::test(flavor = "multi_thread")]
 async fn no_more_grasps_are_sent_than_wanted_per_second() {
     let server = TestServer::start().await;
-    let request = v1::StreamGraspsRequest {
-        most_per_second: Some(5.0),
-        ..every_better(v1::FindGraspRequest {
-            budget: Some(milliseconds(700)),
+    let mut skipped = 0;
+    for seed in 0..4 {
+        let holdout = v1::FindGraspRequest {
+            seed: Some(seed),
             ..held_remote()
-        })
-    };
-    let streamed = stream(&server, request).await.unwrap();
-    // The last one comes when the search ends.
-    let (_, but_last) = streamed.times.split_last().unwrap();
-    for pair in but_last.windows(2) {
-        assert!(pair[1] - pair[0] > Duration::from_millis(190), "{pair:?}");
+        };
+        let request = v1::StreamGraspsRequest {
+            most_per_second: Some(2.0),
+            ..every_better(attempts(300, holdout))
+        };
+        let streamed = stream(&server, request).await.unwrap();
+        // The last one comes when the search ends.
+        let (_, but_last) = streamed.times.split_last().unwrap();
+        for pair in but_last.windows(2) {
+            assert!(pair[1] - pair[0] > Duration::from_millis(450), "{pair:?}");
+        }
+        assert!(streamed.totals().is_sorted_by(|a, b| a < b));
+        skipped += streamed.summary.skipped;
     }
-    assert!(streamed.summary.skipped > 0, "{streamed:?}");
-    assert!(streamed.totals().is_sorted_by(|a, b| a < b));
+    assert!(skipped > 0);
     server.stop().await;
 }
 
@@ -296,12 +301,13 @@ async fn the_summary_comes_before_the_deadline() {
         budget: Some(seconds(10)),
         ..floating_remote()
     }));
-    request.set_timeout(Duration::from_millis(600));
+    let limit = Duration::from_secs(3);
+    request.set_timeout(limit);
     let start = Instant::now();
     let streamed = stream(&server, request).await.unwrap();
-    assert!(start.elapsed() < Duration::from_millis(600), "{:?}", start.elapsed());
+    assert!(start.elapsed() < limit, "{:?}", start.elapsed());
     let budget = streamed.summary.report.unwrap().budget.unwrap();
-    assert!(budget.seconds == 0 && budget.nanos < 600_000_000, "{budget:?}");
+    assert!((1..3).contains(&budget.seconds), "{budget:?}");
     server.stop().await;
 }
 
