@@ -22,6 +22,7 @@
 //!   hand; [`Obstacle`]s are kept clear of like it; [`Receiver`] is the body whose arm has to reach; [`Constraints`] are
 //!   requirements on the grasp.
 //! - [`ValidateRequest`] checks a grasp of the client's own, [`EvaluateRequest`] rates whether and from where an object can be taken.
+//! - [`GraspStream`] has every better grasp as it is found, or the best that differ.
 //! - [`NewObject`] describes an object to create, [`ObjectUpdate`] a change, [`ObjectQuery`] a list, and [`ObjectWatch`] tells what
 //!   happens to objects.
 //! - [`ClientError`] distinguishes failures and carries the standard details that the server attached.
@@ -57,6 +58,7 @@ mod rig;
 mod rigs;
 mod score;
 mod search;
+mod stream;
 mod verdict;
 mod wire;
 
@@ -91,6 +93,7 @@ pub use search::{
     Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
     PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
 };
+pub use stream::{DifferBy, GraspStream, StreamEvent, StreamSummary, Streamed, StreamedGrasp};
 pub use verdict::{Check, GraspToValidate, HandWay, ValidateAnswer, ValidateRequest, Verdict};
 
 /// The README's Rust example compiles.

@@ -9,6 +9,8 @@
 //! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
 //! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
 //!
+//! `web` lets pages in browsers call, and refuses those of other origins.
+//!
 //! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
 //!
 //! Before serving, `memory` compares what the configuration may use with the limits of the process, and
@@ -20,7 +22,7 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  demand  error  health_check  limits  reserve
+//! budget  convention  demand  error  health_check  limits  reserve  web
 //! atlas_slots  saved
 //! rigs
 //! answer  call  config  executor  net  validate
@@ -58,6 +60,7 @@ mod serve;
 mod services;
 mod track;
 mod validate;
+mod web;
 
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
@@ -67,3 +70,4 @@ pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory,
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};
+pub use web::WebOrigins;

@@ -16,18 +16,21 @@ use grasp_proto::v1::{
     object_service_server::ObjectServiceServer,
 };
 use grasp_synthesis::{base::stop::unstopped, model::hand::Handedness};
+use http::Response;
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
-use tonic::{server::NamedService, transport};
+use tonic::{body::Body, codec::CompressionEncoding::Gzip, server::NamedService, transport};
 use tonic_health::{ServingStatus, server::HealthReporter};
+use tonic_web::GrpcWebLayer;
+use tower::util::{MapResponseLayer, option_layer};
 
 use crate::{
     atlases::{Atlases, files::AtlasFiles},
-    call::{CallLayer, CallsInFlight},
+    call::{BySize, CallLayer, CallsInFlight},
     config::{Config, StorePlace},
     executor::SearchExecutor,
     limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
-    net::{AcceptLimits, UnreadAnswers, UnreadLayer, accept},
+    net::{AcceptLimits, AdmitLayer, UnreadAnswers, UnreadLayer, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
         resized::Resizer,
@@ -42,6 +45,7 @@ use crate::{
     saved::{SavedFiles, StoreError},
     services::{Ahead, GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads, load_saved_rigs},
     track::OpenTracks,
+    web::{OriginLayer, WebOrigins, cors},
 };
 
 /// Largest number of open streams per connection.
@@ -121,6 +125,7 @@ pub struct Server {
     maximum_uploads: NonZeroUsize,
     maximum_connections: NonZeroUsize,
     unread: Arc<UnreadAnswers>,
+    web_origins: Arc<WebOrigins>,
     drain: Duration,
     directory_bytes: usize,
     place: StorePlace,
@@ -261,6 +266,7 @@ impl Server {
             maximum_uploads: config.maximum_uploads,
             maximum_connections: config.maximum_connections,
             unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
+            web_origins: Arc::new(config.web_origins),
             drain: config.drain,
             directory_bytes,
             place: config.place,
@@ -305,15 +311,28 @@ impl Server {
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
         self.read_saved().await?;
+        let largest_upload = self.shared.obj_limits.bytes + BYTES_BESIDES_MESH;
         let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
+            .accept_compressed(Gzip)
+            .send_compressed(Gzip)
             .max_decoding_message_size(LARGEST_FIND_REQUEST)
             .max_encoding_message_size(LARGEST_RESPONSE);
         let objects = ObjectServiceServer::new(ObjectHandler::new(Arc::clone(&self.shared)))
-            .max_decoding_message_size(self.shared.obj_limits.bytes + BYTES_BESIDES_MESH)
+            .accept_compressed(Gzip)
+            .send_compressed(Gzip)
             .max_encoding_message_size(LARGEST_RESPONSE);
+        let objects = BySize {
+            small: objects.clone().max_decoding_message_size(LARGEST_FIND_REQUEST),
+            large: objects.max_decoding_message_size(largest_upload),
+        };
         let rigs = HandRigServiceServer::new(HandRigHandler::new(Arc::clone(&self.shared)))
-            .max_decoding_message_size(self.shared.obj_limits.bytes + BYTES_BESIDES_MESH)
+            .accept_compressed(Gzip)
+            .send_compressed(Gzip)
             .max_encoding_message_size(LARGEST_RESPONSE);
+        let rigs = BySize {
+            small: rigs.clone().max_decoding_message_size(LARGEST_FIND_REQUEST),
+            large: rigs.max_decoding_message_size(largest_upload),
+        };
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, ServingStatus::Serving).await;
 
@@ -322,10 +341,13 @@ impl Server {
         let limits = AcceptLimits {
             connections: self.maximum_connections.get(),
             preface: PREFACE_TIME,
+            headers: LARGEST_HEADERS as usize,
         };
         let unread = Arc::clone(&self.unread);
         let incoming = accept(listener, limits, unread, stop.clone(), close.clone());
+        let is_web = *self.web_origins != WebOrigins::NONE;
         let serving = transport::Server::builder()
+            .accept_http1(is_web)
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
             .concurrency_limit_per_connection(CALLS_PER_CONNECTION)
             .load_shed(true)
@@ -336,14 +358,20 @@ impl Server {
             .max_frame_size(LARGEST_FRAME)
             .http2_keepalive_interval(Some(KEEPALIVE_EVERY))
             .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+            .layer(UnreadLayer)
+            .layer(OriginLayer(Arc::clone(&self.web_origins)))
+            .layer(cors(&self.web_origins))
+            .layer(option_layer(is_web.then(GrpcWebLayer::new)))
+            .layer(MapResponseLayer::new(|answer: Response<_>| answer.map(Body::new)))
             .layer(CallLayer {
                 in_flight: self.calls.clone(),
                 uploads: self.builds,
                 maximum_uploads: self.maximum_uploads.get(),
+                largest_upload,
                 reserve: Arc::clone(&self.shared.reserve),
                 longest_call: self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
             })
-            .layer(UnreadLayer)
+            .layer(AdmitLayer)
             .add_service(grasps)
             .add_service(objects)
             .add_service(rigs)

@@ -90,7 +90,7 @@ def test_default_memory_matches_the_page():
     printed = run("docker", "run", "--rm", "--env", "GRASP_WORKERS=30", "grasp-server", "--print-config").stdout
     value = {key: int(text) for key, text in re.findall(r"^(\w+) = (\d+)$", printed, flags=re.MULTILINE)}
     mib = 1 << 20
-    upload = 2 * value["maximum_object_bytes"] + 340 * value["maximum_object_triangles"]
+    upload = 3 * value["maximum_object_bytes"] + 340 * value["maximum_object_triangles"]
     prepared = 240 * value["maximum_object_triangles"] + 2 * mib
     total = (
         26 * mib

@@ -147,7 +147,7 @@ fn bend_ratios_to_wire(ratios: BendRatios) -> v1::BendRatios {
 }
 
 /// None for an origin of a newer server.
-fn source_from_wire(value: i32) -> Option<GraspSource> {
+pub(super) fn source_from_wire(value: i32) -> Option<GraspSource> {
     match v1::GraspSource::try_from(value).ok()? {
         v1::GraspSource::Unspecified => None,
         v1::GraspSource::Search => Some(GraspSource::Search),
@@ -314,7 +314,7 @@ fn contact_from_wire(contact: v1::Contact) -> Result<Contact, Malformed> {
     })
 }
 
-fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed> {
+pub(super) fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed> {
     let duration = |field: &str, value: Option<prost_types::Duration>| {
         required(field, value).and_then(|value| duration_from_wire(field, value))
     };

@@ -354,14 +354,10 @@ fn report(
         strategy: wire_strategy(settings.query.strategy).into(),
         validity: wire_validity(settings.query.validity).into(),
         candidates: report.candidates,
-        source: match report.source {
-            Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
-            Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
-            Some(GraspSource::Standing) => v1::GraspSource::Standing,
-            Some(GraspSource::Preferred(_)) => v1::GraspSource::Preferred,
-            None => v1::GraspSource::Unspecified,
-        }
-        .into(),
+        source: report
+            .source
+            .map_or(v1::GraspSource::Unspecified, wire_source)
+            .into(),
         atlas_entries: u32::try_from(report.known_grips).unwrap_or(u32::MAX),
         atlas_stamp: settings
             .known
@@ -376,6 +372,16 @@ fn report(
             .other_atlas
             .map(|atlas| atlas_stamp(atlas))
             .unwrap_or_default(),
+    }
+}
+
+/// Where a grasp came from.
+pub(crate) fn wire_source(source: GraspSource) -> v1::GraspSource {
+    match source {
+        GraspSource::Attempt(_) => v1::GraspSource::Search,
+        GraspSource::Atlas(_) => v1::GraspSource::Atlas,
+        GraspSource::Standing => v1::GraspSource::Standing,
+        GraspSource::Preferred(_) => v1::GraspSource::Preferred,
     }
 }
 
@@ -424,7 +430,7 @@ fn nearest_miss(miss: &NearestMiss, rig: &Rig, frame: ClientFrame) -> v1::Neares
     }
 }
 
-/// Saturates at the 292 billion years that the message can hold.
+/// A duration. Saturates at the 292 billion years that the message can hold.
 pub(crate) fn wire_duration(duration: Duration) -> prost_types::Duration {
     prost_types::Duration {
         seconds: i64::try_from(duration.as_secs()).unwrap_or(i64::MAX),

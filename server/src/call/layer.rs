@@ -17,11 +17,10 @@ use super::{
     body::{AnswerBody, code_in},
     in_flight::CallsInFlight,
     log_line::LogLine,
-    request_body::RequestBody,
 };
 use crate::{
     budget::parse_grpc_timeout,
-    error::{Limit, ServiceError, blame_malformed_messages},
+    error::{Limit, ServiceError, blame_client},
     limits::LARGEST_FIND_REQUEST,
     reserve::DeadlineReserve,
 };
@@ -37,11 +36,21 @@ const UPLOAD_METHODS: [&str; 4] = [
 /// Path of the method whose request may take long to arrive. It limits its time itself.
 const STREAMED_UPLOAD: &str = "/grasp.v1.ObjectService/UploadObject";
 
-/// Packages and names of the services that take large messages, by the methods above only.
-const UPLOAD_SERVICES: [&str; 2] = ["/grasp.v1.ObjectService/", "/grasp.v1.HandRigService/"];
+/// Paths of the methods that stream small messages, each of which is awaited: packing them would only delay them.
+const AWAITED_STREAMS: [&str; 4] = [
+    "/grasp.v1.GraspService/StreamGrasps",
+    "/grasp.v1.GraspService/TrackHoldout",
+    "/grasp.v1.GraspService/OpenTrack",
+    "/grasp.v1.ObjectService/WatchObjects",
+];
 
 /// When a client whose upload was rejected should retry: after about the time of an upload.
 const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
+
+/// True if a method takes large messages, once its call is admitted.
+pub(super) fn is_upload(path: &str) -> bool {
+    UPLOAD_METHODS.contains(&path)
+}
 
 /// Wraps every service; see the module documentation.
 #[derive(Clone, Debug)]
@@ -54,6 +63,8 @@ pub(crate) struct CallLayer {
     pub maximum_uploads: usize,
     /// Learns the delays of answers.
     pub reserve: Arc<DeadlineReserve>,
+    /// Largest message of an upload, in bytes.
+    pub largest_upload: usize,
     /// Longest time from a call's headers to those of its answer.
     pub longest_call: Duration,
 }
@@ -78,7 +89,7 @@ pub(crate) struct CallService<S> {
 
 impl<S, B, R> Service<Request<B>> for CallService<S>
 where
-    S: Service<Request<RequestBody<B>>, Response = Response<R>>,
+    S: Service<Request<B>, Response = Response<R>>,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
     R: Default + Send + 'static,
@@ -104,15 +115,13 @@ where
             search_end: Arc::clone(&context.search_end),
             reserve: Arc::clone(&self.layer.reserve),
         };
-        let largest = if UPLOAD_SERVICES.iter().any(|service| path.starts_with(service))
-            && !UPLOAD_METHODS.contains(&path)
-        {
-            LARGEST_FIND_REQUEST
+        let largest = if is_upload(path) {
+            self.layer.largest_upload
         } else {
-            usize::MAX
+            LARGEST_FIND_REQUEST
         };
         let longest = (path != STREAMED_UPLOAD).then_some(self.layer.longest_call);
-        let upload = if UPLOAD_METHODS.contains(&path) {
+        let upload = if is_upload(path) {
             let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
                 let error = ServiceError::Overloaded {
                     limit: Limit::Uploads,
@@ -125,6 +134,9 @@ where
         } else {
             None
         };
+        if AWAITED_STREAMS.contains(&path) {
+            request.headers_mut().remove("grpc-accept-encoding");
+        }
         let extensions = request.extensions_mut();
         extensions.insert(context);
         if let Some(permit) = upload {
@@ -132,9 +144,7 @@ where
                 _permit: Arc::new(permit),
             });
         }
-        let answer = self
-            .inner
-            .call(request.map(|body| RequestBody::new(body, largest)));
+        let answer = self.inner.call(request);
         Box::pin(async move {
             let answer = match longest {
                 None => answer.await,
@@ -144,7 +154,7 @@ where
                 },
             };
             drop(delay);
-            match answer.map(blame_malformed_messages) {
+            match answer.map(|answer| blame_client(answer, largest)) {
                 Ok(answer) => {
                     if let Some(code) = code_in(answer.headers()) {
                         line.set_code(code);

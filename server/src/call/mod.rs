@@ -1,13 +1,13 @@
 //! A layer around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
-//! their search, limits their time, bounds uploads, and lets no other call of
-//! the same service send large messages. A call lasts until its answer's body has been handed to the transport,
+//! their search, limits their time, and bounds uploads; no other call of
+//! the same service may send large messages. A call lasts until its answer's body has been handed to the transport,
 //! which for streams may be long after its headers.
 
 mod body;
 mod in_flight;
 mod layer;
 mod log_line;
-mod request_body;
+mod message_sizes;
 
 use std::{
     sync::{Arc, OnceLock},
@@ -17,6 +17,7 @@ use std::{
 pub(crate) use self::{
     in_flight::CallsInFlight,
     layer::{CallLayer, UploadPermit},
+    message_sizes::BySize,
 };
 
 /// How long before its deadline a call that is no search is answered: at the deadline, tonic would answer that it was cancelled.

@@ -9,6 +9,7 @@ use crate::{
     budget::BudgetLimits,
     limits::{LARGEST_RESPONSE, StoreLimits, StreamLimits},
     saved::NEEDED_PLACE,
+    web::{NEEDED_ORIGINS, WebOrigins, parse_origins},
 };
 
 impl RawConfig {
@@ -26,6 +27,7 @@ impl RawConfig {
             self.saving(check, defaults.place, defaults.maximum_saved_objects);
         let streams = self.streams(check, defaults.streams);
         let listen = listen_address(check, self.listen.take(), defaults.listen);
+        let web_origins = web_origins(check, self.web_origins.take(), defaults.web_origins);
         let config = Config {
             listen,
             workers: check.count("workers", self.workers, 1..=1024, defaults.workers),
@@ -91,6 +93,7 @@ impl RawConfig {
                 LARGEST_RESPONSE as u64..=1 << 30,
                 defaults.maximum_unread_bytes,
             ),
+            web_origins,
             drain: check.time("drain_ms", self.drain_ms, 0..=600_000, defaults.drain),
             default_rig: check.parsed(
                 "default_rig",
@@ -293,6 +296,10 @@ fn listen_address(check: &mut Check<'_>, value: Option<String>, default: SocketA
     check.parsed("listen", value, default, needed, |text| text.parse().ok())
 }
 
+fn web_origins(check: &mut Check<'_>, value: Option<String>, default: WebOrigins) -> WebOrigins {
+    check.parsed("web_origins", value, default, NEEDED_ORIGINS, parse_origins)
+}
+
 fn log_filter(text: &str) -> Option<String> {
     let filter = tracing_subscriber::EnvFilter::try_new(text);
     filter.is_ok().then(|| text.to_owned())
@@ -322,6 +329,7 @@ mod tests {
             log_format: LogFormat::Json,
             drain: Duration::from_millis(77),
             improvement: Duration::from_millis(9),
+            web_origins: WebOrigins::NONE,
             place: StorePlace::Folder("/saved".into()),
             objects_directory: Some("/objects".into()),
             atlas_directory: Some("/atlases".into()),
@@ -383,6 +391,7 @@ mod tests {
             atlas_directory: Some(PathBuf::new()),
             maximum_connections: Some(0),
             maximum_unread_bytes: Some(0),
+            web_origins: Some("game.example".into()),
             drain_ms: Some(u64::MAX),
             default_rig: Some("robot".into()),
             log_format: Some("xml".into()),
@@ -391,7 +400,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 30, "{bad:?}");
+        assert_eq!(bad.len(), 31, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

@@ -13,6 +13,7 @@ use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMEN
 use crate::{
     budget::BudgetLimits,
     limits::{StoreLimits, StreamLimits},
+    web::WebOrigins,
 };
 
 /// Format of the log.
@@ -66,6 +67,8 @@ pub struct Config {
     pub maximum_connections: NonZeroUsize,
     /// Largest number of bytes of answers that wait for clients to read them; beyond, the connection with the most is closed.
     pub maximum_unread_bytes: NonZeroUsize,
+    /// Origins of the pages that may call from browsers.
+    pub web_origins: WebOrigins,
     /// How long to wait for running calls at shutdown.
     pub drain: Duration,
     /// Rig of the receiving hand if a request names none. Under `THESIS` validity it is always the rig `thesis`.
@@ -100,7 +103,7 @@ impl Default for Config {
                 upload_bytes: non_zero(256 << 20),
                 upload_idle: Duration::from_secs(10),
                 watchers: non_zero(64),
-                tracks: non_zero(256),
+                tracks: non_zero(200),
                 track_idle: Duration::from_secs(10),
             },
             maximum_object_bytes: non_zero(8 << 20),
@@ -117,6 +120,7 @@ impl Default for Config {
             atlas_directory: None,
             maximum_connections: non_zero(1000),
             maximum_unread_bytes: non_zero(32 << 20),
+            web_origins: WebOrigins::LOOPBACK,
             drain: Duration::from_secs(10),
             default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,

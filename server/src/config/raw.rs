@@ -62,7 +62,7 @@ pub struct RawConfig {
     /// Most watchers of objects; others are rejected [default: 64].
     #[arg(long, env = "GRASP_MAXIMUM_WATCHERS", value_name = "COUNT")]
     pub maximum_watchers: Option<u64>,
-    /// Most tracks of moving givers; others are rejected [default: 256].
+    /// Most tracks of moving givers; others are rejected [default: 200].
     #[arg(long, env = "GRASP_MAXIMUM_TRACKS", value_name = "COUNT")]
     pub maximum_tracks: Option<u64>,
     /// Longest time without a frame of a track, in milliseconds [default: 10000].
@@ -121,6 +121,12 @@ pub struct RawConfig {
     /// Beyond, the connection with the most is closed.
     #[arg(long, env = "GRASP_MAXIMUM_UNREAD_BYTES", value_name = "BYTES")]
     pub maximum_unread_bytes: Option<u64>,
+    /// Origins of the pages that may call from browsers: none, `*`, or a list of loopback and origins such as
+    /// `https://game.example`, separated by commas [default: loopback].
+    ///
+    /// Loopback are pages of localhost, 127.0.0.1 and `[::1]`, with any port. With none, browsers are not served.
+    #[arg(long, env = "GRASP_WEB_ORIGINS", value_name = "ORIGINS")]
+    pub web_origins: Option<String>,
     /// How long to wait for running calls at shutdown, in milliseconds [default: 10000].
     #[arg(long, env = "GRASP_DRAIN_MS", value_name = "MS")]
     pub drain_ms: Option<u64>,
@@ -197,6 +203,7 @@ impl RawConfig {
             atlas_directory: self.atlas_directory.or(fallback.atlas_directory),
             maximum_connections: self.maximum_connections.or(fallback.maximum_connections),
             maximum_unread_bytes: self.maximum_unread_bytes.or(fallback.maximum_unread_bytes),
+            web_origins: self.web_origins.or(fallback.web_origins),
             drain_ms: self.drain_ms.or(fallback.drain_ms),
             default_rig: self.default_rig.or(fallback.default_rig),
             log_format: self.log_format.or(fallback.log_format),
@@ -236,6 +243,7 @@ impl From<&Config> for RawConfig {
             atlas_directory: config.atlas_directory.clone(),
             maximum_connections: count(config.maximum_connections.get()),
             maximum_unread_bytes: count(config.maximum_unread_bytes.get()),
+            web_origins: Some(config.web_origins.to_string()),
             drain_ms: time(config.drain),
             default_rig: Some(config.default_rig.clone()),
             log_format: Some(

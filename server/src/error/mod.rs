@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use grasp_synthesis::base::stop::Stopped;
 
-pub(crate) use status::blame_malformed_messages;
+pub(crate) use status::blame_client;
 
 /// One violation of the contract by a request.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -125,15 +125,20 @@ impl From<ServiceError> for Status {
     }
 }
 
-/// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed. Every other
+/// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed, and to messages
+/// of more than `limit` bytes, packed or unpacked, which it answers without details. Every other
 /// status in the headers of a response comes from a handler, and has details.
-pub(crate) fn blame_malformed_messages<R: Default>(response: Response<R>) -> Response<R> {
-    match Status::from_header_map(response.headers()) {
-        Some(status) if status.code() == Code::Internal && status.details().is_empty() => {
-            Status::from(ServiceError::Malformed(status.message().to_owned())).into_http()
-        }
-        _ => response,
-    }
+pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> Response<R> {
+    let Some(status) = Status::from_header_map(response.headers()) else {
+        return response;
+    };
+    let error = match status.code() {
+        _ if !status.details().is_empty() => return response,
+        Code::Internal => ServiceError::Malformed(status.message().to_owned()),
+        Code::OutOfRange | Code::ResourceExhausted => ServiceError::MessageTooLarge { limit },
+        _ => return response,
+    };
+    Status::from(error).into_http()
 }
 
 /// Details with the `ErrorInfo` that every status carries.
@@ -379,9 +384,9 @@ mod tests {
     }
 
     #[test]
-    fn only_a_failure_without_details_is_a_malformed_message() {
+    fn what_the_transport_answers_without_details_is_the_clients_fault() {
         let code_after = |status: Status| {
-            let response = blame_malformed_messages(status.into_http::<()>());
+            let response = blame_client(status.into_http::<()>(), 77);
             let status = Status::from_header_map(response.headers()).expect("it has a status");
             (status.code(), status.message().to_owned())
         };
@@ -391,9 +396,20 @@ mod tests {
             message,
             "the request is not a valid message: failed to decode: invalid wire type"
         );
+        for too_large in [Status::out_of_range("found 78"), Status::resource_exhausted("unpacked")] {
+            let (code, message) = code_after(too_large);
+            assert_eq!(code, Code::OutOfRange);
+            assert!(message.contains("more than 77 bytes"), "{message}");
+        }
         assert_eq!(code_after(ServiceError::Panicked.into()).0, Code::Internal);
+        let overloaded = ServiceError::Overloaded {
+            limit: Limit::Uploads,
+            maximum: 4,
+            retry_after: SECOND,
+        };
+        assert_eq!(code_after(overloaded.into()).0, Code::ResourceExhausted);
         assert_eq!(code_after(Status::cancelled("gone")).0, Code::Cancelled);
-        let ok = blame_malformed_messages(Response::new(7));
+        let ok = blame_client(Response::new(7), 77);
         assert_eq!(ok.into_body(), 7);
     }
 

@@ -25,8 +25,10 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 pub(crate) struct AcceptLimits {
     /// Largest number of connections; others wait in the kernel's queue.
     pub connections: usize,
-    /// Longest wait for a client's HTTP/2 preface.
+    /// Longest wait for a client's HTTP/2 preface, or as many bytes of a request.
     pub preface: Duration,
+    /// Largest headers of an HTTP/1 request, in bytes.
+    pub headers: usize,
 }
 
 /// Accepts connections until `stop`, which closes the listener immediately. `close` ends every connection.
@@ -62,8 +64,7 @@ async fn accept_all(
                 pause = FIRST_PAUSE;
                 // Small messages must not wait for others. If this fails, the first read fails too.
                 let _ = stream.set_nodelay(true);
-                let connection =
-                    Connection::new(stream, place, unread.connect(), close.clone(), limits.preface);
+                let connection = Connection::new(stream, place, unread.connect(), close.clone(), limits);
                 if sender.send(Ok(connection)).await.is_err() {
                     return;
                 }

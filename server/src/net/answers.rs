@@ -1,4 +1,4 @@
-//! The layer and the body that count what waits for a client.
+//! The layers that reject calls of clients for which too much waits, and that count what waits; with the body that counts.
 
 use std::{
     pin::Pin,
@@ -12,12 +12,65 @@ use http_body::Frame;
 use tonic::{Status, body::Body};
 use tower::{Layer, Service};
 
-use super::{ConnectionInfo, unread::Reader};
+use super::{
+    ConnectionInfo,
+    unread::{Answering, Reader},
+};
 
 /// Largest chunk that is handed to the transport at once, in bytes: what a slow client takes of it shows.
 const CHUNK: usize = 32 << 10;
 
-/// Counts the answers of the services inside.
+/// Rejects calls of connections on which too much waits unread.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AdmitLayer;
+
+impl<S> Layer<S> for AdmitLayer {
+    type Service = AdmitService<S>;
+
+    fn layer(&self, inner: S) -> Self::Service {
+        AdmitService(inner)
+    }
+}
+
+/// A service in its [`AdmitLayer`].
+#[derive(Clone, Debug)]
+pub(crate) struct AdmitService<S>(S);
+
+impl<S, B> Service<Request<B>> for AdmitService<S>
+where
+    S: Service<Request<B>, Response = Response<Body>>,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        self.0.poll_ready(cx)
+    }
+
+    fn call(&mut self, request: Request<B>) -> Self::Future {
+        let reader = reader_of(&request);
+        let answer = self.0.call(request);
+        Box::pin(async move {
+            let answer = answer.await?;
+            match reader.map(|reader| reader.admit()) {
+                Some(Err(error)) => Ok(Status::from(error).into_http()),
+                _ => Ok(answer),
+            }
+        })
+    }
+}
+
+/// What waits on a request's connection.
+fn reader_of<B>(request: &Request<B>) -> Option<Arc<Reader>> {
+    let connection = request.extensions().get::<ConnectionInfo>();
+    connection.map(|connection| Arc::clone(&connection.reader))
+}
+
+/// Counts the answers of the services inside, and the requests that wait for them. Outermost, because other layers may copy
+/// answers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct UnreadLayer;
 
@@ -48,20 +101,20 @@ where
     }
 
     fn call(&mut self, request: Request<B>) -> Self::Future {
-        let connection = request.extensions().get::<ConnectionInfo>();
-        let reader = connection.map(|connection| Arc::clone(&connection.reader));
+        let reader = reader_of(&request);
+        let answering = reader.as_ref().map(Reader::answering);
         let answer = self.0.call(request);
         Box::pin(async move {
             let answer = answer.await?;
-            let Some(reader) = reader else { return Ok(answer) };
-            if let Err(error) = reader.admit() {
-                return Ok(Status::from(error).into_http());
-            }
+            let (Some(reader), Some(answering)) = (reader, answering) else {
+                return Ok(answer);
+            };
             Ok(answer.map(|body| {
                 Body::new(CountedBody {
                     inner: body,
                     rest: None,
                     reader,
+                    _answering: answering,
                 })
             }))
         })
@@ -74,6 +127,7 @@ struct CountedBody {
     /// What is left of the last frame of the inner body.
     rest: Option<Counted>,
     reader: Arc<Reader>,
+    _answering: Answering,
 }
 
 impl http_body::Body for CountedBody {
@@ -147,15 +201,20 @@ mod tests {
     use super::*;
     use crate::net::unread::UnreadAnswers;
 
+    fn counted(content: Vec<u8>, reader: &Arc<Reader>) -> CountedBody {
+        CountedBody {
+            inner: Body::new(Full::new(Bytes::from(content))),
+            rest: None,
+            reader: Arc::clone(reader),
+            _answering: reader.answering(),
+        }
+    }
+
     #[tokio::test]
     async fn chunks_count_until_they_are_dropped() {
         let all = UnreadAnswers::new(usize::MAX);
         let content: Vec<u8> = (0..3 * CHUNK + 5).map(|byte| byte as u8).collect();
-        let mut body = CountedBody {
-            inner: Body::new(Full::new(Bytes::from(content.clone()))),
-            rest: None,
-            reader: all.connect(),
-        };
+        let mut body = counted(content.clone(), &all.connect());
         let mut chunks = Vec::new();
         while let Some(frame) = body.frame().await {
             chunks.push(frame.expect("it does not fail").into_data().expect("it is data"));
@@ -173,11 +232,7 @@ mod tests {
     #[tokio::test]
     async fn a_body_dropped_unread_counts_no_longer() {
         let all = UnreadAnswers::new(usize::MAX);
-        let mut body = CountedBody {
-            inner: Body::new(Full::new(Bytes::from(vec![0; 2 * CHUNK]))),
-            rest: None,
-            reader: all.connect(),
-        };
+        let mut body = counted(vec![0; 2 * CHUNK], &all.connect());
         let first = body.frame().await;
         drop(body);
         assert_eq!(all.bytes(), CHUNK);

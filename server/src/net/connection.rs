@@ -5,7 +5,6 @@ use std::{
     pin::Pin,
     sync::Arc,
     task::{Context, Poll},
-    time::Duration,
 };
 
 use tokio::{
@@ -17,13 +16,17 @@ use tokio::{
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::transport::server::Connected;
 
-use super::unread::Reader;
+use super::{AcceptLimits, unread::Reader};
 
-/// Bytes of the client's HTTP/2 preface (RFC 9113, 3.4).
-const PREFACE_BYTES: usize = 24;
+/// The client's HTTP/2 preface (RFC 9113, 3.4).
+const PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+
+/// Largest part of an HTTP/1 request's headers that is read at once, in bytes.
+const HEADERS_READ: usize = 4 << 10;
 
 /// A TCP connection that counts to the server's limit. Reading ends when the server closes the connection, and fails if
-/// the client does not send the HTTP/2 preface in time, for which the transport would wait forever. Reading and writing fail
+/// the client does not send as many bytes as the HTTP/2 preface has in time, for which the transport would wait forever, or
+/// headers of an HTTP/1 request that are too large. Reading and writing fail
 /// once the connection is cut off because its client does not read.
 #[derive(Debug)]
 pub(crate) struct Connection {
@@ -32,6 +35,9 @@ pub(crate) struct Connection {
     cut_off: Pin<Box<WaitForCancellationFutureOwned>>,
     reader: Arc<Reader>,
     preface: Option<Preface>,
+    /// None as long as the client may speak HTTP/2.
+    headers: Option<Headers>,
+    largest_headers: usize,
     _place: OwnedSemaphorePermit,
 }
 
@@ -42,6 +48,15 @@ struct Preface {
     deadline: Pin<Box<Sleep>>,
 }
 
+/// The headers of HTTP/1 requests, which come one after the other.
+#[derive(Debug)]
+struct Headers {
+    /// The requests whose headers have been read.
+    requests: u64,
+    /// Bytes read since then, of which the rest of that request is not counted.
+    read: usize,
+}
+
 impl Connection {
     /// Wraps an accepted connection.
     pub(crate) fn new(
@@ -49,7 +64,7 @@ impl Connection {
         place: OwnedSemaphorePermit,
         reader: Arc<Reader>,
         close: CancellationToken,
-        preface_time: Duration,
+        limits: AcceptLimits,
     ) -> Self {
         Self {
             stream,
@@ -57,9 +72,11 @@ impl Connection {
             cut_off: Box::pin(reader.cut_off().cancelled_owned()),
             reader,
             preface: Some(Preface {
-                missing: PREFACE_BYTES,
-                deadline: Box::pin(tokio::time::sleep(preface_time)),
+                missing: PREFACE.len(),
+                deadline: Box::pin(tokio::time::sleep(limits.preface)),
             }),
+            headers: None,
+            largest_headers: limits.headers,
             _place: place,
         }
     }
@@ -70,6 +87,50 @@ impl Connection {
             Poll::Ready(()) => Err(io::ErrorKind::ConnectionAborted.into()),
             Poll::Pending => Ok(()),
         }
+    }
+
+    /// Reads from the socket; of an HTTP/1 request's headers no more than allowed.
+    fn poll_read_within_limits(
+        &mut self,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let Some(headers) = &mut self.headers else {
+            return Pin::new(&mut self.stream).poll_read(cx, buffer);
+        };
+        let requests = self.reader.requests();
+        if headers.requests != requests {
+            *headers = Headers { requests, read: 0 };
+        }
+        if !self.reader.awaits_headers() {
+            return Pin::new(&mut self.stream).poll_read(cx, buffer);
+        }
+        let left = self.largest_headers.saturating_sub(headers.read);
+        if left == 0 {
+            tracing::debug!("closing a connection whose request has too large headers");
+            return Poll::Ready(Err(io::ErrorKind::InvalidData.into()));
+        }
+        let mut part = [0; HEADERS_READ];
+        let most = left.min(HEADERS_READ).min(buffer.remaining());
+        let mut part = ReadBuf::new(&mut part[..most]);
+        let read = Pin::new(&mut self.stream).poll_read(cx, &mut part);
+        headers.read += part.filled().len();
+        buffer.put_slice(part.filled());
+        read
+    }
+
+    /// Notes what the first bytes say of the client's protocol. True once there are as many as the preface has.
+    fn note_first_bytes(preface: &mut Preface, headers: &mut Option<Headers>, read: &[u8]) -> bool {
+        let from = PREFACE.len() - preface.missing;
+        let compared = read.len().min(preface.missing);
+        preface.missing -= compared;
+        if headers.is_none() && read[..compared] != PREFACE[from..from + compared] {
+            *headers = Some(Headers {
+                requests: 0,
+                read: from + read.len(),
+            });
+        }
+        preface.missing == 0
     }
 }
 
@@ -102,11 +163,11 @@ impl AsyncRead for Connection {
             return Poll::Ready(Ok(()));
         }
         let before = buffer.filled().len();
-        let read = Pin::new(&mut self.stream).poll_read(cx, buffer);
-        if let Some(preface) = &mut self.preface {
-            preface.missing = preface.missing.saturating_sub(buffer.filled().len() - before);
-            if preface.missing == 0 {
-                self.preface = None;
+        let this = &mut *self;
+        let read = this.poll_read_within_limits(cx, buffer);
+        if let Some(preface) = &mut this.preface {
+            if Self::note_first_bytes(preface, &mut this.headers, &buffer.filled()[before..]) {
+                this.preface = None;
             } else if preface.deadline.as_mut().poll(cx).is_ready() {
                 return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
             }
@@ -145,7 +206,7 @@ impl AsyncWrite for Connection {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
+    use std::{sync::Arc, time::Duration};
 
     use tokio::{
         io::{AsyncReadExt as _, AsyncWriteExt as _},
@@ -156,8 +217,16 @@ mod tests {
     use super::*;
     use crate::net::unread::UnreadAnswers;
 
+    /// Longer than what is read at once, and no multiple of it.
+    const LARGEST_HEADERS: usize = 2 * HEADERS_READ + 7;
+
     /// A client's end, and the server's end of the same connection.
-    async fn connected(close: CancellationToken, preface_time: Duration) -> (TcpStream, Connection) {
+    async fn connected(close: CancellationToken, preface: Duration) -> (TcpStream, Connection) {
+        let limits = AcceptLimits {
+            connections: 1,
+            preface,
+            headers: LARGEST_HEADERS,
+        };
         let reader = UnreadAnswers::new(usize::MAX).connect();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
@@ -165,7 +234,7 @@ mod tests {
         let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
         (
             client,
-            Connection::new(stream, place, reader, close, preface_time),
+            Connection::new(stream, place, reader, close, limits),
         )
     }
 
@@ -186,8 +255,8 @@ mod tests {
     async fn after_the_preface_reading_lasts_until_close() {
         let close = CancellationToken::new();
         let (mut client, mut connection) = connected(close.clone(), Duration::from_millis(20)).await;
-        client.write_all(&[b'x'; PREFACE_BYTES]).await.unwrap();
-        connection.read_exact(&mut [0; PREFACE_BYTES]).await.unwrap();
+        client.write_all(PREFACE).await.unwrap();
+        connection.read_exact(&mut [0; PREFACE.len()]).await.unwrap();
         let reading = tokio::spawn(async move { connection.read_to_end(&mut Vec::new()).await });
         // Longer than the limit for the preface.
         tokio::time::sleep(Duration::from_millis(60)).await;
@@ -195,5 +264,46 @@ mod tests {
         close.cancel();
         assert_eq!(reading.await.unwrap().unwrap(), 0);
         drop(client);
+    }
+
+    #[tokio::test]
+    async fn headers_of_http_1_are_bounded_and_bodies_are_not() {
+        let (mut client, mut connection) =
+            connected(CancellationToken::new(), Duration::from_secs(5)).await;
+        let reader = Arc::clone(&connection.reader);
+        let sending = tokio::spawn(async move {
+            // More than is read before reading fails.
+            let _ = client.write_all(&vec![b'P'; 20 * LARGEST_HEADERS]).await;
+            client
+        });
+        connection.read_exact(&mut [0; 1000]).await.unwrap();
+        // A request with headers of 1000 bytes and a long body.
+        let answering = reader.answering();
+        let mut body = vec![0; 5 * LARGEST_HEADERS];
+        connection.read_exact(&mut body).await.unwrap();
+        // Its answer has ended; the rest is headers of the next one.
+        drop(answering);
+        let mut read = Vec::new();
+        let error = connection.read_to_end(&mut read).await.unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+        assert!(read.len() <= LARGEST_HEADERS, "{} bytes", read.len());
+        // So it is if another request was answered meanwhile, but for its own headers.
+        drop(reader.answering());
+        let mut next = vec![0; LARGEST_HEADERS];
+        connection.read_exact(&mut next).await.unwrap();
+        let error = connection.read_exact(&mut [0; 1]).await.unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+        drop(sending);
+    }
+
+    #[tokio::test]
+    async fn http_2_is_not_taken_for_headers() {
+        let (mut client, mut connection) =
+            connected(CancellationToken::new(), Duration::from_secs(5)).await;
+        let sent = [&PREFACE[..], &vec![0; 3 * LARGEST_HEADERS]].concat();
+        let received = sent.len();
+        let sending = tokio::spawn(async move { client.write_all(&sent).await.map(|()| client) });
+        connection.read_exact(&mut vec![0; received]).await.unwrap();
+        sending.await.unwrap().unwrap();
     }
 }

@@ -6,6 +6,6 @@ mod connection;
 mod unread;
 
 pub(crate) use accept::{AcceptLimits, accept};
-pub(crate) use answers::UnreadLayer;
+pub(crate) use answers::{AdmitLayer, UnreadLayer};
 pub(crate) use connection::{Connection, ConnectionInfo};
 pub(crate) use unread::UnreadAnswers;

@@ -52,8 +52,22 @@ pub(crate) struct Reader {
     unread: AtomicUsize,
     /// When the client last took a chunk or the first one began to wait, in milliseconds since the start.
     progress: AtomicU64,
+    /// Requests whose headers have been read.
+    requests: AtomicU64,
+    /// Requests that have not been answered to the end.
+    answering: AtomicUsize,
     /// Cut off to close the connection.
     cut_off: CancellationToken,
+}
+
+/// A request that is not answered to the end until this is dropped.
+#[derive(Debug)]
+pub(super) struct Answering(Arc<Reader>);
+
+impl Drop for Answering {
+    fn drop(&mut self) {
+        self.0.answering.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 impl UnreadAnswers {
@@ -78,6 +92,8 @@ impl UnreadAnswers {
             all: Arc::clone(self),
             unread: AtomicUsize::new(0),
             progress: AtomicU64::new(0),
+            requests: AtomicU64::new(0),
+            answering: AtomicUsize::new(0),
             cut_off: CancellationToken::new(),
         });
         let mut readers = self.readers();
@@ -152,6 +168,23 @@ impl Reader {
             maximum: MOST_PER_CONNECTION,
             retry_after: RETRY_AFTER,
         })
+    }
+
+    /// Counts a request whose headers have been read.
+    pub(super) fn answering(self: &Arc<Self>) -> Answering {
+        self.requests.fetch_add(1, Ordering::Relaxed);
+        self.answering.fetch_add(1, Ordering::Relaxed);
+        Answering(Arc::clone(self))
+    }
+
+    /// The number of requests whose headers have been read.
+    pub(super) fn requests(&self) -> u64 {
+        self.requests.load(Ordering::Relaxed)
+    }
+
+    /// True if no request is being answered: on a connection that answers one at a time, what is read is headers.
+    pub(super) fn awaits_headers(&self) -> bool {
+        self.answering.load(Ordering::Relaxed) == 0
     }
 
     /// Ends when the connection is to be closed at once.

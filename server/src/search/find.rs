@@ -24,9 +24,9 @@ const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 
 /// A search on the executor, as the call that waits for it sees it.
 #[derive(Debug, Default)]
-struct RunningSearch {
+pub(super) struct RunningSearch {
     /// Set when the search starts.
-    job: SetOnce<Arc<PreparedJob>>,
+    pub(super) job: SetOnce<Arc<PreparedJob>>,
     progress: Progress,
 }
 
@@ -41,27 +41,33 @@ pub(crate) async fn find(
     executor: &SearchExecutor,
     admission: Admission,
 ) -> Result<Answered, ServiceError> {
-    let overdue = job.has_deadline.then(|| job.due() + OVERDUE_AFTER);
+    let overdue = overdue(&job);
+    let running = Arc::default();
     // Boxed: jobs of some kilobytes would make the futures of all calls large.
     if !job.is_quick_if_known() {
         let job = Box::new(job);
-        return search(move || job.prepare().map(Arc::new), overdue, executor, admission).await;
+        return search(running, move || job.prepare().map(Arc::new), overdue, executor, admission).await;
     }
     let mut job = Box::new(job.prepare()?);
     match job.look_up() {
         Some(answered) => answered,
-        None => search(move || Ok(Arc::from(job)), overdue, executor, admission).await,
+        None => search(running, move || Ok(Arc::from(job)), overdue, executor, admission).await,
     }
 }
 
+/// When the call of a job is answered without its end, if ever.
+pub(super) fn overdue(job: &FindJob) -> Option<Instant> {
+    job.has_deadline.then(|| job.due() + OVERDUE_AFTER)
+}
+
 /// Searches on the executor, and waits for the end or until the search is overdue.
-async fn search(
+pub(super) async fn search(
+    running: Arc<RunningSearch>,
     prepare: impl FnOnce() -> Result<Arc<PreparedJob>, ServiceError> + Send + 'static,
     overdue: Option<Instant>,
     executor: &SearchExecutor,
     admission: Admission,
 ) -> Result<Answered, ServiceError> {
-    let running = Arc::new(RunningSearch::default());
     let end = {
         let running = Arc::clone(&running);
         executor.run(admission, move |pool, stop| {

@@ -80,11 +80,11 @@ pub(crate) struct Answered {
 
 /// One hand's search, ready to be run.
 #[derive(Debug)]
-struct HandSearch {
-    hand: RigHand,
+pub(super) struct HandSearch {
+    pub(super) hand: RigHand,
     /// The holdout, with the arm of this hand.
-    holdout: Holdout,
-    settings: SearchSettings,
+    pub(super) holdout: Holdout,
+    pub(super) settings: SearchSettings,
     /// Names of the preferred grips in the settings.
     preferred: Vec<String>,
 }
@@ -92,12 +92,12 @@ struct HandSearch {
 /// A job whose holdouts and settings are ready to be searched.
 #[derive(Debug)]
 pub(super) struct PreparedJob {
-    query: FindQuery,
-    derived: Arc<Derived>,
+    pub(super) query: FindQuery,
+    pub(super) derived: Arc<Derived>,
     /// The receiving hand's search and, if the request leaves the choice, the other hand's.
-    hands: Vec<HandSearch>,
+    pub(super) hands: Vec<HandSearch>,
     clock: SinceArrival,
-    start: Instant,
+    pub(super) start: Instant,
     budget: Duration,
     patience: Duration,
     /// Why the standing grasp fell, once that is known.
@@ -233,6 +233,7 @@ impl FindJob {
                 workers: self.workers,
                 record_step_times: query.record_step_times,
                 mechanisms: self.mechanisms,
+                observer: None,
             },
         }
     }
@@ -437,14 +438,12 @@ impl PreparedJob {
         } = ended_search;
         let HandSearch {
             hand,
-            holdout,
             settings,
             preferred,
+            ..
         } = &self.hands[place];
-        if let (true, Some(grasp)) = (self.query.plan_key_frames, &mut outcome.grasp) {
-            let approach = settings.query.constraints.approach;
-            let friction = settings.query.friction_on(&holdout.object);
-            plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
+        if let Some(grasp) = &mut outcome.grasp {
+            self.plan_key_frames(place, grasp);
         }
         let frame = self.frame();
         let warnings: Vec<String> = self.warnings().cloned().collect();
@@ -476,6 +475,27 @@ impl PreparedJob {
             response.standing = Some(standing_report(&verdict, hand, frame));
         }
         Ok(Answered { response, ended })
+    }
+
+    /// Plans a grasp's key frames, if the request asks for them.
+    pub(super) fn plan_key_frames(&self, place: HandPlace, grasp: &mut Grasp) {
+        if !self.query.plan_key_frames {
+            return;
+        }
+        let HandSearch {
+            hand,
+            holdout,
+            settings,
+            ..
+        } = &self.hands[place];
+        let approach = settings.query.constraints.approach;
+        let friction = settings.query.friction_on(&holdout.object);
+        plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
+    }
+
+    /// When the search's clock started.
+    pub(super) fn arrived(&self) -> Instant {
+        self.clock.0
     }
 
     /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same.

@@ -10,8 +10,10 @@ mod judge;
 mod on_executor;
 mod progress;
 mod slices;
+mod stream;
 
 pub(crate) use evaluate::{EvaluateJob, evaluate};
 pub(crate) use find::find;
-pub(crate) use job::FindJob;
+pub(crate) use job::{Answered, FindJob};
 pub(crate) use judge::{JudgeJob, judge};
+pub(crate) use stream::{Found, Stream, Wanted};

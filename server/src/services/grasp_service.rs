@@ -10,11 +10,12 @@ use grasp_proto::v1::{self, grasp_service_server::GraspService};
 use grasp_synthesis::base::stop::Stop;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{Shared, streaming::Messages, tracks::TrackAnswers};
+use super::{Shared, packing::answer, streaming::Messages, tracks::TrackAnswers};
 use crate::{
     budget::effective_budget,
     call::{CallContext, SearchSummary},
     error::ServiceError,
+    executor::Admission,
     objects::{Derived, StoredObject, resized::ObjectSize, store::Need},
     search::{self, FindJob},
     validate::{FindQuery, RequestedSize, find_query},
@@ -51,18 +52,35 @@ impl GraspHandler {
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &self.shared;
-        call.log_object(&query.object_id);
-        let stored = shared.object(&query.object_id, call).await?.object;
-        // Held while the call lasts, so that the object is not evicted.
-        let _object = stored.hold();
-        let admission = shared.executor.admit()?;
-        let held_out = self.held_out(&stored, query.object_size, call).await?;
-        let job = self.job(query, &stored, held_out, call)?;
+        let Ready {
+            _held,
+            admission,
+            job,
+        } = self.ready(query, call).await?;
         call.search_is_due(job.due());
         let answered = search::find(job, &shared.executor, admission).await?;
         call.search_ended(answered.ended);
         call.log_search(summary(&answered.response));
         Ok(answered.response)
+    }
+
+    /// Admits a search and prepares what it needs.
+    ///
+    /// # Errors
+    /// There is no such object, the server is at its limit of searches, or the deadline leaves no time.
+    pub(super) async fn ready(&self, query: FindQuery, call: &CallContext) -> Result<Ready, ServiceError> {
+        let shared = &self.shared;
+        call.log_object(&query.object_id);
+        let stored = shared.object(&query.object_id, call).await?.object;
+        let held = stored.hold();
+        let admission = shared.executor.admit()?;
+        let held_out = self.held_out(&stored, query.object_size, call).await?;
+        let job = self.job(query, &stored, held_out, call)?;
+        Ok(Ready {
+            _held: held,
+            admission,
+            job,
+        })
     }
 
     /// The object as the request holds it out.
@@ -156,6 +174,16 @@ impl GraspHandler {
     }
 }
 
+/// A search that may run.
+pub(super) struct Ready {
+    /// Held while the call lasts, so that the object is not evicted.
+    pub(super) _held: Arc<()>,
+    /// The right to run it.
+    pub(super) admission: Admission,
+    /// The search.
+    pub(super) job: FindJob,
+}
+
 /// An object as a request holds it out.
 pub(super) struct HeldOut {
     /// The object at its size.
@@ -175,7 +203,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::FindGraspRequest>,
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.find(request.into_inner(), &call).await?))
+        Ok(answer(self.find(request.into_inner(), &call).await?))
     }
 
     type StreamGraspsStream = Messages<v1::StreamGraspsResponse>;
@@ -212,7 +240,7 @@ impl GraspService for GraspHandler {
         &self,
         request: Request<v1::PushFrameRequest>,
     ) -> Result<Response<v1::PushFrameResponse>, Status> {
-        Ok(Response::new(self.push(request.into_inner())?))
+        Ok(answer(self.push(request.into_inner())?))
     }
 
     async fn validate_grasp(
@@ -220,7 +248,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::ValidateGraspRequest>,
     ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.validate(request.into_inner(), &call).await?))
+        Ok(answer(self.validate(request.into_inner(), &call).await?))
     }
 
     async fn evaluate_holdout(
@@ -228,7 +256,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::EvaluateHoldoutRequest>,
     ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.evaluate(request.into_inner(), &call).await?))
+        Ok(answer(self.evaluate(request.into_inner(), &call).await?))
     }
 }
 
@@ -238,7 +266,8 @@ fn drawn_seed() -> u64 {
     RandomState::new().hash_one(0_u8)
 }
 
-fn summary(answer: &v1::FindGraspResponse) -> SearchSummary {
+/// A search as it is logged.
+pub(super) fn summary(answer: &v1::FindGraspResponse) -> SearchSummary {
     let report = answer.report.as_ref();
     let time = report
         .and_then(|report| report.search_time)

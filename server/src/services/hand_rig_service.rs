@@ -7,6 +7,7 @@ use tonic::{Request, Response, Status};
 
 use super::{
     Shared,
+    packing::answer,
     rig_builder::{build_rig, prepare_rig},
     rig_message::rig_message,
 };
@@ -99,14 +100,14 @@ impl HandRigService for HandRigHandler {
         &self,
         request: Request<v1::ListRigsRequest>,
     ) -> Result<Response<v1::ListRigsResponse>, Status> {
-        Ok(Response::new(self.list(request.get_ref())?))
+        Ok(answer(self.list(request.get_ref())?))
     }
 
     async fn get_rig(
         &self,
         request: Request<v1::GetRigRequest>,
     ) -> Result<Response<v1::GetRigResponse>, Status> {
-        Ok(Response::new(self.get(&request.get_ref().name)?))
+        Ok(answer(self.get(&request.get_ref().name)?))
     }
 
     async fn create_rig(
@@ -114,13 +115,13 @@ impl HandRigService for HandRigHandler {
         mut request: Request<v1::CreateRigRequest>,
     ) -> Result<Response<v1::CreateRigResponse>, Status> {
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(self.create(request.into_inner(), permit).await?))
+        Ok(answer(self.create(request.into_inner(), permit).await?))
     }
 
     async fn delete_rig(
         &self,
         request: Request<v1::DeleteRigRequest>,
     ) -> Result<Response<v1::DeleteRigResponse>, Status> {
-        Ok(Response::new(self.delete(&request.get_ref().name).await?))
+        Ok(answer(self.delete(&request.get_ref().name).await?))
     }
 }

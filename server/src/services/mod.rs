@@ -5,6 +5,7 @@ mod grasp_service;
 mod hand_rig_service;
 mod object_service;
 mod object_streams;
+mod packing;
 mod rig_builder;
 mod rig_message;
 mod stream_grasps;

@@ -8,7 +8,7 @@ use grasp_synthesis::{base::stop::Stop, model::hand::Handedness};
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{Shared, streaming::Messages};
+use super::{Shared, packing::answer, streaming::Messages};
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
@@ -294,7 +294,7 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::CreateObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(
+        Ok(answer(
             self.create(request.into_inner(), permit, &call).await?,
         ))
     }
@@ -304,14 +304,14 @@ impl ObjectService for ObjectHandler {
         request: Request<v1::GetObjectRequest>,
     ) -> Result<Response<v1::GetObjectResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.get(&request.get_ref().name, &call).await?))
+        Ok(answer(self.get(&request.get_ref().name, &call).await?))
     }
 
     async fn list_objects(
         &self,
         request: Request<v1::ListObjectsRequest>,
     ) -> Result<Response<v1::ListObjectsResponse>, Status> {
-        Ok(Response::new(self.list(request.get_ref())?))
+        Ok(answer(self.list(request.get_ref())?))
     }
 
     async fn update_object(
@@ -320,7 +320,7 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::UpdateObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(
+        Ok(answer(
             self.update(request.into_inner(), permit, &call).await?,
         ))
     }
@@ -330,7 +330,7 @@ impl ObjectService for ObjectHandler {
         request: Request<v1::DeleteObjectRequest>,
     ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.delete(request.into_inner(), &call).await?))
+        Ok(answer(self.delete(request.into_inner(), &call).await?))
     }
 
     async fn upload_object(
@@ -339,7 +339,7 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::UploadObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(
+        Ok(answer(
             self.upload(request.into_inner(), permit, &call).await?,
         ))
     }

@@ -1,18 +1,133 @@
 //! `GraspService.StreamGrasps`.
 
-use grasp_proto::v1;
+use std::{sync::Arc, time::Duration};
 
-use super::GraspHandler;
-use super::streaming::Messages;
-use crate::call::CallContext;
-use tonic::Status;
+use grasp_proto::v1::{self, stream_grasps_response::Event};
+use tokio::time::Instant;
+
+use super::{
+    GraspHandler,
+    grasp_service::{Ready, summary},
+    streaming::{MessageSender, Messages, endless_messages},
+};
+use crate::{
+    call::CallContext,
+    error::ServiceError,
+    search::{Answered, Found, Stream, Wanted},
+    validate::{Sent, StreamQuery, stream_query},
+};
+
+/// Where the grasps of a stream go.
+struct Sending<'a> {
+    stream: &'a Stream,
+    sender: MessageSender<v1::StreamGraspsResponse>,
+    sent: u32,
+}
 
 impl GraspHandler {
+    /// Searches as long as the stream is read, and sends what is found.
+    ///
+    /// # Errors
+    /// Those of a search that cannot start. What goes wrong later is the status at the end of the stream.
     pub(super) async fn stream(
         &self,
-        _request: v1::StreamGraspsRequest,
-        _call: &CallContext,
-    ) -> Result<Messages<v1::StreamGraspsResponse>, Status> {
-        Err(Status::unimplemented("StreamGrasps"))
+        request: v1::StreamGraspsRequest,
+        call: &CallContext,
+    ) -> Result<Messages<v1::StreamGraspsResponse>, ServiceError> {
+        let shared = &self.shared;
+        let StreamQuery { find, sent } =
+            stream_query(request, (&shared.default_rig, &shared.rigs), |id| {
+                shared.objects.contains(id)
+            })?;
+        let ready = self.ready(find, call).await?;
+        let (shared, call) = (Arc::clone(shared), call.clone());
+        Ok(endless_messages(shared.shutdown.clone(), |sender| async move {
+            let Ready {
+                admission,
+                job,
+                _held,
+                ..
+            } = ready;
+            let stream = Stream::new(match sent {
+                Sent::Better { .. } => Wanted::Better,
+                Sent::Alternatives { count, by } => Wanted::Alternatives { most: count, by },
+            });
+            let mut sending = Sending {
+                stream: &stream,
+                sender,
+                sent: 0,
+            };
+            let search = stream.run(job, &shared.executor, admission);
+            let answered = match sent {
+                Sent::Better { interval } => sending.better(search, interval).await?,
+                Sent::Alternatives { .. } => {
+                    let answered = search.await?;
+                    for found in stream.take_alternatives() {
+                        sending.send(found).await?;
+                    }
+                    answered
+                }
+            };
+            call.log_search(summary(&answered.response));
+            sending.end(answered).await
+        }))
+    }
+}
+
+impl Sending<'_> {
+    /// Sends each better grasp, but no two within the interval, until the search ends; then the best one.
+    async fn better(
+        &mut self,
+        search: impl Future<Output = Result<Answered, ServiceError>>,
+        interval: Duration,
+    ) -> Result<Answered, ServiceError> {
+        let mut search = std::pin::pin!(search);
+        let mut next = Instant::now();
+        let answered = loop {
+            let due = async {
+                self.stream.news().await;
+                tokio::time::sleep_until(next).await;
+            };
+            tokio::select! {
+                biased;
+                answered = &mut search => break answered?,
+                () = due => {}
+            }
+            if let Some(found) = self.stream.take_better() {
+                next = Instant::now() + interval;
+                self.send(found).await?;
+            }
+        };
+        if let Some(found) = self.stream.take_better() {
+            self.send(found).await?;
+        }
+        Ok(answered)
+    }
+
+    async fn send(&mut self, found: Found) -> Result<(), ServiceError> {
+        let message = self.stream.message(found).await?;
+        self.sent += 1;
+        self.event(Event::Grasp(message)).await
+    }
+
+    /// Sends the summary.
+    async fn end(self, answered: Answered) -> Result<(), ServiceError> {
+        let mut outcome = answered.response.outcome();
+        if self.sent > 0 {
+            // An answer that could not wait for the end of the search may know less than was sent.
+            outcome = v1::Outcome::Found;
+        }
+        self.event(Event::Summary(v1::StreamSummary {
+            outcome: outcome.into(),
+            report: answered.response.report,
+            sent: self.sent,
+            skipped: self.stream.skipped(),
+        }))
+        .await
+    }
+
+    async fn event(&self, event: Event) -> Result<(), ServiceError> {
+        let message = v1::StreamGraspsResponse { event: Some(event) };
+        self.sender.send(message).await
     }
 }

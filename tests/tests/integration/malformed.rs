@@ -14,6 +14,13 @@ async fn status_of(server: &TestServer, method: &str, body: Vec<u8>) -> Status {
     status_within(server, method, body, None).await
 }
 
+/// The same for a message that is said to be packed with gzip.
+pub(crate) async fn status_of_packed(server: &TestServer, method: &str, packed: &[u8]) -> Status {
+    let mut body = framed(packed);
+    body[0] = 1;
+    status_with(server, method, body, &[("grpc-encoding", "gzip")]).await
+}
+
 /// The same with a `grpc-timeout`, which this client does not enforce itself.
 pub(crate) async fn status_within(
     server: &TestServer,
@@ -21,14 +28,20 @@ pub(crate) async fn status_within(
     body: Vec<u8>,
     timeout: Option<&str>,
 ) -> Status {
+    let timeout = timeout.map(|timeout| ("grpc-timeout", timeout));
+    status_with(server, method, body, timeout.as_slice()).await
+}
+
+/// The same with further headers.
+async fn status_with(server: &TestServer, method: &str, body: Vec<u8>, headers: &[(&str, &str)]) -> Status {
     let stream = TcpStream::connect(server.address()).await.unwrap();
     let (sender, connection) = h2::client::handshake(stream).await.unwrap();
     let connection = tokio::spawn(connection);
     let mut request = Request::post(format!("{}/grasp.v1.{method}", server.endpoint()))
         .header("content-type", "application/grpc")
         .header("te", "trailers");
-    if let Some(timeout) = timeout {
-        request = request.header("grpc-timeout", timeout);
+    for &(name, value) in headers {
+        request = request.header(name, value);
     }
     let request = request.body(()).unwrap();
     let mut sender = sender.ready().await.unwrap();

@@ -3,6 +3,7 @@
 mod answer;
 mod constraints;
 mod receiver;
+mod stream;
 
 use std::{
     path::PathBuf,
@@ -15,6 +16,7 @@ use serde::Serialize;
 
 use constraints::ConstraintOptions;
 use receiver::ReceiverOptions;
+use stream::StreamOptions;
 
 use crate::{
     EXIT_CODES, Ending, blocking,
@@ -67,6 +69,10 @@ headset does not report is 0. Without a handedness, the receiving hand is the be
 a receiver may be {"client_shoulder": [0.2, 1.4, 1]}, or "receiver_stance" may be "facing_giver" or "any". Metres, radians, quaternions x y z w. Options on the command line override the file.
 --print-request prints the request instead of
 sending it, as a template.
+
+With --stream, a line comes for each grasp that is better than those before, until the budget ends; with --alternatives, the best ones that
+differ. --png and --glb then write a file of each grasp, with -1, -2 … before the extension. With --json, each is a line:
+{"grasp": {…}, "found_after_seconds": …, "source": …}, and last {"outcome": …, "report": {…}, "sent": …, "skipped": …}.
 
 With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
 "round_trip_seconds": …} with the fields of the API's FindGraspResponse, and "other_grasp" for both hands; durations are
@@ -170,6 +176,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     receiver: ReceiverOptions,
     #[command(flatten)]
+    stream: StreamOptions,
+    #[command(flatten)]
     server: ServerOptions,
 }
 
@@ -190,6 +198,15 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     // Reports a missing mesh before the search.
     let picture = arguments.picture(&request)?;
     let client = arguments.server.connect().await?;
+    if let Some(streamed) = arguments.stream.streamed() {
+        let drawing = picture.map(|picture| Drawing {
+            picture,
+            size: arguments.view_size,
+            png: arguments.png,
+            glb: arguments.glb,
+        });
+        return stream::run(&client, &request, &streamed, drawing, output).await;
+    }
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
     let timed = TimedAnswer {
@@ -199,8 +216,13 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     if let Some(picture) = picture
         && timed.answer.grasp.is_some()
     {
-        let picture = picture.with_hands(&timed.answer);
-        draw(picture, arguments.view_size, arguments.png, arguments.glb).await?;
+        let drawing = Drawing {
+            picture: picture.with_hands(&timed.answer),
+            size: arguments.view_size,
+            png: arguments.png,
+            glb: arguments.glb,
+        };
+        drawing.write().await?;
     }
     output.write(&timed, |timed| {
         answer::describe(&request, &timed.answer, timed.round_trip_seconds)
@@ -268,21 +290,33 @@ impl Arguments {
     }
 }
 
-/// Writes the requested files.
-async fn draw(
+/// A picture and the files that show it.
+#[derive(Clone)]
+struct Drawing {
     picture: Picture,
     size: ViewSize,
     png: Option<PathBuf>,
     glb: Option<PathBuf>,
-) -> Result<(), Failure> {
-    blocking(move || {
-        if let Some(path) = png {
-            write_file(&path, &picture.draw(size)?.to_png())?;
-        }
-        if let Some(path) = glb {
-            write_file(&path, &picture.to_glb()?)?;
-        }
-        Ok(())
-    })
-    .await
+}
+
+impl Drawing {
+    /// Writes the files.
+    async fn write(self) -> Result<(), Failure> {
+        let Self {
+            picture,
+            size,
+            png,
+            glb,
+        } = self;
+        blocking(move || {
+            if let Some(path) = png {
+                write_file(&path, &picture.draw(size)?.to_png())?;
+            }
+            if let Some(path) = glb {
+                write_file(&path, &picture.to_glb()?)?;
+            }
+            Ok(())
+        })
+        .await
+    }
 }

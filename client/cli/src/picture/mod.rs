@@ -49,6 +49,14 @@ impl Picture {
         }
     }
 
+    /// Adds a hand.
+    pub(crate) fn with_grasp(self, grasp: Grasp) -> Self {
+        Self {
+            grasp: Some(grasp),
+            ..self
+        }
+    }
+
     /// Two views side by side, each of this size.
     pub(crate) fn draw(&self, size: ViewSize) -> Result<Image, Failure> {
         Ok(self.scene()?.render(self.options(size)))

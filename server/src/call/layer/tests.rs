@@ -9,9 +9,9 @@ use super::*;
 
 /// A service that keeps every request and never answers.
 #[derive(Clone, Default)]
-struct Keeper(Arc<Mutex<Vec<Request<RequestBody<()>>>>>);
+struct Keeper(Arc<Mutex<Vec<Request<()>>>>);
 
-impl Service<Request<RequestBody<()>>> for Keeper {
+impl Service<Request<()>> for Keeper {
     type Response = Response<()>;
     type Error = Infallible;
     type Future = std::future::Pending<Result<Response<()>, Infallible>>;
@@ -20,7 +20,7 @@ impl Service<Request<RequestBody<()>>> for Keeper {
         Poll::Ready(Ok(()))
     }
 
-    fn call(&mut self, request: Request<RequestBody<()>>) -> Self::Future {
+    fn call(&mut self, request: Request<()>) -> Self::Future {
         self.0.lock().unwrap().push(request);
         std::future::pending()
     }
@@ -33,6 +33,7 @@ fn layer() -> CallLayer {
         uploads: Arc::new(Semaphore::new(1)),
         maximum_uploads: 1,
         reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
+        largest_upload: 1 << 20,
         longest_call: Duration::from_mins(1),
     }
 }
@@ -134,7 +135,7 @@ impl Body for Streamed {
 #[tokio::test]
 async fn a_call_lasts_until_its_body_ends() {
     let layer = layer();
-    let mut service = layer.layer(tower::service_fn(|_: Request<RequestBody<()>>| async {
+    let mut service = layer.layer(tower::service_fn(|_: Request<()>| async {
         let mut trailers = HeaderMap::new();
         trailers.insert("grpc-status", "14".parse().unwrap());
         let frames = vec![Frame::trailers(trailers), Frame::data(&b"message"[..])];

@@ -34,6 +34,16 @@ pub struct Region {
 pub struct Regions {
     preferred: Marked,
     avoided: Marked,
+    /// The single regions, in the order of the owner.
+    places: Vec<Place>,
+}
+
+/// Where one region is.
+#[derive(Clone, Debug, PartialEq)]
+struct Place {
+    /// Ascending.
+    triangles: Vec<u32>,
+    zones: Vec<Zone>,
 }
 
 /// How much the places of a surface count for one of the wishes.
@@ -57,8 +67,17 @@ impl Regions {
                 Wish::Prefer => &mut all.preferred,
             };
             marked.add(region, triangles);
+            all.places.push(Place::of(region));
         }
         all
+    }
+
+    /// The region, by its place among all, with most of the contacts, the first of several; none if all contacts are elsewhere.
+    pub fn with_most(&self, contacts: &[Contact]) -> Option<usize> {
+        let held = |place: &Place| contacts.iter().filter(|at| place.contains(at)).count();
+        let counts = self.places.iter().map(held).enumerate();
+        let most = counts.max_by_key(|&(index, count)| (count, std::cmp::Reverse(index)));
+        most.and_then(|(index, count)| (count > 0).then_some(index))
     }
 
     /// True if there are none.
@@ -72,6 +91,7 @@ impl Regions {
         Self {
             preferred: self.preferred.scaled(scale),
             avoided: self.avoided.scaled(scale),
+            places: self.places.iter().map(|place| place.scaled(scale)).collect(),
         }
     }
 
@@ -104,7 +124,36 @@ impl Regions {
 
     /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
-        self.preferred.bytes() + self.avoided.bytes()
+        let places: usize = self.places.iter().map(Place::bytes).sum();
+        self.preferred.bytes() + self.avoided.bytes() + places
+    }
+}
+
+impl Place {
+    fn of(region: &Region) -> Self {
+        let mut triangles = region.triangles.clone();
+        triangles.sort_unstable();
+        Self {
+            triangles,
+            zones: region.zones.clone(),
+        }
+    }
+
+    fn contains(&self, at: &Contact) -> bool {
+        self.triangles.binary_search(&at.triangle).is_ok()
+            || self.zones.iter().any(|zone| zone.contains(at.position))
+    }
+
+    fn scaled(&self, scale: f32) -> Self {
+        Self {
+            triangles: self.triangles.clone(),
+            zones: self.zones.iter().map(|zone| zone.scaled(scale)).collect(),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        let zones: usize = self.zones.iter().map(Zone::bytes).sum();
+        size_of_val(self.triangles.as_slice()) + zones
     }
 }
 

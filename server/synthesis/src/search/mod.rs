@@ -1,6 +1,7 @@
 //! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are
 //! stopped.
 
+pub mod alternatives;
 pub mod attempt;
 mod both_hands;
 pub mod evaluation;
@@ -8,6 +9,7 @@ pub mod key_frames;
 mod known_grips;
 pub mod limits;
 pub mod nearest;
+pub mod observer;
 pub mod physical_attempt;
 mod preference;
 mod race;

@@ -13,6 +13,7 @@ use super::{
     Replaceable, SearchEnd, SearchOutcome,
     attempt::{Attempt, AttemptEnd},
     known_grips::{KnownGrips, TryResult, grasp_value},
+    observer::FoundGrasp,
     report::{GraspSource, SearchReport},
     scene::Scene,
     settings::SearchSettings,
@@ -275,13 +276,16 @@ impl<'a> Race<'a> {
     /// choose is wanted.
     fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32, is_chosen: bool) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
+        let goes_on = self.show(source, &grasp, value);
         let is_reproducible = self.settings.run.reproducible;
         let winner = Winner { source, grasp, value };
         let mut winners = self.winners.lock().unwrap_or_else(PoisonError::into_inner);
         let rival = &mut winners.chosen;
         let is_preferred = match (self.settings.query.choice, source) {
             (_, GraspSource::Preferred(_)) => {
-                self.over.store(true, Ordering::Relaxed);
+                if !goes_on {
+                    self.over.store(true, Ordering::Relaxed);
+                }
                 rival.as_ref().is_none_or(|rival| !rival.source.is_preferred())
             }
             (Choice::BestWithinBudget, _) => rival
@@ -335,6 +339,24 @@ impl<'a> Race<'a> {
             Some(standing) if self.settings.query.choice == Choice::FirstValid => nearness(standing, grasp),
             _ => grasp_value(grasp),
         }
+    }
+
+    /// Shows a valid grasp to the observer. True if the race goes on even after a preferred grip.
+    fn show(&self, source: GraspSource, grasp: &Grasp, value: f32) -> bool {
+        let Some(observer) = &self.settings.run.observer else {
+            return false;
+        };
+        if observer.wants(grasp, source, value) {
+            let mut grasp = Box::new(grasp.clone());
+            self.scene.pose_arm(&mut grasp);
+            observer.keep(FoundGrasp {
+                grasp,
+                source,
+                value,
+                at: self.clock.now(),
+            });
+        }
+        observer.goes_on_after_preferred()
     }
 
     /// True if a grasp that a person would choose is preferred to one just before it.

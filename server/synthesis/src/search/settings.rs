@@ -16,6 +16,8 @@ use crate::{
     propose::prepared::PreparedRig,
 };
 
+use super::observer::GraspObserver;
+
 /// Default of [`Query::improvement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
 pub const IMPROVEMENT: Duration = Duration::from_millis(5);
 
@@ -126,6 +128,8 @@ pub struct Run {
     pub record_step_times: bool,
     /// The mechanisms that are on.
     pub mechanisms: Mechanisms,
+    /// Sees every valid grasp as it is found.
+    pub observer: Option<Arc<dyn GraspObserver>>,
 }
 
 impl Default for Run {
@@ -139,6 +143,7 @@ impl Default for Run {
             workers: 1,
             record_step_times: false,
             mechanisms: Mechanisms::ALL,
+            observer: None,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Whole searches: the race, how it stops, look-ups of known grips, and the key frames of what is found.
 
+mod alternatives;
 mod barriers;
 mod both_hands;
 mod built_in_holdouts;

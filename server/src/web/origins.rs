@@ -1,0 +1,208 @@
+//! The origins of pages that may call.
+
+use std::fmt;
+
+/// What `web_origins` has to be.
+pub(crate) const NEEDED_ORIGINS: &str =
+    "none, *, or a list of loopback and origins such as https://game.example, separated by commas";
+
+/// The hosts of pages that come from the reader's own machine.
+const LOOPBACK_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "[::1]"];
+
+/// The origins of pages that may call; without any, browsers are not served at all.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WebOrigins {
+    /// Every page.
+    Any,
+    /// Some pages.
+    Some {
+        /// Pages of the reader's own machine, with any port.
+        loopback: bool,
+        /// Further origins, in lower case.
+        others: Vec<String>,
+    },
+}
+
+impl WebOrigins {
+    /// No page.
+    pub const NONE: Self = Self::Some {
+        loopback: false,
+        others: Vec::new(),
+    };
+
+    /// Pages of the reader's own machine.
+    pub const LOOPBACK: Self = Self::Some {
+        loopback: true,
+        others: Vec::new(),
+    };
+
+    /// True if a page of this origin, in the form of the header `Origin`, may call.
+    pub fn allow(&self, origin: &str) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Some { loopback, others } => {
+                let origin = origin.to_ascii_lowercase();
+                (*loopback && is_loopback(&origin)) || others.contains(&origin)
+            }
+        }
+    }
+}
+
+impl fmt::Display for WebOrigins {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Any => f.write_str("*"),
+            Self::Some { loopback, others } => {
+                let loopback = loopback.then_some("loopback");
+                let all: Vec<&str> = loopback
+                    .into_iter()
+                    .chain(others.iter().map(String::as_str))
+                    .collect();
+                f.write_str(if all.is_empty() { "none" } else { "" })?;
+                f.write_str(&all.join(","))
+            }
+        }
+    }
+}
+
+/// The origins of a value of the configuration.
+pub(crate) fn parse_origins(text: &str) -> Option<WebOrigins> {
+    match text.trim() {
+        "none" => return Some(WebOrigins::NONE),
+        "*" => return Some(WebOrigins::Any),
+        _ => {}
+    }
+    let (mut loopback, mut others) = (false, Vec::new());
+    for entry in text.split(',').map(|entry| entry.trim().to_ascii_lowercase()) {
+        if entry == "loopback" {
+            loopback = true;
+        } else if is_origin(&entry) {
+            others.push(entry);
+        } else {
+            return None;
+        }
+    }
+    Some(WebOrigins::Some { loopback, others })
+}
+
+/// True for `scheme://host` and `scheme://host:port` in lower case: what browsers send (RFC 6454, 6.2). Extensions have schemes
+/// of their own.
+fn is_origin(text: &str) -> bool {
+    let Some((scheme, authority)) = text.split_once("://") else {
+        return false;
+    };
+    let of_scheme = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
+    let of_authority = |c: char| c.is_ascii_alphanumeric() || "-._[]:".contains(c);
+    scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+        && scheme.chars().all(of_scheme)
+        && !host(authority).is_empty()
+        && authority.chars().all(of_authority)
+}
+
+fn is_loopback(origin: &str) -> bool {
+    let authority = ["http://", "https://"]
+        .iter()
+        .find_map(|scheme| origin.strip_prefix(scheme));
+    authority.is_some_and(|authority| LOOPBACK_HOSTS.contains(&host(authority)))
+}
+
+/// The host of an authority, without its port.
+fn host(authority: &str) -> &str {
+    match authority.rsplit_once(':') {
+        Some((host, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => host,
+        _ => authority,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loopback_pages_are_those_of_the_own_machine_with_any_port() {
+        let origins = WebOrigins::LOOPBACK;
+        for own in [
+            "http://localhost",
+            "http://localhost:5173",
+            "https://LOCALHOST:8443",
+            "http://127.0.0.1:80",
+            "https://[::1]",
+            "http://[::1]:3000",
+        ] {
+            assert!(origins.allow(own), "{own}");
+        }
+        for foreign in [
+            "null",
+            "",
+            "localhost",
+            "http://localhost.evil.example",
+            "http://evil.example:80",
+            "http://127.0.0.1.evil.example",
+            "http://localhost:80:evil",
+            "http://localhost:80@evil.example",
+            "http://[::1].evil.example",
+            "ftp://localhost",
+            "http://127.0.0.2",
+        ] {
+            assert!(!origins.allow(foreign), "{foreign}");
+        }
+    }
+
+    #[test]
+    fn listed_origins_are_allowed_exactly() {
+        let origins = parse_origins("https://Game.example, http://10.0.0.7:8080").unwrap();
+        assert!(origins.allow("https://game.example") && origins.allow("http://10.0.0.7:8080"));
+        for foreign in [
+            "http://game.example",
+            "https://game.example:444",
+            "https://a.game.example",
+            "http://10.0.0.7",
+            "http://localhost",
+        ] {
+            assert!(!origins.allow(foreign), "{foreign}");
+        }
+        let with_loopback = parse_origins("loopback,https://game.example").unwrap();
+        assert!(with_loopback.allow("http://localhost:1") && with_loopback.allow("https://game.example"));
+    }
+
+    #[test]
+    fn everything_and_nothing_can_be_allowed() {
+        assert!(parse_origins("*").unwrap().allow("https://anything.example"));
+        let none = parse_origins("none").unwrap();
+        assert_eq!(none, WebOrigins::NONE);
+        assert!(!none.allow("http://localhost"));
+    }
+
+    #[test]
+    fn values_can_be_printed_and_read_again() {
+        for text in [
+            "none",
+            "*",
+            "loopback",
+            "https://a.example",
+            "loopback,https://a.example,moz-extension://0a-b",
+        ] {
+            assert_eq!(parse_origins(text).unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn what_is_no_origin_is_rejected() {
+        for wrong in [
+            "",
+            "game.example",
+            "https://",
+            "https://:80",
+            "https://a.example/",
+            "https://a.example/page",
+            "https://a.example,",
+            "*,https://a.example",
+            "none,loopback",
+            "https://a b",
+            "https://*.example",
+            "://a",
+        ] {
+            assert_eq!(parse_origins(wrong), None, "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,5 @@
+// Makes all calls from Node and prints what came of them.
+
+import { allCalls } from "./calls.mjs";
+
+console.log(JSON.stringify(await allCalls(process.argv[2], null)));

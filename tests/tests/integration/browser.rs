@@ -1,0 +1,158 @@
+//! A hand-made client of gRPC-Web over HTTP/1.1, as far as a browser's requests can be made by hand.
+
+use std::net::SocketAddr;
+
+use prost::Message;
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _},
+    net::TcpStream,
+};
+use tonic::{Code, Status};
+
+/// Bit of a frame's first byte that marks trailers.
+const TRAILERS: u8 = 0x80;
+
+/// An answer.
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) status: u16,
+    /// Names in lower case.
+    pub(crate) headers: Vec<(String, String)>,
+    pub(crate) body: Vec<u8>,
+}
+
+impl Answer {
+    /// The value of a header.
+    pub(crate) fn header(&self, name: &str) -> Option<&str> {
+        let header = self.headers.iter().find(|(known, _)| known == name);
+        header.map(|(_, value)| value.as_str())
+    }
+
+    /// The messages, and the status that follows them.
+    pub(crate) fn messages<M: Message + Default>(&self) -> (Vec<M>, Status) {
+        let mut messages = Vec::new();
+        let mut rest = self.body.as_slice();
+        let mut trailers: Vec<(String, String)> = self.headers.clone();
+        while let [flags, a, b, c, d, frame @ ..] = rest {
+            let (frame, after) = frame.split_at(u32::from_be_bytes([*a, *b, *c, *d]) as usize);
+            rest = after;
+            if flags & TRAILERS == 0 {
+                messages.push(M::decode(frame).expect("it is a message"));
+            } else {
+                trailers = fields(std::str::from_utf8(frame).expect("trailers are text"));
+            }
+        }
+        assert!(rest.is_empty(), "a frame is cut short: {rest:?}");
+        let mut headers = http::HeaderMap::new();
+        for (name, value) in trailers {
+            headers.insert(
+                http::HeaderName::from_bytes(name.as_bytes()).expect("it is a name"),
+                value.parse().expect("it is a value"),
+            );
+        }
+        let status = Status::from_header_map(&headers);
+        (
+            messages,
+            status.unwrap_or_else(|| Status::new(Code::Unknown, "no status")),
+        )
+    }
+}
+
+/// Lines of `name: value`.
+fn fields(text: &str) -> Vec<(String, String)> {
+    let pairs = text.lines().filter_map(|line| line.split_once(':'));
+    pairs
+        .map(|(name, value)| (name.trim().to_ascii_lowercase(), value.trim().to_owned()))
+        .collect()
+}
+
+/// A message in its frame.
+pub(crate) fn framed(message: &impl Message) -> Vec<u8> {
+    super::malformed::framed(&message.encode_to_vec())
+}
+
+/// Calls a method from a page of an origin, with further headers.
+pub(crate) async fn call(
+    address: SocketAddr,
+    method: &str,
+    headers: &[(&str, &str)],
+    body: Vec<u8>,
+) -> Answer {
+    let (mut stream, start) = request(address, "POST", &format!("/grasp.v1.{method}"), headers, &body).await;
+    // The server may answer before it has read all.
+    let _ = stream.write_all(&[start.into_bytes(), body].concat()).await;
+    answer(&mut stream).await
+}
+
+/// Asks whether a page of an origin may call.
+pub(crate) async fn preflight(address: SocketAddr, origin: &str) -> Answer {
+    let headers = [
+        ("origin", origin),
+        ("access-control-request-method", "POST"),
+        ("access-control-request-headers", "content-type,x-grpc-web,grpc-timeout"),
+    ];
+    let path = "/grasp.v1.GraspService/FindGrasp";
+    let (mut stream, start) = request(address, "OPTIONS", path, &headers, &[]).await;
+    stream.write_all(start.as_bytes()).await.expect("it is sent");
+    answer(&mut stream).await
+}
+
+/// A connection, and the start of a request with a body.
+async fn request(
+    address: SocketAddr,
+    verb: &str,
+    path: &str,
+    headers: &[(&str, &str)],
+    body: &[u8],
+) -> (TcpStream, String) {
+    let stream = TcpStream::connect(address).await.expect("the server listens");
+    let mut start = format!(
+        "{verb} {path} HTTP/1.1\r\nhost: {address}\r\nconnection: close\r\ncontent-length: {}\r\n",
+        body.len()
+    );
+    if verb == "POST" && headers.iter().all(|(name, _)| *name != "content-type") {
+        start.push_str("content-type: application/grpc-web+proto\r\nx-grpc-web: 1\r\n");
+    }
+    for (name, value) in headers {
+        start.push_str(&format!("{name}: {value}\r\n"));
+    }
+    start.push_str("\r\n");
+    (stream, start)
+}
+
+/// Reads an answer to the end of the connection.
+pub(crate) async fn answer(stream: &mut TcpStream) -> Answer {
+    let mut all = Vec::new();
+    let ended = stream.read_to_end(&mut all).await;
+    let end = all.windows(4).position(|at| at == b"\r\n\r\n");
+    let end = end.unwrap_or_else(|| panic!("no headers in {} bytes, which ended with {ended:?}", all.len()));
+    let head = std::str::from_utf8(&all[..end]).expect("headers are text");
+    let (line, headers) = head.split_once("\r\n").unwrap_or((head, ""));
+    let status = line.split(' ').nth(1).and_then(|status| status.parse().ok());
+    let headers = fields(headers);
+    let is_chunked = headers
+        .iter()
+        .any(|(name, value)| name == "transfer-encoding" && value == "chunked");
+    let body = &all[end + 4..];
+    Answer {
+        status: status.unwrap_or_else(|| panic!("no status in {line}")),
+        headers,
+        body: if is_chunked { unchunked(body) } else { body.to_vec() },
+    }
+}
+
+/// The content of chunks (RFC 9112, 7.1).
+fn unchunked(mut rest: &[u8]) -> Vec<u8> {
+    let mut content = Vec::new();
+    while let Some(end) = rest.windows(2).position(|at| at == b"\r\n") {
+        let length = std::str::from_utf8(&rest[..end]).expect("lengths are text");
+        let length = usize::from_str_radix(length, 16).expect("a length is hexadecimal");
+        let chunk = &rest[end + 2..];
+        if length == 0 {
+            break;
+        }
+        content.extend(&chunk[..length]);
+        rest = &chunk[length + 2..];
+    }
+    content
+}

@@ -1,0 +1,141 @@
+//! Messages packed with gzip, in both directions.
+
+use grasp_proto::v1;
+use grasp_tests::TestServer;
+use prost::Message as _;
+use tonic::{Code, codec::CompressionEncoding::Gzip};
+
+use crate::{
+    browser::{call, framed},
+    fixtures::{box_request, floating_remote, milliseconds, reason},
+};
+
+/// Answers from which the server packs, in bytes.
+const PACKED_FROM: usize = 14 << 10;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn packed_requests_are_understood() {
+    let server = TestServer::start().await;
+    let mut plain = server.grasps().await;
+    let mut packing = server.grasps().await.send_compressed(Gzip);
+    let request = v1::FindGraspRequest {
+        reproducible: true,
+        ..floating_remote()
+    };
+    let packed = packing.find_grasp(request.clone()).await.unwrap();
+    let unpacked = plain.find_grasp(request).await.unwrap();
+    assert_eq!(packed.into_inner().grasp, unpacked.into_inner().grasp);
+    let mut objects = server.objects().await.send_compressed(Gzip);
+    let object = objects.create_object(box_request("crate")).await.unwrap();
+    assert_eq!(object.into_inner().object.unwrap().triangle_count, 12);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn large_answers_are_packed_for_clients_that_accept_it() {
+    let server = TestServer::start().await;
+    let get = || v1::GetMeshRequest {
+        name: "objects/remote".to_owned(),
+    };
+    let mut glb = Vec::new();
+    for accepts in [false, true] {
+        let mut objects = server.objects().await;
+        if accepts {
+            objects = objects.accept_compressed(Gzip);
+        }
+        let answer = objects.get_mesh(get()).await.unwrap();
+        let encoding = answer.metadata().get("grpc-encoding").cloned();
+        assert_eq!(encoding.is_some_and(|encoding| encoding == "gzip"), accepts);
+        let mut parts = answer.into_inner();
+        let mut pieces = Vec::new();
+        while let Some(part) = parts.message().await.unwrap() {
+            if let Some(v1::get_mesh_response::Part::Piece(piece)) = part.part {
+                pieces.extend(piece);
+            }
+        }
+        glb.push(pieces);
+    }
+    assert!(glb[0].len() > 1000 && glb[0] == glb[1]);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn streams_of_small_messages_are_not_packed() {
+    let server = TestServer::start().await;
+    let mut grasps = server.grasps().await.accept_compressed(Gzip);
+    let request = v1::StreamGraspsRequest {
+        holdout: Some(v1::FindGraspRequest {
+            budget: Some(milliseconds(50)),
+            ..floating_remote()
+        }),
+        ..Default::default()
+    };
+    let answer = grasps.stream_grasps(request).await.unwrap();
+    assert_eq!(answer.metadata().get("grpc-encoding"), None);
+    let mut stream = answer.into_inner();
+    let mut messages = 0;
+    while stream.message().await.unwrap().is_some() {
+        messages += 1;
+    }
+    assert!(messages >= 2);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_that_arrive_in_the_first_round_trip_are_not_packed() {
+    let server = TestServer::start().await;
+    let mut grasps = server.grasps().await;
+    for plan_key_frames in [false, true] {
+        let request = v1::FindGraspRequest {
+            plan_key_frames,
+            reproducible: true,
+            ..floating_remote()
+        };
+        let accepts = [("grpc-accept-encoding", "gzip")];
+        let body = framed(&request);
+        let answer = call(server.address(), "GraspService/FindGrasp", &accepts, body).await;
+        let unpacked = grasps.find_grasp(request).await.unwrap().into_inner().encoded_len();
+        // The times in the report differ by some bytes.
+        assert!(unpacked.abs_diff(PACKED_FROM) > 100, "{unpacked}");
+        let is_packed = answer.body[0] == 1;
+        assert_eq!(is_packed, unpacked >= PACKED_FROM, "{unpacked}");
+        if is_packed {
+            assert!(answer.body.len() < unpacked * 3 / 4, "{} of {unpacked}", answer.body.len());
+        }
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_large_only_when_unpacked_is_refused() {
+    let server = TestServer::start_with(|config| config.maximum_object_bytes = (1 << 20).try_into().unwrap()).await;
+    let mut objects = server.objects().await.send_compressed(Gzip);
+    let too_large = (Code::OutOfRange, "MESSAGE_TOO_LARGE".to_owned());
+    // 40 MB of one letter take 40 kB.
+    let bomb = v1::CreateObjectRequest {
+        mesh: vec![b'\n'; 40_000_000],
+        ..box_request("bomb")
+    };
+    let status = objects.create_object(bomb).await.unwrap_err();
+    assert_eq!((status.code(), reason(&status)), too_large);
+    // The bound of a method that takes no mesh is its own, though the packed message is smaller than that.
+    let get = v1::GetObjectRequest {
+        name: "n".repeat(1 << 20),
+    };
+    let status = objects.get_object(get).await.unwrap_err();
+    assert_eq!((status.code(), reason(&status)), too_large);
+    let mut grasps = server.grasps().await.send_compressed(Gzip);
+    let find = v1::FindGraspRequest {
+        object: "n".repeat(1 << 20),
+        ..Default::default()
+    };
+    let status = grasps.find_grasp(find).await.unwrap_err();
+    assert_eq!((status.code(), reason(&status)), too_large);
+    // What is not packed as it says is the client's fault.
+    let status = crate::malformed::status_of_packed(&server, "ObjectService/GetObject", b"no gzip").await;
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::InvalidArgument, "MALFORMED_MESSAGE".to_owned())
+    );
+    server.stop().await;
+}
