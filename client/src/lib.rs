@@ -55,6 +55,7 @@ mod rig;
 mod rigs;
 mod score;
 mod search;
+mod standing;
 mod wire;
 
 pub use client::{GraspClient, GraspClientBuilder};
@@ -84,6 +85,9 @@ pub use score::{Score, ScoreTerm};
 pub use search::{
     Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
     PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
+};
+pub use standing::{
+    Fall, FallReason, HandAtObject, HandWay, NoGraspReason, StandingGrasp, StandingReport, StandingStatus,
 };
 
 /// The README's Rust example compiles.

@@ -14,6 +14,7 @@ mod receiver_codec;
 mod region_codec;
 mod rig_codec;
 mod search_codec;
+mod standing_codec;
 
 pub(crate) use object_codec::{health_from_wire, news_from_wire, object_from_wire, object_page_from_wire};
 pub(crate) use object_request_codec::{described_object_to_wire, new_object_to_wire, update_to_wire};

@@ -30,8 +30,8 @@ use grasp_synthesis::{
 };
 
 pub(crate) use self::names::wire_digit;
-pub(crate) use self::standing::standing_report;
 use self::names::{wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
+pub(crate) use self::standing::standing_report;
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
 
 /// The frame and convention in which a client gets its answer.

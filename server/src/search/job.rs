@@ -296,8 +296,7 @@ impl PreparedJob {
             stop,
             progress,
         };
-        let mut settings: Vec<SearchSettings> =
-            self.hands.iter().map(|hand| hand.settings.clone()).collect();
+        let mut settings: Vec<SearchSettings> = self.hands.iter().map(|hand| hand.settings.clone()).collect();
         if let Some(place) = self.standing_place()
             && self.fall.get().is_none()
         {

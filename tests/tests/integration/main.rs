@@ -44,6 +44,7 @@ mod reproducible;
 mod saved_objects;
 mod saved_rigs;
 mod shutdown;
+mod standing;
 mod tracked_hands;
 mod unread;
 mod uploads;

@@ -13,4 +13,5 @@ mod missing_fingers;
 mod preferences;
 mod race;
 mod refinement;
+mod standing;
 mod stopping;
